@@ -1,0 +1,98 @@
+// The Duffing spring with its foundation, integrated by SUNDIALS IDA as an implicit system F(t, Y, Ẏ) = 0.
+//     m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s        (Ahn & Tate, eq. (6)),      up is positive.
+// C comes from outside (contact_law external) or from the normal compliance C = λ_nc (y − u_tip)₊^p inside;
+// N comes from outside or, with the stop enabled, from Signorini's condition (8) with restitution.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace spring {
+
+enum class ContactLaw { external = 1, normal_compliance = 2 };
+
+/// SI units.
+struct Parameters {
+  double mass = 1.0;              ///< m [kg]
+  double damping = 0.0;           ///< α_s [N·s/m]
+  double linear_stiffness = 1.0;  ///< k1 [N/m]
+  double cubic_stiffness = 0.0;   ///< k2 [N/m³]
+  double equilibrium = 0.0;       ///< Ψ [m], where the top rests
+  double displacement = 0.0;      ///< y at the start [m]
+  double velocity = 0.0;          ///< ẏ at the start [m/s]
+  ContactLaw contact_law = ContactLaw::external;
+  double compliance_stiffness = 1.0e4;  ///< λ_nc [N/m^p]
+  double compliance_exponent = 3.0;     ///< p [–] ≥ 1
+  bool stop_enabled = false;
+  double stop_position = -1.0;  ///< φ [m]
+  double restitution = 1.0;     ///< e in [0, 1]
+  double relative_tolerance = 1e-12;
+  double absolute_tolerance = 1e-14;
+};
+
+/// Held or polynomial over one step; τ from its start.
+struct Inputs {
+  std::array<double, 3> contact_force{};     ///< C, Ċ, C̈ : C(τ) = c₀ + c₁τ + c₂τ²/2; positive presses the spring down
+  std::array<double, 3> foundation_force{};  ///< N, Ṅ, N̈ ≥ 0, upward; used when the stop inside is not enabled
+  double external_force = 0.0;               ///< f_s [N]
+  std::array<double, 3> tip_displacement{};  ///< u_tip and its derivatives; read by normal_compliance only
+  double tip_velocity = 0.0;                 ///< [m/s]; slope of u_tip when tip_displacement carries no derivative
+};
+
+/// The step could not be completed: the state is as before the step, `reached` tells how far it came.
+class StepFailure : public std::runtime_error {
+ public:
+  StepFailure(const std::string& what, double reached) : std::runtime_error(what), reached(reached) {}
+  double reached;  ///< [s] after the step's start
+};
+/// A softening spring (k1 > 0 > k2) beyond the hilltop |y| = √(k1/|k2|) of its potential.
+class Escape : public StepFailure {
+ public:
+  using StepFailure::StepFailure;
+};
+
+/// One spring. Every step starts IDA afresh, so a step repeated from the same saved state is bit-identical.
+class Spring {
+ public:
+  /// @throws std::invalid_argument naming the parameter, its value and what is allowed
+  explicit Spring(const Parameters& parameters);
+  ~Spring();
+  Spring(Spring&&) noexcept;
+  Spring& operator=(Spring&&) noexcept;
+
+  /// Advance by `size` [s] > 0.
+  /// @throws StepFailure, Escape (state unchanged)
+  void step(double size, const Inputs& inputs);
+
+  /// Instantaneous upward impulse J [N·s]: z += J/m.
+  void apply_impulse(double impulse);
+
+  double displacement() const;             ///< y [m]
+  double velocity() const;                 ///< z [m/s]
+  double acceleration() const;             ///< ż [m/s²] at the end of the last step, under its inputs
+  double displacement_integral() const;    ///< ∫ y dτ over the last step [m·s]
+  double displacement_integral_2() const;  ///< ∫∫ y dτ dτ over the last step [m·s²]
+  double reaction() const;                 ///< C of the law inside [N]; 0 for external
+  double stop_force() const;               ///< mean of N over the last step, law inside [N]
+  double stop_impulse() const;             ///< sum of stop impulses over the last step [N·s]
+  double kinetic_energy() const;           ///< ½ m z² [J]
+  double potential_energy() const;         ///< ½ k1 y² + ¼ k2 y⁴ [J]
+  double contact_energy() const;           ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
+  double dissipated_energy() const;        ///< ∫ α_s z² dt since the start, an integrated unknown [J]
+  bool seated() const;                     ///< held on the foundation by the law inside
+  long ida_steps() const;                  ///< internal IDA steps since the start
+
+  /// The whole dynamic state as a flat vector of fixed length.
+  void save(std::vector<double>& state) const;
+  /// @throws std::invalid_argument if the length does not fit; the state is then unchanged
+  void restore(const std::vector<double>& state);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace spring
