@@ -1,0 +1,283 @@
+"""The ``springbeam`` command. A command is a thin function: it reads its input, calls the library, prints.
+
+Exit codes: 0 done, 2 bad input, 3 the run stopped early (what was computed is on disk).
+Results go to stdout, progress and errors to stderr.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import metadata
+from itertools import islice
+from pathlib import Path
+from time import monotonic
+from typing import Annotated, Any, NoReturn
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from .recording import (
+    FileRecorder,
+    NonFiniteValue,
+    ResultsExist,
+    RunDirectory,
+    load_events,
+    load_summary,
+    load_trajectory,
+)
+from .scene import Scene, SceneError, load_scene, shipped_scenes
+from .trajectory import Event
+
+BAD_INPUT = 2
+STOPPED = 3
+
+_EVENTS_SHOWN = 12
+_REFRESH_SECONDS = 0.1
+
+app = typer.Typer(
+    help="A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    app()
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"springbeam {version()}")
+        raise typer.Exit
+
+
+def version() -> str:
+    """Version of the installed package."""
+    try:
+        return metadata.version("springbeam")
+    except metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+@app.callback()
+def _common(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
+def _complete_scene(incomplete: str) -> list[str]:
+    return [name for name in shipped_scenes() if name.startswith(incomplete)]
+
+
+@app.command()
+def run(
+    scene: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENE",
+            help="A scene file (.toml), or the name of a shipped scene (springbeam scenes lists them).",
+            autocompletion=_complete_scene,
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Where results go. Default: results/SCENE, or results/SCENE-2, …"
+        ),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="TABLE.KEY=VALUE", help="Change a value of the scene; may be repeated."),
+    ] = None,
+    no_plots: Annotated[bool, typer.Option("--no-plots", help="Do not draw pictures.")] = False,
+    force: Annotated[bool, typer.Option("--force", "-f", help="Replace results that are already there.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="No progress bar and no report; print only where the results are.")
+    ] = False,
+) -> None:
+    """Run a scene; write its results, events and pictures into a directory.
+
+    Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
+    """
+    with _bad_input_reported():
+        what = load_scene(scene, settings or ())
+        directory = _run_directory(scene, out, force)
+    console = Console(quiet=quiet, highlight=False)
+    error = _run_into(directory, what, quiet=quiet)
+    _report(console, directory, what)
+    if not no_plots:
+        from .plots import plot_run  # matplotlib takes a second to load
+
+        pictures = plot_run(load_trajectory(directory.path), directory.path)
+        console.print(Text(f"pictures  {', '.join(picture.name for picture in pictures)}"))
+    if quiet:
+        typer.echo(directory.path)
+    if error is not None:
+        _fail(STOPPED, f"{error}\nwhat was computed is in {directory.path}")
+
+
+@app.command()
+def scenes() -> None:
+    """List the scenes that come with the package."""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("scene", no_wrap=True)
+    table.add_column("contains", no_wrap=True)
+    table.add_column(Text("t_end [s]"), justify="right", no_wrap=True)
+    table.add_column("title")
+    with _bad_input_reported():
+        for name, path in shipped_scenes().items():
+            scene = load_scene(path)
+            parts = {"beam": scene.beam, "spring": scene.spring, "stop": scene.stop}
+            contents = ", ".join(part for part, there in parts.items() if there is not None)
+            table.add_row(name, contents, f"{scene.time.t_end:g}", Text(scene.title))
+    Console(highlight=False).print(table)
+
+
+@contextmanager
+def _bad_input_reported() -> Iterator[None]:
+    try:
+        yield
+    except ResultsExist as error:
+        _fail(BAD_INPUT, f"{error}; --force replaces them, --out DIR puts the new ones elsewhere")
+    except SceneError as error:
+        _fail(BAD_INPUT, str(error))
+    except OSError as error:
+        _fail(BAD_INPUT, f"{error.filename or 'results'}: {error.strerror or error}")
+
+
+def _fail(code: int, message: str) -> NoReturn:
+    typer.echo(f"error: {message}", err=True)
+    raise typer.Exit(code)
+
+
+def _run_directory(scene: str, out: Path | None, force: bool) -> RunDirectory:
+    default = Path("results") / Path(scene).stem
+    if out is None and not force:
+        return RunDirectory.create_numbered(default)
+    return RunDirectory.create(out or default, replace=force)
+
+
+def _run_into(directory: RunDirectory, scene: Scene, *, quiet: bool) -> str | None:
+    """Run ``scene``; returns why it stopped early, or ``None``. The results are closed and complete either way."""
+    from .runner import RunStopped
+    from .runner import run as run_scene
+
+    with FileRecorder(scene, directory) as recorder, _ProgressBar(scene.time.t_end, quiet=quiet) as progress:
+        try:
+            with _termination_as_interrupt():
+                run_scene(scene, recorder, progress)
+            return None
+        except RunStopped as stopped:
+            status, cause = "stopped", str(stopped)
+        except NonFiniteValue as error:
+            status, cause = "stopped", str(error)
+        except OSError as error:
+            status, cause = "stopped", f"{error.filename or directory.path}: {error.strerror or error}"
+        except KeyboardInterrupt:
+            status, cause = "interrupted", "interrupted"
+        reached = 0.0 if recorder.time is None else recorder.time
+        if not recorder.finished:
+            recorder.finish({"status": status, "cause": cause, "time": reached, "version": version()})
+    where = f"{cause} (reached t = {reached:.9g} s of {scene.time.t_end:g} s)"
+    return where if status == "interrupted" else f"the run stopped early: {where}"
+
+
+@contextmanager
+def _termination_as_interrupt() -> Iterator[None]:
+    """SIGTERM, which batch systems send, ends a run as Ctrl-C does: with its results on disk."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(*_: Any) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+class _ProgressBar:
+    """Simulated time, phase and speed on stderr, when that is a terminal."""
+
+    def __init__(self, t_end: float, *, quiet: bool) -> None:
+        console = Console(stderr=True)
+        self._bar = Progress(
+            BarColumn(bar_width=20),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[state]}"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+            disable=quiet or not console.is_terminal,
+        )
+        self._t_end = t_end
+        self._task = self._bar.add_task("", total=t_end, state="starting")
+        self._start = self._shown = monotonic()
+
+    def __enter__(self) -> _ProgressBar:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def __call__(self, time: float, phase: str, macro_steps: int) -> None:
+        now = monotonic()
+        if self._bar.disable or now - self._shown < _REFRESH_SECONDS:
+            return
+        self._shown = now
+        speed = macro_steps / (now - self._start)
+        state = f"t = {time:.4g}/{self._t_end:g} s  {phase:<7}{speed:7.0f} steps/s"
+        self._bar.update(self._task, completed=time, state=state)
+
+
+def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
+    summary = load_summary(directory.path)
+    console.print(Text(scene.title or "(untitled scene)", style="bold"))
+    events = load_events(directory.path)
+    shown = list(islice(events, _EVENTS_SHOWN))
+    more = sum(1 for _ in events)
+    if shown:
+        console.print(_event_table(shown, scene))
+    if more:
+        console.print(f"… and {more} more in {directory.events.name}")
+    if "macro_steps" in summary and "wall_time" in summary:
+        console.print(f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s")
+    if "max_energy_residual" in summary:
+        console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}")
+    for warning in summary.get("warnings", ()):
+        console.print(Text(f"warning   {warning}"))
+    console.print(Text(f"results   {directory.path}"))
+
+
+def _event_table(events: list[Event], scene: Scene) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    position = "y" if scene.spring is not None else "u_tip"
+    speed = "z" if scene.spring is not None else "v_tip"
+    table.add_column("event", no_wrap=True)
+    for heading in ("t [s]", f"{position} [m]", f"{speed} [m/s]", "J_contact", "J_stop [N·s]", "loss [J]"):
+        table.add_column(Text(heading), justify="right", no_wrap=True)
+    for event in events:
+        numbers = (getattr(event, position), getattr(event, speed))
+        table.add_row(
+            event.kind,
+            f"{event.time:.8f}",
+            *("" if number is None else f"{number:.5g}" for number in numbers),
+            *(f"{number:.4g}" if number else "" for number in (event.impulse_contact, event.impulse_foundation)),
+            f"{event.energy_loss:.3g}" if event.energy_loss else "",
+        )
+    return table

@@ -1,0 +1,522 @@
+"""Where a run's results go: into memory, or streamed into the files of a run directory.
+
+A run directory holds ``trajectory.csv`` (a row per accepted step), ``events.csv``, ``shapes.csv`` (the beam's
+deflection at `SHAPE_POINTS`), ``summary.json`` and pictures. Numbers are written as Python's ``repr``, the shortest
+text that reads back to the same double, so a file holds exactly what was computed. No file ever holds NaN or inf.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import count
+from math import isfinite
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+from typing import Any, Protocol, TextIO
+
+import numpy as np
+
+from .scene import Scene, scene_from_dict
+from .trajectory import COLUMNS, EVENT_COLUMNS, EVENT_KINDS, SHAPE_POINTS, Event, Trajectory
+
+#: Pictures `springbeam.plots.plot_run` may leave in a run directory.
+PICTURES = (
+    "a_shapes_after_contact.png",
+    "b_shapes_later.png",
+    "c_positions.png",
+    "d_velocities_and_forces.png",
+    "e_gap_and_energy.png",
+)
+
+_OF_BEAM = frozenset({"u_tip", "v_tip", "e_beam"})
+_OF_SPRING = frozenset({"y", "z", "e_spring"})
+_OF_PAIR = frozenset(
+    {"contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction", "velocity_mismatch", "e_contact"}
+)
+_SHAPE_HEADER = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
+_FLUSH_SECONDS = 1.0
+_PHASE_WIDTH = 32
+
+
+class ResultsExist(FileExistsError):
+    """The directory already holds results, which are never overwritten unasked."""
+
+
+class ResultsUnreadable(ValueError):
+    """A run directory cannot be read; the message names the file and, where known, the line."""
+
+
+class NonFiniteValue(ValueError):
+    """A NaN or an infinity was about to be recorded, in ``column`` at ``time`` [s]."""
+
+    def __init__(self, column: str, time: float, value: float) -> None:
+        super().__init__(f"{column} = {value} at t = {time!r} s: not a finite number")
+        self.column = column
+        self.time = time
+        self.value = value
+
+
+def columns_of(scene: Scene) -> tuple[str, ...]:
+    """The columns of ``scene`` in file order: `COLUMNS` without those of bodies that it does not have.
+
+    ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
+    """
+    beam, spring, stop = scene.beam is not None, scene.spring is not None, scene.stop is not None
+    absent: set[str] = set()
+    if not beam:
+        absent |= _OF_BEAM
+    if not spring:
+        absent |= _OF_SPRING
+    if not (beam and spring):
+        absent |= _OF_PAIR
+    if not stop:
+        absent.add("foundation_force")
+    if not (beam and (spring or stop)):
+        absent.add("gap")
+    return tuple(name for name in COLUMNS if name not in absent)
+
+
+class Recorder(Protocol):
+    """What a run reports to, in this order: any number of rows, events and shapes, then ``finish``."""
+
+    columns: tuple[str, ...]
+
+    def row(self, values: Mapping[str, Any] | Sequence[Any]) -> None:
+        """One accepted step: a value per column, by name (further names are ignored) or in column order.
+
+        Raises
+        ------
+        NonFiniteValue
+            If a number is NaN or infinite; nothing of the row is recorded then.
+        """
+
+    def event(self, event: Event) -> None: ...
+
+    def shape(self, time: float, deflection: np.ndarray) -> None:
+        """The beam's deflection [m] at `SHAPE_POINTS`, shape (21,)."""
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        """The last call; ``summary`` is JSON-like. The scene as run is added.
+
+        The command line reports ``status`` (``done``, ``stopped``, ``interrupted``), ``macro_steps``, ``wall_time``
+        [s], ``max_energy_residual`` (relative) and ``warnings`` (list of str), those that are there.
+        """
+
+
+class _Checks:
+    """What both recorders refuse."""
+
+    def __init__(self, scene: Scene, columns: Sequence[str] | None) -> None:
+        self.scene = scene
+        self.columns = columns_of(scene) if columns is None else tuple(columns)
+        self._phase_at = self.columns.index("phase") if "phase" in self.columns else -1
+        self._phases: set[str] = set()
+
+    def _checked_row(self, values: Mapping[str, Any] | Sequence[Any]) -> list[Any]:
+        if isinstance(values, Mapping):
+            try:
+                row = [values[name] for name in self.columns]
+            except KeyError as missing:
+                raise ValueError(f"row without column {missing}") from None
+        else:
+            row = list(values)
+            if len(row) != len(self.columns):
+                raise ValueError(f"row of {len(row)} values for {len(self.columns)} columns")
+        for i, value in enumerate(row):
+            if i == self._phase_at:
+                self._check_phase(value)
+            elif isfinite(value):
+                row[i] = float(value)
+            else:
+                raise NonFiniteValue(self.columns[i], float(row[0]), float(value))
+        return row
+
+    def _check_phase(self, phase: str) -> None:
+        if phase in self._phases:
+            return
+        if not phase.isprintable() or not 0 < len(phase) <= _PHASE_WIDTH or set(phase) & set(',"'):
+            raise ValueError(f"phase {phase!r} cannot be written to a file")
+        self._phases.add(phase)
+
+    @staticmethod
+    def _checked_event(event: Event) -> Event:
+        if event.kind not in EVENT_KINDS:
+            raise ValueError(f"event kind {event.kind!r}; allowed: {', '.join(EVENT_KINDS)}")
+        for name in EVENT_COLUMNS:
+            value = getattr(event, name)
+            if name != "kind" and value is not None and not isfinite(value):
+                raise NonFiniteValue(f"{name} of event {event.kind!r}", event.time, value)
+        return event
+
+    @staticmethod
+    def _checked_shape(time: float, deflection: np.ndarray) -> np.ndarray:
+        shape = np.asarray(deflection, dtype=float)
+        if shape.shape != SHAPE_POINTS.shape:
+            raise ValueError(f"shape of {shape.shape} values for {SHAPE_POINTS.shape} points")
+        finite = np.isfinite(shape)
+        if not finite.all():
+            worst = int(np.argmin(finite))
+            raise NonFiniteValue(f"u_{worst}", time, float(shape[worst]))
+        if not isfinite(time):
+            raise NonFiniteValue("time", time, time)
+        return shape
+
+
+class _Rows:
+    """Rows of doubles in an array that doubles when full."""
+
+    def __init__(self, width: int) -> None:
+        self._data = np.empty((256, width))
+        self._used = 0
+
+    def append(self, row: Sequence[float] | np.ndarray) -> None:
+        if self._used == len(self._data):
+            self._data = np.concatenate([self._data, np.empty_like(self._data)])
+        self._data[self._used] = row
+        self._used += 1
+
+    def column(self, index: int) -> np.ndarray:
+        return self._data[: self._used, index].copy()
+
+    def columns_from(self, index: int) -> np.ndarray:
+        return self._data[: self._used, index:].copy()
+
+
+class MemoryRecorder(_Checks):
+    """Keeps everything; `trajectory` is the result.
+
+    Parameters
+    ----------
+    scene
+        The scene as run.
+    columns
+        Names in row order, starting with ``time``; default `columns_of(scene)`.
+    """
+
+    def __init__(self, scene: Scene, columns: Sequence[str] | None = None) -> None:
+        super().__init__(scene, columns)
+        self._rows = _Rows(len(self.columns))
+        self._phase_of_row: list[str] = []
+        self._events: list[Event] = []
+        self._shapes = _Rows(len(_SHAPE_HEADER))
+        self._summary: dict[str, Any] = {}
+
+    def row(self, values: Mapping[str, Any] | Sequence[Any]) -> None:
+        row = self._checked_row(values)
+        if self._phase_at >= 0:
+            self._phase_of_row.append(row[self._phase_at])
+            row[self._phase_at] = 0.0
+        self._rows.append(row)
+
+    def event(self, event: Event) -> None:
+        self._events.append(self._checked_event(event))
+
+    def shape(self, time: float, deflection: np.ndarray) -> None:
+        shape = self._checked_shape(time, deflection)
+        self._shapes.append([time, *shape])
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        self._summary = _with_scene(summary, self.scene)
+
+    def trajectory(self) -> Trajectory:
+        """Everything recorded so far."""
+        columns = {
+            name: np.array(self._phase_of_row, dtype=str) if i == self._phase_at else self._rows.column(i)
+            for i, name in enumerate(self.columns)
+        }
+        shapes = None
+        if self.scene.beam is not None:
+            shapes = (self._shapes.column(0), self._shapes.columns_from(1))
+        return Trajectory(self.scene, columns, list(self._events), shapes, dict(self._summary))
+
+
+@dataclasses.dataclass(frozen=True)
+class RunDirectory:
+    """The files of one run."""
+
+    path: Path
+
+    @property
+    def trajectory(self) -> Path:
+        return self.path / "trajectory.csv"
+
+    @property
+    def events(self) -> Path:
+        return self.path / "events.csv"
+
+    @property
+    def shapes(self) -> Path:
+        return self.path / "shapes.csv"
+
+    @property
+    def summary(self) -> Path:
+        return self.path / "summary.json"
+
+    @property
+    def pictures(self) -> list[Path]:
+        """The pictures that are there."""
+        return [self.path / name for name in PICTURES if (self.path / name).exists()]
+
+    def results(self) -> list[Path]:
+        """The result files that are there."""
+        files = (self.trajectory, self.events, self.shapes, self.summary)
+        return [file for file in files if file.exists()] + self.pictures
+
+    @classmethod
+    def create(cls, path: str | Path, *, replace: bool = False) -> RunDirectory:
+        """The directory ``path``, made if need be, without results; files that are not results stay.
+
+        Parameters
+        ----------
+        path
+            The directory.
+        replace
+            Remove results of an earlier run.
+
+        Raises
+        ------
+        ResultsExist
+            If it holds results and ``replace`` is false.
+        """
+        directory = cls(Path(path))
+        directory.path.mkdir(parents=True, exist_ok=True)
+        results = directory.results()
+        if results and not replace:
+            raise ResultsExist(f"{directory.path} already holds results ({results[0].name})")
+        for file in results:
+            file.unlink()
+        return directory
+
+    @classmethod
+    def create_numbered(cls, path: str | Path) -> RunDirectory:
+        """A new directory: ``path``, or ``path-2``, ``path-3``, … when that exists.
+
+        Runs started at the same time get different directories.
+        """
+        first = Path(path)
+        first.parent.mkdir(parents=True, exist_ok=True)
+        for number in count(1):
+            candidate = first if number == 1 else first.with_name(f"{first.name}-{number}")
+            try:
+                candidate.mkdir()
+            except FileExistsError:
+                continue
+            return cls(candidate)
+        raise AssertionError("unreachable")
+
+
+class FileRecorder(_Checks):
+    """Streams into a `RunDirectory` and keeps nothing, so that memory does not grow with the run.
+
+    What was computed is on disk a second later, and ``summary.json`` says from the start which scene it belongs to:
+    the results of a run that was killed can be loaded.
+
+    Parameters
+    ----------
+    scene
+        The scene as run.
+    directory
+        A directory without results (`RunDirectory.create`).
+    columns
+        Names in row order, starting with ``time``; default `columns_of(scene)`.
+    """
+
+    def __init__(self, scene: Scene, directory: RunDirectory, columns: Sequence[str] | None = None) -> None:
+        super().__init__(scene, columns)
+        self.directory = directory
+        self.finished = False
+        #: Of the last row [s]; ``None`` before the first.
+        self.time: float | None = None
+        self._files: list[TextIO] = []
+        self._rows = self._open(directory.trajectory, self.columns)
+        self._events = self._open(directory.events, EVENT_COLUMNS)
+        self._shapes = None if scene.beam is None else self._open(directory.shapes, _SHAPE_HEADER)
+        self._write_summary({"status": "running"})
+        self._flushed = monotonic()
+
+    def __enter__(self) -> FileRecorder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if not self.finished and error is not None:
+            self.finish({"status": "stopped", "cause": f"{type(error).__name__}: {error}", "time": self.time})
+        self.close()
+
+    def row(self, values: Mapping[str, Any] | Sequence[Any]) -> None:
+        row = self._checked_row(values)
+        self.time = row[0]
+        phase_at = self._phase_at
+        self._rows.write(",".join([v if i == phase_at else repr(v) for i, v in enumerate(row)]) + "\n")
+        if monotonic() - self._flushed > _FLUSH_SECONDS:
+            self.flush()
+
+    def event(self, event: Event) -> None:
+        values = [getattr(self._checked_event(event), name) for name in EVENT_COLUMNS]
+        fields = ["" if v is None else v if isinstance(v, str) else repr(float(v)) for v in values]
+        self._events.write(",".join(fields) + "\n")
+
+    def shape(self, time: float, deflection: np.ndarray) -> None:
+        shape = self._checked_shape(time, deflection)
+        if self._shapes is None:
+            raise ValueError("a beam's shape in a scene without a beam")
+        self._shapes.write(",".join(map(repr, [float(time), *shape.tolist()])) + "\n")
+
+    def finish(self, summary: Mapping[str, Any]) -> None:
+        self.close()
+        self._write_summary(summary)
+        self.finished = True
+
+    def flush(self) -> None:
+        """Hand everything to the operating system."""
+        for file in self._files:
+            file.flush()
+        self._flushed = monotonic()
+
+    def close(self) -> None:
+        for file in self._files:
+            file.close()
+
+    def _open(self, path: Path, header: Iterable[str]) -> TextIO:
+        file = path.open("x", encoding="utf-8", newline="\n")
+        self._files.append(file)
+        file.write(",".join(header) + "\n")
+        file.flush()
+        return file
+
+    def _write_summary(self, summary: Mapping[str, Any]) -> None:
+        text = json.dumps(_json_ready(_with_scene(summary, self.scene)), indent=2, allow_nan=False, ensure_ascii=False)
+        # A reader, or a run killed at this moment, finds the old summary or the new one, never half of it.
+        scratch = self.directory.summary.with_suffix(".json.part")
+        scratch.write_text(text + "\n", encoding="utf-8")
+        os.replace(scratch, self.directory.summary)
+
+
+def load_trajectory(directory: str | Path) -> Trajectory:
+    """Read a run directory, also of a run that was stopped or killed: an incomplete last line is left out.
+
+    Raises
+    ------
+    ResultsUnreadable
+        If a file is missing or is not what a run writes.
+    """
+    run = RunDirectory(Path(directory))
+    summary = load_summary(run.path)
+    header, lines = _complete_lines(run.trajectory)
+    columns = _read_table(run.trajectory, header, lines)
+    shapes = None
+    if run.shapes.exists():
+        header, lines = _complete_lines(run.shapes)
+        if header != _SHAPE_HEADER:
+            raise ResultsUnreadable(f"{run.shapes}: line 1: not the columns of shapes.csv")
+        table = _read_table(run.shapes, header, lines)
+        shapes = (table["time"], np.column_stack([table[name] for name in header[1:]]))
+    scene = scene_from_dict(summary["scene"], source=f"{run.summary}: scene")
+    return Trajectory(scene, columns, list(load_events(run.path)), shapes, summary)
+
+
+def load_summary(directory: str | Path) -> dict[str, Any]:
+    """``summary.json`` of a run directory."""
+    path = RunDirectory(Path(directory)).summary
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ResultsUnreadable(f"{path}: missing; {directory} is not a run directory") from None
+    except (OSError, ValueError) as error:
+        raise ResultsUnreadable(f"{path}: {error}") from error
+    if not isinstance(summary, dict) or not isinstance(summary.get("scene"), dict):
+        raise ResultsUnreadable(f"{path}: no scene in it")
+    return summary
+
+
+def load_events(directory: str | Path) -> Iterator[Event]:
+    """The events of a run directory, one at a time."""
+    path = RunDirectory(Path(directory)).events
+    header, lines = _complete_lines(path)
+    if header != EVENT_COLUMNS:
+        raise ResultsUnreadable(f"{path}: line 1: not the columns of events.csv")
+    for number, line in enumerate(lines, start=2):
+        fields = line.rstrip("\n").split(",")
+        if len(fields) != len(EVENT_COLUMNS) or fields[1] not in EVENT_KINDS:
+            raise ResultsUnreadable(f"{path}: line {number}: not an event: {line.strip()[:60]!r}")
+        named = dict(zip(EVENT_COLUMNS, fields, strict=True))
+        kind = named.pop("kind")
+        try:
+            values = {name: float(text) for name, text in named.items() if text}
+            yield Event(kind=kind, **values)
+        except (TypeError, ValueError) as error:
+            raise ResultsUnreadable(f"{path}: line {number}: {error}") from None
+
+
+def _complete_lines(path: Path) -> tuple[tuple[str, ...], Iterator[str]]:
+    """Header and an iterator over the lines after it that end in a newline."""
+
+    def lines() -> Iterator[str]:
+        with path.open(encoding="utf-8", newline="\n") as file:
+            yield from (line for line in file if line.endswith("\n"))
+
+    try:
+        everything = lines()
+        header = next(everything, None)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultsUnreadable(f"{path}: {error}") from error
+    if header is None:
+        raise ResultsUnreadable(f"{path}: empty")
+    return tuple(header.rstrip("\n").split(",")), everything
+
+
+def _read_table(path: Path, header: tuple[str, ...], lines: Iterator[str]) -> dict[str, np.ndarray]:
+    kinds = [(name, f"U{_PHASE_WIDTH}" if name == "phase" else "f8") for name in header]
+    first = next(lines, None)
+    if first is None:
+        table = np.empty(0, dtype=kinds)
+    else:
+        try:
+            table = np.loadtxt(_chain(first, lines), dtype=kinds, delimiter=",", comments=None, ndmin=1)
+        except ValueError as error:
+            raise ResultsUnreadable(f"{path}: after the header: {error}") from None
+    columns = {name: np.ascontiguousarray(table[name]) for name in header}
+    if "phase" in columns:
+        phase = columns["phase"]
+        columns["phase"] = phase.astype(f"U{max(1, int(np.char.str_len(phase).max(initial=1)))}")
+    for name, values in columns.items():
+        if name != "phase" and not np.isfinite(values).all():
+            raise ResultsUnreadable(f"{path}: {name} holds a number that is not finite")
+    return columns
+
+
+def _chain(first: str, rest: Iterable[str]) -> Iterator[str]:
+    yield first
+    yield from rest
+
+
+def _with_scene(summary: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
+    return {**summary, "scene": scene.model_dump(exclude_none=True)}
+
+
+_PLAIN: tuple[tuple[type, Callable[[Any], Any]], ...] = (
+    (np.bool_, bool),
+    (np.integer, int),
+    (np.floating, float),
+    (np.ndarray, np.ndarray.tolist),
+    (Path, str),
+)
+
+
+def _json_ready(value: Any) -> Any:
+    """Plain JSON types; a number that is not finite becomes its name: JSON has none, a stopped run may."""
+    for kind, plain in _PLAIN:
+        if isinstance(value, kind):
+            value = plain(value)
+    if isinstance(value, float) and not isfinite(value):
+        return repr(value)
+    if isinstance(value, Mapping):
+        return {str(key): _json_ready(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [_json_ready(item) for item in value]
+    return value
