@@ -7,13 +7,27 @@ the FMU parameters; units are SI.
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Iterable
+import difflib
+import json
+import math
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic.fields import FieldInfo
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+#: Up to this many elements all modes may be kept; the full eigenproblem grows with the cube.
+ALL_MODES_UP_TO = 500
+#: Two weeks at a microsecond a step: a mistyped macro step, not a run.
+MOST_MACRO_STEPS = 1e12
 
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -56,7 +70,14 @@ class Beam(_Table):
     @model_validator(mode="after")
     def _modes_exist(self) -> Beam:
         if self.n_modes > 2 * self.n_elements:
-            raise ValueError(f"n_modes = {self.n_modes}: {self.n_elements} elements have {2 * self.n_elements} modes")
+            raise ValueError(
+                f"n_modes = {self.n_modes}: n_elements = {self.n_elements} has only {2 * self.n_elements} modes"
+            )
+        if self.integrator == "modal" and self.n_modes == 0 and self.n_elements > ALL_MODES_UP_TO:
+            raise ValueError(
+                f"n_modes = 0: n_elements = {self.n_elements} has too many modes to keep them all (allowed up to "
+                f'{ALL_MODES_UP_TO} elements); use n_modes = 64, or integrator = "generalized_alpha"'
+            )
         return self
 
 
@@ -95,7 +116,7 @@ class Coupling(_Table):
     @model_validator(mode="after")
     def _degree_of_scheme(self) -> Coupling:
         if self.scheme == "hermite" and self.degree == 0:
-            raise ValueError("degree = 0: hermite needs degree 1 or 2")
+            raise ValueError('degree = 0: scheme = "hermite" needs degree 1 or 2')
         return self
 
 
@@ -111,21 +132,146 @@ class Scene(_Table):
     coupling: Coupling = Coupling()
 
     @model_validator(mode="after")
-    def _consistent(self) -> Scene:
-        if self.beam is None and self.spring is None:
-            raise ValueError("a scene needs [beam], [spring] or both")
-        if self.spring is not None and self.stop is not None and self.stop.position >= self.spring.equilibrium:
-            raise ValueError(
-                f"stop.position = {self.stop.position}: the foundation must lie below "
-                f"spring.equilibrium = {self.spring.equilibrium}"
-            )
-        if self.coupling.macro_step > self.time.t_end:
-            raise ValueError(f"coupling.macro_step = {self.coupling.macro_step}: larger than time.t_end")
-        if self.contact.law == "compliance" and self.coupling.scheme != "energy":
-            raise ValueError("contact.law = 'compliance' needs coupling.scheme = 'energy'")
-        if self.contact.law == "compliance" and self.coupling.degree != 0:
-            raise ValueError("contact.law = 'compliance' needs coupling.degree = 0 (discrete gradient)")
+    def _possible(self) -> Scene:
+        if impossible := [message for check in _CHECKS for message in check(self)]:
+            raise ValueError("\n".join(impossible))
         return self
+
+    @property
+    def tip_target(self) -> tuple[str, float] | None:
+        """What the beam's tip meets first, as ``("[table] key", height [m])``: the spring, else the stop."""
+        if self.beam is None:
+            return None
+        if self.spring is not None:
+            return "[spring] equilibrium", self.spring.equilibrium
+        return None if self.stop is None else ("[stop] position", self.stop.position)
+
+    @property
+    def initial_clearance(self) -> float | None:
+        """Height [m] of the tip above `tip_target` at the start, 0 where only rounding separates them."""
+        if self.beam is None or self.tip_target is None:
+            return None
+        tip, target = self.beam.initial_deflection_slope * self.beam.length, self.tip_target[1]
+        return 0.0 if math.isclose(tip, target, rel_tol=1e-12) else tip - target
+
+    @property
+    def contact_time(self) -> float | None:
+        """First contact t_c [s] of an undeformed approach; ``None`` where there is none to compute beforehand."""
+        clearance = self.initial_clearance
+        if self.beam is None or clearance is None or self.beam.approach == "elastic":
+            return None
+        velocity = self.beam.initial_velocity_slope * self.beam.length
+        if clearance == 0.0 and velocity <= 0.0:
+            return 0.0
+        return -clearance / velocity if clearance > 0.0 > velocity else math.inf
+
+
+def _bodies(scene: Scene) -> Iterator[str]:
+    if scene.beam is None and scene.spring is None:
+        yield "no body: a scene needs [beam], [spring] or both"
+    if scene.spring is not None and scene.stop is not None and scene.stop.position >= scene.spring.equilibrium:
+        yield (
+            f"[stop] position = {scene.stop.position}: the foundation must lie below "
+            f"[spring] equilibrium = {scene.spring.equilibrium}"
+        )
+
+
+def _spring_holds(scene: Scene) -> Iterator[str]:
+    if (spring := scene.spring) is None:
+        return
+    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    if (k2 < 0.0 and k1 <= 0.0) or (k1 < 0.0 and k2 <= 0.0):
+        yield (
+            f"[spring] linear_stiffness = {k1}: with cubic_stiffness = {k2} the spring pushes away from y = 0 "
+            "everywhere; one of them must be greater than 0"
+        )
+    elif k2 < 0.0 and abs(spring.equilibrium) >= (hilltop := math.sqrt(k1 / -k2)):
+        yield (
+            f"[spring] equilibrium = {spring.equilibrium}: the softening spring escapes from beyond "
+            f"|y| = √(linear_stiffness/|cubic_stiffness|) = {hilltop:.6g} m; it must start inside"
+        )
+
+
+def _tip_arrives(scene: Scene) -> Iterator[str]:
+    beam, target, clearance = scene.beam, scene.tip_target, scene.initial_clearance
+    if beam is None or target is None or clearance is None:
+        return
+    name, height = target
+    if clearance < 0.0:
+        yield (
+            f"[beam] initial_deflection_slope = {beam.initial_deflection_slope}: the tip starts {-clearance:.6g} m "
+            f"below {name} = {height}; it must start there or above"
+        )
+    elif (t_c := scene.contact_time) is not None and t_c > scene.time.t_end:
+        when = f"not before t = {t_c:.6g} s, after [time] t_end = {scene.time.t_end}" if math.isfinite(t_c) else "never"
+        yield (
+            f"[beam] initial_velocity_slope = {beam.initial_velocity_slope}: the undeformed tip reaches "
+            f'{name} = {height} {when}; use a (more) negative initial_velocity_slope, or approach = "elastic"'
+        )
+
+
+def _law_applies(scene: Scene) -> Iterator[str]:
+    beam, contact, coupling = scene.beam, scene.contact, scene.coupling
+    if contact.law == "paper":
+        for table in ("beam", "spring", "stop"):
+            if getattr(scene, table) is None:
+                yield f'[contact] law = "paper": Algorithm 1 needs a [{table}]'
+        if beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf != 1.0:
+            yield f'[beam] rho_inf = {beam.rho_inf}: [contact] law = "paper" is the midpoint rule, rho_inf = 1'
+    if contact.law == "compliance":
+        if contact.stiffness == 0.0:
+            yield '[contact] stiffness = 0.0: with law = "compliance" nothing would hold the bodies apart'
+        if coupling.scheme != "energy" or coupling.degree != 0:
+            yield (
+                f'[coupling] scheme = "{coupling.scheme}", degree = {coupling.degree}: [contact] law = "compliance" '
+                'needs scheme = "energy" and degree = 0 (its discrete gradient)'
+            )
+
+
+def _coupling_resolves(scene: Scene) -> Iterator[str]:
+    beam, coupling, t_end = scene.beam, scene.coupling, scene.time.t_end
+    if coupling.macro_step > t_end:
+        yield f"[coupling] macro_step = {coupling.macro_step}: must be at most [time] t_end = {t_end}"
+    if t_end / coupling.macro_step > MOST_MACRO_STEPS:
+        yield (
+            f"[coupling] macro_step = {coupling.macro_step}: [time] t_end = {t_end} would take "
+            f"{t_end / coupling.macro_step:.1e} macro steps; at most {MOST_MACRO_STEPS:.0e} are allowed"
+        )
+    if beam is not None and beam.integrator == "generalized_alpha":
+        remedy = '[beam] integrator = "generalized_alpha" sees only the mean of the contact force; use "modal"'
+        if coupling.scheme == "hermite":
+            yield f'[coupling] scheme = "hermite": {remedy}, or scheme = "energy"'
+        elif coupling.degree > 0:
+            yield f"[coupling] degree = {coupling.degree}: {remedy}, or degree = 0"
+
+
+#: What cannot be run although each value is allowed; each yields ``[table] key = value: reason and remedy``.
+_CHECKS = (_bodies, _spring_holds, _tip_arrives, _law_applies, _coupling_resolves)
+
+_TABLES: dict[str, type[_Table]] = {
+    "time": Time,
+    "beam": Beam,
+    "spring": Spring,
+    "stop": Stop,
+    "contact": Contact,
+    "coupling": Coupling,
+}
+
+
+def suspicions(scene: Scene) -> list[str]:
+    """What can be run but may not be meant; for a run's warnings."""
+    found = []
+    if (beam := scene.beam) is not None and not beam.reduced_integration:
+        # Static tip compliance of full integration: the exact one over 1 + KAG h²/12EI.
+        shear = beam.shear_coefficient * beam.shear_modulus * beam.area
+        bending = beam.young_modulus * beam.second_moment_of_area
+        factor = 1.0 + shear * (beam.length / beam.n_elements) ** 2 / (12.0 * bending)
+        if factor > 1.05:
+            found.append(
+                f"[beam] n_elements = {beam.n_elements}: full integration locks, the beam is {factor:.3g} times too "
+                "stiff; use reduced_integration = true or more elements"
+            )
+    return found
 
 
 def shipped_scenes() -> dict[str, Path]:
@@ -149,18 +295,13 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = ()) -> Scene
     SceneError
         If the file cannot be read or the scene cannot be run.
     """
-    path = Path(path_or_name)
-    if path.suffix != ".toml" and not path.exists():
-        shipped = shipped_scenes()
-        if str(path_or_name) not in shipped:
-            raise SceneError(
-                f"{path_or_name}: neither a file nor a shipped scene; shipped scenes: {', '.join(shipped)}"
-            )
-        path = shipped[str(path_or_name)]
+    path = _scene_file(path_or_name)
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SceneError(f"{path}: cannot be read as TOML: {error}") from error
+        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise SceneError(f"{path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise SceneError(f"{path}: not TOML: {error}") from error
     for override in overrides:
         _override(data, override)
     return scene_from_dict(data, source=str(path))
@@ -171,51 +312,114 @@ def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
     try:
         return Scene.model_validate(data)
     except ValidationError as error:
-        lines = [f"{source}: {_place(e['loc'])}{_explain(e)}" for e in error.errors()]
-        raise SceneError("\n".join(lines)) from None
+        lines = [line for e in error.errors() for line in _explain(e)]
+        raise SceneError("\n".join(f"{source}: {line}" for line in lines)) from None
 
 
-def with_changes(scene: Scene, **tables: dict[str, Any]) -> Scene:
-    """A validated copy with keys changed: ``with_changes(scene, coupling={"macro_step": 1e-3})``."""
+def with_changes(scene: Scene, **tables: Mapping[str, Any] | None) -> Scene:
+    """A validated copy with keys changed: ``with_changes(scene, coupling={"macro_step": 1e-3})``.
+
+    ``None`` takes a table out: ``with_changes(scene, stop=None)``.
+    """
     data = scene.model_dump(exclude_none=True)
     for table, changes in tables.items():
-        data[table] = {**data.get(table, {}), **changes}
-    return scene_from_dict(data)
+        data[table] = None if changes is None else {**data.get(table, {}), **changes}
+    return scene_from_dict({table: content for table, content in data.items() if content is not None})
+
+
+def _scene_file(path_or_name: str | Path) -> Path:
+    shipped = shipped_scenes()
+    if str(path_or_name) in shipped:
+        return shipped[str(path_or_name)]
+    path = Path(path_or_name)
+    if path.is_file():
+        return path
+    what = "is a directory" if path.is_dir() else "no such file"
+    if path.suffix != ".toml":
+        what += ", and not a shipped scene"
+    raise SceneError(f"{path_or_name}: {what}; {_nearest(path.stem, shipped)}shipped scenes: {', '.join(shipped)}")
 
 
 def _override(data: dict[str, Any], override: str) -> None:
     target, separator, text = override.partition("=")
-    table, dot, key = target.strip().partition(".")
-    if not separator or not dot or not key:
-        raise SceneError(f"--set {override}: expected table.key=value")
+    table, dot, key = (part.strip() for part in target.partition("."))
+    if not (separator and dot and table and key):
+        raise SceneError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
+    content = data.setdefault(table, {})
+    if not isinstance(content, dict):
+        raise SceneError(f"--set {override}: {table} is not a table; tables: {', '.join(_TABLES)}")
+    content[key] = _override_value(text.strip())
+
+
+def _override_value(text: str) -> Any:
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
+        parsed = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
-        value = text.strip()
-    data.setdefault(table, {})
-    if not isinstance(data[table], dict):
-        raise SceneError(f"--set {override}: {table} is not a table")
-    data[table][key] = value
+        parsed = {}
+    if parsed.keys() == {"value"}:
+        return parsed["value"]
+    try:
+        return float(text)  # ".5" and "1." are not TOML
+    except ValueError:
+        return text
 
 
-def _place(loc: tuple[int | str, ...]) -> str:
-    names = [str(part) for part in loc]
-    if not names:
-        return ""
-    return f"[{names[0]}]: " if len(names) == 1 else f"[{names[0]}] {'.'.join(names[1:])}: "
-
-
-def _explain(error: Any) -> str:
-    if error["type"] == "extra_forbidden":
-        return f"unknown key; allowed: {', '.join(_allowed_keys(error['loc']))}"
-    if error["type"] == "missing":
-        return "missing; it has no default"
-    message = error["msg"].removeprefix("Value error, ")
-    return message if error["type"] == "value_error" else f"{error['input']!r} is not allowed: {message}"
-
-
-def _allowed_keys(loc: tuple[int | str, ...]) -> list[str]:
+def _explain(error: Any) -> list[str]:
+    """Lines ``[table] key = value: what is wrong and what would be allowed`` for one of pydantic's errors."""
+    kind, value, loc = error["type"], error["input"], [str(part) for part in error["loc"]]
+    if kind == "value_error":
+        prefix = f"[{loc[0]}] " if loc else ""
+        return [prefix + line for line in error["msg"].removeprefix("Value error, ").splitlines()]
     if len(loc) == 1:
-        return list(Scene.model_fields)
-    tables = {"time": Time, "beam": Beam, "spring": Spring, "stop": Stop, "contact": Contact, "coupling": Coupling}
-    return list(tables[str(loc[0])].model_fields)
+        return [_explain_top(kind, value, loc[0])]
+    table, key = loc[0], ".".join(loc[1:])
+    if kind == "extra_forbidden":
+        return [f"[{table}] {key}: unknown key; {_nearest_key(table, key)}"]
+    if kind == "missing":
+        return [f"[{table}] {key}: missing; must be {_allowed(_TABLES[table].model_fields[key])}"]
+    return [f"[{table}] {key} = {_toml(value)}: must be {_allowed(_TABLES[table].model_fields[key])}"]
+
+
+def _explain_top(kind: str, value: Any, name: str) -> str:
+    if kind == "missing":
+        return f"[{name}]: missing table; it must have {', '.join(_TABLES[name].model_fields)}"
+    if kind == "extra_forbidden" and isinstance(value, dict):
+        return f"[{name}]: unknown table; {_nearest(name, _TABLES)}allowed: {', '.join(_TABLES)}"
+    if kind == "extra_forbidden":
+        return f"{name} = {_toml(value)}: unknown key outside a table; {_nearest_key('', name)}"
+    return f"{name} = {_toml(value)}: must be {'a table' if name in _TABLES else _allowed(Scene.model_fields[name])}"
+
+
+def _nearest(name: str, candidates: Iterable[str]) -> str:
+    close = difflib.get_close_matches(name, candidates, n=1)
+    return f"did you mean {close[0]}? " if close else ""
+
+
+def _nearest_key(table: str, key: str) -> str:
+    here = list(_TABLES[table].model_fields) if table else ["title", *(f"[{name}]" for name in _TABLES)]
+    elsewhere = [name for name, model in _TABLES.items() if key in model.model_fields]
+    hint = f"it belongs to [{elsewhere[0]}]; " if elsewhere else _nearest(key, here)
+    return f"{hint}allowed: {', '.join(here)}"
+
+
+def _allowed(field: FieldInfo) -> str:
+    """What a key may be, in words, from its declaration."""
+    if get_origin(field.annotation) is Literal:
+        return " or ".join(_toml(choice) for choice in get_args(field.annotation))
+    nouns: dict[Any, str] = {bool: "true or false", str: "a text in quotes", int: "a whole number"}
+    noun = nouns.get(field.annotation, "a finite number")
+    bounds = {
+        name: value
+        for m in field.metadata
+        for name in ("gt", "ge", "le")
+        if (value := getattr(m, name, None)) is not None
+    }
+    words = {"gt": "greater than", "ge": "at least", "le": "at most"}
+    return " ".join([noun, " and ".join(f"{words[name]} {value:.15g}" for name, value in bounds.items())]).strip()
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{…}"
+    text = json.dumps(value, ensure_ascii=False) if isinstance(value, (bool, str)) else repr(value)
+    return text if len(text) <= 60 else text[:59] + "…"

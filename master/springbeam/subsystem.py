@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
-
-import numpy as np
+from typing import NamedTuple, Protocol
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
-Polynomial = np.ndarray
-ZERO_FORCE: Polynomial = np.zeros(3)
+Force = tuple[float, float, float]
+NO_FORCE: Force = (0.0, 0.0, 0.0)
 
 
 class StepRefused(RuntimeError):
@@ -23,9 +21,6 @@ class Motion(NamedTuple):
     integral: float  #: ∫ w dτ over the last step [m·s]
     integral_2: float  #: ∫∫ w dτ dτ over the last step [m·s²]
 
-    def minus(self, other: Motion) -> Motion:
-        return Motion(*(a - b for a, b in zip(self, other, strict=True)))
-
 
 class Energies(NamedTuple):
     """All in J; ``dissipated`` since the start; ``load_potential`` of the constant loads, −(their work)."""
@@ -35,13 +30,9 @@ class Energies(NamedTuple):
     dissipated: float
     load_potential: float
 
-    @property
-    def stored(self) -> float:
-        return self.kinetic + self.potential
-
 
 class Body(Protocol):
-    """A body with one interface end and a state that can be saved and restored.
+    """A body with one interface end and a state that can be rewound.
 
     ``advance`` prescribes the contact force C on the step: the beam takes it as +C, the spring as −C.
     Impulses act at once: ``motion`` and ``energies`` show the state after them.
@@ -50,8 +41,14 @@ class Body(Protocol):
     #: What an impulse at the end meets [kg].
     mass: float
 
-    def advance(self, time: float, size: float, contact: Polynomial, foundation: Polynomial = ZERO_FORCE) -> None:
-        """Advance from ``time`` by ``size`` [s]. Raises StepRefused; the state is then to be restored."""
+    def mark(self) -> None:
+        """Remember the present state as the one ``rewind`` returns to."""
+
+    def rewind(self) -> None:
+        """Return to the marked state. Costs nothing if nothing happened since."""
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
+        """Advance from ``time`` by ``size`` [s]. Raises StepRefused; ``rewind`` then recovers."""
 
     def motion(self) -> Motion: ...
 
@@ -60,9 +57,33 @@ class Body(Protocol):
     def apply_impulse(self, impulse: float) -> None:
         """Upward impulse [N·s]."""
 
-    def save(self) -> Any:
-        """A token for the present state, valid until released."""
+    def close(self) -> None:
+        """Free what the body holds; it is not used afterwards."""
 
-    def restore(self, token: Any) -> None: ...
 
-    def release(self, token: Any) -> None: ...
+class Held:
+    """An end held at rest at a fixed position: the foundation, or a spring seated on it."""
+
+    mass = float("inf")
+
+    def __init__(self, position: float) -> None:
+        self._position = position
+        self._size = 0.0
+
+    def mark(self) -> None: ...
+
+    def rewind(self) -> None: ...
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
+        self._size = size
+
+    def motion(self) -> Motion:
+        w, h = self._position, self._size
+        return Motion(w, 0.0, w * h, 0.5 * w * h * h)
+
+    def energies(self) -> Energies:
+        return Energies(0.0, 0.0, 0.0, 0.0)
+
+    def apply_impulse(self, impulse: float) -> None: ...
+
+    def close(self) -> None: ...

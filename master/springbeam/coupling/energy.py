@@ -1,0 +1,29 @@
+"""Conditions under which the contact force does no net work over a step.
+
+With g = 0 at the step's start and g(H) = 0, the work of C(τ) = Σ c_j τʲ on both bodies together is, by parts,
+
+    ∫ C ġ dτ = [C g]₀ᴴ − Σ j c_j ∫ τ^{j−1} g dτ = 0    if    ∫ τ^{j−1} g dτ = 0,  j = 1 … d,
+
+whatever the coefficients, the step and the bodies: the coupling creates no energy.
+The moments are taken against Legendre polynomials of s = 2τ/H − 1, which spans the same space and keeps the system
+well conditioned:  ∫ g dτ = I₁  and  ∫ s g dτ = I₁ − 2 I₂/H,  with I₁ = ∫ g dτ and I₂ = ∫∫ g dτ dτ = ∫ (H − τ) g dτ.
+"""
+
+from __future__ import annotations
+
+from ..subsystem import Motion
+
+
+def _degree_0(m: Motion, size: float) -> tuple[float, ...]:
+    return (m.displacement,)
+
+
+def _degree_1(m: Motion, size: float) -> tuple[float, ...]:
+    return (m.displacement, m.integral / size)
+
+
+def _degree_2(m: Motion, size: float) -> tuple[float, ...]:
+    return (m.displacement, m.integral / size, (m.integral - 2.0 * m.integral_2 / size) / size)
+
+
+CONDITIONS = {0: _degree_0, 1: _degree_1, 2: _degree_2}

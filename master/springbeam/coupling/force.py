@@ -1,0 +1,71 @@
+"""The contact force of one step: C(τ) = Σ a_k P_k(2τ/H − 1), Legendre polynomials on [0, H], degree ≤ 2."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..subsystem import Force, Motion
+
+#: Gauss–Legendre nodes and weights on [0, 1], exact to degree 7: enough for (1 − x)³ P₂.
+_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
+
+
+def derivatives(a: Sequence[float], size: float) -> Force:
+    """(C, Ċ, C̈) at the step's start [N, N/s, N/s²] of Legendre coefficients ``a`` [N] (1 to 3 of them)."""
+    if len(a) == 1:
+        return (float(a[0]), 0.0, 0.0)
+    if len(a) == 2:
+        return (float(a[0] - a[1]), float(2.0 * a[1] / size), 0.0)
+    return (
+        float(a[0] - a[1] + a[2]),
+        float((2.0 * a[1] - 6.0 * a[2]) / size),
+        float(12.0 * a[2] / (size * size)),
+    )
+
+
+def end_value(force: Force, size: float) -> float:
+    """C(H) [N]."""
+    return force[0] + size * (force[1] + 0.5 * size * force[2])
+
+
+def value(force: Force, tau: float) -> float:
+    """C(τ) [N]."""
+    return force[0] + tau * (force[1] + 0.5 * tau * force[2])
+
+
+def mean(force: Force, size: float) -> float:
+    """∫ C dτ / H [N]."""
+    return force[0] + size * (force[1] / 2.0 + size * force[2] / 6.0)
+
+
+def shifted(force: Force, tau: float) -> Force:
+    """The same polynomial, seen from τ on."""
+    return (value(force, tau), force[1] + tau * force[2], force[2])
+
+
+def legendre(force: Force, size: float, degree: int) -> np.ndarray:
+    """Legendre coefficients, shape (degree + 1,), of the polynomial (cut above ``degree``)."""
+    slope, bend = size * force[1], size * size * force[2]
+    a = (force[0] + slope / 2.0 + bend / 6.0, slope / 2.0 + bend / 4.0, bend / 12.0)
+    return np.array(a[: degree + 1])
+
+
+def free_mass_response(degree: int, size: float, mass: float) -> list[Motion]:
+    """Motion of a free mass [kg] from rest under −P_k, k = 0 … degree: how a spring answers when H is small."""
+    tau = 1.0 - _NODES  # remaining time, in units of H
+    motions = []
+    for k in range(degree + 1):
+        unit = np.zeros(k + 1)
+        unit[k] = 1.0
+        p = -_WEIGHTS * np.polynomial.legendre.legval(2.0 * _NODES - 1.0, unit) / mass
+        motions.append(
+            Motion(
+                float(size**2 * (p @ tau)),
+                float(size * p.sum()),
+                float(size**3 * (p @ tau**2) / 2.0),
+                float(size**4 * (p @ tau**3) / 6.0),
+            )
+        )
+    return motions

@@ -1,0 +1,88 @@
+"""Where inside a step something happens.
+
+An event function f is positive while nothing happens and falls through zero at the event. A step knows f and ḟ at
+both ends; the cubic through them tells where to look, also for a contact that opens and closes again inside the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+_EPS = float(np.finfo(float).eps)
+_MAX_EVALUATIONS = 60
+
+
+class Sample(NamedTuple):
+    """f and ḟ at one time."""
+
+    value: float
+    rate: float
+
+
+def lowest_inside(start: Sample, end: Sample, size: float) -> float | None:
+    """τ in (0, size) where the cubic through both samples has its minimum, if it has one inside."""
+    d0, d1 = start.rate * size, end.rate * size
+    rise = end.value - start.value
+    # f(x) = f0 + d0 x + b x² + a x³ on [0, 1]
+    a, b = d0 + d1 - 2.0 * rise, 3.0 * rise - 2.0 * d0 - d1
+    discriminant = b * b - 3.0 * a * d0
+    if discriminant <= 0.0:
+        return None
+    # The root with f'' > 0; written so that a → 0 does no harm.
+    denominator = b + discriminant**0.5
+    if denominator == 0.0:
+        return None
+    x = -d0 / denominator
+    return x * size if 0.0 < x < 1.0 else None
+
+
+def cubic_value(start: Sample, end: Sample, size: float, tau: float) -> float:
+    """The cubic's value at τ."""
+    x = tau / size
+    d0, d1 = start.rate * size, end.rate * size
+    rise = end.value - start.value
+    return start.value + x * (d0 + x * (3.0 * rise - 2.0 * d0 - d1 + x * (d0 + d1 - 2.0 * rise)))
+
+
+def cubic_crossing(start: Sample, end: Sample, size: float) -> float:
+    """τ where the cubic falls through zero, by bisection; ``end.value`` < 0."""
+    low, high = 0.0, size
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        value = cubic_value(start, end, size, middle)
+        # Starting on zero and rising is still "before": only the side that ends below counts.
+        if value > 0.0 or (value == 0.0 and middle < 0.5 * size):
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def locate(
+    evaluate: Callable[[float], Sample], start: Sample, end: Sample, size: float, tolerance: float, time: float
+) -> float:
+    """Step size at which f = 0 to ``tolerance``, by Newton's method inside a bracket.
+
+    ``evaluate(h)`` repeats the step with size h and returns f, ḟ at its end; the last size evaluated is the one
+    returned, so the bodies are left there. f(0) ≥ 0 > f(size); ``time`` is the step's start (its rounding bounds what
+    can be told apart).
+    """
+    low, high = 0.0, size
+    h = cubic_crossing(start, end, size)
+    for _ in range(_MAX_EVALUATIONS):
+        sample = evaluate(h)
+        if abs(sample.value) <= tolerance:
+            return h
+        if sample.value > 0.0:
+            low = h
+        else:
+            high = h
+        if high - low <= 4.0 * _EPS * max(abs(time), size):
+            return h
+        h = h - sample.value / sample.rate if sample.rate < 0.0 else 0.5 * (low + high)
+        if not low < h < high:
+            h = 0.5 * (low + high)
+    return h

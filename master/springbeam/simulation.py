@@ -1,0 +1,612 @@
+"""The master: macro steps, phases, events, the energy ledger.
+
+One step is *mark* (the bodies remember their state), *attempt* (advance under the phase's law; may be repeated with
+any size, each time from the mark), *detect* (which event comes first inside the step?) and *accept*. An event shortens
+the step to itself, acts, and the run goes on from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from .contact import Impact, Joint, Phase, first_contact, foundation_impact, meeting, spring_force
+from .coupling import conditions, force
+from .coupling.compliance import Compliance, compliance_energy, compliance_force
+from .coupling.tie import NotConverged, Tie
+from .events import Sample, cubic_crossing, cubic_value, locate, lowest_inside
+from .recording import NonFiniteValue, Recorder
+from .scene import Scene
+from .subsystem import NO_FORCE, Body, Energies, Force, Held, Motion, StepRefused
+from .trajectory import Event
+
+#: ``progress(time, phase, macro_steps)``, called once per accepted step.
+Progress = Callable[[float, str, int], None]
+
+_EPS = float(np.finfo(float).eps)
+#: A step that is refused is halved this often before the run stops.
+_MAX_HALVINGS = 20
+#: Events without any time between them before the contact is said to chatter.
+_MAX_EVENTS_AT_ONCE = 25
+#: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only).
+_SEATING_SPEED = 1e-8
+#: A remainder of the macro grid shorter than this fraction of H joins the next step.
+_SHORT_REMAINDER = 0.25
+#: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
+_SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
+
+
+class RunStopped(RuntimeError):
+    """The run ended before t_end; everything up to ``time`` has been recorded."""
+
+    def __init__(self, cause: str, time: float, residual: float | None = None) -> None:
+        at = "" if residual is None else f", residual {residual:.3g} m"
+        super().__init__(f"stopped at t = {time:.9g} s: {cause}{at}")
+        self.cause, self.time, self.residual = cause, time, residual
+
+
+class BeamBody(Body, Protocol):
+    def shape(self) -> np.ndarray:
+        """Deflection [m] at `springbeam.trajectory.SHAPE_POINTS`, shape (21,)."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """An attempted step and what the bodies' ends did on it."""
+
+    time: float
+    size: float
+    phase: Phase
+    contact: Force  #: C on the step
+    foundation: Force  #: N on the step
+    start: tuple[Motion, Motion]  #: (tip, lower end) at the mark
+    end: tuple[Motion, Motion]
+
+
+@dataclass
+class Counts:
+    macro_steps: int = 0
+    events: int = 0
+    halvings: int = 0
+
+
+@dataclass
+class _Ledger:
+    """E_beam + E_spring + E_contact + dissipated + impact losses − work of external loads = constant."""
+
+    impact_loss: float = 0.0
+    initial: float | None = None
+    scale: float = 0.0
+    largest_residual: float = 0.0
+    relative: float = 0.0
+
+    def book(self, beam: Energies, spring: Energies, contact: float) -> dict[str, float]:
+        e_beam = beam.kinetic + beam.potential
+        e_spring = spring.kinetic + spring.potential
+        dissipated = beam.dissipated + spring.dissipated
+        load = beam.load_potential + spring.load_potential
+        total = e_beam + e_spring + contact + dissipated + self.impact_loss + load
+        if self.initial is None:
+            self.initial = total
+        residual = total - self.initial
+        self.scale = max(self.scale, abs(self.initial), e_beam + abs(e_spring) + contact)
+        self.largest_residual = max(self.largest_residual, abs(residual))
+        if self.scale > 0.0:
+            self.relative = max(self.relative, abs(residual) / self.scale)
+        return {
+            "e_beam": e_beam,
+            "e_spring": e_spring,
+            "e_contact": contact,
+            "e_dissipated": dissipated,
+            "e_impact_loss": self.impact_loss,
+            "e_load": load,
+            "e_total": total,
+            "energy_residual": residual,
+        }
+
+
+class Simulation:
+    """One run of a scene with given bodies.
+
+    Parameters
+    ----------
+    scene
+        What is simulated.
+    beam, spring
+        The bodies at the start time `first_contact`; ``None`` where the scene has none.
+    recorder
+        Receives rows, events and shapes.
+    progress
+        Called once per accepted step.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        beam: BeamBody | None,
+        spring: Body | None,
+        recorder: Recorder,
+        progress: Progress | None = None,
+    ) -> None:
+        self.scene, self.recorder = scene, recorder
+        self._beam, self._spring, self._progress = beam, spring, progress
+        self._stop = None if scene.stop is None else scene.stop.position
+        lower: Body | None = spring
+        if lower is None and self._stop is not None:
+            lower = Held(self._stop)
+        self._bodies: list[Body] = [body for body in (beam, lower) if body is not None]
+        self._upper: Body | None = beam
+        self._lower: Body | None = lower
+        self._held = None if self._stop is None else Held(self._stop)
+        self._joinable = beam is not None and spring is not None
+        coupling = scene.coupling
+        self.H = coupling.macro_step
+        self._compliant = scene.contact.law == "compliance"
+        self._tie = Tie(conditions(coupling.scheme, coupling.degree), coupling.degree, coupling.tolerance, self.H)
+        self._compliance = Compliance(scene.contact.stiffness, scene.contact.exponent, coupling.tolerance, self.H)
+        self._degree = 0 if self._compliant else coupling.degree
+        self.counts = Counts()
+        self.warnings: list[str] = []
+        self.time = first_contact(scene)
+        self.phase = Phase()
+        self._ledger = _Ledger()
+        self._contact: Force = NO_FORCE
+        self._foundation: Force = NO_FORCE
+        self._smoothed: tuple[float, float] = (0.0, 0.0)
+        self._steps_in_phase = 0
+        self._previous_size = 0.0
+        self._fastest_impact = 0.0
+        self._shapes_left = _SHAPES_AFTER_CONTACT
+        self._next_shape = self.time
+        self._largest_mismatch = 0.0
+        self._largest_speed = 0.0
+
+    # -- the run ------------------------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Until t_end. Raises RunStopped; what was computed is with the recorder."""
+        t0, t_end = self.time, self.scene.time.t_end
+        self._settle_start()
+        self._record()
+        macro_index, at_once = 0, 0
+        while self.time < t_end:
+            target = t0 + (macro_index + 1) * self.H
+            size = target - self.time
+            on_grid = abs(size - self.H) <= 1e-9 * self.H
+            if size < _SHORT_REMAINDER * self.H:
+                macro_index += 1
+                target, size, on_grid = target + self.H, size + self.H, False
+            if target >= t_end - 1e-9 * self.H:
+                target, size = t_end, t_end - self.time
+                on_grid = abs(size - self.H) <= 1e-9 * self.H
+            step, event = self._advance(self.H if on_grid else size)
+            at_once = 0 if step.size > 0.0 else at_once + 1
+            if at_once > _MAX_EVENTS_AT_ONCE:
+                raise RunStopped("the contact chatters: events without time between them", self.time)
+            whole = event is None and abs(step.size - size) <= 1e-9 * self.H
+            if step.size > 0.0:
+                self._accept(step, target if whole else self.time + step.size)
+            while t0 + (macro_index + 1) * self.H <= self.time + 1e-9 * self.H:
+                macro_index += 1
+            if event is not None:
+                self._act(event, step)
+            self._record()
+            if self._progress is not None:
+                self._progress(self.time, str(self.phase), self.counts.macro_steps)
+
+    def _advance(self, size: float) -> tuple[Step, str | None]:
+        """The next step and the event it ends on, the bodies left at its end."""
+        for body in self._bodies:
+            body.mark()
+        start = self._motions()
+        for halving in range(_MAX_HALVINGS + 1):
+            try:
+                at_once = self._immediate_event(start)
+                if at_once is not None:
+                    return Step(self.time, 0.0, self.phase, self._contact, self._foundation, start, start), at_once
+                return self._detect(self._attempt(size, start))
+            except StepRefused as refused:
+                for body in self._bodies:
+                    body.rewind()
+                if halving == _MAX_HALVINGS:
+                    residual = refused.residual if isinstance(refused, NotConverged) else None
+                    raise RunStopped(str(refused), self.time, residual) from refused
+                self.counts.halvings += 1
+                size *= 0.5
+        raise AssertionError("unreachable")
+
+    def _attempt(self, size: float, start: tuple[Motion, Motion]) -> Step:
+        """From the mark by ``size`` under the law of the phase."""
+        contact = foundation = NO_FORCE
+        upper, lower, spring = self._upper, self._lower, self._spring
+        ends = None if self._held is None or not self.phase.seated else self._held
+        if self.phase.joint is Joint.FREE:
+            if upper is not None:
+                upper.rewind()
+                upper.advance(self.time, size, NO_FORCE)
+            if lower is not None and ends is None:
+                lower.rewind()
+                lower.advance(self.time, size, NO_FORCE)
+        else:
+            assert upper is not None and lower is not None
+            partner = lower if ends is None else ends
+            if self._compliant and spring is not None:
+                penetration = start[1].displacement - start[0].displacement
+                contact = self._compliance.solve(upper, partner, self.time, size, self._contact, penetration)
+            else:
+                contact = self._tie.solve(upper, partner, self.time, size, self._contact, start[0])
+        if self.phase.seated:
+            foundation = contact
+            if spring is not None:
+                static = spring_force(self.scene.spring, self._stop)  # type: ignore[arg-type]
+                foundation = (contact[0] + static, contact[1], contact[2])
+                spring.rewind()
+                spring.advance(self.time, size, contact, foundation)
+        return Step(self.time, size, self.phase, contact, foundation, start, self._motions())
+
+    # -- events -------------------------------------------------------------------------------------------------
+
+    def _functions(self) -> list[tuple[str, Callable[[tuple[Motion, Motion]], Sample]]]:
+        """Event functions of the phase: positive while nothing happens, falling through zero at the event."""
+        tip, low = 0, 1
+        functions: list[tuple[str, Callable[[tuple[Motion, Motion]], Sample]]] = []
+
+        def between(a: int, b: int) -> Callable[[tuple[Motion, Motion]], Sample]:
+            return lambda m: Sample(m[a].displacement - m[b].displacement, m[a].velocity - m[b].velocity)
+
+        def above(a: int, level: float) -> Callable[[tuple[Motion, Motion]], Sample]:
+            return lambda m: Sample(m[a].displacement - level, m[a].velocity)
+
+        def below(a: int, level: float) -> Callable[[tuple[Motion, Motion]], Sample]:
+            return lambda m: Sample(level - m[a].displacement, -m[a].velocity)
+
+        joint, seated = self.phase.joint, self.phase.seated
+        if self._joinable:
+            if joint is Joint.FREE:
+                functions.append(("impact", between(tip, low)))
+            elif self._compliant:
+                functions.append(("separation", between(low, tip)))
+            psi = self.scene.spring.equilibrium  # type: ignore[union-attr]
+            if joint is Joint.TIED and not seated:
+                functions.append(("release", below(low, psi)))
+            if joint is Joint.TOUCH and not self._compliant:
+                functions.append(("retie", above(low, psi)))
+        if self._stop is not None and not seated:
+            functions.append(("stop_impact", above(low if self._spring is not None else tip, self._stop)))
+        return functions
+
+    def _immediate_event(self, start: tuple[Motion, Motion]) -> str | None:
+        rest = 1e-12 * max(abs(start[0].velocity), abs(start[1].velocity))
+        for kind, function in self._functions():
+            sample = function(start)
+            if sample.value <= self._position_tolerance(start) and sample.rate < -rest:
+                return kind
+        return None
+
+    def _detect(self, step: Step) -> tuple[Step, str | None]:
+        """The first event inside the step, located; the bodies are left at the end of what is returned."""
+        found: str | None = None
+        functions = self._functions()
+        for _ in range(2 * len(functions) + 1):
+            candidates = []
+            for kind, function in functions:
+                if kind == found:
+                    continue
+                bracket = self._bracket(function, step)
+                if bracket is not None:
+                    candidates.append((cubic_crossing(function(step.start), function(bracket.end), bracket.size),
+                                       kind, function, bracket))  # fmt: skip
+            if not candidates:
+                break
+            _, found, function, bracket = min(candidates, key=lambda c: c[0])
+            step = self._located(function, bracket)
+        else:
+            found = found or None
+        unilateral = self._unilateral(step)
+        return unilateral if unilateral is not None else (self._settled(step), found)
+
+    def _bracket(self, function: Callable[[tuple[Motion, Motion]], Sample], step: Step) -> Step | None:
+        """The step itself if ``function`` ends below zero, a shorter one if it dips below zero inside, or None."""
+        tolerance = self._position_tolerance(step.end)
+        start, end = function(step.start), function(step.end)
+        if end.value < -tolerance:
+            return step
+        inside = lowest_inside(start, end, step.size)
+        if inside is None or cubic_value(start, end, step.size, inside) >= -tolerance:
+            return None
+        dip = self._attempt(inside, step.start)
+        return dip if function(dip.end).value < -tolerance else None
+
+    def _located(self, function: Callable[[tuple[Motion, Motion]], Sample], bracket: Step) -> Step:
+        last = bracket
+
+        def evaluate(size: float) -> Sample:
+            nonlocal last
+            last = self._attempt(size, bracket.start)
+            return function(last.end)
+
+        tolerance = 0.25 * self._position_tolerance(bracket.end)
+        locate(evaluate, function(bracket.start), function(bracket.end), bracket.size, tolerance, self.time)
+        return last
+
+    def _settled(self, step: Step) -> Step:
+        """Leave the bodies at the end of ``step`` (a look inside it may have moved them)."""
+        if self._motions() == step.end:
+            return step
+        return self._attempt(step.size, step.start)
+
+    def _position_tolerance(self, motions: tuple[Motion, Motion]) -> float:
+        length = max(abs(motions[0].displacement), abs(motions[1].displacement), abs(self._stop or 0.0))
+        speed = max(abs(motions[0].velocity), abs(motions[1].velocity))
+        return 8.0 * _EPS * length + 1e-15 * speed * self.H
+
+    def _unilateral(self, step: Step) -> tuple[Step, str] | None:
+        """The step cut where a force that can only push would pull, and the event there."""
+        kind, pick = self._pushing()
+        if kind is None:
+            return None
+        f = pick(step)
+        if self._degree == 0:
+            return self._unilateral_mean(step, kind, f[0])
+        start, end = f[0], force.end_value(f, step.size)
+        if end >= 0.0:
+            return None
+        if start <= 0.0 and self._steps_in_phase == 0:
+            for body in self._bodies:
+                body.rewind()
+            return replace(step, size=0.0, end=step.start), kind
+        last = step
+
+        def evaluate(size: float) -> Sample:
+            nonlocal last
+            last = self._attempt(size, step.start)
+            g = pick(last)
+            return Sample(force.end_value(g, size), g[1] + size * g[2])
+
+        tolerance = 1e-10 * max(abs(start), abs(end))
+        samples = Sample(max(start, 0.0), f[1]), Sample(end, f[1] + step.size * f[2])
+        locate(evaluate, *samples, step.size, tolerance, self.time)
+        return last, kind
+
+    def _unilateral_mean(self, step: Step, kind: str, c: float) -> tuple[Step, str] | None:
+        """Degree 0: C belongs to the middle of its step; its alternating part is averaged out over two steps."""
+        if self._steps_in_phase == 0:
+            return None
+        before, previous = self._smoothed_before(kind), self._previous_size
+        mean = 0.5 * (c + before)
+        if mean >= 0.0 or (self._steps_in_phase < 2 and c >= 0.0):
+            return None
+        # Zero of the line through the middles, seen from the start of this step.
+        t_before, t_now = -0.5 * previous, 0.5 * step.size
+        at = t_before + (t_now - t_before) * before / (before - c) if before > 0.0 > c else 0.0
+        if at <= 1e-9 * self.H:
+            for body in self._bodies:
+                body.rewind()
+            return replace(step, size=0.0, end=step.start), kind
+        if at >= step.size:
+            return self._settled(step), kind
+        return self._attempt(at, step.start), kind
+
+    def _smoothed_before(self, kind: str) -> float:
+        return (self._foundation if kind == "unseated" else self._contact)[0]
+
+    def _pushing(self) -> tuple[str | None, Callable[[Step], Force]]:
+        if self.phase.seated:
+            return ("unseated" if self._spring is not None else "separation"), lambda s: s.foundation
+        if self.phase.joint is Joint.TOUCH and not self._compliant:
+            return "separation", lambda s: s.contact
+        return None, lambda s: s.contact
+
+    # -- what an event does -------------------------------------------------------------------------------------
+
+    def _settle_start(self) -> None:
+        """First contact at the start: the tip on the spring top (or the stop), moving down or at rest."""
+        if self._upper is None or self._lower is None:
+            return
+        tip, low = self._motions()
+        tolerance = self._position_tolerance((tip, low)) + 1e-12 * abs(low.displacement)
+        if abs(tip.displacement - low.displacement) > tolerance or tip.velocity - low.velocity > 0.0:
+            return
+        for body in self._bodies:
+            body.mark()
+        start = self._motions()
+        at_start = Step(self.time, 0.0, self.phase, NO_FORCE, NO_FORCE, start, start)
+        # The bodies are recorded as they arrive: the ledger starts before the impact.
+        self._ledger.book(*self._energies())
+        self._act("impact" if self._joinable else "stop_impact", at_start)
+
+    def _act(self, kind: str, step: Step) -> None:
+        self.counts.events += 1
+        tip, low = self._motions()
+        impact = Impact()
+        before = self.phase
+        if kind == "impact":
+            impact = self._meet(tip, low)
+        elif kind == "stop_impact":
+            impact, kind = self._strike(tip, low)
+        elif kind == "release":
+            pushing = self._end_force(step) > 0.0
+            self.phase = Phase(Joint.TOUCH if pushing else Joint.FREE)
+            if not pushing:
+                impact = self._part(tip, low)
+        elif kind == "retie":
+            self.phase = Phase(Joint.TIED)
+        elif kind == "separation":
+            self.phase = Phase(Joint.FREE, seated=before.seated and self._spring is not None)
+            if not self._compliant:
+                impact = self._part(tip, low)
+        elif kind == "unseated":
+            self.phase = Phase(before.joint)
+        self._apply(impact)
+        if self.phase != before:
+            self._steps_in_phase = 0
+            if self.phase.joint is Joint.FREE:
+                self._contact = NO_FORCE
+            if not self.phase.seated:
+                self._foundation = NO_FORCE
+        tip, low = self._motions()
+        beam, spring = self._beam is not None, self._spring is not None
+        self.recorder.event(
+            Event(
+                self.time,
+                kind,
+                low.displacement if spring else None,
+                low.velocity if spring else None,
+                tip.displacement if beam else None,
+                tip.velocity if beam else None,
+                impact.on_beam,
+                impact.of_foundation,
+                impact.energy_loss,
+            )
+        )
+
+    def _meet(self, tip: Motion, low: Motion) -> Impact:
+        assert self._beam is not None and self._spring is not None
+        if self._compliant:
+            self.phase = Phase(Joint.TOUCH, seated=self.phase.seated)
+            return Impact()
+        below = low.displacement < self.scene.spring.equilibrium  # type: ignore[union-attr]
+        if self.phase.seated:
+            # The seated spring does not move: the tip strikes the foundation through it.
+            self.phase = Phase(Joint.TIED, seated=True)
+            return foundation_impact(None, 0.0, tip.velocity, self._beam.mass, 0.0)
+        impact = meeting(self.scene.contact.impact, tip.velocity, low.velocity, self._beam.mass, self._spring.mass)
+        common = low.velocity + impact.on_spring / self._spring.mass
+        self.phase = Phase(Joint.TIED if below or common <= 0.0 and self._at_equilibrium(low) else Joint.TOUCH)
+        return impact
+
+    def _at_equilibrium(self, low: Motion) -> bool:
+        psi = self.scene.spring.equilibrium  # type: ignore[union-attr]
+        return abs(low.displacement - psi) <= 4.0 * self._position_tolerance((low, low)) + 1e-12 * abs(psi)
+
+    def _strike(self, tip: Motion, low: Motion) -> tuple[Impact, str]:
+        """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
+        e = self.scene.stop.restitution  # type: ignore[union-attr]
+        beam, spring = self._beam, self._spring
+        tied = spring is not None and beam is not None and self.phase.joint is not Joint.FREE and not self._compliant
+        if spring is None:
+            assert beam is not None
+            ends = (None, 0.0, tip.velocity, beam.mass)
+        else:
+            ends = (low.velocity, spring.mass, tip.velocity if tied else None, beam.mass if tied and beam else 0.0)
+        speed = max(abs(v) for v in (ends[0], ends[2]) if v is not None)
+        self._fastest_impact = max(self._fastest_impact, speed)
+        if e * speed <= _SEATING_SPEED * self._fastest_impact and e < 1.0 or speed == 0.0:
+            joint = self.phase.joint if spring is not None else Joint.TIED
+            self.phase = Phase(joint, seated=True)
+            return foundation_impact(*ends, 0.0), "seated"
+        return foundation_impact(*ends, e), "stop_impact"
+
+    def _part(self, tip: Motion, low: Motion) -> Impact:
+        """A tie that opens while its ends still close (the energy scheme lets velocities differ): they meet first."""
+        closing = tip.velocity - low.velocity
+        if self._spring is None or self._beam is None or closing >= 0.0 or self.phase.seated:
+            return Impact()
+        return meeting("inelastic", tip.velocity, low.velocity, self._beam.mass, self._spring.mass)
+
+    def _apply(self, impact: Impact) -> None:
+        if self._beam is not None and impact.on_beam != 0.0:
+            self._beam.apply_impulse(impact.on_beam)
+        if self._spring is not None and impact.on_spring != 0.0:
+            self._spring.apply_impulse(impact.on_spring)
+        self._ledger.impact_loss += impact.energy_loss
+
+    def _end_force(self, step: Step) -> float:
+        """C at the end of the step as well as the degree tells [N]."""
+        if self._degree > 0:
+            return force.end_value(step.contact, step.size)
+        return self._smoothed[0]
+
+    # -- bookkeeping --------------------------------------------------------------------------------------------
+
+    def _motions(self) -> tuple[Motion, Motion]:
+        """(tip, lower end); the one that is missing is at rest at 0."""
+        rest = Motion(0.0, 0.0, 0.0, 0.0)
+        return (
+            rest if self._upper is None else self._upper.motion(),
+            rest if self._lower is None else self._lower.motion(),
+        )
+
+    def _energies(self) -> tuple[Energies, Energies, float]:
+        nothing = Energies(0.0, 0.0, 0.0, 0.0)
+        contact = 0.0
+        if self._compliant and self._joinable:
+            tip, low = self._motions()
+            law = self.scene.contact
+            contact = compliance_energy(low.displacement - tip.displacement, law.stiffness, law.exponent)
+        return (
+            nothing if self._beam is None else self._beam.energies(),
+            nothing if self._spring is None else self._spring.energies(),
+            contact,
+        )
+
+    def _accept(self, step: Step, time: float) -> None:
+        self.time = time
+        self.counts.macro_steps += 1
+        first = self._steps_in_phase == 0
+        self._smoothed = (
+            step.contact[0] if first or self._degree else 0.5 * (step.contact[0] + self._contact[0]),
+            step.foundation[0] if first or self._degree else 0.5 * (step.foundation[0] + self._foundation[0]),
+        )
+        self._contact = force.shifted(step.contact, step.size)
+        self._foundation = force.shifted(step.foundation, step.size)
+        self._previous_size = step.size
+        self._steps_in_phase += 1
+
+    def _record(self) -> None:
+        tip, low = self._motions()
+        row: dict[str, Any] = {"time": self.time, "phase": str(self.phase)}
+        law = self.scene.contact
+        row.update(u_tip=tip.displacement, v_tip=tip.velocity, y=low.displacement, z=low.velocity)
+        row["gap"] = tip.displacement - low.displacement
+        contact = self._contact[0]
+        if self._compliant:
+            contact = compliance_force(-row["gap"], law.stiffness, law.exponent)
+        joined = self.phase.joint is not Joint.FREE
+        row["contact_force"] = contact
+        row["contact_force_smoothed"] = contact if self._degree or not joined or self._compliant else self._smoothed[0]
+        if self._joinable:
+            psi = self.scene.spring.equilibrium  # type: ignore[union-attr]
+            inside = 0.0 if self._compliant else compliance_force(psi - tip.displacement, law.stiffness, law.exponent)
+            row["compliance_force"] = contact if self._compliant else inside
+            row["tie_reaction"] = contact - row["compliance_force"]
+            row["velocity_mismatch"] = tip.velocity - low.velocity if joined else 0.0
+            if joined and not self._compliant:
+                self._largest_mismatch = max(self._largest_mismatch, abs(row["velocity_mismatch"]))
+        row["foundation_force"] = self._foundation[0]
+        self._largest_speed = max(self._largest_speed, abs(tip.velocity), abs(low.velocity))
+        row.update(self._ledger.book(*self._energies()))
+        try:
+            self.recorder.row(row)
+        except NonFiniteValue as error:
+            raise RunStopped(str(error), self.time) from error
+        self._record_shape(joined)
+
+    def _record_shape(self, joined: bool) -> None:
+        if self._beam is None:
+            return
+        early = joined and self._shapes_left > 0
+        if not early and self.time < self._next_shape:
+            return
+        self._shapes_left -= early
+        span = self.scene.time.t_end / _SHAPES_OVER_RUN
+        while self._next_shape <= self.time:
+            self._next_shape += span
+        self.recorder.shape(self.time, self._beam.shape())
+
+    def summary(self) -> dict[str, Any]:
+        """Counts, residuals and warnings, as they go into ``summary.json``."""
+        return {
+            "time": self.time,
+            "macro_steps": self.counts.macro_steps,
+            "events": self.counts.events,
+            "halved_steps": self.counts.halvings,
+            "iterations": self._tie.iterations + self._compliance.iterations,
+            "max_energy_residual": self._ledger.relative,
+            "max_energy_residual_joule": self._ledger.largest_residual,
+            "max_velocity_mismatch": self._largest_mismatch,
+            "warnings": self.warnings,
+        }
