@@ -1,0 +1,175 @@
+"""Spring and beam as one constraint-eliminated ODE per phase.
+
+State of every phase, a vector of length 2r + 3 (r modal coordinates of the beam, r = 0 without one)::
+
+    X = (a, ȧ, y, z, D),      D the energy dissipated so far [J]
+
+Dynamics, with u = bᵀa, p = f − ω²(a + α_b ȧ) the beam's own forces and s = f_s − α_s z − k1 y − k2 y³ the
+spring's (Ahn & Tate, eqs. (1)–(6), (8))::
+
+    free    ä = p + b C,  m z' = s − C,           C = 0; law `compliance`: C = λ_nc (y − u)₊^p
+    tied    ä = p + b C,  m z' = s − C,  u = y:   C = (s/m − bᵀp) / (bᵀb + 1/m)
+    seated  y = φ, z = 0, N = C − s;  tied: u = φ, C = −bᵀp / bᵀb;  without a spring: u = φ, N = C
+
+`touch` has the equations of `tied` and ends where C would become negative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ..scene import Scene, Spring
+from .semi_discrete import ModalBeam, modal_beam
+
+Contact = Literal["free", "touch", "tied"]
+
+
+class ReferenceFailure(RuntimeError):
+    """The reference cannot go on; the message says why and at which time."""
+
+
+class Phase(NamedTuple):
+    contact: Contact
+    seated: bool = False
+
+    @property
+    def name(self) -> str:
+        return "seated" if self.seated else self.contact
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Interface quantities of states X, each with the leading shape of X."""
+
+    u: np.ndarray  #: tip deflection [m]
+    v: np.ndarray  #: tip velocity [m/s]
+    y: np.ndarray  #: spring top [m]
+    z: np.ndarray  #: its velocity [m/s]
+    C: np.ndarray  #: contact force on the beam's tip, upward [N]
+    N: np.ndarray  #: force of the foundation, upward [N]
+    a: np.ndarray  #: modal accelerations ä
+    z_dot: np.ndarray  #: acceleration of the spring top [m/s²]
+
+
+class HybridSystem:
+    """Equations of motion, energies and interface forces of a scene, phase by phase."""
+
+    def __init__(self, scene: Scene) -> None:
+        if scene.contact.law == "paper":
+            raise ValueError("contact.law = 'paper': this reference knows 'transmission' and 'compliance'")
+        self.scene = scene
+        self.compliance = scene.contact.law == "compliance"
+        self.beam: ModalBeam | None = None if scene.beam is None else modal_beam(scene.beam)
+        self.has_spring = scene.spring is not None
+        #: Without a spring its terms vanish: no stiffness, and 1/m = 0.
+        self.spring = scene.spring or Spring(linear_stiffness=0.0)
+        self.inverse_mass = 1.0 / self.spring.mass if self.has_spring else 0.0
+        empty = np.zeros(0)
+        self.omega = empty if self.beam is None else self.beam.omega
+        self.b = empty if self.beam is None else self.beam.tip
+        self.load = empty if self.beam is None else self.beam.load
+        self.alpha_b = 0.0 if self.beam is None else self.beam.alpha
+        self.stiffness = self.omega**2
+        self.inverse_tip_mass = float(self.b @ self.b)
+        self.r = len(self.omega)
+        self.size = 2 * self.r + 3
+        self.A, self.V = slice(0, self.r), slice(self.r, 2 * self.r)
+        self.Y, self.Z, self.D = 2 * self.r, 2 * self.r + 1, 2 * self.r + 2
+
+    @property
+    def two_bodies(self) -> bool:
+        return self.beam is not None and self.has_spring
+
+    def joined(self, phase: Phase) -> bool:
+        """Whether u = y holds as a constraint."""
+        return self.two_bodies and not self.compliance and phase.contact != "free"
+
+    def spring_force(self, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """s = f_s − α_s z − k1 y − k2 y³ [N]."""
+        p = self.spring
+        return p.external_force - p.damping * z - (p.linear_stiffness + p.cubic_stiffness * y**2) * y
+
+    def compliance_force(self, penetration: np.ndarray) -> np.ndarray:
+        """λ_nc (penetration)₊^p [N]."""
+        law = self.scene.contact
+        return law.stiffness * np.maximum(penetration, 0.0) ** law.exponent
+
+    def motion(self, phase: Phase, X: np.ndarray) -> Motion:
+        """Accelerations and interface quantities of states of shape (..., 2r + 3)."""
+        a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
+        p = self.load - self.stiffness * (a + self.alpha_b * v)
+        u_tip, v_tip = a @ self.b, v @ self.b
+        s = self.spring_force(y, z) if self.has_spring else np.zeros_like(y)
+        N = np.zeros_like(y)
+        if self.joined(phase) or (phase.seated and not self.has_spring):
+            if phase.seated:
+                C = -(p @ self.b) / self.inverse_tip_mass
+                N = C - s
+            else:
+                C = (s * self.inverse_mass - p @ self.b) / (self.inverse_tip_mass + self.inverse_mass)
+        else:
+            in_contact = self.two_bodies and self.compliance and phase.contact != "free"
+            C = self.compliance_force(y - u_tip) if in_contact else np.zeros_like(y)
+            if phase.seated:
+                N = C - s
+        z_dot = np.zeros_like(y) if phase.seated else (s - C) * self.inverse_mass
+        return Motion(u_tip, v_tip, y, z, C, N, p + self.b * C[..., None], z_dot)
+
+    def derivative(self, phase: Phase, X: np.ndarray) -> np.ndarray:
+        """dX/dt for one state."""
+        m = self.motion(phase, X)
+        dX = np.empty_like(X)
+        dX[self.A] = X[self.V]
+        dX[self.V] = m.a
+        dX[self.Y] = 0.0 if phase.seated else X[self.Z]
+        dX[self.Z] = m.z_dot
+        dX[self.D] = self.dissipation_rate(X)
+        return dX
+
+    def dissipation_rate(self, X: np.ndarray) -> np.ndarray:
+        """α_b ȧᵀω²ȧ + α_s z² [W]."""
+        return self.alpha_b * (X[..., self.V] ** 2 @ self.stiffness) + self.spring.damping * X[..., self.Z] ** 2
+
+    def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
+        """X with y, z set to the tip's where they are tied."""
+        if self.joined(phase) and not phase.seated:
+            X[..., self.Y] = X[..., self.A] @ self.b
+            X[..., self.Z] = X[..., self.V] @ self.b
+        return X
+
+    def energies(self, X: np.ndarray, phase: Phase) -> dict[str, np.ndarray]:
+        """Energies [J] of states of shape (k, 2r + 3); ``e_load`` is minus the work of the constant loads."""
+        a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
+        p, law = self.spring, self.scene.contact
+        spring = (0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4) * float(
+            self.has_spring
+        )
+        contact = np.zeros_like(y)
+        if self.two_bodies and self.compliance and phase.contact != "free":
+            depth = np.maximum(y - a @ self.b, 0.0)
+            contact = law.stiffness * depth ** (law.exponent + 1.0) / (law.exponent + 1.0)
+        return {
+            "e_beam": 0.5 * np.sum(v**2 + self.stiffness * a**2, axis=-1),
+            "e_spring": spring,
+            "e_contact": contact,
+            "e_dissipated": X[..., self.D],
+            "e_load": -(a @ self.load) - p.external_force * y * float(self.has_spring),
+        }
+
+    def displacement_noise(self, X: np.ndarray) -> float:
+        """What rounding leaves of a displacement that is exactly zero [m]."""
+        stop = 0.0 if self.scene.stop is None else abs(self.scene.stop.position)
+        size = float(np.abs(X[self.A]) @ np.abs(self.b)) + abs(X[self.Y]) + stop
+        return 16.0 * np.finfo(float).eps * size
+
+    def force_noise(self, X: np.ndarray) -> float:
+        """What rounding leaves of a contact force that is exactly zero [N]."""
+        a, v = np.abs(X[self.A]), np.abs(X[self.V])
+        beam = float(np.abs(self.b) @ (self.stiffness * (a + self.alpha_b * v) + np.abs(self.load)))
+        p = self.spring
+        spring = abs(p.external_force) + p.damping * abs(X[self.Z]) + abs(p.linear_stiffness * X[self.Y])
+        weight = self.inverse_tip_mass + self.inverse_mass
+        return 16.0 * np.finfo(float).eps * (beam / weight + spring)
