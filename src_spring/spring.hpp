@@ -82,6 +82,7 @@ class Spring {
   double potential_energy() const;         ///< ½ k1 y² + ¼ k2 y⁴ [J]
   double contact_energy() const;           ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
   double dissipated_energy() const;        ///< ∫ α_s z² dt since the start, an integrated unknown [J]
+  double impact_loss() const;              ///< energy lost in stop impacts since the start [J]
   bool seated() const;                     ///< held on the foundation by the law inside
   long ida_steps() const;                  ///< internal IDA steps since the start
 

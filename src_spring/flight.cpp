@@ -1,0 +1,199 @@
+#include "flight.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace spring {
+namespace {
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+
+// The tolerances hold for a step, IDA's are per internal step: what is asked of IDA is a tenth.
+constexpr double safety = 0.1;
+// IDA's local error must stay this much above rounding in ÿ, or its error estimate is noise.
+constexpr double noise_margin = 20.0;
+// Taylor terms are used while H × (rate of the spring) is below this; beyond, they would only cancel.
+constexpr double resolved_limit = 3.0;
+// H / first step = 2ᵏ. IDA doubles step and order from 1 to 5, so 8 is the least that brings it to order 4.
+constexpr int least_halvings = 3, most_halvings = 48;
+
+enum Unknown { q, p, A, B, e, unknowns };
+
+}  // namespace
+
+std::vector<Crossing> Flight::crossings(const Laws& laws) {
+  std::vector<Crossing> list;
+  if (std::isfinite(laws.hilltop)) list.push_back(Crossing::falling);
+  for (bool active : {laws.stop, laws.compliance})
+    if (active) list.insert(list.end(), {Crossing::falling, Crossing::rising});
+  return list;
+}
+
+Flight::Flight(const Motion& motion, const Laws& laws)
+    : motion_(motion), laws_(laws), solver_(unknowns, crossings(laws)) {}
+
+void Flight::prepare(const FlightStart& start) {
+  start_ = start;
+  const double H = start.size, y = start.y, z = start.z;
+  const Compliance& contact = motion_.compliance();
+
+  auto d = motion_.derivatives(y, z, start.loads, false, 0.0);
+  touching_ = false;
+  std::array<double, 4> depth{};
+  if (laws_.compliance) {
+    const auto depths = [&] {
+      const auto& u = start.loads.tip.c;
+      return std::array<double, 5>{start.depth, z - u[1], d[2] - u[2], d[3], d[4]};
+    };
+    touching_ = Watch::direction(depths()) > 0.0;
+    contact_sign_ = touching_ ? 1.0 : -1.0;
+    if (touching_) d = motion_.derivatives(y, z, start.loads, true, start.depth);
+    auto distance = depths();
+    depth = {distance[0], distance[1], distance[2], distance[3]};
+    for (double& value : distance) value *= contact_sign_;
+    contact_watch_ = Watch(distance);
+  }
+  if (start.released) d[2] = 0.0;
+  if (laws_.stop) stop_watch_ = Watch({start.gap, z, d[2], d[3], d[4]});
+
+  const double travel = std::abs(z) * H + std::abs(d[2]) * H * H / 2;
+  const double depth_travel = std::abs(depth[1]) * H + std::abs(depth[2]) * H * H / 2;
+  const double force = touching_ ? contact.force(start.depth) : 0.0;
+  const double rate = motion_.rate(std::abs(y) + travel, touching_ ? contact.slope(start.depth + depth_travel) : 0.0);
+  const bool resolved = H * rate <= resolved_limit;
+  const bool smooth = !touching_ || contact.analytic() || start.depth > 2.0 * depth_travel;
+  const int order = !resolved ? 0 : smooth ? 4 : 2;
+  R_ = Taylor({d[0], d[1], d[2], d[3], d[4]}, order);
+
+  // Tolerances: of y and z by what they and their change over the step (or over 1/rate) are, then scaled.
+  const double span = std::min(H, 1.0 / std::max(rate, std::numeric_limits<double>::min()));
+  const double noise = noise_margin * epsilon * span *
+                       motion_.acceleration_scale(y, z, start.loads.force.c[0], force);
+  const double velocity = std::abs(z) + std::abs(d[2]) * span;
+  const double displacement = std::abs(y) + velocity * span;
+  const double tolerance_z =
+      std::max(safety * (laws_.relative_tolerance * velocity + laws_.absolute_tolerance), noise);
+  const double tolerance_y = std::max(
+      safety * (laws_.relative_tolerance * displacement + laws_.absolute_tolerance), noise * span);
+  relative_ = std::max(safety * laws_.relative_tolerance, 50.0 * epsilon);
+  double* tolerance = solver_.absolute_tolerance();
+  tolerance[q] = tolerance[A] = tolerance[B] = tolerance_y;
+  tolerance[p] = H * tolerance_z;
+  tolerance[e] = motion_.mass() * (velocity + tolerance_z) * tolerance_z;
+
+  // First step: the error of the low orders that IDA begins with, from the first derivative that R leaves out.
+  double h = H;
+  const auto limit = [&h](double bound, double exponent) {
+    if (bound < std::numeric_limits<double>::max()) h = std::min(h, std::pow(bound, exponent));
+  };
+  if (order == 4) {
+    const double neglected = std::abs(d[5]) + rate * rate * H * std::abs(d[4]);
+    limit(tolerance_z / (40.0 * neglected), 0.25);
+  } else {
+    limit(tolerance_z / std::abs(d[3]), 0.5);
+    if (order == 0) limit(tolerance_y / std::abs(d[2]), 0.5);
+  }
+  int halvings = std::max(least_halvings, static_cast<int>(std::ceil(std::log2(H / h))));
+  if (touching_ && !smooth) {
+    // Where the power law has no second derivative: the velocity that its growth over the first step would give.
+    const auto growth = [&](double t) {
+      const double deeper = start.depth + t * (std::abs(depth[1]) + t * std::abs(depth[2]) / 2);
+      return t * (contact.force(deeper) - force) / motion_.mass();
+    };
+    while (halvings < most_halvings && growth(std::ldexp(H, -halvings)) > tolerance_z) ++halvings;
+  }
+  h0_ = std::ldexp(1.0, -std::min(halvings, most_halvings));
+
+  double* Y = solver_.initial_value();
+  double* Yp = solver_.initial_derivative();
+  std::fill(Y, Y + unknowns, 0.0);
+  std::fill(Yp, Yp + unknowns, 0.0);
+  Y[p] = Yp[q] = H * (z - R_.rate(0.0));
+  Yp[p] = H * H * (d[2] - R_.second(0.0));
+  Yp[e] = order == 0 ? H * motion_.damping() * z * z : 0.0;
+}
+
+Flight::Event Flight::run(const FlightStart& start) {
+  prepare(start);
+  solver_.start(*this, relative_, h0_);
+  const int first = std::isfinite(laws_.hilltop) ? 1 : 0;
+  const int stop = first, contact = first + (laws_.stop ? 2 : 0);
+  Event event = Event::none;
+  while (event == Event::none && solver_.advance() == IdaSolver::Outcome::event) {
+    if (first == 1 && solver_.occurred(0)) event = Event::hilltop;
+    if (laws_.stop && event == Event::none && solver_.fell(stop, stop + 1)) event = Event::stop;
+    if (laws_.compliance && event == Event::none && solver_.fell(contact, contact + 1)) event = Event::contact;
+  }
+  finish();
+  if (event == Event::none && std::abs(y_) > laws_.hilltop) event = Event::hilltop;
+  return event;
+}
+
+double Flight::elapsed() const { return solver_.s() * start_.size; }
+
+void Flight::finish() {
+  const double H = start_.size, t = elapsed();
+  const double* Y = solver_.value();
+  const double rise = R_.rise(t) + Y[q];
+  y_ = start_.y + rise;
+  gap_ = start_.gap + rise;
+  z_ = R_.rate(t) + Y[p] / H;
+  integral_ = R_.integral(t) + H * Y[A];
+  integral_2_ = R_.integral_2(t) + H * H * Y[B];
+  dissipated_ = motion_.damping() * R_.squared_rate_integral(t) + Y[e];
+}
+
+bool Flight::residual(double s, const double* Y, const double* Yp, double* F) const noexcept {
+  const double H = start_.size, t = H * s;
+  const double w = Y[p] / H, rate = R_.rate(t);
+  const double rise = R_.rise(t) + Y[q];
+  const double y = start_.y + rise, z = rate + w;
+  double contact = 0.0;
+  if (touching_) {
+    const auto& u = start_.loads.tip.c;
+    contact = motion_.compliance().continued_force(start_.depth + rise - t * (u[1] + t * u[2] / 2));
+  }
+  const double a = motion_.acceleration(y, z, start_.loads.force(t), contact);
+  F[q] = Yp[q] - Y[p];
+  F[p] = Yp[p] - H * H * (a - R_.second(t));
+  F[A] = Yp[A] - Y[q];
+  F[B] = Yp[B] - Y[A];
+  F[e] = Yp[e] - H * motion_.damping() * w * (2.0 * rate + w);
+  return std::isfinite(F[p]) && std::isfinite(F[e]);
+}
+
+void Flight::jacobian(double s, double c, const double* Y, const double*, double* J) const noexcept {
+  const double H = start_.size, t = H * s;
+  const double rise = R_.rise(t) + Y[q];
+  double slope = 0.0;
+  if (touching_) {
+    const auto& u = start_.loads.tip.c;
+    slope = motion_.compliance().continued_slope(start_.depth + rise - t * (u[1] + t * u[2] / 2));
+  }
+  const auto at = [J](int row, int column) -> double& { return J[column * unknowns + row]; };
+  for (int i = 0; i < unknowns; ++i) at(i, i) = c;
+  at(q, p) = -1.0;
+  at(p, q) = -H * H * motion_.acceleration_by_displacement(start_.y + rise, slope);
+  at(p, p) = c - H * motion_.acceleration_by_velocity();
+  at(A, q) = -1.0;
+  at(B, A) = -1.0;
+  at(e, p) = -2.0 * motion_.damping() * (R_.rate(t) + Y[p] / H);
+}
+
+void Flight::events(double s, const double* Y, double* g) const noexcept {
+  const double H = start_.size, t = H * s;
+  const double rise = R_.rise(t) + Y[q], z = R_.rate(t) + Y[p] / H;
+  if (std::isfinite(laws_.hilltop)) *g++ = laws_.hilltop - std::abs(start_.y + rise);
+  if (laws_.stop) {
+    *g++ = stop_watch_.scaled(start_.gap + rise, t);
+    *g++ = z;
+  }
+  if (laws_.compliance) {
+    const auto& u = start_.loads.tip.c;
+    *g++ = contact_watch_.scaled(contact_sign_ * (start_.depth + rise - t * (u[1] + t * u[2] / 2)), t);
+    *g++ = contact_sign_ * (z - start_.loads.tip.rate(t));
+  }
+}
+
+}  // namespace spring

@@ -1,0 +1,83 @@
+// Free motion of the spring's top over one segment of a step, as an implicit system for IDA.
+//
+// With R the Taylor polynomial of the start (taylor.hpp), scaled time s = τ/H, w = ẏ − Ṙ:
+//     q = y − R,   p = H w,   A = ∫₀ˢ q,   B = ∫₀ˢ A,   e = D − ∫ α_s Ṙ² dτ        (D: dissipated energy)
+//     F = ( q' − p,   p' − H²[ÿ(y, ẏ, τ) − R̈],   A' − q,   B' − A,   e' − H α_s w (2Ṙ + w) ) = 0,
+// ÿ from motion.hpp. q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H² B.
+// All unknowns are under error control, see tolerances in flight.cpp.
+//
+// Events: [hilltop] |y| reaches the hilltop; [stop] y − φ falls to 0; [contact] y − u_tip changes sign. A gap that
+// starts at 0 is divided by its leading power of τ, so that the start itself is no root; a rate (ẏ, ẏ − u̇_tip) that
+// rises through 0 marks a minimum of the gap, so that a gap that dips below 0 between two internal steps is noticed.
+#pragma once
+
+#include <vector>
+
+#include "ida_solver.hpp"
+#include "motion.hpp"
+#include "taylor.hpp"
+#include "watch.hpp"
+
+namespace spring {
+
+/// Which laws an object has; fixes the event functions.
+struct Laws {
+  double hilltop;  ///< infinity: none
+  bool stop;
+  double stop_position;
+  bool compliance;
+  double relative_tolerance, absolute_tolerance;
+};
+
+/// Where a segment starts, and what may be known better than by subtraction.
+struct FlightStart {
+  double y, z;
+  Loads loads;
+  double size;          ///< H [s]
+  double gap;           ///< y − φ, exactly 0 after a stop event
+  double depth;         ///< y − u_tip, exactly 0 after a contact event
+  bool released;        ///< from the stop, N = 0: ÿ = 0 by definition
+};
+
+class Flight final : public ImplicitSystem {
+ public:
+  enum class Event { none, hilltop, stop, contact };
+
+  Flight(const Motion& motion, const Laws& laws);
+
+  /// @throws IdaError; s reached is solver().s()
+  Event run(const FlightStart& start);
+
+  // At the end of run():
+  double elapsed() const;  ///< τ
+  double displacement() const { return y_; }
+  double velocity() const { return z_; }
+  double gap() const { return gap_; }
+  double integral() const { return integral_; }
+  double integral_2() const { return integral_2_; }
+  double dissipated() const { return dissipated_; }
+  const IdaSolver& solver() const { return solver_; }
+
+  bool residual(double s, const double* Y, const double* Yp, double* F) const noexcept override;
+  void jacobian(double s, double c, const double* Y, const double* Yp, double* J) const noexcept override;
+  void events(double s, const double* Y, double* g) const noexcept override;
+
+ private:
+  static std::vector<Crossing> crossings(const Laws& laws);
+  void prepare(const FlightStart& start);
+  void finish();
+
+  const Motion& motion_;
+  const Laws laws_;
+  IdaSolver solver_;
+  // The segment.
+  FlightStart start_{};
+  Taylor R_;
+  bool touching_ = false;
+  double contact_sign_ = 1.0;
+  Watch stop_watch_, contact_watch_;
+  double relative_ = 0.0, h0_ = 1.0;
+  double y_ = 0.0, z_ = 0.0, gap_ = 0.0, integral_ = 0.0, integral_2_ = 0.0, dissipated_ = 0.0;
+};
+
+}  // namespace spring

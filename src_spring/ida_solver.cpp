@@ -1,0 +1,205 @@
+#include "ida_solver.hpp"
+
+#include <cstdlib>
+#include <limits>
+
+#include "sundials_compat.hpp"
+
+namespace spring {
+namespace {
+
+constexpr int max_order = 5;
+constexpr long max_steps = 10'000'000;  ///< per start(); a step that needs more is refused
+
+struct ContextDeleter {
+  void operator()(SUNContext context) const { SUNContext_Free(&context); }
+};
+struct VectorDeleter {
+  void operator()(N_Vector vector) const { N_VDestroy(vector); }
+};
+struct MatrixDeleter {
+  void operator()(SUNMatrix matrix) const { SUNMatDestroy(matrix); }
+};
+struct LinearSolverDeleter {
+  void operator()(SUNLinearSolver solver) const { SUNLinSolFree(solver); }
+};
+struct IdaDeleter {
+  void operator()(void* ida) const { IDAFree(&ida); }
+};
+template <class Handle, class Deleter>
+using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Deleter>;
+
+double* data(N_Vector vector) { return N_VGetArrayPointer(vector); }
+
+/// What the callbacks see.
+struct Problem {
+  const ImplicitSystem* system = nullptr;
+  std::vector<Crossing> crossings;
+};
+
+const ImplicitSystem& system_of(void* user_data) { return *static_cast<const Problem*>(user_data)->system; }
+
+int residual(sunrealtype s, N_Vector Y, N_Vector Yp, N_Vector F, void* user_data) {
+  return system_of(user_data).residual(s, data(Y), data(Yp), data(F)) ? 0 : 1;
+}
+
+int jacobian(sunrealtype s, sunrealtype c, N_Vector Y, N_Vector Yp, N_Vector, SUNMatrix J, void* user_data, N_Vector,
+             N_Vector, N_Vector) {
+  system_of(user_data).jacobian(s, c, data(Y), data(Yp), SUNDenseMatrix_Data(J));
+  return 0;
+}
+
+int events(sunrealtype s, N_Vector Y, N_Vector, sunrealtype* g, void* user_data) {
+  const auto& problem = *static_cast<const Problem*>(user_data);
+  problem.system->events(s, data(Y), g);
+  // An exact zero counts as not yet crossed: IDA would switch the event function off, and keep it off after IDAReInit.
+  for (std::size_t i = 0; i < problem.crossings.size(); ++i)
+    if (g[i] == 0.0) g[i] = -static_cast<int>(problem.crossings[i]) * std::numeric_limits<double>::min();
+  return 0;
+}
+
+}  // namespace
+
+struct IdaSolver::Impl {
+  // Order matters: the context outlives everything made in it.
+  Owned<SUNContext, ContextDeleter> context;
+  Owned<N_Vector, VectorDeleter> Y0, Yp0, tolerance, Y, Yp;
+  Owned<SUNMatrix, MatrixDeleter> J;
+  Owned<SUNLinearSolver, LinearSolverDeleter> linear_solver;
+  std::unique_ptr<void, IdaDeleter> ida;
+  Problem problem;
+  std::string message;
+  int n = 0;
+  std::vector<int> occurred;
+  std::vector<double> event_values;
+  double s = 0.0;
+
+  [[noreturn]] void fail(const char* what, int code) const {
+    std::unique_ptr<char, decltype(&std::free)> name(IDAGetReturnFlagName(code), &std::free);
+    throw IdaError(std::string(what) + ": " + (name ? name.get() : "unknown flag") +
+                   (message.empty() ? std::string() : " (" + message + ")"));
+  }
+  void check(int code, const char* what) const {
+    if (code < 0) fail(what, code);
+  }
+  N_Vector new_vector() const {
+    N_Vector vector = N_VNew_Serial(n, context.get());
+    if (vector == nullptr) throw std::bad_alloc();
+    return vector;
+  }
+};
+
+IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings) : impl_(std::make_unique<Impl>()) {
+  Impl& d = *impl_;
+  d.n = unknowns;
+  d.problem.crossings = crossings;
+  d.occurred.assign(crossings.size(), 0);
+  d.event_values.assign(crossings.size(), 0.0);
+  SUNContext context = nullptr;
+  if (compat::create_context(&context) != 0) throw std::bad_alloc();
+  d.context.reset(context);
+  for (auto* vector : {&d.Y0, &d.Yp0, &d.tolerance, &d.Y, &d.Yp}) vector->reset(d.new_vector());
+  for (N_Vector vector : {d.Y0.get(), d.Yp0.get()}) N_VConst(0.0, vector);
+  N_VConst(1.0, d.tolerance.get());
+  d.J.reset(SUNDenseMatrix(unknowns, unknowns, context));
+  if (!d.J) throw std::bad_alloc();
+  d.linear_solver.reset(SUNLinSol_Dense(d.Y0.get(), d.J.get(), context));
+  if (!d.linear_solver) throw std::bad_alloc();
+  d.ida.reset(IDACreate(context));
+  if (!d.ida) throw std::bad_alloc();
+  void* ida = d.ida.get();
+  d.check(compat::redirect_messages(context, ida, &d.message), "error handler");
+  d.check(IDAInit(ida, residual, 0.0, d.Y0.get(), d.Yp0.get()), "IDAInit");
+  d.check(IDASVtolerances(ida, 1e-6, d.tolerance.get()), "IDASVtolerances");
+  d.check(IDASetUserData(ida, &d.problem), "IDASetUserData");
+  d.check(IDASetLinearSolver(ida, d.linear_solver.get(), d.J.get()), "IDASetLinearSolver");
+  d.check(IDASetJacFn(ida, jacobian), "IDASetJacFn");
+  d.check(IDASetMaxOrd(ida, max_order), "IDASetMaxOrd");
+  d.check(IDASetMaxNumSteps(ida, max_steps), "IDASetMaxNumSteps");
+  if (!crossings.empty()) {
+    d.check(IDARootInit(ida, static_cast<int>(crossings.size()), events), "IDARootInit");
+    std::vector<int> directions;
+    for (Crossing crossing : crossings) directions.push_back(static_cast<int>(crossing));
+    d.check(IDASetRootDirection(ida, directions.data()), "IDASetRootDirection");
+    d.check(IDASetNoInactiveRootWarn(ida), "IDASetNoInactiveRootWarn");
+  }
+}
+
+IdaSolver::~IdaSolver() = default;
+
+int IdaSolver::unknowns() const { return impl_->n; }
+int IdaSolver::event_functions() const { return static_cast<int>(impl_->occurred.size()); }
+double* IdaSolver::initial_value() { return data(impl_->Y0.get()); }
+double* IdaSolver::initial_derivative() { return data(impl_->Yp0.get()); }
+double* IdaSolver::absolute_tolerance() { return data(impl_->tolerance.get()); }
+
+void IdaSolver::start(const ImplicitSystem& system, double relative_tolerance, double first_step) {
+  Impl& d = *impl_;
+  void* ida = d.ida.get();
+  d.problem.system = &system;
+  d.message.clear();
+  d.s = 0.0;
+  d.check(IDAReInit(ida, 0.0, d.Y0.get(), d.Yp0.get()), "IDAReInit");
+  d.check(IDASVtolerances(ida, relative_tolerance, d.tolerance.get()), "IDASVtolerances");
+  d.check(IDASetInitStep(ida, first_step), "IDASetInitStep");
+  d.check(IDASetStopTime(ida, 1.0), "IDASetStopTime");
+}
+
+IdaSolver::Outcome IdaSolver::advance() {
+  Impl& d = *impl_;
+  const int code = IDASolve(d.ida.get(), 1.0, &d.s, d.Y.get(), d.Yp.get(), IDA_NORMAL);
+  if (code < 0) d.fail("IDASolve", code);
+  if (code != IDA_ROOT_RETURN) return Outcome::finished;
+  d.check(IDAGetRootInfo(d.ida.get(), d.occurred.data()), "IDAGetRootInfo");
+  return Outcome::event;
+}
+
+double IdaSolver::s() const { return impl_->s; }
+const double* IdaSolver::value() const { return data(impl_->Y.get()); }
+bool IdaSolver::occurred(int event) const { return impl_->occurred[static_cast<std::size_t>(event)] != 0; }
+
+bool IdaSolver::fell(int distance, int rate) {
+  if (occurred(distance)) return true;
+  if (!occurred(rate) || event_value(distance) >= 0.0) return false;
+  double above = last_step_start(), below = s();
+  while (below - above > 4.0 * std::numeric_limits<double>::epsilon()) {
+    const double middle = above + (below - above) / 2;
+    interpolate(middle);
+    (event_value(distance) < 0.0 ? below : above) = middle;
+  }
+  interpolate(above);
+  return true;
+}
+
+double IdaSolver::event_value(int event) const {
+  std::vector<double>& g = impl_->event_values;
+  impl_->problem.system->events(s(), value(), g.data());
+  return g[static_cast<std::size_t>(event)];
+}
+
+double IdaSolver::last_step_start() const {
+  double end = 0.0, size = 0.0;
+  impl_->check(IDAGetCurrentTime(impl_->ida.get(), &end), "IDAGetCurrentTime");
+  impl_->check(IDAGetLastStep(impl_->ida.get(), &size), "IDAGetLastStep");
+  return end - size;
+}
+
+void IdaSolver::interpolate(double s) {
+  Impl& d = *impl_;
+  d.check(IDAGetDky(d.ida.get(), s, 0, d.Y.get()), "IDAGetDky");
+  d.s = s;
+}
+
+long IdaSolver::steps() const {
+  long steps = 0;
+  impl_->check(IDAGetNumSteps(impl_->ida.get(), &steps), "IDAGetNumSteps");
+  return steps;
+}
+
+long IdaSolver::residual_evaluations() const {
+  long evaluations = 0;
+  impl_->check(IDAGetNumResEvals(impl_->ida.get(), &evaluations), "IDAGetNumResEvals");
+  return evaluations;
+}
+
+}  // namespace spring

@@ -1,0 +1,137 @@
+#include "seated.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace spring {
+namespace {
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr double safety = 0.1;         ///< as in flight.cpp
+constexpr double noise_margin = 20.0;  ///< as in flight.cpp
+constexpr int least_halvings = 3, most_halvings = 48;
+
+enum Unknown { eta, zeta, n, P, unknowns };
+
+}  // namespace
+
+std::vector<Crossing> Seated::crossings(const Laws& laws) {
+  std::vector<Crossing> list{Crossing::falling, Crossing::rising};
+  if (laws.compliance) list.insert(list.end(), {Crossing::falling, Crossing::rising});
+  return list;
+}
+
+Seated::Seated(const Motion& motion, const Laws& laws)
+    : motion_(motion), laws_(laws), solver_(unknowns, crossings(laws)) {}
+
+bool Seated::holds(const std::array<double, 3>& holding_force) {
+  return Watch::direction({holding_force[0], holding_force[1], holding_force[2], 0.0, 0.0}) >= 0.0;
+}
+
+double Seated::contact_depth(double displacement, double t) const {
+  const auto& u = start_.loads.tip.c;
+  return start_.depth + displacement - t * (u[1] + t * u[2] / 2);
+}
+
+void Seated::prepare(const SeatedStart& start) {
+  start_ = start;
+  const double H = start.size, y = laws_.stop_position;
+  const Compliance& contact = motion_.compliance();
+  const auto& u = start.loads.tip.c;
+
+  std::array<double, 5> depth{start.depth, -u[1], -u[2], 0.0, 0.0};
+  touching_ = laws_.compliance && Watch::direction(depth) > 0.0;
+  contact_sign_ = touching_ ? 1.0 : -1.0;
+  for (double& value : depth) value *= contact_sign_;
+  contact_watch_ = Watch(depth);
+
+  auto N = motion_.holding_force(y, start.loads, touching_, start.depth);
+  const double depth_travel = std::abs(u[1]) * H + std::abs(u[2]) * H * H / 2;
+  const bool smooth = !touching_ || contact.analytic() || start.depth > 2.0 * depth_travel;
+  release_watch_ = smooth ? Watch({N[0], N[1], N[2], 0.0, 0.0}) : Watch({N[0], 0.0, 0.0, 0.0, 0.0});
+  N_.c = smooth ? N : std::array<double, 3>{N[0], 0.0, 0.0};
+
+  const double force = touching_ ? contact.force(start.depth) : 0.0;
+  const double deepest = touching_ ? contact.force(start.depth + depth_travel) : 0.0;
+  const double scale =
+      motion_.mass() * motion_.acceleration_scale(y, 0.0, start.loads.force.c[0], force) + std::abs(deepest - force);
+  const double tolerance_N =
+      std::max(safety * (laws_.relative_tolerance * scale + laws_.absolute_tolerance), noise_margin * epsilon * scale);
+  relative_ = std::max(safety * laws_.relative_tolerance, 50.0 * epsilon);
+  double* tolerance = solver_.absolute_tolerance();
+  tolerance[eta] = tolerance[zeta] = safety * laws_.absolute_tolerance;
+  tolerance[n] = tolerance_N;
+  tolerance[P] = H * tolerance_N;
+
+  // First step: P by the first order is wrong by the change of N − N_R over it.
+  int halvings = least_halvings;
+  const auto growth = [&](double t) {
+    const double deeper = start.depth + t * (std::abs(u[1]) + t * std::abs(u[2]) / 2);
+    return t / H * std::abs(contact.force(deeper) - force);
+  };
+  if (touching_) {
+    while (halvings < most_halvings && growth(std::ldexp(H, -halvings)) > tolerance_N) ++halvings;
+  }
+  h0_ = std::ldexp(1.0, -halvings);
+
+  double* Y = solver_.initial_value();
+  double* Yp = solver_.initial_derivative();
+  std::fill(Y, Y + unknowns, 0.0);
+  std::fill(Yp, Yp + unknowns, 0.0);
+}
+
+Seated::Event Seated::run(const SeatedStart& start) {
+  prepare(start);
+  solver_.start(*this, relative_, h0_);
+  Event event = Event::none;
+  while (event == Event::none && solver_.advance() == IdaSolver::Outcome::event) {
+    if (solver_.fell(0, 1))
+      event = Event::release;
+    else if (laws_.compliance && solver_.fell(2, 3))
+      event = Event::contact;
+  }
+  const double t = elapsed();
+  impulse_ = t * (N_.c[0] + t * (N_.c[1] / 2 + t * N_.c[2] / 6)) + start.size * solver_.value()[P];
+  return event;
+}
+
+double Seated::elapsed() const { return solver_.s() * start_.size; }
+
+bool Seated::residual(double s, const double* Y, const double* Yp, double* F) const noexcept {
+  const double t = s * start_.size, y = laws_.stop_position + Y[eta];
+  const double contact = touching_ ? motion_.compliance().continued_force(contact_depth(Y[eta], t)) : 0.0;
+  F[eta] = Y[eta];
+  F[zeta] = Y[zeta];
+  F[n] = N_(t) + Y[n] + motion_.mass() * motion_.acceleration(y, Y[zeta], start_.loads.force(t), contact);
+  F[P] = Yp[P] - Y[n];
+  return std::isfinite(F[n]);
+}
+
+void Seated::jacobian(double s, double c, const double* Y, const double*, double* J) const noexcept {
+  const double t = s * start_.size, y = laws_.stop_position + Y[eta];
+  const double slope = touching_ ? motion_.compliance().continued_slope(contact_depth(Y[eta], t)) : 0.0;
+  const auto at = [J](int row, int column) -> double& { return J[column * unknowns + row]; };
+  at(eta, eta) = 1.0;
+  at(zeta, zeta) = 1.0;
+  at(n, eta) = motion_.mass() * motion_.acceleration_by_displacement(y, slope);
+  at(n, zeta) = motion_.mass() * motion_.acceleration_by_velocity();
+  at(n, n) = 1.0;
+  at(P, n) = -1.0;
+  at(P, P) = c;
+}
+
+void Seated::events(double s, const double* Y, double* g) const noexcept {
+  const double t = s * start_.size;
+  const auto& u = start_.loads.tip;
+  const double depth = contact_depth(Y[eta], t);
+  const double contact_rate = touching_ ? -motion_.compliance().continued_slope(depth) * u.rate(t) : 0.0;
+  *g++ = release_watch_.scaled(N_(t) + Y[n], t);
+  *g++ = contact_rate - start_.loads.force.rate(t);
+  if (laws_.compliance) {
+    *g++ = contact_watch_.scaled(contact_sign_ * depth, t);
+    *g++ = -contact_sign_ * u.rate(t);
+  }
+}
+
+}  // namespace spring

@@ -1,0 +1,271 @@
+#include "spring.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "flight.hpp"
+#include "motion.hpp"
+#include "parameters.hpp"
+#include "seated.hpp"
+
+namespace spring {
+namespace {
+
+constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr long most_segments = 1'000'000;  ///< in one step; more events than this are refused
+
+/// Everything that a step changes. All members are doubles, so that the flat vector is this struct.
+struct State {
+  double y, z;
+  double integral = 0.0, integral_2 = 0.0;
+  double dissipated = 0.0, impact_loss = 0.0;
+  double stop_force = 0.0, stop_impulse = 0.0;
+  double seated = 0.0;               ///< 1 on the foundation
+  double force = 0.0, tip = 0.0;     ///< F and u_tip where the step ended
+  double steps = 0.0;                ///< IDA's, since the start
+};
+
+template <class Visit>
+void for_each(State& s, Visit visit) {
+  for (double* value : {&s.y, &s.z, &s.integral, &s.integral_2, &s.dissipated, &s.impact_loss, &s.stop_force,
+                        &s.stop_impulse, &s.seated, &s.force, &s.tip, &s.steps})
+    visit(*value);
+}
+constexpr std::size_t state_length = 12;
+
+}  // namespace
+
+struct Spring::Impl {
+  const Parameters parameters;
+  const Motion motion;
+  const Laws laws;
+  Flight flight;
+  std::optional<Seated> seated;
+  State state;
+
+  explicit Impl(const Parameters& p)
+      : parameters(p),
+        motion(p),
+        laws{hilltop(p),
+             p.stop_enabled,
+             p.stop_position,
+             p.contact_law == ContactLaw::normal_compliance,
+             p.relative_tolerance,
+             p.absolute_tolerance},
+        flight(motion, laws),
+        state{p.displacement, p.velocity} {
+    if (laws.stop) seated.emplace(motion, laws);
+  }
+
+  double depth(const State& s) const { return laws.compliance ? s.y - s.tip : -1.0; }
+  double contact(const State& s) const { return laws.compliance ? motion.compliance().force(depth(s)) : 0.0; }
+
+  State advanced(double size, const Inputs& inputs);
+};
+
+namespace {
+
+/// One step: a sequence of segments, each smooth, joined by events.
+class Step {
+ public:
+  Step(const Motion& motion, const Laws& laws, double restitution, Flight& flight, Seated* seat, State state,
+       double size, const Loads& loads)
+      : motion_(motion),
+        laws_(laws),
+        restitution_(restitution),
+        flight_(flight),
+        seat_(seat),
+        state_(state),
+        size_(size),
+        loads_(loads) {}
+
+  State run() {
+    state_.integral = state_.integral_2 = state_.stop_force = state_.stop_impulse = 0.0;
+    double held = 0.0;  // ∫N while seated
+    for (long segments = 0; remaining() > 0.0; ++segments) {
+      if (segments == most_segments)
+        throw StepFailure("spring: more than " + std::to_string(most_segments) + " contact events in one step of " +
+                              number(size_) + " s",
+                          t_);
+      now_ = loads_.shifted(t_);
+      if (!depth_) depth_ = laws_.compliance ? state_.y - now_.tip.c[0] : -1.0;
+      if (laws_.stop) land();
+      if (state_.seated != 0.0)
+        held += sit();
+      else
+        fly();
+    }
+    state_.stop_force = held / size_;
+    state_.force = loads_.force(size_);
+    state_.tip = loads_.tip(size_);
+    return state_;
+  }
+
+ private:
+  /// What is left, or 0 where that is rounding.
+  double remaining() const {
+    const double left = size_ - t_;
+    return left > 4.0 * epsilon * size_ ? left : 0.0;
+  }
+
+  bool touching() const {
+    const auto& u = now_.tip.c;
+    return laws_.compliance && Watch::direction({*depth_, state_.z - u[1], -u[2], 0.0, 0.0}) > 0.0;
+  }
+
+  /// At the foundation: rebound, or come to rest, or leave.
+  /// Deviation: impacts that die out are cut short when the top, pressed down, would rise no higher than the solver's
+  /// tolerance of y; its last velocity is then lost too.
+  void land() {
+    const double gap = state_.y - laws_.stop_position;
+    if (gap > 0.0) {
+      state_.seated = 0.0;
+      return;
+    }
+    const auto N = motion_.holding_force(state_.y, now_, touching(), *depth_);
+    const bool pressed = Seated::holds(N);
+    const double before = state_.z;
+    if (before < 0.0) {
+      const double pull = std::max(N[0], 0.0) / motion_.mass();  // −ÿ
+      const double rebound = -restitution_ * before;
+      const double tolerance = laws_.relative_tolerance * std::abs(state_.y) + laws_.absolute_tolerance;
+      const bool dies_out = pressed && rebound * rebound <= 2.0 * pull * tolerance;
+      state_.z = dies_out ? 0.0 : rebound;
+      state_.stop_impulse += motion_.mass() * (state_.z - before);
+      state_.impact_loss += motion_.mass() / 2 * (before * before - state_.z * state_.z);
+    }
+    state_.seated = state_.z == 0.0 && pressed && !released_ ? 1.0 : 0.0;
+  }
+
+  void fly() {
+    const double gap = laws_.stop ? state_.y - laws_.stop_position : 1.0;
+    const FlightStart start{state_.y, state_.z, now_, remaining(), gap, *depth_, released_};
+    const auto event = attempt(flight_, start);
+    released_ = false;
+    state_.integral_2 += state_.integral * flight_.elapsed() + flight_.integral_2();
+    state_.integral += flight_.integral();
+    state_.dissipated += flight_.dissipated();
+    state_.y = flight_.displacement();
+    state_.z = flight_.velocity();
+    t_ += flight_.elapsed();
+    if (event == Flight::Event::hilltop)
+      throw Escape("spring: y = " + number(state_.y) + " m is past the hilltop |y| = " + number(laws_.hilltop) +
+                       " m of the softening spring, reached " + number(t_) + " s after the step's start",
+                   t_);
+    if (laws_.stop)
+      state_.y = event == Flight::Event::stop ? laws_.stop_position
+                                              : laws_.stop_position + std::max(flight_.gap(), 0.0);
+    depth_.reset();
+    if (event == Flight::Event::contact) depth_ = 0.0;
+    if (event == Flight::Event::none) t_ = size_;
+  }
+
+  /// @return ∫N
+  double sit() {
+    const auto event = attempt(*seat_, SeatedStart{now_, remaining(), *depth_});
+    const double t = seat_->elapsed();
+    state_.integral_2 += state_.integral * t + state_.y * t * t / 2;
+    state_.integral += state_.y * t;
+    t_ += t;
+    released_ = event == Seated::Event::release;
+    if (released_) state_.seated = 0.0;
+    depth_.reset();
+    if (event == Seated::Event::contact) depth_ = 0.0;
+    if (event == Seated::Event::none) t_ = size_;
+    return seat_->impulse();
+  }
+
+  template <class Phase, class Start>
+  typename Phase::Event attempt(Phase& phase, const Start& start) {
+    try {
+      const auto event = phase.run(start);
+      state_.steps += static_cast<double>(phase.solver().steps());
+      return event;
+    } catch (const IdaError& error) {
+      const double reached = t_ + phase.solver().s() * start.size;
+      throw StepFailure(std::string("spring: ") + error.what() + ", " + number(reached) + " s after the step's start",
+                        reached);
+    }
+  }
+
+  const Motion& motion_;
+  const Laws& laws_;
+  const double restitution_;
+  Flight& flight_;
+  Seated* seat_;
+  State state_;
+  const double size_;
+  const Loads loads_;
+  double t_ = 0.0;                ///< since the step's start
+  Loads now_;                     ///< loads_ from t_ on
+  std::optional<double> depth_;   ///< y − u_tip at t_, exactly 0 after a contact event
+  bool released_ = false;         ///< has just left the foundation, N = 0
+};
+
+}  // namespace
+
+State Spring::Impl::advanced(double size, const Inputs& inputs) {
+  return Step(motion, laws, parameters.restitution, flight, seated ? &*seated : nullptr, state, size,
+              Loads::from(parameters, inputs))
+      .run();
+}
+
+Spring::Spring(const Parameters& parameters) {
+  check(parameters);
+  impl_ = std::make_unique<Impl>(parameters);
+}
+Spring::~Spring() = default;
+Spring::Spring(Spring&&) noexcept = default;
+Spring& Spring::operator=(Spring&&) noexcept = default;
+
+void Spring::step(double size, const Inputs& inputs) {
+  if (!(size > 0.0) || !std::isfinite(size))
+    throw std::invalid_argument("spring: step size = " + number(size) + ": must be > 0 and finite");
+  check(inputs);
+  impl_->state = impl_->advanced(size, inputs);
+}
+
+void Spring::apply_impulse(double impulse) {
+  if (!std::isfinite(impulse)) throw std::invalid_argument("spring: impulse = " + number(impulse) + ": must be finite");
+  impl_->state.z += impulse / impl_->parameters.mass;
+  if (impl_->state.z != 0.0) impl_->state.seated = 0.0;
+}
+
+double Spring::displacement() const { return impl_->state.y; }
+double Spring::velocity() const { return impl_->state.z; }
+double Spring::acceleration() const {
+  const State& s = impl_->state;
+  return seated() ? 0.0 : impl_->motion.acceleration(s.y, s.z, s.force, impl_->contact(s));
+}
+double Spring::displacement_integral() const { return impl_->state.integral; }
+double Spring::displacement_integral_2() const { return impl_->state.integral_2; }
+double Spring::reaction() const { return impl_->contact(impl_->state); }
+double Spring::stop_force() const { return impl_->state.stop_force; }
+double Spring::stop_impulse() const { return impl_->state.stop_impulse; }
+double Spring::kinetic_energy() const { return impl_->parameters.mass / 2 * impl_->state.z * impl_->state.z; }
+double Spring::potential_energy() const { return impl_->motion.potential_energy(impl_->state.y); }
+double Spring::contact_energy() const {
+  return impl_->laws.compliance ? impl_->motion.compliance().energy(impl_->depth(impl_->state)) : 0.0;
+}
+double Spring::dissipated_energy() const { return impl_->state.dissipated; }
+double Spring::impact_loss() const { return impl_->state.impact_loss; }
+bool Spring::seated() const { return impl_->state.seated != 0.0; }
+long Spring::ida_steps() const { return static_cast<long>(impl_->state.steps); }
+
+void Spring::save(std::vector<double>& state) const {
+  state.clear();
+  state.reserve(state_length);
+  for_each(impl_->state, [&state](double value) { state.push_back(value); });
+}
+
+void Spring::restore(const std::vector<double>& state) {
+  if (state.size() != state_length)
+    throw std::invalid_argument("spring: a saved state has " + std::to_string(state_length) + " numbers, not " +
+                                std::to_string(state.size()));
+  std::size_t i = 0;
+  for_each(impl_->state, [&](double& value) { value = state[i++]; });
+}
+
+}  // namespace spring
