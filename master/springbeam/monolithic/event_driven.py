@@ -12,9 +12,10 @@ stop_impact    y = φ with z < 0: z → −e z, and the tied tip likewise, by J 
                the tip on the stop
 release        tied, y rises through Ψ; goes on as `touch` if C > 0 there, else as `free`
 retie          touch, y falls through Ψ
-separation     touch, C becomes negative (`compliance`: the penetration ends)
-seated         bounces have died out: the flight after an impact would rise less than ``seat_height``
-unseated       seated, N becomes negative
+separation     touch, C becomes negative (`compliance`: the penetration ends); at once where a meeting above Ψ
+               leaves C < 0
+seated         the impact after which bounces have died out: the flight would rise less than ``seat_height``
+unseated       seated, N becomes negative; without a spring this is the tip's `separation`
 =============  ====================================================================================================
 
 With ``contact.impact = "rest"`` tip and spring keep different velocities, which the rigid tie u = y cannot: the
@@ -180,15 +181,14 @@ class _Run:
         m = s.motion(self.phase, X)
         noise = s.displacement_noise(X)
         if s.two_bodies and float(m.u - m.y) <= noise:
-            if m.v < m.z:
+            if m.v <= m.z:
                 self._meet()
-            elif m.v == m.z:
-                self.phase = Phase("touch" if s.compliance else self._joined_contact())
         elif not s.has_spring and self.scene.stop is not None and m.u - self.scene.stop.position <= noise:
             if m.v < 0.0:
                 self._hit_stop()
             elif m.v == 0.0 and m.a @ s.b < 0.0:
                 self._seat()
+                self._emit("seated")
 
     # Main loop ------------------------------------------------------------------------------------------------------
 
@@ -354,8 +354,7 @@ class _Run:
         if name == "meet":
             self._meet()
         elif name == "separate":
-            self.phase = Phase("free", self.phase.seated)
-            self._emit("separation")
+            self._part()
         elif name == "release":
             contact = "touch" if self._contact_force(Phase("touch")) > 0.0 else "free"
             self.phase = Phase(contact)  # type: ignore[arg-type]
@@ -365,7 +364,7 @@ class _Run:
             self._emit("retie")
         elif name == "unseat":
             self.phase = Phase(self.phase.contact)
-            self._emit("unseated")
+            self._emit("unseated" if s.has_spring else "separation")
         elif name == "stop":
             self._hit_stop()
         s.synchronise(self.phase, self.X)
@@ -373,16 +372,18 @@ class _Run:
     def _contact_force(self, phase: Phase) -> float:
         return float(self.system.motion(phase, self.X).C)
 
-    def _joined_contact(self) -> Any:
-        """Which contact follows when tip and spring are together with equal velocities."""
+    def _below_equilibrium(self) -> bool:
+        """Whether tip and spring, together with one velocity, are (about to be) below Ψ, where the tie is bilateral."""
         s, X = self.system, self.X
         m = s.motion(Phase("tied"), X)
         height = float(m.y) - s.spring.equilibrium
         if abs(height) <= s.displacement_noise(X):
             height = float(m.z) if m.z != 0.0 else float(m.z_dot)
-        if height < 0.0:
-            return "tied"
-        return "touch" if m.C >= 0.0 else "free"
+        return height < 0.0
+
+    def _part(self) -> None:
+        self.phase = Phase("free", self.phase.seated)
+        self._emit("separation")
 
     def _meet(self) -> None:
         s, X = self.system, self.X
@@ -401,11 +402,13 @@ class _Run:
             X[s.V] += s.b * impulse
             X[s.Z] -= impulse * s.inverse_mass
         was_seated = self.phase.seated
-        self.phase = Phase(self._joined_contact())
+        self.phase = Phase("tied" if self._below_equilibrium() else "touch")
         s.synchronise(self.phase, X)
         self._emit("impact", impulse_contact=impulse, energy_loss=before - self._mechanical_energy())
         if was_seated:  # the spring already stands on the foundation
             self._hit_stop()
+        elif self.phase.contact == "touch" and self._contact_force(self.phase) < 0.0:
+            self._part()
 
     def _hit_stop(self) -> None:
         """Newton's impact law on the foundation, and whether it was the last bounce."""
@@ -423,14 +426,14 @@ class _Run:
             self.X = arriving
             contact_impulse, foundation_impulse, _ = self._bounce(0.0)
         self.phase = free_phase
+        if seats:
+            self._seat()
         self._emit(
-            "stop_impact",
+            "seated" if seats else "stop_impact",
             impulse_contact=contact_impulse,
             impulse_foundation=foundation_impulse,
             energy_loss=before - self._mechanical_energy(),
         )
-        if seats:
-            self._seat()
 
     def _bounce(self, e: float) -> tuple[float, float, float]:
         """Apply restitution e; impulses on the tip and of the foundation [N·s], speed afterwards [m/s]."""
@@ -454,9 +457,8 @@ class _Run:
         if s.has_spring:
             self.X[s.Y], self.X[s.Z] = stop.position, 0.0
         if s.joined(self.phase) or not s.has_spring:
-            # Rounding of the tip's position and velocity, which the constraint would otherwise keep.
+            # Rounding of the tip's velocity, which the constraint would otherwise keep.
             self.X[s.V] -= s.b * (float(self.X[s.V] @ s.b) / s.inverse_tip_mass)
-        self._emit("seated")
 
     def _height_to_seat(self) -> float:
         if self._seat_height is not None:
@@ -542,13 +544,12 @@ class _Run:
             columns["gap"] = columns["u_tip"] - columns["y"]
             together = columns["phase"] != "free"
             columns["velocity_mismatch"] = np.where(together, columns["v_tip"] - columns["z"], 0.0)
-            if not s.compliance:
-                columns["compliance_force"] = s.compliance_force(s.spring.equilibrium - columns["u_tip"])
-                columns["tie_reaction"] = columns["contact_force"] - columns["compliance_force"]
-        elif stop is not None:
-            columns["gap"] = columns["u_tip" if s.beam is not None else "y"] - stop.position
-            if s.beam is not None:
-                columns["foundation_force"] = columns["contact_force"]
+            C = columns["contact_force"]
+            inside = C if s.compliance else s.compliance_force(s.spring.equilibrium - columns["u_tip"])
+            columns["compliance_force"], columns["tie_reaction"] = inside, C - inside
+        elif stop is not None and s.beam is not None:
+            columns["gap"] = columns["u_tip"] - stop.position
+            columns["foundation_force"] = columns["contact_force"]
         names = ("e_beam", "e_spring", "e_contact", "e_dissipated", "e_impact_loss", "e_load")
         columns["e_total"] = np.sum([columns[name] for name in names], axis=0)
         columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
