@@ -1,0 +1,152 @@
+#!/usr/bin/env bash
+# Everything from a fresh checkout: ./build.sh help
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+
+usage() {
+  cat <<'TEXT'
+./build.sh run [SCENE] [OPTION]…   set up, build, and simulate a scene (default: soft)
+./build.sh test [PYTEST OPTION]…   set up, build, and run all tests (C++, then Python)
+./build.sh fmus                    set up and build fmus/beam.fmu and fmus/spring.fmu
+./build.sh lint                    formatters, linters and type checker
+
+Set-up makes .venv here and installs Python packages into it; as root it also installs the system packages that are
+missing (Debian, Ubuntu), otherwise it names them. Variables:
+  PYTHON             the Python to start from, 3.10 or later (default: python3)
+  CXX                the C++17 compiler
+  SPRINGBEAM_PREFIX  where Eigen, Spectra, SUNDIALS and GoogleTest are if not in the system (also: CMAKE_PREFIX_PATH)
+  JOBS               parallel compilations (default: all processors)
+TEXT
+}
+
+say() { printf '== %s\n' "$*" >&2; }
+die() {
+  printf '\nbuild.sh: %s\n' "$*" >&2
+  exit 1
+}
+
+readonly venv=.venv
+readonly python=$venv/bin/python
+
+# install_packages WHAT PACKAGE… — with apt as root; otherwise say what is missing.
+apt_updated=
+install_packages() {
+  local what=$1
+  shift
+  if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    say "installing $*"
+    [ -n "$apt_updated" ] || apt-get update -qq || true
+    apt_updated=1
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >&2 ||
+      die "$what missing, and apt-get could not install: $*"
+  else
+    die "$what missing. Debian/Ubuntu packages: $*
+  sudo apt-get install $*
+or name a prefix that has them: SPRINGBEAM_PREFIX=/path ./build.sh …"
+  fi
+}
+
+python_is_recent() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null; }
+
+set_up_python() {
+  local base=${PYTHON:-python3} stamp
+  if ! [ -x $python ] || ! $python -m pip --version >/dev/null 2>&1; then
+    command -v "$base" >/dev/null || install_packages "Python is" python3 python3-venv
+    python_is_recent "$base" || die "$base is older than 3.10; name a later one: PYTHON=… ./build.sh …"
+    say "making $venv"
+    rm -rf $venv
+    # Debian's python3 comes without ensurepip.
+    if ! "$base" -m venv $venv >/dev/null 2>&1; then
+      rm -rf $venv
+      install_packages "Python's venv module is" python3-venv
+      "$base" -m venv $venv || die "$base -m venv failed"
+    fi
+  fi
+  stamp=$(cat pyproject.toml | cksum)" $1"
+  if [ "$(cat "$venv/.installed-$1" 2>/dev/null)" != "$stamp" ]; then
+    say "installing Python packages ($1)"
+    $python -m pip install --quiet --disable-pip-version-check -e ".[$1]" ||
+      die "pip could not install the packages of pyproject.toml (is there a network, or PIP_INDEX_URL to set?)"
+    printf '%s' "$stamp" >"$venv/.installed-$1"
+  fi
+}
+
+# has_header HEADER — where CMake would look for it.
+has_header() {
+  local flags=(-I/usr/include/eigen3) dir
+  local IFS=':;'
+  for dir in ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-}; do
+    flags+=(-I"$dir/include" -I"$dir/include/eigen3")
+  done
+  echo "#include <$1>" | "${CXX:-c++}" -std=c++17 -fsyntax-only "${flags[@]}" -x c++ - 2>/dev/null
+}
+
+set_up_system() {
+  local missing=()
+  command -v "${CXX:-c++}" >/dev/null || install_packages "a C++ compiler is" g++
+  has_header Eigen/SparseCore || missing+=(libeigen3-dev)
+  has_header Spectra/SymGEigsShiftSolver.h || missing+=(libspectra-dev)
+  has_header ida/ida.h || missing+=(libsundials-dev)
+  has_header gtest/gtest.h || missing+=(libgtest-dev)
+  [ ${#missing[@]} = 0 ] || install_packages "libraries are" "${missing[@]}"
+}
+
+build() {
+  set_up_python dev
+  local configured
+  configured="$PWD ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-} ${CXX:-}"
+  if [ "$(cat build/.configured 2>/dev/null)" != "$configured" ]; then
+    set_up_system
+    say "configuring"
+    rm -rf build
+    $venv/bin/cmake -S . -B build -G Ninja -DCMAKE_MAKE_PROGRAM="$PWD/$venv/bin/ninja" \
+      -DPython3_EXECUTABLE="$PWD/$python" >build.log 2>&1 || {
+      cat build.log >&2
+      rm -f build.log
+      die "CMake stopped, see above"
+    }
+    mv build.log build/configure.log
+    printf '%s' "$configured" >build/.configured
+  fi
+  say "building"
+  $venv/bin/ninja -C build ${JOBS:+-j "$JOBS"} --quiet "$@" >&2 || die "the build stopped, see above"
+}
+
+command=${1:-help}
+[ $# = 0 ] || shift
+case $command in
+  run)
+    build beam_fmu spring_fmu
+    [ $# -gt 0 ] || set -- soft
+    exec $venv/bin/springbeam run "$@"
+    ;;
+  test)
+    build
+    failed=
+    say "C++ tests"
+    $venv/bin/ctest --test-dir build --output-on-failure || failed="C++ tests"
+    say "Python tests"
+    $python -m pytest -n auto "$@" || failed="${failed:+$failed and }Python tests"
+    [ -z "$failed" ] || die "failed: $failed"
+    ;;
+  fmus) build beam_fmu spring_fmu && ls -l fmus/*.fmu ;;
+  lint)
+    set_up_python lint
+    build beam spring
+    failed=
+    run() { "$@" || failed=1; }
+    run $venv/bin/ruff check .
+    run $venv/bin/ruff format --check .
+    run $venv/bin/mypy
+    mapfile -t sources < <(find src_beam src_spring fmus tests/cpp -name '*.cpp' -o -name '*.hpp')
+    run $venv/bin/clang-format --dry-run -Werror "${sources[@]}"
+    mapfile -t units < <(find src_beam src_spring fmus -name '*.cpp')
+    run $venv/bin/clang-tidy --quiet -p build "${units[@]}"
+    [ -z "$failed" ] || die "lint found something"
+    ;;
+  help | -h | --help) usage ;;
+  *)
+    usage >&2
+    exit 2
+    ;;
+esac

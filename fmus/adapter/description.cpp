@@ -1,0 +1,251 @@
+#include "description.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+#include "version.hpp"
+
+namespace fmi {
+namespace {
+
+struct Unit {
+  const char* name;
+  const char* quantity;  ///< also the name of the SimpleType
+  int kg, m, s, rad;
+};
+
+// Every unit used by the tables, with its SI base units.
+constexpr Unit units[] = {
+    {"kg", "Mass", 1, 0, 0, 0},
+    {"kg/m3", "Density", 1, -3, 0, 0},
+    {"m", "Length", 0, 1, 0, 0},
+    {"m2", "Area", 0, 2, 0, 0},
+    {"m4", "SecondMomentOfArea", 0, 4, 0, 0},
+    {"m/s", "Velocity", 0, 1, -1, 0},
+    {"m.s", "Absement", 0, 1, 1, 0},
+    {"m.s2", "Absity", 0, 1, 2, 0},
+    {"s", "Time", 0, 0, 1, 0},
+    {"1/s", "Rate", 0, 0, -1, 0},
+    {"rad", "Angle", 0, 0, 0, 1},
+    {"Pa", "Pressure", 1, -1, -2, 0},
+    {"N", "Force", 1, 1, -2, 0},
+    {"N/m", "Stiffness", 1, 0, -2, 0},
+    {"N/m3", "CubicStiffness", 1, -2, -2, 0},
+    {"N.s", "Impulse", 1, 1, -1, 0},
+    {"N.s/m", "Damping", 1, 0, -1, 0},
+    {"J", "Energy", 1, 2, -2, 0},
+};
+
+const Unit& unit(const std::string& name) {
+  for (const Unit& u : units) {
+    if (name == u.name) return u;
+  }
+  throw std::logic_error("unit '" + name + "' is not in the list of units");
+}
+
+std::string escaped(const std::string& s) {
+  std::string out;
+  for (char c : s) {
+    switch (c) {
+      case '&': out += "&amp;"; break;
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += c;
+    }
+  }
+  return out;
+}
+
+std::string attribute(const char* name, const std::string& value) {
+  return std::string(" ") + name + "=\"" + escaped(value) + "\"";
+}
+
+std::string value_text(const Variable& v, double value) {
+  if (v.type == Type::boolean) return value != 0.0 ? "true" : "false";
+  if (v.type == Type::real) return text(value);
+  return std::to_string(static_cast<long>(value));
+}
+
+void write_units(std::ostream& out, const std::set<std::string>& used) {
+  out << "  <UnitDefinitions>\n";
+  for (const Unit& u : units) {
+    if (!used.count(u.name)) continue;
+    out << "    <Unit" << attribute("name", u.name) << ">\n      <BaseUnit";
+    const std::pair<const char*, int> exponents[] = {{"kg", u.kg}, {"m", u.m}, {"s", u.s}, {"rad", u.rad}};
+    for (const auto& [name, exponent] : exponents) {
+      if (exponent != 0) out << attribute(name, std::to_string(exponent));
+    }
+    out << "/>\n    </Unit>\n";
+  }
+  out << "  </UnitDefinitions>\n";
+}
+
+void write_types(std::ostream& out, const Table& t, const std::set<std::string>& used) {
+  out << "  <TypeDefinitions>\n";
+  for (const Unit& u : units) {
+    if (!used.count(u.name)) continue;
+    out << "    <SimpleType" << attribute("name", u.quantity) << ">\n      <Real" << attribute("quantity", u.quantity)
+        << attribute("unit", u.name) << "/>\n    </SimpleType>\n";
+  }
+  for (const Enumeration& e : t.enumerations) {
+    out << "    <SimpleType" << attribute("name", e.name) << attribute("description", e.description)
+        << ">\n      <Enumeration>\n";
+    int value = 0;
+    for (const auto& [name, description] : e.items) {
+      out << "        <Item" << attribute("name", name) << attribute("value", std::to_string(++value))
+          << attribute("description", description) << "/>\n";
+    }
+    out << "      </Enumeration>\n    </SimpleType>\n";
+  }
+  out << "  </TypeDefinitions>\n";
+}
+
+void write_variable(std::ostream& out, const Variable& v, std::size_t reference) {
+  const bool is_output = v.causality == Causality::output;
+  const bool is_parameter = v.causality == Causality::parameter;
+  out << "    <ScalarVariable" << attribute("name", v.name) << attribute("valueReference", std::to_string(reference))
+      << attribute("description", v.description)
+      << attribute("causality", is_output ? "output" : is_parameter ? "parameter" : "input")
+      << attribute("variability", is_parameter ? "fixed" : v.consumed || v.type != Type::real ? "discrete" : "continuous");
+  if (is_parameter || is_output) out << attribute("initial", is_parameter || v.exact ? "exact" : "calculated");
+  out << ">\n      <";
+  switch (v.type) {
+    case Type::real:
+      out << "Real";
+      if (!v.unit.empty()) {
+        const Unit& u = unit(v.unit);
+        out << attribute("declaredType", u.quantity) << attribute("quantity", u.quantity) << attribute("unit", u.name);
+      }
+      break;
+    case Type::integer: out << "Integer"; break;
+    case Type::boolean: out << "Boolean"; break;
+    case Type::enumeration: out << "Enumeration" << attribute("declaredType", v.enumeration); break;
+  }
+  if (v.type != Type::boolean) {
+    if (std::isfinite(v.min)) out << attribute("min", value_text(v, v.min));
+    if (std::isfinite(v.max)) out << attribute("max", value_text(v, v.max));
+  }
+  if (v.type == Type::real && v.nominal != 1.0) out << attribute("nominal", text(v.nominal));
+  if (!is_output || v.exact) out << attribute("start", value_text(v, v.start));
+  out << "/>\n    </ScalarVariable>\n";
+}
+
+void write_unknown(std::ostream& out, const Table& t, std::size_t i, const std::vector<std::string>& names) {
+  std::vector<std::size_t> dependencies;
+  for (const std::string& name : names) dependencies.push_back(t.index(name) + 1);
+  std::sort(dependencies.begin(), dependencies.end());
+  std::string list;
+  for (std::size_t d : dependencies) list += (list.empty() ? "" : " ") + std::to_string(d);
+  out << "      <Unknown" << attribute("index", std::to_string(i + 1)) << attribute("dependencies", list) << "/>\n";
+}
+
+void write_structure(std::ostream& out, const Table& t) {
+  out << "  <ModelStructure>\n    <Outputs>\n";
+  for (std::size_t i = 0; i < t.variables.size(); ++i) {
+    if (t.variables[i].causality == Causality::output) write_unknown(out, t, i, t.variables[i].depends_on);
+  }
+  out << "    </Outputs>\n    <InitialUnknowns>\n";
+  for (std::size_t i = 0; i < t.variables.size(); ++i) {
+    const Variable& v = t.variables[i];
+    if (v.causality == Causality::output && !v.exact) write_unknown(out, t, i, v.starts_from);
+  }
+  out << "    </InitialUnknowns>\n  </ModelStructure>\n";
+}
+
+std::string document(const Table& t, const std::string& identity, const std::string& source_files) {
+  std::set<std::string> used;
+  for (const Variable& v : t.variables) {
+    if (!v.unit.empty()) used.insert(v.unit);
+  }
+  std::ostringstream out;
+  out << "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription" << attribute("fmiVersion", "2.0")
+      << attribute("modelName", t.title) << attribute("guid", identity) << attribute("description", t.description)
+      << attribute("version", SPRINGBEAM_VERSION) << attribute("license", "BSD-3-Clause")
+      << attribute("generationTool", "springbeam " SPRINGBEAM_VERSION)
+      << attribute("variableNamingConvention", "structured") << attribute("numberOfEventIndicators", "0") << ">\n";
+  out << "  <CoSimulation" << attribute("modelIdentifier", t.identifier)
+      << attribute("needsExecutionTool", "false") << attribute("canHandleVariableCommunicationStepSize", "true")
+      << attribute("canInterpolateInputs", "true")
+      << attribute("maxOutputDerivativeOrder", std::to_string(max_output_derivative_order))
+      << attribute("canRunAsynchronuously", "false") << attribute("canBeInstantiatedOnlyOncePerProcess", "false")
+      << attribute("canNotUseMemoryManagementFunctions", "true") << attribute("canGetAndSetFMUstate", "true")
+      << attribute("canSerializeFMUstate", "true") << attribute("providesDirectionalDerivative", "false");
+  if (source_files.empty()) {
+    out << "/>\n";
+  } else {
+    out << ">\n    <SourceFiles>\n";
+    std::istringstream names(source_files);
+    for (std::string name; std::getline(names, name);) out << "      <File" << attribute("name", name) << "/>\n";
+    out << "    </SourceFiles>\n  </CoSimulation>\n";
+  }
+  write_units(out, used);
+  write_types(out, t, used);
+  out << "  <LogCategories>\n";
+  for (const auto& [name, text] : log_categories) {
+    out << "    <Category" << attribute("name", name) << attribute("description", text) << "/>\n";
+  }
+  out << "  </LogCategories>\n  <DefaultExperiment startTime=\"0\"" << attribute("stopTime", text(t.stop_time))
+      << attribute("stepSize", text(t.step_size)) << "/>\n  <ModelVariables>\n";
+  for (std::size_t i = 0; i < t.variables.size(); ++i) {
+    out << "    <!-- index " << i + 1 << " -->\n";
+    write_variable(out, t.variables[i], i);
+  }
+  out << "  </ModelVariables>\n";
+  write_structure(out, t);
+  out << "</fmiModelDescription>\n";
+  return out.str();
+}
+
+// FNV-1a; two differently seeded halves make the 128 bits of a GUID.
+std::uint64_t fnv(const std::string& s, std::uint64_t hash) {
+  for (unsigned char c : s) hash = (hash ^ c) * 0x100000001b3ULL;
+  return hash;
+}
+
+}  // namespace
+
+std::string text(double value) {
+  char buffer[32];
+  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
+  return std::string(buffer, end);
+}
+
+const Variable* Table::find(const std::string& name) const {
+  for (const Variable& v : variables) {
+    if (v.name == name) return &v;
+  }
+  return nullptr;
+}
+
+std::size_t Table::index(const std::string& name) const {
+  const Variable* v = find(name);
+  if (!v) throw std::logic_error("no variable '" + name + "'");
+  return static_cast<std::size_t>(v - variables.data());
+}
+
+std::string guid(const Table& table) {
+  const std::string content = document(table, "", "");
+  std::ostringstream hex;
+  hex << std::hex;
+  const std::uint64_t halves[] = {fnv(content, 0xcbf29ce484222325ULL), fnv(content, 0x9ae16a3b2f90404fULL)};
+  for (std::uint64_t half : halves) {
+    hex.width(16);
+    hex.fill('0');
+    hex << half;
+  }
+  const std::string h = hex.str();
+  return "{" + h.substr(0, 8) + "-" + h.substr(8, 4) + "-" + h.substr(12, 4) + "-" + h.substr(16, 4) + "-" +
+         h.substr(20) + "}";
+}
+
+std::string description(const Table& table, const std::string& source_files) {
+  return document(table, guid(table), source_files);
+}
+
+}  // namespace fmi

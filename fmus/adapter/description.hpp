@@ -1,0 +1,32 @@
+// modelDescription.xml and the GUID, from the table.
+#pragma once
+
+#include <string>
+
+#include "table.hpp"
+
+namespace fmi {
+
+/// A hash of everything the description says: two FMUs with the same GUID have the same variables.
+std::string guid(const Table& table);
+
+/// `source_files`: names in sources/, one per line, empty if the FMU carries none.
+std::string description(const Table& table, const std::string& source_files = "");
+
+/// The shortest decimal that reads back as the same double, for the XML and for messages.
+std::string text(double value);
+
+struct LogCategory {
+  const char *name, *description;
+};
+inline constexpr LogCategory log_categories[] = {
+    {"logStatusError", "errors; always reported"},
+    {"logStatusDiscard", "steps that could not be completed; always reported"},
+    {"logStatusWarning", "warnings; always reported"},
+    {"logEvents", "calls that change what the instance is doing"},
+    {"logAll", "everything"},
+};
+
+inline constexpr int max_output_derivative_order = 1;
+
+}  // namespace fmi

@@ -1,0 +1,197 @@
+#include "instance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "description.hpp"
+
+namespace fmi {
+namespace {
+
+const char* name(Type type) {
+  switch (type) {
+    case Type::real: return "Real";
+    case Type::integer: return "Integer";
+    case Type::boolean: return "Boolean";
+    case Type::enumeration: return "Enumeration";
+  }
+  return "?";
+}
+
+// Enumerations travel through fmi2GetInteger and fmi2SetInteger.
+bool same_access(Type asked, Type declared) {
+  return asked == declared || (asked == Type::integer && declared == Type::enumeration);
+}
+
+bool is_setting(const Variable& v) { return v.causality == Causality::parameter || v.exact; }
+
+}  // namespace
+
+Instance::Instance() : table_(table()) { reset(); }
+
+void Instance::reset() {
+  model_ = make_model();
+  built_ = false;
+  settings_.clear();
+  for (const Variable& v : table_.variables) settings_.push_back({v.start, 0.0, 0.0});
+  time_ = 0.0;
+  stop_time_ = std::numeric_limits<double>::infinity();
+  tolerance_ = 0.0;
+  last_status = 0;
+  phase = instantiated;
+}
+
+void Instance::setup(double start, double stop, double tolerance) {
+  if (!std::isfinite(start)) throw std::invalid_argument("startTime = " + text(start) + " is not finite");
+  if (std::isnan(stop) || stop < start) {
+    throw std::invalid_argument("stopTime = " + text(stop) + " is not after startTime = " + text(start));
+  }
+  time_ = start;
+  stop_time_ = stop;
+  if (tolerance != tolerance_) built_ = false;
+  tolerance_ = tolerance;
+}
+
+void Instance::enter_initialization() { phase = initialization; }
+
+void Instance::exit_initialization() {
+  ensure_built();
+  phase = step_complete;
+}
+
+void Instance::terminate() { phase = terminated; }
+
+void Instance::ensure_built() {
+  if (built_) return;
+  for (std::size_t i = 0; i < settings_.size(); ++i) {
+    if (is_setting(table_.variables[i])) table_.variables[i].set(*model_, settings_[i]);
+  }
+  model_->build(tolerance_);
+  built_ = true;
+}
+
+const Variable& Instance::variable(unsigned reference, Type type, const char* what) const {
+  if (reference >= table_.variables.size()) {
+    throw std::invalid_argument("value reference " + std::to_string(reference) + " does not exist: there are " +
+                                std::to_string(table_.variables.size()) + " variables, numbered from 0");
+  }
+  const Variable& v = table_.variables[reference];
+  if (!same_access(type, v.type)) {
+    throw std::invalid_argument(std::string("cannot ") + what + " '" + v.name + "' (value reference " +
+                                std::to_string(reference) + ") as " + name(type) + ": it is " + name(v.type));
+  }
+  return v;
+}
+
+double Instance::get(unsigned reference, Type type) {
+  const Variable& v = variable(reference, type, "get");
+  if (v.causality != Causality::output) return settings_[reference][0];
+  if (phase == instantiated && !v.exact) {
+    throw std::invalid_argument("'" + v.name + "' is not known before fmi2EnterInitializationMode");
+  }
+  if (phase == instantiated) return settings_[reference][0];
+  ensure_built();
+  return v.get(*model_);
+}
+
+void Instance::set(unsigned reference, Type type, double value) {
+  const Variable& v = variable(reference, type, "set");
+  if (v.causality == Causality::output && !v.exact) {
+    throw std::invalid_argument("'" + v.name + "' is a calculated output and cannot be set");
+  }
+  if (is_setting(v) && (phase & ~(instantiated | initialization)) != 0) {
+    throw std::invalid_argument("'" + v.name + "' can only be set before fmi2ExitInitializationMode");
+  }
+  if (!std::isfinite(value)) throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not finite");
+  if (value < v.min || value > v.max) {
+    throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not in [" + text(v.min) + ", " +
+                                text(v.max) + "]");
+  }
+  settings_[reference][0] = value;
+  if (is_setting(v)) built_ = false;
+}
+
+void Instance::set_derivative(unsigned reference, int order, double value) {
+  const Variable& v = variable(reference, Type::real, "set a derivative of");
+  if (!v.interpolated) throw std::invalid_argument("'" + v.name + "' is not an input that takes derivatives");
+  if (order < 1 || order > 2) {
+    throw std::invalid_argument("derivative order " + std::to_string(order) + " of '" + v.name +
+                                "': orders 1 and 2 are possible");
+  }
+  if (!std::isfinite(value)) {
+    throw std::invalid_argument("derivative of '" + v.name + "' = " + text(value) + " is not finite");
+  }
+  settings_[reference][static_cast<std::size_t>(order)] = value;
+}
+
+double Instance::output_derivative(unsigned reference, int order) {
+  const Variable& v = variable(reference, Type::real, "get a derivative of");
+  if (order < 1 || order > max_output_derivative_order || !v.derivative) {
+    throw std::invalid_argument("derivative of order " + std::to_string(order) + " of '" + v.name +
+                                "' is not available");
+  }
+  ensure_built();
+  return v.derivative(*model_);
+}
+
+void Instance::step(double time, double size) {
+  if (!std::isfinite(time)) throw std::invalid_argument("currentCommunicationPoint = " + text(time));
+  if (!std::isfinite(size) || size <= 0.0) {
+    throw std::invalid_argument("communicationStepSize = " + text(size) + ": must be finite and > 0");
+  }
+  // Importers add up or multiply their times; both round.
+  const double rounding = 64.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(time), std::abs(time_));
+  if (std::abs(time - time_) > 1e-9 * size + rounding) {
+    throw std::invalid_argument("currentCommunicationPoint = " + text(time) + ", but the slave is at " + text(time_));
+  }
+  if (time + size > stop_time_ + 1e-6 * size + 1e-9 * std::abs(stop_time_)) {
+    throw std::invalid_argument("a step from " + text(time) + " to " + text(time + size) +
+                                " goes past the stop time " + text(stop_time_));
+  }
+  ensure_built();
+  for (std::size_t i = 0; i < settings_.size(); ++i) {
+    if (table_.variables[i].causality == Causality::input) table_.variables[i].set(*model_, settings_[i]);
+  }
+  model_->step(size);
+  for (std::size_t i = 0; i < settings_.size(); ++i) {
+    const Variable& v = table_.variables[i];
+    if (v.causality == Causality::input) settings_[i] = {v.consumed ? 0.0 : settings_[i][0], 0.0, 0.0};
+  }
+  time_ = time + size;
+}
+
+Snapshot Instance::save() const {
+  Snapshot s;
+  s.phase = static_cast<int>(phase);
+  s.last_status = last_status;
+  s.time = time_;
+  s.stop_time = stop_time_;
+  s.tolerance = tolerance_;
+  s.settings = settings_;
+  s.built = built_;
+  if (built_) model_->save(s.numerics);
+  return s;
+}
+
+void Instance::restore(const Snapshot& s) {
+  bool same = tolerance_ == s.tolerance;
+  for (std::size_t i = 0; i < settings_.size(); ++i) {
+    if (is_setting(table_.variables[i])) same = same && settings_[i][0] == s.settings[i][0];
+  }
+  settings_ = s.settings;
+  tolerance_ = s.tolerance;
+  built_ = built_ && same;
+  if (s.built) {
+    ensure_built();
+    model_->restore(s.numerics);
+  } else {
+    built_ = false;
+  }
+  time_ = s.time;
+  stop_time_ = s.stop_time;
+  last_status = s.last_status;
+  phase = static_cast<Phase>(s.phase);
+}
+
+}  // namespace fmi

@@ -1,0 +1,62 @@
+// One instance of the FMU: the life cycle of FMI 2.0.4, section 4.2.4, over a Model and its table. No FMI types.
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "snapshot.hpp"
+#include "table.hpp"
+
+namespace fmi {
+
+/// The states of section 4.2.4 that a slave which completes every step at once can be in, as bits.
+enum Phase : unsigned {
+  instantiated = 1U << 0,
+  initialization = 1U << 1,
+  step_complete = 1U << 2,
+  step_failed = 1U << 3,
+  terminated = 1U << 4,
+  error = 1U << 5,
+};
+
+class Instance {
+ public:
+  Instance();
+
+  Phase phase = instantiated;
+  int last_status = 0;  ///< of the last step
+
+  void setup(double start, double stop, double tolerance);
+  void enter_initialization();
+  void exit_initialization();
+  void terminate();
+  void reset();
+
+  double get(unsigned reference, Type type);
+  void set(unsigned reference, Type type, double value);
+  void set_derivative(unsigned reference, int order, double value);
+  double output_derivative(unsigned reference, int order);
+
+  /// @throws StepDiscarded (nothing changed), std::invalid_argument
+  void step(double time, double size);
+  double time() const { return time_; }
+
+  Snapshot save() const;
+  void restore(const Snapshot& snapshot);
+
+ private:
+  const Variable& variable(unsigned reference, Type type, const char* what) const;
+  void ensure_built();
+
+  const Table& table_;
+  std::unique_ptr<Model> model_;
+  std::vector<Polynomial> settings_;  ///< of every variable; unused for calculated outputs
+  bool built_ = false;
+  double time_ = 0.0;
+  double stop_time_ = std::numeric_limits<double>::infinity();
+  double tolerance_ = 0.0;  ///< relative, asked for by the importer; 0 = none
+};
+
+}  // namespace fmi

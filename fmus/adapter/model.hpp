@@ -1,0 +1,39 @@
+// What the adapter asks of a model: built from parameters, stepped, saved and restored. No FMI types.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace fmi {
+
+/// A value and its first and second time derivative at the start of a step.
+using Polynomial = std::array<double, 3>;
+
+/// The step could not be completed and the model is as before it: becomes fmi2Discard.
+class StepDiscarded : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class Model {
+ public:
+  virtual ~Model() = default;
+
+  /// Called when outputs are first needed, again if parameters changed meanwhile: make the numerics in their
+  /// initial state. `tolerance` is the importer's, 0 if it names none; it may tighten, never loosen.
+  /// @throws std::exception naming the parameter
+  virtual void build(double tolerance) = 0;
+
+  /// Called by fmi2DoStep, the inputs having been set.
+  /// @throws StepDiscarded (model unchanged)
+  virtual void step(double size) = 0;
+
+  /// Called for every saved state; the vector is flat and holds everything that build() does not make.
+  virtual void save(std::vector<double>& state) const = 0;
+  virtual void restore(const std::vector<double>& state) = 0;
+};
+
+}  // namespace fmi

@@ -1,0 +1,105 @@
+#include "snapshot.hpp"
+
+#include <cstdint>
+#include <cstring>
+#include <stdexcept>
+
+namespace fmi {
+namespace {
+
+constexpr char magic[8] = {'s', 'p', 'r', 'i', 'n', 'g', 'b', 'm'};
+constexpr std::uint32_t format = 1;
+constexpr std::uint32_t byte_order = 0x01020304;
+constexpr std::size_t guid_length = 38;
+
+struct Header {
+  char magic[8];
+  std::uint32_t byte_order;
+  std::uint32_t format;
+  char guid[40];
+  std::uint64_t count;     ///< doubles that follow
+  std::uint64_t checksum;  ///< of them
+};
+static_assert(sizeof(Header) == 72, "the header has no padding");
+
+constexpr std::size_t fixed_count = 7;  ///< doubles before settings
+
+std::uint64_t checksum(const char* bytes, std::size_t size) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;
+  for (std::size_t i = 0; i < size; ++i) hash = (hash ^ static_cast<unsigned char>(bytes[i])) * 0x100000001b3ULL;
+  return hash;
+}
+
+std::size_t count(const Snapshot& s) { return fixed_count + 3 * s.settings.size() + s.numerics.size(); }
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw std::invalid_argument("the bytes are not a saved state of this FMU: " + why);
+}
+
+}  // namespace
+
+std::size_t serialized_size(const Snapshot& snapshot) { return sizeof(Header) + count(snapshot) * sizeof(double); }
+
+void serialize(const Snapshot& s, const std::string& guid, char* bytes) {
+  std::vector<double> values{static_cast<double>(s.phase),
+                             static_cast<double>(s.last_status),
+                             s.time,
+                             s.stop_time,
+                             s.tolerance,
+                             s.built ? 1.0 : 0.0,
+                             static_cast<double>(s.numerics.size())};
+  for (const Polynomial& p : s.settings) values.insert(values.end(), p.begin(), p.end());
+  values.insert(values.end(), s.numerics.begin(), s.numerics.end());
+
+  Header header{};
+  std::memcpy(header.magic, magic, sizeof magic);
+  header.byte_order = byte_order;
+  header.format = format;
+  guid.copy(header.guid, guid_length);
+  header.count = values.size();
+  const std::size_t payload = values.size() * sizeof(double);
+  std::memcpy(bytes + sizeof header, values.data(), payload);
+  header.checksum = checksum(bytes + sizeof header, payload);
+  std::memcpy(bytes, &header, sizeof header);
+}
+
+Snapshot deserialize(const char* bytes, std::size_t size, const std::string& guid, std::size_t n_settings) {
+  Header header{};
+  if (size < sizeof header) refuse(std::to_string(size) + " bytes are fewer than its header has");
+  std::memcpy(&header, bytes, sizeof header);
+  if (std::memcmp(header.magic, magic, sizeof magic) != 0) refuse("they do not begin with its mark");
+  if (header.byte_order != byte_order) refuse("written on a machine of another byte order");
+  if (header.format != format) {
+    refuse("format " + std::to_string(header.format) + ", this FMU reads " + std::to_string(format));
+  }
+  const std::string written_by(header.guid, guid_length);
+  if (written_by != guid) refuse("written by the FMU " + written_by + ", this is " + guid);
+  const std::size_t payload = size - sizeof header;
+  if (header.count > payload / sizeof(double) || header.count * sizeof(double) != payload) {
+    refuse(std::to_string(size) + " bytes, its header announces " +
+           std::to_string(sizeof header + header.count * sizeof(double)));
+  }
+  if (checksum(bytes + sizeof header, payload) != header.checksum) refuse("the checksum is wrong");
+
+  std::vector<double> values(header.count);
+  std::memcpy(values.data(), bytes + sizeof header, payload);
+  const std::size_t settings_end = fixed_count + 3 * n_settings;
+  if (values.size() < settings_end || static_cast<double>(values.size() - settings_end) != values[6]) {
+    refuse("its parts do not add up");
+  }
+  Snapshot s;
+  s.phase = static_cast<int>(values[0]);
+  s.last_status = static_cast<int>(values[1]);
+  s.time = values[2];
+  s.stop_time = values[3];
+  s.tolerance = values[4];
+  s.built = values[5] != 0.0;
+  for (std::size_t i = 0; i < n_settings; ++i) {
+    const double* p = &values[fixed_count + 3 * i];
+    s.settings.push_back({p[0], p[1], p[2]});
+  }
+  s.numerics.assign(values.begin() + static_cast<std::ptrdiff_t>(settings_end), values.end());
+  return s;
+}
+
+}  // namespace fmi

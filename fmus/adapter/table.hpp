@@ -1,0 +1,168 @@
+// The table of an FMU's variables: the one place where they are written down. modelDescription.xml, the GUID and
+// every fmi2Get/Set go by it. A value reference is the variable's position in the table.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "model.hpp"
+
+namespace fmi {
+
+enum class Type { real, integer, boolean, enumeration };
+enum class Causality { parameter, input, output };
+
+/// Values of every type are held as double, which represents all of them exactly.
+struct Variable {
+  std::string name;
+  Causality causality = Causality::output;
+  Type type = Type::real;
+  std::string unit;  ///< one of units(), empty if dimensionless
+  std::string description;
+  std::string enumeration;  ///< name of its type, see Table::enumerations
+  double start = 0.0;       ///< of parameters, inputs and exact outputs
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  double nominal = 1.0;
+  bool exact = false;     ///< an output whose start is the initial state (initial="exact")
+  bool consumed = false;  ///< an input that acts once: read back as 0 after the step that used it
+
+  std::function<void(Model&, const Polynomial&)> set;    ///< parameters, inputs, exact outputs
+  std::function<double(const Model&)> get;               ///< outputs
+  std::function<double(const Model&)> derivative;        ///< outputs that know their time derivative
+  bool interpolated = false;                             ///< an input that takes derivatives
+  std::vector<std::string> depends_on;                   ///< inputs that an output follows without a step
+  std::vector<std::string> starts_from;                  ///< what an output depends on at initialization
+
+  // Named arguments.
+  Variable& range(double low, double high) { return min = low, max = high, *this; }
+  Variable& at_least(double low) { return min = low, *this; }
+  Variable& scale(double value) { return nominal = value, *this; }
+  Variable& from(std::vector<std::string> names) { return starts_from = std::move(names), *this; }
+  Variable& follows(std::vector<std::string> names) { return depends_on = std::move(names), *this; }
+};
+
+struct Enumeration {
+  std::string name, description;
+  std::vector<std::pair<std::string, std::string>> items;  ///< name, description; numbered from 1
+};
+
+struct Table {
+  std::string identifier;  ///< modelIdentifier
+  std::string title, description;
+  double stop_time = 1.0, step_size = 1e-3;  ///< DefaultExperiment
+  std::vector<Enumeration> enumerations;
+  std::vector<Variable> variables;
+
+  const Variable* find(const std::string& name) const;
+  std::size_t index(const std::string& name) const;  ///< @throws std::logic_error
+};
+
+/// Each FMU defines these two (fmus/beam/beam_fmu.cpp, fmus/spring/spring_fmu.cpp).
+const Table& table();
+std::unique_ptr<Model> make_model();
+
+/// Adds variables bound to a concrete model `M`.
+template <class M>
+class TableBuilder {
+ public:
+  explicit TableBuilder(Table& table) : table_(table) {}
+
+  /// A parameter stored in a field of the model's parameter struct, whose default is the start value.
+  template <class P, class T>
+  Variable& parameter(const std::string& name, const std::string& unit, P M::*parameters, T P::*field,
+                      const std::string& description) {
+    Variable& v = add(name, unit, description, Causality::parameter);
+    v.type = std::is_same_v<T, bool>     ? Type::boolean
+             : std::is_integral_v<T>     ? Type::integer
+             : std::is_enum_v<T>         ? Type::enumeration
+                                         : Type::real;
+    v.start = static_cast<double>(P{}.*field);
+    v.set = [=](Model& m, const Polynomial& value) { assign(static_cast<M&>(m).*parameters.*field, value[0]); };
+    return v;
+  }
+
+  /// An input that is held over the step.
+  template <class Access>
+  Variable& input(const std::string& name, const std::string& unit, const std::string& description, Access access) {
+    Variable& v = add(name, unit, description, Causality::input);
+    v.set = [access](Model& m, const Polynomial& value) { access(static_cast<M&>(m)) = value[0]; };
+    return v;
+  }
+
+  /// An input that is a polynomial over the step.
+  template <class Access>
+  Variable& polynomial(const std::string& name, const std::string& unit, const std::string& description,
+                       Access access) {
+    Variable& v = add(name, unit, description, Causality::input);
+    v.set = [access](Model& m, const Polynomial& value) { access(static_cast<M&>(m)) = value; };
+    v.interpolated = true;
+    return v;
+  }
+
+  /// An input that acts at the start of the next step and is then 0 again.
+  template <class Access>
+  Variable& impulse(const std::string& name, const std::string& unit, const std::string& description, Access access) {
+    Variable& v = input(name, unit, description, access);
+    v.consumed = true;
+    return v;
+  }
+
+  template <class Get>
+  Variable& output(const std::string& name, const std::string& unit, const std::string& description, Get get) {
+    Variable& v = add(name, unit, description, Causality::output);
+    v.get = [get](const Model& m) { return static_cast<double>(get(static_cast<const M&>(m))); };
+    return v;
+  }
+
+  template <class Get, class Derivative>
+  Variable& output(const std::string& name, const std::string& unit, const std::string& description, Get get,
+                   Derivative derivative) {
+    Variable& v = output(name, unit, description, get);
+    v.derivative = [derivative](const Model& m) { return derivative(static_cast<const M&>(m)); };
+    return v;
+  }
+
+  /// Makes the last output's start value settable: it is a field of the parameters.
+  template <class P>
+  Variable& exact_start(P M::*parameters, double P::*field) {
+    Variable& v = table_.variables.back();
+    v.exact = true;
+    v.start = P{}.*field;
+    v.set = [=](Model& m, const Polynomial& value) { static_cast<M&>(m).*parameters.*field = value[0]; };
+    return v;
+  }
+
+ private:
+  template <class T>
+  static void assign(T& field, double value) {
+    if constexpr (std::is_same_v<T, bool>) {
+      field = value != 0.0;
+    } else if constexpr (std::is_enum_v<T>) {
+      field = static_cast<T>(static_cast<int>(value));
+    } else {
+      field = static_cast<T>(value);
+    }
+  }
+
+  Variable& add(const std::string& name, const std::string& unit, const std::string& description,
+                Causality causality) {
+    Variable v;
+    v.name = name;
+    v.unit = unit;
+    v.description = description;
+    v.causality = causality;
+    table_.variables.push_back(std::move(v));
+    return table_.variables.back();
+  }
+
+  Table& table_;
+};
+
+}  // namespace fmi

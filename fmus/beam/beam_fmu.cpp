@@ -1,0 +1,144 @@
+// The beam FMU: its table of variables, bound to beam::Beam.
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "../../src_beam/beam.hpp"
+#include "../adapter/table.hpp"
+
+namespace {
+
+using beam::Beam;
+using beam::Parameters;
+
+struct BeamModel final : fmi::Model {
+  Parameters parameters;
+  fmi::Polynomial tip_force{};
+  double tip_impulse = 0.0;
+  double distributed_load = 0.0;
+  std::optional<Beam> beam;
+
+  // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
+  void build(double) override { beam.emplace(parameters); }
+
+  void step(double size) override {
+    std::vector<double> before;
+    if (tip_impulse != 0.0) {
+      beam->save(before);
+      beam->apply_tip_impulse(tip_impulse);
+    }
+    try {
+      beam->step(size, tip_force, distributed_load);
+    } catch (const std::domain_error& e) {
+      if (!before.empty()) beam->restore(before);
+      throw fmi::StepDiscarded(e.what());
+    }
+  }
+
+  void save(std::vector<double>& state) const override { beam->save(state); }
+  void restore(const std::vector<double>& state) override { beam->restore(state); }
+};
+
+template <class Value>
+auto of(Value (Beam::*value)() const) {
+  return [value](const BeamModel& m) { return ((*m.beam).*value)(); };
+}
+
+template <class Fill>
+auto point(int i, Fill fill) {
+  return [i, fill](const BeamModel& m) {
+    std::array<double, beam::shape_points> values{};
+    ((*m.beam).*fill)(values);
+    return values[static_cast<std::size_t>(i)];
+  };
+}
+
+fmi::Table make_table() {
+  fmi::Table t;
+  t.identifier = "beam";
+  t.title = "TimoshenkoBeam";
+  t.description =
+      "Viscoelastic (Kelvin-Voigt) Timoshenko beam, clamped at x = 0, loaded at its tip x = L by a contact force";
+  t.stop_time = 0.6;
+  t.step_size = 1e-3;
+  t.enumerations.push_back({"Integrator",
+                            "time integration of the beam",
+                            {{"modal", "exact step of each mode under a polynomial force"},
+                             {"generalized_alpha", "generalized-alpha rule; rho_inf = 1 is the midpoint rule"}}});
+
+  fmi::TableBuilder<BeamModel> add(t);
+  const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
+    return add.parameter(name, unit, &BeamModel::parameters, field, text);
+  };
+  parameter("density", "kg/m3", &Parameters::density, "mass density rho, > 0").at_least(0);
+  parameter("area", "m2", &Parameters::area, "area of the cross-section A, > 0").at_least(0);
+  parameter("second_moment_of_area", "m4", &Parameters::second_moment_of_area, "second moment of area I, > 0")
+      .at_least(0);
+  parameter("young_modulus", "Pa", &Parameters::young_modulus, "Young's modulus E, > 0").at_least(0);
+  parameter("shear_modulus", "Pa", &Parameters::shear_modulus, "shear modulus G, > 0").at_least(0);
+  parameter("shear_coefficient", "", &Parameters::shear_coefficient, "shear coefficient K, > 0").at_least(0);
+  parameter("length", "m", &Parameters::length, "length L, > 0").at_least(0);
+  parameter("alpha_b", "s", &Parameters::alpha_b, "Kelvin-Voigt retardation time: damping = alpha_b * stiffness")
+      .at_least(0);
+  parameter("n_elements", "", &Parameters::n_elements, "uniform linear elements").range(1, 1000000);
+  parameter("n_modes", "", &Parameters::n_modes, "lowest modes kept by the modal integrator; 0 = all").at_least(0);
+  parameter("reduced_integration", "", &Parameters::reduced_integration,
+            "one-point integration of the shear term; false = full integration, which locks for slender beams");
+  fmi::Variable& integrator = parameter("integrator", "", &Parameters::integrator, "1 = modal, 2 = generalized_alpha");
+  integrator.range(1, 2).enumeration = "Integrator";
+  parameter("rho_inf", "", &Parameters::rho_inf, "spectral radius at infinity of generalized_alpha; 1 = midpoint rule")
+      .range(0, 1);
+  parameter("initial_deflection_slope", "", &Parameters::initial_deflection_slope,
+            "s in the initial deflection u = s*x");
+  parameter("initial_velocity_slope", "1/s", &Parameters::initial_velocity_slope, "s in the initial velocity u_t = s*x");
+  parameter("tip_load_coefficient", "N/m", &Parameters::tip_load_coefficient,
+            "coefficient of the last hat function in the distributed load");
+
+  add.polynomial("tip_force", "N",
+                 "contact force C on the tip, positive upward; its derivatives of order 1 and 2 hold for the next "
+                 "step only: C(tau) = C + C' tau + C'' tau^2/2",
+                 [](BeamModel& m) -> fmi::Polynomial& { return m.tip_force; });
+  add.impulse("tip_impulse", "N.s", "upward impulse on the tip, applied at the start of the next step, then 0 again",
+              [](BeamModel& m) -> double& { return m.tip_impulse; });
+  add.input("distributed_load", "N/m", "distributed load f_b, uniform in x, positive upward",
+            [](BeamModel& m) -> double& { return m.distributed_load; });
+
+  const std::vector<std::string> start_u{"initial_deflection_slope", "length"};
+  const std::vector<std::string> start_v{"initial_velocity_slope", "length"};
+  add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),
+             of(&Beam::tip_velocity))
+      .from(start_u);
+  add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
+      .from(start_v);
+  add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation));
+  add.output("tip_displacement_integral", "m.s", "integral of tip_displacement over the last step",
+             of(&Beam::tip_displacement_integral), of(&Beam::tip_displacement));
+  add.output("tip_displacement_integral_2", "m.s2", "double integral of tip_displacement over the last step",
+             of(&Beam::tip_displacement_integral_2), of(&Beam::tip_displacement_integral));
+  add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy));
+  add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy));
+  add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy));
+  add.output("load_potential", "J", "potential of the distributed load of the last step", of(&Beam::load_potential));
+  add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam",
+             of(&Beam::tip_mass));
+  for (int i = 0; i < beam::shape_points; ++i) {
+    const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
+    add.output("deflection[" + std::to_string(i + 1) + "]", "m", "deflection" + x, point(i, &Beam::deflection));
+  }
+  for (int i = 0; i < beam::shape_points; ++i) {
+    const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
+    add.output("rotation[" + std::to_string(i + 1) + "]", "rad", "rotation of the cross-section" + x,
+               point(i, &Beam::rotation));
+  }
+  return t;
+}
+
+}  // namespace
+
+const fmi::Table& fmi::table() {
+  static const Table instance = make_table();
+  return instance;
+}
+
+std::unique_ptr<fmi::Model> fmi::make_model() { return std::make_unique<BeamModel>(); }

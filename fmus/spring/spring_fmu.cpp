@@ -1,0 +1,145 @@
+// The spring FMU: its table of variables, bound to spring::Spring.
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "../../src_spring/spring.hpp"
+#include "../adapter/description.hpp"
+#include "../adapter/table.hpp"
+
+namespace {
+
+using spring::Parameters;
+using spring::Spring;
+
+struct SpringModel final : fmi::Model {
+  Parameters parameters;
+  spring::Inputs inputs;
+  double impulse = 0.0;
+  std::optional<Spring> spring;
+
+  void build(double tolerance) override {
+    Parameters p = parameters;
+    if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
+    spring.emplace(p);
+  }
+
+  void step(double size) override {
+    std::vector<double> before;
+    if (impulse != 0.0) {
+      spring->save(before);
+      spring->apply_impulse(impulse);
+    }
+    const auto discard = [&](const std::string& why) {
+      if (!before.empty()) spring->restore(before);
+      throw fmi::StepDiscarded(why);
+    };
+    try {
+      spring->step(size, inputs);
+    } catch (const spring::StepFailure& e) {
+      discard(std::string(e.what()) + " (" + fmi::text(e.reached) + " s after the start of the step)");
+    } catch (const std::domain_error& e) {
+      discard(e.what());
+    }
+  }
+
+  void save(std::vector<double>& state) const override { spring->save(state); }
+  void restore(const std::vector<double>& state) override { spring->restore(state); }
+};
+
+template <class Value>
+auto of(Value (Spring::*value)() const) {
+  return [value](const SpringModel& m) { return ((*m.spring).*value)(); };
+}
+
+fmi::Table make_table() {
+  fmi::Table t;
+  t.identifier = "spring";
+  t.title = "DuffingSpring";
+  t.description =
+      "Duffing spring m y'' + alpha_s y' + k1 y + k2 y^3 = -C + N + f_s under a contact force C, above a rigid "
+      "foundation";
+  t.stop_time = 0.6;
+  t.step_size = 1e-3;
+  t.enumerations.push_back({"ContactLaw",
+                            "where the contact force comes from",
+                            {{"external", "the input contact_force"},
+                             {"normal_compliance", "computed inside from tip_displacement and tip_velocity"}}});
+
+  fmi::TableBuilder<SpringModel> add(t);
+  const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
+    return add.parameter(name, unit, &SpringModel::parameters, field, text);
+  };
+  parameter("mass", "kg", &Parameters::mass, "mass m, > 0").at_least(0);
+  parameter("damping", "N.s/m", &Parameters::damping, "viscous damping alpha_s").at_least(0);
+  parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
+  parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness, "cubic stiffness k2; < 0 softens");
+  parameter("equilibrium", "m", &Parameters::equilibrium, "position Psi where the top rests");
+  fmi::Variable& law =
+      parameter("contact_law", "", &Parameters::contact_law, "1 = external, 2 = normal_compliance inside");
+  law.range(1, 2).enumeration = "ContactLaw";
+  parameter("compliance_stiffness", "", &Parameters::compliance_stiffness,
+            "lambda in C = lambda*max(0, y - u_tip)^p [N/m^p]")
+      .at_least(0)
+      .scale(1e4);
+  parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").at_least(1);
+  parameter("stop_enabled", "", &Parameters::stop_enabled, "foundation inside, with impacts");
+  parameter("stop_position", "m", &Parameters::stop_position, "position phi of the foundation");
+  parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation").range(0, 1);
+  parameter("relative_tolerance", "", &Parameters::relative_tolerance,
+            "relative tolerance of IDA; an importer's tolerance can tighten, never loosen it")
+      .range(0, 1)
+      .scale(1e-12);
+  parameter("absolute_tolerance", "", &Parameters::absolute_tolerance, "absolute tolerance of IDA")
+      .at_least(0)
+      .scale(1e-14);
+
+  using spring::Inputs;
+  const auto polynomial = [&](const char* name, const char* unit, auto Inputs::*field, const char* text) {
+    add.polynomial(name, unit, text, [field](SpringModel& m) -> fmi::Polynomial& { return m.inputs.*field; });
+  };
+  const auto input = [&](const char* name, const char* unit, auto Inputs::*field, const char* text) {
+    add.input(name, unit, text, [field](SpringModel& m) -> double& { return m.inputs.*field; });
+  };
+  polynomial("contact_force", "N", &Inputs::contact_force,
+             "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next "
+             "step only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2");
+  polynomial("foundation_force", "N", &Inputs::foundation_force,
+             "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled");
+  add.impulse("impulse", "N.s", "upward impulse, applied at the start of the next step, then 0 again",
+              [](SpringModel& m) -> double& { return m.impulse; });
+  input("external_force", "N", &Inputs::external_force, "external force f_s, positive upward");
+  polynomial("tip_displacement", "m", &Inputs::tip_displacement,
+             "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives "
+             "or else by tip_velocity");
+  input("tip_velocity", "m/s", &Inputs::tip_velocity, "velocity of the beam's tip, read by contact_law = 2");
+
+  add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
+  add.exact_start(&SpringModel::parameters, &Parameters::displacement);
+  add.output("velocity", "m/s", "velocity z of the top", of(&Spring::velocity), of(&Spring::acceleration));
+  add.exact_start(&SpringModel::parameters, &Parameters::velocity);
+  add.output("displacement_integral", "m.s", "integral of displacement over the last step",
+             of(&Spring::displacement_integral), of(&Spring::displacement));
+  add.output("displacement_integral_2", "m.s2", "double integral of displacement over the last step",
+             of(&Spring::displacement_integral_2), of(&Spring::displacement_integral));
+  add.output("reaction", "N", "contact force of the law inside, 0 when contact_law = 1", of(&Spring::reaction));
+  add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
+  add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
+  add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});
+  add.output("potential_energy", "J", "potential energy of the spring", of(&Spring::potential_energy))
+      .from({"linear_stiffness", "cubic_stiffness", "displacement"});
+  add.output("contact_energy", "J", "energy stored in the contact law inside", of(&Spring::contact_energy));
+  add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Spring::dissipated_energy));
+  return t;
+}
+
+}  // namespace
+
+const fmi::Table& fmi::table() {
+  static const Table instance = make_table();
+  return instance;
+}
+
+std::unique_ptr<fmi::Model> fmi::make_model() { return std::make_unique<SpringModel>(); }
