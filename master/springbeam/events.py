@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .subsystem import Motion
+
 _EPS = float(np.finfo(float).eps)
 _MAX_EVALUATIONS = 60
 
@@ -45,6 +47,16 @@ def cubic_value(start: Sample, end: Sample, size: float, tau: float) -> float:
     d0, d1 = start.rate * size, end.rate * size
     rise = end.value - start.value
     return start.value + x * (d0 + x * (3.0 * rise - 2.0 * d0 - d1 + x * (d0 + d1 - 2.0 * rise)))
+
+
+def interpolated(start: Motion, end: Motion, size: float, tau: float) -> Sample:
+    """Displacement and velocity at τ of the cubic through both ends of a step."""
+    a, b = Sample(start.displacement, start.velocity), Sample(end.displacement, end.velocity)
+    x, rise = tau / size, (end.displacement - start.displacement) / size
+    bend = 3.0 * rise - 2.0 * a.rate - b.rate
+    return Sample(
+        cubic_value(a, b, size, tau), a.rate + x * (2.0 * bend + 3.0 * x * (a.rate + b.rate - 2.0 * rise))
+    )
 
 
 def cubic_crossing(start: Sample, end: Sample, size: float) -> float:

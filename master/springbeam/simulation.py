@@ -17,7 +17,7 @@ from .contact import Impact, Joint, Phase, first_contact, foundation_impact, mee
 from .coupling import conditions, force
 from .coupling.compliance import Compliance, compliance_energy, compliance_force
 from .coupling.tie import NotConverged, Tie
-from .events import Sample, cubic_crossing, cubic_value, locate, lowest_inside
+from .events import Sample, cubic_crossing, cubic_value, interpolated, locate, lowest_inside
 from .recording import NonFiniteValue, Recorder
 from .scene import Scene
 from .subsystem import NO_FORCE, Body, Energies, Force, Held, Motion, StepRefused
@@ -144,7 +144,7 @@ class Simulation:
         self._joinable = beam is not None and spring is not None
         coupling = scene.coupling
         self.H = coupling.macro_step
-        self._compliant = scene.contact.law == "compliance"
+        self._compliant = scene.contact.law == "compliance" and self._joinable
         self._tie = Tie(conditions(coupling.scheme, coupling.degree), coupling.degree, coupling.tolerance, self.H)
         self._compliance = Compliance(scene.contact.stiffness, scene.contact.exponent, coupling.tolerance, self.H)
         self._degree = 0 if self._compliant else coupling.degree
@@ -189,6 +189,8 @@ class Simulation:
             whole = event is None and abs(step.size - size) <= 1e-9 * self.H
             if step.size > 0.0:
                 self._accept(step, target if whole else self.time + step.size)
+                if self._compliant:
+                    self._note_contact(step)
             while t0 + (macro_index + 1) * self.H <= self.time + 1e-9 * self.H:
                 macro_index += 1
             if event is not None:
@@ -223,7 +225,11 @@ class Simulation:
         contact = foundation = NO_FORCE
         upper, lower, spring = self._upper, self._lower, self._spring
         ends = None if self._held is None or not self.phase.seated else self._held
-        if self.phase.joint is Joint.FREE:
+        if self._compliant:
+            assert upper is not None and lower is not None
+            penetration = start[1].displacement - start[0].displacement
+            contact = self._compliance.solve(upper, ends or lower, self.time, size, self._contact, penetration)
+        elif self.phase.joint is Joint.FREE:
             if upper is not None:
                 upper.rewind()
                 upper.advance(self.time, size, NO_FORCE)
@@ -232,12 +238,7 @@ class Simulation:
                 lower.advance(self.time, size, NO_FORCE)
         else:
             assert upper is not None and lower is not None
-            partner = lower if ends is None else ends
-            if self._compliant and spring is not None:
-                penetration = start[1].displacement - start[0].displacement
-                contact = self._compliance.solve(upper, partner, self.time, size, self._contact, penetration)
-            else:
-                contact = self._tie.solve(upper, partner, self.time, size, self._contact, start[0])
+            contact = self._tie.solve(upper, ends or lower, self.time, size, self._contact, start[0])
         if self.phase.seated:
             foundation = contact
             if spring is not None:
@@ -264,15 +265,13 @@ class Simulation:
             return lambda m: Sample(level - m[a].displacement, -m[a].velocity)
 
         joint, seated = self.phase.joint, self.phase.seated
-        if self._joinable:
+        if self._joinable and not self._compliant:
             if joint is Joint.FREE:
                 functions.append(("impact", between(tip, low)))
-            elif self._compliant:
-                functions.append(("separation", between(low, tip)))
             psi = self.scene.spring.equilibrium  # type: ignore[union-attr]
             if joint is Joint.TIED and not seated:
                 functions.append(("release", below(low, psi)))
-            if joint is Joint.TOUCH and not self._compliant:
+            if joint is Joint.TOUCH:
                 functions.append(("retie", above(low, psi)))
         if self._stop is not None and not seated:
             functions.append(("stop_impact", above(low if self._spring is not None else tip, self._stop)))
@@ -305,6 +304,8 @@ class Simulation:
             step = self._located(function, bracket)
         else:
             found = found or None
+        if self._compliant:
+            step = self._touched_inside(step)
         unilateral = self._unilateral(step)
         return unilateral if unilateral is not None else (self._settled(step), found)
 
@@ -331,6 +332,18 @@ class Simulation:
         tolerance = 0.25 * self._position_tolerance(bracket.end)
         locate(evaluate, function(bracket.start), function(bracket.end), bracket.size, tolerance, self.time)
         return last
+
+    def _touched_inside(self, step: Step) -> Step:
+        """Compliance: a contact that closes and opens inside the step would be missed; the step is cut to its middle."""
+        start, end = (Sample(m[0].displacement - m[1].displacement, m[0].velocity - m[1].velocity)
+                      for m in (step.start, step.end))  # fmt: skip
+        if start.value < 0.0 or end.value < 0.0:
+            return step
+        inside = lowest_inside(start, end, step.size)
+        if inside is None or cubic_value(start, end, step.size, inside) >= 0.0:
+            return step
+        cut = self._attempt(inside, step.start)
+        return cut if cut.contact[0] > 0.0 else step
 
     def _settled(self, step: Step) -> Step:
         """Leave the bodies at the end of ``step`` (a look inside it may have moved them)."""
@@ -404,7 +417,7 @@ class Simulation:
 
     def _settle_start(self) -> None:
         """First contact at the start: the tip on the spring top (or the stop), moving down or at rest."""
-        if self._upper is None or self._lower is None:
+        if self._upper is None or self._lower is None or self._compliant:
             return
         tip, low = self._motions()
         tolerance = self._position_tolerance((tip, low)) + 1e-12 * abs(low.displacement)
@@ -436,8 +449,7 @@ class Simulation:
             self.phase = Phase(Joint.TIED)
         elif kind == "separation":
             self.phase = Phase(Joint.FREE, seated=before.seated and self._spring is not None)
-            if not self._compliant:
-                impact = self._part(tip, low)
+            impact = self._part(tip, low)
         elif kind == "unseated":
             self.phase = Phase(before.joint)
         self._apply(impact)
@@ -463,11 +475,21 @@ class Simulation:
             )
         )
 
+    def _note_contact(self, step: Step) -> None:
+        """Compliance: opening and closing are nothing special, they are told from the step that crossed."""
+        gap = [m[0].displacement - m[1].displacement for m in (step.start, step.end)]
+        touching = gap[1] < 0.0
+        self.phase = Phase(Joint.TOUCH if touching else Joint.FREE, self.phase.seated)
+        if (gap[0] < 0.0) == touching:
+            return
+        at = step.size * gap[0] / (gap[0] - gap[1])
+        ends = [interpolated(step.start[i], step.end[i], step.size, at) for i in (1, 0)]
+        self.counts.events += 1
+        values = [x for end in ends for x in end]
+        self.recorder.event(Event(step.time + at, "impact" if touching else "separation", *values))
+
     def _meet(self, tip: Motion, low: Motion) -> Impact:
         assert self._beam is not None and self._spring is not None
-        if self._compliant:
-            self.phase = Phase(Joint.TOUCH, seated=self.phase.seated)
-            return Impact()
         below = low.displacement < self.scene.spring.equilibrium  # type: ignore[union-attr]
         if self.phase.seated:
             # The seated spring does not move: the tip strikes the foundation through it.
@@ -486,7 +508,7 @@ class Simulation:
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
         e = self.scene.stop.restitution  # type: ignore[union-attr]
         beam, spring = self._beam, self._spring
-        tied = spring is not None and beam is not None and self.phase.joint is not Joint.FREE and not self._compliant
+        tied = beam is not None and self.phase.joint is not Joint.FREE and not self._compliant
         if spring is None:
             assert beam is not None
             ends = (None, 0.0, tip.velocity, beam.mass)

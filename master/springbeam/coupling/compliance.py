@@ -60,6 +60,7 @@ class Compliance:
         self._regular_size = regular_size
         self._regular_response: float | None = None
         self.iterations = 0
+        self._scale = 0.0
 
     def solve(self, beam: Body, partner: Body, time: float, size: float, guess: Force, start: float) -> Force:
         """Advance both bodies from their marks by ``size`` [s] under the force of the law.
@@ -73,12 +74,13 @@ class Compliance:
         if response is None:
             # Response of two free masses; the secant below corrects it.
             response = 0.5 * size * size * (1.0 / beam.mass + 1.0 / partner.mass)
-        error = float("inf")
+        residual = float("inf")
         for _ in range(_MAX_ITERATIONS):
             target = discrete_gradient(start, p, *self._law)
             error = abs(target - c)
-            noise = response * error
-            if error <= self._tolerance * abs(target) or noise <= 4.0 * _EPS * max(abs(start), abs(p), self._scale):
+            # The same mismatch as a displacement: what p can be told apart to bounds it from below.
+            residual = error / (1.0 / response + self._tangent(start, p))
+            if error <= self._tolerance * abs(target) or residual <= 16.0 * _EPS * self._scale:
                 break
             self.iterations += 1
             new = self._model_root(start, p, c, response)
@@ -90,7 +92,7 @@ class Compliance:
                 response = measured
             c, p = new, p_new
         else:
-            raise NotConverged(response * error, _MAX_ITERATIONS)
+            raise NotConverged(residual, _MAX_ITERATIONS)
         if size == self._regular_size:
             self._regular_response = response
         return (c, 0.0, 0.0)
@@ -103,6 +105,11 @@ class Compliance:
             ends.append(body.motion())
         self._scale = max(abs(ends[0].displacement), abs(ends[1].displacement))
         return ends[1].displacement - ends[0].displacement
+
+    def _tangent(self, start: float, p: float) -> float:
+        """∂DG/∂p⁺ [N/m] by a difference."""
+        delta = 1e-6 * max(abs(p), abs(start), self._scale * _EPS)
+        return abs(discrete_gradient(start, p + delta, *self._law) - discrete_gradient(start, p, *self._law)) / delta
 
     def _model_root(self, start: float, p: float, c: float, response: float) -> float:
         """The C with C = DG(start, p − response·(C − c)): monotone, so bracketed by 0 and the force at C = 0."""
