@@ -35,6 +35,8 @@ _MAX_EVENTS_AT_ONCE = 25
 _SEATING_SPEED = 1e-8
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
 _SHORT_REMAINDER = 0.25
+#: Repetitions to end a step where the contact force vanishes.
+_MAX_FORCE_CUTS = 8
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
 
@@ -364,25 +366,35 @@ class Simulation:
         f = pick(step)
         if self._degree == 0:
             return self._unilateral_mean(step, kind, f[0])
-        start, end = f[0], force.end_value(f, step.size)
-        if end >= 0.0:
+        changes = force.sign_changes(f, step.size)
+        if f[0] < 0.0 and self._steps_in_phase == 0:
+            # Right after an event the sign may be a false alarm: it is one if the ends, let go, close.
+            if self._opens(changes[0] if changes else step.size, step.start):
+                for body in self._bodies:
+                    body.rewind()
+                return replace(step, size=0.0, end=step.start), kind
+            step = self._settled(step)
+            changes = changes[1:]
+        if not changes:
             return None
-        if start <= 0.0 and self._steps_in_phase == 0:
-            for body in self._bodies:
-                body.rewind()
-            return replace(step, size=0.0, end=step.start), kind
-        last = step
-
-        def evaluate(size: float) -> Sample:
-            nonlocal last
+        # The polynomial tells where the force of the step vanishes; the step is repeated until it ends there.
+        last, size = step, changes[0]
+        for _ in range(_MAX_FORCE_CUTS):
             last = self._attempt(size, step.start)
             g = pick(last)
-            return Sample(force.end_value(g, size), g[1] + size * g[2])
-
-        tolerance = 1e-10 * max(abs(start), abs(end))
-        samples = Sample(max(start, 0.0), f[1]), Sample(end, f[1] + step.size * f[2])
-        locate(evaluate, *samples, step.size, tolerance, self.time)
+            value, slope = force.end_value(g, size), g[1] + size * g[2]
+            change = -value / slope if slope < 0.0 else 0.0
+            if not 0.0 < size + change < step.size or abs(change) <= 1e-12 * self.H:
+                break
+            size += change
         return last, kind
+
+    def _opens(self, size: float, start: tuple[Motion, Motion]) -> bool:
+        phase = self.phase
+        self.phase = Phase(Joint.FREE, phase.seated and self._spring is not None)
+        tip, low = self._attempt(size, start).end
+        self.phase = phase
+        return tip.displacement > low.displacement
 
     def _unilateral_mean(self, step: Step, kind: str, c: float) -> tuple[Step, str] | None:
         """Degree 0: C belongs to the middle of its step; its alternating part is averaged out over two steps."""

@@ -40,6 +40,20 @@ def mean(force: Force, size: float) -> float:
     return force[0] + size * (force[1] / 2.0 + size * force[2] / 6.0)
 
 
+def sign_changes(force: Force, size: float) -> list[float]:
+    """Where C passes through zero inside the step, ascending."""
+    c, b, a = force[0], force[1], 0.5 * force[2]
+    if a == 0.0:
+        roots = [-c / b] if b != 0.0 else []
+    else:
+        discriminant = b * b - 4.0 * a * c
+        if discriminant <= 0.0:
+            return []
+        q = -0.5 * (b + (discriminant**0.5 if b >= 0.0 else -(discriminant**0.5)))
+        roots = [q / a, c / q] if q != 0.0 else []
+    return sorted(tau for tau in roots if 0.0 < tau < size)
+
+
 def shifted(force: Force, tau: float) -> Force:
     """The same polynomial, seen from τ on."""
     return (value(force, tau), force[1] + tau * force[2], force[2])
