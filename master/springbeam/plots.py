@@ -36,7 +36,7 @@ _PHASE_WORDS = {
     "free": "free",
     "tied": "tied (u = y < Ψ)",
     "touch": "touch (y ≥ Ψ)",
-    "seated": "seated (y = φ)",
+    "seated": "seated (at φ)",
 }
 #: Colour, marker and words of each kind of event.
 _EVENT_MARKS: dict[str, tuple[str, str, str]] = {
@@ -63,13 +63,14 @@ _STYLE: dict[Any, Any] = {
     "axes.formatter.useoffset": False,
     "agg.path.chunksize": 10000,
 }
+_REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
 _DPI = 160
 _WIDTH = 8.2  # inches
 #: Columns of pixels of a time axis, roughly; more points than a few per column cannot be seen.
 _PIXEL_COLUMNS = 1000
 _MANY_EVENTS = 60
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
-_MARK_HEIGHT = 1.045
+_MARK_HEIGHT, _MARK_ROW = 1.045, 0.04
 _KEY_COLUMNS = 4
 #: Forces and energies below this part of the largest one are not seen beside it.
 _INVISIBLE = 5e-3
@@ -167,7 +168,7 @@ def phase_intervals(
     if len(starts) > columns:
         samples = np.linspace(time[0], time[-1], columns + 1)
         at = np.searchsorted(time, 0.5 * (samples[1:] + samples[:-1]), side="right") - 1
-        return phase_intervals(samples, np.r_[phase[at], phase[at[-1]]], columns + 1)
+        return phase_intervals(samples, phase[np.append(at, at[-1])], columns + 1)
     ends = np.r_[time[starts[1:]], time[-1]]
     return [(str(phase[i]), float(time[i]), float(end)) for i, end in zip(starts, ends, strict=True) if end > time[i]]
 
@@ -192,7 +193,8 @@ class _Timeline:
         keys: list[Patch | Line2D] = [*timeline._shade(), *timeline._mark_events()]
         # Legends fill column by column; these read row by row.
         keys = [key for column in range(_KEY_COLUMNS) for key in keys[column::_KEY_COLUMNS]]
-        figure.legend(handles=keys, loc="outside lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
+        if keys:
+            figure.legend(handles=keys, loc="outside lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
         return timeline
 
     def line(self, ax: Axes, unit: Unit, name: str, **style: Any) -> None:
@@ -202,7 +204,7 @@ class _Timeline:
         t, v = self.unit.factor * self.trajectory["time"][rows], unit.factor * values[rows]
         if alternates(values):
             style = {**style, "linewidth": 0.25, "marker": ".", "markersize": 1.6, "markeredgewidth": 0.0}
-            _note(ax, "alternates from step to step: not resolved")
+            _note(ax, "alternates from step\nto step: not resolved")
         ax.plot(t, v, **style)
 
     def _shade(self) -> list[Patch]:
@@ -211,6 +213,8 @@ class _Timeline:
             spans.setdefault(phase, []).append((self.unit.factor * start, self.unit.factor * (end - start)))
         others = iter(_OTHER_SHADES * len(spans))
         patches = []
+        if spans.keys() == {"free"}:
+            return []
         for phase, intervals in spans.items():
             colour = _PHASE_SHADES.get(phase) or next(others)
             for ax in self.axes:
@@ -221,27 +225,25 @@ class _Timeline:
         return patches
 
     def _mark_events(self) -> list[Line2D]:
-        handles = []
-        many = len(self.trajectory.events) > _MANY_EVENTS
+        """Marks above the first panel and lines through all; of many events only ticks, a row for each kind."""
+        events = self.trajectory.events
+        many = len(events) > _MANY_EVENTS
+        handles: list[Line2D] = []
         for kind, (colour, marker, words) in _EVENT_MARKS.items():
-            times = self.unit.factor * np.array([e.time for e in self.trajectory.events if e.kind == kind])
+            times = self.unit.factor * np.array([event.time for event in events if event.kind == kind])
             if not len(times):
                 continue
+            height = _MARK_HEIGHT + (_MARK_ROW * len(handles) if many else 0.0)
+            look: dict[str, Any] = {"color": colour, "marker": "|" if many else marker, "markersize": 4.0, "ls": "none"}
             visible = times[decimated(times, times)]
-            look: dict[str, Any] = {
-                "color": colour,
-                "marker": marker,
-                "markersize": 4.0,
-                "markeredgewidth": 0.0,
-                "linestyle": "none",
-            }
-            for row, ax in enumerate(self.axes):
-                if row == 0:
-                    ax.plot(visible, np.full(len(visible), _MARK_HEIGHT), transform=ax.get_xaxis_transform(),
-                            clip_on=False, **look)  # fmt: skip
-                if not many:
-                    ax.vlines(visible, 0.0, 1.0, transform=ax.get_xaxis_transform(), color=colour, lw=0.4, alpha=0.6,
-                              zorder=1)  # fmt: skip
+            first = self.axes[0]
+            first.plot(
+                visible, np.full(len(visible), height), transform=first.get_xaxis_transform(), clip_on=False, **look
+            )
+            for ax in [] if many else self.axes:
+                ax.vlines(
+                    visible, 0.0, 1.0, transform=ax.get_xaxis_transform(), color=colour, lw=0.4, alpha=0.6, zorder=1
+                )
             handles.append(Line2D([], [], label=f"{words} ({len(times)})", **look))
         return handles
 
@@ -259,12 +261,10 @@ def _key(ax: Axes) -> None:
 
 
 def _note(ax: Axes, text: str) -> None:
-    """A remark inside the panel; the last one counts."""
+    """A remark beside the panel, under its key; the last one counts."""
     for earlier in [t for t in ax.texts if t.get_gid() == "note"]:
         earlier.remove()
-    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0}
-    ax.text(0.995, 0.97, text, transform=ax.transAxes, ha="right", va="top", fontsize=7.0, style="italic", color=GREY,
-            gid="note", bbox=box)  # fmt: skip
+    ax.text(1.012, 0.0, text, transform=ax.transAxes, va="bottom", gid="note", **_REMARK)
 
 
 # -- (A), (B): the beam's shape -----------------------------------------------------------------------------------
@@ -291,7 +291,7 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     _curves(figure, left, trajectory, times, shapes, "deflection u", "m", bar=False)
     _levels(left, trajectory, readable_unit([shapes], "m"))
     middles = 0.5 * (times[1:] + times[:-1])[apart]
-    _curves(figure, right, trajectory, middles, velocities, "mean velocity between shapes Δu/Δt", "m/s", bar=True)
+    _curves(figure, right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s", bar=True)
     return figure
 
 
@@ -305,11 +305,16 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
         return None
     figure = _figure(trajectory, "(B) Subsequent motion of the beam", 3.6)
     left, right = figure.subplots(1, 2)
-    wanted = np.linspace(times[0], times[-1], _SHAPES_LATER)
-    some = np.unique(np.searchsorted(times, wanted).clip(max=len(times) - 1))
+    jumpy = alternates(shapes[:, -1])
+    # Of shapes that alternate, evenly spaced ones may all be of one kind: pairs show both.
+    wanted = np.linspace(times[0], times[-1], _SHAPES_LATER // 2 if jumpy else _SHAPES_LATER)
+    some = np.searchsorted(times, wanted)
+    some = np.unique((np.append(some, some + 1) if jumpy else some).clip(max=len(times) - 1))
     _curves(figure, left, trajectory, times[some], shapes[some], "deflection u", "m", bar=True)
     _levels(left, trajectory, readable_unit([shapes[some]], "m"))
     _map(figure, right, trajectory, times, shapes)
+    if jumpy:
+        left.set_title("pairs of successive shapes: they alternate,\nthe motion is not resolved", **_REMARK)
     return figure
 
 
@@ -370,8 +375,8 @@ def _levels(ax: Axes, trajectory: Trajectory, unit: Unit, *, whole_width: bool =
         if not low - reach <= level <= high + reach:
             continue
         ax.axhline(level, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **style)
-        ax.annotate(symbol, (1.0, level), xycoords=("axes fraction", "data"), xytext=(3.0, 0.0),
-                    textcoords="offset points", va="center", fontsize=8.0)  # fmt: skip
+        ax.annotate(symbol, (1.0, level), xycoords=("axes fraction", "data"), xytext=(-2.0, 1.5),
+                    textcoords="offset points", ha="right", fontsize=8.0)  # fmt: skip
 
 
 def _level_values(trajectory: Trajectory) -> list[tuple[float, str, dict[str, Any]]]:
@@ -400,7 +405,9 @@ def _present(trajectory: Trajectory, *names: str) -> list[str]:
 def _positions(trajectory: Trajectory) -> Figure | None:
     positions = _present(trajectory, "u_tip", "y")
     speeds = _present(trajectory, "v_tip") or _present(trajectory, "z")
-    timeline = _Timeline.of(trajectory, "(C) Positions, and velocity of the beam's tip", (2.4, 1.6))
+    whose = "beam's tip" if "v_tip" in speeds else "spring's top"
+    title = "(C) Positions, and velocity" if len(positions) > 1 else "(C) Position and velocity"
+    timeline = _Timeline.of(trajectory, f"{title} of the {whose}", (2.4, 1.6))
     above, below = timeline.axes
     unit = readable_unit([trajectory[name] for name in positions], "m")
     for name in positions:
@@ -427,13 +434,13 @@ def _velocity_panel(timeline: _Timeline, ax: Axes, names: list[str]) -> None:
 _FORCES: dict[str, tuple[str, dict[str, Any]]] = {
     "contact_force": ("contact C, as applied", {"color": SKY, "linewidth": 0.7}),
     "contact_force_smoothed": ("contact C, smoothed", {"color": BLUE, "linewidth": 1.2}),
-    "compliance_force": (r"of it $\lambda_{nc}(\Psi-u)_+^p$", {"color": GREEN, "linewidth": 1.0, "linestyle": "--"}),
-    "foundation_force": ("foundation N", {"color": BLACK, "linewidth": 1.0, "linestyle": "-."}),
+    "compliance_force": (r"part $\lambda_{nc}(\Psi-u)_+^p$", {"color": GREEN, "linewidth": 1.0, "linestyle": "--"}),
+    "foundation_force": ("foundation N", {"color": BLACK, "linewidth": 0.9}),
 }
 
 
 def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
-    forces = _present(trajectory, *_FORCES)
+    forces = [name for name in _present(trajectory, *_FORCES) if np.any(trajectory[name] != 0.0)]
     speeds = _present(trajectory, "z")
     impulses = [e for e in trajectory.events if e.impulse_contact != 0.0 or e.impulse_foundation != 0.0]
     panels = [1.6] * bool(speeds) + [2.0] * bool(forces) + [1.2] * bool(impulses)
@@ -460,23 +467,22 @@ def _force_panel(timeline: _Timeline, ax: Axes, names: list[str]) -> None:
     unseen = []
     for name in names:
         label, style = _FORCES[name]
-        if sizes[name] >= _INVISIBLE * largest > 0.0:
+        if sizes[name] >= _INVISIBLE * largest:
             timeline.line(ax, unit, name, label=label, **style)
-        elif sizes[name] > 0.0:
+        else:
             unseen.append(f"{label} ≤ {sizes[name]:.2g} N")
     if unseen:
-        _note(ax, "too small to draw: " + ", ".join(unseen))
+        _note(ax, "too small to draw:\n" + "\n".join(unseen))
     ax.set_ylabel(f"force [{unit.name}]")
-    if ax.get_legend_handles_labels()[0]:
-        _key(ax)
+    _key(ax)
 
 
 def _impulse_panel(timeline: _Timeline, ax: Axes) -> None:
     events = timeline.trajectory.events
     kinds = (("impulse_contact", "on the tip", BLUE, "o"), ("impulse_foundation", "of the foundation", BLACK, "^"))
     sizes = np.array([getattr(e, name) for e in events for name, *_ in kinds if getattr(e, name) != 0.0])
-    unit = readable_unit([sizes], "N·s")
     logarithmic = bool(np.all(sizes > 0.0) and np.max(sizes) > 30.0 * np.min(sizes))
+    unit = Unit(1.0, "N·s") if logarithmic else readable_unit([sizes], "N·s")
     foot = 0.3 * unit.factor * float(np.min(sizes)) if logarithmic else 0.0
     for name, label, colour, marker in kinds:
         points = np.array([(e.time, getattr(e, name)) for e in events if getattr(e, name) != 0.0])
@@ -525,11 +531,15 @@ def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
     """Stacked where the parts are positive and of a size to be seen, else lines, on a log axis if sizes differ much."""
     columns = timeline.trajectory.columns
     parts = [name for name in _ENERGIES if name in columns and np.any(columns[name] != 0.0)]
-    unit = readable_unit([columns["e_total"], *(columns[name] for name in parts)], "J")
     sizes = {name: float(np.max(np.abs(columns[name]))) for name in parts}
     scale = max(sizes.values(), default=0.0)
     positive = all(np.min(columns[name]) >= -1e-9 * scale for name in parts)
-    if positive and all(size >= 1e-2 * scale for size in sizes.values()):
+    comparable = all(size >= _INVISIBLE * scale for size in sizes.values())
+    logarithmic = positive and not comparable
+    unit = (
+        Unit(1.0, "J") if logarithmic else readable_unit([columns["e_total"], *(columns[name] for name in parts)], "J")
+    )
+    if positive and comparable:
         rows = decimated(columns["time"], columns["e_beam" if "e_beam" in columns else "e_spring"])
         ax.stackplot(
             timeline.unit.factor * columns["time"][rows],
@@ -542,10 +552,10 @@ def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
     else:
         for name in parts:
             timeline.line(ax, unit, name, color=_ENERGIES[name][1], label=_ENERGIES[name][0])
-        if positive:
-            ax.set_yscale("log")
-            ax.set_ylim(bottom=unit.factor * max(1e-2 * min(sizes.values()), 1e-15 * scale))
-    timeline.line(ax, unit, "e_total", color=BLACK, linewidth=1.4, label="total")
+    if logarithmic:
+        ax.set_yscale("log")
+        ax.set_ylim(bottom=max(1e-2 * min(sizes.values()), 1e-18 * scale))
+    timeline.line(ax, unit, "e_total", color=BLACK, linewidth=1.4, linestyle=(0, (4, 2)), label="total")
     ax.set_ylabel(f"energy [{unit.name}]")
     _key(ax)
 
@@ -558,8 +568,10 @@ def _residual_panel(timeline: _Timeline, ax: Axes) -> None:
     rows = decimated(columns["time"], relative)
     rows = rows[relative[rows] > 0.0]
     ax.plot(timeline.unit.factor * columns["time"][rows], relative[rows], color=VERMILLION, lw=0.8)
-    ax.set_yscale("log")
     if len(rows):
+        ax.set_yscale("log")
         ax.set_ylim(0.3 * max(float(np.min(relative[rows])), 1e-18), 5.0 * float(np.max(relative[rows])))
-    ax.yaxis.set_major_locator(LogLocator(numticks=6))
+        ax.yaxis.set_major_locator(LogLocator(numticks=6))
+    else:
+        _note(ax, "zero throughout")
     ax.set_ylabel("energy residual\n/ largest energy [–]")
