@@ -39,6 +39,7 @@ inline constexpr int shape_points = 21;
 class Beam {
  public:
   /// @throws std::invalid_argument naming the parameter, its value and what is allowed
+  /// @throws std::runtime_error if the eigensolver does not converge
   explicit Beam(const Parameters& parameters);
   ~Beam();
   Beam(Beam&&) noexcept;
@@ -46,11 +47,15 @@ class Beam {
 
   /// Advance by `size` [s] > 0 under C(τ) = c[0] + c[1] τ + c[2] τ²/2 [N, N/s, N/s²], τ from the step's start,
   /// and the uniform load `distributed_load` [N/m].
+  /// @throws std::invalid_argument for a step size that is not finite and > 0, or an input that is not finite
   /// @throws std::domain_error (state unchanged) if the result is not finite
   void step(double size, const std::array<double, 3>& tip_force, double distributed_load);
 
   /// Instantaneous upward impulse J [N·s] at the tip: v += M⁻¹ e J.
   void apply_tip_impulse(double impulse);
+
+  /// The uniform load [N/m] that `load_potential` and `tip_acceleration` refer to until the next step brings its own.
+  void set_distributed_load(double distributed_load);
 
   double tip_displacement() const;             ///< u(L) [m]
   double tip_velocity() const;                 ///< u_t(L) [m/s]

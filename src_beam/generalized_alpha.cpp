@@ -1,0 +1,222 @@
+#include "generalized_alpha.hpp"
+
+#include <Eigen/SparseCholesky>
+
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "timoshenko.hpp"
+
+namespace beam {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+// Banded matrices stay banded in their natural order.
+using Factorisation = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
+
+class GeneralizedAlphaBeam final : public BeamIntegrator {
+ public:
+  explicit GeneralizedAlphaBeam(const Parameters& p)
+      : mesh_(p),
+        mu_(p.density * p.area),
+        alpha_(p.alpha_b),
+        midpoint_(p.rho_inf == 1.0),
+        alpha_m_((2.0 * p.rho_inf - 1.0) / (p.rho_inf + 1.0)),
+        alpha_f_(p.rho_inf / (p.rho_inf + 1.0)),
+        beta_(0.25 * (1.0 - alpha_m_ + alpha_f_) * (1.0 - alpha_m_ + alpha_f_)),
+        gamma_(0.5 - alpha_m_ + alpha_f_),
+        M_(mesh_.mass()),
+        K_(mesh_.stiffness()),
+        uniform_load_(mesh_.uniform_load() / mu_),
+        hat_load_(p.tip_load_coefficient / mu_ * mesh_.hat_load()),
+        tip_response_(mesh_.mass_solve(mesh_.unit_tip_force()) / mu_),
+        compliance_(mesh_.flexibility_times(mesh_.unit_tip_force())[mesh_.tip_index()] / mu_),
+        q_(p.initial_deflection_slope * mesh_.linear_shape()),
+        v_(p.initial_velocity_slope * mesh_.linear_shape()),
+        a_(midpoint_ ? 0 : mesh_.size()),
+        rhs_(mesh_.size()),
+        w_(mesh_.size()),
+        work_(mesh_.size()),
+        work2_(mesh_.size()) {
+    set_distributed_load(0.0);
+    if (!midpoint_) a_ = mesh_.mass_solve(residual_force());
+  }
+
+  void step(double size, const TipForce& c, double distributed_load) override {
+    const auto& factorisation = *cache_.get(size, [this](double h) { return factorise(h); });
+    if (midpoint_) {
+      midpoint_step(factorisation, size, c, distributed_load);
+    } else {
+      alpha_step(factorisation, size, c, distributed_load);
+    }
+  }
+
+  void apply_tip_impulse(double impulse) override {
+    w_ = v_ + impulse * tip_response_;
+    if (!w_.allFinite()) throw_not_finite(0.0, {impulse, 0.0, 0.0}, distributed_load_);
+    if (!midpoint_ && alpha_ > 0.0) {
+      work_ = w_ - v_;
+      a_ -= alpha_ * mesh_.mass_solve(mesh_.stiffness_times(work_));
+    }
+    v_.swap(w_);
+  }
+
+  void set_distributed_load(double distributed_load) override {
+    distributed_load_ = distributed_load;
+    load_ = distributed_load * uniform_load_ + hat_load_;
+  }
+
+  double tip_displacement() const override { return q_[mesh_.tip_index()]; }
+  double tip_velocity() const override { return v_[mesh_.tip_index()]; }
+  double tip_acceleration() const override { return mu_ * tip_response_.dot(residual_force()); }
+  double tip_rotation() const override { return q_[mesh_.tip_rotation_index()] / mesh_.radius_of_gyration(); }
+  double tip_displacement_integral() const override { return integral_; }
+  double tip_displacement_integral_2() const override { return integral_2_; }
+  double kinetic_energy() const override { return 0.5 * mu_ * mesh_.mass_norm2(v_); }
+  double strain_energy() const override { return 0.5 * mu_ * mesh_.stiffness_norm2(q_); }
+  double dissipated_energy() const override { return dissipated_; }
+  double load_potential() const override { return -mu_ * load_.dot(q_); }
+  double tip_mass() const override { return 1.0 / tip_response_[mesh_.tip_index()]; }
+  double static_tip_compliance() const override { return compliance_; }
+  void deflection(std::array<double, shape_points>& u) const override {
+    mesh_.sample_deflection(q_.data(), u.data());
+  }
+  void rotation(std::array<double, shape_points>& theta) const override {
+    mesh_.sample_scaled_rotation(q_.data(), theta.data());
+    for (double& value : theta) value /= mesh_.radius_of_gyration();
+  }
+  std::vector<double> frequencies() const override { return {}; }
+
+  void save(std::vector<double>& state) const override {
+    state.clear();
+    state.reserve(static_cast<std::size_t>(q_.size() + v_.size() + a_.size()) + 5);
+    for (const VectorXd* x : {&q_, &v_, &a_}) state.insert(state.end(), x->data(), x->data() + x->size());
+    for (const double value : {integral_, integral_2_, dissipated_, end_force_, distributed_load_}) {
+      state.push_back(value);
+    }
+  }
+
+  void restore(const std::vector<double>& state) override {
+    const double* from = state.data();
+    for (VectorXd* x : {&q_, &v_, &a_}) {
+      *x = Eigen::Map<const VectorXd>(from, x->size());
+      from += x->size();
+    }
+    for (double* value : {&integral_, &integral_2_, &dissipated_, &end_force_}) *value = *from++;
+    set_distributed_load(*from);
+  }
+
+ private:
+  void midpoint_step(const Factorisation& S, double h, const TipForce& c, double distributed_load) {
+    mesh_.mass_times(v_.data(), rhs_.data());
+    mesh_.stiffness_times(q_.data(), work_.data());
+    rhs_ -= (0.5 * h) * work_;
+    add_load(0.5 * h, mean_force(c, h), distributed_load);
+    w_ = S.solve(rhs_);
+
+    work_ = q_ + h * w_;
+    work2_ = 2.0 * w_ - v_;
+    const double loss = alpha_ > 0.0 ? mu_ * h * alpha_ * mesh_.stiffness_norm2(w_) : 0.0;
+    finish(h, c, distributed_load, loss, nullptr);
+  }
+
+  void alpha_step(const Factorisation& S, double h, const TipForce& c, double distributed_load) {
+    // The jump of the loads since the end of the last step, in the acceleration that this one starts from.
+    VectorXd a = a_ + (c[0] - end_force_) * tip_response_;
+    if (distributed_load != distributed_load_) {
+      a += mesh_.mass_solve((distributed_load - distributed_load_) * uniform_load_);
+    }
+    const double f = 1.0 - alpha_f_;
+    mesh_.mass_times(a.data(), rhs_.data());
+    rhs_ *= -alpha_m_;
+    work2_ = alpha_ * (v_ + (f * (1.0 - gamma_) * h) * a) + q_ + (f * h) * (v_ + ((0.5 - beta_) * h) * a);
+    mesh_.stiffness_times(work2_.data(), work_.data());
+    rhs_ -= work_;
+    add_load(1.0, force_at(c, f * h), distributed_load);
+    VectorXd a1 = S.solve(rhs_);
+
+    work_ = q_ + h * (v_ + h * ((0.5 - beta_) * a + beta_ * a1));
+    work2_ = v_ + h * ((1.0 - gamma_) * a + gamma_ * a1);
+    double loss = 0.0;
+    if (alpha_ > 0.0) {
+      w_ = f * work2_ + alpha_f_ * v_;
+      mesh_.stiffness_times(w_.data(), rhs_.data());
+      loss = mu_ * alpha_ * (work_ - q_).dot(rhs_);
+    }
+    finish(h, c, distributed_load, loss, &a1);
+  }
+
+  // Accepts work_ and work2_ as the new q and v, or throws.
+  void finish(double h, const TipForce& c, double distributed_load, double loss, VectorXd* a1) {
+    const double u0 = q_[mesh_.tip_index()], u1 = work_[mesh_.tip_index()];
+    const double integral = 0.5 * h * (u0 + u1), integral_2 = h * h * (2.0 * u0 + u1) / 6.0;
+    if (!work_.allFinite() || !work2_.allFinite() || (a1 != nullptr && !a1->allFinite()) ||
+        !std::isfinite(dissipated_ + loss) || !std::isfinite(integral) || !std::isfinite(integral_2)) {
+      throw_not_finite(h, c, distributed_load);
+    }
+    q_.swap(work_);
+    v_.swap(work2_);
+    if (a1 != nullptr) a_.swap(*a1);
+    integral_ = integral;
+    integral_2_ = integral_2;
+    dissipated_ += loss;
+    end_force_ = force_at(c, h);
+    if (distributed_load != distributed_load_) set_distributed_load(distributed_load);
+  }
+
+  void add_load(double factor, double tip_force, double distributed_load) {
+    rhs_ += (factor * distributed_load) * uniform_load_ + factor * hat_load_;
+    rhs_[mesh_.tip_index()] += factor * tip_force / mu_;
+  }
+
+  /// (F − K q − α_b K v)/ρA under the loads of the last step's end.
+  VectorXd residual_force() const {
+    VectorXd force = load_ - mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
+    force[mesh_.tip_index()] += end_force_ / mu_;
+    return force;
+  }
+
+  std::unique_ptr<Factorisation> factorise(double h) const {
+    const double f = 1.0 - alpha_f_;
+    const Eigen::SparseMatrix<double> S =
+        midpoint_ ? Eigen::SparseMatrix<double>(M_ + (0.25 * h * h + 0.5 * alpha_ * h) * K_)
+                  : Eigen::SparseMatrix<double>((1.0 - alpha_m_) * M_ + f * (alpha_ * gamma_ * h + beta_ * h * h) * K_);
+    auto factorisation = std::make_unique<Factorisation>();
+    factorisation->compute(S);
+    if (factorisation->info() != Eigen::Success) {
+      throw std::domain_error("beam: the matrix of the time step cannot be factorised; use a smaller step size");
+    }
+    return factorisation;
+  }
+
+  Timoshenko mesh_;
+  double mu_;     // ρA [kg/m]: all below is per ρA
+  double alpha_;  // α_b [s]
+  bool midpoint_;
+  double alpha_m_, alpha_f_, beta_, gamma_;
+  Eigen::SparseMatrix<double> M_, K_;
+  VectorXd uniform_load_, hat_load_;
+  VectorXd tip_response_;  // M⁻¹e/ρA [1/kg], the velocity that a unit impulse leaves
+  double compliance_;
+
+  VectorXd q_, v_, a_;  // state [m, m/s, m/s²]; a only for ρ∞ < 1
+  VectorXd load_;
+  double distributed_load_ = 0.0;
+  double end_force_ = 0.0;
+  double integral_ = 0.0, integral_2_ = 0.0;
+  double dissipated_ = 0.0;
+
+  VectorXd rhs_, w_, work_, work2_;  // work space
+  StepCache<std::unique_ptr<Factorisation>> cache_;
+};
+
+}  // namespace
+
+std::unique_ptr<BeamIntegrator> make_generalized_alpha_beam(const Parameters& parameters) {
+  return std::make_unique<GeneralizedAlphaBeam>(parameters);
+}
+
+}  // namespace beam

@@ -1,0 +1,30 @@
+// Integrator `generalized_alpha` (Chung & Hulbert, "A time integration algorithm for structural dynamics with
+// improved numerical dissipation: the generalized-α method", J. Appl. Mech. 60, 1993, 371–375), direct in the mesh's
+// unknowns. ρ∞ = 1 is the midpoint rule of Ahn & Tate, eq. (62).
+//
+//   M a_m + α_b K v_f + K q_f = F(t + (1−α_f)h)/ρA,   x_m = (1−α_m) x₁ + α_m x₀,  x_f = (1−α_f) x₁ + α_f x₀,
+//   q₁ = q₀ + h v₀ + h² [(½−β) a₀ + β a₁],   v₁ = v₀ + h [(1−γ) a₀ + γ a₁],
+//   α_m = (2ρ∞−1)/(ρ∞+1),  α_f = ρ∞/(ρ∞+1),  γ = ½ − α_m + α_f,  β = (1 − α_m + α_f)²/4.
+//
+// For ρ∞ = 1 the acceleration drops out, and the step is, with the mean velocity w = (q₁ − q₀)/h,
+//   [M + (h²/4 + α_b h/2) K] w = M v₀ + (h/2)(F̄/ρA − K q₀),   q₁ = q₀ + h w,   v₁ = 2w − v₀,
+// F̄ the mean of F over the step. Then E₁ − E₀ = F̄ᵀ(q₁ − q₀) − h α_b wᵀK w holds to rounding, whatever happened to F
+// or v between the steps. For ρ∞ < 1 the stored a₀ is kept consistent when C or f_b jumps between two steps (by M⁻¹
+// of the jump) and when an impulse changes v (by −α_b M⁻¹K of the change), so that a₀ belongs to the forces of the
+// step that begins.
+//
+// Dissipated energy: (q₁ − q₀)ᵀ α_b K v_f, the work of the damping force in the scheme; for ρ∞ = 1 it is the exact
+// h α_b wᵀKw. What ρ∞ < 1 takes out of high frequencies is not part of it.
+// ∫u and ∫∫u are those of u linear in time between the steps, as the paper reads (62): the work of a polynomial C on
+// that motion is F̄ Δu, what the midpoint rule sees.
+#pragma once
+
+#include <memory>
+
+#include "integrator.hpp"
+
+namespace beam {
+
+std::unique_ptr<BeamIntegrator> make_generalized_alpha_beam(const Parameters& parameters);
+
+}  // namespace beam

@@ -1,0 +1,241 @@
+#include "modal_beam.hpp"
+
+#include <Eigen/Core>
+
+#include <cmath>
+#include <utility>
+
+#include "modal_oscillator.hpp"
+#include "modes.hpp"
+
+namespace beam {
+namespace {
+
+using Eigen::ArrayXd;
+using Eigen::Index;
+
+/// Structure of arrays over the modes; φ stands for φ(L).
+struct Coefficients {
+  ArrayXd one_minus_decay;          // 1 − ġ = ω²G₁ + cG₀
+  ArrayXd G0, G1;
+  ArrayXd phi_G1, phi_G2, phi_G3;   // response of v, of v and η, of η to c₁ and c₂
+  // ∫u and ∫∫u: from η₀ and v₀ per mode, from c₀, c₁, c₂, f_b and the hat load in sum.
+  ArrayXd integral_eta, integral_v, integral2_eta, integral2_v;
+  std::array<double, 5> integral_input, integral2_input;
+  // c∫η̇²: from v₀², v₀r, r², and with c₁, c₂; from c₁², c₁c₂, c₂² in sum. Empty without damping.
+  ArrayXd loss_vv, loss_vr, loss_rr, loss_v1, loss_v2, loss_r1, loss_r2;
+  std::array<double, 3> loss_input;
+};
+
+class ModalBeam final : public BeamIntegrator {
+ public:
+  explicit ModalBeam(const Parameters& p)
+      : modes_(compute_modes(Timoshenko(p), p)),
+        tip_(modes_.tip),
+        omega2_(modes_.omega.array().square()),
+        damping_(p.alpha_b * omega2_),
+        hat_load_(p.tip_load_coefficient * modes_.hat_load.array()),
+        hat_coefficient_(p.tip_load_coefficient),
+        inverse_tip_mass_(tip_.square().sum()),
+        compliance_((tip_ / modes_.omega.array()).square().sum()),
+        eta_(p.initial_deflection_slope * modes_.linear_shape.array()),
+        v_(p.initial_velocity_slope * modes_.linear_shape.array()),
+        eta_next_(eta_.size()),
+        v_next_(eta_.size()),
+        r_(eta_.size()) {
+    set_distributed_load(0.0);
+    update_tip();
+  }
+
+  void step(double size, const TipForce& c, double distributed_load) override {
+    const Coefficients& k = cache_.get(size, [this](double h) { return make_coefficients(h); });
+    if (distributed_load != distributed_load_) set_distributed_load(distributed_load);
+
+    r_ = c[0] * tip_ + load_ - omega2_ * eta_;
+    eta_next_ = eta_ + (k.G0 * v_ + k.G1 * r_ + c[1] * k.phi_G2 + c[2] * k.phi_G3);
+    v_next_ = v_ + (k.G0 * r_ - k.one_minus_decay * v_ + c[1] * k.phi_G1 + c[2] * k.phi_G2);
+
+    const std::array<double, 5> input = {c[0], c[1], c[2], distributed_load, hat_coefficient_};
+    double integral = (k.integral_eta * eta_ + k.integral_v * v_).sum();
+    double integral_2 = (k.integral2_eta * eta_ + k.integral2_v * v_).sum();
+    for (std::size_t i = 0; i < input.size(); ++i) {
+      integral += k.integral_input[i] * input[i];
+      integral_2 += k.integral2_input[i] * input[i];
+    }
+    double loss = 0.0;
+    if (k.loss_vv.size() > 0) {
+      loss = (v_ * (k.loss_vv * v_ + k.loss_vr * r_ + c[1] * k.loss_v1 + c[2] * k.loss_v2) +
+              r_ * (k.loss_rr * r_ + c[1] * k.loss_r1 + c[2] * k.loss_r2))
+                 .sum() +
+             (c[1] * (c[1] * k.loss_input[0] + c[2] * k.loss_input[1]) + c[2] * c[2] * k.loss_input[2]);
+    }
+
+    const double displacement = (tip_ * eta_next_).sum();
+    const double velocity = (tip_ * v_next_).sum();
+    if (!std::isfinite(displacement) || !std::isfinite(velocity) || !std::isfinite(integral) ||
+        !std::isfinite(integral_2) || !std::isfinite(dissipated_ + loss)) {
+      throw_not_finite(size, c, distributed_load);
+    }
+    eta_.swap(eta_next_);
+    v_.swap(v_next_);
+    displacement_ = displacement;
+    velocity_ = velocity;
+    integral_ = integral;
+    integral_2_ = integral_2;
+    dissipated_ += loss;
+    end_force_ = force_at(c, size);
+  }
+
+  void apply_tip_impulse(double impulse) override {
+    v_next_ = v_ + impulse * tip_;
+    const double velocity = (tip_ * v_next_).sum();
+    if (!std::isfinite(velocity)) throw_not_finite(0.0, {impulse, 0.0, 0.0}, distributed_load_);
+    v_.swap(v_next_);
+    velocity_ = velocity;
+  }
+
+  void set_distributed_load(double distributed_load) override {
+    distributed_load_ = distributed_load;
+    load_ = distributed_load * modes_.uniform_load.array() + hat_load_;
+  }
+
+  double tip_displacement() const override { return displacement_; }
+  double tip_velocity() const override { return velocity_; }
+  double tip_acceleration() const override {
+    return (tip_ * (end_force_ * tip_ + load_ - omega2_ * eta_ - damping_ * v_)).sum();
+  }
+  double tip_rotation() const override { return modes_.tip_rotation.dot(eta_.matrix()); }
+  double tip_displacement_integral() const override { return integral_; }
+  double tip_displacement_integral_2() const override { return integral_2_; }
+  double kinetic_energy() const override { return 0.5 * v_.square().sum(); }
+  double strain_energy() const override { return 0.5 * (modes_.omega.array() * eta_).square().sum(); }
+  double dissipated_energy() const override { return dissipated_; }
+  double load_potential() const override { return -(load_ * eta_).sum(); }
+  double tip_mass() const override { return 1.0 / inverse_tip_mass_; }
+  double static_tip_compliance() const override { return compliance_; }
+  void deflection(std::array<double, shape_points>& u) const override {
+    Eigen::Map<Eigen::VectorXd>(u.data(), shape_points).noalias() = modes_.deflection * eta_.matrix();
+  }
+  void rotation(std::array<double, shape_points>& theta) const override {
+    Eigen::Map<Eigen::VectorXd>(theta.data(), shape_points).noalias() = modes_.rotation * eta_.matrix();
+  }
+  std::vector<double> frequencies() const override {
+    return std::vector<double>(modes_.omega.data(), modes_.omega.data() + modes_.omega.size());
+  }
+
+  void save(std::vector<double>& state) const override {
+    const auto m = static_cast<std::size_t>(eta_.size());
+    state.resize(2 * m + 5);
+    Eigen::Map<ArrayXd>(state.data(), eta_.size()) = eta_;
+    Eigen::Map<ArrayXd>(state.data() + m, eta_.size()) = v_;
+    double* rest = state.data() + 2 * m;
+    rest[0] = integral_;
+    rest[1] = integral_2_;
+    rest[2] = dissipated_;
+    rest[3] = end_force_;
+    rest[4] = distributed_load_;
+  }
+
+  void restore(const std::vector<double>& state) override {
+    const auto m = static_cast<std::size_t>(eta_.size());
+    eta_ = Eigen::Map<const ArrayXd>(state.data(), eta_.size());
+    v_ = Eigen::Map<const ArrayXd>(state.data() + m, eta_.size());
+    const double* rest = state.data() + 2 * m;
+    integral_ = rest[0];
+    integral_2_ = rest[1];
+    dissipated_ = rest[2];
+    end_force_ = rest[3];
+    set_distributed_load(rest[4]);
+    update_tip();
+  }
+
+ private:
+  Coefficients make_coefficients(double h) const {
+    const Index m = eta_.size();
+    Coefficients k;
+    for (ArrayXd* array : {&k.one_minus_decay, &k.G0, &k.G1, &k.phi_G1, &k.phi_G2, &k.phi_G3, &k.integral_eta,
+                           &k.integral_v, &k.integral2_eta, &k.integral2_v}) {
+      array->resize(m);
+    }
+    k.integral_input.fill(0.0);
+    k.integral2_input.fill(0.0);
+    k.loss_input.fill(0.0);
+    const bool damped = (damping_ > 0.0).any();
+    if (damped) {
+      for (ArrayXd* array : {&k.loss_vv, &k.loss_vr, &k.loss_rr, &k.loss_v1, &k.loss_v2, &k.loss_r1, &k.loss_r2}) {
+        array->resize(m);
+      }
+    }
+    for (Index i = 0; i < m; ++i) {
+      const double phi = tip_[i], c = damping_[i];
+      const OscillatorResponse response = oscillator_response(modes_.omega[i], c, h);
+      const std::array<double, 6>& G = response.G;
+      k.one_minus_decay[i] = omega2_[i] * G[1] + c * G[0];
+      k.G0[i] = G[0];
+      k.G1[i] = G[1];
+      k.phi_G1[i] = phi * G[1];
+      k.phi_G2[i] = phi * G[2];
+      k.phi_G3[i] = phi * G[3];
+      k.integral_eta[i] = phi * (G[0] + c * G[1]);
+      k.integral_v[i] = phi * G[1];
+      k.integral2_eta[i] = phi * (G[1] + c * G[2]);
+      k.integral2_v[i] = phi * G[2];
+      const std::array<double, 3> force = {phi, modes_.uniform_load[i], modes_.hat_load[i]};
+      for (std::size_t j = 0; j < 3; ++j) {
+        k.integral_input[j] += phi * phi * G[j + 2];
+        k.integral2_input[j] += phi * phi * G[j + 3];
+      }
+      for (std::size_t j = 1; j < 3; ++j) {
+        k.integral_input[j + 2] += phi * force[j] * G[2];
+        k.integral2_input[j + 2] += phi * force[j] * G[3];
+      }
+      if (damped) {
+        const std::array<double, 10> Q = oscillator_dissipation(modes_.omega[i], c, h);
+        k.loss_vv[i] = Q[0];
+        k.loss_vr[i] = 2.0 * Q[1];
+        k.loss_v1[i] = 2.0 * phi * Q[2];
+        k.loss_v2[i] = 2.0 * phi * Q[3];
+        k.loss_rr[i] = Q[4];
+        k.loss_r1[i] = 2.0 * phi * Q[5];
+        k.loss_r2[i] = 2.0 * phi * Q[6];
+        k.loss_input[0] += phi * phi * Q[7];
+        k.loss_input[1] += 2.0 * phi * phi * Q[8];
+        k.loss_input[2] += phi * phi * Q[9];
+      }
+    }
+    return k;
+  }
+
+  void update_tip() {
+    displacement_ = (tip_ * eta_).sum();
+    velocity_ = (tip_ * v_).sum();
+  }
+
+  Modes modes_;
+  ArrayXd tip_;        // φ(L) [1/√kg]
+  ArrayXd omega2_;     // ω² [1/s²]
+  ArrayXd damping_;    // α_b ω² [1/s]
+  ArrayXd hat_load_;   // modal force of the hat load [N/√kg]
+  double hat_coefficient_;
+  double inverse_tip_mass_;
+  double compliance_;
+
+  ArrayXd eta_, v_;    // state: modal displacement [m √kg] and velocity
+  ArrayXd load_;       // modal force of f_b and the hat load [N/√kg]
+  double distributed_load_ = 0.0;
+  double end_force_ = 0.0;  // C at the end of the last step
+  double displacement_ = 0.0, velocity_ = 0.0;
+  double integral_ = 0.0, integral_2_ = 0.0;
+  double dissipated_ = 0.0;
+
+  ArrayXd eta_next_, v_next_, r_;  // work space
+  StepCache<Coefficients> cache_;
+};
+
+}  // namespace
+
+std::unique_ptr<BeamIntegrator> make_modal_beam(const Parameters& parameters) {
+  return std::make_unique<ModalBeam>(parameters);
+}
+
+}  // namespace beam

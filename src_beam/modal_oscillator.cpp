@@ -1,0 +1,268 @@
+#include "modal_oscillator.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace beam {
+namespace {
+
+constexpr int max_order = 5;
+constexpr int n_terms = 24;
+
+// gamma[k + 1] = γ_k, k = −1 … 5
+using Gamma = std::array<double, max_order + 2>;
+
+constexpr std::array<double, n_terms + max_order + 2> make_inverse_factorials() {
+  std::array<double, n_terms + max_order + 2> values{};
+  double factorial = 1.0;
+  values[0] = 1.0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    factorial *= static_cast<double>(i);
+    values[i] = 1.0 / factorial;
+  }
+  return values;
+}
+
+constexpr auto inverse_factorial = make_inverse_factorials();
+
+// Unevaluated sum high + low: twice the digits where ω²−c²/4 cancels and where the phase ωt is large.
+struct Double2 {
+  double high, low;
+};
+
+Double2 product(double a, double b) {
+  const double p = a * b;
+  return {p, std::fma(a, b, -p)};
+}
+
+Double2 difference(const Double2& a, const Double2& b) {
+  const double s = a.high - b.high, bb = s - a.high;
+  const double error = (a.high - (s - bb)) - (b.high + bb);
+  const double low = error + (a.low - b.low);
+  const double high = s + low;
+  return {high, low - (high - s)};
+}
+
+Double2 square_root(const Double2& a) {
+  if (a.high <= 0.0) return {0.0, 0.0};
+  const double s = std::sqrt(a.high);
+  return {s, (std::fma(-s, s, a.high) + a.low) / (2.0 * s)};
+}
+
+Double2 times(const Double2& a, double b) {
+  const Double2 p = product(a.high, b);
+  const double low = p.low + a.low * b;
+  const double high = p.high + low;
+  return {high, low - (high - p.high)};
+}
+
+// Roots of μ² + dμ + x² = 0 as −d/2 ± iw (complex) or −d/2 ± w (real).
+struct Roots {
+  double x, d;    // ωt, ct
+  Double2 w;      // |√(x² − d²/4)|
+  bool complex;
+  double slow;    // |μ₊|, the smaller modulus
+  double fast;    // |μ₋|
+};
+
+Roots roots(double omega, double c, double t) {
+  Roots z;
+  z.x = omega * t;
+  z.d = c * t;
+  Double2 square = difference(product(omega, omega), product(0.5 * c, 0.5 * c));
+  z.complex = square.high > 0.0;
+  if (!z.complex) square = {-square.high, -square.low};
+  z.w = times(square_root(square), t);
+  if (z.complex) {
+    z.slow = z.fast = z.x;
+  } else {
+    z.fast = 0.5 * z.d + z.w.high;
+    z.slow = z.x * (z.x / z.fast);
+  }
+  return z;
+}
+
+// Power series; needs |μ±| ≤ 1. With b_n the n-th derivative of g at 0: γ_k = Σ b_n/(n+k)!.
+Gamma by_series(double x, double d) {
+  std::array<double, n_terms> b{};
+  b[0] = 0.0;
+  b[1] = 1.0;
+  for (std::size_t n = 2; n < n_terms; ++n) b[n] = -d * b[n - 1] - x * x * b[n - 2];
+  Gamma gamma{};
+  for (std::size_t k = 0; k < gamma.size(); ++k) {  // order k − 1
+    double sum = 0.0;
+    for (std::size_t n = n_terms - 1; n >= 1; --n) sum += b[n] * inverse_factorial[n + k - 1];
+    gamma[k] = sum;
+  }
+  return gamma;
+}
+
+// From t to 2t (x and d are those of t): the k-fold integral over the second half continues the motion that the
+// first half ends with, γ₀ and γ₋₁, on top of the polynomial that the first half's integrals leave.
+Gamma doubled(const Gamma& a, double x, double d) {
+  const double y = a[1], dy = a[0];
+  Gamma r{};
+  r[0] = dy * dy - (x * y) * (x * y);
+  double power = 0.5;
+  for (std::size_t k = 1; k < a.size(); ++k) {  // order k − 1
+    double sum = y * (a[k - 1] + d * a[k]) + dy * a[k];
+    for (std::size_t j = 0; j + 1 < k; ++j) sum += a[k - j] * inverse_factorial[j];
+    r[k] = power * sum;
+    power *= 0.5;
+  }
+  return r;
+}
+
+// γ_k from γ₋₁ and γ₀ by the recurrence; loses nothing while |μ₊| ≥ 2.
+void recur(Gamma& gamma, double x, double d) {
+  const double w = 1.0 / x / x;
+  for (std::size_t k = 2; k < gamma.size(); ++k) {
+    gamma[k] = (inverse_factorial[k - 2] - gamma[k - 2] - d * gamma[k - 1]) * w;
+  }
+}
+
+Gamma by_closed_form(const Roots& z) {
+  Gamma gamma{};
+  if (z.complex) {
+    const double e = std::exp(-0.5 * z.d);
+    const double s0 = std::sin(z.w.high), c0 = std::cos(z.w.high);
+    const double s = s0 + z.w.low * c0, c = c0 - z.w.low * s0;
+    const double sinc = z.w.high > 0.0 ? s / z.w.high : 1.0;
+    gamma[1] = e * sinc;
+    gamma[0] = e * (c - 0.5 * z.d * sinc);
+  } else {
+    const double w = z.w.high;
+    gamma[1] = std::exp(-z.slow) * (w > 0.0 ? -std::expm1(-2.0 * w) / (2.0 * w) : 1.0);
+    gamma[0] = std::exp(-z.fast) - z.slow * gamma[1];
+  }
+  recur(gamma, z.x, z.d);
+  return gamma;
+}
+
+// φ_k(z) = (φ_{k−1}(z) − 1/(k−1)!)/z, φ₀ = exp: phi[k], k = 0 … 5.
+using Phi = std::array<double, max_order + 1>;
+
+Phi phi_near(double z) {  // |z| ≤ 2
+  Phi phi{};
+  for (std::size_t k = 0; k < phi.size(); ++k) {
+    double sum = 0.0;
+    for (std::size_t n = n_terms; n-- > 0;) sum = sum * z + inverse_factorial[n + k];
+    phi[k] = sum;
+  }
+  return phi;
+}
+
+Phi phi_far(double z) {  // z ≤ −4
+  Phi phi{};
+  phi[0] = std::exp(z);
+  for (std::size_t k = 1; k < phi.size(); ++k) phi[k] = (phi[k - 1] - inverse_factorial[k - 1]) / z;
+  return phi;
+}
+
+// Strongly overdamped: the roots are far apart, γ_k = (φ_k(μ₊) − φ_k(μ₋))/(μ₊ − μ₋) does not cancel.
+Gamma by_separation(const Roots& z) {
+  const Phi slow = phi_near(-z.slow), fast = phi_far(-z.fast);
+  const double gap = 2.0 * z.w.high;
+  Gamma gamma{};
+  for (std::size_t k = 0; k < slow.size(); ++k) gamma[k + 1] = (slow[k] - fast[k]) / gap;
+  gamma[0] = fast[0] - z.slow * gamma[1];
+  return gamma;
+}
+
+Gamma gamma_functions(const Roots& z) {
+  if (z.fast <= 1.0) return by_series(z.x, z.d);
+  if (z.fast <= 4.0) {
+    Gamma gamma = by_series(0.25 * z.x, 0.25 * z.d);
+    gamma = doubled(gamma, 0.25 * z.x, 0.25 * z.d);
+    return doubled(gamma, 0.5 * z.x, 0.5 * z.d);
+  }
+  if (z.slow >= 2.0) return by_closed_form(z);
+  return by_separation(z);
+}
+
+// Gauss–Legendre on [0, 1], exact to degree 15; the other half is symmetric about 1/2.
+constexpr std::array<double, 4> gauss_node = {0.0198550717512318841582, 0.1016667612931866302042,
+                                              0.2372337950418355070911, 0.4082826787521750975303};
+constexpr std::array<double, 4> gauss_weight = {0.0506142681451881295763, 0.1111905172266872352722,
+                                                0.1568533229389436436690, 0.1813418916891809914826};
+
+}  // namespace
+
+OscillatorResponse oscillator_response(double omega, double c, double t) {
+  const Gamma gamma = gamma_functions(roots(omega, c, t));
+  OscillatorResponse response;
+  response.decay = gamma[0];
+  double power = t;
+  for (std::size_t k = 0; k < response.G.size(); ++k) {
+    response.G[k] = power * gamma[k + 1];
+    power *= t;
+  }
+  return response;
+}
+
+std::array<double, 10> oscillator_dissipation(double omega, double c, double t) {
+  constexpr std::size_t n = 4;
+  // In units of the current length t_j the state is z = (v, r t_j, f₁ t_j², f₂ t_j³), and v(σ t_j) = basis · z.
+  const Roots whole = roots(omega, c, t);
+  int doublings = 0;
+  for (double m = whole.fast; m > 1.0; m *= 0.5) ++doublings;
+  double length = std::ldexp(t, -doublings);
+
+  double Q[n][n] = {};
+  for (std::size_t q = 0; q < 2 * gauss_node.size(); ++q) {
+    const std::size_t half = q / 2;
+    const double sigma = q % 2 == 0 ? gauss_node[half] : 1.0 - gauss_node[half];
+    const Gamma gamma = by_series(sigma * omega * length, sigma * c * length);
+    double basis[n], power = 1.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      basis[i] = power * gamma[i];
+      power *= sigma;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i; j < n; ++j) Q[i][j] += gauss_weight[half] * basis[i] * basis[j];
+    }
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < i; ++j) Q[i][j] = Q[j][i];
+  }
+
+  for (int step = 0; step < doublings; ++step) {
+    const Roots z = roots(omega, c, length);
+    const Gamma g = gamma_functions(z);
+    const double P[n][n] = {{g[0], g[1], g[2], g[3]},
+                            {-z.x * z.x * g[1], g[0] + z.d * g[1], g[1] + z.d * g[2], g[2] + z.d * g[3]},
+                            {0.0, 0.0, 1.0, 1.0},
+                            {0.0, 0.0, 0.0, 1.0}};
+    double QP[n][n] = {};
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < n; ++k) {
+        for (std::size_t j = 0; j < n; ++j) QP[i][j] += Q[i][k] * P[k][j];
+      }
+    }
+    double R[n][n];
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = i; j < n; ++j) {
+        double sum = Q[i][j];
+        for (std::size_t k = 0; k < n; ++k) sum += P[k][i] * QP[k][j];
+        R[i][j] = R[j][i] = std::ldexp(sum, -1 - static_cast<int>(i + j));  // from units of t_j to 2 t_j
+      }
+    }
+    std::copy(&R[0][0], &R[0][0] + n * n, &Q[0][0]);
+    length *= 2.0;
+  }
+
+  std::array<double, 10> form{};
+  std::size_t entry = 0;
+  double row = c * t;
+  for (std::size_t i = 0; i < n; ++i) {
+    double power = row;
+    for (std::size_t j = i; j < n; ++j) {
+      form[entry++] = power * Q[i][j];
+      power *= t;
+    }
+    row *= t * t;
+  }
+  return form;
+}
+
+}  // namespace beam

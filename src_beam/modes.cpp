@@ -1,0 +1,219 @@
+#include "modes.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/SVD>
+#include <Spectra/SymGEigsShiftSolver.h>
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+#include "validate.hpp"
+
+namespace beam {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Residual up to which a mode counts as found. The solvers leave 1e-15 … 1e-9, the most for slender beams.
+constexpr double residual_tolerance = 1e-6;
+
+/// A static shape whose part outside the basis is smaller than this (in the M-norm, relative) is already in it.
+/// The compliance missed by dropping it is of the same relative size, since the residual of K⁻¹e consists of modes
+/// that enter it with φ(L)/ω².
+constexpr double rank_tolerance = 1e-12;
+
+/// y = ν K⁻¹ x for Spectra, which wants to set a shift: ours is 0. The factor ν lifts the eigenvalues ν/ω² to where
+/// Spectra's convergence test, which has an absolute part of 4e-11, is relative.
+class Flexibility {
+ public:
+  using Scalar = double;
+  Flexibility(const Timoshenko& mesh, double factor) : mesh_(mesh), factor_(factor) {}
+  Index rows() const { return mesh_.size(); }
+  Index cols() const { return mesh_.size(); }
+  void set_shift(double) {}
+  void perform_op(const double* x, double* y) const {
+    mesh_.flexibility_times(x, y);
+    Eigen::Map<VectorXd>(y, mesh_.size()) *= factor_;
+  }
+
+ private:
+  const Timoshenko& mesh_;
+  double factor_;
+};
+
+/// y = M x for Spectra.
+class Mass {
+ public:
+  using Scalar = double;
+  explicit Mass(const Timoshenko& mesh) : mesh_(mesh) {}
+  Index rows() const { return mesh_.size(); }
+  Index cols() const { return mesh_.size(); }
+  void perform_op(const double* x, double* y) const { mesh_.mass_times(x, y); }
+
+ private:
+  const Timoshenko& mesh_;
+};
+
+/// Lowest modes by implicitly restarted Lanczos on K⁻¹M, M-orthonormal columns.
+MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
+  // Rayleigh quotient of the static tip shape: a little above the lowest ω².
+  const VectorXd shape = mesh.flexibility_times(mesh.unit_tip_force());
+  const double lowest = shape[mesh.tip_index()] / mesh.mass_norm2(shape);
+
+  Flexibility flexibility(mesh, 1e8 * lowest);
+  Mass mass(mesh);
+  const Index subspace = std::min(mesh.size(), std::max(2 * count, count + 20));
+  Spectra::SymGEigsShiftSolver<Flexibility, Mass, Spectra::GEigsMode::ShiftInvert> solver(flexibility, mass, count,
+                                                                                           subspace, 0.0);
+  solver.init();  // a fixed pseudo-random start
+  const Index converged = solver.compute(Spectra::SortRule::LargestMagn, 300, 1e-12, Spectra::SortRule::SmallestAlge);
+  if (converged < count) {
+    std::ostringstream message;
+    message << "beam: only " << converged << " of " << count << " modes of " << mesh.elements()
+            << " elements converged; keep fewer n_modes, or use the integrator generalized_alpha";
+    throw std::runtime_error(message.str());
+  }
+  return solver.eigenvectors();
+}
+
+/// Solves C x = y or, for all columns, overwrites y by x; C the upper bidiagonal factor of M.
+void solve_upper(const VectorXd& d, const VectorXd& l, MatrixXd& y) {
+  for (Index i = d.size() - 1; i >= 0; --i) {
+    for (Index f = 0; f < 2; ++f) {
+      if (i + 1 < d.size()) y.row(2 * i + f) -= l[i] * y.row(2 * i + 2 + f);
+      y.row(2 * i + f) /= d[i];
+    }
+  }
+}
+
+/// Lowest modes from the singular values of G C⁻¹, where K = GᵀG and M = CᵀC: a dense decomposition, but its error
+/// relative to ω₁ is ε ω_max/ω₁, where that of the eigenproblem of K would be the square of the ratio.
+MatrixXd dense_modes(const Timoshenko& mesh, Index count) {
+  const Index size = mesh.size();
+  VectorXd d, l;
+  mesh.mass_cholesky(d, l);
+  MatrixXd X = MatrixXd::Identity(size, size);
+  solve_upper(d, l, X);
+  VectorXd strains(size);
+  for (Index j = 0; j < size; ++j) {
+    mesh.weighted_strains(X.col(j).data(), strains.data());
+    X.col(j) = strains;
+  }
+  const Eigen::BDCSVD<MatrixXd> svd(X, Eigen::ComputeThinV);
+  MatrixXd modes = svd.matrixV().rightCols(count).rowwise().reverse();
+  solve_upper(d, l, modes);
+  return modes;
+}
+
+/// Appends what `shape` has outside the M-orthonormal columns of `basis`, normalised; nothing if that is nothing.
+void augment(const Timoshenko& mesh, VectorXd shape, MatrixXd& basis, Index& columns) {
+  const double whole = std::sqrt(mesh.mass_norm2(shape));
+  for (int pass = 0; pass < 3; ++pass) {
+    const VectorXd Mx = mesh.mass_times(shape);
+    shape.noalias() -= basis.leftCols(columns) * (basis.leftCols(columns).transpose() * Mx);
+    const double rest = std::sqrt(mesh.mass_norm2(shape));
+    if (!(rest > (pass == 0 ? rank_tolerance * whole : 0.5))) return;
+    shape /= rest;
+  }
+  basis.col(columns++) = shape;
+}
+
+/// Z becomes the transformation W for which Z W diagonalises both forms in span Z; returns ω.
+/// The stiffness Gram matrix is formed of strains scaled to unit length, of which only well-conditioned matrices
+/// remain: frequencies that differ by orders of magnitude keep their digits.
+VectorXd rayleigh_ritz(const Timoshenko& mesh, const MatrixXd& Z, MatrixXd& W) {
+  const Index m = Z.cols();
+  MatrixXd work(mesh.size(), m);
+  for (Index k = 0; k < m; ++k) mesh.mass_times(Z.col(k).data(), work.col(k).data());
+  const MatrixXd mass = Z.transpose() * work;
+  VectorXd scale(m);
+  for (Index k = 0; k < m; ++k) {
+    mesh.weighted_strains(Z.col(k).data(), work.col(k).data());
+    scale[k] = work.col(k).norm();
+    work.col(k) /= scale[k];
+  }
+  const MatrixXd stiffness = work.transpose() * work;
+  const Eigen::LLT<MatrixXd> mass_factor(mass), stiffness_factor(stiffness);
+  if (mass_factor.info() != Eigen::Success || stiffness_factor.info() != Eigen::Success) {
+    throw std::runtime_error("beam: the modes found are not independent; keep fewer n_modes");
+  }
+  // X = R_K S R_M⁻¹ with XᵀX similar to the pencil: its singular values are ω.
+  MatrixXd X = stiffness_factor.matrixU();
+  X *= scale.asDiagonal();
+  mass_factor.matrixU().solveInPlace<Eigen::OnTheRight>(X);
+  const Eigen::BDCSVD<MatrixXd> svd(X, Eigen::ComputeThinV);
+  W = svd.matrixV().rowwise().reverse();
+  mass_factor.matrixU().solveInPlace(W);
+  return svd.singularValues().reverse();
+}
+
+}  // namespace
+
+Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
+  const Index size = mesh.size();
+  const Index count = p.n_modes == 0 ? size : p.n_modes;
+  const bool dense = size <= 200 || (size <= max_dense_unknowns && count > size / 4);
+
+  Index columns = count;
+  MatrixXd basis(size, std::min(size, count + 4));
+  basis.leftCols(count) = dense ? dense_modes(mesh, count) : lanczos_modes(mesh, count);
+
+  Modes modes;
+  VectorXd y(size);
+  for (Index k = 0; k < count; ++k) {
+    const double omega2 = mesh.stiffness_norm2(basis.col(k)) / mesh.mass_norm2(basis.col(k));
+    y = mesh.flexibility_times(mesh.mass_times(VectorXd(basis.col(k))));
+    const double residual = std::sqrt(mesh.stiffness_norm2(basis.col(k) - omega2 * y) / omega2);
+    if (!(residual <= residual_tolerance)) {
+      std::ostringstream message;
+      message << "beam: mode " << k + 1 << " of " << count << " (" << std::sqrt(omega2)
+              << " rad/s) did not converge: its residual is " << residual << ", allowed is " << residual_tolerance
+              << "; keep fewer n_modes, or use the integrator generalized_alpha";
+      throw std::runtime_error(message.str());
+    }
+    modes.residual = std::max(modes.residual, residual);
+  }
+
+  if (count < size) {
+    const auto add = [&](const VectorXd& shape) {
+      if (columns < basis.cols()) augment(mesh, shape, basis, columns);
+    };
+    add(mesh.flexibility_times(mesh.unit_tip_force()));
+    add(mesh.flexibility_times(mesh.uniform_load()));
+    if (p.tip_load_coefficient != 0.0) add(mesh.flexibility_times(mesh.hat_load()));
+    if (p.initial_deflection_slope != 0.0 || p.initial_velocity_slope != 0.0) add(mesh.linear_shape());
+    basis.conservativeResize(Eigen::NoChange, columns);
+  }
+
+  MatrixXd W;
+  modes.omega = rayleigh_ritz(mesh, basis, W);
+
+  // Only rows of Φ = Z W that are ever asked for are formed; from θ̃ to θ, and from M = ∫ to ρA ∫.
+  const double norm = 1.0 / std::sqrt(mesh.mass_per_length());
+  W *= norm;
+  for (Index k = 0; k < columns; ++k) {
+    if (basis.row(mesh.tip_index()).dot(W.col(k)) < 0.0) W.col(k) = -W.col(k);
+  }
+  const double rotation_norm = 1.0 / mesh.radius_of_gyration();
+  MatrixXd u(shape_points, columns), theta(shape_points, columns);
+  for (Index k = 0; k < columns; ++k) {
+    mesh.sample_deflection(basis.col(k).data(), u.col(k).data());
+    mesh.sample_scaled_rotation(basis.col(k).data(), theta.col(k).data());
+  }
+  modes.deflection = u * W;
+  modes.rotation = rotation_norm * (theta * W);
+  modes.tip = (basis.row(mesh.tip_index()) * W).transpose();
+  modes.tip_rotation = rotation_norm * (basis.row(mesh.tip_rotation_index()) * W).transpose();
+  modes.uniform_load = W.transpose() * (basis.transpose() * mesh.uniform_load());
+  modes.hat_load = W.transpose() * (basis.transpose() * mesh.hat_load());
+  modes.linear_shape =
+      mesh.mass_per_length() * (W.transpose() * (basis.transpose() * mesh.mass_times(mesh.linear_shape())));
+  return modes;
+}
+
+}  // namespace beam

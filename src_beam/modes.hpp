@@ -1,0 +1,38 @@
+// The reduced basis of the modal integrator: lowest modes plus static shapes.
+//
+// Modes are the lowest n of K φ = ω² M φ. Kept alone they would be too stiff at the tip, so the basis is augmented
+// by the M-orthogonal residuals of static shapes (modal truncation augmentation: Dickens, Nakagawa & Wittbrodt,
+// "A critique of mode acceleration and modal truncation augmentation methods for modal response analysis",
+// Computers & Structures 62, 1997, 985–998): K⁻¹e of the tip force, K⁻¹F of the uniform load, of the hat load if there
+// is one, and u = x if the beam starts from it. A Rayleigh–Ritz step diagonalises all of them together; what is added
+// behaves as a few more modes of high frequency. So the static tip compliance and the initial state are those of the
+// full mesh for any n ≥ 1, and everything stays a linear mechanical system with a mass and a continuous state.
+//
+// The alternative, adding the missing compliance as a massless spring in series (static or residual-flexibility
+// correction), would let u(L) jump whenever C does: the tip's velocity, its work and a gap kept closed would have no
+// meaning, and the energy could not be conserved.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "timoshenko.hpp"
+
+namespace beam {
+
+/// Mass-normalised: φᵀ M φ = 1 kg, φᵀ K φ = ω². Ascending ω; m of them.
+struct Modes {
+  Eigen::VectorXd omega;            ///< [rad/s], m
+  Eigen::VectorXd tip;              ///< φ_u(L) ≥ 0 [1/√kg], m
+  Eigen::VectorXd tip_rotation;     ///< φ_θ(L) [1/(m √kg)], m
+  Eigen::VectorXd uniform_load;     ///< ∫ φ_u dx [m/√kg], m
+  Eigen::VectorXd hat_load;         ///< ∫ φ_u ψ_n dx [m/√kg], m
+  Eigen::VectorXd linear_shape;     ///< coordinates of u = x, θ = 0: φᵀ M q [m √kg], m
+  Eigen::MatrixXd deflection;       ///< φ_u at the output points, 21 × m
+  Eigen::MatrixXd rotation;         ///< φ_θ at the output points, 21 × m
+  double residual = 0.0;            ///< largest ‖φ − ω² K⁻¹M φ‖_K / ω of the computed modes, φ with unit M-norm
+};
+
+/// @throws std::runtime_error if the eigensolver does not converge
+Modes compute_modes(const Timoshenko& mesh, const Parameters& parameters);
+
+}  // namespace beam

@@ -1,0 +1,78 @@
+#include "validate.hpp"
+
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+namespace beam {
+namespace {
+
+template <typename Value>
+[[noreturn]] void reject(const char* name, Value value, const std::string& allowed) {
+  std::ostringstream message;
+  message.precision(17);
+  message << "beam: " << name << " = " << value << " is not allowed; it must be " << allowed;
+  throw std::invalid_argument(message.str());
+}
+
+void require_positive(const char* name, double value) {
+  if (!(std::isfinite(value) && value > 0.0)) reject(name, value, "finite and > 0");
+}
+
+}  // namespace
+
+void require_finite(const char* name, double value) {
+  if (!std::isfinite(value)) reject(name, value, "finite");
+}
+
+void require_step_size(double size) { require_positive("step size [s]", size); }
+
+void validate(const Parameters& p) {
+  require_positive("density [kg/m3]", p.density);
+  require_positive("area [m2]", p.area);
+  require_positive("second_moment_of_area [m4]", p.second_moment_of_area);
+  require_positive("young_modulus [Pa]", p.young_modulus);
+  require_positive("shear_modulus [Pa]", p.shear_modulus);
+  require_positive("shear_coefficient", p.shear_coefficient);
+  require_positive("length [m]", p.length);
+  if (!(std::isfinite(p.alpha_b) && p.alpha_b >= 0.0)) reject("alpha_b [s]", p.alpha_b, "finite and >= 0");
+  require_finite("initial_deflection_slope", p.initial_deflection_slope);
+  require_finite("initial_velocity_slope [1/s]", p.initial_velocity_slope);
+  require_finite("tip_load_coefficient [N/m]", p.tip_load_coefficient);
+
+  // Each factor may be harmless and the product still leave the range of a double.
+  require_positive("density * area [kg/m]", p.density * p.area);
+  require_positive("second_moment_of_area / area [m2]", p.second_moment_of_area / p.area);
+  require_positive("young_modulus / density [m2/s2]", p.young_modulus / p.density);
+  require_positive("shear_modulus * shear_coefficient / density [m2/s2]",
+                   p.shear_modulus * p.shear_coefficient / p.density);
+
+  if (p.n_elements < 1 || p.n_elements > max_elements) {
+    reject("n_elements", p.n_elements, "between 1 and " + std::to_string(max_elements));
+  }
+  switch (p.integrator) {
+    case Integrator::modal: {
+      const int unknowns = 2 * p.n_elements;
+      if (p.n_modes < 0 || p.n_modes > unknowns) {
+        reject("n_modes", p.n_modes,
+               "between 0 (all) and " + std::to_string(unknowns) + ", the unknowns of " + std::to_string(p.n_elements) +
+                   " elements");
+      }
+      if (unknowns > max_dense_unknowns && (p.n_modes == 0 || p.n_modes > unknowns / 2)) {
+        reject("n_modes", p.n_modes,
+               "between 1 and " + std::to_string(unknowns / 2) + " with " + std::to_string(p.n_elements) +
+                   " elements (all modes only up to " + std::to_string(max_dense_unknowns / 2) +
+                   " elements); keep fewer n_modes, or use the integrator generalized_alpha");
+      }
+      break;
+    }
+    case Integrator::generalized_alpha:
+      if (!(p.rho_inf >= 0.0 && p.rho_inf <= 1.0)) reject("rho_inf", p.rho_inf, "between 0 and 1");
+      break;
+    default:
+      reject("integrator", static_cast<int>(p.integrator), "1 (modal) or 2 (generalized_alpha)");
+  }
+}
+
+}  // namespace beam

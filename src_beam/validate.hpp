@@ -1,0 +1,23 @@
+// Parameter checks: a message always names the parameter, its value and what is allowed.
+#pragma once
+
+#include "beam.hpp"
+
+namespace beam {
+
+/// Most elements that a beam may have; bounds memory, not the mathematics.
+inline constexpr int max_elements = 1000000;
+
+/// Most unknowns (two per element) of a dense eigenproblem, which "all modes" needs.
+inline constexpr int max_dense_unknowns = 1000;
+
+/// @throws std::invalid_argument for the first parameter that is not allowed
+void validate(const Parameters& parameters);
+
+/// @throws std::invalid_argument unless `value` is finite
+void require_finite(const char* name, double value);
+
+/// @throws std::invalid_argument unless `size` is a finite, positive step size [s]
+void require_step_size(double size);
+
+}  // namespace beam
