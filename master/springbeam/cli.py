@@ -22,6 +22,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from .fmu import FmuError
 from .recording import (
     FileRecorder,
     NonFiniteValue,
@@ -114,7 +115,11 @@ def run(
         what = load_scene(scene, settings or ())
         directory = _run_directory(scene, out, force)
     console = Console(quiet=quiet, highlight=False)
-    error = _run_into(directory, what, quiet=quiet)
+    try:
+        error = _run_into(directory, what, quiet=quiet)
+    except FmuError as missing:
+        directory.remove()
+        _fail(BAD_INPUT, str(missing))
     _report(console, directory, what)
     if not no_plots:
         from .plots import plot_run  # matplotlib takes a second to load

@@ -179,11 +179,8 @@ class _Rows:
         self._data[self._used] = row
         self._used += 1
 
-    def column(self, index: int) -> np.ndarray:
-        return self._data[: self._used, index].copy()
-
-    def columns_from(self, index: int) -> np.ndarray:
-        return self._data[: self._used, index:].copy()
+    def columns(self) -> list[np.ndarray]:
+        return [column.copy() for column in self._data[: self._used].T]
 
 
 class MemoryRecorder(_Checks):
@@ -224,13 +221,13 @@ class MemoryRecorder(_Checks):
 
     def trajectory(self) -> Trajectory:
         """Everything recorded so far."""
-        columns = {
-            name: np.array(self._phase_of_row, dtype=str) if i == self._phase_at else self._rows.column(i)
-            for i, name in enumerate(self.columns)
-        }
+        columns = dict(zip(self.columns, self._rows.columns(), strict=True))
+        if self._phase_at >= 0:
+            columns["phase"] = np.array(self._phase_of_row, dtype=str)
         shapes = None
         if self.scene.beam is not None:
-            shapes = (self._shapes.column(0), self._shapes.columns_from(1))
+            time, *deflection = self._shapes.columns()
+            shapes = (time, np.column_stack(deflection))
         return Trajectory(self.scene, columns, list(self._events), shapes, dict(self._summary))
 
 
@@ -265,6 +262,13 @@ class RunDirectory:
         """The result files that are there."""
         files = (self.trajectory, self.events, self.shapes, self.summary)
         return [file for file in files if file.exists()] + self.pictures
+
+    def remove(self) -> None:
+        """Remove the results, and the directory if nothing else is in it."""
+        for file in self.results():
+            file.unlink()
+        if not any(self.path.iterdir()):
+            self.path.rmdir()
 
     @classmethod
     def create(cls, path: str | Path, *, replace: bool = False) -> RunDirectory:
