@@ -9,8 +9,9 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
-// The tolerances hold for a step, IDA's are per internal step: what is asked of IDA is a tenth.
-constexpr double safety = 0.1;
+// The tolerances hold for a step, IDA's are per internal step: what is asked of IDA is a tenth, and less where the
+// step spans more of the spring's motion and so more internal steps.
+constexpr double safety = 0.03, safety_per_rate = 10.0;
 // IDA's local error must stay this much above rounding in ÿ, or its error estimate is noise.
 constexpr double noise_margin = 20.0;
 // Taylor terms are used while H × (rate of the spring) is below this; beyond, they would only cancel.
@@ -72,11 +73,12 @@ void Flight::prepare(const FlightStart& start) {
                        motion_.acceleration_scale(y, z, start.loads.force.c[0], force);
   const double velocity = std::abs(z) + std::abs(d[2]) * span;
   const double displacement = std::abs(y) + velocity * span;
+  const double share = safety / (1.0 + safety_per_rate * std::min(H * rate, resolved_limit));
   const double tolerance_z =
-      std::max(safety * (laws_.relative_tolerance * velocity + laws_.absolute_tolerance), noise);
+      std::max(share * (laws_.relative_tolerance * velocity + laws_.absolute_tolerance), noise);
   const double tolerance_y = std::max(
-      safety * (laws_.relative_tolerance * displacement + laws_.absolute_tolerance), noise * span);
-  relative_ = std::max(safety * laws_.relative_tolerance, 50.0 * epsilon);
+      share * (laws_.relative_tolerance * displacement + laws_.absolute_tolerance), noise * span);
+  relative_ = std::max(share * laws_.relative_tolerance, 50.0 * epsilon);
   double* tolerance = solver_.absolute_tolerance();
   tolerance[q] = tolerance[A] = tolerance[B] = tolerance_y;
   tolerance[p] = H * tolerance_z;

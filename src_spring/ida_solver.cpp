@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "sundials_compat.hpp"
+#include "small_algebra.hpp"
 
 namespace spring {
 namespace {
@@ -83,7 +83,7 @@ struct IdaSolver::Impl {
     if (code < 0) fail(what, code);
   }
   N_Vector new_vector() const {
-    N_Vector vector = N_VNew_Serial(n, context.get());
+    N_Vector vector = new_small_vector(n, context.get());
     if (vector == nullptr) throw std::bad_alloc();
     return vector;
   }
@@ -103,7 +103,7 @@ IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings) : imp
   N_VConst(1.0, d.tolerance.get());
   d.J.reset(SUNDenseMatrix(unknowns, unknowns, context));
   if (!d.J) throw std::bad_alloc();
-  d.linear_solver.reset(SUNLinSol_Dense(d.Y0.get(), d.J.get(), context));
+  d.linear_solver.reset(new_small_linear_solver(d.Y0.get(), d.J.get(), context));
   if (!d.linear_solver) throw std::bad_alloc();
   d.ida.reset(IDACreate(context));
   if (!d.ida) throw std::bad_alloc();
