@@ -1,0 +1,486 @@
+"""Scene files: what is accepted, what is refused, and whether the refusal says what to do."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from springbeam.scene import (
+    Scene,
+    SceneError,
+    load_scene,
+    scene_from_dict,
+    shipped_scenes,
+    suspicions,
+    with_changes,
+)
+
+PAIR = """
+[time]
+t_end = 0.6
+[beam]
+young_modulus = 100.0
+shear_modulus = 100.0
+initial_velocity_slope = -1.0
+[spring]
+linear_stiffness = 3.0
+cubic_stiffness = -0.2
+[stop]
+position = -0.015
+[coupling]
+macro_step = 0.001
+"""
+
+
+def changed(**tables):
+    """The dictionary of `PAIR` with keys changed; ``None`` takes a table or a key out."""
+    data = load_pair()
+    for table, changes in tables.items():
+        if changes is None:
+            data.pop(table, None)
+        elif isinstance(changes, dict) and isinstance(data.get(table, {}), dict):
+            merged = {**data.get(table, {}), **changes}
+            data[table] = {key: value for key, value in merged.items() if value is not None}
+        else:
+            data[table] = changes
+    return data
+
+
+def load_pair():
+    return {
+        "time": {"t_end": 0.6},
+        "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "initial_velocity_slope": -1.0},
+        "spring": {"linear_stiffness": 3.0, "cubic_stiffness": -0.2},
+        "stop": {"position": -0.015},
+        "coupling": {"macro_step": 0.001},
+    }
+
+
+# What is wrong, then fragments that its message must have: where, the value, and what would be allowed.
+BAD = {
+    # tables and keys
+    "empty": ({}, ["[time]", "missing table", "t_end"]),
+    "no time": (changed(time=None), ["[time]", "missing table"]),
+    "no t_end": (changed(time={"t_end": None}), ["[time] t_end", "missing", "greater than 0"]),
+    "no body": (changed(beam=None, spring=None), ["[beam], [spring] or both"]),
+    "no stop position": (changed(stop={"position": None}), ["[stop] position", "missing", "finite number"]),
+    "unknown table": (changed(sping={"mass": 1.0}), ["[sping]", "did you mean spring?", "coupling"]),
+    "unknown key": (changed(spring={"masss": 1.0}), ["[spring] masss", "did you mean mass?", "linear_stiffness"]),
+    "key far from any": (changed(beam={"colour": 1.0}), ["[beam] colour", "unknown key", "density"]),
+    "key of another table": (changed(spring={"density": 1.0}), ["[spring] density", "belongs to [beam]"]),
+    "step in time": (changed(time={"macro_step": 0.1}), ["[time] macro_step", "belongs to [coupling]"]),
+    "key outside": (changed(t_end=3.0), ["t_end = 3.0", "outside a table", "belongs to [time]"]),
+    "title misspelt": (changed(titel="x"), ['titel = "x"', "did you mean title?"]),
+    "case": (changed(Beam={}), ["[Beam]", "did you mean beam?"]),
+    "table is a number": (changed(beam=3), ["beam = 3", "must be a table"]),
+    "table is a list": (changed(spring=[{"mass": 1.0}]), ["spring", "must be a table"]),
+    "table is a text": (changed(stop="floor"), ['stop = "floor"', "must be a table"]),
+    # types
+    "title is a number": (changed(title=3), ["title = 3", "text in quotes"]),
+    "number as text": (changed(spring={"mass": "1.0"}), ['[spring] mass = "1.0"', "finite number greater than 0"]),
+    "true as number": (changed(spring={"damping": True}), ["[spring] damping = true", "finite number at least 0"]),
+    "false as stiffness": (changed(spring={"linear_stiffness": False}), ["linear_stiffness = false", "finite number"]),
+    "true as count": (changed(beam={"n_elements": True}), ["n_elements = true", "whole number"]),
+    "float as count": (changed(beam={"n_elements": 50.0}), ["n_elements = 50.0", "whole number"]),
+    "float as degree": (changed(coupling={"degree": 0.0}), ["degree = 0.0", "whole number"]),
+    "number as flag": (changed(beam={"reduced_integration": 1}), ["reduced_integration = 1", "true or false"]),
+    "text as flag": (changed(beam={"reduced_integration": "yes"}), ['"yes"', "true or false"]),
+    "list as number": (changed(beam={"length": [1.0, 2.0]}), ["[beam] length = [1.0, 2.0]", "finite number"]),
+    "table as number": (changed(beam={"length": {"m": 1.0}}), ["[beam] length", "finite number"]),
+    "very long value": (changed(spring={"mass": "9" * 500}), ["[spring] mass", "…", "finite number"]),
+    "huge integer": (changed(time={"t_end": 10**400}), ["[time] t_end", "finite number"]),
+    # not finite
+    "t_end inf": (changed(time={"t_end": math.inf}), ["[time] t_end = inf", "finite number greater than 0"]),
+    "mass nan": (changed(spring={"mass": math.nan}), ["[spring] mass = nan", "finite number"]),
+    "stiffness inf": (changed(spring={"linear_stiffness": math.inf}), ["linear_stiffness = inf", "finite number"]),
+    "load -inf": (changed(beam={"distributed_load": -math.inf}), ["distributed_load = -inf", "finite number"]),
+    "equilibrium nan": (changed(spring={"equilibrium": math.nan}), ["equilibrium = nan", "finite number"]),
+    # ranges
+    "t_end 0": (changed(time={"t_end": 0.0}), ["[time] t_end = 0.0", "greater than 0"]),
+    "t_end negative": (changed(time={"t_end": -1}), ["[time] t_end = -1", "greater than 0"]),
+    "density 0": (changed(beam={"density": 0.0}), ["[beam] density = 0.0", "greater than 0"]),
+    "area negative": (changed(beam={"area": -1.0}), ["[beam] area = -1.0", "greater than 0"]),
+    "second moment 0": (changed(beam={"second_moment_of_area": 0}), ["second_moment_of_area = 0", "greater than 0"]),
+    "modulus 0": (changed(beam={"young_modulus": 0.0}), ["young_modulus = 0.0", "greater than 0"]),
+    "shear modulus negative": (changed(beam={"shear_modulus": -1.0}), ["shear_modulus = -1.0", "greater than 0"]),
+    "shear coefficient 0": (changed(beam={"shear_coefficient": 0.0}), ["shear_coefficient = 0.0", "greater than 0"]),
+    "length 0": (changed(beam={"length": 0.0}), ["[beam] length = 0.0", "greater than 0"]),
+    "alpha_b negative": (changed(beam={"alpha_b": -1e-9}), ["alpha_b = -1e-09", "at least 0"]),
+    "no elements": (changed(beam={"n_elements": 0}), ["n_elements = 0", "at least 1", "at most 1000000"]),
+    "too many elements": (changed(beam={"n_elements": 2_000_000}), ["n_elements = 2000000", "at most 1000000"]),
+    "modes negative": (changed(beam={"n_modes": -1}), ["n_modes = -1", "at least 0"]),
+    "rho_inf above 1": (changed(beam={"rho_inf": 1.1}), ["rho_inf = 1.1", "at least 0 and at most 1"]),
+    "rho_inf negative": (changed(beam={"rho_inf": -0.1}), ["rho_inf = -0.1", "at least 0 and at most 1"]),
+    "mass 0": (changed(spring={"mass": 0.0}), ["[spring] mass = 0.0", "greater than 0"]),
+    "damping negative": (changed(spring={"damping": -0.1}), ["[spring] damping = -0.1", "at least 0"]),
+    "restitution above 1": (changed(stop={"restitution": 1.01}), ["[stop] restitution = 1.01", "at most 1"]),
+    "restitution negative": (changed(stop={"restitution": -0.5}), ["[stop] restitution = -0.5", "at least 0"]),
+    "stiffness negative": (changed(contact={"stiffness": -1.0}), ["[contact] stiffness = -1.0", "at least 0"]),
+    "exponent below 1": (changed(contact={"exponent": 0.5}), ["[contact] exponent = 0.5", "at least 1"]),
+    "degree 3": (changed(coupling={"degree": 3}), ["[coupling] degree = 3", "at least 0 and at most 2"]),
+    "degree negative": (changed(coupling={"degree": -1}), ["[coupling] degree = -1", "at least 0 and at most 2"]),
+    "macro_step 0": (changed(coupling={"macro_step": 0.0}), ["macro_step = 0.0", "greater than 0"]),
+    "tolerance 0": (changed(coupling={"tolerance": 0.0}), ["tolerance = 0.0", "greater than 0 and at most 0.001"]),
+    "tolerance large": (changed(coupling={"tolerance": 0.1}), ["tolerance = 0.1", "at most 0.001"]),
+    # choices
+    "integrator": (changed(beam={"integrator": "newmark"}), ['"newmark"', '"modal" or "generalized_alpha"']),
+    "integrator number": (changed(beam={"integrator": 1}), ["integrator = 1", '"modal" or "generalized_alpha"']),
+    "approach": (changed(beam={"approach": "rigid"}), ['"rigid"', '"undeformed" or "elastic"']),
+    "law": (changed(contact={"law": "penalty"}), ['"penalty"', '"transmission"', '"compliance"', '"paper"']),
+    "law case": (changed(contact={"law": "Paper"}), ['"Paper"', '"paper"']),
+    "impact": (changed(contact={"impact": "elastic"}), ['"elastic"', '"inelastic"', '"rest"', '"tip"']),
+    "scheme": (changed(coupling={"scheme": "jacoby"}), ["[coupling] scheme", '"energy"', '"hermite"']),
+    # values that do not go together
+    "more modes than there are": (changed(beam={"n_elements": 5, "n_modes": 11}), ["n_modes = 11", "only 10 modes"]),
+    "all modes of many elements": (
+        changed(beam={"n_elements": 501}),
+        ["[beam] n_modes = 0", "n_elements = 501", "n_modes = 64", "generalized_alpha"],
+    ),
+    "hermite of degree 0": (changed(coupling={"scheme": "hermite"}), ["degree = 0", "degree 1 or 2"]),
+    "hermite on midpoint": (
+        changed(beam={"integrator": "generalized_alpha"}, coupling={"scheme": "hermite", "degree": 1}),
+        ['[coupling] scheme = "hermite"', 'use "modal"', 'scheme = "energy"'],
+    ),
+    "degree on midpoint": (
+        changed(beam={"integrator": "generalized_alpha"}, coupling={"degree": 2}),
+        ["[coupling] degree = 2", "mean of the contact force", "degree = 0"],
+    ),
+    "compliance by hermite": (
+        changed(contact={"law": "compliance"}, coupling={"scheme": "hermite", "degree": 1}),
+        ['scheme = "hermite"', '"compliance"', 'scheme = "energy" and degree = 0'],
+    ),
+    "compliance of degree 1": (
+        changed(contact={"law": "compliance"}, coupling={"degree": 1}),
+        ["degree = 1", '"compliance"', "degree = 0"],
+    ),
+    "compliance without stiffness": (
+        changed(contact={"law": "compliance", "stiffness": 0.0}),
+        ["[contact] stiffness = 0.0", "compliance"],
+    ),
+    "paper without beam": (changed(beam=None, contact={"law": "paper"}), ['law = "paper"', "needs a [beam]"]),
+    "paper without spring": (changed(spring=None, contact={"law": "paper"}), ['law = "paper"', "needs a [spring]"]),
+    "paper without stop": (changed(stop=None, contact={"law": "paper"}), ['law = "paper"', "needs a [stop]"]),
+    "paper, damped integrator": (
+        changed(beam={"integrator": "generalized_alpha", "rho_inf": 0.5}, contact={"law": "paper"}),
+        ["[beam] rho_inf = 0.5", "paper", "rho_inf = 1"],
+    ),
+    "stop above spring": (changed(stop={"position": 0.1}), ["[stop] position = 0.1", "below", "equilibrium = 0.0"]),
+    "stop at spring": (changed(stop={"position": 0.0}), ["[stop] position = 0.0", "below", "equilibrium = 0.0"]),
+    "step longer than run": (changed(coupling={"macro_step": 1.0}), ["macro_step = 1.0", "t_end = 0.6"]),
+    "endless run": (changed(coupling={"macro_step": 1e-15}), ["macro_step = 1e-15", "6.0e+14 macro steps"]),
+    # the spring lets go
+    "softening only": (
+        changed(spring={"linear_stiffness": 0.0}),
+        ["[spring] linear_stiffness = 0.0", "pushes away", "greater than 0"],
+    ),
+    "negative stiffness only": (
+        changed(spring={"linear_stiffness": -3.0, "cubic_stiffness": 0.0}),
+        ["[spring] linear_stiffness = -3.0", "pushes away"],
+    ),
+    "beyond the hilltop": (
+        changed(beam=None, spring={"equilibrium": 4.0}),
+        ["[spring] equilibrium = 4.0", "escapes", "3.87298 m"],
+    ),
+    "beyond the other hilltop": (
+        changed(beam=None, stop=None, spring={"equilibrium": -4.0}),
+        ["[spring] equilibrium = -4.0", "escapes", "3.87298 m"],
+    ),
+    # the tip does not arrive
+    "tip at rest above": (
+        changed(beam={"initial_deflection_slope": 0.5, "initial_velocity_slope": 0.0}),
+        ["[beam] initial_velocity_slope = 0.0", "never", "negative initial_velocity_slope", 'approach = "elastic"'],
+    ),
+    "tip moves up": (
+        changed(beam={"initial_velocity_slope": 1.0}),
+        ["[beam] initial_velocity_slope = 1.0", "never", "[spring] equilibrium = 0.0", 'approach = "elastic"'],
+    ),
+    "tip moves away from above": (
+        changed(beam={"initial_deflection_slope": 0.5, "initial_velocity_slope": 2.0}),
+        ["initial_velocity_slope = 2.0", "never"],
+    ),
+    "tip too slow": (
+        changed(beam={"initial_deflection_slope": 0.5, "initial_velocity_slope": -0.1}),
+        ["initial_velocity_slope = -0.1", "not before t = 5 s", "t_end = 0.6"],
+    ),
+    "tip below spring": (
+        changed(beam={"initial_deflection_slope": -0.01}),
+        ["[beam] initial_deflection_slope = -0.01", "0.01 m below [spring] equilibrium = 0.0"],
+    ),
+    "elastic tip below spring": (
+        changed(beam={"initial_deflection_slope": -0.01, "approach": "elastic"}),
+        ["[beam] initial_deflection_slope = -0.01", "below [spring] equilibrium = 0.0"],
+    ),
+    "tip below raised spring": (
+        changed(beam={"length": 2.0}, spring={"equilibrium": 0.1}),
+        ["[beam] initial_deflection_slope = 0.0", "0.1 m below [spring] equilibrium = 0.1"],
+    ),
+    "tip below stop": (
+        changed(spring=None, beam={"initial_deflection_slope": -0.1}),
+        ["initial_deflection_slope = -0.1", "below [stop] position = -0.015"],
+    ),
+    "tip never at stop": (
+        changed(spring=None, beam={"initial_velocity_slope": 0.0}),
+        ["initial_velocity_slope = 0.0", "never", "[stop] position = -0.015"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("data", "fragments"), BAD.values(), ids=BAD)
+def test_refusal_says_where_what_and_what_would_do(data, fragments):
+    with pytest.raises(SceneError) as refusal:
+        scene_from_dict(data, source="my.toml")
+    message = str(refusal.value)
+    assert all(line.startswith("my.toml: ") for line in message.splitlines())
+    for fragment in fragments:
+        assert fragment in message
+    assert "pydantic" not in message
+    assert "Input should" not in message
+
+
+GOOD = {
+    "pair": changed(),
+    "integer for a number": changed(time={"t_end": 1}, stop={"position": -1}),
+    "beam alone, at rest": changed(spring=None, stop=None, beam={"initial_velocity_slope": 0.0}),
+    "beam alone, upward": changed(spring=None, stop=None, beam={"initial_velocity_slope": 3.0}),
+    "beam alone, far below": changed(spring=None, stop=None, beam={"initial_deflection_slope": -5.0}),
+    "spring alone": changed(beam=None, stop=None),
+    "free mass on a stop": changed(beam=None, spring={"linear_stiffness": 0.0, "cubic_stiffness": 0.0}),
+    "double well": changed(beam=None, spring={"linear_stiffness": -1.0, "cubic_stiffness": 1.0}),
+    "just inside the hilltop": changed(beam=None, spring={"equilibrium": 3.872}),
+    "touching at rest": changed(beam={"initial_velocity_slope": 0.0}),
+    "elastic, at rest above": changed(
+        beam={"initial_deflection_slope": 0.5, "initial_velocity_slope": 0.0, "approach": "elastic"}
+    ),
+    "contact at t_end": changed(beam={"initial_deflection_slope": 0.6}),
+    "500 elements, all modes": changed(beam={"n_elements": 500}),
+    "1000 elements, 64 modes": changed(beam={"n_elements": 1000, "n_modes": 64}),
+    "1000 elements, midpoint": changed(beam={"n_elements": 1000, "integrator": "generalized_alpha"}),
+    # Algorithm 1 brings its own integrator, so that a shipped scene need not be rewritten for it.
+    "paper on a modal scene": changed(contact={"law": "paper"}),
+    "paper on midpoint": changed(beam={"integrator": "generalized_alpha"}, contact={"law": "paper"}),
+    "hermite": changed(coupling={"scheme": "hermite", "degree": 2}),
+    "no compliance part": changed(contact={"stiffness": 0.0}),
+    "one step": changed(coupling={"macro_step": 0.6}),
+}
+
+
+@pytest.mark.parametrize("data", GOOD.values(), ids=GOOD)
+def test_accepted_and_unchanged_by_a_round_trip(data):
+    scene = scene_from_dict(data)
+    assert scene_from_dict(scene.model_dump(exclude_none=True)) == scene
+
+
+def test_every_mistake_is_reported_at_once():
+    with pytest.raises(SceneError) as refusal:
+        scene_from_dict(changed(time={"t_end": 0}, spring={"masss": 1}, contact={"law": "x"}))
+    assert len(str(refusal.value).splitlines()) == 3
+
+
+def test_every_impossibility_is_reported_at_once():
+    with pytest.raises(SceneError) as refusal:
+        scene_from_dict(changed(stop={"position": 1.0}, beam={"initial_velocity_slope": 1.0}))
+    assert len(str(refusal.value).splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, 0.0),
+        ({"beam": {"initial_deflection_slope": 0.5}}, 0.5),
+        ({"beam": {"initial_deflection_slope": 0.5, "initial_velocity_slope": -2.0, "length": 3.0}}, 0.25),
+        ({"spring": None}, 0.015),
+        ({"beam": {"approach": "elastic"}}, None),
+        ({"beam": None}, None),
+        ({"spring": None, "stop": None}, None),
+        # 0.1·0.7 < 0.07 in doubles: only rounding parts tip and spring.
+        ({"beam": {"initial_deflection_slope": 0.1, "length": 0.7}, "spring": {"equilibrium": 0.07}}, 0.0),
+        ({"beam": {"initial_velocity_slope": 0.0}}, 0.0),
+    ],
+)
+def test_contact_time_of_the_undeformed_approach(changes, expected):
+    """t_c = (Ψ/L − s₀)/s₁ of u = (s₀ + s₁ t) x; Ψ is φ without a spring."""
+    t_c = scene_from_dict(changed(**changes)).contact_time
+    assert t_c == (None if expected is None else pytest.approx(expected, rel=1e-14))
+
+
+def test_locking_of_full_integration_is_suspected_with_its_size():
+    """Full integration is 1 + KAG h²/12EI times too stiff: KAG/EI = 1200, h = 1/10 gives 2."""
+    slender = {"young_modulus": 1.0, "shear_modulus": 1200.0, "n_elements": 10}
+    (suspicion,) = suspicions(scene_from_dict(changed(beam=slender)))
+    assert "2 times too stiff" in suspicion
+    assert "reduced_integration = true" in suspicion
+    assert suspicions(scene_from_dict(changed(beam={**slender, "reduced_integration": True}))) == []
+
+
+def test_shipped_scenes_are_valid_and_titled():
+    scenes = shipped_scenes()
+    assert "soft" in scenes
+    for name in scenes:
+        scene = load_scene(name)
+        assert scene.title
+        assert suspicions(scene) == []
+
+
+def test_a_file_means_what_its_text_says(tmp_path):
+    path = tmp_path / "pair.toml"
+    path.write_text(PAIR, encoding="utf-8")
+    assert load_scene(path) == load_scene(str(path)) == scene_from_dict(load_pair())
+
+
+def test_a_byte_order_mark_is_no_obstacle(tmp_path):
+    path = tmp_path / "windows.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + PAIR.replace("\n", "\r\n").encode())
+    assert load_scene(path) == scene_from_dict(load_pair())
+
+
+def test_a_name_is_the_shipped_scene_even_beside_a_folder_of_that_name(tmp_path, monkeypatch):
+    (tmp_path / "soft").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert load_scene("soft").title == load_scene(shipped_scenes()["soft"]).title
+
+
+@pytest.mark.parametrize(
+    ("content", "fragments"),
+    [
+        (b"[time\nt_end = 1", ["not TOML", "line 1"]),
+        (b"[time]\nt_end = 1\n[time]\n", ["not TOML", "line 3"]),
+        (b"[time]\nt_end = 1,5\n", ["not TOML", "line 2"]),
+        (b"[time]\nt_end = .5\n", ["not TOML", "line 2"]),
+        (b"\xff\xfe[\x00t\x00", ["not TOML"]),
+        (b"", ["[time]", "missing table"]),
+    ],
+)
+def test_unreadable_files(tmp_path, content, fragments):
+    path = tmp_path / "broken.toml"
+    path.write_bytes(content)
+    with pytest.raises(SceneError) as refusal:
+        load_scene(path)
+    for fragment in ["broken.toml: ", *fragments]:
+        assert fragment in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "fragments"),
+    [
+        ("sotf", ["sotf: no such file", "did you mean soft?", "shipped scenes:"]),
+        ("soft.toml", ["soft.toml: no such file", "did you mean soft?"]),
+        ("no/where.toml", ["no/where.toml: no such file"]),
+        ("folder", ["folder: is a directory"]),
+        ("", ["shipped scenes:"]),
+    ],
+)
+def test_scenes_that_are_not_there(tmp_path, monkeypatch, name, fragments):
+    (tmp_path / "folder").mkdir()
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SceneError) as refusal:
+        load_scene(name)
+    for fragment in fragments:
+        assert fragment in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("override", "table", "key", "value"),
+    [
+        ("time.t_end=2", "time", "t_end", 2.0),
+        ("time.t_end = 0.25", "time", "t_end", 0.25),
+        ("spring.mass=.5", "spring", "mass", 0.5),
+        ("spring.mass=1.", "spring", "mass", 1.0),
+        ("coupling.macro_step=1e-4", "coupling", "macro_step", 1e-4),
+        ("beam.n_elements=12", "beam", "n_elements", 12),
+        ("beam.reduced_integration=true", "beam", "reduced_integration", True),
+        ("contact.law=compliance", "contact", "law", "compliance"),
+        ('contact.law="compliance"', "contact", "law", "compliance"),
+        ("contact.law='compliance'", "contact", "law", "compliance"),
+    ],
+)
+def test_overrides(override, table, key, value):
+    changed_value = getattr(getattr(load_scene("soft", [override]), table), key)
+    assert changed_value == value
+    assert type(changed_value) is type(value)
+
+
+def test_the_last_override_of_a_key_counts():
+    assert load_scene("soft", ["time.t_end=1", "time.t_end=2"]).time.t_end == 2.0
+
+
+@pytest.mark.parametrize(
+    ("override", "fragments"),
+    [
+        ("t_end=1", ["--set t_end=1", "TABLE.KEY=VALUE"]),
+        ("time.t_end", ["--set time.t_end", "TABLE.KEY=VALUE"]),
+        ("time.=1", ["TABLE.KEY=VALUE"]),
+        (".t_end=1", ["TABLE.KEY=VALUE"]),
+        ("", ["TABLE.KEY=VALUE"]),
+        ("title.x=1", ["title is not a table"]),
+        ("time.end=1", ["[time] end", "t_end"]),
+        ("tim.t_end=1", ["[tim]", "did you mean time?"]),
+        ("time.t_end=", ['[time] t_end = ""', "finite number"]),
+        ("time.t_end=1,5", ['t_end = "1,5"', "finite number"]),
+        ("time.t_end=nan", ["t_end = nan", "finite number"]),
+        ("beam.n_elements=1e2", ["n_elements = 100.0", "whole number"]),
+        ("beam.n_elements.x=1", ["[beam] n_elements.x", "unknown key"]),
+        ("contact.law=glue", ['law = "glue"', '"transmission"']),
+        ("time.t_end=1\n[stop]\nposition=-1", ["t_end", "finite number"]),
+    ],
+)
+def test_bad_overrides(override, fragments):
+    with pytest.raises(SceneError) as refusal:
+        load_scene("soft", [override])
+    for fragment in fragments:
+        assert fragment in str(refusal.value)
+
+
+def test_with_changes_copies_and_validates():
+    scene = scene_from_dict(load_pair())
+    finer = with_changes(scene, coupling={"macro_step": 1e-4}, stop=None)
+    assert finer.coupling.macro_step == 1e-4
+    assert finer.stop is None
+    assert scene.coupling.macro_step == 1e-3
+    assert scene.stop is not None
+    with pytest.raises(SceneError, match="macro_step = -1"):
+        with_changes(scene, coupling={"macro_step": -1.0})
+
+
+def test_a_scene_cannot_be_changed_in_place():
+    scene = scene_from_dict(load_pair())
+    with pytest.raises(ValueError, match="frozen"):
+        scene.time.t_end = 3.0
+
+
+def outcome(data):
+    try:
+        return scene_from_dict(data)
+    except SceneError as refusal:
+        return str(refusal)
+
+
+@settings(deadline=None)
+@given(
+    table=st.sampled_from(["time", "beam", "spring", "stop", "contact", "coupling"]),
+    key=st.text(min_size=1, max_size=12),
+    value=st.one_of(
+        st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.lists(st.integers(), max_size=2)
+    ),
+)
+def test_whatever_is_in_a_table_is_a_scene_or_a_scene_error(table, key, value):
+    data = load_pair()
+    data.setdefault(table, {})[key] = value
+    result = outcome(data)
+    assert isinstance(result, Scene) or result.startswith("scene: ")
+
+
+@settings(deadline=None)
+@given(
+    key=st.sampled_from(list(load_scene("soft").beam.model_dump())),
+    value=st.one_of(st.booleans(), st.integers(), st.floats(), st.text(max_size=5)),
+)
+def test_any_value_of_a_beam_key_is_allowed_or_explained(key, value):
+    result = outcome(changed(beam={key: value}))
+    if isinstance(result, Scene):
+        assert getattr(result.beam, key) == value
+    else:
+        # Another key is named where the two do not go together.
+        assert any(f"[beam] {name}" in result for name in (key, "n_modes", "initial_velocity_slope"))
