@@ -129,6 +129,8 @@ Flight::Event Flight::run(const FlightStart& start) {
   }
   finish();
   if (event == Event::none && std::abs(y_) > laws_.hilltop) event = Event::hilltop;
+  if (event == Event::none && laws_.stop && gap_ < -solver_.absolute_tolerance()[q])
+    throw IdaError("the top passed the stop unnoticed");
   return event;
 }
 

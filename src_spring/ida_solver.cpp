@@ -53,8 +53,9 @@ int events(sunrealtype s, N_Vector Y, N_Vector, sunrealtype* g, void* user_data)
   const auto& problem = *static_cast<const Problem*>(user_data);
   problem.system->events(s, data(Y), g);
   // An exact zero counts as not yet crossed: IDA would switch the event function off, and keep it off after IDAReInit.
+  // Not the smallest double: IDA multiplies values to compare signs.
   for (std::size_t i = 0; i < problem.crossings.size(); ++i)
-    if (g[i] == 0.0) g[i] = -static_cast<int>(problem.crossings[i]) * std::numeric_limits<double>::min();
+    if (g[i] == 0.0) g[i] = -static_cast<int>(problem.crossings[i]) * 1e-100;
   return 0;
 }
 

@@ -227,6 +227,13 @@ void Spring::step(double size, const Inputs& inputs) {
   impl_->state = impl_->advanced(size, inputs);
 }
 
+void Spring::observe(const Inputs& inputs) {
+  check(inputs);
+  const Loads loads = Loads::from(impl_->parameters, inputs);
+  impl_->state.force = loads.force(0.0);
+  impl_->state.tip = loads.tip(0.0);
+}
+
 void Spring::apply_impulse(double impulse) {
   if (!std::isfinite(impulse)) throw std::invalid_argument("spring: impulse = " + number(impulse) + ": must be finite");
   impl_->state.z += impulse / impl_->parameters.mass;

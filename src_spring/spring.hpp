@@ -67,15 +67,19 @@ class Spring {
   /// @throws StepFailure, Escape (state unchanged)
   void step(double size, const Inputs& inputs);
 
+  /// Take `inputs` as acting at the present instant, for acceleration(), reaction() and contact_energy() before the
+  /// first step or after an input has jumped. The motion does not depend on it.
+  void observe(const Inputs& inputs);
+
   /// Instantaneous upward impulse J [N·s]: z += J/m.
   void apply_impulse(double impulse);
 
   double displacement() const;             ///< y [m]
   double velocity() const;                 ///< z [m/s]
-  double acceleration() const;             ///< ż [m/s²] at the end of the last step, under its inputs
+  double acceleration() const;             ///< ż [m/s²] under the inputs at the end of the last step
   double displacement_integral() const;    ///< ∫ y dτ over the last step [m·s]
   double displacement_integral_2() const;  ///< ∫∫ y dτ dτ over the last step [m·s²]
-  double reaction() const;                 ///< C of the law inside [N]; 0 for external
+  double reaction() const;                 ///< C of the law inside, at the end of the last step [N]; 0 for external
   double stop_force() const;               ///< mean of N over the last step, law inside [N]
   double stop_impulse() const;             ///< sum of stop impulses over the last step [N·s]
   double kinetic_energy() const;           ///< ½ m z² [J]
