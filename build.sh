@@ -92,6 +92,9 @@ set_up_system() {
 }
 
 build() {
+  # One at a time: two would build into the same folder.
+  exec 9<.
+  command -v flock >/dev/null && { flock -n 9 || { say "waiting for another build"; flock 9; }; }
   set_up_python dev
   local configured
   configured="$PWD ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-} ${CXX:-}"
@@ -110,6 +113,7 @@ build() {
   fi
   say "building"
   $venv/bin/ninja -C build ${JOBS:+-j "$JOBS"} --quiet "$@" >&2 || die "the build stopped, see above"
+  exec 9<&-
 }
 
 command=${1:-help}

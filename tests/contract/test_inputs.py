@@ -1,0 +1,142 @@
+"""Inputs over a step: derivatives hold for one step, impulses act once; output derivatives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+OK, ERROR = 0, 3
+
+
+def test_free_mass_under_a_polynomial_force_is_exact(spring: Any) -> None:
+    # m ÿ = −C + N with C = c0 + c1 τ + c2 τ²/2: four integrations by hand.
+    m, H, y0, z0 = 2.0, 0.3, 0.1, -0.7
+    c, n = (1.5, -4.0, 9.0), (0.5, 2.0, -3.0)
+    k = spring.running(mass=m, linear_stiffness=0.0, displacement=y0, velocity=z0)
+    for name, values in (("contact_force", c), ("foundation_force", n)):
+        k.set(name, values[0])
+        assert k.derive(name, 1, values[1]) == OK
+        assert k.derive(name, 2, values[2]) == OK
+    k.step(0.0, H)
+    f = [(b - a) / m for a, b in zip(c, n, strict=True)]
+    y, z, integral, integral_2 = k.get("displacement", "velocity", "displacement_integral", "displacement_integral_2")
+    # IDA's relative tolerance is 1e-12.
+    assert z == pytest.approx(z0 + f[0] * H + f[1] * H**2 / 2 + f[2] * H**3 / 6, rel=1e-10)
+    assert y == pytest.approx(y0 + z0 * H + f[0] * H**2 / 2 + f[1] * H**3 / 6 + f[2] * H**4 / 24, rel=1e-10)
+    powers = [y0, z0, f[0], f[1], f[2]]
+    factorials = [1, 1, 2, 6, 24, 120, 720]
+    assert integral == pytest.approx(
+        sum(p * H ** (i + 1) / factorials[i + 1] for i, p in enumerate(powers)), rel=1e-10
+    )
+    assert integral_2 == pytest.approx(
+        sum(p * H ** (i + 2) / factorials[i + 2] for i, p in enumerate(powers)), rel=1e-10
+    )
+
+
+def test_a_polynomial_step_equals_its_two_halves(case: Any) -> None:
+    H = 0.2
+    c0, c1, c2 = 0.8, -3.0, 11.0
+    whole, halves = case.running(), case.running()
+
+    def step(k: Any, time: float, size: float, value: float, slope: float, bend: float) -> None:
+        k.set(case.force, value)
+        assert k.derive(case.force, 1, slope) == OK
+        assert k.derive(case.force, 2, bend) == OK
+        k.step(time, size)
+
+    step(whole, 0.0, H, c0, c1, c2)
+    h = H / 2
+    step(halves, 0.0, h, c0, c1, c2)
+    step(halves, h, h, c0 + c1 * h + c2 * h * h / 2, c1 + c2 * h, c2)
+    names = (case.displacement, case.velocity, "kinetic_energy", "dissipated_energy")
+    # Modes are stepped exactly, IDA keeps 1e-12: what is left is rounding, 100 times that.
+    assert halves.get(*names) == pytest.approx(whole.get(*names), rel=1e-10, abs=1e-12)
+
+
+def test_derivatives_hold_for_one_step_the_value_stays(case: Any) -> None:
+    once, told = case.running(), case.running()
+    for k in (once, told):
+        k.set(case.force, 0.8)
+        assert k.derive(case.force, 1, 5.0) == OK
+        assert k.derive(case.force, 2, -7.0) == OK
+        k.step(0.0, 0.05)
+    assert once.get(case.force) == 0.8
+    told.set(case.force, 0.8)
+    assert told.derive(case.force, 1, 0.0) == OK
+    assert told.derive(case.force, 2, 0.0) == OK
+    for k in (once, told):
+        k.step(0.05, 0.05)
+    assert once.outputs() == told.outputs()
+
+
+@pytest.mark.parametrize("order", [0, 3, -1])
+def test_other_derivative_orders_are_refused(case: Any, order: int) -> None:
+    k = case.running()
+    assert k.derive(case.force, order, 1.0) == ERROR
+    assert f"derivative order {order}" in k.message
+
+
+def test_only_polynomial_inputs_take_derivatives(case: Any) -> None:
+    k = case.running()
+    assert k.derive(case.impulse, 1, 1.0) == ERROR
+    assert case.impulse in k.message
+
+
+def test_an_impulse_acts_once_at_the_start_of_the_next_step(case: Any) -> None:
+    J, H = 0.25, 0.02
+    plain, struck = case.running(), case.running()
+    struck.set(case.impulse, J)
+    assert struck.get(case.impulse) == J
+    assert struck.get(case.velocity) == plain.get(case.velocity)
+    for k in (plain, struck):
+        k.step(0.0, H)
+    assert struck.get(case.impulse) == 0.0
+    # Very short steps show the jump of velocity J/m; m is what the FMU says an impulse meets.
+    h = 1e-9
+    mass = {"beam": lambda: plain.get("tip_mass"), "spring": lambda: 1.0}[case.name]()
+    before = plain.get(case.velocity)
+    plain.set(case.impulse, J)
+    plain.step(H, h)
+    assert plain.get(case.velocity) - before == pytest.approx(J / mass, rel=1e-6)
+    after = plain.get(case.velocity)
+    plain.step(H + h, h)  # consumed
+    assert plain.get(case.velocity) == pytest.approx(after, abs=1e-4)
+
+
+def test_impulse_changes_the_energy_by_its_work(case: Any) -> None:
+    # ΔE = J (v⁻ + v⁺)/2, exactly, for any body that answers with v⁺ − v⁻ = J/m.
+    J = -0.3
+    k = case.running(**({"alpha_b": 0.0} if case.name == "beam" else {"damping": 0.0}))
+    stored = ("kinetic_energy", "strain_energy" if case.name == "beam" else "potential_energy")
+    mass = k.get("tip_mass") if case.name == "beam" else 1.0
+    k.step(0.0, 0.05)
+    before, velocity = sum(k.get(*stored)), k.get(case.velocity)
+    k.set(case.impulse, J)
+    k.step(0.05, 0.05)
+    work = J * (2 * velocity + J / mass) / 2
+    assert sum(k.get(*stored)) - before == pytest.approx(work, rel=1e-9)
+
+
+def test_output_derivatives(case: Any) -> None:
+    k = case.running()
+    k.set(case.force, 0.4)
+    k.step(0.0, 0.1)
+    status, rate = k.derivative(case.displacement)
+    assert (status, rate) == (OK, k.get(case.velocity))
+    status, acceleration = k.derivative(case.velocity)
+    assert status == OK
+    # Against the difference over a step so short that its error is h·jerk/2.
+    h = 1e-7
+    before = k.get(case.velocity)
+    k.step(0.1, h)
+    assert (k.get(case.velocity) - before) / h == pytest.approx(acceleration, rel=1e-3)
+
+
+def test_output_derivatives_that_are_not_there_are_refused(case: Any) -> None:
+    k = case.running()
+    assert k.derivative(case.displacement, 2)[0] == ERROR
+    assert "order 2" in k.message
+    k = case.running()
+    assert k.derivative("kinetic_energy")[0] == ERROR
+    assert "kinetic_energy" in k.message

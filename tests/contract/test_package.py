@@ -1,0 +1,118 @@
+"""What is in the .fmu files, and what their binaries need and show."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import zipfile
+from typing import Any
+
+import pytest
+from fmpy.validation import validate_fmu
+
+ROOT_LIBRARIES = {"libc.so.6", "libm.so.6", "ld-linux-x86-64.so.2"}
+
+
+def output(*command: str) -> str:
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+def test_fmpy_validation_reports_nothing(case: Any) -> None:
+    assert validate_fmu(str(case.fmu.path)) == []
+
+
+def test_binary_needs_only_libc_and_libm(case: Any) -> None:
+    needed = set(re.findall(r"\(NEEDED\).*\[(.*)\]", output("readelf", "-d", str(case.fmu.binary))))
+    assert needed <= ROOT_LIBRARIES
+
+
+def test_binary_binds_its_own_symbols_first(case: Any) -> None:
+    assert "SYMBOLIC" in output("readelf", "-d", str(case.fmu.binary))
+
+
+def test_binary_shows_the_fmi2_functions_and_nothing_else(case: Any) -> None:
+    symbols = {line.split()[-1] for line in output("nm", "-D", "--defined-only", str(case.fmu.binary)).splitlines()}
+    assert {s for s in symbols if not s.startswith("fmi2")} == set()
+    # FMI 2.0.4: 25 common functions and 9 of co-simulation (fmi2GetStatus and its four typed forms are 5 of them).
+    assert len(symbols) == 34
+
+
+def test_binary_names_no_folder_of_the_build_machine(case: Any) -> None:
+    binary = case.fmu.binary.read_bytes()
+    assert b"/home/" not in binary
+    assert str(case.fmu.path.parents[1]).encode() not in binary
+
+
+def test_packing_depends_on_contents_alone(case: Any) -> None:
+    with zipfile.ZipFile(case.fmu.path) as archive:
+        entries = archive.infolist()
+    assert entries[0].filename == "modelDescription.xml"
+    assert {e.date_time for e in entries} == {(1980, 1, 1, 0, 0, 0)}
+    names = [e.filename for e in entries[1:]]
+    assert names == sorted(names)
+
+
+def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
+    # design.md, section 5: names, kinds and units that masters rely on.
+    agreed = {
+        "beam": {
+            ("input", "N"): ["tip_force"],
+            ("input", "N.s"): ["tip_impulse"],
+            ("input", "N/m"): ["distributed_load"],
+            ("output", "m"): ["tip_displacement", *(f"deflection[{i}]" for i in range(1, 22))],
+            ("output", "m/s"): ["tip_velocity"],
+            ("output", "rad"): ["tip_rotation", *(f"rotation[{i}]" for i in range(1, 22))],
+            ("output", "m.s"): ["tip_displacement_integral"],
+            ("output", "m.s2"): ["tip_displacement_integral_2"],
+            ("output", "J"): ["kinetic_energy", "strain_energy", "dissipated_energy", "load_potential"],
+            ("output", "kg"): ["tip_mass"],
+            ("parameter", "s"): ["alpha_b"],
+            ("parameter", "N/m"): ["tip_load_coefficient"],
+            ("parameter", None): [
+                *("shear_coefficient", "n_elements", "n_modes", "reduced_integration", "integrator", "rho_inf"),
+                "initial_deflection_slope",
+            ],
+        },
+        "spring": {
+            ("input", "N"): ["contact_force", "foundation_force", "external_force"],
+            ("input", "N.s"): ["impulse"],
+            ("input", "m"): ["tip_displacement"],
+            ("input", "m/s"): ["tip_velocity"],
+            ("output", "m"): ["displacement"],
+            ("output", "m/s"): ["velocity"],
+            ("output", "N"): ["reaction", "stop_force"],
+            ("output", "N.s"): ["stop_impulse"],
+            ("output", "J"): ["kinetic_energy", "potential_energy", "contact_energy", "dissipated_energy"],
+            ("parameter", "kg"): ["mass"],
+            ("parameter", "N.s/m"): ["damping"],
+            ("parameter", "N/m"): ["linear_stiffness"],
+            ("parameter", "N/m3"): ["cubic_stiffness"],
+            ("parameter", "m"): ["equilibrium", "stop_position"],
+            ("parameter", None): [
+                *("contact_law", "compliance_stiffness", "compliance_exponent", "stop_enabled", "restitution"),
+                *("relative_tolerance", "absolute_tolerance"),
+            ],
+        },
+    }
+    for (causality, unit), names in agreed[case.name].items():
+        for name in names:
+            variable = case.fmu.variables[name]
+            assert (name, variable.causality, variable.unit) == (name, causality, unit)
+    if case.name == "spring":
+        assert {case.fmu.variables[n].initial for n in ("displacement", "velocity")} == {"exact"}
+
+
+@pytest.mark.parametrize(
+    "capability",
+    [
+        "canHandleVariableCommunicationStepSize",
+        "canInterpolateInputs",
+        "canGetAndSetFMUstate",
+        "canSerializeFMUstate",
+        "canNotUseMemoryManagementFunctions",
+    ],
+)
+def test_capability_is_declared(case: Any, capability: str) -> None:
+    assert getattr(case.fmu.description.coSimulation, capability) is True
+    assert case.fmu.description.coSimulation.maxOutputDerivativeOrder >= 1
+    assert not case.fmu.description.coSimulation.canBeInstantiatedOnlyOncePerProcess
