@@ -1,0 +1,432 @@
+"""Result files: exact, complete up to an interruption, never NaN, never overwritten unasked."""
+
+from __future__ import annotations
+
+import json
+import math
+import tracemalloc
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from springbeam import recording
+from springbeam.recording import (
+    PICTURES,
+    FileRecorder,
+    MemoryRecorder,
+    NonFiniteValue,
+    ResultsExist,
+    ResultsUnreadable,
+    RunDirectory,
+    columns_of,
+    load_events,
+    load_summary,
+    load_trajectory,
+)
+from springbeam.scene import load_scene, with_changes
+from springbeam.trajectory import COLUMNS, EVENT_COLUMNS, Event
+
+PAIR = load_scene("soft")
+BEAM_AND_STOP = with_changes(PAIR, spring=None)
+SPRING_AND_STOP = with_changes(PAIR, beam=None)
+BEAM = with_changes(PAIR, spring=None, stop=None)
+SPRING = with_changes(PAIR, beam=None, stop=None)
+SHAPE = np.linspace(0.0, 1.0, 21) ** 2
+
+
+def a_row(scene=PAIR, time=0.25, **values):
+    numbers = {name: (i + 1) / 7.0 for i, name in enumerate(columns_of(scene))}
+    return {**numbers, "time": time, "phase": "tied", **values}
+
+
+def record(recorder, rows=3, event=None):
+    for i in range(rows):
+        recorder.row(a_row(recorder.scene, time=0.1 * i, phase="tied" if i % 2 else "free"))
+        if recorder.scene.beam is not None:
+            recorder.shape(0.1 * i, SHAPE * i)
+    if event is not None:
+        recorder.event(event)
+
+
+def filed(path, scene=PAIR, **arguments):
+    recorder = FileRecorder(scene, RunDirectory.create(path))
+    record(recorder, **arguments)
+    recorder.finish({"status": "done", "macro_steps": 3})
+    return recorder
+
+
+# -- columns ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scene", "without"),
+    [
+        (PAIR, set()),
+        (with_changes(PAIR, stop=None), {"foundation_force"}),
+        (
+            BEAM_AND_STOP,
+            {"y", "z", "e_spring", "contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction",
+             "velocity_mismatch", "e_contact"},
+        ),
+        (
+            BEAM,
+            {"y", "z", "e_spring", "contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction",
+             "velocity_mismatch", "e_contact", "gap", "foundation_force"},
+        ),
+        (
+            SPRING,
+            {"u_tip", "v_tip", "e_beam", "contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction",
+             "velocity_mismatch", "e_contact", "gap", "foundation_force"},
+        ),
+    ],
+)  # fmt: skip
+def test_columns_of_absent_bodies_are_left_out_in_order(scene, without):
+    assert columns_of(scene) == tuple(name for name in COLUMNS if name not in without)
+
+
+# -- what both recorders do ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["memory", "file"])
+def make(request, tmp_path):
+    def recorder(scene=PAIR, columns=None):
+        if request.param == "memory":
+            return MemoryRecorder(scene, columns)
+        return FileRecorder(scene, RunDirectory.create(tmp_path / "run"), columns)
+
+    def trajectory(recorder):
+        if isinstance(recorder, MemoryRecorder):
+            return recorder.trajectory()
+        return load_trajectory(recorder.directory.path)
+
+    recorder.trajectory = trajectory
+    return recorder
+
+
+@pytest.mark.parametrize("scene", [PAIR, BEAM_AND_STOP, SPRING_AND_STOP, BEAM, SPRING])
+def test_what_is_recorded_comes_back(make, scene):
+    recorder = make(scene)
+    event = Event(0.05, "stop_impact", y=-0.015 if scene.spring else None, impulse_foundation=0.1, energy_loss=1e-3)
+    record(recorder, rows=300, event=event)
+    recorder.finish({"status": "done"})
+    result = make.trajectory(recorder)
+    assert list(result.columns) == list(columns_of(scene))
+    assert np.array_equal(result.time, [0.1 * i for i in range(300)])
+    assert list(result.phase[:3]) == ["free", "tied", "free"]
+    assert result.e_total[7] == (columns_of(scene).index("e_total") + 1) / 7.0
+    assert result.events == [event]
+    assert result.summary["status"] == "done"
+    assert result.scene == scene
+    if scene.beam is None:
+        assert result.shapes is None
+    else:
+        times, shapes = result.shapes
+        assert np.array_equal(times, result.time)
+        assert np.array_equal(shapes, np.outer(np.arange(300), SHAPE))
+
+
+def test_rows_may_be_sequences_in_column_order(make):
+    recorder = make()
+    row = a_row()
+    recorder.row([row[name] for name in recorder.columns])
+    recorder.row(tuple(row[name] for name in recorder.columns))
+    recorder.row({**row, "not a column": math.nan})
+    recorder.finish({})
+    result = make.trajectory(recorder)
+    for name in recorder.columns:
+        assert len(set(result[name])) == 1
+
+
+def test_columns_may_be_chosen(make):
+    recorder = make(PAIR, ("time", "y"))
+    recorder.row((0.0, 1.5))
+    recorder.row({"time": np.float64(1.0), "y": np.float32(0.25), "z": 3.0})
+    recorder.finish({})
+    result = make.trajectory(recorder)
+    assert {name: values.tolist() for name, values in result.columns.items()} == {"time": [0, 1], "y": [1.5, 0.25]}
+
+
+@pytest.mark.parametrize("column", [name for name in COLUMNS if name not in ("phase", "time")])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, np.float64("nan")])
+def test_a_row_that_is_not_finite_is_refused_by_column_and_time(column, value):
+    recorder = MemoryRecorder(PAIR)
+    recorder.row(a_row())
+    with pytest.raises(NonFiniteValue, match=rf"^{column} = .* at t = 0\.75 s") as refusal:
+        recorder.row(a_row(time=0.75, **{column: value}))
+    assert (refusal.value.column, refusal.value.time) == (column, 0.75)
+    assert len(recorder.trajectory()) == 1
+
+
+def test_nothing_that_is_not_finite_reaches_a_file(make):
+    recorder = make()
+    recorder.row(a_row(time=0.0))
+    with pytest.raises(NonFiniteValue, match="z = nan"):
+        recorder.row(a_row(z=math.nan))
+    with pytest.raises(NonFiniteValue, match="time = inf"):
+        recorder.row(a_row(time=math.inf))
+    with pytest.raises(NonFiniteValue, match=r"u_4 = inf at t = 0\.5 s"):
+        recorder.shape(0.5, np.where(np.arange(21) == 4, np.inf, 0.0))
+    with pytest.raises(NonFiniteValue, match="time"):
+        recorder.shape(math.nan, SHAPE)
+    with pytest.raises(NonFiniteValue, match=r"energy_loss of event 'impact' = nan at t = 0\.5 s"):
+        recorder.event(Event(0.5, "impact", energy_loss=math.nan))
+    with pytest.raises(NonFiniteValue, match="u_tip of event"):
+        recorder.event(Event(0.5, "impact", u_tip=-math.inf))
+    recorder.finish({"residual": math.nan, "history": [1.0, math.inf]})
+    result = make.trajectory(recorder)
+    assert len(result) == 1
+    assert result.events == []
+    assert len(result.shapes[0]) == 0
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        lambda r: r.row({"time": 0.0}),
+        lambda r: r.row((0.0, 1.0)),
+        lambda r: r.row(a_row(phase="a,b")),
+        lambda r: r.row(a_row(phase="a\nb")),
+        lambda r: r.row(a_row(phase="")),
+        lambda r: r.row(a_row(phase="x" * 33)),
+        lambda r: r.event(Event(0.0, "bang")),
+        lambda r: r.shape(0.0, np.zeros(20)),
+    ],
+    ids=["missing", "short", "comma", "newline", "empty", "long", "kind", "points"],
+)
+def test_what_a_file_cannot_hold_is_refused(make, bad):
+    recorder = make()
+    with pytest.raises(ValueError, match=r"row|phase|kind|shape"):
+        bad(recorder)
+
+
+# -- files --------------------------------------------------------------------------------------------------------
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@settings(deadline=None, max_examples=60)
+@given(values=st.lists(st.tuples(finite, finite), min_size=1, max_size=40))
+def test_numbers_survive_a_file_bit_for_bit(tmp_path_factory, values):
+    path = tmp_path_factory.mktemp("run")
+    recorder = FileRecorder(PAIR, RunDirectory(path), ("time", "y"))
+    for time, y in values:
+        recorder.row((time, y))
+        recorder.event(Event(time, "release", y=y, impulse_contact=y))
+        recorder.shape(time, np.full(21, y))
+    recorder.finish({})
+    result = load_trajectory(path)
+    expected = np.array(values)
+    assert np.column_stack([result.time, result.y]).tobytes() == expected.tobytes()
+    assert np.array([(e.time, e.impulse_contact) for e in result.events]).tobytes() == expected.tobytes()
+    assert np.column_stack([result.shapes[0], result.shapes[1][:, 20]]).tobytes() == expected.tobytes()
+
+
+def test_files_are_plain_csv_and_json(tmp_path):
+    filed(tmp_path / "run", event=Event(0.1, "impact", y=0.5, z=-1.0, energy_loss=0.25))
+    text = (tmp_path / "run" / "trajectory.csv").read_bytes().decode()
+    lines = text.split("\n")
+    assert lines[0].split(",") == list(COLUMNS)
+    assert Fraction(lines[1].split(",")[1]) == Fraction(repr(2 / 7))
+    assert "\r" not in text
+    assert (tmp_path / "run" / "events.csv").read_text().splitlines() == [
+        ",".join(EVENT_COLUMNS),
+        "0.1,impact,0.5,-1.0,,,0.0,0.0,0.25",
+    ]
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["macro_steps"] == 3
+    assert summary["scene"]["spring"]["cubic_stiffness"] == -0.2
+    assert sorted(p.name for p in (tmp_path / "run").iterdir()) == [
+        "events.csv", "shapes.csv", "summary.json", "trajectory.csv",
+    ]  # fmt: skip
+
+
+def test_a_scene_without_a_beam_has_no_shapes(tmp_path):
+    recorder = filed(tmp_path / "run", SPRING)
+    assert not recorder.directory.shapes.exists()
+    with pytest.raises(ValueError, match="without a beam"):
+        recorder.shape(0.0, SHAPE)
+
+
+def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
+    recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path))
+    recorder.finish(
+        {
+            "count": np.int64(3),
+            "size": np.float64(0.5),
+            "flag": np.bool_(True),
+            "list": np.arange(2),
+            "path": tmp_path,
+            "residual": math.nan,
+            "nested": {"worst": -math.inf},
+            "nothing": None,
+        }
+    )
+    summary = load_summary(tmp_path)
+    del summary["scene"]
+    assert summary == {
+        "count": 3, "size": 0.5, "flag": True, "list": [0, 1], "path": str(tmp_path),
+        "residual": "nan", "nested": {"worst": "-inf"}, "nothing": None,
+    }  # fmt: skip
+
+
+def test_rows_reach_the_disk_while_the_run_goes_on(tmp_path, monkeypatch):
+    clock = iter(np.arange(0.0, 1e6, 0.4))
+    monkeypatch.setattr(recording, "monotonic", lambda: next(clock))
+    recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path))
+    record(recorder, rows=10)
+    assert len(load_trajectory(tmp_path)) == 9  # flushed every third row of 0.4 s
+    assert load_summary(tmp_path)["status"] == "running"
+    recorder.close()
+
+
+def test_memory_does_not_grow_with_the_run(tmp_path):
+    recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path))
+    record(recorder, rows=200)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    record(recorder, rows=3000)
+    grown = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    recorder.close()
+    assert grown < 20_000  # 3000 rows are 500 kB as doubles
+
+
+def test_an_error_leaves_what_was_computed_and_its_cause(tmp_path):
+    def run():
+        with FileRecorder(PAIR, RunDirectory.create(tmp_path)) as recorder:
+            record(recorder, rows=5)
+            raise ZeroDivisionError("of what")
+
+    with pytest.raises(ZeroDivisionError):
+        run()
+    result = load_trajectory(tmp_path)
+    assert len(result) == 5
+    assert result.summary["status"] == "stopped"
+    assert "ZeroDivisionError" in result.summary["cause"]
+    assert result.summary["time"] == 0.4
+
+
+# -- damaged files ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cut", [1, 2, 7, 40])
+@pytest.mark.parametrize("name", ["trajectory.csv", "shapes.csv", "events.csv"])
+def test_an_incomplete_last_line_is_left_out(tmp_path, name, cut):
+    """Cut anywhere: half a number would read as another number."""
+    run = filed(tmp_path / "run", event=Event(0.1, "impact", y=1.0 / 3.0, z=-2.0 / 3.0, u_tip=0.1, v_tip=1.0 / 7.0))
+    whole = load_trajectory(run.directory.path)
+    path = run.directory.path / name
+    path.write_bytes(path.read_bytes()[:-cut])
+    cut_short = load_trajectory(run.directory.path)
+    lost = {file: int(file == name) for file in ("trajectory.csv", "shapes.csv", "events.csv")}
+    assert len(cut_short) == 3 - lost["trajectory.csv"]
+    assert len(cut_short.shapes[0]) == 3 - lost["shapes.csv"]
+    assert len(cut_short.events) == 1 - lost["events.csv"]
+    assert np.array_equal(cut_short.y, whole.y[: len(cut_short)])
+
+
+def test_a_run_killed_at_once_loads_empty(tmp_path):
+    FileRecorder(PAIR, RunDirectory.create(tmp_path)).close()
+    result = load_trajectory(tmp_path)
+    assert len(result) == 0
+    assert list(result.columns) == list(COLUMNS)
+    assert result.shapes[1].shape == (0, 21)
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "message"),
+    [
+        ("trajectory.csv", lambda text: text.replace("0.1,", "0.1.1,", 1), r"trajectory\.csv: .*row"),
+        ("trajectory.csv", lambda text: text.replace("\n0.1,", "\n0.1,0.5,", 1), r"trajectory\.csv: "),
+        ("trajectory.csv", lambda text: text.replace("\n0.1,", "\nnan,", 1), r"trajectory\.csv: time .* not finite"),
+        ("trajectory.csv", lambda text: "", r"trajectory\.csv: empty"),
+        ("events.csv", lambda text: text.replace("impact", "bang"), r"events\.csv: line 2: not an event"),
+        ("events.csv", lambda text: text.replace("0.5", "five"), r"events\.csv: line 2: .*five"),
+        ("events.csv", lambda text: text.replace("time,", "t,"), r"events\.csv: line 1"),
+        ("shapes.csv", lambda text: text.replace("u_0", "w_0"), r"shapes\.csv: line 1"),
+        ("summary.json", lambda text: text[:-20], r"summary\.json: "),
+        ("summary.json", lambda text: "[]", r"summary\.json: no scene"),
+    ],
+)
+def test_damage_is_named_by_file(tmp_path, name, damage, message):
+    run = filed(tmp_path / "run", event=Event(0.1, "impact", y=0.5))
+    path = run.directory.path / name
+    path.write_text(damage(path.read_text(encoding="utf-8")), encoding="utf-8")
+    with pytest.raises(ResultsUnreadable, match=message):
+        load_trajectory(run.directory.path)
+
+
+@pytest.mark.parametrize("name", ["trajectory.csv", "events.csv", "summary.json"])
+def test_a_missing_file_is_named(tmp_path, name):
+    run = filed(tmp_path / "run")
+    (run.directory.path / name).unlink()
+    with pytest.raises(ResultsUnreadable, match=name):
+        load_trajectory(run.directory.path)
+
+
+def test_a_folder_that_is_no_run_is_said_to_be_none(tmp_path):
+    with pytest.raises(ResultsUnreadable, match="not a run directory"):
+        load_trajectory(tmp_path)
+
+
+def test_events_are_read_one_at_a_time(tmp_path):
+    run = filed(tmp_path / "run", event=Event(0.1, "impact", y=0.5))
+    with run.directory.events.open("a") as file:
+        file.write("broken line\n")
+    events = load_events(run.directory.path)
+    assert next(events).kind == "impact"
+    with pytest.raises(ResultsUnreadable, match="line 3"):
+        next(events)
+
+
+# -- directories --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["trajectory.csv", "events.csv", "shapes.csv", "summary.json", PICTURES[2]])
+def test_results_are_not_overwritten_unasked(tmp_path, name):
+    (tmp_path / name).write_text("precious")
+    with pytest.raises(ResultsExist, match=name):
+        RunDirectory.create(tmp_path)
+    assert (tmp_path / name).read_text() == "precious"
+    RunDirectory.create(tmp_path, replace=True)
+    assert not (tmp_path / name).exists()
+
+
+def test_replacing_leaves_what_is_not_a_result(tmp_path):
+    run = filed(tmp_path / "run")
+    (run.directory.path / "notes.txt").write_text("mine")
+    (run.directory.path / PICTURES[0]).write_text("")
+    directory = RunDirectory.create(tmp_path / "run", replace=True)
+    assert [path.name for path in directory.path.iterdir()] == ["notes.txt"]
+
+
+def test_a_recorder_does_not_write_over_files(tmp_path):
+    run = filed(tmp_path / "run")
+    with pytest.raises(FileExistsError):
+        FileRecorder(PAIR, run.directory)
+
+
+def test_a_directory_may_exist_with_other_files_and_is_made_with_its_parents(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    assert RunDirectory.create(tmp_path).path == tmp_path
+    assert RunDirectory.create(tmp_path / "a" / "b").path.is_dir()
+
+
+def test_numbered_directories_are_new_each_time_also_in_parallel(tmp_path):
+    with ThreadPoolExecutor(8) as pool:
+        made = list(pool.map(lambda _: RunDirectory.create_numbered(tmp_path / "results" / "soft").path, range(12)))
+    assert {path.name for path in made} == {"soft", *(f"soft-{i}" for i in range(2, 13))}
+
+
+def test_removing_results_keeps_other_files(tmp_path):
+    run = filed(tmp_path / "run")
+    run.directory.remove()
+    assert not run.directory.path.exists()
+    other = filed(tmp_path / "other")
+    (other.directory.path / "notes.txt").write_text("mine")
+    other.directory.remove()
+    assert [path.name for path in other.directory.path.iterdir()] == ["notes.txt"]
