@@ -539,7 +539,7 @@ def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
     unit = (
         Unit(1.0, "J") if logarithmic else readable_unit([columns["e_total"], *(columns[name] for name in parts)], "J")
     )
-    if positive and comparable:
+    if parts and positive and comparable:
         rows = decimated(columns["time"], columns["e_beam" if "e_beam" in columns else "e_spring"])
         ax.stackplot(
             timeline.unit.factor * columns["time"][rows],

@@ -1,0 +1,295 @@
+"""Pictures: which are drawn, what is in them, and that thinning keeps extremes."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import matplotlib
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+from matplotlib.image import imread
+
+from springbeam import plots
+from springbeam.plots import alternates, decimated, phase_intervals, plot_run, readable_unit
+from springbeam.recording import PICTURES, columns_of
+from springbeam.scene import load_scene, with_changes
+from springbeam.trajectory import EVENT_KINDS, SHAPE_POINTS, Event, Trajectory
+
+PAIR = load_scene("soft")
+A, B, C, D, E = PICTURES
+
+
+def a_trajectory(scene=PAIR, n=400, events=(), **columns):
+    t = np.linspace(0.0, scene.time.t_end, n)
+    made = {
+        name: 1e-2 * np.sin((i + 3.0) * t) ** 2 for i, name in enumerate(columns_of(scene)) if name.startswith("e_")
+    }
+    made |= {"e_load": np.zeros(n), "energy_residual": 1e-15 * np.sin(t)}
+    made["e_total"] = sum(values for name, values in made.items() if name not in ("e_total", "energy_residual"))
+    for i, name in enumerate(columns_of(scene)):
+        made.setdefault(name, 1e-2 * np.sin((i + 3.0) * t))
+    made |= {"time": t, "phase": np.where(np.sin(20.0 * t) > 0.0, "tied", "free")} | columns
+    shapes = None if scene.beam is None else (t, np.outer(np.sin(9.0 * t), SHAPE_POINTS**2))
+    ordered = {name: made[name] for name in columns_of(scene)}
+    return Trajectory(scene, ordered, list(events), shapes, {})
+
+
+EVERY_EVENT = [Event(0.05 * (i + 1), kind, 0, 0, 0, 0, 0.1, 0.2, 0.3) for i, kind in enumerate(EVENT_KINDS)]
+
+
+# -- which pictures -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scene", "expected"),
+    [
+        (PAIR, [A, B, C, D, E]),
+        (with_changes(PAIR, stop=None), [A, B, C, D, E]),
+        (with_changes(PAIR, spring=None), [A, B, C, D, E]),
+        (with_changes(PAIR, spring=None, stop=None), [A, B, C, E]),
+        (with_changes(PAIR, beam=None), [C, D, E]),
+        (with_changes(PAIR, beam=None, stop=None), [C, E]),
+    ],
+    ids=["all", "no stop", "no spring", "beam", "spring and stop", "spring"],
+)
+def test_a_scene_gets_the_pictures_of_what_it_has(tmp_path, scene, expected):
+    written = plot_run(a_trajectory(scene), tmp_path)
+    assert [path.name for path in written] == expected
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(expected)
+    for path in written:
+        image = imread(path)
+        assert image.shape[1] == round(plots._WIDTH * plots._DPI)
+        assert image[..., :3].std() > 0.02  # not blank
+
+
+def test_nothing_is_drawn_of_nothing(tmp_path):
+    whole = a_trajectory()
+    for rows in (0, 1):
+        short = dataclasses.replace(whole, columns={name: v[:rows] for name, v in whole.columns.items()})
+        assert plot_run(short, tmp_path) == []
+
+
+def test_a_run_that_stopped_at_its_second_row_is_drawn(tmp_path):
+    whole = a_trajectory()
+    short = dataclasses.replace(
+        whole,
+        columns={name: values[:2] for name, values in whole.columns.items()},
+        shapes=(whole.shapes[0][:2], whole.shapes[1][:2]),
+    )
+    assert [path.name for path in plot_run(short, tmp_path)] == [A, C, D, E]
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {"energy_residual": np.zeros(400)},
+        {"contact_force": np.zeros(400), "contact_force_smoothed": np.zeros(400)},
+        {"e_beam": np.full(400, 4.5e9)},
+        {"e_spring": np.linspace(-1.0, 1.0, 400)},
+        {name: np.zeros(400) for name in columns_of(PAIR) if name not in ("time", "phase")},
+        {"phase": np.full(400, "a phase to come")},
+        {"u_tip": np.full(400, 1e-300), "y": np.full(400, -1e300)},
+        {"v_tip": np.where(np.arange(400) % 2, 1.0, -1.0)},
+    ],
+    ids=["no residual", "no force", "stiff", "negative", "all zero", "unknown phase", "extreme", "alternating"],
+)
+def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, columns):
+    plot_run(a_trajectory(events=EVERY_EVENT, **columns), tmp_path)
+    assert [str(warning.message) for warning in recwarn] == []
+
+
+def test_style_is_not_left_behind(tmp_path):
+    before = dict(matplotlib.rcParams)
+    plot_run(a_trajectory(), tmp_path)
+    assert dict(matplotlib.rcParams) == before
+
+
+# -- what is in them ----------------------------------------------------------------------------------------------
+
+
+def texts(figure):
+    found = [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
+    return [text for text in found if text]
+
+
+@pytest.mark.parametrize("draw", [plots._positions, plots._velocities_and_forces, plots._gap_and_energy])
+def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(draw):
+    figure = draw(a_trajectory(events=EVERY_EVENT))
+    axes = figure.axes
+    assert axes[-1].get_xlabel() == "time t [s]"
+    for ax in axes:
+        assert ax.get_ylabel().endswith("]")
+    key = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert {"free", "tied (u = y < Ψ)"} <= set(key)
+    assert {f"{words} (1)" for _, _, words in plots._EVENT_MARKS.values()} <= set(key)
+
+
+@pytest.mark.parametrize("draw", [plots._shapes_after_contact, plots._shapes_later])
+def test_shapes_have_quantities_and_units(draw):
+    figure = draw(a_trajectory())
+    for ax in figure.axes[:2]:
+        assert ax.get_xlabel() == "position along the beam x [m]"
+        assert ax.get_ylabel().endswith("]")
+    assert any(text.startswith("time t [") for text in texts(figure))
+
+
+def test_shapes_start_at_first_contact():
+    t_c = 0.2
+    figure = plots._shapes_after_contact(a_trajectory(events=[Event(t_c, "impact")]))
+    curves, velocities = (ax.collections[0] for ax in figure.axes[:2])
+    first = curves.get_array()[0]
+    assert t_c <= first < t_c + 0.6 / 399
+    assert len(curves.get_segments()) == plots._SHAPES_EARLY
+    assert len(velocities.get_segments()) == plots._SHAPES_EARLY - 1
+
+
+def test_mean_velocity_of_shapes():
+    """A beam moving as u = −2 t x² has the mean velocity −2 x² between any two shapes."""
+    t = np.linspace(0.0, 1.0, 30)
+    moving = dataclasses.replace(a_trajectory(), shapes=(t, np.outer(-2.0 * t, SHAPE_POINTS**2)))
+    for curve in plots._shapes_after_contact(moving).axes[1].collections[0].get_segments():
+        assert np.allclose(curve[:, 1], -2.0 * SHAPE_POINTS**2, rtol=1e-12)
+
+
+def test_equilibrium_and_foundation_are_drawn_unless_far_outside():
+    figure = plots._positions(a_trajectory())
+    assert {"Ψ", "φ"} <= set(texts(figure))
+    deep = with_changes(PAIR, stop={"position": -100.0})
+    assert "φ" not in texts(plots._positions(a_trajectory(deep)))
+
+
+def test_many_events_become_ticks_in_rows():
+    events = [Event(0.6 * i / 100, "impact" if i % 2 else "separation") for i in range(100)]
+    figure = plots._positions(a_trajectory(events=events))
+    marks = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
+    assert [len(line.get_xdata()) for line in marks] == [50, 50]
+    assert len({line.get_ydata()[0] for line in marks}) == 2
+
+
+def test_what_alternates_is_said_to_be_unresolved():
+    flips = np.where(np.arange(400) % 2, 1.0, -1.0)
+    remark = "alternates from step\nto step: not resolved"
+    assert remark in texts(plots._positions(a_trajectory(v_tip=flips)))
+    assert remark not in texts(plots._positions(a_trajectory()))
+    unresolved = a_trajectory()
+    unresolved.shapes[1][:] = np.outer(flips, SHAPE_POINTS)
+    figure = plots._shapes_later(unresolved)
+    assert any("not resolved" in text for text in texts(figure))
+    tips = [curve[-1, 1] for curve in figure.axes[0].collections[0].get_segments()]
+    assert {-1.0, 1.0} == set(tips)
+
+
+def test_small_forces_are_named_rather_than_drawn_on_the_axis():
+    figure = plots._velocities_and_forces(a_trajectory(compliance_force=np.full(400, 1e-9)))
+    assert any("too small to draw" in text and "1e-09 N" in text for text in texts(figure))
+
+
+def test_energies_are_stacked_or_on_a_log_axis_by_their_size():
+    comparable = plots._gap_and_energy(a_trajectory())
+    stiff = plots._gap_and_energy(a_trajectory(e_beam=np.full(400, 4.5e9)))
+    assert comparable.axes[1].get_yscale() == "linear"
+    assert stiff.axes[1].get_yscale() == "log"
+    assert stiff.axes[1].get_ylabel() == "energy [J]"
+
+
+def test_residual_is_relative_to_the_largest_energy():
+    trajectory = a_trajectory(e_beam=np.full(400, 3.0), energy_residual=np.full(400, -6e-12))
+    line = plots._gap_and_energy(trajectory).axes[2].lines[-1]
+    stored = np.abs(trajectory.e_beam) + np.abs(trajectory.e_spring) + np.abs(trajectory.e_contact)
+    assert np.allclose(line.get_ydata(), 6e-12 / stored.max(), rtol=1e-12)
+
+
+# -- thinning -----------------------------------------------------------------------------------------------------
+
+
+@settings(deadline=None)
+@given(
+    values=npst.arrays(float, st.integers(1, 3000), elements=st.floats(-1e6, 1e6)),
+    columns=st.integers(2, 60),
+)
+def test_thinning_keeps_ends_order_and_the_extremes_of_every_column_of_pixels(values, columns):
+    time = np.sort(np.random.default_rng(len(values)).random(len(values)))
+    rows = decimated(time, values, columns)
+    assert np.all(np.diff(rows) > 0)
+    assert rows[0] == 0
+    assert rows[-1] == len(values) - 1
+    assert len(rows) <= max(4 * columns, 1)
+    edges = np.linspace(time[0], time[-1], columns + 1)[1:-1]
+    for span in np.split(np.arange(len(values)), np.searchsorted(time, edges)):
+        kept = rows[np.isin(rows, span)]
+        if len(span):
+            assert values[kept].min() == values[span].min()
+            assert values[kept].max() == values[span].max()
+
+
+def test_a_short_run_is_not_thinned():
+    time = np.linspace(0.0, 1.0, 4 * plots._PIXEL_COLUMNS)
+    assert np.array_equal(decimated(time, time), np.arange(len(time)))
+
+
+def test_one_wild_row_of_a_million_is_in_the_picture():
+    time = np.linspace(0.0, 1.0, 1_000_000)
+    values = np.zeros_like(time)
+    values[123_456] = -7.0
+    assert 123_456 in decimated(time, values)
+
+
+def test_a_long_run_is_drawn_from_few_points(tmp_path):
+    figure = plots._positions(a_trajectory(n=200_000))
+    for ax in figure.axes:
+        assert all(len(line.get_xdata()) <= 4 * plots._PIXEL_COLUMNS for line in ax.lines)
+
+
+def test_phases_hold_until_the_next_row():
+    time = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 4.0])
+    phase = np.array(["free", "free", "tied", "tied", "touch", "free"])
+    assert phase_intervals(time, phase) == [("free", 0.0, 2.0), ("tied", 2.0, 3.0), ("touch", 3.0, 4.0)]
+
+
+def test_more_phases_than_pixels_are_sampled_in_proportion():
+    time = np.arange(40_000) / 4.0
+    phase = np.where(np.arange(40_000) % 4 == 0, "tied", "free")
+    intervals = phase_intervals(time, phase, 999)
+    assert len(intervals) <= 1000
+    tied = sum(end - start for name, start, end in intervals if name == "tied")
+    assert tied / time[-1] == pytest.approx(0.25, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        (np.where(np.arange(100) % 2, 1.0, -1.0), True),
+        (np.where(np.arange(100) % 2, 1.0, -1.0) + np.sin(np.arange(100) / 9.0), True),
+        (np.sin(np.linspace(0.0, 30.0, 400)), False),
+        (np.sin(np.linspace(0.0, 30.0, 400)) + 1e-3 * np.where(np.arange(400) % 2, 1.0, -1.0), False),
+        (np.zeros(100), False),
+        (np.array([1.0, -1.0, 1.0]), False),
+    ],
+    ids=["flips", "flips on a wave", "wave", "ripple", "constant", "too short"],
+)
+def test_alternation(values, expected):
+    assert alternates(values) is expected
+
+
+@pytest.mark.parametrize(
+    ("largest", "unit", "expected"),
+    [
+        (0.0, "m", (1.0, "m")),
+        (0.6, "s", (1.0, "s")),
+        (0.1, "m", (1.0, "m")),
+        (9999.0, "N", (1.0, "N")),
+        (0.015, "m", (1e3, "mm")),
+        (3e-7, "m", (1e9, "nm")),
+        (4.4e-6, "m", (1e6, "µm")),
+        (4.5e9, "J", (1e-9, "GJ")),
+        (2e4, "N", (1e-3, "kN")),
+        (1e-30, "J", (1e12, "pJ")),
+        (1e30, "J", (1e-12, "TJ")),
+    ],
+)
+def test_readable_units(largest, unit, expected):
+    factor, name = readable_unit([np.array([0.0, -largest]), np.array([])], unit)
+    assert (factor, name) == (pytest.approx(expected[0], rel=1e-15), expected[1])
