@@ -26,6 +26,9 @@ from .semi_discrete import ModalBeam, modal_beam
 
 Contact = Literal["free", "touch", "tied"]
 
+#: What rounding leaves of a sum that is exactly zero, as a share of its terms.
+_NOISE = 16.0 * float(np.finfo(float).eps)
+
 
 class ReferenceFailure(RuntimeError):
     """The reference cannot go on; the message says why and at which time."""
@@ -90,12 +93,12 @@ class HybridSystem:
     def spring_force(self, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """s = f_s − α_s z − k1 y − k2 y³ [N]."""
         p = self.spring
-        return p.external_force - p.damping * z - (p.linear_stiffness + p.cubic_stiffness * y**2) * y
+        return np.asarray(p.external_force - p.damping * z - (p.linear_stiffness + p.cubic_stiffness * y**2) * y)
 
     def compliance_force(self, penetration: np.ndarray) -> np.ndarray:
         """λ_nc (penetration)₊^p [N]."""
         law = self.scene.contact
-        return law.stiffness * np.maximum(penetration, 0.0) ** law.exponent
+        return np.asarray(law.stiffness * np.maximum(penetration, 0.0) ** law.exponent)
 
     def motion(self, phase: Phase, X: np.ndarray) -> Motion:
         """Accelerations and interface quantities of states of shape (..., 2r + 3)."""
@@ -131,11 +134,17 @@ class HybridSystem:
 
     def dissipation_rate(self, X: np.ndarray) -> np.ndarray:
         """α_b ȧᵀω²ȧ + α_s z² [W]."""
-        return self.alpha_b * (X[..., self.V] ** 2 @ self.stiffness) + self.spring.damping * X[..., self.Z] ** 2
+        v, z = X[..., self.V], X[..., self.Z]
+        return np.asarray(self.alpha_b * (v**2 @ self.stiffness) + self.spring.damping * z**2)
 
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """X with y, z set to the tip's where they are tied."""
-        if self.joined(phase) and not phase.seated:
+        """X, in place, with what rounding leaves of the phase's constraint removed: y = u, or u = φ when seated."""
+        joined = self.joined(phase)
+        if phase.seated and (joined or not self.has_spring) and self.scene.stop is not None:
+            towards = self.b / self.inverse_tip_mass
+            X[..., self.A] += (self.scene.stop.position - X[..., self.A] @ self.b)[..., None] * towards
+            X[..., self.V] -= (X[..., self.V] @ self.b)[..., None] * towards
+        elif joined:
             X[..., self.Y] = X[..., self.A] @ self.b
             X[..., self.Z] = X[..., self.V] @ self.b
         return X
@@ -162,14 +171,14 @@ class HybridSystem:
     def displacement_noise(self, X: np.ndarray) -> float:
         """What rounding leaves of a displacement that is exactly zero [m]."""
         stop = 0.0 if self.scene.stop is None else abs(self.scene.stop.position)
-        size = float(np.abs(X[self.A]) @ np.abs(self.b)) + abs(X[self.Y]) + stop
-        return 16.0 * np.finfo(float).eps * size
+        size = float(np.abs(X[self.A]) @ np.abs(self.b)) + abs(float(X[self.Y])) + stop
+        return _NOISE * size
 
     def force_noise(self, X: np.ndarray) -> float:
         """What rounding leaves of a contact force that is exactly zero [N]."""
         a, v = np.abs(X[self.A]), np.abs(X[self.V])
         beam = float(np.abs(self.b) @ (self.stiffness * (a + self.alpha_b * v) + np.abs(self.load)))
         p = self.spring
-        spring = abs(p.external_force) + p.damping * abs(X[self.Z]) + abs(p.linear_stiffness * X[self.Y])
+        spring = abs(p.external_force) + p.damping * abs(float(X[self.Z])) + abs(p.linear_stiffness * float(X[self.Y]))
         weight = self.inverse_tip_mass + self.inverse_mass
-        return 16.0 * np.finfo(float).eps * (beam / weight + spring)
+        return _NOISE * (beam / weight + spring)

@@ -25,10 +25,12 @@ from .hybrid_system import HybridSystem, Phase, ReferenceFailure
 METHODS = ("exponential", "DOP853", "Radau")
 _STAGES = 12
 _QUADRATURE = 24
+_MAX_HALVINGS = 60
 #: Step size × largest |root| of the phase: 12 Gauss points interpolate e^{iθ}, θ ≤ 2, to 1e-12.
 _STEP_PHASE = 2.0
-#: Largest accepted share of the last two Legendre coefficients in a force r over a step.
-_TAIL = 1e-10
+#: Largest accepted impulse of the last two Legendre coefficients of r over a step, as a share of the momentum there.
+#: The step's end is far more exact: Gauss points integrate what these coefficients leave out.
+_TAIL = 1e-12
 
 
 class Segment(ABC):
@@ -61,7 +63,7 @@ class _RungeKuttaSegment(Segment):
 
     def state(self, tau: float) -> np.ndarray:
         if tau <= 0.0:
-            return self.start.copy()
+            return np.array(self.start)
         # Again from the start, because the dense output is a power of the step less accurate.
         solution = solve_ivp(
             self.owner.rhs,
@@ -133,11 +135,15 @@ class _GaussRule:
 
     def lagrange(self, c: np.ndarray) -> np.ndarray:
         """ℓ_k(c): shape c.shape + (stages,)."""
-        return np.polynomial.legendre.legvander(2.0 * c - 1.0, self.stages - 1) @ self.transform
+        return np.asarray(np.polynomial.legendre.legvander(2.0 * c - 1.0, self.stages - 1) @ self.transform)
 
 
 _GAUSS = _GaussRule(_STAGES)
 _INNER = _GaussRule(_QUADRATURE)
+_TARGETS = np.append(_GAUSS.nodes, 1.0)
+#: Quadrature points on [0, c] for each target c, shape (targets, Q), and weight × ℓ_k there, (targets, stages, Q).
+_ELAPSED = _TARGETS[:, None] * _INNER.nodes
+_FORCE_BASIS = np.swapaxes(_GAUSS.lagrange(_ELAPSED) * (_TARGETS[:, None] * _INNER.weights)[..., None], 1, 2)
 
 
 class LinearForm:
@@ -202,7 +208,7 @@ class LinearForm:
             np.sqrt(np.abs(self.omega2)),
         )
         self.radius = float(roots.max(initial=0.0))  #: largest |root| [1/s]
-        self._cache: dict[float, _Weights] = {}
+        self._cache: dict[str, _Weights] = {}
 
     def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         s = self.system
@@ -271,29 +277,27 @@ class LinearForm:
             S_dot = np.where(far, (slow * first + (safe + sigma) * second) / (2.0 * safe), S_dot)
         return S, S_dot
 
-    def weights(self, size: float, targets: np.ndarray | None = None) -> _Weights:
-        """Weights of a step of ``size`` at the Gauss points and the end, or at ``targets`` (fractions of it)."""
-        if targets is None:
-            for cached, known in self._cache.items():
-                if abs(cached - size) <= 1e-12 * size:
-                    return known
-        c = np.append(_GAUSS.nodes, 1.0) if targets is None else targets
-        S, S_dot = self.kernels(c * size)
-        elapsed = c[:, None] * _INNER.nodes  # fractions of the step at which the force acts
-        basis = _GAUSS.lagrange(elapsed) * (c[:, None] * _INNER.weights * size)[..., None]
-        kernel, kernel_dot = self.kernels((c[:, None] - elapsed) * size)
+    def weights(self, size: float) -> _Weights:
+        """Weights of a step of ``size`` [s] at the Gauss points and the end; the last ones used are kept."""
+        key = f"{size:.12e}"  # differences of equally spaced times are equal only to rounding
+        known = self._cache.pop(key, None)
+        if known is not None:
+            self._cache[key] = known
+            return known
+        S, S_dot = self.kernels(_TARGETS * size)
+        kernel, kernel_dot = self.kernels((_TARGETS[:, None] - _ELAPSED) * size)
+        basis = _FORCE_BASIS * size
         result = _Weights(
             C=S_dot + 2.0 * self.sigma * S,
             S=S,
             C_dot=-self.omega2 * S,
             S_dot=S_dot,
-            force=np.einsum("iqk,iqj->ikj", basis, kernel),
-            force_dot=np.einsum("iqk,iqj->ikj", basis, kernel_dot),
+            force=np.matmul(basis, kernel),
+            force_dot=np.matmul(basis, kernel_dot),
         )
-        if targets is None:
-            if len(self._cache) > 8:
-                self._cache.pop(next(iter(self._cache)))
-            self._cache[size] = result
+        if len(self._cache) >= 64:
+            self._cache.pop(next(iter(self._cache)))
+        self._cache[key] = result
         return result
 
     def respond(self, w: _Weights, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -319,43 +323,43 @@ def _modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @dataclass
 class _ExponentialSegment(Segment):
     form: LinearForm
-    start: np.ndarray
     size: float
     nodes: np.ndarray
     states: np.ndarray
-    modes: tuple[np.ndarray, np.ndarray]
-    r: np.ndarray
+    speed: float
 
     def state(self, tau: float) -> np.ndarray:
-        if tau <= 0.0:
-            return self.start.copy()
-        form, fraction = self.form, tau / self.size
-        # Targets: Gauss points of [0, τ] for the dissipated energy, then τ itself.
-        w = form.weights(self.size, np.append(_GAUSS.nodes, 1.0) * fraction)
-        states = form.unpack(*form.respond(w, *self.modes, self.r), self.start)
-        return _with_dissipation(form.system, self.start, states, tau)
+        # Stepped anew, because the forces of the whole segment may hold a kink that lies after τ.
+        inner = ExponentialPropagator(self.form, self.states[0].copy(), self.speed)
+        elapsed = 0.0
+        while tau - elapsed > 1e-15 * tau:
+            elapsed += inner.advance(tau - elapsed).size
+        return np.array(inner.X)
 
 
 class ExponentialPropagator(Propagator):
     """Exact in the phase's linear part, Gauss collocation in the rest."""
 
-    def __init__(self, form: LinearForm, X: np.ndarray) -> None:
+    def __init__(self, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
         self.form, self.X = form, X
-        self._force_scale = 0.0
+        self._speed = speed  # largest interface velocity so far × √mass, the scale of `_TAIL`
+        self._mobility = np.sum(form.inputs**2, axis=1)  # [1/kg]
         self._limit = _STEP_PHASE / form.radius if form.radius > 0.0 else np.inf
+        self._halvings = 0
 
     def advance(self, remaining: float) -> Segment:
-        size = remaining / np.ceil(remaining / self._limit * (1.0 - 1e-9)) if np.isfinite(self._limit) else remaining
-        size = min(size, remaining)
-        while True:
-            segment = self._step(size)
+        steps = 1.0 if np.isinf(self._limit) else np.ceil(remaining / self._limit * (1.0 - 1e-9))
+        whole = remaining / max(steps, 1.0)
+        while self._halvings < _MAX_HALVINGS:
+            # Halved steps keep to limit/2ᵏ, whose weights are known already.
+            size = whole if self._halvings == 0 else min(self._limit, remaining) * 0.5**self._halvings
+            segment = self._step(size if remaining > 1.5 * size else remaining)
             if segment is not None:
                 self.X = segment.states[-1].copy()
+                self._halvings = max(self._halvings - 1, 0)
                 return segment
-            size *= 0.5
-            self._limit = size
-            if size < 1e-14 * remaining or size < 1e-300:
-                raise ReferenceFailure(f"no step resolves the interface force in phase {self.form.phase.name}")
+            self._halvings += 1
+        raise ReferenceFailure(f"no step resolves the interface force in phase {self.form.phase.name}")
 
     def _step(self, size: float) -> _ExponentialSegment | None:
         form, X = self.form, self.X
@@ -373,10 +377,10 @@ class ExponentialPropagator(Propagator):
                 break
         else:
             return None
-        self._force_scale = max(self._force_scale, scale)
         if len(r):
+            self._speed = max(self._speed, float(np.max(np.abs(xi_dot @ form.inputs.T / np.sqrt(self._mobility)))))
             tail = np.sum(np.abs(r @ _GAUSS.transform[-2:].T), axis=1)
-            if np.any(tail > _TAIL * self._force_scale):
+            if np.any(tail * size * np.sqrt(self._mobility) > _TAIL * self._speed):
                 return None
         xi, xi_dot = form.respond(w, *modes, r)
         states = form.unpack(xi, xi_dot, X)
@@ -385,11 +389,11 @@ class ExponentialPropagator(Propagator):
         end = _with_dissipation(form.system, X, states, size)
         states = np.vstack([X, states[:-1], end])
         nodes = np.concatenate([[0.0], _GAUSS.nodes * size, [size]])
-        return _ExponentialSegment(form, X, size, nodes, states, modes, r)
+        return _ExponentialSegment(form, size, nodes, states, self._speed)
 
 
 def _with_dissipation(system: HybridSystem, start: np.ndarray, states: np.ndarray, size: float) -> np.ndarray:
     """The last of ``states`` with D integrated over the Gauss points, which are the others."""
-    end = states[-1].copy()
+    end = np.array(states[-1])
     end[system.D] = start[system.D] + size * float(_GAUSS.weights @ system.dissipation_rate(states[:-1]))
     return end

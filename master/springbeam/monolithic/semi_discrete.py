@@ -21,6 +21,10 @@ from ..scene import Beam
 from ..trajectory import SHAPE_POINTS
 
 
+#: Up to this many unknowns all modes are computed, also where few are wanted.
+_DENSE_SIZE = 400
+
+
 @dataclass(frozen=True)
 class SemiDiscreteBeam:
     """Matrices of the clamped beam; N = 2n unknowns, node i has θᵢ at 2(i−1) and uᵢ at 2(i−1)+1.
@@ -163,11 +167,7 @@ def modal_beam(beam: Beam) -> ModalBeam:
         space = _augmented_space(discrete, beam)
         omega, basis = _rayleigh_ritz(discrete, space)
     else:
-        # With M = LLᵀ, the modes are L⁻ᵀ × right singular vectors of B L⁻ᵀ.
-        L = np.linalg.cholesky(discrete.M.toarray())
-        factor = scipy.linalg.solve_triangular(L, discrete.B.toarray().T, lower=True).T
-        omega, vectors = _singular_modes(factor)
-        basis = scipy.linalg.solve_triangular(L.T, vectors, lower=False)
+        omega, basis = _all_modes(discrete)
     load = beam.distributed_load * discrete.uniform_load + beam.tip_load_coefficient * discrete.hat_load
     return ModalBeam(
         omega=omega,
@@ -178,6 +178,14 @@ def modal_beam(beam: Beam) -> ModalBeam:
         basis=basis,
         alpha=beam.alpha_b,
     )
+
+
+def _all_modes(discrete: SemiDiscreteBeam) -> tuple[np.ndarray, np.ndarray]:
+    """With M = LLᵀ, the modes are L⁻ᵀ × right singular vectors of B L⁻ᵀ."""
+    L = np.linalg.cholesky(discrete.M.toarray())
+    factor = scipy.linalg.solve_triangular(L, discrete.B.toarray().T, lower=True).T
+    omega, vectors = _singular_modes(factor)
+    return omega, scipy.linalg.solve_triangular(L.T, vectors, lower=False)
 
 
 def _singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -191,7 +199,10 @@ def _singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
     solve = spla.factorized(discrete.K)
-    _, modes = spla.eigsh(discrete.K, k=beam.n_modes, M=discrete.M, sigma=0.0, v0=np.ones(discrete.size), tol=0.0)
+    if discrete.size <= _DENSE_SIZE or 2 * beam.n_modes > discrete.size:
+        modes = _all_modes(discrete)[1][:, : beam.n_modes]
+    else:
+        _, modes = spla.eigsh(discrete.K, k=beam.n_modes, M=discrete.M, sigma=0.0, v0=np.ones(discrete.size))
     extra = [solve(discrete.tip_vector), solve(discrete.uniform_load)]
     if beam.tip_load_coefficient != 0.0:
         extra.append(solve(discrete.hat_load))
@@ -201,15 +212,12 @@ def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
     for shape in extra:
         residual = shape / np.sqrt(shape @ (discrete.M @ shape))
         W = np.array(space).T
-        new = True
+        shares = []
         for _ in range(3):  # repeated, because one projection leaves cancellation errors
             residual = residual - W @ (W.T @ (discrete.M @ residual))
-            norm = np.sqrt(residual @ (discrete.M @ residual))
-            if norm < 1e-10:  # the shape already lies in the space
-                new = False
-                break
-            residual /= norm
-        if new:
+            shares.append(np.sqrt(residual @ (discrete.M @ residual)))
+            residual /= shares[-1]
+        if shares[0] > 1e-10:  # otherwise the shape already lies in the space
             space.append(residual)
     return np.array(space).T
 
