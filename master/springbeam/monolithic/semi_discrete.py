@@ -20,7 +20,6 @@ import scipy.sparse.linalg as spla
 from ..scene import Beam
 from ..trajectory import SHAPE_POINTS
 
-
 #: Up to this many unknowns all modes are computed, also where few are wanted.
 _DENSE_SIZE = 400
 
@@ -219,7 +218,7 @@ def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
             residual /= shares[-1]
         if shares[0] > 1e-10:  # otherwise the shape already lies in the space
             space.append(residual)
-    return np.array(space).T
+    return np.asarray(np.array(space).T)
 
 
 def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

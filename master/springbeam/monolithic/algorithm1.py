@@ -1,0 +1,406 @@
+"""Ahn & Tate's Algorithm 1, step for step, with (52)–(56) and (62)–(65), as a monolithic code.
+
+Line numbers in comments are those of the printed algorithm. Where it leaves something open the choice has a name:
+
+``start_velocity``
+    z at t_c: ``"rest"`` 0 (section 6), ``"tip"`` the tip's velocity (line 5), ``"average"`` eq. (11). In the
+    semi-discrete model the tip's velocity does not jump at t_c, so "average" and "tip" are one number.
+``y_temp`` (lines 16–17, "accommodate the transmission condition")
+    ``"equation"``: (53) starts from the tip's position u instead of yˡ, and line 29 forms z from the true yˡ.
+    ``"guess"``: u is where Newton's method starts; (53) keeps yˡ.
+    ``"both"``: u takes the place of yˡ in (53) and in line 29.
+``y == φ`` (line 20)
+    y ≤ φ.
+Lines 11 and 14 leave a third case, y ≤ Ψ < u: nothing is changed.
+
+Line 18 overwrites the tip by the spring's position. The force on the tip that would do so is recovered from the tip's
+row of (62) and its work is booked (``e_injected_beam``), like what exchanging yˡ adds to the spring
+(``e_injected_spring``): nothing else in the model pays for either.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Literal, get_args
+
+import numpy as np
+import scipy.sparse.linalg as spla
+
+from ..scene import Scene
+from ..trajectory import COLUMNS, Event, Trajectory
+from .semi_discrete import SemiDiscreteBeam, assemble
+
+StartVelocity = Literal["rest", "tip", "average"]
+YTemp = Literal["equation", "guess", "both"]
+
+_MAX_ITERATIONS = 50
+
+
+class AlgorithmFailure(RuntimeError):
+    """Newton's method did not converge, or the solution overflows; ``trajectory`` holds what came before."""
+
+    trajectory: Trajectory | None = None
+
+
+@dataclass(frozen=True)
+class NewtonStatistics:
+    """Newton iterations per solve (Table 2): steps Δ taken up to and including the first with |Δ| ≤ tolerance."""
+
+    tolerance: float
+    beam: float  #: line 9, (62) at the tip
+    spring_predicted: float  #: line 10, (53) from yˡ
+    spring_joined: float  #: line 17, (53) from y_temp
+    spring: float  #: lines 10 and 17 together
+    solves: int  #: of (53)
+    time_per_step: float  #: [s]
+
+
+def simulate(
+    scene: Scene,
+    *,
+    start_velocity: StartVelocity | None = None,
+    y_temp: YTemp = "equation",
+    tolerance: float = 1e-12,
+) -> Trajectory:
+    """Run Algorithm 1 with h_t = ``coupling.macro_step`` on a scene with beam and spring.
+
+    Parameters
+    ----------
+    start_velocity
+        See the module. Default: what ``contact.impact`` says, ``"tip"`` or ``"rest"``; the default of other laws,
+        ``"inelastic"``, is no choice of the paper's and is taken as its section 6, ``"rest"``.
+    y_temp
+        See the module.
+    tolerance
+        Of Newton's method, on the change of the unknown [m].
+
+    Returns
+    -------
+    Trajectory
+        A row per step from t_c on (from 0 with ``approach = "elastic"``). ``contact_force``, ``compliance_force`` and
+        ``tie_reaction`` are means over the step that ends in the row. ``e_total`` is (63) + ``e_dissipated``, and
+        ``energy_residual`` what the algorithm has injected. Extra columns: ``e_injected_beam``,
+        ``e_injected_spring`` [J], and ``case`` (11, 14, or 0 where neither line holds).
+        ``summary["newton"]`` holds a `NewtonStatistics`.
+
+    Raises
+    ------
+    ValueError
+        If the scene is not one that Algorithm 1 is written for.
+    AlgorithmFailure
+        With the time and the trajectory so far, where an iteration fails or the solution overflows.
+    """
+    if scene.beam is None or scene.spring is None:
+        raise ValueError("Algorithm 1 needs [beam] and [spring]")
+    if start_velocity is None:
+        start_velocity = "tip" if scene.contact.impact == "tip" else "rest"
+    for name, value, kind in (("start_velocity", start_velocity, StartVelocity), ("y_temp", y_temp, YTemp)):
+        if value not in get_args(kind):
+            raise ValueError(f"{name} = {value!r}: one of {', '.join(get_args(kind))}")
+    return _Algorithm(scene, start_velocity, y_temp, tolerance).run()
+
+
+class _Algorithm:
+    def __init__(self, scene: Scene, start_velocity: StartVelocity, y_temp: YTemp, tolerance: float) -> None:
+        assert scene.beam is not None
+        assert scene.spring is not None
+        self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
+        self.start_velocity, self.y_temp, self.tolerance = start_velocity, y_temp, tolerance
+        self.h = scene.coupling.macro_step
+        self.discrete: SemiDiscreteBeam = assemble(scene.beam)
+        d, h, alpha = self.discrete, self.h, scene.beam.alpha_b
+        self.load = scene.beam.distributed_load * d.uniform_load + scene.beam.tip_load_coefficient * d.hat_load
+        self.B = (4.0 * d.M + (2.0 * alpha * h - h**2) * d.K).tocsr()
+        self.solve: Callable[[np.ndarray], np.ndarray] = spla.splu(
+            (4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()
+        ).solve
+        #: A⁻¹e: how (62) answers to a force at the tip.
+        self.tip_response = self.solve(d.tip_vector)
+        self.phi = -np.inf if scene.stop is None else scene.stop.position
+        self.iterations: dict[str, list[int]] = {"beam": [], "predicted": [], "joined": []}
+
+    # Laws -----------------------------------------------------------------------------------------------------------
+
+    def _compliance(self, w: float, stiffness: float) -> tuple[float, float]:
+        """λ (Ψ − w)₊^p and its derivative by w."""
+        depth = max(self.spring.equilibrium - w, 0.0)
+        p = self.scene.contact.exponent
+        slope = -p * stiffness * depth ** (p - 1.0) if depth > 0.0 else 0.0
+        return stiffness * depth**p, slope
+
+    def _newton(self, f: Callable[[float], tuple[float, float]], guess: float, solve: str) -> float:
+        x = guess
+        for k in range(1, _MAX_ITERATIONS + 1):
+            value, slope = f(x)
+            change = value / slope
+            x -= change
+            if not np.isfinite(x):
+                break
+            if abs(change) <= self.tolerance:
+                self.iterations[solve].append(k)
+                return x
+        raise AlgorithmFailure(f"Newton's method for the {solve} position does not converge at t = {self.time:.6g} s")
+
+    def _spring_step(self, y: float, z: float, guess: float, stiffness: float, solve: str) -> float:
+        """yˡ⁺¹ from (53) and (54), N = 0."""
+        p, h = self.spring, self.h
+        before = self._compliance(y, stiffness)[0]
+
+        def f(Y: float) -> tuple[float, float]:
+            force, slope = self._compliance(Y, stiffness)
+            value = (
+                2.0 * p.mass * ((Y - y) / h - z) / h
+                + p.damping * (Y - y) / h
+                + 0.5 * p.linear_stiffness * (Y + y)
+                + 0.25 * p.cubic_stiffness * (Y**2 + y**2) * (Y + y)
+                + 0.5 * (force + before)
+                - p.external_force
+            )
+            tangent = (
+                2.0 * p.mass / h**2
+                + p.damping / h
+                + 0.5 * p.linear_stiffness
+                + 0.25 * p.cubic_stiffness * (3.0 * Y**2 + 2.0 * Y * y + y**2)
+                + 0.5 * slope
+            )
+            return value, tangent
+
+        return self._newton(f, guess, solve)
+
+    def _foundation_force(self, y: float, z: float, y_new: float, stiffness: float) -> float:
+        """N of (53) for a step that ends on the foundation."""
+        p, h = self.spring, self.h
+        z_new = 2.0 * (y_new - y) / h - z
+        contact = 0.5 * (self._compliance(y_new, stiffness)[0] + self._compliance(y, stiffness)[0])
+        return (
+            p.mass * (z_new - z) / h
+            + p.damping * (y_new - y) / h
+            + 0.5 * p.linear_stiffness * (y_new + y)
+            + 0.25 * p.cubic_stiffness * (y_new**2 + y**2) * (y_new + y)
+            + contact
+            - p.external_force
+        )
+
+    # Algorithm ------------------------------------------------------------------------------------------------------
+
+    def run(self) -> Trajectory:
+        self.time = 0.0
+        q, v = self._initial_beam()
+        y, z = self.spring.equilibrium, self.spring.initial_velocity
+        self._rows: dict[str, list[float]] = {}
+        self._shapes: list[np.ndarray] = []
+        self._phases: list[str] = []
+        self._sampler = self.discrete.deflection_sampler()
+        self._totals = {"e_dissipated": 0.0, "e_injected_beam": 0.0, "e_injected_spring": 0.0}
+        touched = self.beam.approach == "undeformed"
+        if touched:  # nothing to integrate before t_c
+            z = self._velocity_at_contact(v)
+        self._record(q, v, y, z, "tied" if touched else "free", 0.0, 0.0, 0.0, 0)
+        stiffness = self.scene.contact.stiffness if touched else 0.0
+        steps = int(np.floor((self.scene.time.t_end - self.time) / self.h * (1.0 + 1e-12)))
+        begin, began = self.time, clock.perf_counter()
+        self._events = [self._first_contact(q, v, y, z)] if touched else []
+        for step in range(1, steps + 1):
+            self.time = begin + step * self.h
+            if touched:
+                try:
+                    q, v, y, z, stiffness = self._contact_step(q, v, y, z, stiffness)
+                except AlgorithmFailure as failure:
+                    failure.trajectory = self._trajectory((clock.perf_counter() - began) / step)
+                    raise
+                continue
+            q, v = self._free_beam_step(q, v)  # lines 1–4
+            if q[-1] <= self.spring.equilibrium:
+                touched, stiffness = True, self.scene.contact.stiffness  # line 6
+                y, z = self.spring.equilibrium, self._velocity_at_contact(v)  # line 5
+                self._events.append(self._first_contact(q, v, y, z))
+            self._record(q, v, y, z, "tied" if touched else "free", 0.0, 0.0, 0.0, 0)
+        return self._trajectory((clock.perf_counter() - began) / max(steps, 1))
+
+    def _initial_beam(self) -> tuple[np.ndarray, np.ndarray]:
+        slope, rate = self.beam.initial_deflection_slope, self.beam.initial_velocity_slope
+        gap = slope * self.beam.length - self.spring.equilibrium
+        if gap < 0.0 or (gap > 0.0 and rate >= 0.0 and self.beam.approach == "undeformed"):
+            raise ValueError("Algorithm 1 needs a tip above the spring that moves down")
+        if self.beam.approach == "undeformed":
+            if gap > 0.0:
+                self.time = -gap / (rate * self.beam.length)
+            slope = self.spring.equilibrium / self.beam.length
+        shape = self.discrete.slope_shape
+        return slope * shape, rate * shape
+
+    def _velocity_at_contact(self, v: np.ndarray) -> float:
+        return 0.0 if self.start_velocity == "rest" else float(v[-1])
+
+    def _first_contact(self, q: np.ndarray, v: np.ndarray, y: float, z: float) -> Event:
+        return Event(self.time, "impact", y, z, float(q[-1]), float(v[-1]))
+
+    def _free_beam_step(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        h = self.h
+        new = self.solve(self.B @ q + 4.0 * h * (self.discrete.M @ v) + 2.0 * h**2 * self.load)
+        self._dissipate(q, new, 0.0)
+        return new, 2.0 * (new - q) / h - v
+
+    def _contact_step(
+        self, q: np.ndarray, v: np.ndarray, y: float, z: float, stiffness: float
+    ) -> tuple[np.ndarray, np.ndarray, float, float, float]:
+        """Lines 8–30: the state at l + 1 and λ_nc as the step leaves it."""
+        h, psi, response = self.h, self.spring.equilibrium, self.tip_response
+        # Line 9: (62), nonlinear only at the tip.
+        before = self._compliance(q[-1], stiffness)[0]
+        known = self.solve(self.B @ q + 4.0 * h * (self.discrete.M @ v) + 2.0 * h**2 * self.load)
+        known_tip = float(known[-1] + h**2 * response[-1] * before)
+
+        def tip(w: float) -> tuple[float, float]:
+            force, slope = self._compliance(w, stiffness)
+            return w - known_tip - h**2 * response[-1] * force, 1.0 - h**2 * response[-1] * slope
+
+        u_new = self._newton(tip, float(q[-1]), "beam")
+        y_new = self._spring_step(y, z, y, stiffness, "predicted")  # line 10
+        case, foundation, y_used = 0, 0.0, y
+        acting = stiffness
+        if psi < y_new < u_new:  # lines 11–13: the interior of (62) does not see λ_nc
+            case, stiffness = 11, 0.0
+        elif u_new <= psi or u_new <= y_new:  # line 14
+            case = 14
+            stiffness = acting = self.scene.contact.stiffness  # line 15
+            u_temp = u_new  # line 16
+            y_used = y if self.y_temp == "guess" else u_temp
+            y_new = self._spring_step(y_used, z, u_temp, stiffness, "joined")  # line 17
+            u_new = y_new  # line 18
+            if y_new <= self.phi:  # lines 20–24
+                u_new = y_new = self.phi
+                foundation = self._foundation_force(y, z, y_new, stiffness)
+        # Lines 13, 19, 22: all rows of (62) but the tip's, with u_tip given: a force at the tip does that.
+        q_new = known + response * ((u_new - known[-1]) / response[-1])
+        on_tip = float((u_new - known[-1]) / (2.0 * h**2 * response[-1]))  # mean over the step [N]
+        v_new = 2.0 * (q_new - q) / h - v  # line 29
+        z_base = y_used if self.y_temp == "both" and case == 14 else y
+        z_new = 2.0 * (y_new - z_base) / h - z
+        if not (np.all(np.isfinite(v_new)) and np.isfinite(z_new)):
+            raise AlgorithmFailure(f"the solution overflows at t = {self.time:.6g} s")
+        inside = 0.5 * (self._compliance(u_new, acting)[0] + self._compliance(q[-1], acting)[0])
+        self._book(q, q_new, y, z, y_new, z_new, on_tip, inside, foundation, acting)
+        seated = case == 14 and y_new == self.phi
+        phase = "seated" if seated else "tied" if case == 14 else "free"
+        if seated:
+            tip_state = (float(q_new[-1]), float(v_new[-1]))
+            self._events.append(
+                Event(self.time, "stop_impact", y_new, z_new, *tip_state, impulse_foundation=self.h * foundation)
+            )
+        self._record(q_new, v_new, y_new, z_new, phase, on_tip, inside, foundation, case)
+        return q_new, v_new, y_new, z_new, stiffness
+
+    # Energy ---------------------------------------------------------------------------------------------------------
+
+    def _dissipate(self, q: np.ndarray, q_new: np.ndarray, dy: float) -> None:
+        rate = (q_new - q) / self.h
+        beam = self.beam.alpha_b * float(rate @ (self.discrete.K @ rate)) if self.beam.alpha_b else 0.0
+        self._totals["e_dissipated"] += self.h * beam + self.spring.damping * dy**2 / self.h
+
+    def _book(
+        self,
+        q: np.ndarray,
+        q_new: np.ndarray,
+        y: float,
+        z: float,
+        y_new: float,
+        z_new: float,
+        on_tip: float,
+        inside: float,
+        foundation: float,
+        stiffness: float,
+    ) -> None:
+        """Work that no force of the model does: of the overwritten tip on the beam, of yˡ's exchange on the spring."""
+        dy = y_new - y
+        self._dissipate(q, q_new, dy)
+        self._totals["e_injected_beam"] += (on_tip - inside) * float(q_new[-1] - q[-1])
+        pressing = 0.5 * (self._compliance(y_new, stiffness)[0] + self._compliance(y, stiffness)[0])
+        gained = self._spring_energy(y_new, z_new) - self._spring_energy(y, z)
+        worked = (foundation - pressing + self.spring.external_force) * dy - self.spring.damping * dy**2 / self.h
+        self._totals["e_injected_spring"] += gained - worked
+
+    def _spring_energy(self, y: float, z: float) -> float:
+        p = self.spring
+        return 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
+
+    def _record(
+        self,
+        q: np.ndarray,
+        v: np.ndarray,
+        y: float,
+        z: float,
+        phase: str,
+        on_tip: float,
+        inside: float,
+        foundation: float,
+        case: int,
+    ) -> None:
+        d = self.discrete
+        e_beam = 0.5 * float(v @ (d.M @ v)) + 0.5 * float(np.sum((d.B @ q) ** 2))
+        e_spring = self._spring_energy(y, z)
+        e_load = -float(self.load @ q) - self.spring.external_force * y
+        row = {
+            "time": self.time,
+            "u_tip": float(q[-1]),
+            "v_tip": float(v[-1]),
+            "y": y,
+            "z": z,
+            "contact_force": on_tip,
+            "compliance_force": inside,
+            "tie_reaction": on_tip - inside,
+            "foundation_force": foundation,
+            "gap": float(q[-1]) - y,
+            "velocity_mismatch": float(v[-1]) - z if phase != "free" else 0.0,
+            "e_beam": e_beam,
+            "e_spring": e_spring,
+            "e_contact": 0.0,
+            "e_impact_loss": 0.0,
+            "e_load": e_load,
+            "e_total": e_beam + e_spring + e_load + self._totals["e_dissipated"],
+            "case": float(case),
+            **self._totals,
+        }
+        for name, value in row.items():
+            self._rows.setdefault(name, []).append(value)
+        self._phases.append(phase)
+        self._shapes.append(self._sampler @ q)
+
+    # Result ---------------------------------------------------------------------------------------------------------
+
+    def _trajectory(self, time_per_step: float) -> Trajectory:
+        columns: dict[str, np.ndarray] = {name: np.array(values) for name, values in self._rows.items()}
+        columns["phase"] = np.array(self._phases, dtype="<U8")
+        columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
+        if self.scene.stop is None:
+            del columns["foundation_force"]
+        ordered = {name: columns[name] for name in COLUMNS if name in columns}
+        ordered.update((name, columns[name]) for name in columns if name not in ordered)
+
+        def mean(*solves: str) -> float:
+            counts = [k for solve in solves for k in self.iterations[solve]]
+            return float(np.mean(counts)) if counts else 0.0
+
+        statistics = NewtonStatistics(
+            tolerance=self.tolerance,
+            beam=mean("beam"),
+            spring_predicted=mean("predicted"),
+            spring_joined=mean("joined"),
+            spring=mean("predicted", "joined"),
+            solves=len(self.iterations["predicted"]) + len(self.iterations["joined"]),
+            time_per_step=time_per_step,
+        )
+        after_contact = columns["case"][1:]
+        summary = {
+            "reference": "algorithm1",
+            "start_velocity": self.start_velocity,
+            "y_temp": self.y_temp,
+            "newton": asdict(statistics),
+            "steps_apart": int(np.sum(after_contact == 11)),
+            "steps_joined": int(np.sum(after_contact == 14)),
+            "largest_energy_residual": float(np.max(np.abs(columns["energy_residual"]))),
+        }
+        shapes = (columns["time"], np.array(self._shapes))
+        return Trajectory(self.scene, ordered, self._events, shapes, summary)
