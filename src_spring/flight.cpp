@@ -12,7 +12,7 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 // The tolerances hold for a step, IDA's are per internal step: what is asked of IDA is a tenth, and less where the
 // step spans more of the spring's motion and so more internal steps.
 constexpr double safety = 0.03, safety_per_rate = 10.0;
-// IDA's local error must stay this much above rounding in ÿ, or its error estimate is noise.
+// IDA's local error must stay this much above rounding in the contact force, or its error estimate is noise.
 constexpr double noise_margin = 20.0;
 // Taylor terms are used while H × (rate of the spring) is below this; beyond, they would only cancel.
 constexpr double resolved_limit = 3.0;
@@ -67,10 +67,16 @@ void Flight::prepare(const FlightStart& start) {
   const int order = !resolved ? 0 : smooth ? 4 : 2;
   R_ = Taylor({d[0], d[1], d[2], d[3], d[4]}, order);
 
+  remainder_ = motion_.remainder(R_, start.loads);
+  contact_taylor_ = {};
+  if (touching_ && order >= 2) {
+    const auto c = contact.rates({start.depth, depth[1], depth[2], 0.0});
+    for (std::size_t k = 0; k <= static_cast<std::size_t>(order - 2); ++k) contact_taylor_[k] = c[k];
+  }
+
   // Tolerances: of y and z by what they and their change over the step (or over 1/rate) are, then scaled.
   const double span = std::min(H, 1.0 / std::max(rate, std::numeric_limits<double>::min()));
-  const double noise = noise_margin * epsilon * span *
-                       motion_.acceleration_scale(y, z, start.loads.force.c[0], force);
+  const double noise = noise_margin * epsilon * force / motion_.mass() * span;
   const double velocity = std::abs(z) + std::abs(d[2]) * span;
   const double displacement = std::abs(y) + velocity * span;
   const double share = safety / (1.0 + safety_per_rate * std::min(H * rate, resolved_limit));
@@ -91,7 +97,7 @@ void Flight::prepare(const FlightStart& start) {
   };
   if (order == 4) {
     const double neglected = std::abs(d[5]) + rate * rate * H * std::abs(d[4]);
-    limit(tolerance_z / (40.0 * neglected), 0.25);
+    limit(tolerance_z / (400.0 * neglected), 0.25);
   } else {
     limit(tolerance_z / std::abs(d[3]), 0.5);
     if (order == 0) limit(tolerance_y / std::abs(d[2]), 0.5);
@@ -112,7 +118,7 @@ void Flight::prepare(const FlightStart& start) {
   std::fill(Y, Y + unknowns, 0.0);
   std::fill(Yp, Yp + unknowns, 0.0);
   Y[p] = Yp[q] = H * (z - R_.rate(0.0));
-  Yp[p] = H * H * (d[2] - R_.second(0.0));
+  Yp[p] = H * H * (order == 0 ? d[2] : 0.0);
   Yp[e] = order == 0 ? H * motion_.damping() * z * z : 0.0;
 }
 
@@ -148,33 +154,38 @@ void Flight::finish() {
   dissipated_ = motion_.damping() * R_.squared_rate_integral(t) + Y[e];
 }
 
+double Flight::remainder(double t) const {
+  double sum = 0.0;
+  for (std::size_t k = remainder_.size(); k-- > 0;) sum = sum * t + remainder_[k];
+  return sum;
+}
+
+double Flight::contact_depth(double rise, double t) const {
+  const auto& u = start_.loads.tip.c;
+  return start_.depth + rise - t * (u[1] + t * u[2] / 2);
+}
+
 bool Flight::residual(double s, const double* Y, const double* Yp, double* F) const noexcept {
   const double H = start_.size, t = H * s;
-  const double w = Y[p] / H, rate = R_.rate(t);
-  const double rise = R_.rise(t) + Y[q];
-  const double y = start_.y + rise, z = rate + w;
+  const double w = Y[p] / H;
   double contact = 0.0;
   if (touching_) {
-    const auto& u = start_.loads.tip.c;
-    contact = motion_.compliance().continued_force(start_.depth + rise - t * (u[1] + t * u[2] / 2));
+    const auto& c = contact_taylor_;
+    contact = motion_.compliance().continued_force(contact_depth(R_.rise(t) + Y[q], t)) -
+              (c[0] + t * (c[1] + t * c[2] / 2));
   }
-  const double a = motion_.acceleration(y, z, start_.loads.force(t), contact);
   F[q] = Yp[q] - Y[p];
-  F[p] = Yp[p] - H * H * (a - R_.second(t));
+  F[p] = Yp[p] - H * H * motion_.excess_acceleration(R_(t), Y[q], w, remainder(t), contact);
   F[A] = Yp[A] - Y[q];
   F[B] = Yp[B] - Y[A];
-  F[e] = Yp[e] - H * motion_.damping() * w * (2.0 * rate + w);
+  F[e] = Yp[e] - H * motion_.damping() * w * (2.0 * R_.rate(t) + w);
   return std::isfinite(F[p]) && std::isfinite(F[e]);
 }
 
 void Flight::jacobian(double s, double c, const double* Y, const double*, double* J) const noexcept {
   const double H = start_.size, t = H * s;
   const double rise = R_.rise(t) + Y[q];
-  double slope = 0.0;
-  if (touching_) {
-    const auto& u = start_.loads.tip.c;
-    slope = motion_.compliance().continued_slope(start_.depth + rise - t * (u[1] + t * u[2] / 2));
-  }
+  const double slope = touching_ ? motion_.compliance().continued_slope(contact_depth(rise, t)) : 0.0;
   const auto at = [J](int row, int column) -> double& { return J[column * unknowns + row]; };
   for (int i = 0; i < unknowns; ++i) at(i, i) = c;
   at(q, p) = -1.0;
@@ -194,8 +205,7 @@ void Flight::events(double s, const double* Y, double* g) const noexcept {
     *g++ = z;
   }
   if (laws_.compliance) {
-    const auto& u = start_.loads.tip.c;
-    *g++ = contact_watch_.scaled(contact_sign_ * (start_.depth + rise - t * (u[1] + t * u[2] / 2)), t);
+    *g++ = contact_watch_.scaled(contact_sign_ * contact_depth(rise, t), t);
     *g++ = contact_sign_ * (z - start_.loads.tip.rate(t));
   }
 }

@@ -3,7 +3,7 @@
 // With R the Taylor polynomial of the start (taylor.hpp), scaled time s = τ/H, w = ẏ − Ṙ:
 //     q = y − R,   p = H w,   A = ∫₀ˢ q,   B = ∫₀ˢ A,   e = D − ∫ α_s Ṙ² dτ        (D: dissipated energy)
 //     F = ( q' − p,   p' − H²[ÿ(y, ẏ, τ) − R̈],   A' − q,   B' − A,   e' − H α_s w (2Ṙ + w) ) = 0,
-// ÿ from motion.hpp. q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H² B.
+// where ÿ − R̈ is evaluated without cancellation (motion.hpp). q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H² B.
 // All unknowns are under error control, see tolerances in flight.cpp.
 //
 // Events: [hilltop] |y| reaches the hilltop; [stop] y − φ falls to 0; [contact] y − u_tip changes sign. A gap that
@@ -65,6 +65,8 @@ class Flight final : public ImplicitSystem {
  private:
   static std::vector<Crossing> crossings(const Laws& laws);
   void prepare(const FlightStart& start);
+  double remainder(double t) const;
+  double contact_depth(double rise, double t) const;
   void finish();
 
   const Motion& motion_;
@@ -73,6 +75,8 @@ class Flight final : public ImplicitSystem {
   // The segment.
   FlightStart start_{};
   Taylor R_;
+  std::array<double, 13> remainder_{};     ///< of the equation of motion along R
+  std::array<double, 3> contact_taylor_{};  ///< contact force terms that R accounts for
   bool touching_ = false;
   double contact_sign_ = 1.0;
   Watch stop_watch_, contact_watch_;

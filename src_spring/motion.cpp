@@ -49,6 +49,26 @@ std::array<double, 6> Motion::derivatives(double y, double z, const Loads& loads
   return {y, z, a, j, s, c};
 }
 
+std::array<double, 13> Motion::remainder(const Taylor& R, const Loads& loads) const {
+  constexpr std::size_t n = Taylor::max_order + 1;
+  const std::array<double, n> c = R.coefficients();
+  std::array<double, 2 * n - 1> square{};
+  std::array<double, 13> r{};
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j) square[i + j] += c[i] * c[j];
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < square.size(); ++j) r[i + j] -= k2_ * c[i] * square[j];
+  for (std::size_t k = 0; k < n; ++k) r[k] -= k1_ * c[k];
+  for (std::size_t k = 1; k < n; ++k) r[k - 1] -= damping_ * static_cast<double>(k) * c[k];
+  for (std::size_t k = 2; k < n; ++k) r[k - 2] -= mass_ * static_cast<double>(k * (k - 1)) * c[k];
+  const auto& F = loads.force.c;
+  r[0] += F[0];
+  r[1] += F[1];
+  r[2] += F[2] / 2;
+  for (int k = 0; k < R.order() - 1; ++k) r[static_cast<std::size_t>(k)] = 0.0;
+  return r;
+}
+
 double Motion::acceleration_scale(double y, double z, double force, double contact) const {
   return (std::abs(force) + std::abs(damping_ * z) + (std::abs(k1_) + std::abs(k2_) * y * y) * std::abs(y) +
           std::abs(contact)) /

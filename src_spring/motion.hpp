@@ -8,6 +8,7 @@
 #include "compliance.hpp"
 #include "polynomial.hpp"
 #include "spring.hpp"
+#include "taylor.hpp"
 
 namespace spring {
 
@@ -32,6 +33,16 @@ class Motion {
   /// y and its first five derivatives at a segment's start; `depth` = y − u_tip ≥ 0 matters when touching.
   /// Where the power law has no derivative they may be infinite or NaN.
   std::array<double, 6> derivatives(double y, double z, const Loads& loads, bool touching, double depth) const;
+
+  /// Remainder of the equation of motion along a Taylor polynomial R of the motion, without the contact force:
+  ///     r(τ) = F − α_s Ṙ − k1 R − k2 R³ − m R̈ = Σ rₖ τᵏ.
+  /// The terms below τ^{order−1} vanish by construction (with the contact's own Taylor terms, if it touches).
+  std::array<double, 13> remainder(const Taylor& R, const Loads& loads) const;
+  /// ÿ − R̈ for y = R + q, ẏ = Ṙ + w, given r(τ) and what the contact force has in excess of its Taylor terms:
+  /// the difference itself, free of cancellation.
+  double excess_acceleration(double R, double q, double w, double remainder, double contact) const {
+    return (remainder - damping_ * w - (k1_ + k2_ * (3.0 * R * (R + q) + q * q)) * q - contact) / mass_;
+  }
 
   /// Σ|forces|/m: what rounding in acceleration() is relative to.
   double acceleration_scale(double y, double z, double force, double contact) const;
