@@ -1,125 +1,341 @@
-"""Pure-Python test doubles of the two bodies: a modal beam stepped by its matrix exponential, a Duffing spring.
+"""Pure-Python test doubles of the two bodies, exact to rounding for a contact force quadratic in time.
 
-Independent of the FMUs, so that the coupling is tested by itself.
+Independent of the FMUs and of `springbeam.monolithic`, so that the coupling is tested by itself:
+
+* `ModalBody`: a linear body in its modes, each stepped by closed forms (undamped) or its matrix exponential;
+* `DuffingBody`: m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series of order 22.
+
+Both count their steps and rewinds.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
+from math import factorial
+
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.linalg import expm
-
+from scipy.linalg import eigh, expm
+from springbeam.contact import first_contact
+from springbeam.recording import MemoryRecorder
+from springbeam.scene import Beam, Scene
+from springbeam.simulation import RunStopped, Simulation
 from springbeam.subsystem import NO_FORCE, Energies, Force, Motion
+from springbeam.trajectory import SHAPE_POINTS, Trajectory
+
+_EPS = float(np.finfo(float).eps)
 
 
-class LinearBody:
-    """M q̈ + α K q̇ + K q = e F, F = +C: state (q, q̇, ∫w, ∫∫w), stepped exactly."""
+def stumpff(theta: np.ndarray) -> list[np.ndarray]:
+    """c_n(θ) = Σ_j (−1)ʲ θ²ʲ/(2j+n)!, n = 0 … 6; θ²c_{n+2} = 1/n! − c_n."""
+    theta = np.asarray(theta, float)
+    square = theta * theta
+    c = [np.cos(theta), np.sinc(theta / np.pi)] + [np.zeros_like(theta)] * 5
+    small = theta < 4.0
+    x = np.where(small, square, 1.0)
+    for n in (5, 6):
+        term = np.full_like(theta, 1.0 / factorial(n))
+        series = term.copy()
+        for j in range(1, 26):
+            term = -term * x / ((2 * j + n) * (2 * j + n - 1))
+            series += term
+        c[n] = series
+    safe = np.where(small, 1.0, square)
+    for n in (3, 4, 5, 6):
+        c[n] = np.where(small, c[n], 0.0)
+    for n in (4, 3, 2):
+        c[n] = np.where(small, 1.0 / factorial(n) - square * c[n + 2], 0.0)
+    for n in range(2, 7):
+        c[n] = np.where(small, c[n], (1.0 / factorial(n - 2) - c[n - 2]) / safe)
+    return c
 
-    def __init__(self, M, K, e, q, v, alpha=0.0):
-        self.M, self.K, self.e, self.alpha = map(np.asarray, (M, K, e, alpha))
-        self.q, self.v = np.array(q, float), np.array(v, float)
-        self.mass = 1.0 / float(self.e @ np.linalg.solve(self.M, self.e))
+
+class ModalBody:
+    """ä + α ω² ȧ + ω² a = b C + f per mode, w = bᵀa; F = +C.
+
+    Parameters
+    ----------
+    omega, b, f : (r,) arrays
+        Frequencies [rad/s], end shape [kg^-1/2], load.
+    a, v : (r,) arrays
+        Initial state.
+    sampler : (21, r) array or None
+        a → shape.
+    """
+
+    def __init__(self, omega, b, a, v, f=0.0, alpha=0.0, sampler=None):
+        self.omega, self.b = np.asarray(omega, float), np.asarray(b, float)
+        self.a, self.v = np.array(a, float), np.array(v, float)
+        self.f = np.broadcast_to(np.asarray(f, float), self.omega.shape)
+        self.alpha, self._sampler = alpha, sampler
+        self.mass = 1.0 / float(self.b @ self.b)
         self._integrals = (0.0, 0.0)
         self._dissipated = 0.0
         self._maps = {}
         self.steps = self.rewinds = 0
 
     def mark(self):
-        self._marked = (self.q.copy(), self.v.copy(), self._integrals, self._dissipated)
+        self._marked = (self.a, self.v, self._integrals, self._dissipated)
+        self._moved = False
 
     def rewind(self):
-        self.rewinds += 1
-        q, v, self._integrals, self._dissipated = self._marked
-        self.q, self.v = q.copy(), v.copy()
+        if self._moved:
+            self.rewinds += 1
+            self.a, self.v, self._integrals, self._dissipated = self._marked
+            self._moved = False
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE):
         self.steps += 1
-        n = len(self.q)
-        if size not in self._maps:
-            A = np.zeros((2 * n + 5, 2 * n + 5))
-            A[:n, n : 2 * n] = np.eye(n)
-            Minv = np.linalg.inv(self.M)
-            A[n : 2 * n, :n] = -Minv @ self.K
-            A[n : 2 * n, n : 2 * n] = -self.alpha * Minv @ self.K
-            A[n : 2 * n, 2 * n] = Minv @ self.e
-            A[2 * n, 2 * n + 1] = A[2 * n + 1, 2 * n + 2] = 1.0
-            A[2 * n + 3, :n] = self.e
-            A[2 * n + 4, 2 * n + 3] = 1.0
-            self._maps[size] = expm(A * size)
-        x = self._maps[size] @ np.concatenate([self.q, self.v, contact, [0.0, 0.0]])
-        self.q, self.v, self._integrals = x[:n], x[n : 2 * n], (float(x[-2]), float(x[-1]))
+        self._moved = True
+        step = self._undamped if self.alpha == 0.0 else self._damped
+        p = np.outer(contact, self.b)
+        p[0] += self.f
+        i1, i2 = step(size, p)
+        self._integrals = (float(self.b @ i1), float(self.b @ i2))
+
+    def _undamped(self, h, p):
+        if h not in self._maps:
+            self._maps[h] = [c * h**n for n, c in enumerate(stumpff(self.omega * h))]
+        c = self._maps[h]
+        a, v = self.a, self.v
+        self.a = c[0] * a + c[1] * v + p[0] * c[2] + p[1] * c[3] + p[2] * c[4]
+        self.v = -(self.omega**2) * c[1] * a + c[0] * v + p[0] * c[1] + p[1] * c[2] + p[2] * c[3]
+        i1 = c[1] * a + c[2] * v + p[0] * c[3] + p[1] * c[4] + p[2] * c[5]
+        i2 = c[2] * a + c[3] * v + p[0] * c[4] + p[1] * c[5] + p[2] * c[6]
+        return i1, i2
+
+    def _damped(self, h, p):
+        """State per mode (ωa, ȧ, p, ṗ, p̈, ∫a, ∫∫a); dissipation by W(2h) = W(h) + E(h)ᵀW(h)E(h)."""
+        if h not in self._maps:
+            r = len(self.omega)
+            A = np.zeros((r, 7, 7))
+            A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = self.omega, -self.omega, -self.alpha * self.omega**2
+            A[:, 1, 2] = A[:, 2, 3] = A[:, 3, 4] = 1.0
+            A[:, 5, 0] = 1.0 / self.omega
+            A[:, 6, 5] = 1.0
+            doublings = max(0, int(np.ceil(np.log2(h * np.abs(A).sum(axis=2).max()))) + 1)
+            small = h / 2**doublings
+            E, W = expm(A * small), np.zeros((r, 7, 7))
+            nodes, weights = np.polynomial.legendre.leggauss(8)
+            for x, w in zip(nodes, weights, strict=True):
+                rate = expm(A * (0.5 * (x + 1.0) * small))[:, 1, :]
+                W += 0.5 * w * small * rate[:, :, None] * rate[:, None, :]
+            W *= self.alpha * self.omega[:, None, None] ** 2
+            for _ in range(doublings):
+                W = W + np.swapaxes(E, 1, 2) @ W @ E
+                E = E @ E
+            self._maps[h] = (E, W)
+        E, W = self._maps[h]
+        zero = np.zeros_like(self.a)
+        x = np.stack([self.omega * self.a, self.v, *p, zero, zero], axis=1)
+        self._dissipated += float(np.einsum("ri,rij,rj", x, W, x))
+        x = np.einsum("rij,rj->ri", E, x)
+        self.a, self.v = x[:, 0] / self.omega, x[:, 1]
+        return x[:, 5], x[:, 6]
 
     def motion(self) -> Motion:
-        return Motion(float(self.e @ self.q), float(self.e @ self.v), *self._integrals)
+        return Motion(float(self.b @ self.a), float(self.b @ self.v), *self._integrals)
 
     def energies(self) -> Energies:
+        stretch = self.omega * self.a
         return Energies(
-            0.5 * float(self.v @ self.M @ self.v), 0.5 * float(self.q @ self.K @ self.q), self._dissipated, 0.0
+            0.5 * float(self.v @ self.v), 0.5 * float(stretch @ stretch), self._dissipated, -float(self.f @ self.a)
         )
 
     def apply_impulse(self, impulse: float):
-        self.v = self.v + np.linalg.solve(self.M, self.e) * impulse
+        self.v = self.v + self.b * impulse
+        self._moved = True
+
+    def shape(self) -> np.ndarray:
+        return self._sampler @ self.a
 
     def close(self): ...
 
 
-def modal_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> LinearBody:
-    """An undamped unit Timoshenko beam of ``n`` P1 elements, EI = KAG = ``stiffness``, moving as u̇ = slope·x."""
-    h = 1.0 / n
+def beam_body(beam: Beam, slope: float | None = None) -> ModalBody:
+    """The scene's beam: P1 elements, full integration, all modes. ``slope`` replaces initial_deflection_slope."""
+    n, h = beam.n_elements, beam.length / beam.n_elements
+    bending = beam.young_modulus * beam.second_moment_of_area
+    shear = beam.shear_coefficient * beam.shear_modulus * beam.area
     M, K = np.zeros((2 * n + 2,) * 2), np.zeros((2 * n + 2,) * 2)
+    m = h / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
+    k = np.array([[1.0, -1.0], [-1.0, 1.0]]) / h
+    s = 0.5 * np.array([[-1.0, 1.0], [-1.0, 1.0]])  # ∫ ψ_i ψ_j'
     for i in range(n):
         d = slice(2 * i, 2 * i + 4)
-        m = h / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
-        k = np.array([[1.0, -1.0], [-1.0, 1.0]]) / h
-        s = 0.5 * np.array([[-1.0, 1.0], [-1.0, 1.0]])  # ∫ ψ_i ψ_j'
         Ke, Me = np.zeros((4, 4)), np.zeros((4, 4))
-        Me[::2, ::2] = Me[1::2, 1::2] = m
-        Ke[::2, ::2], Ke[1::2, 1::2], Ke[::2, 1::2], Ke[1::2, ::2] = k + m, k, -s, -s.T
+        Me[::2, ::2] = beam.density * beam.second_moment_of_area * m
+        Me[1::2, 1::2] = beam.density * beam.area * m
+        Ke[::2, ::2], Ke[1::2, 1::2] = bending * k + shear * m, shear * k
+        Ke[::2, 1::2], Ke[1::2, ::2] = -shear * s, -shear * s.T
         M[d, d] += Me
-        K[d, d] += stiffness * Ke
-    e = np.zeros(2 * n)
-    e[-1] = 1.0
-    v = np.zeros(2 * n)
-    v[1::2] = slope * h * np.arange(1, n + 1)
-    return LinearBody(M[2:, 2:], K[2:, 2:], e, np.zeros(2 * n), v)
+        K[d, d] += Ke
+    M, K = M[2:, 2:], K[2:, 2:]
+    squares, basis = eigh(K, M)
+    x = np.zeros(2 * n)
+    x[1::2] = h * np.arange(1, n + 1)
+    load = np.zeros(2 * n)
+    load[1::2] = beam.distributed_load * h
+    load[-1] *= 0.5
+    load[-1] += beam.tip_load_coefficient * h / 3.0
+    load[-3] += beam.tip_load_coefficient * h / 6.0
+    nodes = np.linspace(0.0, 1.0, n + 1)
+    deflection = np.vstack([np.zeros((1, 2 * n)), basis[1::2]])
+    line = basis.T @ (M @ x)
+    return ModalBody(
+        np.sqrt(squares),
+        basis[-1],
+        (beam.initial_deflection_slope if slope is None else slope) * line,
+        beam.initial_velocity_slope * line,
+        basis.T @ load,
+        beam.alpha_b,
+        np.array([np.interp(SHAPE_POINTS, nodes, column) for column in deflection.T]).T,
+    )
+
+
+def modal_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> ModalBody:
+    """An undamped unit beam of ``n`` elements, EI = KAG = ``stiffness``, moving as u̇ = slope·x."""
+    return beam_body(
+        Beam(n_elements=n, young_modulus=stiffness, shear_modulus=stiffness, initial_velocity_slope=slope)
+    )
+
+
+_ORDER = 22
 
 
 class DuffingBody:
-    """m ÿ + k1 y + k2 y³ = −C + N by DOP853 at 1e-13."""
+    """m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series in steps short enough for rounding."""
 
-    def __init__(self, mass=1.0, k1=3.0, k2=-0.2, y=0.0, z=0.0, damping=0.0):
-        self.mass, self.k1, self.k2, self.damping = mass, k1, k2, damping
-        self.x = np.array([y, z, 0.0, 0.0, 0.0])
+    def __init__(self, mass=1.0, k1=3.0, k2=-0.2, y=0.0, z=0.0, damping=0.0, external=0.0):
+        self.mass, self.k1, self.k2, self.damping, self.external = mass, k1, k2, damping, external
+        self.y, self.z = float(y), float(z)
+        self._integrals = (0.0, 0.0)
+        self._dissipated = 0.0
         self.steps = self.rewinds = 0
 
     def mark(self):
-        self._marked = self.x.copy()
+        self._marked = (self.y, self.z, self._integrals, self._dissipated)
+        self._moved = False
 
     def rewind(self):
-        self.rewinds += 1
-        self.x = self._marked.copy()
+        if self._moved:
+            self.rewinds += 1
+            self.y, self.z, self._integrals, self._dissipated = self._marked
+            self._moved = False
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE):
         self.steps += 1
-        c = [n - p for n, p in zip(foundation, contact, strict=True)]
+        self._moved = True
+        f0, f1, f2 = (n - p for n, p in zip(foundation, contact, strict=True))
+        f0 += self.external
+        i1 = i2 = done = 0.0
+        while done < size:
+            tau = done
+            y = self._series(f0 + tau * (f1 + 0.5 * tau * f2), f1 + tau * f2, 0.5 * f2)
+            h = self._reach(y, size - done)
+            if size - done - h < 1e-12 * size:
+                h = size - done
+                done = size
+            else:
+                done += h
+            if self.damping != 0.0:
+                rate = [k * c for k, c in enumerate(y)][1:]
+                squares = [sum(rate[i] * rate[k - i] for i in range(k + 1)) for k in range(len(rate))]
+                self._dissipated += self.damping * _sum([c / (k + 1) for k, c in enumerate(squares)], h) * h
+            new1 = i1 + h * _sum([c / (k + 1) for k, c in enumerate(y)], h)
+            i2 += h * i1 + h * h * _sum([c / ((k + 1) * (k + 2)) for k, c in enumerate(y)], h)
+            i1 = new1
+            self.y, self.z = _sum(y, h), _sum([k * c for k, c in enumerate(y)][1:], h)
+        self._integrals = (i1, i2)
 
-        def rhs(t, x):
-            f = c[0] + t * (c[1] + 0.5 * t * c[2])
-            acceleration = (f - self.damping * x[1] - self.k1 * x[0] - self.k2 * x[0] ** 3) / self.mass
-            return [x[1], acceleration, x[0], x[2], self.damping * x[1] ** 2]
+    def _series(self, *forcing: float) -> list[float]:
+        y, z = [self.y, self.z], [self.z]
+        squares: list[float] = []
+        for k in range(_ORDER - 1):
+            f = forcing[k] if k < 3 else 0.0
+            f -= self.damping * z[k] + self.k1 * y[k]
+            if self.k2 != 0.0:
+                squares.append(sum(y[i] * y[k - i] for i in range(k + 1)))
+                f -= self.k2 * sum(squares[i] * y[k - i] for i in range(k + 1))
+            z.append(f / (self.mass * (k + 1)))
+            y.append(z[-1] / (k + 2))
+        return y
 
-        start = [self.x[0], self.x[1], 0.0, 0.0, self.x[4]]
-        scale = 1e-14 * np.array([1e-2, 1e-2, 1e-2 * size, 1e-2 * size**2, 1e-2])
-        self.x = solve_ivp(rhs, (0.0, size), start, method="DOP853", rtol=2.3e-14, atol=scale, first_step=size / 4).y[:, -1]
+    @staticmethod
+    def _reach(y: list[float], size: float) -> float:
+        """Step over which the last coefficients are rounding of the largest term."""
+        h = size
+        for _ in range(200):
+            terms = [abs(c) * h**k for k, c in enumerate(y)]
+            if _ORDER * max(terms[-1], terms[-2]) <= 1e-18 * max(terms[1:]) or max(terms) == 0.0:
+                return h
+            h *= 0.75
+        raise AssertionError(f"no step: {y}")
 
     def motion(self) -> Motion:
-        return Motion(float(self.x[0]), float(self.x[1]), float(self.x[2]), float(self.x[3]))
+        return Motion(self.y, self.z, *self._integrals)
 
     def energies(self) -> Energies:
-        y, z = self.x[0], self.x[1]
-        return Energies(0.5 * self.mass * z * z, 0.5 * self.k1 * y * y + 0.25 * self.k2 * y**4, self.x[4], 0.0)
+        y, z = self.y, self.z
+        return Energies(
+            0.5 * self.mass * z * z,
+            0.5 * self.k1 * y * y + 0.25 * self.k2 * y**4,
+            self._dissipated,
+            -self.external * y,
+        )
 
     def apply_impulse(self, impulse: float):
-        self.x[1] += impulse / self.mass
+        self.z += impulse / self.mass
+        self._moved = True
 
     def close(self): ...
+
+
+def _sum(coefficients: list[float], h: float) -> float:
+    total = 0.0
+    for c in reversed(coefficients):
+        total = total * h + c
+    return total
+
+
+def bodies(scene: Scene) -> tuple[ModalBody | None, DuffingBody | None]:
+    """The scene's bodies at `first_contact`."""
+    beam = spring = None
+    if scene.beam is not None:
+        target = scene.tip_target
+        kinematic = scene.beam.approach == "undeformed" and target is not None
+        beam = beam_body(scene.beam, target[1] / scene.beam.length if kinematic else None)
+    if (p := scene.spring) is not None:
+        spring = DuffingBody(
+            p.mass, p.linear_stiffness, p.cubic_stiffness, p.equilibrium, p.initial_velocity, p.damping, p.external_force
+        )
+    return beam, spring
+
+
+def simulate(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> Trajectory:
+    """The master's run with the doubles (``wrap`` may replace them); ``summary["stopped"]`` holds a RunStopped."""
+    beam, spring = wrap(*bodies(scene))
+    recorder = MemoryRecorder(scene)
+    simulation = Simulation(scene, beam, spring, recorder)
+    stopped = None
+    try:
+        simulation.run()
+    except RunStopped as error:
+        stopped = error
+    recorder.finish({**simulation.summary(), "first_contact": first_contact(scene)})
+    trajectory = recorder.trajectory()
+    trajectory.summary["stopped"] = stopped
+    trajectory.summary["work"] = {
+        name: body.steps for name, body in (("beam", beam), ("spring", spring)) if body is not None
+    }
+    return trajectory
+
+
+def orders(errors, sizes) -> list[float]:
+    """Observed orders between neighbouring step sizes."""
+    pairs = zip(pairwise(errors), pairwise(sizes), strict=True)
+    return [float(np.log(e0 / e1) / np.log(h0 / h1)) for (e0, e1), (h0, h1) in pairs]
+
+
+def drift(bodies_) -> float:
+    """Total mechanical energy with what was dissipated and the loads' potential [J]."""
+    return sum(sum(body.energies()) for body in bodies_)

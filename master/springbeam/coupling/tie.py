@@ -17,6 +17,8 @@ _MAX_ITERATIONS = 20
 _EPS = float(np.finfo(float).eps)
 #: Where the iteration stops to converge within this factor of the tolerance it has met the bodies' own rounding.
 _NOISE = 1e3
+#: A guess fitted over a step is extrapolated over at most this many times its size; beyond, its end value is held.
+_REACH_OF_GUESS = 4.0
 
 
 class NotConverged(StepRefused):
@@ -49,6 +51,7 @@ class Tie:
         self._regular_size = regular_size
         self._beam_matrix: dict[float, np.ndarray] = {}
         self._partner_matrix: dict[type, np.ndarray] = {}
+        self._last_size = 0.0
         self.iterations = 0  #: Newton updates since the start
 
     def solve(self, beam: Body, partner: Body, time: float, size: float, guess: Force, start: Motion) -> Force:
@@ -57,6 +60,8 @@ class Tie:
         ``guess`` is the contact force as far as known, ``start`` the beam's motion at the mark. Returns the contact
         force. Raises NotConverged (with the residual [m]) or StepRefused.
         """
+        if size > _REACH_OF_GUESS * self._last_size:
+            guess = (guess[0], 0.0, 0.0)
         a = force.legendre(guess, size, self._degree)
         r_beam = self._advance(beam, time, size, a)
         beam_end = beam.motion()
@@ -68,15 +73,20 @@ class Tie:
                 self._beam_matrix[size] = B
         r_partner = self._advance(partner, time, size, a)
         S = self._partner_response(partner, size)
-        tolerance = self._absolute_tolerance(start, beam_end, partner.motion(), size)
+        tolerance = self._absolute_tolerance(start, beam_end, partner.motion(), size, B @ a)
         residual = r_beam - r_partner
         norm = float(np.abs(residual).max())
         measured = False
+        noise = 1.0
         for iteration in range(_MAX_ITERATIONS):
-            if norm <= tolerance:
+            if not norm < float("inf"):
+                raise NotConverged(norm, iteration)
+            if norm <= noise * tolerance:
                 if at_beam is a:
                     break
                 r_beam, at_beam = self._advance(beam, time, size, a), a  # in place of the affine prediction
+                # A bad guess moves the bodies far: what counts is the motion under the force found.
+                tolerance = self._absolute_tolerance(start, beam.motion(), partner.motion(), size, B @ a)
             else:
                 self.iterations += 1
                 try:
@@ -90,15 +100,16 @@ class Tie:
                 r_partner = r_new
             residual = r_beam - r_partner
             previous, norm = norm, float(np.abs(residual).max())
-            if norm > tolerance and norm > 0.3 * previous:
+            if norm > noise * tolerance and norm > 0.3 * previous:
                 if norm <= _NOISE * tolerance:  # the bodies' own rounding: nothing left to gain
-                    tolerance *= _NOISE
+                    noise = _NOISE
                 elif not measured:
                     S = self._measure(partner, time, size, a, r_partner, partner.motion(), 1e-4)
                     self._advance(partner, time, size, a)
                     measured = True
         else:
             raise NotConverged(norm, _MAX_ITERATIONS)
+        self._last_size = size
         if size == self._regular_size:
             self._partner_matrix[type(partner)] = S
         return force.derivatives(a, size)
@@ -132,8 +143,12 @@ class Tie:
             columns.append((self._advance(body, time, size, changed) - r) / delta)
         return np.array(columns).T
 
-    def _absolute_tolerance(self, start: Motion, beam: Motion, partner: Motion, size: float) -> float:
+    def _absolute_tolerance(
+        self, start: Motion, beam: Motion, partner: Motion, size: float, by_force: np.ndarray
+    ) -> float:
         speed = max(abs(start.velocity), abs(beam.velocity), abs(partner.velocity))
         change = max(size * speed, abs(beam.displacement - start.displacement))
-        rounding = 16.0 * _EPS * max(abs(start.displacement), abs(beam.displacement), abs(partner.displacement))
+        ends = (abs(start.displacement), abs(beam.displacement), abs(partner.displacement))
+        # The end is a sum of the free motion and of what the force does, ``by_force``; both are rounded.
+        rounding = 16.0 * _EPS * max(*ends, float(np.abs(by_force).max()))
         return max(self._tolerance * change, rounding)
