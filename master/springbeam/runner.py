@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from time import perf_counter
 from typing import Any
 
@@ -42,6 +43,7 @@ def run(scene: Scene, recorder: Recorder, progress: Progress | None = None) -> d
         finally:
             summary = {
                 **status,
+                "version": version("springbeam"),
                 **simulation.summary(),
                 **_calls(beam, spring),
                 "setup_time": loaded - began,

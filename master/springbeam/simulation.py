@@ -29,12 +29,16 @@ Progress = Callable[[float, str, int], None]
 _EPS = float(np.finfo(float).eps)
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
-#: Events without any time between them before the contact is said to chatter.
-_MAX_EVENTS_AT_ONCE = 25
+#: Events closer than this fraction of H are at once; so many of them and the contact is said to chatter.
+_AT_ONCE, _MAX_EVENTS_AT_ONCE = 1e-6, 100
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only).
 _SEATING_SPEED = 1e-8
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
 _SHORT_REMAINDER = 0.25
+#: Relative energy residual at which `hermite` is said to be unstable, and at which the run stops.
+_HERMITE_WARNS, _HERMITE_STOPS = 1e-3, 0.1
+#: Velocity mismatch of tip and spring top, relative to their speed, above which the motion is called unresolved.
+_UNRESOLVED = 0.2
 #: Repetitions to end a step where the contact force vanishes.
 _MAX_FORCE_CUTS = 8
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
@@ -149,9 +153,9 @@ class Simulation:
         self._compliant = scene.contact.law == "compliance" and self._joinable
         self._tie = Tie(conditions(coupling.scheme, coupling.degree), coupling.degree, coupling.tolerance, self.H)
         self._compliance = Compliance(scene.contact.stiffness, scene.contact.exponent, coupling.tolerance, self.H)
+        self._hermite = coupling.scheme == "hermite" and not self._compliant
         self._degree = 0 if self._compliant else coupling.degree
         self.counts = Counts()
-        self.warnings: list[str] = []
         self.time = first_contact(scene)
         self.phase = Phase()
         self._ledger = _Ledger()
@@ -161,6 +165,8 @@ class Simulation:
         self._steps_in_phase = 0
         self._previous_size = 0.0
         self._fastest_impact = 0.0
+        self._last_opening = -float("inf")
+        self._reclosed = False  #: the contact had opened and closed at once: its next step does not open it again
         self._shapes_left = _SHAPES_AFTER_CONTACT
         self._next_shape = self.time
         self._largest_mismatch = 0.0
@@ -173,7 +179,7 @@ class Simulation:
         t0, t_end = self.time, self.scene.time.t_end
         self._settle_start()
         self._record()
-        macro_index, at_once = 0, 0
+        macro_index, at_once, since = 0, 0, self.time
         while self.time < t_end:
             target = t0 + (macro_index + 1) * self.H
             size = target - self.time
@@ -185,9 +191,11 @@ class Simulation:
                 target, size = t_end, t_end - self.time
                 on_grid = abs(size - self.H) <= 1e-9 * self.H
             step, event = self._advance(self.H if on_grid else size)
-            at_once = 0 if step.size > 0.0 else at_once + 1
+            if self.time + step.size - since > _AT_ONCE * self.H:
+                at_once, since = 0, self.time + step.size
+            at_once += 1
             if at_once > _MAX_EVENTS_AT_ONCE:
-                raise RunStopped("the contact chatters: events without time between them", self.time)
+                raise RunStopped(f"the contact chatters: {at_once} events at once", self.time)
             whole = event is None and abs(step.size - size) <= 1e-9 * self.H
             if step.size > 0.0:
                 self._accept(step, target if whole else self.time + step.size)
@@ -369,7 +377,7 @@ class Simulation:
         changes = force.sign_changes(f, step.size)
         if f[0] < 0.0 and self._steps_in_phase == 0:
             # Right after an event the sign may be a false alarm: it is one if the ends, let go, close.
-            if self._opens(changes[0] if changes else step.size, step.start):
+            if not self._reclosed and self._opens(changes[0] if changes else step.size, step.start):
                 for body in self._bodies:
                     body.rewind()
                 return replace(step, size=0.0, end=step.start), kind
@@ -448,7 +456,10 @@ class Simulation:
         tip, low = self._motions()
         impact = Impact()
         before = self.phase
+        if kind in ("separation", "release"):
+            self._last_opening = self.time
         if kind == "impact":
+            self._reclosed = self.time - self._last_opening <= _AT_ONCE * self.H
             impact = self._meet(tip, low)
         elif kind == "stop_impact":
             impact, kind = self._strike(tip, low)
@@ -618,6 +629,14 @@ class Simulation:
         except NonFiniteValue as error:
             raise RunStopped(str(error), self.time) from error
         self._record_shape(joined)
+        if self._hermite and self._ledger.relative > _HERMITE_STOPS:
+            raise RunStopped(self._hermite_cause(), self.time)
+
+    def _hermite_cause(self) -> str:
+        return (
+            f"hermite of degree {self._degree} has changed the energy by {100.0 * self._ledger.relative:.2g} %: the "
+            f"macro step {self.H:g} s is too large for it; take a smaller one, or coupling.scheme = 'energy'"
+        )
 
     def _record_shape(self, joined: bool) -> None:
         if self._beam is None:
@@ -633,6 +652,15 @@ class Simulation:
 
     def summary(self) -> dict[str, Any]:
         """Counts, residuals and warnings, as they go into ``summary.json``."""
+        warnings = []
+        if self._hermite and self._ledger.relative > _HERMITE_WARNS:
+            warnings.append(self._hermite_cause())
+        if self._largest_mismatch > _UNRESOLVED * self._largest_speed:
+            warnings.append(
+                f"not resolved: the joined ends' velocities differ by up to {self._largest_mismatch:.3g} m/s of "
+                f"{self._largest_speed:.3g} m/s; velocities and forces alternate from step to step. A smaller "
+                f"coupling.macro_step (now {self.H:g} s) or fewer beam.n_modes resolves the motion"
+            )
         return {
             "time": self.time,
             "macro_steps": self.counts.macro_steps,
@@ -642,5 +670,5 @@ class Simulation:
             "max_energy_residual": self._ledger.relative,
             "max_energy_residual_joule": self._ledger.largest_residual,
             "max_velocity_mismatch": self._largest_mismatch,
-            "warnings": self.warnings,
+            "warnings": warnings,
         }
