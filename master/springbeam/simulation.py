@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .contact import Impact, Joint, Phase, first_contact, foundation_impact, meeting, spring_force
+from .contact import Impact, Joint, Phase, foundation_impact, meeting, spring_force
 from .coupling import conditions, force
 from .coupling.compliance import Compliance, compliance_energy, compliance_force
 from .coupling.tie import NotConverged, Tie
@@ -80,7 +80,7 @@ class Counts:
 
 
 @dataclass
-class _Ledger:
+class Ledger:
     """E_beam + E_spring + E_contact + dissipated + impact losses − work of external loads = constant."""
 
     impact_loss: float = 0.0
@@ -121,8 +121,10 @@ class Simulation:
     ----------
     scene
         What is simulated.
+    start_time
+        Where the run starts [s], `springbeam.contact.first_contact`.
     beam, spring
-        The bodies at the start time `first_contact`; ``None`` where the scene has none.
+        The bodies at the start time; ``None`` where the scene has none.
     recorder
         Receives rows, events and shapes.
     progress
@@ -132,6 +134,7 @@ class Simulation:
     def __init__(
         self,
         scene: Scene,
+        start_time: float,
         beam: BeamBody | None,
         spring: Body | None,
         recorder: Recorder,
@@ -156,9 +159,9 @@ class Simulation:
         self._hermite = coupling.scheme == "hermite" and not self._compliant
         self._degree = 0 if self._compliant else coupling.degree
         self.counts = Counts()
-        self.time = first_contact(scene)
+        self.time = start_time
         self.phase = Phase()
-        self._ledger = _Ledger()
+        self._ledger = Ledger()
         self._contact: Force = NO_FORCE
         self._foundation: Force = NO_FORCE
         self._smoothed: tuple[float, float] = (0.0, 0.0)
