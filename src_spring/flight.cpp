@@ -103,8 +103,8 @@ void Flight::prepare(const FlightStart& start) {
     if (order == 0) limit(tolerance_y / std::abs(d[2]), 0.5);
   }
   int halvings = std::max(least_halvings, static_cast<int>(std::ceil(std::log2(H / h))));
-  if (touching_ && !smooth) {
-    // Where the power law has no second derivative: the velocity that its growth over the first step would give.
+  if (touching_ && order < Taylor::max_order) {
+    // The power law has no second derivative or outgrows its rates at the start: the velocity from its growth instead.
     const auto growth = [&](double t) {
       const double deeper = start.depth + t * (std::abs(depth[1]) + t * std::abs(depth[2]) / 2);
       return t * (contact.force(deeper) - force) / motion_.mass();

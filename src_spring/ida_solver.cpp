@@ -15,6 +15,7 @@ constexpr int max_order = 5;
 // Newton's remainder, relative to the tolerance: small, or it is noise in the error estimate (IDA's default, 0.33, costs
 // more steps than it saves iterations).
 constexpr double newton_share = 0.01;
+constexpr int max_error_failures = 40;  ///< in one internal step: a first step that is far too long recovers
 constexpr long max_steps = 10'000'000;  ///< per start(); a step that needs more is refused
 
 struct ContextDeleter {
@@ -122,6 +123,7 @@ IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings) : imp
   d.check(IDASetLinearSolver(ida, d.linear_solver.get(), d.J.get()), "IDASetLinearSolver");
   d.check(IDASetJacFn(ida, jacobian), "IDASetJacFn");
   d.check(IDASetMaxOrd(ida, max_order), "IDASetMaxOrd");
+  d.check(IDASetMaxErrTestFails(ida, max_error_failures), "IDASetMaxErrTestFails");
   d.check(IDASetNonlinConvCoef(ida, newton_share), "IDASetNonlinConvCoef");
   d.check(IDASetMaxNumSteps(ida, max_steps), "IDASetMaxNumSteps");
   if (!crossings.empty()) {

@@ -8,7 +8,7 @@ namespace spring {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double safety = 0.1;         ///< as in flight.cpp
+constexpr double safety = 0.01;        ///< of the tolerance, per internal step
 constexpr double noise_margin = 20.0;  ///< as in flight.cpp
 constexpr int least_halvings = 3, most_halvings = 48;
 
@@ -49,8 +49,9 @@ void Seated::prepare(const SeatedStart& start) {
   auto N = motion_.holding_force(y, start.loads, touching_, start.depth);
   const double depth_travel = std::abs(u[1]) * H + std::abs(u[2]) * H * H / 2;
   const bool smooth = !touching_ || contact.analytic() || start.depth > 2.0 * depth_travel;
-  release_watch_ = smooth ? Watch({N[0], N[1], N[2], 0.0, 0.0}) : Watch({N[0], 0.0, 0.0, 0.0, 0.0});
-  N_.c = smooth ? N : std::array<double, 3>{N[0], 0.0, 0.0};
+  if (!smooth) N[2] = 0.0;  // may be infinite
+  release_watch_ = Watch({N[0], N[1], N[2], 0.0, 0.0});
+  N_.c = N;
 
   const double force = touching_ ? contact.force(start.depth) : 0.0;
   const double deepest = touching_ ? contact.force(start.depth + depth_travel) : 0.0;
@@ -64,11 +65,12 @@ void Seated::prepare(const SeatedStart& start) {
   tolerance[n] = tolerance_N;
   tolerance[P] = H * tolerance_N;
 
-  // First step: P by the first order is wrong by the change of N − N_R over it.
+  // First step: N − N_R starts flat and must still be within the tolerance after it.
   int halvings = least_halvings;
+  const double slope = touching_ ? contact.slope(start.depth) : 0.0;
   const auto growth = [&](double t) {
-    const double deeper = start.depth + t * (std::abs(u[1]) + t * std::abs(u[2]) / 2);
-    return t / H * std::abs(contact.force(deeper) - force);
+    const double deeper = t * (std::abs(u[1]) + t * std::abs(u[2]) / 2);
+    return std::abs(contact.force(start.depth + deeper) - force - slope * deeper);
   };
   if (touching_) {
     while (halvings < most_halvings && growth(std::ldexp(H, -halvings)) > tolerance_N) ++halvings;

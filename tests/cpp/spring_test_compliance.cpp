@@ -1,0 +1,154 @@
+// Normal compliance inside: C = λ (y − u_tip)₊^p against closed forms.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <tuple>
+
+#include "spring.hpp"
+#include "spring_support.hpp"
+
+using namespace spring_test;
+using spring::ContactLaw;
+using spring::Inputs;
+using spring::Parameters;
+using spring::Spring;
+
+namespace {
+
+Parameters compliant(double lambda, double exponent) {
+  Parameters p;
+  p.contact_law = ContactLaw::normal_compliance;
+  p.compliance_stiffness = lambda;
+  p.compliance_exponent = exponent;
+  return p;
+}
+
+constexpr double pi = 3.14159265358979323846;
+
+}  // namespace
+
+// p = 1 in contact: two springs in parallel, m ÿ + (k + λ) y = λ (u₀ + v t).
+TEST(SpringCompliance, LinearLawIsASecondSpring) {
+  const double k = 10.0, lambda = 200.0, u0 = -0.05, v = -0.02;
+  Parameters p = compliant(lambda, 1.0);
+  p.linear_stiffness = k;
+  p.displacement = 0.01;
+  p.velocity = 0.1;
+  const double w = std::sqrt(k + lambda), p0 = lambda * u0 / (k + lambda), p1 = lambda * v / (k + lambda);
+  const double a = p.displacement - p0, b = (p.velocity - p1) / w;
+  for (const double H : {1e-3, 2e-2}) {
+    Spring s(p);
+    for (int i = 1; i * H <= 0.04 + 1e-9; ++i) {
+      Inputs inputs;
+      inputs.tip_displacement[0] = u0 + v * (i - 1) * H;
+      inputs.tip_velocity = v;
+      s.step(H, inputs);
+      const double t = i * H;
+      const double y = p0 + p1 * t + a * std::cos(w * t) + b * std::sin(w * t);
+      EXPECT_NEAR(s.displacement(), y, 1e-13) << "t = " << t;  // 1e-12 × 0.06 m, the tolerance
+      EXPECT_NEAR(s.reaction(), lambda * (y - u0 - v * t), lambda * 1e-13);
+      EXPECT_NEAR(s.contact_energy(), s.reaction() * s.reaction() / (2 * lambda), 1e-15);
+      EXPECT_NEAR(s.acceleration(), -k * s.displacement() - s.reaction(), 1e-13);
+    }
+  }
+}
+
+// Derivatives of the tip displacement, where given, are used instead of the tip velocity.
+TEST(SpringCompliance, TipIsExtrapolated) {
+  Parameters p = compliant(1e3, 1.0);
+  p.linear_stiffness = 0.0;
+  p.mass = 1e9;  // stays
+  for (const bool derivatives : {false, true}) {
+    Spring s(p);
+    Inputs inputs;
+    inputs.tip_displacement = {-0.1, derivatives ? 0.3 : 0.0, derivatives ? 2.0 : 0.0};
+    inputs.tip_velocity = -0.2;
+    s.observe(inputs);
+    EXPECT_NEAR(s.reaction(), 100.0, 1e-12);
+    s.step(0.1, inputs);
+    EXPECT_NEAR(s.reaction(), derivatives ? 1e3 * (0.1 - 0.03 - 0.01) : 1e3 * (0.1 + 0.02),
+                1e3 * 1e-9);  // the mass has moved by λδt²/2m
+  }
+}
+
+// p = 1 about a tip at rest: half periods π/√(k+λ) above and π/√k below. The kink is met twice per period.
+TEST(SpringCompliance, PeriodOfABilinearOscillator) {
+  const double k = 25.0, lambda = 1e4;
+  Parameters p = compliant(lambda, 1.0);
+  p.linear_stiffness = k;
+  p.velocity = 0.7;
+  const double period = pi / std::sqrt(k) + pi / std::sqrt(k + lambda);
+  for (const int steps : {7, 100, 1000}) {
+    Spring s(p);
+    for (int i = 0; i < 3 * steps; ++i) s.step(period / steps, Inputs{});
+    // 1e-12 of what z and y reach for each of the 19 radians of the motion.
+    EXPECT_NEAR(s.velocity(), 0.7, 2e-11 * 0.7) << steps;
+    EXPECT_NEAR(s.displacement(), 0.0, 2e-11 * 0.7 / std::sqrt(k)) << steps;
+  }
+}
+
+// A free mass thrown against the tip: by energy it comes back with the speed it had, after
+//     T = 2 (δ/v) √π Γ(1 + 1/(p+1)) / Γ(1/2 + 1/(p+1)),    δ = ((p+1) m v² / 2λ)^{1/(p+1)}     (p = 3/2: Hertz, 2.943 δ/v).
+class Rebound : public testing::TestWithParam<std::tuple<double, double>> {};
+
+TEST_P(Rebound, TimeAndSpeed) {
+  const auto [lambda, exponent] = GetParam();
+  const double v = 0.5, gap = 0.013, r = 1.0 / (exponent + 1.0), mass = 1.3;
+  Parameters p = compliant(lambda, exponent);
+  p.linear_stiffness = 0.0;
+  p.mass = mass;
+  p.displacement = -gap;
+  p.velocity = v;
+  const double depth = std::pow((exponent + 1.0) * mass * v * v / (2 * lambda), r);
+  const double duration = 2 * depth / v * std::sqrt(pi) * std::tgamma(1.0 + r) / std::tgamma(0.5 + r);
+  const double end = 2 * gap / v + duration + 0.01;
+  for (const int steps : {1, 10, 777}) {
+    Spring s(p);
+    for (int i = 0; i < steps; ++i) s.step(end / steps, Inputs{});
+    EXPECT_NEAR(s.velocity(), -v, 1e-11 * v) << steps;
+    EXPECT_NEAR(s.displacement(), -gap - 0.01 * v, 1e-12 * (0.1 + depth)) << steps;
+    EXPECT_EQ(s.reaction(), 0.0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, Rebound,
+                         testing::Combine(testing::Values(1e2, 1e4, 1e8, 1e12), testing::Values(1.0, 1.5, 2.0, 2.2, 3.0)));
+
+// The tip passes through the top's position and back within one step: the touch must not be stepped over.
+// Parabola u = d − v τ + a τ²/2 that dips δ below y: for p = 1 and a heavy mass the impulse is λ ∫(y − u)₊ = λ (2/3) δ · 2√(2δ/a).
+TEST(SpringCompliance, AShortTouchWithinOneStepCounts) {
+  for (const double dip : {1e-4, 1e-6, 1e-8}) {
+    Parameters p = compliant(1e6, 1.0);
+    p.linear_stiffness = 0.0;
+    p.mass = 1e6;
+    Spring s(p);
+    const double a = 8.0, half = 0.37;  // lowest at τ = 0.37
+    Inputs inputs;
+    inputs.tip_displacement = {a * half * half / 2 - dip, -a * half, a};
+    s.step(1.0, inputs);
+    const double impulse = 1e6 * (4.0 / 3.0) * dip * std::sqrt(2 * dip / a);
+    // The mass gives way by (λ/m)·(duration²); the parabola's start rounds at 1e-16 m; z is good to 1e-14 m/s.
+    EXPECT_NEAR(-s.velocity() * 1e6, impulse, impulse * (8 * dip / a + 4e-16 / dip) + 1e6 * 1e-14) << dip;
+  }
+}
+
+// Undamped, p = 1.5, λ = 1e6, against a tip at rest: E_spring + E_contact is constant through 100 contacts.
+TEST(SpringCompliance, EnergyIsConserved) {
+  Parameters p = compliant(1e6, 1.5);
+  p.linear_stiffness = 150.0;
+  p.cubic_stiffness = 67.0;
+  p.velocity = -0.5;
+  Spring s(p);
+  const double before = energy(s);
+  double worst = 0.0;
+  long contacts = 0;
+  bool touching = false;
+  for (int i = 0; i < 26000; ++i) {
+    s.step(1e-3, Inputs{});
+    worst = std::max(worst, std::abs(energy(s) - before));
+    contacts += s.reaction() > 0.0 && !touching;
+    touching = s.reaction() > 0.0;
+  }
+  EXPECT_GE(contacts, 90);
+  EXPECT_LT(worst, 26000 * 6e-14 * before);  // IDA is asked for 3e-14 of z per internal step
+}

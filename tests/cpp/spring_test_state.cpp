@@ -1,0 +1,270 @@
+// Parameters, inputs, states, impulses, escape.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "spring.hpp"
+#include "spring_support.hpp"
+
+using namespace spring_test;
+using spring::ContactLaw;
+using spring::Escape;
+using spring::Inputs;
+using spring::Parameters;
+using spring::Spring;
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+
+/// What the call says when it refuses.
+std::string refusal(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "nothing was refused";
+}
+
+std::string refusal(const std::function<void(Parameters&)>& change) {
+  Parameters p;
+  change(p);
+  return refusal(std::function<void()>([&p] { Spring s(p); }));
+}
+
+Parameters softening() {
+  Parameters p;
+  p.linear_stiffness = 3.0;
+  p.cubic_stiffness = -0.2;
+  return p;
+}
+
+const double hilltop = std::sqrt(3.0 / 0.2);
+const double hilltop_energy = 9.0 / (4 * 0.2);  // k1²/4|k2|
+
+/// Everything switched on: a stop, and normal compliance with a moving tip.
+Parameters everything() {
+  Parameters p = softening();
+  p.displacement = -0.01;
+  p.velocity = -0.4;
+  p.damping = 0.1;
+  p.contact_law = ContactLaw::normal_compliance;
+  p.compliance_stiffness = 1e4;
+  p.compliance_exponent = 1.5;
+  p.stop_enabled = true;
+  p.stop_position = -0.015;
+  p.restitution = 0.5;
+  return p;
+}
+
+}  // namespace
+
+TEST(SpringParameters, RefusalsNameParameterValueAndWhatIsAllowed) {
+  const auto expect = [](const std::string& message, std::initializer_list<const char*> parts) {
+    for (const char* part : parts) EXPECT_NE(message.find(part), std::string::npos) << message;
+  };
+  expect(refusal([](Parameters& p) { p.mass = 0.0; }), {"mass = 0", "> 0"});
+  expect(refusal([](Parameters& p) { p.mass = not_a_number; }), {"mass = nan", "> 0"});
+  expect(refusal([](Parameters& p) { p.damping = -0.5; }), {"damping = -0.5", ">= 0"});
+  expect(refusal([](Parameters& p) { p.linear_stiffness = infinity; }), {"linear_stiffness = inf", "finite"});
+  expect(refusal([](Parameters& p) { p.velocity = not_a_number; }), {"velocity = nan", "finite"});
+  expect(refusal([](Parameters& p) { p.restitution = 1.5; }), {"restitution = 1.5", "[0, 1]"});
+  expect(refusal([](Parameters& p) { p.compliance_exponent = 0.5; }), {"compliance_exponent = 0.5", "[1, 100]"});
+  expect(refusal([](Parameters& p) { p.compliance_stiffness = -1; }), {"compliance_stiffness = -1", ">= 0"});
+  expect(refusal([](Parameters& p) { p.relative_tolerance = 0.1; }), {"relative_tolerance = 0.1", "(0, 1e-2]"});
+  expect(refusal([](Parameters& p) { p.absolute_tolerance = 0.0; }), {"absolute_tolerance = 0", "(0, 1e-2]"});
+  expect(refusal([](Parameters& p) { p.contact_law = static_cast<ContactLaw>(3); }), {"contact_law = 3", "1", "2"});
+  expect(refusal([](Parameters& p) {
+           p.stop_enabled = true;
+           p.stop_position = 0.1;
+         }),
+         {"displacement = 0", "stop_position = 0.1"});
+  // No potential well: every motion would escape.
+  for (const double k1 : {0.0, -1.0})
+    expect(refusal([k1](Parameters& p) {
+             p.linear_stiffness = k1;
+             p.cubic_stiffness = -0.2;
+           }),
+           {"cubic_stiffness = -0.2", "linear_stiffness > 0"});
+}
+
+TEST(SpringParameters, StartBeyondTheHilltopIsRefused) {
+  Parameters p = softening();
+  p.displacement = 3.872;  // the hilltop is at 3.87298
+  EXPECT_NO_THROW(Spring{p});
+  p.displacement = -3.874;
+  const std::string message = refusal(std::function<void()>([&p] { Spring s(p); }));
+  EXPECT_NE(message.find("displacement = -3.874"), std::string::npos) << message;
+  EXPECT_NE(message.find("3.87298"), std::string::npos) << message;
+}
+
+TEST(SpringInputs, ImpossibleStepsAndInputsAreRefusedAndChangeNothing) {
+  Spring s(softening());
+  s.step(0.01, Inputs{});
+  const auto before = saved(s);
+  for (const double size : {0.0, -1e-3, not_a_number, infinity}) EXPECT_THROW(s.step(size, Inputs{}), std::invalid_argument);
+  Inputs inputs;
+  inputs.contact_force[2] = not_a_number;
+  EXPECT_THROW(s.step(0.01, inputs), std::invalid_argument);
+  EXPECT_THROW(s.apply_impulse(infinity), std::invalid_argument);
+  EXPECT_EQ(saved(s), before);
+}
+
+// The coupling repeats steps and compares with ==.
+TEST(SpringState, RepeatedStepsAreBitIdentical) {
+  for (const Parameters& p : {softening(), everything()}) {
+    Spring s(p);
+    Inputs inputs;
+    inputs.contact_force = {0.3, -2.0, 11.0};
+    inputs.tip_displacement = {-0.012, 0.05, 0.0};
+    inputs.tip_velocity = 0.05;
+    s.step(1e-3, inputs);
+    s.apply_impulse(-0.01);
+    const auto start = saved(s);
+    s.step(3e-2, inputs);
+    const auto once = saved(s);
+
+    // Other sizes and forces in between, on the same object.
+    for (const double size : {0.2, 1e-7, 5e-3}) {
+      Inputs other;
+      other.contact_force[0] = 10.0 * size;
+      s.step(size, other);
+    }
+    s.restore(start);
+    EXPECT_EQ(saved(s), start);
+    s.step(3e-2, inputs);
+    EXPECT_EQ(saved(s), once);
+
+    // On another object, fresh or with a history.
+    Spring fresh(p), used(p);
+    used.step(0.13, inputs);
+    for (Spring* other : {&fresh, &used}) {
+      other->restore(start);
+      other->step(3e-2, inputs);
+      EXPECT_EQ(saved(*other), once);
+      EXPECT_EQ(other->acceleration(), s.acceleration());
+      EXPECT_EQ(other->reaction(), s.reaction());
+    }
+  }
+}
+
+TEST(SpringState, MovedObjectsGoOn) {
+  Spring a(everything());
+  const auto start = saved(a);
+  a.step(0.02, Inputs{});
+  const auto once = saved(a);
+  a.restore(start);
+  Spring b(std::move(a));
+  b.step(0.02, Inputs{});
+  EXPECT_EQ(saved(b), once);
+}
+
+TEST(SpringState, AStateOfAnotherLengthIsRefused) {
+  Spring s(softening());
+  const auto before = saved(s);
+  EXPECT_THROW(s.restore({1.0, 2.0}), std::invalid_argument);
+  EXPECT_EQ(saved(s), before);
+}
+
+TEST(SpringState, ImpulseChangesTheVelocityByJOverM) {
+  Parameters p = softening();
+  p.mass = 2.0;
+  p.velocity = 0.25;
+  Spring s(p);
+  s.apply_impulse(-1.5);
+  EXPECT_EQ(s.velocity(), -0.5);
+  EXPECT_EQ(s.kinetic_energy(), 0.25);
+  EXPECT_EQ(s.displacement(), 0.0);
+}
+
+// ÿ = (−C + N + f_s − α_s ẏ − k1 y − k2 y³)/m at the end of the step, and of what observe() was given.
+TEST(SpringState, AccelerationFollowsTheInputs) {
+  Parameters p = softening();
+  p.damping = 0.7;
+  p.displacement = 0.5;
+  p.velocity = -0.3;
+  Spring s(p);
+  Inputs inputs;
+  inputs.contact_force = {1.0, 2.0, 6.0};
+  inputs.foundation_force[0] = 0.5;
+  inputs.external_force = 0.25;
+  const auto expected = [&](double force) {
+    const double y = s.displacement(), z = s.velocity();
+    return force - 0.7 * z - 3.0 * y + 0.2 * y * y * y;
+  };
+  s.observe(inputs);
+  EXPECT_NEAR(s.acceleration(), expected(-0.25), 4 * epsilon);
+  s.step(0.1, inputs);
+  EXPECT_NEAR(s.acceleration(), expected(-1.0 - 0.2 - 0.03 + 0.75), 4 * epsilon);
+}
+
+// With 1e-6 of the hilltop's energy missing the motion turns back; its period (4K/ω) is many times the small one.
+TEST(SpringEscape, JustBelowTheHilltopRuns) {
+  const double amplitude = hilltop * (1.0 - 1e-6);
+  const Duffing exact(3.0, -0.2, amplitude);
+  Parameters p = softening();
+  p.velocity = exact.velocity(0.75 * exact.period());  // through y = 0, upward
+  Spring s(p);
+  double highest = 0.0;
+  const int steps = static_cast<int>(0.5 * exact.period() / 0.01);
+  for (int i = 0; i < steps; ++i) {
+    s.step(0.01, Inputs{});
+    highest = std::max(highest, s.displacement());
+  }
+  EXPECT_LT(highest, hilltop);
+  EXPECT_GT(highest, hilltop * (1.0 - 1e-5));
+  EXPECT_LT(s.displacement(), 0.1);  // on its way back
+  EXPECT_LT(s.velocity(), 0.0);
+}
+
+// With 10 % more energy than the hilltop's the top gets there at T = ∫dy/√(2(E − V)); then the state stays, and what is
+// said names y, the hilltop and the time.
+TEST(SpringEscape, BeyondTheHilltopIsReported) {
+  const double E = 1.1 * hilltop_energy;
+  const auto integrand = [E](double y) { return 1.0 / std::sqrt(2.0 * (E - 1.5 * y * y + 0.05 * y * y * y * y)); };
+  double T = 0.0;
+  constexpr int n = 4000;  // Simpson: error ~ 1e-13 on this smooth integrand
+  for (int i = 0; i <= n; ++i)
+    T += integrand(hilltop * i / n) * (i == 0 || i == n ? 1.0 : i % 2 != 0 ? 4.0 : 2.0) * hilltop / n / 3.0;
+
+  for (const double sign : {1.0, -1.0}) {
+    Parameters p = softening();
+    p.velocity = sign * std::sqrt(2.0 * E);
+    Spring s(p);
+    double t = 0.0;
+    bool escaped = false;
+    for (int i = 0; i < 400 && !escaped; ++i) {
+      const auto before = saved(s);
+      try {
+        s.step(0.02, Inputs{});
+        t += 0.02;
+      } catch (const Escape& escape) {
+        escaped = true;
+        EXPECT_NEAR(t + escape.reached, T, 1e-10);  // 100 steps of 1e-12 relative
+        EXPECT_EQ(saved(s), before);
+        const std::string message = escape.what();
+        EXPECT_NE(message.find(sign > 0 ? "y = 3.87298" : "y = -3.87298"), std::string::npos) << message;
+        EXPECT_NE(message.find("hilltop"), std::string::npos) << message;
+      }
+    }
+    EXPECT_TRUE(escaped);
+  }
+}
+
+// A force that pushes it over, within one long step; a hardening spring takes the same force.
+TEST(SpringEscape, AForceCanPushItOver) {
+  Inputs inputs;
+  inputs.external_force = 20.0;
+  Spring s(softening());
+  EXPECT_THROW(s.step(1.0, inputs), Escape);
+  Parameters p = softening();
+  p.cubic_stiffness = 0.2;
+  Spring hardening(p);
+  EXPECT_NO_THROW(hardening.step(1.0, inputs));
+}

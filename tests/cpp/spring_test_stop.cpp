@@ -1,0 +1,238 @@
+// The foundation inside: Signorini's condition with restitution, rest and release.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "spring.hpp"
+#include "spring_support.hpp"
+
+using namespace spring_test;
+using spring::ContactLaw;
+using spring::Inputs;
+using spring::Parameters;
+using spring::Spring;
+
+namespace {
+
+/// A free mass above a stop at 0.
+Parameters ball(double height, double velocity, double restitution) {
+  Parameters p;
+  p.linear_stiffness = 0.0;
+  p.displacement = height;
+  p.velocity = velocity;
+  p.stop_enabled = true;
+  p.stop_position = 0.0;
+  p.restitution = restitution;
+  return p;
+}
+
+Inputs weight(double force) {
+  Inputs inputs;
+  inputs.external_force = -force;
+  return inputs;
+}
+
+}  // namespace
+
+// Free fall g from h: impacts at t₁ = √(2h/g) and then after flights 2vₖ/g, vₖ = eᵏ g t₁; all are over at
+// t₁ (1 + e)/(1 − e). Compared at many times with the parabola of the flight it must be in.
+TEST(SpringStop, BouncesFollowTheGeometricSeries) {
+  const double g = 9.81, h = 0.8, e = 0.5, m = 1.6, t1 = std::sqrt(2 * h / g), zeno = t1 * (1 + e) / (1 - e);
+  for (const double H : {1e-3, 0.0371, 0.2}) {
+    Parameters p = ball(h, 0.0, e);
+    p.mass = m;
+    Spring s(p);
+    double impulses = 0.0;
+    for (int i = 1; i * H < zeno + 0.5; ++i) {
+      s.step(H, weight(m * g));
+      impulses += s.stop_impulse();
+      const double t = i * H;
+      double start = -t1, speed = g * t1, momentum = 0.0;  // of the flight that began at `start`
+      while (t >= start + 2 * speed / g && speed > 1e-6) {
+        start += 2 * speed / g;
+        momentum += m * speed * (1 + e);
+        speed *= e;
+      }
+      if (speed <= 1e-6) break;  // so close to the end that rounding decides which flight it is
+      const double tau = t - start;
+      ASSERT_NEAR(s.displacement(), speed * tau - g / 2 * tau * tau, 1e-13) << "t = " << t;
+      ASSERT_NEAR(s.velocity(), speed - g * tau, 1e-12) << "t = " << t;
+      ASSERT_NEAR(impulses, momentum, 1e-12) << "t = " << t;
+      ASSERT_FALSE(s.seated());
+    }
+  }
+}
+
+// It comes to rest at the end of the series, not before and not long after: the bounces that are cut short would have
+// risen less than the tolerance of y, which takes √(8·tol/g)/(1 − e) < 1e-6 s.
+TEST(SpringStop, ImpactsThatDieOutEndSeated) {
+  const double g = 10.0, h = 1.0, e = 0.5, zeno = std::sqrt(2 * h / g) * (1 + e) / (1 - e);
+  Spring before(ball(h, 0.0, e)), after(ball(h, 0.0, e));
+  before.step(zeno - 1e-6, weight(g));
+  EXPECT_FALSE(before.seated());
+  after.step(zeno + 1e-6, weight(g));
+  EXPECT_TRUE(after.seated());
+  EXPECT_EQ(after.displacement(), 0.0);
+  EXPECT_EQ(after.velocity(), 0.0);
+  EXPECT_EQ(after.acceleration(), 0.0);
+  // All of the potential energy m g h is lost in impacts; the impulses sum to m v₁(1 + e)/(1 − e).
+  EXPECT_NEAR(after.impact_loss(), g * h, 1e-12);
+  const double cut = std::sqrt(2 * g * 1e-14);  // speed that rises to the tolerance
+  EXPECT_NEAR(after.stop_impulse(), std::sqrt(2 * g * h) * (1 + e) / (1 - e), cut * (1 + e) / (1 - e));
+  after.step(0.25, weight(g));
+  EXPECT_TRUE(after.seated());
+  EXPECT_NEAR(after.stop_force(), g, 1e-14);
+  EXPECT_EQ(after.stop_impulse(), 0.0);
+  EXPECT_EQ(after.displacement_integral(), 0.0);
+}
+
+// In one step that holds all of it: ∫N + impulses balance the weight, m Δz = Σ J + ∫N − m g t.
+TEST(SpringStop, MomentumBalanceOverAStepWithInfinitelyManyImpacts) {
+  Spring s(ball(1.0, 0.0, 0.9));
+  const double H = 12.0;  // Zeno time 8.5
+  s.step(H, weight(10.0));
+  EXPECT_TRUE(s.seated());
+  EXPECT_NEAR(s.stop_impulse() + s.stop_force() * H, 10.0 * H, 1e-10);
+}
+
+// e = 1: nothing is lost, over 1000 impacts of a nonlinear spring on the foundation.
+TEST(SpringStop, ElasticImpactsConserveEnergy) {
+  Parameters p;
+  p.linear_stiffness = 3.0;
+  p.cubic_stiffness = -0.2;
+  p.velocity = -0.3;
+  p.stop_enabled = true;
+  p.stop_position = -0.015;
+  Spring s(p);
+  const double before = energy(s);
+  int impacts = 0;
+  double worst = 0.0;
+  for (int i = 0; i < 30000; ++i) {
+    s.step(4e-3, Inputs{});
+    impacts += s.stop_impulse() > 0.0;
+    worst = std::max(worst, std::abs(energy(s) - before));
+  }
+  EXPECT_GE(impacts, 60);
+  EXPECT_LT(worst, 30000 * 4e-15 * before);
+  EXPECT_EQ(s.impact_loss(), 0.0);
+}
+
+// What an impact takes away is ½ m (1 − e²) z², counted once.
+TEST(SpringStop, LedgerOfALossyImpact) {
+  Parameters p = ball(0.1, -2.0, 0.3);
+  p.linear_stiffness = 40.0;
+  p.damping = 0.5;
+  p.mass = 0.7;
+  Spring s(p);
+  const double before = energy(s);
+  s.step(0.2, Inputs{});
+  EXPECT_GT(s.stop_impulse(), 0.0);
+  EXPECT_GT(s.impact_loss(), 0.5);
+  EXPECT_NEAR(energy(s) + s.dissipated_energy() + s.impact_loss(), before, 1e-12 * before);
+}
+
+// Held down by −10 N while C pulls up with 50 t: N = 10 − 50 t, off at 0.2 s, then y = 50 τ³/6.
+TEST(SpringStop, LeavesWhenTheForceTurns) {
+  Inputs inputs = weight(10.0);
+  inputs.contact_force[1] = -50.0;
+  Spring s(ball(0.0, 0.0, 0.5));
+  s.step(1.0, inputs);
+  const double tau = 0.8;
+  EXPECT_FALSE(s.seated());
+  EXPECT_NEAR(s.displacement(), 50 * tau * tau * tau / 6, 1e-14);
+  EXPECT_NEAR(s.velocity(), 50 * tau * tau / 2, 4e-14);
+  EXPECT_NEAR(s.stop_force(), 1.0, 1e-15);  // ∫₀^0.2 (10 − 50 t) dt
+  EXPECT_EQ(s.stop_impulse(), 0.0);
+}
+
+// N ≥ 0 touches below 0 for a moment: seen although both ends of the step have N > 0.
+// N = (τ − ½)² − ε: off at τ₁ = ½ − √ε, so it leaves, lands softly and is seated again: ∫(N − 0) + J − 0 = Σ of forces.
+TEST(SpringStop, AShortReleaseWithinOneStepCounts) {
+  const double dip = 1e-4;
+  Inputs inputs;
+  inputs.contact_force = {0.25 - dip, -1.0, 2.0};
+  Spring s(ball(0.0, 0.0, 0.0));
+  s.step(1.0, inputs);
+  EXPECT_TRUE(s.seated());
+  // While off: y = 2·√ε·τ³/6 − τ⁴/12 (force 2√ε τ − τ²), back at τ = 4√ε with −m z = Σ force·dt.
+  const double off = 4 * std::sqrt(dip), force = std::sqrt(dip) * off * off - off * off * off / 3;
+  EXPECT_NEAR(s.stop_impulse(), -force, 1e-9 * std::abs(force));
+  EXPECT_NEAR(s.stop_force() + s.stop_impulse(), 1.0 / 12 - dip, 1e-13);
+}
+
+// A parabola with its lowest point δ below the stop, well inside one step: m(1 + e)√(2aδ), or nothing when above.
+TEST(SpringStop, AGrazingImpactWithinOneStepCounts) {
+  const double a = 6.0, half = 0.43;
+  for (const double dip : {1e-4, 1e-8, 1e-11, -1e-11, -1e-4}) {
+    Spring s(ball(a * half * half / 2 - dip, -a * half, 1.0));
+    s.step(1.0, weight(-a));
+    const double impulse = dip > 0 ? 2.0 * std::sqrt(2 * a * dip) : 0.0;
+    EXPECT_NEAR(s.stop_impulse(), impulse, impulse * (1e-8 + 4e-16 / std::abs(dip))) << dip;
+  }
+}
+
+// Starting on the stop: pressed it stays, lifted it goes; an impulse into the stop rebounds at once.
+TEST(SpringStop, StartOnTheStop) {
+  Spring pressed(ball(0.0, 0.0, 0.5));
+  pressed.step(0.1, weight(2.0));
+  EXPECT_TRUE(pressed.seated());
+  EXPECT_EQ(pressed.stop_force(), 2.0);
+  Spring lifted(ball(0.0, 0.0, 0.5));
+  lifted.step(0.1, weight(-2.0));
+  EXPECT_FALSE(lifted.seated());
+  EXPECT_NEAR(lifted.displacement(), 0.01, 1e-16);
+  EXPECT_EQ(lifted.stop_force(), 0.0);
+
+  pressed.apply_impulse(-3.0);
+  pressed.step(0.01, weight(2.0));
+  EXPECT_FALSE(pressed.seated());
+  EXPECT_NEAR(pressed.velocity(), 1.5 - 0.02, 1e-15);
+  EXPECT_NEAR(pressed.stop_impulse(), 4.5, 1e-15);
+  EXPECT_NEAR(pressed.impact_loss(), 4.5 - 1.125, 1e-15);
+  Spring pushed(ball(0.0, 0.0, 0.5));
+  pushed.step(0.1, weight(2.0));
+  pushed.apply_impulse(1.0);
+  pushed.step(0.1, weight(2.0));
+  EXPECT_NEAR(pushed.displacement(), 0.1 - 0.01, 1e-15);
+}
+
+// The input N is for a master that applies Signorini itself; with the stop inside it is not read.
+TEST(SpringStop, FoundationForceIsNotAddedToTheStopInside) {
+  Inputs inputs = weight(2.0);
+  inputs.foundation_force[0] = 5.0;
+  Spring s(ball(0.0, 0.0, 0.5));
+  s.step(0.1, inputs);
+  EXPECT_TRUE(s.seated());
+  EXPECT_EQ(s.stop_force(), 2.0);
+}
+
+// Both laws: seated under a tip that presses with λ δ^p and lifts off with v: N = λ(−u)₊^p + k φ.
+TEST(SpringStop, SeatedUnderTheTip) {
+  Parameters p = ball(0.0, 0.0, 0.0);
+  p.contact_law = ContactLaw::normal_compliance;
+  p.compliance_stiffness = 1e5;
+  p.compliance_exponent = 1.5;
+  p.stop_position = -0.01;
+  p.displacement = -0.01;
+  p.linear_stiffness = 300.0;  // pulls up with 3 N
+  Spring s(p);
+  Inputs inputs;
+  inputs.tip_displacement[0] = -0.02;
+  inputs.tip_velocity = 0.04;
+  s.observe(inputs);
+  EXPECT_NEAR(s.reaction(), 1e5 * std::pow(0.01, 1.5), 1e-10);
+  s.step(0.1, inputs);
+  EXPECT_TRUE(s.seated());
+  // Mean of λ δ^1.5 − 3 with δ from 0.01 to 0.006.
+  const double mean = 1e5 * (std::pow(0.01, 2.5) - std::pow(0.006, 2.5)) / (2.5 * 0.04) / 0.1 - 3.0;
+  EXPECT_NEAR(s.stop_force(), mean, 1e-12 * mean);
+  EXPECT_NEAR(s.contact_energy(), 1e5 * std::pow(0.006, 2.5) / 2.5, 1e-15);
+  // λ δ^1.5 = 3 at δ = 9.65e-4: it leaves 0.1258 s later and then follows the tip.
+  inputs.tip_displacement[0] = -0.016;
+  s.step(0.1258, inputs);
+  EXPECT_TRUE(s.seated());
+  inputs.tip_displacement[0] += 0.04 * 0.1258;
+  s.step(0.02, inputs);
+  EXPECT_FALSE(s.seated());
+  EXPECT_GT(s.displacement(), -0.01);
+}
