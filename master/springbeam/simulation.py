@@ -29,6 +29,8 @@ Progress = Callable[[float, str, int], None]
 _EPS = float(np.finfo(float).eps)
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
+#: An event closer to the start of a step than this fraction of H happens at the start.
+_NO_TIME = 1e-9
 #: Events closer than this fraction of H are at once; so many of them and the contact is said to chatter.
 _AT_ONCE, _MAX_EVENTS_AT_ONCE = 1e-6, 100
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only).
@@ -315,6 +317,11 @@ class Simulation:
                 break
             _, found, function, bracket = min(candidates, key=lambda c: c[0])
             step = self._located(function, bracket)
+            if step.size < _NO_TIME * self.H:
+                # Too short for a contact force: velocities that differ would be turned round by an infinite one.
+                for body in self._bodies:
+                    body.rewind()
+                return replace(step, size=0.0, end=step.start), found
         else:
             found = found or None
         if self._compliant:

@@ -52,6 +52,7 @@ class Tie:
         self._beam_matrix: dict[float, np.ndarray] = {}
         self._partner_matrix: dict[type, np.ndarray] = {}
         self._last_size = 0.0
+        self._reach = 0.0  #: largest displacement of an end so far [m]
         self.iterations = 0  #: Newton updates since the start
 
     def solve(self, beam: Body, partner: Body, time: float, size: float, guess: Force, start: Motion) -> Force:
@@ -148,7 +149,7 @@ class Tie:
     ) -> float:
         speed = max(abs(start.velocity), abs(beam.velocity), abs(partner.velocity))
         change = max(size * speed, abs(beam.displacement - start.displacement))
-        ends = (abs(start.displacement), abs(beam.displacement), abs(partner.displacement))
-        # The end is a sum of the free motion and of what the force does, ``by_force``; both are rounded.
-        rounding = 16.0 * _EPS * max(*ends, float(np.abs(by_force).max()))
+        self._reach = max(self._reach, abs(start.displacement), abs(beam.displacement), abs(partner.displacement))
+        # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
+        rounding = 16.0 * _EPS * max(self._reach, float(np.abs(by_force).max()))
         return max(self._tolerance * change, rounding)
