@@ -24,11 +24,9 @@ struct BeamModel final : fmi::Model {
 
   void step(double size) override {
     std::vector<double> before;
-    if (tip_impulse != 0.0) {
-      beam->save(before);
-      beam->apply_tip_impulse(tip_impulse);
-    }
+    if (tip_impulse != 0.0) beam->save(before);
     try {
+      if (tip_impulse != 0.0) beam->apply_tip_impulse(tip_impulse);
       beam->step(size, tip_force, distributed_load);
     } catch (const std::domain_error& e) {
       if (!before.empty()) beam->restore(before);

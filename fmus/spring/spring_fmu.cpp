@@ -28,15 +28,13 @@ struct SpringModel final : fmi::Model {
 
   void step(double size) override {
     std::vector<double> before;
-    if (impulse != 0.0) {
-      spring->save(before);
-      spring->apply_impulse(impulse);
-    }
+    if (impulse != 0.0) spring->save(before);
     const auto discard = [&](const std::string& why) {
       if (!before.empty()) spring->restore(before);
       throw fmi::StepDiscarded(why);
     };
     try {
+      if (impulse != 0.0) spring->apply_impulse(impulse);
       spring->step(size, inputs);
     } catch (const spring::StepFailure& e) {
       discard(std::string(e.what()) + " (" + fmi::text(e.reached) + " s after the start of the step)");
