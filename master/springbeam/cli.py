@@ -9,7 +9,7 @@ from __future__ import annotations
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import metadata
 from itertools import islice
 from pathlib import Path
@@ -122,14 +122,22 @@ def run(
         _fail(BAD_INPUT, str(missing))
     _report(console, directory, what)
     if not no_plots:
-        from .plots import plot_run  # matplotlib takes a second to load
-
-        pictures = plot_run(load_trajectory(directory.path), directory.path)
-        console.print(Text(f"pictures  {', '.join(picture.name for picture in pictures)}"))
+        _draw(console, directory)
     if quiet:
         typer.echo(directory.path)
     if error is not None:
         _fail(STOPPED, f"{error}\nwhat was computed is in {directory.path}")
+
+
+def _draw(console: Console, directory: RunDirectory) -> None:
+    from .plots import plot_run  # matplotlib takes a second to load
+
+    try:
+        pictures = plot_run(load_trajectory(directory.path), directory.path)
+    except KeyboardInterrupt:
+        _fail(STOPPED, f"interrupted while drawing; the results in {directory.path} are complete")
+    if pictures:
+        console.print(Text(f"pictures  {directory.path / '*.png'} ({len(pictures)})"), soft_wrap=True)
 
 
 @app.command()
@@ -193,7 +201,8 @@ def _run_into(directory: RunDirectory, scene: Scene, *, quiet: bool) -> str | No
             status, cause = "interrupted", "interrupted"
         reached = 0.0 if recorder.time is None else recorder.time
         if not recorder.finished:
-            recorder.finish({"status": status, "cause": cause, "time": reached, "version": version()})
+            with suppress(OSError):  # on a full disk: the rows that fit are there, and the cause is reported
+                recorder.finish({"status": status, "cause": cause, "time": reached})
     where = f"{cause} (reached t = {reached:.9g} s of {scene.time.t_end:g} s)"
     return where if status == "interrupted" else f"the run stopped early: {where}"
 
@@ -227,6 +236,7 @@ class _ProgressBar:
             TimeRemainingColumn(),
             console=console,
             transient=True,
+            redirect_stdout=False,
             disable=quiet or not console.is_terminal,
         )
         self._t_end = t_end
@@ -266,7 +276,7 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}")
     for warning in summary.get("warnings", ()):
         console.print(Text(f"warning   {warning}"))
-    console.print(Text(f"results   {directory.path}"))
+    console.print(Text(f"results   {directory.path}"), soft_wrap=True)
 
 
 def _event_table(events: list[Event], scene: Scene) -> Table:

@@ -11,6 +11,7 @@ import dataclasses
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from itertools import count
 from math import isfinite
 from pathlib import Path
@@ -383,8 +384,9 @@ class FileRecorder(_Checks):
         self._flushed = monotonic()
 
     def close(self) -> None:
-        for file in self._files:
-            file.close()
+        with ExitStack() as files:  # each is closed, also when another cannot be (a full disk)
+            for file in self._files:
+                files.callback(file.close)
 
     def _open(self, path: Path, header: Iterable[str]) -> TextIO:
         file = path.open("x", encoding="utf-8", newline="\n")

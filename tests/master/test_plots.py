@@ -96,7 +96,8 @@ def test_a_run_that_stopped_at_its_second_row_is_drawn(tmp_path):
     ],
     ids=["no residual", "no force", "stiff", "negative", "all zero", "unknown phase", "extreme", "alternating"],
 )
-def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, columns):
+def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, monkeypatch, columns):
+    monkeypatch.setattr(plots, "_DPI", 40)
     plot_run(a_trajectory(events=EVERY_EVENT, **columns), tmp_path)
     assert [str(warning.message) for warning in recwarn] == []
 

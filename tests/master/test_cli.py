@@ -1,0 +1,393 @@
+"""The command: exit codes, what it prints and where, and what an interruption leaves."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import springbeam.runner
+from springbeam import cli
+from springbeam.fmu import FmuError
+from springbeam.recording import PICTURES, load_trajectory
+from springbeam.runner import RunStopped
+from springbeam.scene import shipped_scenes
+from springbeam.trajectory import Event
+
+SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
+
+
+def fake_run(scene, recorder, progress=None):
+    """Steps, as the real runner reports them."""
+    for i in range(31):
+        t = i / 30 * scene.time.t_end
+        recorder.row(dict.fromkeys(recorder.columns, 0.1 * i) | {"time": t, "phase": "free"})
+        if scene.beam is not None:
+            recorder.shape(t, np.full(21, 0.1 * i))
+        if progress is not None:
+            progress(t, "free", i)
+    recorder.event(Event(0.1, "impact", 0.5, -1.0, 0.5, -1.0, 0.25, 0.0, 0.125))
+    recorder.finish(SUMMARY)
+    return SUMMARY
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(springbeam.runner, "run", fake_run)
+    for name in ("COLUMNS", "TERMINAL_WIDTH", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS"):
+        monkeypatch.delenv(name, raising=False)
+    return tmp_path
+
+
+def springbeam_command(*arguments):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+def replace_run(monkeypatch, error, after=fake_run):
+    def run(scene, recorder, progress=None):
+        class Stop:
+            columns = recorder.columns
+            row, event, shape = recorder.row, recorder.event, recorder.shape
+
+            def finish(self, summary):
+                pass
+
+        if after is not None:
+            after(scene, Stop(), progress)
+        raise error
+
+    monkeypatch.setattr(springbeam.runner, "run", run)
+
+
+# -- a run that ends well -----------------------------------------------------------------------------------------
+
+
+def test_a_run_leaves_results_and_pictures_and_says_where(here):
+    result = springbeam_command("run", "soft")
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    assert sorted(path.name for path in (here / "results" / "soft").iterdir()) == sorted(
+        ["trajectory.csv", "events.csv", "shapes.csv", "summary.json", *PICTURES]
+    )
+    assert "results   results/soft\n" in result.stdout
+    assert "pictures  results/soft/*.png (5)" in result.stdout
+    assert "largest relative residual 3.0e-14" in result.stdout
+    assert "31 macro steps" in result.stdout
+    (event,) = [line for line in result.stdout.splitlines() if line.startswith("impact")]
+    assert event.split() == ["impact", "0.10000000", "0.5", "-1", "0.25", "0.125"]
+
+
+def test_no_plots(here):
+    result = springbeam_command("run", "soft", "--no-plots")
+    assert result.exit_code == 0
+    assert not list((here / "results" / "soft").glob("*.png"))
+    assert "pictures" not in result.stdout
+
+
+def test_settings_reach_the_run_and_the_summary(here):
+    settings = ["--set", "time.t_end=2", "--set", "contact.law=compliance"]
+    assert springbeam_command("run", "soft", "--no-plots", *settings).exit_code == 0
+    result = load_trajectory(here / "results" / "soft")
+    assert result.time[-1] == 2.0
+    assert result.scene.contact.law == "compliance"
+
+
+def test_a_second_run_does_not_touch_the_first(here):
+    springbeam_command("run", "soft", "--no-plots")
+    first = (here / "results" / "soft" / "summary.json").stat().st_mtime_ns
+    result = springbeam_command("run", "soft", "--no-plots")
+    assert result.exit_code == 0
+    assert "results   results/soft-2\n" in result.stdout
+    assert (here / "results" / "soft" / "summary.json").stat().st_mtime_ns == first
+
+
+def test_results_are_named_after_the_file(here):
+    (here / "mine.toml").write_text(shipped_scenes()["soft"].read_text(encoding="utf-8"), encoding="utf-8")
+    assert springbeam_command("run", "mine.toml", "--no-plots").exit_code == 0
+    assert (here / "results" / "mine" / "trajectory.csv").exists()
+
+
+def test_force_replaces(here):
+    springbeam_command("run", "soft", "--out", "here", "--set", "time.t_end=1")
+    assert springbeam_command("run", "soft", "--out", "here", "--force", "--no-plots").exit_code == 0
+    assert load_trajectory(here / "here").time[-1] == 0.6
+    assert not list((here / "here").glob("*.png"))  # pictures of the earlier run would lie
+
+
+def test_quiet_prints_only_where(here):
+    result = springbeam_command("run", "soft", "--quiet", "--no-plots")
+    assert (result.stdout, result.stderr) == ("results/soft\n", "")
+
+
+def test_report_fits_80_columns_and_says_how_many_events_are_not_shown(here, monkeypatch):
+    def many(scene, recorder, progress=None):
+        for i in range(40):
+            recorder.event(Event(123.456789 + i, "stop_impact", -1.2345e-5, -1.234e-5, 0.1, 0.1, -1.234e-7, 1e-9, 1e-9))
+        fake_run(scene, recorder)
+
+    monkeypatch.setattr(springbeam.runner, "run", many)
+    result = springbeam_command("run", "soft", "--no-plots")
+    assert max(map(len, result.stdout.splitlines())) <= 80
+    assert "and 29 more in events.csv" in result.stdout
+
+
+def test_warnings_are_shown_as_they_are(here, monkeypatch):
+    def warned(scene, recorder, progress=None):
+        fake_run(scene, recorder)
+        recorder.finish({**SUMMARY, "warnings": ["[beam] is [bold]coarse[/bold]"]})
+
+    monkeypatch.setattr(springbeam.runner, "run", warned)
+    assert "warning   [beam] is [bold]coarse[/bold]" in springbeam_command("run", "soft", "--no-plots").stdout
+
+
+@pytest.mark.parametrize("name", ["duffing", "beam-on-stop"])
+def test_scenes_without_a_body(here, name):
+    result = springbeam_command("run", name)
+    assert result.exit_code == 0
+    assert "impact" in result.stdout
+
+
+# -- bad input: exit code 2, nothing written ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fragments"),
+    [
+        (["run", "sotf"], ["sotf: no such file", "did you mean soft?"]),
+        (["run", "broken.toml"], ["broken.toml", "not TOML"]),
+        (["run", "soft", "--set", "beam.densty=1"], ["[beam] densty", "did you mean density?"]),
+        (["run", "soft", "--set", "time.t_end=-1"], ["[time] t_end = -1", "greater than 0"]),
+        (["run", "soft", "--set", "t_end"], ["TABLE.KEY=VALUE"]),
+        (["run", "soft", "--out", "used"], ["used already holds results (summary.json)", "--force", "--out"]),
+        (["run", "soft", "--out", "broken.toml"], ["broken.toml", "exists"]),
+        (["run"], ["Missing argument", "SCENE"]),
+        (["run", "soft", "--sett", "a.b=1"], ["No such option", "--set"]),
+        (["rum", "soft"], ["No such command"]),
+    ],
+)
+def test_bad_input(here, arguments, fragments):
+    (here / "broken.toml").write_text("[time")
+    (here / "used").mkdir()
+    (here / "used" / "summary.json").write_text("precious")
+    result = springbeam_command(*arguments)
+    assert result.exit_code == 2
+    for fragment in fragments:
+        assert fragment in result.stderr
+    assert "Traceback" not in result.output
+    assert not (here / "results").exists()
+    assert (here / "used" / "summary.json").read_text() == "precious"
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="nothing is forbidden to root")
+def test_a_place_that_cannot_be_written_is_bad_input(here):
+    (here / "locked").mkdir(mode=0o500)
+    result = springbeam_command("run", "soft", "--out", "locked/run")
+    assert result.exit_code == 2
+    assert "locked" in result.stderr
+
+
+def test_a_missing_fmu_is_bad_input_and_leaves_nothing(here, monkeypatch):
+    replace_run(monkeypatch, FmuError("beam.fmu: not found; ./build.sh fmus builds it"), after=None)
+    result = springbeam_command("run", "soft")
+    assert result.exit_code == 2
+    assert result.stderr == "error: beam.fmu: not found; ./build.sh fmus builds it\n"
+    assert list((here / "results").iterdir()) == []
+
+
+# -- stopped early: exit code 3, what was computed is there -------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "fragments"),
+    [
+        (RunStopped("not converged", 0.6, 1e-3), "stopped", ["stopped", "not converged", "0.6"]),
+        (KeyboardInterrupt(), "interrupted", ["interrupted (reached t = 0.6 s of 0.6 s)"]),
+        (OSError(errno.ENOSPC, "No space left on device"), "stopped", ["No space left on device"]),
+    ],
+    ids=["stopped", "interrupted", "disk full"],
+)
+def test_a_run_that_stops_early(here, monkeypatch, error, status, fragments):
+    replace_run(monkeypatch, error)
+    result = springbeam_command("run", "soft")
+    assert result.exit_code == 3
+    for fragment in [*fragments, "what was computed is in results/soft"]:
+        assert fragment in result.stderr
+    assert "Traceback" not in result.output
+    trajectory = load_trajectory(here / "results" / "soft")
+    assert len(trajectory) == 31
+    assert trajectory.summary["status"] == status
+    assert (here / "results" / "soft" / PICTURES[2]).exists()
+
+
+def test_a_value_that_is_not_finite_stops_the_run(here, monkeypatch):
+    def run(scene, recorder, progress=None):
+        fake_run(scene, recorder)
+        recorder.row(dict.fromkeys(recorder.columns, float("nan")) | {"time": 0.7, "phase": "free"})
+
+    monkeypatch.setattr(springbeam.runner, "run", run)
+    result = springbeam_command("run", "soft", "--no-plots")
+    assert result.exit_code == 3
+    assert "u_tip = nan at t = 0.7 s" in result.stderr
+
+
+def test_an_unforeseen_error_is_not_hidden(here, monkeypatch):
+    replace_run(monkeypatch, ZeroDivisionError("a bug"))
+    result = springbeam_command("run", "soft")
+    assert result.exit_code == 1
+    assert isinstance(result.exception, ZeroDivisionError)
+    assert load_trajectory(here / "results" / "soft").summary["cause"] == "ZeroDivisionError: a bug"
+
+
+SLOW = """
+import sys, time
+import springbeam.runner
+from springbeam import cli
+
+def run(scene, recorder, progress=None):
+    for i in range(60_000):  # a minute, should nobody interrupt it
+        t = 1e-5 * i
+        recorder.row(dict.fromkeys(recorder.columns, 0.5) | {"time": t, "phase": "tied"})
+        if progress is not None:
+            progress(t, "tied", i)
+        if i == 50:
+            print("going", flush=True)
+        time.sleep(1e-3)
+
+springbeam.runner.run = run
+sys.argv[0] = "springbeam"
+cli.main()
+"""
+
+
+def slow_command(here, *arguments, stderr=subprocess.PIPE):
+    environment = {**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[1]), "TERM": "xterm", "COLUMNS": "80"}
+    return subprocess.Popen(
+        [sys.executable, "-c", SLOW, "run", "soft", "--no-plots", *arguments],
+        cwd=here, env=environment, stdout=subprocess.PIPE, stderr=stderr, text=True,
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_leaves_its_results(here, number):
+    process = slow_command(here, "--quiet")
+    assert process.stdout.readline() == "going\n"
+    process.send_signal(number)
+    output, errors = process.communicate(timeout=60)
+    assert process.returncode == 3
+    assert output == "results/soft\n"
+    assert "interrupted" in errors
+    assert "Traceback" not in errors
+    trajectory = load_trajectory(here / "results" / "soft")
+    assert len(trajectory) > 50
+    assert trajectory.summary["status"] == "interrupted"
+    assert trajectory.summary["time"] == trajectory.time[-1]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+def test_a_killed_run_can_be_loaded(here):
+    process = slow_command(here, "--quiet")
+    assert process.stdout.readline() == "going\n"
+    time.sleep(2.5)  # results reach the disk every second
+    process.kill()
+    process.communicate(timeout=60)
+    trajectory = load_trajectory(here / "results" / "soft")
+    assert len(trajectory) > 50
+    assert trajectory.summary["status"] == "running"
+    assert trajectory.scene.title
+
+
+# -- progress -----------------------------------------------------------------------------------------------------
+
+
+def read_all(terminal, into):
+    """What is written to a pseudo-terminal until its writers are gone (an error on Linux, an end elsewhere)."""
+    with suppress(OSError):
+        while chunk := os.read(terminal, 10_000):
+            into.append(chunk)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals")
+@pytest.mark.parametrize(("arguments", "shown"), [([], True), (["--quiet"], False)])
+def test_progress_is_for_terminals(here, arguments, shown):
+    ours, theirs = os.openpty()
+    process = slow_command(here, *arguments, stderr=theirs)
+    os.close(theirs)
+    seen = []
+    reader = threading.Thread(target=read_all, args=(ours, seen))
+    reader.start()
+    assert process.stdout.readline() == "going\n"
+    time.sleep(1.0)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    reader.join(60)
+    os.close(ours)
+    text = b"".join(seen).decode()
+    for fragment in ("t = ", "/0.6 s", "tied", "steps/s", "%"):
+        assert (fragment in text) is (shown or fragment == "t = ")  # the last message names t, too
+
+
+def test_no_progress_in_a_file(here):
+    process = slow_command(here)
+    assert process.stdout.readline() == "going\n"
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert "steps/s" not in errors
+    assert "\x1b" not in errors
+
+
+# -- the other commands -------------------------------------------------------------------------------------------
+
+
+def test_scenes_lists_what_is_shipped_within_80_columns(here):
+    result = springbeam_command("scenes")
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[0].split() == ["scene", "contains", "t_end", "[s]", "title"]
+    first_words = [line.split()[0] for line in lines if line and not line.startswith(" ")]
+    assert first_words[1:] == list(shipped_scenes())
+    (soft,) = [line for line in lines if line.startswith("soft ")]
+    assert "beam, spring, stop" in soft
+
+
+def test_version_is_that_of_the_package(here, monkeypatch):
+    monkeypatch.setattr(cli.metadata, "version", lambda name: {"springbeam": "1.2.3"}[name])
+    result = springbeam_command("--version")
+    assert (result.exit_code, result.stdout) == (0, "springbeam 1.2.3\n")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["run", "--help"], ["scenes", "--help"]])
+def test_help(here, arguments):
+    result = springbeam_command(*arguments)
+    assert result.exit_code == 0
+    assert max(map(len, result.stdout.splitlines())) <= 80
+
+
+def test_help_of_run_teaches_by_an_example(here):
+    text = " ".join(springbeam_command("run", "--help").stdout.split())
+    for fragment in ("springbeam run soft --set coupling.macro_step=5e-4", "--out", "--no-plots", "--force", "--quiet"):
+        assert fragment in text
+
+
+def test_completion_offers_shipped_scenes():
+    assert cli._complete_scene("so") == ["soft"]
+    assert cli._complete_scene("") == list(shipped_scenes())
+
+
+def test_summary_in_the_directory_is_the_runners(here):
+    springbeam_command("run", "soft", "--no-plots")
+    summary = json.loads((here / "results" / "soft" / "summary.json").read_text(encoding="utf-8"))
+    assert {key: summary[key] for key in SUMMARY} == SUMMARY
