@@ -1,0 +1,262 @@
+"""The pair end to end: both FMUs, the master, the shipped scenes."""
+
+from __future__ import annotations
+
+import csv
+import json
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.special import ellipk
+from typer.testing import CliRunner
+
+from springbeam import load_scene, simulate
+from springbeam.cli import app
+from springbeam.monolithic import event_driven
+from springbeam.scene import Scene, shipped_scenes, with_changes
+from springbeam.trajectory import Trajectory
+
+
+@lru_cache(maxsize=32)
+def run(name: str, size: float = 0.0, scheme: str = "", degree: int = 0, t_end: float = 0.0) -> Trajectory:
+    scene = load_scene(name)
+    coupling: dict[str, object] = {}
+    if size:
+        coupling["macro_step"] = size
+    if scheme:
+        coupling.update(scheme=scheme, degree=degree)
+    return simulate(with_changes(scene, coupling=coupling, **({"time": {"t_end": t_end}} if t_end else {})))
+
+
+def times(trajectory: Trajectory, kind: str) -> list[float]:
+    return [event.time for event in trajectory.events if event.kind == kind]
+
+
+# -- soft: the numbers of an event-driven solution of the same semi-discrete model ----------------------------------
+
+
+def test_soft_follows_its_first_events():
+    trajectory = run("soft", 2.5e-4)
+    impact, foundation, release = trajectory.events[:3]
+    assert [e.kind for e in (impact, foundation, release)] == ["impact", "stop_impact", "release"]
+    assert impact.time == 0.0
+    # J = (z − v)/(1/m_tip + 1/m) leaves both at m_tip v/(m_tip + m).
+    assert impact.z == pytest.approx(-0.0057403607, abs=1e-10)
+    assert impact.v_tip == pytest.approx(impact.z, abs=1e-15)
+    assert foundation.time == pytest.approx(0.0712240094, abs=1e-7)
+    assert release.time == pytest.approx(0.1443694562, abs=1e-6)
+    at = int(np.argmin(np.abs(trajectory.time - 0.05)))
+    assert trajectory.y[at] == pytest.approx(-0.0087444212, abs=1e-9)
+
+
+def test_soft_hermite_hands_the_right_velocity_to_the_impact():
+    foundation = run("soft", 1e-3, "hermite", 2, 0.3).events[1]
+    assert foundation.z == pytest.approx(0.2986839623, abs=2e-10)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "degree", "sizes", "order", "allowed"),
+    [
+        # Orders of the displacement in a smooth tied phase.
+        ("energy", 0, (5e-4, 2.5e-4), 4, 0.4),
+        ("energy", 1, (1e-3, 5e-4), 4, 0.4),
+        ("energy", 2, (2e-3, 1e-3), 8, 2.5),  # one halving only: below, IDA's tolerance is reached
+        ("hermite", 1, (1e-3, 5e-4), 4, 0.4),
+        ("hermite", 2, (2e-3, 1e-3), 6, 0.4),
+    ],
+)
+def test_displacement_converges_with_the_order_of_the_scheme(scheme, degree, sizes, order, allowed):
+    errors = []
+    for size in sizes:
+        trajectory = run("soft", size, scheme, degree, 0.3)
+        rows = np.flatnonzero((trajectory.time > 0.0) & (trajectory.time < 0.07))
+        reference = event_driven.simulate(trajectory.scene, sample_times=trajectory.time[rows])
+        errors.append(np.abs(trajectory.y[rows] - reference.y[: len(rows)]).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=allowed)
+
+
+def test_hermite_keeps_its_order_through_events():
+    """Foundation impact, release, second meeting at H = 1e-3: 1e-10, 1e-10, 1e-7 s; and 6th order from 2H to H."""
+    reference = event_driven.simulate(run("soft", 1e-3, "hermite", 2, 0.3).scene).events
+    errors = {
+        size: [a.time - b.time for a, b in zip(run("soft", size, "hermite", 2, 0.3).events[1:4], reference[1:4], strict=True)]
+        for size in (2e-3, 1e-3)
+    }
+    assert np.all(np.abs(errors[1e-3]) < [1e-10, 1e-10, 1e-7])
+    # The second meeting; the others are at IDA's tolerance.
+    assert np.log2(errors[2e-3][2] / errors[1e-3][2]) == pytest.approx(6.0, abs=0.5)
+
+
+# -- energy ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("factor", [1.0, 5.0, 0.2])
+@pytest.mark.parametrize(
+    ("name", "bound"),
+    [
+        ("soft", 1e-9),
+        ("steel-bumper", 1e-9),
+        ("beam-on-stop", 1e-9),
+        *((f"paper-fig{k}", 1e-7) for k in (2, 3, 4, 5)),
+    ],
+)
+def test_energy_is_conserved_at_any_macro_step(name, factor, bound):
+    scene = load_scene(name)
+    trajectory = run(name, scene.coupling.macro_step * factor)
+    assert trajectory.time[-1] == scene.time.t_end
+    assert trajectory.summary["max_energy_residual"] <= bound
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_energy_of_higher_degree_conserves_too(degree):
+    assert run("soft", 2e-3, "energy", degree).summary["max_energy_residual"] <= 1e-9
+
+
+def test_hermite_says_when_the_macro_step_is_too_large():
+    summary = run("soft", 6e-3, "hermite", 2).summary
+    assert summary["max_energy_residual"] > 1e-3
+    assert any("hermite of degree 2" in warning for warning in summary["warnings"])
+
+
+# -- other parameter sets against the reference ---------------------------------------------------------------------
+
+CASES = {
+    "damped": {"beam": {"alpha_b": 1e-3}, "spring": {"damping": 2.0}},
+    "lossy stop": {"stop": {"restitution": 0.3}},
+    "loads": {"beam": {"distributed_load": -0.7}, "spring": {"external_force": 0.2}},
+    "masses": {"beam": {"density": 2.5}, "spring": {"mass": 0.2, "linear_stiffness": 40.0, "cubic_stiffness": 300.0}},
+    "shifted": {
+        "spring": {"equilibrium": 0.1, "linear_stiffness": 5.0},
+        "stop": {"position": 0.08},
+        "beam": {"initial_deflection_slope": 0.1},
+    },
+    "slender": {"beam": {"second_moment_of_area": 0.05, "reduced_integration": True, "n_elements": 20}},
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_agrees_with_the_reference(case):
+    """H = 2.5e-4: displacement to 1e-8 before the foundation, first two events to 1e-6 s."""
+    scene = with_changes(load_scene("soft"), time={"t_end": 0.25}, coupling={"macro_step": 2.5e-4}, **CASES[case])
+    trajectory = simulate(scene)
+    reference = event_driven.simulate(scene)
+    for ours, theirs in zip(trajectory.events[1:3], reference.events[1:3], strict=True):
+        assert ours.kind == theirs.kind
+        assert ours.time == pytest.approx(theirs.time, abs=1e-6)
+    first = trajectory.events[1].time
+    rows = np.flatnonzero((trajectory.time > 0.0) & (trajectory.time < first))
+    sampled = event_driven.simulate(scene, sample_times=trajectory.time[rows], t_end=scene.time.t_end)
+    assert np.abs(trajectory.y[rows] - np.interp(trajectory.time[rows], sampled.time, sampled.y)).max() < 1e-8
+    assert trajectory.summary["max_energy_residual"] < 1e-9
+
+
+def test_bounces_die_out_and_the_spring_stays_seated():
+    """A constant load presses tip and spring onto the foundation: N settles at the static balance."""
+    scene = with_changes(
+        load_scene("soft"),
+        time={"t_end": 1.5},
+        beam={"alpha_b": 0.05, "distributed_load": -60.0, "initial_velocity_slope": -0.1},
+        stop={"restitution": 0.3},
+        coupling={"macro_step": 1e-3},
+    )
+    trajectory = simulate(scene)
+    assert "seated" in [event.kind for event in trajectory.events]
+    assert trajectory.phase[-1] == "seated"
+    assert trajectory.y[-1] == pytest.approx(-0.015, abs=1e-12)
+    spring = scene.spring
+    static = trajectory.contact_force[-1] + spring.linear_stiffness * -0.015 + spring.cubic_stiffness * -(0.015**3)
+    assert trajectory.foundation_force[-1] == pytest.approx(static, rel=1e-12)
+    assert trajectory.foundation_force.min() > -1e-9 * trajectory.foundation_force.max()
+
+
+# -- a scene pays for what it contains ------------------------------------------------------------------------------
+
+
+def test_duffing_alone_has_the_exact_period():
+    """Softening, from rest at A: T = 4K(m)/ω, ω² = k1 + k2A²/2, m = −k2A²/2ω²."""
+    trajectory = run("duffing")
+    w2 = 3.0 - 0.2 * 0.5**2 / 2
+    period = 4.0 * ellipk(0.2 * 0.5**2 / 2 / w2) / np.sqrt(w2)
+    y = trajectory.y
+    falling = np.flatnonzero((y[:-1] > 0.0) & (y[1:] <= 0.0))
+    # Zero of the cubic through displacement and velocity at both ends: error O(H⁴).
+    zeros = []
+    for i in falling:
+        t0, t1 = trajectory.time[i : i + 2]
+        h = t1 - t0
+        z0, z1 = trajectory.z[i] * h, trajectory.z[i + 1] * h
+        cubic = [z0 + z1 - 2 * (y[i + 1] - y[i]), 3 * (y[i + 1] - y[i]) - 2 * z0 - z1, z0, y[i]]
+        zeros.append(t0 + h * next(r.real for r in np.roots(cubic) if abs(r.imag) < 1e-9 and 0 <= r.real <= 1))
+    assert np.diff(zeros) == pytest.approx(period, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("name", "loaded", "absent"),
+    [("duffing", "spring", "beam"), ("beam-on-stop", "beam", "spring"), ("bar-impact", "beam", "spring")],
+)
+def test_a_missing_body_is_neither_loaded_nor_stepped(name, loaded, absent):
+    trajectory = run(name)
+    assert trajectory.summary[f"{loaded}_steps"] > 0
+    assert f"{absent}_steps" not in trajectory.summary
+    assert ("u_tip" in trajectory.columns) == (loaded == "beam")
+    assert ("y" in trajectory.columns) == (loaded == "spring")
+
+
+def test_bar_impact_converges_to_the_exact_impulse():
+    """u_tt = u_xx on a rigid stop: contact from 1 to 2, impulse 1/2, energy 1/8. First order in mesh and H."""
+    errors = []
+    for n in (25, 50, 100):
+        scene = with_changes(load_scene("bar-impact"), beam={"n_elements": n}, coupling={"macro_step": 0.5 / n})
+        trajectory = simulate(scene)
+        assert trajectory.e_beam[0] == pytest.approx(0.125, rel=1e-9)
+        force = trajectory.foundation_force
+        impulse = float(np.sum(force[1:] * np.diff(trajectory.time)))
+        impulse += sum(e.impulse_foundation for e in trajectory.events)
+        errors.append(abs(impulse - 0.5))
+    assert errors[2] < errors[0]
+    assert errors[2] < 0.02
+
+
+def test_reduced_integration_is_what_the_steel_bumper_needs():
+    """Static tip compliance: full (1/3EI + 1/KAG)/(1 + KAG h²/12EI), reduced (1 − h²/4)/3EI + 1/KAG (L = 1)."""
+    beam = load_scene("steel-bumper").beam
+    ei, kag = beam.young_modulus * beam.second_moment_of_area, beam.shear_coefficient * beam.shear_modulus * beam.area
+    h = beam.length / beam.n_elements
+    locking = 1.0 + kag * h * h / (12.0 * ei)
+    assert locking == pytest.approx(3.01, abs=0.01)
+
+
+# -- the command ----------------------------------------------------------------------------------------------------
+
+
+def test_every_shipped_scene_is_valid():
+    assert len(shipped_scenes()) >= 9
+    assert all(isinstance(load_scene(path), Scene) for path in shipped_scenes().values())
+
+
+def test_run_leaves_the_promised_files(tmp_path):
+    out = tmp_path / "out"
+    result = CliRunner().invoke(app, ["run", "soft", "--out", str(out), "--set", "time.t_end=0.1"])
+    assert result.exit_code == 0, result.output
+    header = next(csv.reader((out / "trajectory.csv").open()))
+    promised = (
+        "time,u_tip,v_tip,y,z,contact_force,foundation_force,gap,phase,e_beam,e_spring,e_contact,e_dissipated,"
+        "e_impact_loss,e_total,energy_residual"
+    )
+    assert set(promised.split(",")) <= set(header)
+    assert (out / "events.csv").read_text().startswith(
+        "time,kind,y,z,u_tip,v_tip,impulse_contact,impulse_foundation,energy_loss\n"
+    )
+    summary = json.loads((out / "summary.json").read_text())
+    assert {"scene", "version", "wall_time", "macro_steps", "beam_steps", "spring_steps", "events", "warnings"} <= set(
+        summary
+    )
+    assert len(list(out.glob("*.png"))) == 5
+
+
+def test_bad_input_is_exit_code_2(tmp_path):
+    result = CliRunner().invoke(app, ["run", "soft", "--set", "spring.mas=1", "--out", str(tmp_path / "x")])
+    assert result.exit_code == 2
+    assert "mas" in result.output
+    assert not (tmp_path / "x").exists()
