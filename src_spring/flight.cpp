@@ -16,7 +16,8 @@ constexpr double safety = 0.03, safety_per_rate = 10.0;
 constexpr double noise_margin = 20.0;
 // Taylor terms are used while H × (rate of the spring) is below this; beyond, they would only cancel.
 constexpr double resolved_limit = 3.0;
-// H / first step = 2ᵏ. IDA doubles step and order from 1 to 5, so 8 is the least that brings it to order 4.
+// H / first step = 2ᵏ, so that it does not vary with the forces but in rare jumps. IDA doubles step and order until
+// order 5; k = 3 brings it to order 3 at least.
 constexpr int least_halvings = 3, most_halvings = 48;
 
 enum Unknown { q, p, A, B, e, unknowns };
@@ -80,10 +81,9 @@ void Flight::prepare(const FlightStart& start) {
   const double velocity = std::abs(z) + std::abs(d[2]) * span;
   const double displacement = std::abs(y) + velocity * span;
   const double share = safety / (1.0 + safety_per_rate * std::min(H * rate, resolved_limit));
-  const double tolerance_z =
-      std::max(share * (laws_.relative_tolerance * velocity + laws_.absolute_tolerance), noise);
-  const double tolerance_y = std::max(
-      share * (laws_.relative_tolerance * displacement + laws_.absolute_tolerance), noise * span);
+  const double tolerance_z = std::max(share * (laws_.relative_tolerance * velocity + laws_.absolute_tolerance), noise);
+  const double tolerance_y =
+      std::max(share * (laws_.relative_tolerance * displacement + laws_.absolute_tolerance), noise * span);
   relative_ = std::max(share * laws_.relative_tolerance, 50.0 * epsilon);
   double* tolerance = solver_.absolute_tolerance();
   tolerance[q] = tolerance[A] = tolerance[B] = tolerance_y;
@@ -102,7 +102,8 @@ void Flight::prepare(const FlightStart& start) {
     limit(tolerance_z / std::abs(d[3]), 0.5);
     if (order == 0) limit(tolerance_y / std::abs(d[2]), 0.5);
   }
-  int halvings = std::max(least_halvings, static_cast<int>(std::ceil(std::log2(H / h))));
+  int halvings =
+      static_cast<int>(std::clamp(std::ceil(std::log2(H / h)), double{least_halvings}, double{most_halvings}));
   if (touching_ && order < Taylor::max_order) {
     // The power law has no second derivative or outgrows its rates at the start: the velocity from its growth instead.
     const auto growth = [&](double t) {
@@ -111,7 +112,7 @@ void Flight::prepare(const FlightStart& start) {
     };
     while (halvings < most_halvings && growth(std::ldexp(H, -halvings)) > tolerance_z) ++halvings;
   }
-  h0_ = std::ldexp(1.0, -std::min(halvings, most_halvings));
+  h0_ = std::ldexp(1.0, -halvings);
 
   double* Y = solver_.initial_value();
   double* Yp = solver_.initial_derivative();
@@ -171,8 +172,8 @@ bool Flight::residual(double s, const double* Y, const double* Yp, double* F) co
   double contact = 0.0;
   if (touching_) {
     const auto& c = contact_taylor_;
-    contact = motion_.compliance().continued_force(contact_depth(R_.rise(t) + Y[q], t)) -
-              (c[0] + t * (c[1] + t * c[2] / 2));
+    contact =
+        motion_.compliance().continued_force(contact_depth(R_.rise(t) + Y[q], t)) - (c[0] + t * (c[1] + t * c[2] / 2));
   }
   F[q] = Yp[q] - Y[p];
   F[p] = Yp[p] - H * H * motion_.excess_acceleration(R_(t), Y[q], w, remainder(t), contact);

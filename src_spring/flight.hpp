@@ -3,8 +3,8 @@
 // With R the Taylor polynomial of the start (taylor.hpp), scaled time s = τ/H, w = ẏ − Ṙ:
 //     q = y − R,   p = H w,   A = ∫₀ˢ q,   B = ∫₀ˢ A,   e = D − ∫ α_s Ṙ² dτ        (D: dissipated energy)
 //     F = ( q' − p,   p' − H²[ÿ(y, ẏ, τ) − R̈],   A' − q,   B' − A,   e' − H α_s w (2Ṙ + w) ) = 0,
-// where ÿ − R̈ is evaluated without cancellation (motion.hpp). q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H² B.
-// All unknowns are under error control, see tolerances in flight.cpp.
+// where ÿ − R̈ is evaluated without cancellation (motion.hpp). q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H²
+// B. All unknowns are under error control, see tolerances in flight.cpp.
 //
 // Events: [hilltop] |y| reaches the hilltop; [stop] y − φ falls to 0; [contact] y − u_tip changes sign. A gap that
 // starts at 0 is divided by its leading power of τ, so that the start itself is no root; a rate (ẏ, ẏ − u̇_tip) that
@@ -33,10 +33,10 @@ struct Laws {
 struct FlightStart {
   double y, z;
   Loads loads;
-  double size;          ///< H [s]
-  double gap;           ///< y − φ, exactly 0 after a stop event
-  double depth;         ///< y − u_tip, exactly 0 after a contact event
-  bool released;        ///< from the stop, N = 0: ÿ = 0 by definition
+  double size;    ///< H [s]
+  double gap;     ///< y − φ, exactly 0 after a stop event
+  double depth;   ///< y − u_tip, exactly 0 after a contact event
+  bool released;  ///< from the stop, N = 0: ÿ = 0 by definition
 };
 
 class Flight final : public ImplicitSystem {
@@ -75,7 +75,7 @@ class Flight final : public ImplicitSystem {
   // The segment.
   FlightStart start_{};
   Taylor R_;
-  std::array<double, 13> remainder_{};     ///< of the equation of motion along R
+  std::array<double, 13> remainder_{};      ///< of the equation of motion along R
   std::array<double, 3> contact_taylor_{};  ///< contact force terms that R accounts for
   bool touching_ = false;
   double contact_sign_ = 1.0;

@@ -12,8 +12,8 @@ namespace {
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr double root_bracket = 400.0 * epsilon;  ///< IDA's is 100 ε (s + h), s and h ≤ 1
 constexpr int max_order = 5;
-// Newton's remainder, relative to the tolerance: small, or it is noise in the error estimate (IDA's default, 0.33, costs
-// more steps than it saves iterations).
+// Newton's remainder, relative to the tolerance: small, or it is noise in the error estimate (IDA's default, 0.33,
+// costs more steps than it saves iterations).
 constexpr double newton_share = 0.01;
 constexpr int max_error_failures = 40;  ///< in one internal step: a first step that is far too long recovers
 constexpr long max_steps = 10'000'000;  ///< per start(); a step that needs more is refused
@@ -137,8 +137,6 @@ IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings) : imp
 
 IdaSolver::~IdaSolver() = default;
 
-int IdaSolver::unknowns() const { return impl_->n; }
-int IdaSolver::event_functions() const { return static_cast<int>(impl_->occurred.size()); }
 double* IdaSolver::initial_value() { return data(impl_->Y0.get()); }
 double* IdaSolver::initial_derivative() { return data(impl_->Yp0.get()); }
 double* IdaSolver::absolute_tolerance() { return data(impl_->tolerance.get()); }
@@ -210,12 +208,6 @@ long IdaSolver::steps() const {
   long steps = 0;
   impl_->check(IDAGetNumSteps(impl_->ida.get(), &steps), "IDAGetNumSteps");
   return steps;
-}
-
-long IdaSolver::residual_evaluations() const {
-  long evaluations = 0;
-  impl_->check(IDAGetNumResEvals(impl_->ida.get(), &evaluations), "IDAGetNumResEvals");
-  return evaluations;
 }
 
 }  // namespace spring

@@ -37,9 +37,6 @@ class IdaSolver {
   IdaSolver(const IdaSolver&) = delete;
   IdaSolver& operator=(const IdaSolver&) = delete;
 
-  int unknowns() const;
-  int event_functions() const;
-
   /// Fill in before start(): consistent Y(0), Y'(0) and the absolute tolerance of each unknown.
   double* initial_value();
   double* initial_derivative();
@@ -52,14 +49,13 @@ class IdaSolver {
   /// Go on to s = 1 or to the next event, whichever comes first. @throws IdaError
   Outcome advance();
 
-  double s() const;                 ///< reached
-  const double* value() const;      ///< Y(s)
-  bool occurred(int event) const;   ///< after Outcome::event
+  double s() const;                ///< reached
+  const double* value() const;     ///< Y(s)
+  bool occurred(int event) const;  ///< after Outcome::event
   /// After Outcome::event, for a distance and its rate among the event functions: the distance passed 0, or is found
   /// below 0 at its minimum; s() and value() are then moved back to where it passed 0.
   bool fell(int distance, int rate);
-  long steps() const;               ///< internal steps since start()
-  long residual_evaluations() const;
+  long steps() const;  ///< internal steps since start()
 
  private:
   double event_value(int event) const;

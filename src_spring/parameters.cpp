@@ -42,8 +42,8 @@ void check(const Parameters& p) {
   require_finite("displacement", p.displacement);
   require_finite("velocity", p.velocity);
   if (p.cubic_stiffness < 0.0 && p.linear_stiffness <= 0.0)
-    throw std::invalid_argument("spring: linear_stiffness = " + number(p.linear_stiffness) + ", cubic_stiffness = " +
-                                number(p.cubic_stiffness) +
+    throw std::invalid_argument("spring: linear_stiffness = " + number(p.linear_stiffness) +
+                                ", cubic_stiffness = " + number(p.cubic_stiffness) +
                                 ": a softening spring (cubic_stiffness < 0) needs linear_stiffness > 0, "
                                 "else there is no potential well");
   if (std::abs(p.displacement) > hilltop(p))

@@ -29,7 +29,7 @@ class Seated final : public ImplicitSystem {
   /// @pre holds(). @throws IdaError
   Event run(const SeatedStart& start);
 
-  double elapsed() const;                     ///< τ
+  double elapsed() const;                      ///< τ
   double impulse() const { return impulse_; }  ///< ∫N [N·s]
   const IdaSolver& solver() const { return solver_; }
 

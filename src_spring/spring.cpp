@@ -22,9 +22,9 @@ struct State {
   double integral = 0.0, integral_2 = 0.0;
   double dissipated = 0.0, impact_loss = 0.0;
   double stop_force = 0.0, stop_impulse = 0.0;
-  double seated = 0.0;               ///< 1 on the foundation
-  double force = 0.0, tip = 0.0;     ///< F and u_tip where the step ended
-  double steps = 0.0;                ///< IDA's, since the start
+  double seated = 0.0;            ///< 1 on the foundation
+  double force = 0.0, tip = 0.0;  ///< F and u_tip where the step ended
+  double steps = 0.0;             ///< IDA's, since the start
 };
 
 template <class Visit>
@@ -48,12 +48,8 @@ struct Spring::Impl {
   explicit Impl(const Parameters& p)
       : parameters(p),
         motion(p),
-        laws{hilltop(p),
-             p.stop_enabled,
-             p.stop_position,
-             p.contact_law == ContactLaw::normal_compliance,
-             p.relative_tolerance,
-             p.absolute_tolerance},
+        laws{hilltop(p),           p.stop_enabled,      p.stop_position, p.contact_law == ContactLaw::normal_compliance,
+             p.relative_tolerance, p.absolute_tolerance},
         flight(motion, laws),
         state{p.displacement, p.velocity} {
     if (laws.stop) seated.emplace(motion, laws);
@@ -155,8 +151,8 @@ class Step {
                        " m of the softening spring, reached " + number(t_) + " s after the step's start",
                    t_);
     if (laws_.stop)
-      state_.y = event == Flight::Event::stop ? laws_.stop_position
-                                              : laws_.stop_position + std::max(flight_.gap(), 0.0);
+      state_.y =
+          event == Flight::Event::stop ? laws_.stop_position : laws_.stop_position + std::max(flight_.gap(), 0.0);
     depth_.reset();
     if (event == Flight::Event::contact) depth_ = 0.0;
     if (event == Flight::Event::none) t_ = size_;
@@ -198,10 +194,10 @@ class Step {
   State state_;
   const double size_;
   const Loads loads_;
-  double t_ = 0.0;                ///< since the step's start
-  Loads now_;                     ///< loads_ from t_ on
-  std::optional<double> depth_;   ///< y − u_tip at t_, exactly 0 after a contact event
-  bool released_ = false;         ///< has just left the foundation, N = 0
+  double t_ = 0.0;               ///< since the step's start
+  Loads now_;                    ///< loads_ from t_ on
+  std::optional<double> depth_;  ///< y − u_tip at t_, exactly 0 after a contact event
+  bool released_ = false;        ///< has just left the foundation, N = 0
 };
 
 }  // namespace
@@ -271,6 +267,9 @@ void Spring::restore(const std::vector<double>& state) {
   if (state.size() != state_length)
     throw std::invalid_argument("spring: a saved state has " + std::to_string(state_length) + " numbers, not " +
                                 std::to_string(state.size()));
+  for (double value : state)
+    if (!std::isfinite(value))
+      throw std::invalid_argument("spring: a saved state holds " + number(value) + ": must be finite");
   std::size_t i = 0;
   for_each(impl_->state, [&](double& value) { value = state[i++]; });
 }

@@ -1,7 +1,8 @@
 // The Duffing spring with its foundation, integrated by SUNDIALS IDA as an implicit system F(t, Y, Ẏ) = 0.
 //     m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s        (Ahn & Tate, eq. (6)),      up is positive.
 // C comes from outside (contact_law external) or from the normal compliance C = λ_nc (y − u_tip)₊^p inside;
-// N comes from outside or, with the stop enabled, from Signorini's condition (8) with restitution.
+// N comes from outside or, with the stop enabled, from Signorini's condition (8) with restitution:
+//     0 ≤ N ⊥ y − φ ≥ 0,   z⁺ = −e z⁻ at an impact. Impacts that die out end seated, y = φ, until N would be < 0.
 #pragma once
 
 #include <array>
@@ -20,7 +21,7 @@ struct Parameters {
   double damping = 0.0;           ///< α_s [N·s/m]
   double linear_stiffness = 1.0;  ///< k1 [N/m]
   double cubic_stiffness = 0.0;   ///< k2 [N/m³]
-  double equilibrium = 0.0;       ///< Ψ [m], where the top rests
+  double equilibrium = 0.0;       ///< Ψ [m], where the top is met; (6) has its spring force 0 at y = 0 all the same
   double displacement = 0.0;      ///< y at the start [m]
   double velocity = 0.0;          ///< ẏ at the start [m/s]
   ContactLaw contact_law = ContactLaw::external;
@@ -92,7 +93,7 @@ class Spring {
 
   /// The whole dynamic state as a flat vector of fixed length.
   void save(std::vector<double>& state) const;
-  /// @throws std::invalid_argument if the length does not fit; the state is then unchanged
+  /// @throws std::invalid_argument if the length does not fit or a number is not finite; the state is then unchanged
   void restore(const std::vector<double>& state);
 
  private:

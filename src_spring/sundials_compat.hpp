@@ -1,5 +1,6 @@
 // What differs between SUNDIALS 6.x and 7.x, in one place.
-//     6: SUNContext_Create(void*, …), IDASetErrHandlerFn      7: SUNContext_Create(SUNComm, …), SUNContext_PushErrHandler
+//     6: SUNContext_Create(void*, …), IDASetErrHandlerFn      7: SUNContext_Create(SUNComm, …),
+//     SUNContext_PushErrHandler
 #pragma once
 
 #include <ida/ida.h>

@@ -24,13 +24,10 @@ class Taylor {
   double rise(double t) const { return t * (d_[1] + t * (d_[2] / 2 + t * (d_[3] / 6 + t * d_[4] / 24))); }
   double rate(double t) const { return d_[1] + t * (d_[2] + t * (d_[3] / 2 + t * d_[4] / 6)); }
   /// y⁽ᵏ⁾/k!
-  std::array<double, max_order + 1> coefficients() const {
-    return {d_[0], d_[1], d_[2] / 2, d_[3] / 6, d_[4] / 24};
-  }
-  double second(double t) const { return d_[2] + t * (d_[3] + t * d_[4] / 2); }
+  std::array<double, max_order + 1> coefficients() const { return {d_[0], d_[1], d_[2] / 2, d_[3] / 6, d_[4] / 24}; }
 
-  double integral(double t) const;             ///< ∫₀ᵗ R
-  double integral_2(double t) const;           ///< ∫₀ᵗ∫ R
+  double integral(double t) const;               ///< ∫₀ᵗ R
+  double integral_2(double t) const;             ///< ∫₀ᵗ∫ R
   double squared_rate_integral(double t) const;  ///< ∫₀ᵗ Ṙ²
 
  private:

@@ -47,7 +47,8 @@ inline double complete_elliptic(double m) {
 }
 
 /// Free, undamped Duffing motion m = 1 from rest at A.
-///   k2 > 0: y = A cn(ωt|m), ω² = k1 + k2A², m = k2A²/2ω².   k2 < 0: y = A sn(ωt + K|m), ω² = k1 + k2A²/2, m = −k2A²/2ω².
+///   k2 > 0: y = A cn(ωt|m), ω² = k1 + k2A², m = k2A²/2ω².   k2 < 0: y = A sn(ωt + K|m), ω² = k1 + k2A²/2, m =
+///   −k2A²/2ω².
 struct Duffing {
   double A, omega, m, K;
   bool softening;

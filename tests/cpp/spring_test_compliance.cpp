@@ -88,7 +88,8 @@ TEST(SpringCompliance, PeriodOfABilinearOscillator) {
 }
 
 // A free mass thrown against the tip: by energy it comes back with the speed it had, after
-//     T = 2 (δ/v) √π Γ(1 + 1/(p+1)) / Γ(1/2 + 1/(p+1)),    δ = ((p+1) m v² / 2λ)^{1/(p+1)}     (p = 3/2: Hertz, 2.943 δ/v).
+//     T = 2 (δ/v) √π Γ(1 + 1/(p+1)) / Γ(1/2 + 1/(p+1)),    δ = ((p+1) m v² / 2λ)^{1/(p+1)}     (p = 3/2: Hertz, 2.943
+//     δ/v).
 class Rebound : public testing::TestWithParam<std::tuple<double, double>> {};
 
 TEST_P(Rebound, TimeAndSpeed) {
@@ -112,10 +113,12 @@ TEST_P(Rebound, TimeAndSpeed) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Laws, Rebound,
-                         testing::Combine(testing::Values(1e2, 1e4, 1e8, 1e12), testing::Values(1.0, 1.5, 2.0, 2.2, 3.0)));
+                         testing::Combine(testing::Values(1e2, 1e4, 1e8, 1e12),
+                                          testing::Values(1.0, 1.5, 2.0, 2.2, 3.0)));
 
 // The tip passes through the top's position and back within one step: the touch must not be stepped over.
-// Parabola u = d − v τ + a τ²/2 that dips δ below y: for p = 1 and a heavy mass the impulse is λ ∫(y − u)₊ = λ (2/3) δ · 2√(2δ/a).
+// Parabola u = d − v τ + a τ²/2 that dips δ below y: for p = 1 and a heavy mass the impulse is λ ∫(y − u)₊ = λ (2/3) δ
+// · 2√(2δ/a).
 TEST(SpringCompliance, AShortTouchWithinOneStepCounts) {
   for (const double dip : {1e-4, 1e-6, 1e-8}) {
     Parameters p = compliant(1e6, 1.0);

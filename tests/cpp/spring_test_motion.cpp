@@ -166,15 +166,16 @@ TEST(Spring, OscillatorUnderQuadraticForceWithIntegrals) {
     const double size = 0.15;
     EXPECT_NEAR(s.displacement(), p0 + p1 * H + p2 * H * H / 2 + a * c + b * sn, 1e-12 * size);
     EXPECT_NEAR(s.velocity(), p1 + p2 * H + w * (b * c - a * sn), 1e-12 * size * w);
-    EXPECT_NEAR(s.displacement_integral(),
-                p0 * H + p1 * H * H / 2 + p2 * H * H * H / 6 + (a * sn + b * vers) / w, 1e-12 * size * H);
+    EXPECT_NEAR(s.displacement_integral(), p0 * H + p1 * H * H / 2 + p2 * H * H * H / 6 + (a * sn + b * vers) / w,
+                1e-12 * size * H);
     EXPECT_NEAR(s.displacement_integral_2(),
                 p0 * H * H / 2 + p1 * H * H * H / 6 + p2 * std::pow(H, 4) / 24 + (a * vers + b * (w * H - sn)) / k,
                 1e-12 * size * H * H);
   }
 }
 
-// E + D − work of the forces is constant; all terms have their own way through the integrator. Damped, hardening, driven.
+// E + D − work of the forces is constant; all terms have their own way through the integrator. Damped, hardening,
+// driven.
 TEST(Spring, EnergyBalance) {
   Parameters p = duffing(150.0, 67.0, 0.4, 1.0);
   p.damping = 0.8;

@@ -108,7 +108,8 @@ TEST(SpringInputs, ImpossibleStepsAndInputsAreRefusedAndChangeNothing) {
   Spring s(softening());
   s.step(0.01, Inputs{});
   const auto before = saved(s);
-  for (const double size : {0.0, -1e-3, not_a_number, infinity}) EXPECT_THROW(s.step(size, Inputs{}), std::invalid_argument);
+  for (const double size : {0.0, -1e-3, not_a_number, infinity})
+    EXPECT_THROW(s.step(size, Inputs{}), std::invalid_argument);
   Inputs inputs;
   inputs.contact_force[2] = not_a_number;
   EXPECT_THROW(s.step(0.01, inputs), std::invalid_argument);

@@ -1,0 +1,251 @@
+// The layers below the spring: IDA wrapper and its events, Jacobians, Taylor polynomial.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "flight.hpp"
+#include "ida_solver.hpp"
+#include "parameters.hpp"
+#include "seated.hpp"
+#include "spring_support.hpp"
+
+using namespace spring;
+using spring_test::epsilon;
+
+namespace {
+
+/// Y₀' = Y₁, Y₁' = −ω² Y₀: cosine; event functions Y₀ − level and its rate.
+class Cosine final : public ImplicitSystem {
+ public:
+  Cosine(double omega, double level) : omega_(omega), level_(level) {}
+  bool residual(double, const double* Y, const double* Yp, double* F) const noexcept override {
+    F[0] = Yp[0] - Y[1];
+    F[1] = Yp[1] + omega_ * omega_ * Y[0];
+    return true;
+  }
+  void jacobian(double, double c, const double*, const double*, double* J) const noexcept override {
+    J[0] = J[3] = c;
+    J[2] = -1.0;
+    J[1] = omega_ * omega_;
+  }
+  void events(double, const double* Y, double* g) const noexcept override {
+    g[0] = Y[0] - level_;
+    g[1] = Y[1];
+  }
+
+ private:
+  double omega_, level_;
+};
+
+void start_cosine(IdaSolver& solver, const Cosine& system, double omega) {
+  solver.initial_value()[0] = 1.0;
+  solver.initial_value()[1] = solver.initial_derivative()[0] = 0.0;
+  solver.initial_derivative()[1] = -omega * omega;
+  solver.absolute_tolerance()[0] = 1e-13;
+  solver.absolute_tolerance()[1] = 1e-13 * omega;
+  solver.start(system, 1e-13, 1e-7);
+}
+
+const std::vector<Crossing> distance_and_rate{Crossing::falling, Crossing::rising};
+
+/// ∂F/∂Y + c ∂F/∂Y' by central differences.
+template <std::size_t n>
+void expect_jacobian(const ImplicitSystem& system, double s, double c, std::array<double, n> Y,
+                     std::array<double, n> step, double tolerance) {
+  std::array<double, n> Yp{};
+  Yp.fill(0.3);
+  std::array<double, n * n> J{};
+  system.jacobian(s, c, Y.data(), Yp.data(), J.data());
+  for (std::size_t j = 0; j < n; ++j) {
+    const auto residual = [&](double h) {
+      auto Z = Y, Zp = Yp;
+      Z[j] += h;
+      Zp[j] += c * h;
+      std::array<double, n> F{};
+      EXPECT_TRUE(system.residual(s, Z.data(), Zp.data(), F.data()));
+      return F;
+    };
+    const auto up = residual(step[j]), down = residual(-step[j]);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double difference = (up[i] - down[i]) / (2 * step[j]);
+      EXPECT_NEAR(J[j * n + i], difference, tolerance * (1.0 + std::abs(difference))) << "row " << i << " column " << j;
+    }
+  }
+}
+
+Parameters nonlinear() {
+  Parameters p;
+  p.mass = 1.3;
+  p.damping = 0.7;
+  p.linear_stiffness = 20.0;
+  p.cubic_stiffness = 9.0;
+  p.contact_law = ContactLaw::normal_compliance;
+  p.compliance_stiffness = 300.0;
+  p.compliance_exponent = 1.5;
+  p.stop_enabled = true;
+  p.stop_position = -0.2;
+  return p;
+}
+
+Laws laws_of(const Parameters& p) { return {hilltop(p), true, p.stop_position, true, 1e-12, 1e-14}; }
+
+}  // namespace
+
+// cos ωs falls through the level at s = arccos(level)/ω. IDA's own bracket is 100 ulp; ours ends at an ulp, and then
+// the solution's error, asked to be 1e-13 per internal step, is what is left.
+TEST(IdaSolver, EventWhereADistanceFalls) {
+  const Cosine system(3.0, 0.4);
+  IdaSolver solver(2, distance_and_rate);
+  start_cosine(solver, system, 3.0);
+  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
+  EXPECT_TRUE(solver.occurred(0));
+  EXPECT_TRUE(solver.fell(0, 1));
+  EXPECT_NEAR(solver.s(), std::acos(0.4) / 3.0, 1e-11);
+  EXPECT_NEAR(solver.value()[0], 0.4, 4 * epsilon);
+}
+
+// The lowest point of cos ωs is 1e-9 below the level for 1.4e-5 of s; internal steps are a hundred times longer.
+TEST(IdaSolver, DistanceThatDipsWithinOneInternalStep) {
+  const Cosine system(6.0, -1.0 + 1e-9);
+  IdaSolver solver(2, distance_and_rate);
+  start_cosine(solver, system, 6.0);
+  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
+  EXPECT_TRUE(solver.fell(0, 1));
+  EXPECT_NEAR(solver.s(), (3.14159265358979323846 - std::sqrt(2e-9)) / 6.0, 1e-7);
+  EXPECT_LT(solver.s(), 3.14159265358979323846 / 6.0);
+}
+
+// Above the level at its lowest: the rate is an event, but no fall; then on to the end.
+TEST(IdaSolver, MinimumAboveTheLevelIsNoFall) {
+  const Cosine system(6.0, -1.0 - 1e-9);
+  IdaSolver solver(2, distance_and_rate);
+  start_cosine(solver, system, 6.0);
+  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
+  EXPECT_FALSE(solver.fell(0, 1));
+  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::finished);
+  EXPECT_EQ(solver.s(), 1.0);
+  EXPECT_NEAR(solver.value()[0], std::cos(6.0), 2e-10);  // 1e-13 in each of some 1000 steps
+}
+
+// Event functions that are exactly 0 at a start, or hit 0 exactly in IDA's search, were lost once.
+TEST(IdaSolver, ExactZerosDoNotSwitchEventsOff) {
+  const Cosine at_start(3.0, 1.0);  // distance and rate are 0 at s = 0
+  IdaSolver solver(2, distance_and_rate);
+  start_cosine(solver, at_start, 3.0);
+  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
+  EXPECT_LT(solver.s(), 1e-6);
+  const Cosine system(3.0, 0.5);
+  solver.start(system, 1e-13, 1e-7);
+  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
+  EXPECT_TRUE(solver.fell(0, 1));
+  EXPECT_NEAR(solver.s(), 3.14159265358979323846 / 9.0, 1e-11);
+}
+
+TEST(IdaSolver, FailureCarriesIdasMessage) {
+  class Nowhere final : public ImplicitSystem {
+    bool residual(double, const double*, const double*, double*) const noexcept override { return false; }
+    void jacobian(double, double, const double*, const double*, double*) const noexcept override {}
+    void events(double, const double*, double*) const noexcept override {}
+  };
+  const Nowhere system;
+  IdaSolver solver(1, {});
+  solver.start(system, 1e-6, 1e-3);
+  try {
+    solver.advance();
+    FAIL() << "no error";
+  } catch (const IdaError& error) {
+    EXPECT_NE(std::string(error.what()).find("IDA_"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Flight, JacobianMatchesDifferences) {
+  const Parameters p = nonlinear();
+  const Motion motion(p);
+  Flight flight(motion, laws_of(p));
+  Loads loads;
+  loads.force.c = {1.0, -2.0, 3.0};
+  loads.tip.c = {0.05, 0.4, -1.0};
+  const double H = 0.02, y = 0.15, z = 0.5;
+  // Touching, δ = 0.1; unresolved steps have another reference polynomial.
+  for (const double size : {H, 40 * H}) {
+    const FlightStart start{y, z, loads, size, y + 0.2, y - 0.05, false};
+    flight.run(start);
+    const double d = 1e-5;
+    expect_jacobian<5>(flight, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2, 0.3}, {d, d * size, d, d, d}, 1e-7);
+  }
+}
+
+TEST(Seated, JacobianMatchesDifferences) {
+  const Parameters p = nonlinear();
+  const Motion motion(p);
+  Seated seated(motion, laws_of(p));
+  Loads loads;
+  loads.force.c = {-20.0, 1.0, 3.0};
+  loads.tip.c = {-0.3, 0.4, -1.0};
+  EXPECT_EQ(seated.run({loads, 0.02, 0.1}), Seated::Event::none);
+  const double d = 1e-5;
+  expect_jacobian<4>(seated, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2}, {d, d, d, d}, 1e-7);
+}
+
+// ÿ − R̈ without cancellation is the same as the difference of both, to the rounding of that difference.
+TEST(Motion, ExcessAccelerationIsTheDifference) {
+  const Parameters p = nonlinear();
+  const Motion motion(p);
+  Loads loads;
+  loads.force.c = {1.0, -2.0, 3.0};
+  const double y = 0.15, z = 0.5;
+  const auto d = motion.derivatives(y, z, loads, false, 0.0);
+  for (const int order : {0, 2, 4}) {
+    const Taylor R({d[0], d[1], d[2], d[3], d[4]}, order);
+    const auto coefficients = motion.remainder(R, loads);
+    for (const double t : {0.0, 0.01, 0.2}) {
+      double remainder = 0.0;
+      for (std::size_t k = coefficients.size(); k-- > 0;) remainder = remainder * t + coefficients[k];
+      const double q = 0.02, w = -0.3;
+      const double second = order == 0 ? 0.0 : d[2] + (order < 4 ? 0.0 : t * (d[3] + t * d[4] / 2));
+      const double difference = motion.acceleration(R(t) + q, R.rate(t) + w, loads.force(t), 0.0) - second;
+      EXPECT_NEAR(motion.excess_acceleration(R(t), q, w, remainder, 0.0), difference, 100 * epsilon)
+          << order << " " << t;
+    }
+  }
+}
+
+// The five derivatives that a start is expanded in: against differences of those one lower along the exact motion's
+// Taylor series (step 1e-3, central: error of order 1e-6).
+TEST(Motion, DerivativesAreThoseOfTheMotion) {
+  const Parameters p = nonlinear();
+  const Motion motion(p);
+  Loads loads;
+  loads.force.c = {1.0, -2.0, 3.0};
+  loads.tip.c = {0.05, 0.4, -1.0};
+  const double y = 0.15, z = 0.5, h = 1e-3;
+  for (const bool touching : {false, true}) {
+    const auto d = motion.derivatives(y, z, loads, touching, y - loads.tip.c[0]);
+    const auto at = [&](double t) {
+      double position = 0.0, velocity = 0.0, factor = 1.0;
+      for (std::size_t k = 0; k < 6; ++k) {
+        position += d[k] * factor;
+        if (k > 0) velocity += d[k] * factor * static_cast<double>(k) / t;
+        factor *= t / static_cast<double>(k + 1);
+      }
+      return motion.derivatives(position, velocity, loads.shifted(t), touching, position - loads.tip(t));
+    };
+    const auto up = at(h), down = at(-h);
+    for (std::size_t k = 2; k < 5; ++k) {
+      const double difference = (up[k] - down[k]) / (2 * h);
+      EXPECT_NEAR(d[k + 1], difference, 1e-3 * std::abs(difference)) << "derivative " << k + 1;
+    }
+  }
+}
+
+TEST(Taylor, IntegralsAreExact) {
+  const Taylor R({1.0, -2.0, 6.0, 12.0, -48.0}, 4);  // 1 − 2t + 3t² + 2t³ − 2t⁴
+  EXPECT_DOUBLE_EQ(R(0.5), 1 - 1 + 0.75 + 0.25 - 0.125);
+  EXPECT_DOUBLE_EQ(R.integral(1.0), 1 - 1 + 1 + 0.5 - 0.4);
+  EXPECT_DOUBLE_EQ(R.integral_2(1.0), 0.5 - 1.0 / 3 + 0.25 + 0.1 - 1.0 / 15);
+  // ∫ (−2 + 6t + 6t² − 8t³)²
+  EXPECT_DOUBLE_EQ(R.squared_rate_integral(1.0), 4.0 - 12 + 4 + 26 - 12 - 16 + 64.0 / 7);
+}
