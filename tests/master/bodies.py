@@ -315,13 +315,13 @@ def simulate(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> Trajecto
     """The master's run with the doubles (``wrap`` may replace them); ``summary["stopped"]`` holds a RunStopped."""
     beam, spring = wrap(*bodies(scene))
     recorder = MemoryRecorder(scene)
-    simulation = Simulation(scene, beam, spring, recorder)
+    simulation = Simulation(scene, first_contact(scene), beam, spring, recorder)
     stopped = None
     try:
         simulation.run()
     except RunStopped as error:
         stopped = error
-    recorder.finish({**simulation.summary(), "first_contact": first_contact(scene)})
+    recorder.finish(simulation.summary())
     trajectory = recorder.trajectory()
     trajectory.summary["stopped"] = stopped
     trajectory.summary["work"] = {
