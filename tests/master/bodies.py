@@ -15,6 +15,7 @@ from math import factorial
 
 import numpy as np
 from scipy.linalg import eigh, expm
+
 from springbeam.contact import first_contact
 from springbeam.recording import MemoryRecorder
 from springbeam.scene import Beam, Scene
@@ -194,9 +195,7 @@ def beam_body(beam: Beam, slope: float | None = None) -> ModalBody:
 
 def modal_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> ModalBody:
     """An undamped unit beam of ``n`` elements, EI = KAG = ``stiffness``, moving as u̇ = slope·x."""
-    return beam_body(
-        Beam(n_elements=n, young_modulus=stiffness, shear_modulus=stiffness, initial_velocity_slope=slope)
-    )
+    return beam_body(Beam(n_elements=n, young_modulus=stiffness, shear_modulus=stiffness, initial_velocity_slope=slope))
 
 
 _ORDER = 22
@@ -306,7 +305,13 @@ def bodies(scene: Scene) -> tuple[ModalBody | None, DuffingBody | None]:
         beam = beam_body(scene.beam, target[1] / scene.beam.length if kinematic else None)
     if (p := scene.spring) is not None:
         spring = DuffingBody(
-            p.mass, p.linear_stiffness, p.cubic_stiffness, p.equilibrium, p.initial_velocity, p.damping, p.external_force
+            p.mass,
+            p.linear_stiffness,
+            p.cubic_stiffness,
+            p.equilibrium,
+            p.initial_velocity,
+            p.damping,
+            p.external_force,
         )
     return beam, spring
 
