@@ -17,6 +17,12 @@ using Eigen::VectorXd;
 // Banded matrices stay banded in their natural order.
 using Factorisation = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
 
+/// S = mass M + stiffness K of one step size, factorised.
+struct StepMatrix {
+  double mass, stiffness;
+  Factorisation factorisation;
+};
+
 class GeneralizedAlphaBeam final : public BeamIntegrator {
  public:
   explicit GeneralizedAlphaBeam(const Parameters& p)
@@ -36,35 +42,32 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
         compliance_(mesh_.flexibility_times(mesh_.unit_tip_force())[mesh_.tip_index()] / mu_),
         q_(p.initial_deflection_slope * mesh_.linear_shape()),
         v_(p.initial_velocity_slope * mesh_.linear_shape()),
-        a_(midpoint_ ? 0 : mesh_.size()),
+        a_(VectorXd::Zero(midpoint_ ? 0 : mesh_.size())),
         rhs_(mesh_.size()),
         w_(mesh_.size()),
         work_(mesh_.size()),
         work2_(mesh_.size()) {
     set_distributed_load(0.0);
-    if (!midpoint_) a_ = mesh_.mass_solve(residual_force());
   }
 
   void step(double size, const TipForce& c, double distributed_load) override {
-    const auto& factorisation = *cache_.get(size, [this](double h) { return factorise(h); });
+    const StepMatrix& S = *cache_.get(size, [this](double h) { return factorise(h); });
     if (midpoint_) {
-      midpoint_step(factorisation, size, c, distributed_load);
+      midpoint_step(S, size, c, distributed_load);
     } else {
-      alpha_step(factorisation, size, c, distributed_load);
+      alpha_step(S, size, c, distributed_load);
     }
   }
 
   void apply_tip_impulse(double impulse) override {
     w_ = v_ + impulse * tip_response_;
     if (!w_.allFinite()) throw_not_finite(0.0, {impulse, 0.0, 0.0}, distributed_load_);
-    if (!midpoint_ && alpha_ > 0.0) {
-      work_ = w_ - v_;
-      a_ -= alpha_ * mesh_.mass_solve(mesh_.stiffness_times(work_));
-    }
     v_.swap(w_);
+    if (!midpoint_) pending_impulse_ += impulse;
   }
 
   void set_distributed_load(double distributed_load) override {
+    if (!midpoint_ && started_) pending_load_ += distributed_load - distributed_load_;
     distributed_load_ = distributed_load;
     load_ = distributed_load * uniform_load_ + hat_load_;
   }
@@ -92,9 +95,10 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
 
   void save(std::vector<double>& state) const override {
     state.clear();
-    state.reserve(static_cast<std::size_t>(q_.size() + v_.size() + a_.size()) + 5);
+    state.reserve(static_cast<std::size_t>(q_.size() + v_.size() + a_.size()) + 8);
     for (const VectorXd* x : {&q_, &v_, &a_}) state.insert(state.end(), x->data(), x->data() + x->size());
-    for (const double value : {integral_, integral_2_, dissipated_, end_force_, distributed_load_}) {
+    for (const double value : {integral_, integral_2_, dissipated_, end_force_, distributed_load_, pending_impulse_,
+                               pending_load_, started_ ? 1.0 : 0.0}) {
       state.push_back(value);
     }
   }
@@ -105,17 +109,24 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
       *x = Eigen::Map<const VectorXd>(from, x->size());
       from += x->size();
     }
-    for (double* value : {&integral_, &integral_2_, &dissipated_, &end_force_}) *value = *from++;
-    set_distributed_load(*from);
+    const double distributed_load = from[4];
+    set_distributed_load(distributed_load);
+    integral_ = from[0];
+    integral_2_ = from[1];
+    dissipated_ = from[2];
+    end_force_ = from[3];
+    pending_impulse_ = from[5];
+    pending_load_ = from[6];
+    started_ = from[7] != 0.0;
   }
 
  private:
-  void midpoint_step(const Factorisation& S, double h, const TipForce& c, double distributed_load) {
+  void midpoint_step(const StepMatrix& S, double h, const TipForce& c, double distributed_load) {
     mesh_.mass_times(v_.data(), rhs_.data());
     mesh_.stiffness_times(q_.data(), work_.data());
     rhs_ -= (0.5 * h) * work_;
     add_load(0.5 * h, mean_force(c, h), distributed_load);
-    w_ = S.solve(rhs_);
+    solve(S, w_);
 
     work_ = q_ + h * w_;
     work2_ = 2.0 * w_ - v_;
@@ -123,11 +134,11 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     finish(h, c, distributed_load, loss, nullptr);
   }
 
-  void alpha_step(const Factorisation& S, double h, const TipForce& c, double distributed_load) {
-    // The jump of the loads since the end of the last step, in the acceleration that this one starts from.
-    VectorXd a = a_ + (c[0] - end_force_) * tip_response_;
-    if (distributed_load != distributed_load_) {
-      a += mesh_.mass_solve((distributed_load - distributed_load_) * uniform_load_);
+  void alpha_step(const StepMatrix& S, double h, const TipForce& c, double distributed_load) {
+    VectorXd a = a_;
+    if (add_missing_force(c[0], distributed_load)) {
+      solve(S, w_);
+      a += (1.0 - alpha_m_) * w_;
     }
     const double f = 1.0 - alpha_f_;
     mesh_.mass_times(a.data(), rhs_.data());
@@ -136,7 +147,8 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     mesh_.stiffness_times(work2_.data(), work_.data());
     rhs_ -= work_;
     add_load(1.0, force_at(c, f * h), distributed_load);
-    VectorXd a1 = S.solve(rhs_);
+    VectorXd a1(mesh_.size());
+    solve(S, a1);
 
     work_ = q_ + h * (v_ + h * ((0.5 - beta_) * a + beta_ * a1));
     work2_ = v_ + h * ((1.0 - gamma_) * a + gamma_ * a1);
@@ -147,6 +159,31 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
       loss = mu_ * alpha_ * (work_ - q_).dot(rhs_);
     }
     finish(h, c, distributed_load, loss, &a1);
+  }
+
+  /// rhs_ = the force that a_ does not know of yet; false if there is none.
+  bool add_missing_force(double tip_force, double distributed_load) {
+    if (!started_) {
+      rhs_ = hat_load_ - mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
+      rhs_ += distributed_load * uniform_load_;
+      rhs_[mesh_.tip_index()] += tip_force / mu_;
+      return true;
+    }
+    const double load = distributed_load - distributed_load_ + pending_load_, force = tip_force - end_force_;
+    if (load == 0.0 && force == 0.0 && pending_impulse_ == 0.0) return false;
+    rhs_ = load * uniform_load_;
+    rhs_[mesh_.tip_index()] += force / mu_;
+    if (pending_impulse_ != 0.0) rhs_ -= (alpha_ * pending_impulse_) * mesh_.stiffness_times(tip_response_);
+    return true;
+  }
+
+  /// x = S⁻¹ rhs_ with one step of iterative refinement.
+  void solve(const StepMatrix& S, VectorXd& x) {
+    x = S.factorisation.solve(rhs_);
+    mesh_.mass_times(x.data(), work_.data());
+    mesh_.stiffness_times(x.data(), work2_.data());
+    rhs_ -= S.mass * work_ + S.stiffness * work2_;
+    x += S.factorisation.solve(rhs_);
   }
 
   // Accepts work_ and work2_ as the new q and v, or throws.
@@ -165,6 +202,9 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     dissipated_ += loss;
     end_force_ = force_at(c, h);
     if (distributed_load != distributed_load_) set_distributed_load(distributed_load);
+    pending_impulse_ = 0.0;
+    pending_load_ = 0.0;
+    started_ = true;
   }
 
   void add_load(double factor, double tip_force, double distributed_load) {
@@ -179,17 +219,16 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     return force;
   }
 
-  std::unique_ptr<Factorisation> factorise(double h) const {
+  std::unique_ptr<StepMatrix> factorise(double h) const {
     const double f = 1.0 - alpha_f_;
-    const Eigen::SparseMatrix<double> S =
-        midpoint_ ? Eigen::SparseMatrix<double>(M_ + (0.25 * h * h + 0.5 * alpha_ * h) * K_)
-                  : Eigen::SparseMatrix<double>((1.0 - alpha_m_) * M_ + f * (alpha_ * gamma_ * h + beta_ * h * h) * K_);
-    auto factorisation = std::make_unique<Factorisation>();
-    factorisation->compute(S);
-    if (factorisation->info() != Eigen::Success) {
+    auto S = std::make_unique<StepMatrix>();
+    S->mass = midpoint_ ? 1.0 : 1.0 - alpha_m_;
+    S->stiffness = midpoint_ ? 0.25 * h * h + 0.5 * alpha_ * h : f * (alpha_ * gamma_ * h + beta_ * h * h);
+    S->factorisation.compute(Eigen::SparseMatrix<double>(S->mass * M_ + S->stiffness * K_));
+    if (S->factorisation.info() != Eigen::Success) {
       throw std::domain_error("beam: the matrix of the time step cannot be factorised; use a smaller step size");
     }
-    return factorisation;
+    return S;
   }
 
   Timoshenko mesh_;
@@ -208,9 +247,12 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   double end_force_ = 0.0;
   double integral_ = 0.0, integral_2_ = 0.0;
   double dissipated_ = 0.0;
+  // What a_ does not know of yet, besides the jump of C [N·s, N/m]; all of it before the first step.
+  double pending_impulse_ = 0.0, pending_load_ = 0.0;
+  bool started_ = false;
 
   VectorXd rhs_, w_, work_, work2_;  // work space
-  StepCache<std::unique_ptr<Factorisation>> cache_;
+  StepCache<std::unique_ptr<StepMatrix>> cache_;
 };
 
 }  // namespace

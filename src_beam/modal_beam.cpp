@@ -16,13 +16,13 @@ using Eigen::Index;
 
 /// Structure of arrays over the modes; φ stands for φ(L).
 struct Coefficients {
-  ArrayXd one_minus_decay;          // 1 − ġ = ω²G₁ + cG₀
-  ArrayXd G0, G1;
+  ArrayXd sign, kick, drift, reflection;  // undamped; reflection = (1 − sign)/ω²
+  ArrayXd one_minus_decay, G0, G1;        // damped; 1 − ġ = ω²G₁ + cG₀
   ArrayXd phi_G1, phi_G2, phi_G3;   // response of v, of v and η, of η to c₁ and c₂
   // ∫u and ∫∫u: from η₀ and v₀ per mode, from c₀, c₁, c₂, f_b and the hat load in sum.
   ArrayXd integral_eta, integral_v, integral2_eta, integral2_v;
   std::array<double, 5> integral_input, integral2_input;
-  // c∫η̇²: from v₀², v₀r, r², and with c₁, c₂; from c₁², c₁c₂, c₂² in sum. Empty without damping.
+  // c∫η̇²: from v₀², v₀r, r², and with c₁, c₂; from c₁², c₁c₂, c₂² in sum.
   ArrayXd loss_vv, loss_vr, loss_rr, loss_v1, loss_v2, loss_r1, loss_r2;
   std::array<double, 3> loss_input;
 };
@@ -34,6 +34,7 @@ class ModalBeam final : public BeamIntegrator {
         tip_(modes_.tip),
         omega2_(modes_.omega.array().square()),
         damping_(p.alpha_b * omega2_),
+        damped_(p.alpha_b > 0.0),
         hat_load_(p.tip_load_coefficient * modes_.hat_load.array()),
         hat_coefficient_(p.tip_load_coefficient),
         inverse_tip_mass_(tip_.square().sum()),
@@ -42,6 +43,7 @@ class ModalBeam final : public BeamIntegrator {
         v_(p.initial_velocity_slope * modes_.linear_shape.array()),
         eta_next_(eta_.size()),
         v_next_(eta_.size()),
+        force_(eta_.size()),
         r_(eta_.size()) {
     set_distributed_load(0.0);
     update_tip();
@@ -49,11 +51,24 @@ class ModalBeam final : public BeamIntegrator {
 
   void step(double size, const TipForce& c, double distributed_load) override {
     const Coefficients& k = cache_.get(size, [this](double h) { return make_coefficients(h); });
-    if (distributed_load != distributed_load_) set_distributed_load(distributed_load);
+    const double previous_load = distributed_load_;
+    if (distributed_load != previous_load) set_distributed_load(distributed_load);
 
-    r_ = c[0] * tip_ + load_ - omega2_ * eta_;
-    eta_next_ = eta_ + (k.G0 * v_ + k.G1 * r_ + c[1] * k.phi_G2 + c[2] * k.phi_G3);
-    v_next_ = v_ + (k.G0 * r_ - k.one_minus_decay * v_ + c[1] * k.phi_G1 + c[2] * k.phi_G2);
+    force_ = c[0] * tip_ + load_;
+    r_ = force_ - omega2_ * eta_;
+    if (damped_) {
+      eta_next_ = eta_ + (k.G0 * v_ + k.G1 * r_ + c[1] * k.phi_G2 + c[2] * k.phi_G3);
+      v_next_ = v_ + (k.G0 * r_ - k.one_minus_decay * v_ + c[1] * k.phi_G1 + c[2] * k.phi_G2);
+    } else {
+      v_next_ = v_ + k.kick * r_;
+      eta_next_ = eta_ + k.drift * v_next_;
+      v_next_ = k.sign * (v_next_ + k.kick * (force_ - omega2_ * eta_next_));
+      eta_next_ = k.sign * eta_next_ + k.reflection * force_;
+      if (c[1] != 0.0 || c[2] != 0.0) {
+        eta_next_ += c[1] * k.phi_G2 + c[2] * k.phi_G3;
+        v_next_ += c[1] * k.phi_G1 + c[2] * k.phi_G2;
+      }
+    }
 
     const std::array<double, 5> input = {c[0], c[1], c[2], distributed_load, hat_coefficient_};
     double integral = (k.integral_eta * eta_ + k.integral_v * v_).sum();
@@ -63,7 +78,7 @@ class ModalBeam final : public BeamIntegrator {
       integral_2 += k.integral2_input[i] * input[i];
     }
     double loss = 0.0;
-    if (k.loss_vv.size() > 0) {
+    if (damped_) {
       loss = (v_ * (k.loss_vv * v_ + k.loss_vr * r_ + c[1] * k.loss_v1 + c[2] * k.loss_v2) +
               r_ * (k.loss_rr * r_ + c[1] * k.loss_r1 + c[2] * k.loss_r2))
                  .sum() +
@@ -74,6 +89,7 @@ class ModalBeam final : public BeamIntegrator {
     const double velocity = (tip_ * v_next_).sum();
     if (!std::isfinite(displacement) || !std::isfinite(velocity) || !std::isfinite(integral) ||
         !std::isfinite(integral_2) || !std::isfinite(dissipated_ + loss)) {
+      set_distributed_load(previous_load);
       throw_not_finite(size, c, distributed_load);
     }
     eta_.swap(eta_next_);
@@ -153,26 +169,24 @@ class ModalBeam final : public BeamIntegrator {
   Coefficients make_coefficients(double h) const {
     const Index m = eta_.size();
     Coefficients k;
-    for (ArrayXd* array : {&k.one_minus_decay, &k.G0, &k.G1, &k.phi_G1, &k.phi_G2, &k.phi_G3, &k.integral_eta,
+    for (ArrayXd* array : {&k.phi_G1, &k.phi_G2, &k.phi_G3, &k.integral_eta,
                            &k.integral_v, &k.integral2_eta, &k.integral2_v}) {
       array->resize(m);
     }
     k.integral_input.fill(0.0);
     k.integral2_input.fill(0.0);
     k.loss_input.fill(0.0);
-    const bool damped = (damping_ > 0.0).any();
-    if (damped) {
-      for (ArrayXd* array : {&k.loss_vv, &k.loss_vr, &k.loss_rr, &k.loss_v1, &k.loss_v2, &k.loss_r1, &k.loss_r2}) {
+    if (damped_) {
+      for (ArrayXd* array : {&k.one_minus_decay, &k.G0, &k.G1, &k.loss_vv, &k.loss_vr, &k.loss_rr, &k.loss_v1, &k.loss_v2, &k.loss_r1, &k.loss_r2}) {
         array->resize(m);
       }
+    } else {
+      for (ArrayXd* array : {&k.sign, &k.kick, &k.drift, &k.reflection}) array->resize(m);
     }
     for (Index i = 0; i < m; ++i) {
       const double phi = tip_[i], c = damping_[i];
       const OscillatorResponse response = oscillator_response(modes_.omega[i], c, h);
       const std::array<double, 6>& G = response.G;
-      k.one_minus_decay[i] = omega2_[i] * G[1] + c * G[0];
-      k.G0[i] = G[0];
-      k.G1[i] = G[1];
       k.phi_G1[i] = phi * G[1];
       k.phi_G2[i] = phi * G[2];
       k.phi_G3[i] = phi * G[3];
@@ -189,7 +203,10 @@ class ModalBeam final : public BeamIntegrator {
         k.integral_input[j + 2] += phi * force[j] * G[2];
         k.integral2_input[j + 2] += phi * force[j] * G[3];
       }
-      if (damped) {
+      if (damped_) {
+        k.one_minus_decay[i] = omega2_[i] * G[1] + c * G[0];
+        k.G0[i] = G[0];
+        k.G1[i] = G[1];
         const std::array<double, 10> Q = oscillator_dissipation(modes_.omega[i], c, h);
         k.loss_vv[i] = Q[0];
         k.loss_vr[i] = 2.0 * Q[1];
@@ -201,6 +218,12 @@ class ModalBeam final : public BeamIntegrator {
         k.loss_input[0] += phi * phi * Q[7];
         k.loss_input[1] += 2.0 * phi * phi * Q[8];
         k.loss_input[2] += phi * phi * Q[9];
+      } else {
+        const UndampedStep undamped = undamped_step(modes_.omega[i], h);
+        k.sign[i] = undamped.sign;
+        k.kick[i] = undamped.kick;
+        k.drift[i] = undamped.drift;
+        k.reflection[i] = (1.0 - undamped.sign) / omega2_[i];
       }
     }
     return k;
@@ -215,6 +238,7 @@ class ModalBeam final : public BeamIntegrator {
   ArrayXd tip_;        // φ(L) [1/√kg]
   ArrayXd omega2_;     // ω² [1/s²]
   ArrayXd damping_;    // α_b ω² [1/s]
+  bool damped_;
   ArrayXd hat_load_;   // modal force of the hat load [N/√kg]
   double hat_coefficient_;
   double inverse_tip_mass_;
@@ -228,7 +252,7 @@ class ModalBeam final : public BeamIntegrator {
   double integral_ = 0.0, integral_2_ = 0.0;
   double dissipated_ = 0.0;
 
-  ArrayXd eta_next_, v_next_, r_;  // work space
+  ArrayXd eta_next_, v_next_, force_, r_;  // work space
   StepCache<Coefficients> cache_;
 };
 

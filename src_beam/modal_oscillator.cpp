@@ -121,15 +121,23 @@ void recur(Gamma& gamma, double x, double d) {
   }
 }
 
+struct SineCosine {
+  double sine, cosine;
+};
+
+SineCosine sine_cosine(const Double2& phase) {
+  const double s = std::sin(phase.high), c = std::cos(phase.high);
+  return {s + phase.low * c, c - phase.low * s};
+}
+
 Gamma by_closed_form(const Roots& z) {
   Gamma gamma{};
   if (z.complex) {
     const double e = std::exp(-0.5 * z.d);
-    const double s0 = std::sin(z.w.high), c0 = std::cos(z.w.high);
-    const double s = s0 + z.w.low * c0, c = c0 - z.w.low * s0;
-    const double sinc = z.w.high > 0.0 ? s / z.w.high : 1.0;
+    const SineCosine w = sine_cosine(z.w);
+    const double sinc = z.w.high > 0.0 ? w.sine / z.w.high : 1.0;
     gamma[1] = e * sinc;
-    gamma[0] = e * (c - 0.5 * z.d * sinc);
+    gamma[0] = e * (w.cosine - 0.5 * z.d * sinc);
   } else {
     const double w = z.w.high;
     gamma[1] = std::exp(-z.slow) * (w > 0.0 ? -std::expm1(-2.0 * w) / (2.0 * w) : 1.0);
@@ -198,6 +206,13 @@ OscillatorResponse oscillator_response(double omega, double c, double t) {
     power *= t;
   }
   return response;
+}
+
+UndampedStep undamped_step(double omega, double t) {
+  const SineCosine x = sine_cosine(product(omega, t));
+  const double sign = x.cosine >= 0.0 ? 1.0 : -1.0;
+  const double sine = sign * x.sine, cosine = sign * x.cosine;
+  return {sign, sine / (1.0 + cosine) / omega, sine / omega};
 }
 
 std::array<double, 10> oscillator_dissipation(double omega, double c, double t) {

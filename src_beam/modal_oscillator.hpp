@@ -22,6 +22,20 @@ struct OscillatorResponse {
 /// @pre ω > 0, c ≥ 0, t > 0, all finite
 OscillatorResponse oscillator_response(double omega, double c, double t);
 
+/// The undamped step under constant force as kick, drift and kick: with r(η) = f₀ − ω²η,
+///   w = v₀ + kick r(η₀),   η = η₀ + drift w,   v = w + kick r(η),   kick = tan(x̃/2)/ω,   drift = sin(x̃)/ω,
+/// then, if sign = −1, reflected at the point of rest, η ← 2f₀/ω² − η, v ← −v. Here x̃ = ωt modulo 2π, less π where
+/// that keeps |x̃| ≤ π/2. In exact arithmetic the map conserves an energy for *any* values of the three, so that
+/// rounding them changes the energy by 1e-16 once; the coefficients of η(t), v(t) above would do so at every step.
+struct UndampedStep {
+  double sign;   ///< ±1
+  double kick;   ///< [s]
+  double drift;  ///< [s]
+};
+
+/// @pre ω > 0, t > 0
+UndampedStep undamped_step(double omega, double t);
+
 /// ∫ c η̇² dτ over the step as a quadratic form in z = (v₀, r, f₁, f₂): the upper triangle of Q, row by row, so that
 /// the dissipated energy is Σ_i Q_ii z_i² + 2 Σ_{i<j} Q_ij z_i z_j.
 /// Found from the damping force: η̇ is integrated by Gauss–Legendre quadrature over a part of the step short enough

@@ -1,0 +1,150 @@
+// The eigenproblem: the exact frequencies of the continuous beam, completeness, and the two solvers against each other.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/SparseCholesky>
+
+#include <chrono>
+#include <cmath>
+#include <vector>
+
+#include "beam.hpp"
+#include "beam_testing.hpp"
+#include "modes.hpp"
+#include "timoshenko.hpp"
+
+namespace beam {
+namespace {
+
+using testing::general_beam;
+using testing::unit_beam;
+
+// Clamped–free, EI = KAG = ρA = ρI = L = 1: zeros of det [[X_MM, X_MQ], [X_QM, X_QQ]] of X = exp(A), A from
+// θ' = M/EI, M' = −Q − ρIω²θ, u' = Q/KAG + θ, Q' = −ρAω²u.
+const std::vector<double> exact_frequencies = {1.27396492100357,  1.893962818707578, 4.644109211156441,
+                                               4.830446154139584, 7.81367505095888,  7.925418160665796};
+
+TEST(BeamModes, FrequenciesConvergeToTheExactOnesInSecondOrder) {
+  const std::vector<double> coarse = Beam(unit_beam(80)).frequencies();
+  const std::vector<double> fine = Beam(unit_beam(160)).frequencies();
+  ASSERT_EQ(coarse.size(), 160U);
+  EXPECT_NEAR(coarse[0] / exact_frequencies[0] - 1.0, 1.67e-5, 0.01e-5);
+  for (std::size_t k = 0; k < exact_frequencies.size(); ++k) {
+    const double e1 = coarse[k] / exact_frequencies[k] - 1.0, e2 = fine[k] / exact_frequencies[k] - 1.0;
+    EXPECT_NEAR(e1 / e2, 4.0, 0.01) << k;  // from above: Rayleigh–Ritz
+    // The h² term removed, (4ω_fine − ω_coarse)/3 leaves h⁴ terms, here up to 1e-8.
+    EXPECT_NEAR((4.0 * fine[k] - coarse[k]) / 3.0, exact_frequencies[k], 2e-8 * exact_frequencies[k]) << k;
+  }
+}
+
+TEST(BeamModes, FrequenciesScaleWithTheRootOfTheStiffness) {
+  Parameters p = unit_beam(300);
+  p.n_modes = 20;
+  const std::vector<double> one = Beam(p).frequencies();
+  p.young_modulus = p.shear_modulus = 3.6e10;
+  const std::vector<double> stiff = Beam(p).frequencies();
+  for (std::size_t k = 0; k < one.size(); ++k) EXPECT_NEAR(stiff[k], one[k] * std::sqrt(3.6e10), 1e-10 * stiff[k]);
+}
+
+// Number of frequencies below ω: negative pivots of K − ω²M (Sylvester's law of inertia).
+int count_below(const Timoshenko& mesh, double omega) {
+  const Eigen::SparseMatrix<double> shifted = mesh.stiffness() - omega * omega * mesh.mass();
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> ldlt(shifted);
+  return static_cast<int>((ldlt.vectorD().array() < 0.0).count());
+}
+
+struct Case {
+  Parameters parameters;
+  const char* name;
+};
+
+std::vector<Case> cases(int n) {
+  std::vector<Case> all = {{unit_beam(n), "unit"},
+                           {unit_beam(n, 3.6e10), "stiff"},
+                           {unit_beam(n), "slender"},
+                           {unit_beam(n), "bar"},
+                           {general_beam(n), "general"}};
+  all[2].parameters.shear_modulus = 1e6;
+  all[2].parameters.reduced_integration = true;
+  all[3].parameters.young_modulus = 1e6;
+  return all;
+}
+
+TEST(BeamModes, LanczosMissesNoMode) {
+  for (Case c : cases(600)) {
+    c.parameters.n_modes = 40;
+    const Timoshenko mesh(c.parameters);
+    const Modes modes = compute_modes(mesh, c.parameters);
+    EXPECT_LT(modes.residual, 1e-8) << c.name;
+    for (const Eigen::Index k : {1, 7, 39}) {
+      const double between = 0.5 * (modes.omega[k - 1] + modes.omega[k]);
+      EXPECT_EQ(count_below(mesh, between), k) << c.name;
+    }
+  }
+}
+
+TEST(BeamModes, LanczosAndDenseDecompositionAgree) {
+  for (Case c : cases(110)) {
+    const Timoshenko mesh(c.parameters);
+    c.parameters.n_modes = 0;
+    const Modes all = compute_modes(mesh, c.parameters);  // singular values of a 220 × 220 matrix
+    EXPECT_LT(all.residual, 1e-9) << c.name;
+    c.parameters.n_modes = 12;
+    const Modes few = compute_modes(mesh, c.parameters);  // Lanczos
+    for (Eigen::Index k = 0; k < 12; ++k) {
+      EXPECT_NEAR(few.omega[k], all.omega[k], 1e-10 * all.omega[k]) << c.name << k;
+      // Eigenvectors: error of the Krylov vectors over the relative gap of neighbouring modes.
+      EXPECT_NEAR(few.tip[k], all.tip[k], 1e-8 * std::fabs(all.tip[k])) << c.name << k;
+    }
+  }
+}
+
+TEST(BeamModes, AllModesSpanTheMesh) {
+  for (const Case& c : cases(60)) {
+    const Timoshenko mesh(c.parameters);
+    const Modes modes = compute_modes(mesh, c.parameters);
+    ASSERT_EQ(modes.omega.size(), 120);
+    // Σ φφᵀ = M⁻¹, applied to the tip and to u = x.
+    const double inverse_mass = mesh.mass_solve(mesh.unit_tip_force())[mesh.tip_index()] / mesh.mass_per_length();
+    EXPECT_NEAR(modes.tip.squaredNorm(), inverse_mass, 1e-11 * inverse_mass) << c.name;
+    EXPECT_NEAR(modes.tip.dot(modes.linear_shape), c.parameters.length, 1e-11) << c.name;
+    EXPECT_EQ(count_below(mesh, modes.omega[119] * (1.0 + 1e-6)), 120) << c.name;
+    EXPECT_LT(count_below(mesh, modes.omega[119] * (1.0 - 1e-6)), 120) << c.name;
+  }
+}
+
+TEST(BeamModes, ReducedBasisKeepsTheInitialState) {
+  // u⁰ = s x and u_t⁰ = s' x exactly, for any number of modes: energies ½KAG s²L and ½ρA s'²L³/3.
+  for (const int n_modes : {1, 5, 64}) {
+    Parameters p = general_beam(400);
+    p.n_modes = n_modes;
+    p.initial_deflection_slope = 0.2;
+    p.initial_velocity_slope = -1.5;
+    const Beam b(p);
+    const double L = p.length, KAG = p.shear_modulus * p.shear_coefficient * p.area, rho_A = p.density * p.area;
+    EXPECT_NEAR(b.tip_displacement(), 0.2 * L, 1e-12);
+    EXPECT_NEAR(b.tip_velocity(), -1.5 * L, 1e-12);
+    EXPECT_NEAR(b.strain_energy(), 0.5 * KAG * 0.04 * L, 1e-11);
+    EXPECT_NEAR(b.kinetic_energy(), 0.5 * rho_A * 2.25 * L * L * L / 3.0, 1e-12);
+    std::array<double, shape_points> u, theta;
+    b.deflection(u);
+    b.rotation(theta);
+    for (std::size_t j = 0; j < shape_points; ++j) {
+      EXPECT_NEAR(u[j], 0.2 * L * static_cast<double>(j) / 20.0, 1e-12);
+      EXPECT_NEAR(theta[j], 0.0, 1e-11);
+    }
+  }
+}
+
+TEST(BeamModes, AThousandElementsInitialiseQuickly) {
+  // 0.05 s on the machine this was written on; the bound is what "well under a second" allows on a slow one.
+  Parameters p = unit_beam(1000, 3.6e10);
+  p.n_modes = 64;
+  const auto start = std::chrono::steady_clock::now();
+  const Beam b(p);
+  EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), 0.5);
+  EXPECT_EQ(b.frequencies().size(), 66U);  // 64 modes, the tip force's and the uniform load's shape
+}
+
+}  // namespace
+}  // namespace beam

@@ -1,0 +1,200 @@
+// Impulses, save and restore, and what is refused.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "beam.hpp"
+#include "beam_testing.hpp"
+
+namespace beam {
+namespace {
+
+using testing::Force;
+using testing::general_beam;
+using testing::mechanical_energy;
+using testing::outputs;
+using testing::unit_beam;
+using testing::with_integrator;
+
+std::vector<Parameters> variants() {
+  std::vector<Parameters> all;
+  for (const double alpha_b : {0.0, 2e-3}) {
+    Parameters p = general_beam(25);
+    p.alpha_b = alpha_b;
+    p.initial_velocity_slope = -1.0;
+    p.initial_deflection_slope = 0.05;
+    p.tip_load_coefficient = -0.2;
+    all.push_back(p);
+    p.n_modes = 4;
+    all.push_back(p);
+    for (const double rho_inf : {1.0, 0.7, 0.0}) all.push_back(with_integrator(p, Integrator::generalized_alpha, rho_inf));
+  }
+  return all;
+}
+
+TEST(BeamState, AnImpulseMovesTheTipMassOnly) {
+  for (const Parameters& p : variants()) {
+    Beam b(p);
+    b.step(0.01, {0.3, 0.0, 0.0}, 0.1);
+    const double v = b.tip_velocity(), u = b.tip_displacement(), before = mechanical_energy(b), strain = b.strain_energy();
+    const double J = 0.37;
+    b.apply_tip_impulse(J);
+    EXPECT_NEAR(b.tip_velocity() - v, J / b.tip_mass(), 1e-12 * J / b.tip_mass());  // momentum
+    EXPECT_NEAR(mechanical_energy(b) - before, 0.5 * J * (v + b.tip_velocity()), 1e-12 * before);  // its work
+    EXPECT_EQ(b.tip_displacement(), u);
+    EXPECT_EQ(b.strain_energy(), strain);
+    b.apply_tip_impulse(-J);
+    EXPECT_NEAR(b.tip_velocity(), v, 1e-12);
+  }
+}
+
+TEST(BeamState, TheTipMassOfTheMeshIsThatOfTheLastElements) {
+  // eᵀM⁻¹e of the u-block h/6·tridiag(1, 4, 1) with 2 at the end: for many elements 2√3/(ρA h), since the pivots tend
+  // to (2 + √3)h/6 from the clamp, and 2 − 1/(2 + √3) = √3 … the last is √3 h/6.
+  for (const Integrator integrator : {Integrator::modal, Integrator::generalized_alpha}) {
+    const Parameters p = with_integrator(general_beam(40), integrator);
+    const double h = p.length / p.n_elements;
+    EXPECT_NEAR(Beam(p).tip_mass(), p.density * p.area * h * std::sqrt(3.0) / 6.0, 1e-11);
+  }
+}
+
+TEST(BeamState, AStepRepeatedFromTheSameStateIsBitIdentical) {
+  for (const Parameters& p : variants()) {
+    Beam b(p);
+    const auto some_steps = [&b] {
+      b.step(0.01, {0.3, 2.0, -50.0}, 0.1);
+      b.apply_tip_impulse(0.2);
+      b.apply_tip_impulse(-0.1);
+      b.step(0.004, {-0.6, 0.0, 0.0}, 0.1);
+      b.set_distributed_load(0.4);
+      b.step(0.004, {-0.6, 0.0, 0.0}, 0.3);
+      return outputs(b);
+    };
+    some_steps();
+    for (const bool after_impulse : {false, true}) {
+      if (after_impulse) b.apply_tip_impulse(0.05);
+      std::vector<double> state;
+      b.save(state);
+      const std::vector<double> saved = outputs(b);
+      const std::vector<double> first = some_steps();
+
+      b.restore(state);
+      EXPECT_EQ(outputs(b), saved);  // outputs of the last step included
+      EXPECT_EQ(some_steps(), first);
+
+      // More step sizes than the cache holds, as event location does, must change nothing.
+      b.restore(state);
+      for (int i = 1; i < 9; ++i) b.step(0.01 / i, {1.0, 1.0, 1.0}, 0.0);
+      b.restore(state);
+      EXPECT_EQ(outputs(b), saved);
+      EXPECT_EQ(some_steps(), first);
+
+      // Nor does it matter which object continues.
+      Beam other(p);
+      other.restore(state);
+      EXPECT_EQ(outputs(other), saved);
+      other.step(0.007, {1.0, 0.0, 0.0}, 0.0);
+      b.restore(state);
+      b.step(0.007, {1.0, 0.0, 0.0}, 0.0);
+      EXPECT_EQ(outputs(other), outputs(b));
+    }
+  }
+}
+
+TEST(BeamState, AForeignStateIsRefused) {
+  Beam b(general_beam(10)), other(general_beam(11));
+  std::vector<double> state;
+  other.save(state);
+  const std::vector<double> before = outputs(b);
+  EXPECT_THROW(b.restore(state), std::invalid_argument);
+  b.save(state);
+  state[3] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(b.restore(state), std::invalid_argument);
+  EXPECT_EQ(outputs(b), before);
+}
+
+TEST(BeamState, AResultThatIsNotFiniteLeavesTheStateUnchanged) {
+  for (const Parameters& p : variants()) {
+    Beam b(p);
+    b.step(0.01, {0.3, 0.0, 0.0}, 0.1);
+    const std::vector<double> before = outputs(b);
+    EXPECT_THROW(b.step(1e10, {1e308, 1e308, 1e308}, -3.0), std::domain_error);
+    EXPECT_EQ(outputs(b), before);
+    EXPECT_THROW(b.apply_tip_impulse(1.7e308), std::domain_error);
+    EXPECT_EQ(outputs(b), before);
+    Beam same(p);
+    same.step(0.01, {0.3, 0.0, 0.0}, 0.1);
+    same.step(0.01, {0.2, 0.0, 0.0}, 0.1);
+    b.step(0.01, {0.2, 0.0, 0.0}, 0.1);
+    EXPECT_EQ(outputs(b), outputs(same));
+  }
+}
+
+TEST(BeamState, InputsThatAreNotFiniteAreRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  Beam b(general_beam(5));
+  const std::vector<double> before = outputs(b);
+  for (const double size : {0.0, -0.1, nan, inf}) EXPECT_THROW(b.step(size, {0.0, 0.0, 0.0}, 0.0), std::invalid_argument);
+  EXPECT_THROW(b.step(0.1, {nan, 0.0, 0.0}, 0.0), std::invalid_argument);
+  EXPECT_THROW(b.step(0.1, {0.0, 0.0, inf}, 0.0), std::invalid_argument);
+  EXPECT_THROW(b.step(0.1, {0.0, 0.0, 0.0}, nan), std::invalid_argument);
+  EXPECT_THROW(b.apply_tip_impulse(nan), std::invalid_argument);
+  EXPECT_THROW(b.set_distributed_load(inf), std::invalid_argument);
+  EXPECT_EQ(outputs(b), before);
+}
+
+// The message names the parameter, its value and what is allowed.
+TEST(BeamState, ParametersAreChecked) {
+  struct Refused {
+    std::function<void(Parameters&)> change;
+    std::vector<std::string> named;
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<Refused> all = {
+      {[](Parameters& p) { p.density = 0.0; }, {"density", "= 0 ", "> 0"}},
+      {[](Parameters& p) { p.area = -2.0; }, {"area", "= -2 "}},
+      {[&](Parameters& p) { p.second_moment_of_area = nan; }, {"second_moment_of_area", "nan"}},
+      {[](Parameters& p) { p.young_modulus = 0.0; }, {"young_modulus"}},
+      {[](Parameters& p) { p.shear_modulus = -1.0; }, {"shear_modulus"}},
+      {[](Parameters& p) { p.shear_coefficient = 0.0; }, {"shear_coefficient"}},
+      {[](Parameters& p) { p.length = 0.0; }, {"length"}},
+      {[](Parameters& p) { p.alpha_b = -1e-3; }, {"alpha_b", "-0.001", ">= 0"}},
+      {[](Parameters& p) { p.n_elements = 0; }, {"n_elements", "= 0 ", "between 1 and"}},
+      {[](Parameters& p) { p.n_elements = 2000000; }, {"n_elements"}},
+      {[](Parameters& p) { p.n_modes = -1; }, {"n_modes", "= -1 "}},
+      {[](Parameters& p) { p.n_modes = 101; }, {"n_modes", "= 101 ", "100"}},
+      {[](Parameters& p) { p.n_elements = 501; }, {"n_modes", "= 0 ", "generalized_alpha", "fewer n_modes"}},
+      {[](Parameters& p) { p.n_elements = 501, p.n_modes = 502; }, {"n_modes", "= 502 ", "501"}},
+      {[](Parameters& p) { p.integrator = static_cast<Integrator>(3); }, {"integrator", "= 3 ", "modal"}},
+      {[](Parameters& p) { p.integrator = Integrator::generalized_alpha, p.rho_inf = 1.1; }, {"rho_inf", "between 0 and 1"}},
+      {[&](Parameters& p) { p.initial_deflection_slope = nan; }, {"initial_deflection_slope"}},
+      {[&](Parameters& p) { p.initial_velocity_slope = nan; }, {"initial_velocity_slope"}},
+      {[&](Parameters& p) { p.tip_load_coefficient = nan; }, {"tip_load_coefficient"}},
+      {[](Parameters& p) { p.density = 1e-200, p.area = 1e-200; }, {"density * area"}},
+  };
+  for (const Refused& refused : all) {
+    Parameters p = unit_beam(50);
+    refused.change(p);
+    try {
+      Beam b(p);
+      ADD_FAILURE() << "accepted: " << refused.named[0];
+    } catch (const std::invalid_argument& error) {
+      for (const std::string& part : refused.named) {
+        EXPECT_NE(std::string(error.what()).find(part), std::string::npos) << error.what();
+      }
+    }
+  }
+  Parameters p = unit_beam(500);
+  p.integrator = Integrator::generalized_alpha;
+  p.n_elements = 5000;  // no eigenproblem: any number of elements
+  EXPECT_NO_THROW(Beam{p});
+}
+
+}  // namespace
+}  // namespace beam

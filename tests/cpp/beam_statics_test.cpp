@@ -1,0 +1,156 @@
+// Statics of the discrete beam: closed forms of the P1/P1 element with full and with reduced integration.
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "beam.hpp"
+#include "beam_testing.hpp"
+#include "timoshenko.hpp"
+
+namespace beam {
+namespace {
+
+using testing::general_beam;
+using testing::unit_beam;
+using testing::with_integrator;
+
+double bending(const Parameters& p) { return p.young_modulus * p.second_moment_of_area; }
+double shearing(const Parameters& p) { return p.shear_modulus * p.shear_coefficient * p.area; }
+
+/// u(L) of the discrete beam under a unit tip force. In element e the moment is M_e = L − x_mid; with
+/// Σ h M_e² = L³/3 − L h²/12:
+///   full integration     (L³/3EI + L/KAG)/(1 + KAG h²/12EI)
+///   reduced integration  (L³/3 − L h²/12)/EI + L/KAG
+double tip_compliance(const Parameters& p) {
+  const double L = p.length, h = L / p.n_elements, EI = bending(p), KAG = shearing(p);
+  if (p.reduced_integration) return (L * L * L / 3.0 - L * h * h / 12.0) / EI + L / KAG;
+  return (L * L * L / (3.0 * EI) + L / KAG) / (1.0 + KAG * h * h / (12.0 * EI));
+}
+
+std::vector<Parameters> meshes() {
+  std::vector<Parameters> all;
+  for (const int n : {1, 2, 10, 37, 100}) {
+    for (const bool reduced : {false, true}) {
+      for (Parameters p : {unit_beam(n), unit_beam(n, 3.6e10), general_beam(n)}) {
+        p.reduced_integration = reduced;
+        all.push_back(p);
+      }
+      Parameters slender = unit_beam(n);
+      slender.shear_modulus = 1e6;
+      slender.reduced_integration = reduced;
+      all.push_back(slender);
+    }
+  }
+  return all;
+}
+
+TEST(BeamStatics, TipComplianceIsThatOfTheMeshForAnyNumberOfModes) {
+  for (Parameters p : meshes()) {
+    const double exact = tip_compliance(p);
+    for (const int n_modes : {1, 2, 7, 30, 0}) {
+      if (n_modes > 2 * p.n_elements) continue;
+      p.n_modes = n_modes;
+      // Rounding, of sums over the mesh and over the modes.
+      EXPECT_NEAR(Beam(p).static_tip_compliance(), exact, 1e-12 * exact) << p.n_elements << " " << n_modes;
+    }
+    const Beam direct(with_integrator(p, Integrator::generalized_alpha));
+    EXPECT_NEAR(direct.static_tip_compliance(), exact, 1e-13 * exact);
+  }
+}
+
+TEST(BeamStatics, FullIntegrationLocksAndReducedDoesNot) {
+  Parameters p = unit_beam(10);
+  p.shear_modulus = 1e6;
+  const double truth = 1.0 / 3.0 + 1e-6;
+  EXPECT_NEAR(Beam(p).static_tip_compliance() / truth, 0.0012, 5e-6);  // 1/(1 + 1e6/1200) = 0.00119856
+  p.reduced_integration = true;
+  EXPECT_NEAR(Beam(p).static_tip_compliance() / truth, 0.9975, 1e-8);  // 1 − h²/4
+}
+
+// A large Kelvin–Voigt damping and a long step end in equilibrium.
+TEST(BeamStatics, MotionComesToRestInTheStaticShape) {
+  for (const bool reduced : {false, true}) {
+    for (const int n_modes : {1, 5, 0}) {
+      Parameters p = general_beam(20);
+      p.reduced_integration = reduced;
+      p.n_modes = n_modes;
+      p.alpha_b = 0.3;
+      const double C = 0.7, L = p.length, h = L / p.n_elements;
+      const double EI = bending(p) + (reduced ? 0.0 : shearing(p) * h * h / 12.0);
+      for (const Integrator integrator : {Integrator::modal, Integrator::generalized_alpha}) {
+        Beam b(with_integrator(p, integrator, 0.5));
+        const int steps = integrator == Integrator::modal ? 1 : 300;
+        for (int i = 0; i < steps; ++i) b.step(300.0 / steps, {C, 0.0, 0.0}, 0.0);
+        // What is left of the motion is e^{−t ω₁²α/2} ~ 1e-200 (modal), 0.5^300 (generalised-α).
+        EXPECT_NEAR(b.tip_displacement(), C * tip_compliance(p), 1e-12 * C * tip_compliance(p));
+        EXPECT_NEAR(b.strain_energy(), 0.5 * C * C * tip_compliance(p), 1e-12 * C * C * tip_compliance(p));
+        EXPECT_NEAR(b.tip_velocity(), 0.0, 1e-12);
+        EXPECT_NEAR(b.tip_acceleration(), 0.0, 1e-7);  // forces in balance up to rounding of KAG/h u/(ρA h)
+        // θ(L) = Σ h (L − x_mid)/EI = L²/2EI; the static shape is in the basis, so this too holds for any n_modes.
+        EXPECT_NEAR(b.tip_rotation(), C * L * L / (2.0 * EI), 1e-12);
+        std::array<double, shape_points> u, theta;
+        b.deflection(u);
+        b.rotation(theta);
+        EXPECT_EQ(u[0], 0.0);
+        EXPECT_EQ(theta[0], 0.0);
+        EXPECT_NEAR(u[20], b.tip_displacement(), 1e-14);
+        EXPECT_NEAR(theta[20], b.tip_rotation(), 1e-14);
+        for (int j = 0; j <= 20; ++j) {  // 20 elements: every output point is a node
+          const double x = L * j / 20.0, shape = (L * x - 0.5 * x * x) / EI;
+          EXPECT_NEAR(theta[static_cast<std::size_t>(j)], C * shape, 1e-12) << j;
+        }
+      }
+    }
+  }
+}
+
+TEST(BeamStatics, UniformLoadConvergesToTheExactDeflectionInSecondOrder) {
+  // Exact u(L) = f_b (L⁴/8EI + L²/2KAG).
+  double previous = 0.0;
+  for (const int n : {10, 20, 40}) {
+    Parameters p = general_beam(n);
+    p.alpha_b = 1.0;
+    p.n_modes = 2;
+    const double L = p.length, exact = L * L * L * L / (8.0 * bending(p)) + L * L / (2.0 * shearing(p));
+    Beam b(p);
+    b.step(1000.0, {0.0, 0.0, 0.0}, 1.0);
+    const double error = std::fabs(b.tip_displacement() / exact - 1.0);
+    if (previous > 0.0) {
+      EXPECT_NEAR(previous / error, 4.0, 0.1) << n;
+    }
+    previous = error;
+  }
+}
+
+TEST(BeamStatics, LoadsAreConsistent) {
+  // Reciprocity: the tip deflection under a load equals the work of that load on the shape of the unit tip force.
+  for (const Integrator integrator : {Integrator::modal, Integrator::generalized_alpha}) {
+    Parameters p = with_integrator(general_beam(9), integrator, 0.5);
+    p.alpha_b = 1.0;
+    p.n_modes = 3;
+    const double h = p.length / p.n_elements;
+    Timoshenko mesh(p);
+    const Eigen::VectorXd shape = mesh.flexibility_times(mesh.unit_tip_force()) / (p.density * p.area);
+    double uniform = 0.0;  // ∫u dx by the trapezoidal rule, exact for P1
+    for (Eigen::Index i = 0; i < 9; ++i) uniform += h * shape[2 * i + 1] * (i < 8 ? 1.0 : 0.5);
+    const double hat = h * (shape[17] / 3.0 + shape[15] / 6.0);  // ∫ψ_n u dx
+
+    const auto at_rest = [&](double f_b) {
+      Beam b(p);
+      for (int i = 0; i < 200; ++i) b.step(5.0, {0.0, 0.0, 0.0}, f_b);
+      return b;
+    };
+    EXPECT_NEAR(at_rest(1.0).tip_displacement(), uniform, 1e-12 * uniform);
+    p.tip_load_coefficient = -6.0;
+    const Beam b = at_rest(2.0);
+    EXPECT_NEAR(b.tip_displacement(), 2.0 * uniform - 6.0 * hat, 1e-12 * uniform);
+    // At rest the potential of the load is −2 times the strain energy (Clapeyron).
+    EXPECT_NEAR(b.load_potential(), -2.0 * b.strain_energy(), 1e-11 * b.strain_energy());
+  }
+}
+
+}  // namespace
+}  // namespace beam

@@ -1,0 +1,80 @@
+// What the beam's tests share.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "beam.hpp"
+
+namespace beam::testing {
+
+using Force = std::array<double, 3>;
+
+/// κ = EI = KAG, everything else 1: section 6 of the paper.
+inline Parameters unit_beam(int n_elements, double kappa = 1.0) {
+  Parameters p;
+  p.n_elements = n_elements;
+  p.young_modulus = kappa;
+  p.shear_modulus = kappa;
+  return p;
+}
+
+/// No two parameters alike, so that a forgotten factor shows.
+inline Parameters general_beam(int n_elements) {
+  Parameters p;
+  p.density = 3.0;
+  p.area = 0.7;
+  p.second_moment_of_area = 0.11;
+  p.young_modulus = 50.0;
+  p.shear_modulus = 21.0;
+  p.shear_coefficient = 0.85;
+  p.length = 1.3;
+  p.n_elements = n_elements;
+  return p;
+}
+
+inline Parameters with_integrator(Parameters p, Integrator integrator, double rho_inf = 1.0) {
+  p.integrator = integrator;
+  p.rho_inf = rho_inf;
+  return p;
+}
+
+/// C(τ) seen from τ₀ on: the same polynomial re-expanded.
+inline Force shifted(const Force& c, double t) { return {c[0] + t * (c[1] + 0.5 * t * c[2]), c[1] + t * c[2], c[2]}; }
+
+inline double mechanical_energy(const Beam& b) { return b.kinetic_energy() + b.strain_energy(); }
+
+/// Everything that can be read, for comparisons bit by bit.
+inline std::vector<double> outputs(const Beam& b) {
+  std::vector<double> all = {b.tip_displacement(),
+                             b.tip_velocity(),
+                             b.tip_acceleration(),
+                             b.tip_rotation(),
+                             b.tip_displacement_integral(),
+                             b.tip_displacement_integral_2(),
+                             b.kinetic_energy(),
+                             b.strain_energy(),
+                             b.dissipated_energy(),
+                             b.load_potential()};
+  std::array<double, shape_points> shape;
+  b.deflection(shape);
+  all.insert(all.end(), shape.begin(), shape.end());
+  b.rotation(shape);
+  all.insert(all.end(), shape.begin(), shape.end());
+  return all;
+}
+
+/// Pseudo-random numbers in (−1, 1), always the same.
+class Noise {
+ public:
+  double operator()() {
+    state_ = state_ * 6364136223846793005ULL + 1442695040888963407ULL;
+    return static_cast<double>(static_cast<long long>(state_ >> 11)) * 0x1p-52 - 1.0;
+  }
+
+ private:
+  unsigned long long state_ = 20240229ULL;
+};
+
+}  // namespace beam::testing
