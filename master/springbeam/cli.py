@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import signal
 import threading
+from collections import Counter, deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib import metadata
@@ -38,7 +39,7 @@ from .trajectory import Event
 BAD_INPUT = 2
 STOPPED = 3
 
-_EVENTS_SHOWN = 12
+_FIRST_EVENTS, _LAST_EVENTS = 10, 3
 _REFRESH_SECONDS = 0.1
 
 app = typer.Typer(
@@ -264,12 +265,16 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
     summary = load_summary(directory.path)
     console.print(Text(scene.title or "(untitled scene)", style="bold"))
     events = load_events(directory.path)
-    shown = list(islice(events, _EVENTS_SHOWN))
-    more = sum(1 for _ in events)
-    if shown:
-        console.print(_event_table(shown, scene))
-    if more:
-        console.print(f"… and {more} more in {directory.events.name}")
+    first = list(islice(events, _FIRST_EVENTS))
+    kinds = Counter(event.kind for event in first)
+    last: deque[Event] = deque(maxlen=_LAST_EVENTS)
+    for event in events:
+        kinds[event.kind] += 1
+        last.append(event)
+    if first:
+        console.print(_event_table(first, list(last), kinds.total() - len(first) - len(last), scene))
+        counts = ", ".join(f"{number} {kind}" for kind, number in kinds.most_common())
+        console.print(f"events    {counts}")
     if "macro_steps" in summary and "wall_time" in summary:
         console.print(f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s")
     if "max_energy_residual" in summary:
@@ -279,20 +284,21 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
     console.print(Text(f"results   {directory.path}"), soft_wrap=True)
 
 
-def _event_table(events: list[Event], scene: Scene) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    position = "y" if scene.spring is not None else "u_tip"
-    speed = "z" if scene.spring is not None else "v_tip"
+def _event_table(first: list[Event], last: list[Event], between: int, scene: Scene) -> Table:
+    position, speed = ("u_tip", "v_tip") if scene.spring is None else ("y", "z")
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
     table.add_column("event", no_wrap=True)
-    for heading in ("t [s]", f"{position} [m]", f"{speed} [m/s]", "J_contact", "J_stop [N·s]", "loss [J]"):
-        table.add_column(Text(heading), justify="right", no_wrap=True)
-    for event in events:
-        numbers = (getattr(event, position), getattr(event, speed))
+    units = {"t": "s", position: "m", speed: "m/s", "J_contact": "N·s", "J_stop": "N·s", "loss": "J"}
+    for name, unit in units.items():
+        table.add_column(Text(f"{name}\n[{unit}]"), justify="right", no_wrap=True)
+    for event in [*first, *last]:
+        if between and last and event is last[0]:
+            table.add_row("⋮", Text(f"{between} more"))
+        impulses = (event.impulse_contact, event.impulse_foundation)
         table.add_row(
             event.kind,
             f"{event.time:.8f}",
-            *("" if number is None else f"{number:.5g}" for number in numbers),
-            *(f"{number:.4g}" if number else "" for number in (event.impulse_contact, event.impulse_foundation)),
-            f"{event.energy_loss:.3g}" if event.energy_loss else "",
+            *("" if value is None else f"{value:.4g}" for value in (getattr(event, position), getattr(event, speed))),
+            *(f"{value:.3g}" if value else "" for value in (*impulses, event.energy_loss)),
         )
     return table

@@ -154,7 +154,8 @@ def alternates(values: np.ndarray) -> bool:
         return False
     jumps = np.diff(values)
     reversals = np.mean(jumps[1:] * jumps[:-1] < 0.0)
-    return bool(reversals > 0.6 and np.sum(np.abs(jumps)) > 20.0 * np.ptp(values))
+    usual_range = np.subtract(*np.quantile(values, (0.95, 0.05)))
+    return bool(reversals > 0.6 and np.mean(np.abs(jumps)) > 0.15 * usual_range)
 
 
 def phase_intervals(
@@ -286,12 +287,21 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     figure = _figure(trajectory, "(A) The beam right after first contact", 3.6)
     left, right = figure.subplots(1, 2)
     steps = np.diff(times)
-    apart = steps > 0.0
+    apart = steps > 1e-6 * np.max(steps, initial=0.0)  # between rows of one event Δu is rounding
     velocities = np.diff(shapes, axis=0)[apart] / steps[apart, None]
     _curves(figure, left, trajectory, times, shapes, "deflection u", "m", bar=False)
     _levels(left, trajectory, readable_unit([shapes], "m"))
     middles = 0.5 * (times[1:] + times[:-1])[apart]
     _curves(figure, right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s", bar=True)
+    seen = (trajectory["time"] >= times[0]) & (trajectory["time"] <= times[-1])
+    fastest = float(np.max(np.abs(trajectory["v_tip"][seen]), initial=0.0))
+    if fastest > 3.0 * float(np.max(np.abs(velocities[:, -1]))):
+        unit = readable_unit([np.array([fastest])], "m/s")
+        right.set_title(
+            f"mean from shape to shape; the tip's own velocity reaches {unit.factor * fastest:.2g} {unit.name}:\n"
+            "the motion is faster than the steps",
+            **_REMARK,
+        )
     return figure
 
 
@@ -342,7 +352,7 @@ def _curves(
     ax.autoscale_view(scalex=False)
     if bar:
         mappable = ScalarMappable(norm, _CLOCK)
-        figure.colorbar(mappable, ax=ax, label=f"time t [{clock.name}]", pad=0.02, aspect=30)
+        figure.colorbar(mappable, ax=ax, label=f"time t [{clock.name}]", pad=0.05, aspect=30)
 
 
 def _map(figure: Figure, ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray) -> None:
@@ -375,8 +385,11 @@ def _levels(ax: Axes, trajectory: Trajectory, unit: Unit, *, whole_width: bool =
         if not low - reach <= level <= high + reach:
             continue
         ax.axhline(level, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **style)
-        ax.annotate(symbol, (1.0, level), xycoords=("axes fraction", "data"), xytext=(-2.0, 1.5),
-                    textcoords="offset points", ha="right", fontsize=8.0)  # fmt: skip
+        place: dict[str, Any] = {"xytext": (3.0, 0.0), "va": "center"}
+        if whole_width:  # beside the panel is the key
+            place = {"xytext": (-2.0, 1.5), "ha": "right"}
+        ax.annotate(symbol, (1.0, level), xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=8.0,
+                    **place)  # fmt: skip
 
 
 def _level_values(trajectory: Trajectory) -> list[tuple[float, str, dict[str, Any]]]:
@@ -407,18 +420,30 @@ def _positions(trajectory: Trajectory) -> Figure | None:
     speeds = _present(trajectory, "v_tip") or _present(trajectory, "z")
     whose = "beam's tip" if "v_tip" in speeds else "spring's top"
     title = "(C) Positions, and velocity" if len(positions) > 1 else "(C) Position and velocity"
-    timeline = _Timeline.of(trajectory, f"{title} of the {whose}", (2.4, 1.6))
-    above, below = timeline.axes
+    hidden = _much_smaller(trajectory, positions)
+    timeline = _Timeline.of(trajectory, f"{title} of the {whose}", [2.4] + [1.2] * bool(hidden) + [1.6])
+    above, *close, below = timeline.axes
     unit = readable_unit([trajectory[name] for name in positions], "m")
     for name in positions:
         label, style = _LABELS[name]
         timeline.line(above, unit, name, label=label, **style)
     _levels(above, trajectory, unit, whole_width=True)
     above.set_ylabel(f"position [{unit.name}]")
+    for ax, name in zip(close, hidden, strict=True):
+        unit = readable_unit([trajectory[name]], "m")
+        label, style = _LABELS[name]
+        timeline.line(ax, unit, name, label=f"{label}, enlarged", **{**style, "linewidth": 1.0})
+        ax.set_ylabel(f"position [{unit.name}]")
     _velocity_panel(timeline, below, speeds)
     for ax in timeline.axes:
         _key(ax)
     return timeline.figure
+
+
+def _much_smaller(trajectory: Trajectory, names: list[str]) -> list[str]:
+    """The one of two whose motion cannot be seen beside the other's, if it moves at all."""
+    ranges = {name: float(np.ptp(trajectory[name])) for name in names}
+    return [name for name, size in ranges.items() if 0.0 < size < 0.02 * max(ranges.values())]
 
 
 def _velocity_panel(timeline: _Timeline, ax: Axes, names: list[str]) -> None:

@@ -139,8 +139,12 @@ def test_report_fits_80_columns_and_says_how_many_events_are_not_shown(here, mon
 
     monkeypatch.setattr(springbeam.runner, "run", many)
     result = springbeam_command("run", "soft", "--no-plots")
-    assert max(map(len, result.stdout.splitlines())) <= 80
-    assert "and 29 more in events.csv" in result.stdout
+    lines = result.stdout.splitlines()
+    assert max(map(len, lines)) <= 80
+    # Whole numbers, none cut short.
+    assert " ".join(lines[3].split()) == "stop_impact 123.45678900 -1.234e-05 -1.234e-05 -1.23e-07 1e-09 1e-09"
+    assert "⋮ 28 more" in " ".join(result.stdout.split())
+    assert "events    40 stop_impact, 1 impact" in result.stdout
 
 
 def test_warnings_are_shown_as_they_are(here, monkeypatch):

@@ -155,6 +155,20 @@ def test_mean_velocity_of_shapes():
         assert np.allclose(curve[:, 1], -2.0 * SHAPE_POINTS**2, rtol=1e-12)
 
 
+def test_a_motion_lost_in_the_other_is_enlarged():
+    t = np.linspace(0.0, 0.6, 400)
+    figure = plots._positions(a_trajectory(u_tip=2e-6 * np.sin(9.0 * t), y=-1e-2 * np.sin(5.0 * t)))
+    assert [ax.get_ylabel() for ax in figure.axes] == ["position [mm]", "position [µm]", "velocity [mm/s]"]
+    assert len(plots._positions(a_trajectory()).axes) == 2
+
+
+def test_shapes_too_far_apart_for_the_motion_say_so():
+    slow = a_trajectory()
+    assert not any("faster than the steps" in text for text in texts(plots._shapes_after_contact(slow)))
+    fast = a_trajectory(v_tip=np.full(400, 1e3))
+    assert any("1 km/s" in text or "1e+03 m/s" in text for text in texts(plots._shapes_after_contact(fast)))
+
+
 def test_equilibrium_and_foundation_are_drawn_unless_far_outside():
     figure = plots._positions(a_trajectory())
     assert {"Ψ", "φ"} <= set(texts(figure))

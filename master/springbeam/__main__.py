@@ -1,0 +1,5 @@
+"""``python -m springbeam`` is the ``springbeam`` command."""
+
+from .cli import main
+
+main()
