@@ -33,15 +33,9 @@ from scipy.optimize import brentq
 
 from ..scene import Scene
 from ..trajectory import COLUMNS, Event, Trajectory
+from .exponential import ExponentialPropagator, LinearForm
 from .hybrid_system import HybridSystem, Motion, Phase, ReferenceFailure
-from .propagators import (
-    METHODS,
-    ExponentialPropagator,
-    LinearForm,
-    Propagator,
-    RungeKuttaPropagator,
-    Segment,
-)
+from .propagators import SCIPY_METHODS, Propagator, RungeKuttaPropagator, Segment
 
 __all__ = ["ReferenceFailure", "simulate"]
 
@@ -94,8 +88,8 @@ def simulate(
     ValueError
         If the scene is outside what this reference defines.
     """
-    if method not in METHODS:
-        raise ValueError(f"method = {method!r}: one of {', '.join(METHODS)}")
+    if method not in ("exponential", *SCIPY_METHODS):
+        raise ValueError(f"method = {method!r}: one of exponential, {', '.join(SCIPY_METHODS)}")
     run = _Run(scene, method, rtol, atol, velocity_perturbation, seat_height, max_events, t_end)
     return run.execute(sample_times)
 
@@ -216,7 +210,7 @@ class _Run:
         propagator = self._propagator()
         while self.t_end - self.time > 1e-14 * self.t_end:
             target = samples[upcoming] if upcoming < len(samples) else self.t_end
-            segment = propagator.advance(max(target - self.time, 1e-16 * self.t_end))
+            segment = propagator.advance(max(target - self.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
             self.counts["steps"] += 1
             found = self._first_event(segment, armed)
             reach = segment.size if found is None else found[1]
@@ -370,8 +364,7 @@ class _Run:
             self.phase = Phase("tied")
             self._emit("retie")
         elif name == "unseat":
-            self.phase = Phase(self.phase.contact)
-            self._emit("unseated" if s.has_spring else "separation")
+            self._unseat()
         elif name == "stop":
             self._hit_stop()
         s.synchronise(self.phase, self.X)
@@ -428,7 +421,7 @@ class _Run:
         free_phase = Phase(self.phase.contact)
         m = s.motion(free_phase, self.X)
         acceleration = float(m.z_dot) if s.has_spring else float(m.a @ s.b)
-        seats = acceleration < 0.0 and 0.5 * speed**2 / -acceleration <= self._height_to_seat()
+        seats = e == 0.0 or 0.5 * speed**2 <= -acceleration * self._height_to_seat()
         if seats and e > 0.0:
             self.X = arriving
             contact_impulse, foundation_impulse, _ = self._bounce(0.0)
@@ -441,6 +434,8 @@ class _Run:
             impulse_foundation=foundation_impulse,
             energy_loss=before - self._mechanical_energy(),
         )
+        if seats and s.motion(self.phase, self.X).N < 0.0:
+            self._unseat()
 
     def _bounce(self, e: float) -> tuple[float, float, float]:
         """Apply restitution e; impulses on the tip and of the foundation [N·s], speed afterwards [m/s]."""
@@ -464,6 +459,10 @@ class _Run:
         if s.has_spring:
             self.X[s.Y], self.X[s.Z] = stop.position, 0.0
         s.synchronise(self.phase, self.X)
+
+    def _unseat(self) -> None:
+        self.phase = Phase(self.phase.contact)
+        self._emit("unseated" if self.system.has_spring else "separation")
 
     def _height_to_seat(self) -> float:
         if self._seat_height is not None:

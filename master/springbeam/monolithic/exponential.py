@@ -1,0 +1,357 @@
+"""Exact modal integration of one phase of a `HybridSystem`.
+
+The phase's linear part is diagonalised and solved exactly; what is nonlinear or not proportionally damped enters as
+forces r(t) at the interface, collocated at s Gauss points of each step::
+
+    ξ̈ + α_b ω² ξ̇ + ω² ξ = c + Pᵀ r(t),     r = R(w, ẇ),  w = Jξ the interface displacements
+    ξ(τ) = C(τ) ξ₀ + S(τ) ξ̇₀ + ∫₀^τ S(τ − σ) (c + Pᵀ r(σ)) dσ,    S the response to a unit impulse, C = Ṡ + α_b ω² S
+
+The steps are as long as the fastest mode's radian: not for accuracy, which a linear phase has at any step, but so that
+no event slips through between two nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from .hybrid_system import HybridSystem, Phase, ReferenceFailure
+from .propagators import Propagator, Segment
+
+_STAGES = 12
+#: Points that integrate S × a polynomial of degree 11 over a step to rounding.
+_QUADRATURE = 24
+_MAX_HALVINGS = 60
+_MAX_ITERATIONS = 60
+#: Step size × largest |root| of the phase: 12 Gauss points interpolate e^{iθ}, θ ≤ 2, to 1e-12.
+_STEP_PHASE = 2.0
+#: Largest accepted impulse of the last two Legendre coefficients of r over a step, as a share of the momentum there.
+#: The step's end is far more exact: Gauss points integrate what these coefficients leave out.
+_TAIL = 1e-12
+_CACHED_SIZES = 64
+
+
+class _GaussRule:
+    """Gauss–Legendre collocation on [0, 1]: nodes, weights, Lagrange basis ℓ_k, Legendre transform."""
+
+    def __init__(self, stages: int) -> None:
+        x, w = np.polynomial.legendre.leggauss(stages)
+        self.nodes = 0.5 * (x + 1.0)
+        self.weights = 0.5 * w
+        #: (stages, stages): values at the nodes → Legendre coefficients.
+        self.transform = np.polynomial.legendre.legvander(x, stages - 1).T * w * (np.arange(stages)[:, None] + 0.5)
+        self.stages = stages
+
+    def lagrange(self, c: np.ndarray) -> np.ndarray:
+        """ℓ_k(c), shape c.shape + (stages,)."""
+        return np.asarray(np.polynomial.legendre.legvander(2.0 * c - 1.0, self.stages - 1) @ self.transform)
+
+
+_GAUSS = _GaussRule(_STAGES)
+_INNER = _GaussRule(_QUADRATURE)
+#: Where a step is evaluated: the Gauss points and the end.
+_TARGETS = np.append(_GAUSS.nodes, 1.0)
+#: Quadrature points on [0, c] for each target c, shape (targets, Q), and weight × ℓ_k there, (targets, stages, Q).
+_ELAPSED = _TARGETS[:, None] * _INNER.nodes
+_FORCE_BASIS = np.swapaxes(_GAUSS.lagrange(_ELAPSED) * (_TARGETS[:, None] * _INNER.weights)[..., None], 1, 2)
+
+
+@dataclass(frozen=True)
+class _Weights:
+    """Maps over [0, τᵢ], τᵢ the targets of a step; p modes, o interface outputs, k inputs."""
+
+    C: np.ndarray  #: (targets, p): ξ₀ → ξ
+    S: np.ndarray  #: ξ̇₀ → ξ
+    C_dot: np.ndarray  #: ξ₀ → ξ̇
+    S_dot: np.ndarray  #: ξ̇₀ → ξ̇
+    force: np.ndarray  #: (targets, stages, p): ∫ S(τᵢ − σ) ℓ_j(σ) dσ
+    force_dot: np.ndarray
+    constant: np.ndarray  #: (targets, p): the response to c
+    constant_dot: np.ndarray
+    interface: np.ndarray  #: (o, stages, k, stages): r at the Gauss points → w there
+    interface_dot: np.ndarray
+
+
+class LinearForm:
+    """The linear part of a phase in M-orthonormal coordinates ξ.
+
+    Attributes
+    ----------
+    omega2 : (p,) array
+        ω² [1/s²]; negative where a spring with k1 < 0 wins.
+    constant : (p,) array
+        c, of the constant loads.
+    inputs : (k, p) array
+        P: the forces r. First the spring's remainder −(α_s − α_b k1) z − k2 y³, then C of `compliance`; each if
+        the phase has it.
+    outputs : (o, p) array
+        J: the interface displacements that r depends on: y, then u; each if it moves and matters.
+    radius : float
+        Largest |root| [1/s].
+    """
+
+    def __init__(self, system: HybridSystem, phase: Phase) -> None:
+        self.system, self.phase = system, phase
+        p = system.spring
+        self.root_mass = float(np.sqrt(p.mass))
+        self.joined = system.joined(phase)
+        self.held = phase.seated and (self.joined or not system.has_spring)
+        self.spring_moves = system.has_spring and not phase.seated
+        self.pressed = system.two_bodies and system.compliance and phase.contact != "free"
+        #: Modes of M ξ-space: a = basis ξ (+ offset), and back.
+        self.offset = np.zeros(system.r)
+        if self.held:
+            self._hold()
+        elif self.joined:
+            self._join()
+        else:
+            self._separate()
+        #: Damping of the spring that α_b × stiffness does not hold yet [N·s/m].
+        self.extra_damping = p.damping - system.alpha_b * p.linear_stiffness
+        self.sigma = 0.5 * system.alpha_b * self.omega2
+        discriminant = self.sigma**2 - self.omega2
+        self._over = discriminant > 0.0
+        self._root = np.sqrt(np.abs(discriminant))
+        roots = np.where(self._over, np.abs(self.sigma) + self._root, np.sqrt(np.abs(self.omega2)))
+        self.radius = float(roots.max(initial=0.0))
+        self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
+        self._cache: dict[str, _Weights] = {}
+
+    def _hold(self) -> None:
+        """The tip at φ: coordinates orthogonal to b, about the multiple of b that has the tip there."""
+        s = self.system
+        if s.scene.stop is None:
+            raise ReferenceFailure("seated without a stop")
+        self.offset = s.b * (s.scene.stop.position / s.inverse_tip_mass)
+        tangent = scipy.linalg.null_space(s.b[None, :])
+        self.omega2, modes = _modes(s.omega[:, None] * tangent)
+        self.basis = tangent @ modes
+        self.constant = self.basis.T @ (s.load - s.stiffness * self.offset)
+        self.inputs = self.outputs = np.zeros((0, len(self.omega2)))
+        self._to_modes = self.basis.T
+
+    def _join(self) -> None:
+        """u = y: M = I + m bbᵀ, K = ω² + k1 bbᵀ; M's root and inverse root are known."""
+        s, p = self.system, self.system.spring
+        identity, beta, m = np.eye(s.r), s.inverse_tip_mass, p.mass
+        growth = float(np.sqrt(1.0 + m * beta))
+        projector = np.outer(s.b, s.b) / beta
+        inverse_root = identity - (1.0 - 1.0 / growth) * projector
+        if p.linear_stiffness >= 0.0:
+            factor = np.vstack([np.diag(s.omega), np.sqrt(p.linear_stiffness) * s.b])
+            self.omega2, modes = _modes(factor @ inverse_root)
+        else:
+            K = np.diag(s.stiffness) + p.linear_stiffness * np.outer(s.b, s.b)
+            self.omega2, modes = np.linalg.eigh(inverse_root @ K @ inverse_root)
+        self.basis = inverse_root @ modes
+        self._to_modes = modes.T @ (identity + (growth - 1.0) * projector)
+        self.constant = self.basis.T @ (s.load + s.b * p.external_force)
+        self.inputs = self.outputs = (self.basis.T @ s.b)[None, :]
+
+    def _separate(self) -> None:
+        """Beam and spring side by side, ξ = (a, √m y); the spring only if it moves."""
+        s, p = self.system, self.system.spring
+        self.omega2, self.constant = s.stiffness, s.load
+        spring_row, tip_row = np.zeros(s.r), s.b
+        if self.spring_moves:
+            self.omega2 = np.append(self.omega2, p.linear_stiffness / p.mass)
+            self.constant = np.append(self.constant, p.external_force / self.root_mass)
+            spring_row = np.append(spring_row, 1.0 / self.root_mass)
+            tip_row = np.append(tip_row, 0.0)
+        inputs, outputs = [], []
+        if self.spring_moves:
+            inputs.append(spring_row)
+            outputs.append(spring_row)
+        if self.pressed:
+            inputs.append(tip_row - spring_row)
+            outputs.append(tip_row)
+        self.inputs = np.array(inputs).reshape(len(inputs), len(self.omega2))
+        self.outputs = np.array(outputs).reshape(len(outputs), len(self.omega2))
+
+    def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(ξ, ξ̇) of a state."""
+        s = self.system
+        a, v = X[s.A] - self.offset, X[s.V]
+        if self.joined or self.held:
+            return self._to_modes @ a, self._to_modes @ v
+        if self.spring_moves:
+            return np.append(a, self.root_mass * X[s.Y]), np.append(v, self.root_mass * X[s.Z])
+        return a, v
+
+    def unpack(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
+        """States of shape (k, 2r + 3) from modes of shape (k, p); X supplies what does not move."""
+        s = self.system
+        states = np.repeat(X[None, :], len(xi), axis=0)
+        if self.joined or self.held:
+            states[:, s.A] = xi @ self.basis.T + self.offset
+            states[:, s.V] = xi_dot @ self.basis.T
+            return s.synchronise(self.phase, states)
+        states[:, s.A], states[:, s.V] = xi[:, : s.r], xi_dot[:, : s.r]
+        if self.spring_moves:
+            states[:, s.Y], states[:, s.Z] = xi[:, -1] / self.root_mass, xi_dot[:, -1] / self.root_mass
+        return states
+
+    def forces(self, w: np.ndarray, w_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
+        """R: forces (k, n) at interface displacements and velocities (o, n)."""
+        s = self.system
+        result = np.empty((len(self.inputs), w.shape[1]))
+        if self.joined or self.spring_moves:
+            result[0] = -self.extra_damping * w_dot[0] - s.spring.cubic_stiffness * w[0] ** 3
+        if self.pressed:
+            result[-1] = s.compliance_force((w[0] if self.spring_moves else X[s.Y]) - w[-1])
+        return result
+
+    def kernels(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """S and Ṡ at times ``tau``, shape tau.shape + (p,)."""
+        t = tau[..., None]
+        x = self._root * t
+        decay = np.exp(-self.sigma * t)
+        S = t * decay * np.sinc(x / np.pi)
+        S_dot = decay * np.cos(x) - self.sigma * S
+        if np.any(self._over):
+            # Roots −σ ± δ, apart or, for small δτ, together; −σ + δ = −ω²/(σ + δ) without the cancellation.
+            over = self._over
+            sigma, delta, x = self.sigma[over], self._root[over], x[..., over]
+            slow, fast = -self.omega2[over] / (delta + sigma), -(delta + sigma)
+            near = t * decay[..., over] * np.sinh(np.minimum(x, 1.0)) / np.where(x > 0.0, np.minimum(x, 1.0), 1.0)
+            near = np.where(x > 0.0, near, t * decay[..., over])
+            e_slow, e_fast = np.exp(slow * t), np.exp(fast * t)
+            S[..., over] = np.where(x < 1.0, near, (e_slow - e_fast) / (2.0 * delta))
+            S_dot[..., over] = 0.5 * (e_slow + e_fast) - sigma * S[..., over]
+            far = (slow * e_slow - fast * e_fast) / (2.0 * delta)
+            S_dot[..., over] = np.where(x < 1.0, S_dot[..., over], far)
+        return S, S_dot
+
+    def weights(self, size: float) -> _Weights:
+        """Weights of a step of ``size`` [s]; the last ones used are kept."""
+        key = f"{size:.12e}"
+        known = self._cache.pop(key, None)
+        if known is None:
+            known = self._new_weights(size)
+            if len(self._cache) >= _CACHED_SIZES:
+                self._cache.pop(next(iter(self._cache)))
+        self._cache[key] = known
+        return known
+
+    def _new_weights(self, size: float) -> _Weights:
+        S, S_dot = self.kernels(_TARGETS * size)
+        kernel, kernel_dot = self.kernels((_TARGETS[:, None] - _ELAPSED) * size)
+        basis = _FORCE_BASIS * size
+        force, force_dot = np.matmul(basis, kernel), np.matmul(basis, kernel_dot)
+
+        def at_interface(weights: np.ndarray) -> np.ndarray:
+            pairs = self.outputs[:, None, :] * self.inputs  # (o, k, p)
+            return np.asarray(np.einsum("okp,ijp->oikj", pairs, weights[:-1]))
+
+        return _Weights(
+            C=S_dot + 2.0 * self.sigma * S,
+            S=S,
+            C_dot=-self.omega2 * S,
+            S_dot=S_dot,
+            force=force,
+            force_dot=force_dot,
+            constant=self.constant * force.sum(axis=1),
+            constant_dot=self.constant * force_dot.sum(axis=1),
+            interface=at_interface(force),
+            interface_dot=at_interface(force_dot),
+        )
+
+
+def _modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """ω² and orthonormal modes of factorᵀfactor, from singular values (see `semi_discrete`)."""
+    _, sigma, vt = scipy.linalg.svd(factor, full_matrices=False)
+    return sigma[::-1] ** 2, vt[::-1].T
+
+
+@dataclass
+class _ExponentialSegment(Segment):
+    form: LinearForm
+    size: float
+    nodes: np.ndarray
+    states: np.ndarray
+    speed: float
+
+    def state(self, tau: float) -> np.ndarray:
+        # Stepped anew, because the forces of the whole segment may hold a kink that lies after τ.
+        inner = ExponentialPropagator(self.form, self.states[0], self.speed)
+        elapsed = 0.0
+        while tau - elapsed > 1e-15 * tau:
+            elapsed += inner.advance(tau - elapsed).size
+        return np.array(inner.X)
+
+
+class ExponentialPropagator(Propagator):
+    """Exact in the phase's linear part, Gauss collocation in the rest."""
+
+    def __init__(self, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
+        self.form, self.X = form, X
+        self._speed = speed  #: largest interface velocity so far × √mass, the scale of `_TAIL`
+        self._limit = _STEP_PHASE / form.radius if form.radius > 0.0 else np.inf
+        self._size = 0.0
+        self._halvings = 0
+
+    def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
+        while self._halvings < _MAX_HALVINGS:
+            segment = self._step(self._next_size(remaining, resolution))
+            if segment is not None:
+                self.X = segment.states[-1]
+                self._halvings = max(self._halvings - 1, 0)
+                return segment
+            self._halvings += 1
+        raise ReferenceFailure(f"no step resolves the interface force in phase {self.form.phase.name}")
+
+    def _next_size(self, remaining: float, resolution: float) -> float:
+        """Equal steps to the target; sizes recur where they differ by rounding only, because weights are dear."""
+        if self._halvings > 0:
+            size = min(self._limit, remaining) * 0.5**self._halvings
+            return size if remaining > 1.5 * size else remaining
+        steps = 1.0 if np.isinf(self._limit) else max(np.ceil(remaining / self._limit * (1.0 - 1e-9)), 1.0)
+        if abs(remaining - steps * self._size) > resolution:
+            self._size = remaining / steps
+        return self._size
+
+    def _step(self, size: float) -> _ExponentialSegment | None:
+        """One step, or None where it is too long for the forces r."""
+        form, X = self.form, self.X
+        w = form.weights(size)
+        xi, xi_dot = form.pack(X)
+        free = w.C * xi + w.S * xi_dot + w.constant
+        free_dot = w.C_dot * xi + w.S_dot * xi_dot + w.constant_dot
+        if len(form.inputs):
+            start = form.forces((form.outputs @ xi)[:, None], (form.outputs @ xi_dot)[:, None], X)
+            r = self._forces(w, free[:-1] @ form.outputs.T, free_dot[:-1] @ form.outputs.T, start)
+            if r is None:
+                return None
+            load = r.T @ form.inputs
+            free = free + np.einsum("ikj,kj->ij", w.force, load)
+            free_dot = free_dot + np.einsum("ikj,kj->ij", w.force_dot, load)
+            root_mobility = np.sqrt(form.mobility)
+            self._speed = max(self._speed, float(np.max(np.abs(free_dot @ form.inputs.T / root_mobility))))
+            tail = np.sum(np.abs(r @ _GAUSS.transform[-2:].T), axis=1)
+            if np.any(tail * size * root_mobility > _TAIL * self._speed):
+                return None
+        states = form.unpack(free, free_dot, X)
+        if not np.all(np.isfinite(states)):
+            return None
+        rate = form.system.dissipation_rate(states[:-1])
+        states[-1, form.system.D] = X[form.system.D] + size * float(_GAUSS.weights @ rate)
+        nodes = np.concatenate([[0.0], _GAUSS.nodes * size, [size]])
+        return _ExponentialSegment(form, size, nodes, np.vstack([X, states]), self._speed)
+
+    def _forces(self, w: _Weights, free: np.ndarray, free_dot: np.ndarray, start: np.ndarray) -> np.ndarray | None:
+        """r = R(w, ẇ) at the Gauss points by fixed-point iteration; ``free`` (stages, o) is w without r."""
+        r = np.repeat(start, _STAGES, axis=1)
+        for iteration in range(_MAX_ITERATIONS):
+            displacement = free.T + np.tensordot(w.interface, r, axes=2)
+            velocity = free_dot.T + np.tensordot(w.interface_dot, r, axes=2)
+            with np.errstate(over="ignore", invalid="ignore"):  # an escaping spring; found below
+                new = self.form.forces(displacement, velocity, self.X)
+            if not np.all(np.isfinite(new)):
+                return None
+            change, scale = np.max(np.abs(new - r)), np.max(np.abs(new))
+            r = new
+            if change <= 4e-16 * scale or (iteration > 8 and change <= 1e-14 * scale):
+                return r
+        return None

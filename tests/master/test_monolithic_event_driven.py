@@ -1,0 +1,419 @@
+"""The event-driven reference against exact solutions, extended precision, and its own second integrator."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.special import ellipj, ellipk
+
+from springbeam.monolithic.event_driven import ReferenceFailure, simulate
+from springbeam.monolithic.semi_discrete import assemble
+from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
+from springbeam.trajectory import COLUMNS, EVENT_KINDS, Trajectory
+
+
+def soft(n_elements: int = 10, **tables: dict[str, Any]) -> Scene:
+    """The scene `soft` on a coarser beam, with changes."""
+    tables["beam"] = {"n_elements": n_elements, **tables.get("beam", {})}
+    tables.setdefault("coupling", {"macro_step": 1e-3})
+    return with_changes(load_scene("soft"), **tables)
+
+
+def spring_only(t_end: float, stop: dict[str, float] | None = None, **spring: float) -> Scene:
+    tables: dict[str, Any] = {"time": {"t_end": t_end}, "spring": spring, "coupling": {"macro_step": 0.01}}
+    return scene_from_dict(tables if stop is None else {**tables, "stop": stop})
+
+
+def kinds(trajectory: Trajectory) -> list[str]:
+    return [event.kind for event in trajectory.events]
+
+
+# The scene `soft` -------------------------------------------------------------------------------------------------
+
+
+def extended_precision_soft() -> list[tuple[float, float]]:
+    """(time, velocity afterwards) of the foundation impact and the release of `soft`, in 80-bit arithmetic.
+
+    Taylor series of the tied semi-discrete model on steps of 4 ms to order 46; shares nothing with the package.
+    """
+    real = np.longdouble
+    n, h, stiffness = 50, real(1) / 50, real(100)
+    M, K = np.zeros((2, 2 * n + 2, 2 * n + 2), real)
+    pair, line = np.array([[2, 1], [1, 2]], real), np.array([[1, -1], [-1, 1]], real)
+    for i in range(n):
+        theta, u = np.array([2 * i, 2 * i + 2]), np.array([2 * i + 1, 2 * i + 3])
+        for rows in (theta, u):
+            M[np.ix_(rows, rows)] += h / 6 * pair
+        K[np.ix_(theta, theta)] += stiffness / h * line + stiffness * h / 6 * pair
+        K[np.ix_(u, u)] += stiffness / h * line
+        coupling = -stiffness / 2 * np.array([[-1, 1], [-1, 1]], real)
+        K[np.ix_(theta, u)] += coupling
+        K[np.ix_(u, theta)] += coupling.T
+    M, K = M[2:, 2:], K[2:, 2:]
+
+    def inverse(A: np.ndarray) -> np.ndarray:
+        X = np.linalg.inv(A.astype(float)).astype(real)
+        for _ in range(3):  # Newton–Schulz doubles the digits
+            X = X @ (2 * np.eye(len(A), dtype=real) - A @ X)
+        return X
+
+    tip_response = inverse(M)[:, -1]
+    k1, k2, phi = real(3), -real(2) / 10, -real(15) / 1000
+    M[-1, -1] += 1
+    K[-1, -1] += k1
+    M_inverse = inverse(M)
+    A, b = -M_inverse @ K, -k2 * M_inverse[:, -1]
+
+    def series(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        c = [q, v]
+        for k in range(46):
+            y = [term[-1] for term in c]
+            square = [sum(y[i] * y[j - i] for i in range(j + 1)) for j in range(k + 1)]
+            cube = sum(square[i] * y[k - i] for i in range(k + 1))
+            c.append((A @ c[k] + b * cube) / real((k + 1) * (k + 2)))
+        return np.array(c)
+
+    def evaluate(c: np.ndarray, t: Any) -> tuple[np.ndarray, np.ndarray]:
+        powers = t ** np.arange(len(c))
+        return powers @ c, powers[:-1] @ (c[1:] * np.arange(1, len(c))[:, None])
+
+    def until(q: np.ndarray, v: np.ndarray, t: Any, level: Any, sign: int) -> tuple[np.ndarray, np.ndarray, Any]:
+        step = real(4) / 1000
+        while True:
+            c = series(q, v)
+            q, v = evaluate(c, step)
+            if sign * (q[-1] - level) < 0:
+                low, high = real(0), step
+                for _ in range(70):
+                    middle = (low + high) / 2
+                    low, high = (low, middle) if sign * (evaluate(c, middle)[0][-1] - level) < 0 else (middle, high)
+                return *evaluate(c, high), t + high
+            t = t + step
+
+    x = np.zeros(2 * n, real)
+    x[1::2] = h * np.arange(1, n + 1)
+    q, v = 0 * x, -x
+    v = v - tip_response * (v[-1] / (tip_response[-1] + 1))
+    q, v, t = until(q, v, real(0), phi, 1)
+    v = v - 2 * tip_response * (v[-1] / tip_response[-1])
+    result = [(float(t), float(v[-1]))]
+    q, v, t = until(q, v, t, real(0), -1)
+    return [*result, (float(t), float(v[-1]))]
+
+
+@pytest.mark.parametrize(
+    # exponential: the lowest frequencies carry ε·ω_max/ω_min of their own size; DOP853: rtol.
+    ("method", "time_error", "velocity_error"),
+    [("exponential", 3e-14, 2e-13), ("DOP853", 3e-14, 1e-13)],
+)
+def test_soft_agrees_with_extended_precision(method: str, time_error: float, velocity_error: float) -> None:
+    if np.finfo(np.longdouble).eps > 1e-18:
+        pytest.skip("long double is double here")
+    result = simulate(soft(50), method=method, sample_times=[0.0, 0.05, 0.15], t_end=0.15)
+    assert kinds(result) == ["impact", "stop_impact", "release"]
+    first = result.events[0]
+    assert first.time == 0.0
+    assert first.z == pytest.approx(-0.0057403607, abs=5e-11)
+    assert result.y[1] == pytest.approx(-0.0087444212, abs=5e-11)
+    for event, (time, velocity) in zip(result.events[1:], extended_precision_soft(), strict=True):
+        assert event.time == pytest.approx(time, abs=time_error)
+        assert event.z == pytest.approx(velocity, abs=velocity_error)
+        assert event.v_tip == pytest.approx(velocity, abs=velocity_error)
+
+
+def test_soft_conserves_energy_and_visits_the_phases() -> None:
+    result = simulate(soft(50))
+    assert result.summary["largest_relative_energy_residual"] < 1e-11
+    assert kinds(result)[:6] == ["impact", "stop_impact", "release", "impact", "separation", "impact"]
+    assert {"tied", "touch", "free"} <= set(result.phase)
+    assert set(kinds(result)) <= set(EVENT_KINDS)
+    assert list(result.columns) == [name for name in COLUMNS if name in result.columns]
+    joined = np.isin(result.phase, ["tied", "touch"])
+    assert np.max(np.abs(result.gap[joined])) < 1e-15
+    assert np.min(result.gap) > -1e-15
+    assert np.min(result.contact_force[result.phase == "touch"]) > -1e-9
+    assert np.min(result.y) > -0.015 - 1e-15
+    times, shapes = result.shapes
+    np.testing.assert_array_equal(times, result.time)
+    np.testing.assert_allclose(shapes[:, -1], result.u_tip, atol=1e-15)
+
+
+CASES = {
+    "damped": soft(beam={"alpha_b": 2e-3}, spring={"damping": 0.7}),
+    "overdamped": soft(beam={"alpha_b": 2e-2}, spring={"damping": 5.0}, time={"t_end": 0.3}),
+    "seating": soft(
+        beam={"distributed_load": -9.0}, spring={"external_force": -4.0}, stop={"restitution": 0.3}, time={"t_end": 0.5}
+    ),
+    "stiffer": soft(
+        beam={"initial_deflection_slope": 0.02},
+        spring={
+            "equilibrium": 0.01, "mass": 0.1, "external_force": 1.0, "linear_stiffness": 150.0, "cubic_stiffness": 67.0
+        },
+    ),
+    "elastic": soft(beam={"initial_deflection_slope": 0.02, "approach": "elastic", "young_modulus": 10.0}),
+    "line 5": soft(contact={"impact": "tip"}, time={"t_end": 0.15}),
+    "modes": soft(40, beam={"n_modes": 6, "tip_load_coefficient": -6.0}, time={"t_end": 0.3}),
+    "unstable spring": soft(spring={"linear_stiffness": -3.0, "cubic_stiffness": 2000.0}, time={"t_end": 0.3}),
+    "compliance": soft(contact={"law": "compliance", "exponent": 1.5}),
+    "compliance, seating": soft(
+        beam={"alpha_b": 1e-3},
+        contact={"law": "compliance", "stiffness": 1e3, "exponent": 1.0},
+        spring={"damping": 1.0, "external_force": -5.0},
+        stop={"restitution": 0.3},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_two_integrators_agree(name: str) -> None:
+    """Exact modal stepping and DOP853 share the equations, not a numerical method."""
+    scene = CASES[name]
+    samples = np.linspace(0.05 * scene.time.t_end, scene.time.t_end, 20)
+    one, two = (simulate(scene, method=method, sample_times=samples) for method in ("exponential", "DOP853"))
+    assert kinds(one) == kinds(two)
+    # Bounces close to their end and grazing contacts multiply rounding; all others agree to 1e-13.
+    for a, b in zip(one.events, two.events, strict=True):
+        assert a.time == pytest.approx(b.time, abs=1e-9)
+    for a, b in zip(one.events[:5], two.events[:5], strict=True):
+        assert a.time == pytest.approx(b.time, abs=2e-13)
+    assert len(one) == len(two) == len(samples)
+    np.testing.assert_allclose(one.y, two.y, atol=1e-10)
+    np.testing.assert_allclose(one.u_tip, two.u_tip, atol=1e-10)
+    for result in (one, two):
+        assert result.summary["largest_relative_energy_residual"] < 1e-11
+
+
+def test_tied_phase_is_the_matrix_exponential() -> None:
+    """With k2 = 0 the tied phase is linear: exp of the full first-order system in nodal unknowns."""
+    scene = soft(6, beam={"alpha_b": 1e-3}, spring={"cubic_stiffness": 0.0, "damping": 0.4, "external_force": -0.5})
+    d = assemble(scene.beam)  # type: ignore[arg-type]
+    M, K = d.M.toarray(), d.K.toarray()
+    N = d.size
+    v = -d.slope_shape - np.linalg.inv(M)[:, -1] * (-1.0 / (np.linalg.inv(M)[-1, -1] + 1.0))
+    D = 1e-3 * K
+    M[-1, -1] += 1.0
+    D[-1, -1] += 0.4
+    K[-1, -1] += 3.0
+    F = -0.5 * d.tip_vector
+    A = np.zeros((2 * N + 1, 2 * N + 1))
+    A[:N, N : 2 * N] = np.eye(N)
+    A[N : 2 * N, :N], A[N : 2 * N, N : 2 * N] = -np.linalg.solve(M, K), -np.linalg.solve(M, D)
+    A[N : 2 * N, -1] = np.linalg.solve(M, F)
+    start = np.concatenate([np.zeros(N), v, [1.0]])
+    times = np.array([0.01, 0.02, 0.04])
+    exact = np.array([expm(A * t) @ start for t in times])
+    result = simulate(scene, sample_times=times, t_end=0.04)
+    np.testing.assert_allclose(result.y, exact[:, N - 1], atol=1e-13)
+    np.testing.assert_allclose(result.z, exact[:, 2 * N - 1], atol=1e-12)
+
+
+# Impacts ----------------------------------------------------------------------------------------------------------
+
+
+def test_meeting_conserves_momentum_and_books_the_loss() -> None:
+    scene = soft(spring={"mass": 0.3, "initial_velocity": 0.2})
+    first = simulate(scene, t_end=1e-3).events[0]
+    tip_mass = 1.0 / np.linalg.inv(assemble(scene.beam).M.toarray())[-1, -1]  # type: ignore[arg-type]
+    common = (tip_mass * -1.0 + 0.3 * 0.2) / (tip_mass + 0.3)
+    assert first.kind == "impact"
+    assert first.z == pytest.approx(common, rel=1e-12)
+    assert first.v_tip == pytest.approx(common, rel=1e-12)
+    assert first.impulse_contact == pytest.approx(tip_mass * (common + 1.0), rel=1e-12)
+    assert first.impulse_contact == pytest.approx(-0.3 * (common - 0.2), rel=1e-12)
+    reduced = tip_mass * 0.3 / (tip_mass + 0.3)
+    assert first.energy_loss == pytest.approx(0.5 * reduced * 1.2**2, rel=1e-12)
+
+
+def test_foundation_reverses_both_and_takes_its_share() -> None:
+    e = 0.4
+    scene = soft(stop={"restitution": e})
+    impact = next(event for event in simulate(scene, t_end=0.08).events if event.kind == "stop_impact")
+    tip_mass = 1.0 / np.linalg.inv(assemble(scene.beam).M.toarray())[-1, -1]  # type: ignore[arg-type]
+    arriving = -impact.z / e
+    assert impact.v_tip == pytest.approx(impact.z, abs=1e-13)
+    assert impact.impulse_contact == pytest.approx(-(1.0 + e) * tip_mass * arriving, rel=1e-12)
+    assert impact.impulse_foundation == pytest.approx(-(1.0 + e) * (tip_mass + 1.0) * arriving, rel=1e-12)
+    assert impact.energy_loss == pytest.approx(0.5 * (1.0 - e**2) * (tip_mass + 1.0) * arriving**2, rel=1e-10)
+
+
+def test_line_5_gives_the_spring_the_tips_velocity() -> None:
+    first = simulate(soft(contact={"impact": "tip"}), t_end=1e-3).events[0]
+    assert first.z == first.v_tip == pytest.approx(-1.0, abs=1e-12)
+    assert first.energy_loss == pytest.approx(-0.5, rel=1e-12)
+
+
+def test_bouncing_mass_comes_to_rest_at_the_zeno_time() -> None:
+    """Free fall g on a stop from height a: first impact √(2a/g), flights 2eʲv/g, rest after (1 + e)/(1 − e) of it."""
+    g, e, height = 10.0, 0.5, 0.2
+    scene = spring_only(
+        1.0,
+        {"position": -0.2, "restitution": e},
+        mass=2.0,
+        linear_stiffness=0.0,
+        cubic_stiffness=0.0,
+        external_force=-2.0 * g,
+    )
+    result = simulate(scene)
+    fall = np.sqrt(2.0 * height / g)
+    bounces = [event for event in result.events if event.kind == "stop_impact"]
+    for j, event in enumerate(bounces[:6]):
+        assert event.time == pytest.approx(fall * (1.0 + 2.0 * (e - e ** (j + 1)) / (1.0 - e)), abs=1e-12)
+        assert event.z == pytest.approx(e ** (j + 1) * g * fall, abs=1e-12)
+    seated = result.events[-1]
+    assert seated.kind == "seated"
+    # The flights left out last 2v/(g(1 − e)), and rise v²/2g ≤ seat_height.
+    left_out = 2.0 * np.sqrt(2.0 * result.summary["seat_height"] / g) / (1.0 - e)
+    assert 0.0 <= fall * (1.0 + e) / (1.0 - e) - seated.time <= left_out
+    assert result.foundation_force[-1] == pytest.approx(2.0 * g, rel=1e-14)
+    assert result.y[-1] == -0.2
+    assert result.e_impact_loss[-1] == pytest.approx(2.0 * g * height, rel=1e-12)
+
+
+def test_seated_pair_rests_on_the_static_forces() -> None:
+    """After damping, the seated tip is held at φ: C = (φ − u_load)/compliance, N = C + k1 φ + k2 φ³ − f_s."""
+    scene = soft(
+        6,
+        beam={"alpha_b": 0.02, "distributed_load": -20.0},
+        spring={"damping": 8.0, "external_force": -1.0},
+        stop={"restitution": 0.2},
+        time={"t_end": 12.0},
+        coupling={"macro_step": 0.5},
+    )
+    result = simulate(scene)
+    h = 1.0 / 6.0
+    static = (1.0 / 300.0 + 1.0 / 100.0) / (1.0 + h**2 / 12.0)
+    d = assemble(scene.beam)  # type: ignore[arg-type]
+    load = np.linalg.solve(d.K.toarray(), -20.0 * d.uniform_load)[-1]
+    force = (-0.015 - load) / static
+    assert result.phase[-1] == "seated"
+    assert result.contact_force[-1] == pytest.approx(force, rel=1e-9)
+    assert result.foundation_force[-1] == pytest.approx(force - 3.0 * 0.015 + 0.2 * 0.015**3 + 1.0, rel=1e-9)
+    assert np.min(result.foundation_force) >= -1e-10
+
+
+# Exact solutions --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("k1", "k2", "A"), [(150.0, 67.0, 0.5), (150.0, 67.0, 1.0), (3.0, -0.2, 0.5), (3.0, -0.2, 1.0)]
+)
+def test_duffing_spring_is_an_elliptic_function(k1: float, k2: float, A: float) -> None:
+    """Hardening: A cn(ωt|m), ω² = k1 + k2A², m = k2A²/2ω².
+
+    Softening: A sn(ωt + K|m), ω² = k1 + k2A²/2, m = −k2A²/2ω².
+    """
+    scene = spring_only(10.0, equilibrium=A, linear_stiffness=k1, cubic_stiffness=k2)
+    result = simulate(scene, sample_times=np.linspace(0.0, 10.0, 41))
+    if k2 > 0.0:
+        w = np.sqrt(k1 + k2 * A**2)
+        exact = A * ellipj(w * result.time, k2 * A**2 / (2.0 * w**2))[1]
+    else:
+        w = np.sqrt(k1 + k2 * A**2 / 2.0)
+        m = -k2 * A**2 / (2.0 * w**2)
+        exact = A * ellipj(w * result.time + ellipk(m), m)[0]
+    # ellipj itself is good to about 1e-12 at these arguments.
+    np.testing.assert_allclose(result.y, exact, atol=2e-11)
+    assert set(result.columns).isdisjoint({"u_tip", "contact_force", "foundation_force", "gap"})
+
+
+def test_softening_spring_runs_up_to_its_barrier_and_fails_beyond() -> None:
+    barrier = np.sqrt(3.0 / 0.2)
+    below = simulate(spring_only(20.0, equilibrium=barrier - 1e-3, linear_stiffness=3.0, cubic_stiffness=-0.2))
+    assert np.max(np.abs(below.y)) <= barrier
+    with pytest.raises(ReferenceFailure):  # ½ z² = 12.5 J, the barrier is k1²/4|k2| = 11.25 J high
+        simulate(spring_only(20.0, initial_velocity=5.0, linear_stiffness=3.0, cubic_stiffness=-0.2))
+
+
+def bar(n_elements: int) -> Trajectory:
+    """A shear bar (EI → ∞) pulled to u = x/2 and let go above a stop at 0."""
+    scene = scene_from_dict(
+        {
+            "time": {"t_end": 3.0},
+            "beam": {
+                "n_elements": n_elements,
+                "young_modulus": 1e3,
+                "initial_deflection_slope": 0.5,
+                "approach": "elastic",
+            },
+            "stop": {"position": 0.0, "restitution": 0.0},
+            "coupling": {"macro_step": 0.01},
+        }
+    )
+    return simulate(scene, sample_times=np.linspace(0.0, 3.0, 1501))
+
+
+def test_bar_on_a_stop_approaches_the_exact_impact() -> None:
+    """u_tt = u_xx, exact: contact from 1 to 2 with impulse ½, back to x/2 at t = 3, energy 1/8."""
+    errors = []
+    for n in (20, 40):
+        result = bar(n)
+        assert kinds(result) == ["seated", "separation"]
+        start, end = result.events
+        impulse = start.impulse_foundation + np.trapezoid(result.foundation_force, result.time)
+        errors.append([abs(start.time - 1.0), abs(end.time - 2.0), abs(impulse - 0.5), abs(result.u_tip[-1] - 0.5)])
+        assert result.e_total[0] == pytest.approx(0.125, rel=1e-9)
+        assert result.summary["largest_relative_energy_residual"] < 1e-10
+        # The bar's front is smeared over a few elements, h^(2/3) for P1 elements.
+        assert np.all(np.array(errors[-1]) < n ** (-2.0 / 3.0))
+    assert np.all(np.array(errors[1]) < 0.8 * np.array(errors[0]))
+
+
+# Start and input --------------------------------------------------------------------------------------------------
+
+
+def test_undeformed_approach_starts_at_contact() -> None:
+    scene = soft(beam={"initial_deflection_slope": 0.03}, spring={"equilibrium": 0.01}, time={"t_end": 0.1})
+    result = simulate(scene)
+    assert result.time[0] == pytest.approx(0.02, abs=1e-16)
+    assert result.events[0].time == result.time[0]
+    assert result.u_tip[0] == pytest.approx(0.01, abs=1e-16)
+    np.testing.assert_allclose(result.shapes[1][0], 0.01 * np.linspace(0.0, 1.0, 21), atol=1e-14)
+
+
+def test_perturbation_shows_in_proportion() -> None:
+    """An event time moves linearly with a small change of the initial velocity: the horizon can be measured."""
+    scene = soft()
+    base, once, twice = (
+        simulate(scene, velocity_perturbation=delta, t_end=0.15).events[2].time for delta in (0.0, 1e-6, 2e-6)
+    )
+    assert once != base
+    assert (twice - base) / (once - base) == pytest.approx(2.0, rel=1e-4)
+
+
+def test_sampling_does_not_change_the_run() -> None:
+    scene = soft(time={"t_end": 0.2})
+    coarse = simulate(scene, sample_times=[0.0, 0.2])
+    fine = simulate(scene, sample_times=np.linspace(0.0, 0.2, 301))
+    assert len(coarse) == 2
+    assert len(fine) == 301
+    for a, b in zip(coarse.events, fine.events, strict=True):
+        assert a.time == pytest.approx(b.time, abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"contact": {"impact": "rest"}}, "rigid tie"),
+        ({"contact": {"law": "paper"}}, "'transmission' and 'compliance'"),
+        ({"beam": {"initial_deflection_slope": -0.1}}, "below"),
+        ({"beam": {"initial_deflection_slope": 0.1, "initial_velocity_slope": 0.0}}, "never"),
+    ],
+)
+def test_refuses_what_it_does_not_define(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        simulate(soft(**changes))
+
+
+def test_stiff_beam_of_the_paper_is_resolved() -> None:
+    """κ = 3.6e10, 64 modes: 5 periods of the lowest mode take seconds, and both integrators agree."""
+    scene = load_scene("paper-fig2")
+    samples = 0.5 + np.linspace(0.0, 1e-5, 5)
+    one, two = (simulate(scene, method=m, sample_times=samples, t_end=0.50001) for m in ("exponential", "DOP853"))
+    assert one.events[0].z == pytest.approx(-0.00389010363865, rel=1e-6)
+    assert np.max(np.abs(one.y)) > 1e-7
+    # Times near 0.5 are known to 1e-16 s, where v_tip changes by 1e-8 of itself.
+    np.testing.assert_allclose(one.y, two.y, atol=1e-13)
+    assert one.summary["largest_relative_energy_residual"] < 1e-11

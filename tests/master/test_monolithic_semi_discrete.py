@@ -1,0 +1,148 @@
+"""The reference's own beam against exact solutions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
+from scipy.sparse.linalg import spsolve
+
+from springbeam.monolithic.semi_discrete import assemble, modal_beam
+from springbeam.scene import Beam
+from springbeam.trajectory import SHAPE_POINTS
+
+
+def beam(bending: float = 1.0, shear: float = 1.0, **changes: object) -> Beam:
+    return Beam(young_modulus=bending, shear_modulus=shear, **changes)  # type: ignore[arg-type]
+
+
+def static_compliance(bending: float, shear: float, n: int, reduced: bool) -> float:
+    """Tip deflection of the discrete unit-length beam under a unit tip force, exact."""
+    h = 1.0 / n
+    if reduced:
+        return (1.0 - h**2 / 4.0) / (3.0 * bending) + 1.0 / shear
+    return (1.0 / (3.0 * bending) + 1.0 / shear) / (1.0 + shear * h**2 / (12.0 * bending))
+
+
+@pytest.mark.parametrize("reduced", [False, True])
+@pytest.mark.parametrize(("bending", "shear", "n"), [(1.0, 1.0, 1), (2.0, 7.0, 5), (1.0, 1e6, 10), (100.0, 100.0, 50)])
+def test_static_tip_deflection_is_the_discrete_one(bending: float, shear: float, n: int, reduced: bool) -> None:
+    d = assemble(beam(bending, shear, n_elements=n, reduced_integration=reduced))
+    u = spsolve(d.K, d.tip_vector)[d.tip]
+    # Rounding × condition number of K, at most about n⁴ KAG/EI here.
+    assert u == pytest.approx(static_compliance(bending, shear, n, reduced), rel=1e-8 if shear > 1e5 else 1e-11)
+
+
+def test_full_integration_locks_and_reduced_does_not() -> None:
+    truth = 1.0 / 3.0 + 1e-6
+    full, reduced = (static_compliance(1.0, 1e6, 10, r) / truth for r in (False, True))
+    assert full == pytest.approx(0.0012, abs=5e-5)
+    assert reduced == pytest.approx(0.9975, abs=5e-5)
+
+
+def exact_frequencies(count: int) -> list[float]:
+    """Clamped–free Timoshenko beam with all constants 1: zeros of det X_MM X_MQ; X_QM X_QQ, X = exp(A)."""
+
+    def determinant(w: float) -> float:
+        A = np.zeros((4, 4))  # (θ, M, u, Q)' = A (θ, M, u, Q)
+        A[0, 1] = 1.0
+        A[1, 3], A[1, 0] = -1.0, -(w**2)
+        A[2, 3], A[2, 0] = 1.0, 1.0
+        A[3, 2] = -(w**2)
+        X = expm(A)
+        return float(X[1, 1] * X[3, 3] - X[1, 3] * X[3, 1])
+
+    grid = np.linspace(0.5, 8.5, 81)
+    values = [determinant(w) for w in grid]
+    zeros = [
+        brentq(determinant, a, b, xtol=1e-14)
+        for a, b, fa, fb in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True)
+        if fa * fb < 0.0
+    ]
+    return zeros[:count]
+
+
+def test_frequencies_converge_to_the_exact_ones_at_second_order() -> None:
+    exact = np.array(exact_frequencies(6))
+    assert exact[0] == pytest.approx(1.27396492100357, abs=1e-12)
+    errors = [modal_beam(beam(n_elements=n)).omega[:6] / exact - 1.0 for n in (40, 80)]
+    orders = np.log2(errors[0] / errors[1])
+    assert np.all((orders > 1.9) & (orders < 2.1))
+    assert errors[1][0] * exact[0] == pytest.approx(1.67e-5, rel=0.3)
+
+
+def test_frequencies_scale_with_the_root_of_the_stiffness() -> None:
+    soft, stiff = modal_beam(beam(n_elements=20)), modal_beam(beam(3.6e10, 3.6e10, n_elements=20))
+    np.testing.assert_allclose(stiff.omega, soft.omega * np.sqrt(3.6e10), rtol=1e-12)
+
+
+@pytest.mark.parametrize("reduced", [False, True])
+def test_energies_of_linear_fields_are_the_integrals(reduced: bool) -> None:
+    """P1 holds θ = x, u = x exactly: ½∫ EI θ'² + KAG (u' − θ)², ½∫ ρI θ² + ρA u²."""
+    b = beam(
+        3.0,
+        5.0,
+        n_elements=4,
+        length=2.0,
+        density=7.0,
+        area=0.5,
+        second_moment_of_area=0.25,
+        reduced_integration=reduced,
+    )
+    d = assemble(b)
+    x = 0.5 * np.arange(1, 5)
+    q = np.zeros(8)
+    q[0::2] = q[1::2] = x
+    shear_integral = 2.0 / 3.0  # ∫₀² (1 − x)² dx = 2/3
+    if reduced:  # the midpoint rule misses h³/12 of x² in each element
+        shear_integral -= 4 * 0.5**3 / 12.0
+    assert q @ d.K @ q == pytest.approx(3.0 * 0.25 * 2.0 + 5.0 * 0.5 * shear_integral, rel=1e-13)
+    assert q @ d.M @ q == pytest.approx(7.0 * (0.25 + 0.5) * 8.0 / 3.0, rel=1e-13)
+    assert d.uniform_load @ q == pytest.approx(2.0, rel=1e-14)  # ∫₀² x dx
+    h = 0.5
+    assert d.hat_load @ q == pytest.approx(h / 2.0 * 2.0 - h**2 / 6.0, rel=1e-14)  # ∫ ψₙ x dx
+    np.testing.assert_allclose(d.slope_shape[1::2], x, rtol=1e-15)
+
+
+def test_shape_is_sampled_at_the_agreed_points() -> None:
+    d = assemble(beam(n_elements=7, length=3.0))
+    np.testing.assert_allclose(d.deflection_sampler() @ d.slope_shape, 3.0 * SHAPE_POINTS, atol=1e-15)
+
+
+def test_all_modes_reproduce_the_matrices() -> None:
+    b = beam(2.0, 9.0, n_elements=6, density=3.0)
+    d, m = assemble(b), modal_beam(b)
+    identity = np.eye(12)
+    np.testing.assert_allclose(m.basis.T @ d.M @ m.basis, identity, atol=1e-13)
+    np.testing.assert_allclose(m.basis.T @ d.K @ m.basis, np.diag(m.omega**2), atol=1e-12 * m.omega[-1] ** 2)
+    Minv = np.linalg.inv(d.M.toarray())
+    assert m.inverse_tip_mass == pytest.approx(Minv[-1, -1], rel=1e-12)
+
+
+@pytest.mark.parametrize("n_modes", [1, 3, 8])
+def test_truncated_beam_keeps_static_answers_and_its_start(n_modes: int) -> None:
+    """Modal truncation augmentation: tip force, loads and u = x lie in the space, however few the modes."""
+    b = beam(
+        4.0, 9.0, n_elements=30, n_modes=n_modes, distributed_load=-2.0, tip_load_coefficient=-6.0,
+        initial_velocity_slope=-1.0,
+    )  # fmt: skip
+    d, m = assemble(b), modal_beam(b)
+    assert len(m.omega) == n_modes + 4
+    assert m.tip**2 @ m.omega**-2.0 == pytest.approx(static_compliance(4.0, 9.0, 30, False), rel=1e-11)
+    full = spsolve(d.K, -2.0 * d.uniform_load - 6.0 * d.hat_load)
+    np.testing.assert_allclose(m.basis @ (m.load / m.omega**2), full, atol=1e-11 * abs(full).max())
+    np.testing.assert_allclose(m.basis @ m.slope_shape, d.slope_shape, atol=1e-12)
+    np.testing.assert_allclose(m.omega[:n_modes], modal_beam(b.model_copy(update={"n_modes": 0})).omega[:n_modes])
+
+
+def test_sparse_and_dense_modes_span_the_same_space() -> None:
+    """Above the dense size the lowest modes come from shift-and-invert; the frequencies must not tell."""
+    few = beam(3.6e10, 3.6e10, n_elements=201, n_modes=6)
+    sparse, dense = modal_beam(few), modal_beam(few.model_copy(update={"n_modes": 0}))
+    np.testing.assert_allclose(sparse.omega[:6], dense.omega[:6], rtol=1e-10)
+
+
+def test_nearly_all_modes_make_no_dependent_shape() -> None:
+    m = modal_beam(beam(n_elements=5, n_modes=9, initial_velocity_slope=-1.0))
+    assert len(m.omega) == 10
