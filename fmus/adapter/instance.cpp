@@ -69,6 +69,14 @@ void Instance::ensure_built() {
   }
   model_->build(tolerance_);
   built_ = true;
+  push_inputs();
+  model_->observe();
+}
+
+void Instance::push_inputs() {
+  for (std::size_t i = 0; i < settings_.size(); ++i) {
+    if (table_.variables[i].causality == Causality::input) table_.variables[i].set(*model_, settings_[i]);
+  }
 }
 
 const Variable& Instance::variable(unsigned reference, Type type, const char* what) const {
@@ -109,7 +117,12 @@ void Instance::set(unsigned reference, Type type, double value) {
                                 text(v.max) + "]");
   }
   settings_[reference][0] = value;
-  if (is_setting(v)) built_ = false;
+  if (is_setting(v)) {
+    built_ = false;
+  } else if (built_) {
+    v.set(*model_, settings_[reference]);
+    model_->observe();
+  }
 }
 
 void Instance::set_derivative(unsigned reference, int order, double value) {
@@ -150,9 +163,7 @@ void Instance::step(double time, double size) {
                                 " goes past the stop time " + text(stop_time_));
   }
   ensure_built();
-  for (std::size_t i = 0; i < settings_.size(); ++i) {
-    if (table_.variables[i].causality == Causality::input) table_.variables[i].set(*model_, settings_[i]);
-  }
+  push_inputs();
   model_->step(size);
   for (std::size_t i = 0; i < settings_.size(); ++i) {
     const Variable& v = table_.variables[i];
@@ -184,6 +195,7 @@ void Instance::restore(const Snapshot& s) {
   built_ = built_ && same;
   if (s.built) {
     ensure_built();
+    push_inputs();
     model_->restore(s.numerics);
   } else {
     built_ = false;

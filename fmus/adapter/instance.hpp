@@ -49,6 +49,7 @@ class Instance {
  private:
   const Variable& variable(unsigned reference, Type type, const char* what) const;
   void ensure_built();
+  void push_inputs();
 
   const Table& table_;
   std::unique_ptr<Model> model_;

@@ -27,6 +27,9 @@ class Model {
   /// @throws std::exception naming the parameter
   virtual void build(double tolerance) = 0;
 
+  /// Called after build() and whenever an input was set: outputs that follow inputs without a step are due.
+  virtual void observe() {}
+
   /// Called by fmi2DoStep, the inputs having been set.
   /// @throws StepDiscarded (model unchanged)
   virtual void step(double size) = 0;

@@ -75,8 +75,8 @@ class TableBuilder {
   explicit TableBuilder(Table& table) : table_(table) {}
 
   /// A parameter stored in a field of the model's parameter struct, whose default is the start value.
-  template <class P, class T>
-  Variable& parameter(const std::string& name, const std::string& unit, P M::*parameters, T P::*field,
+  template <class P, class B, class T>
+  Variable& parameter(const std::string& name, const std::string& unit, P M::*parameters, T B::*field,
                       const std::string& description) {
     Variable& v = add(name, unit, description, Causality::parameter);
     v.type = std::is_same_v<T, bool>     ? Type::boolean
@@ -130,8 +130,8 @@ class TableBuilder {
   }
 
   /// Makes the last output's start value settable: it is a field of the parameters.
-  template <class P>
-  Variable& exact_start(P M::*parameters, double P::*field) {
+  template <class P, class B>
+  Variable& exact_start(P M::*parameters, double B::*field) {
     Variable& v = table_.variables.back();
     v.exact = true;
     v.start = P{}.*field;

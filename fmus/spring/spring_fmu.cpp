@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "../../src_spring/compliance.hpp"
+#include "../../src_spring/held_contact.hpp"
 #include "../../src_spring/spring.hpp"
 #include "../adapter/description.hpp"
 #include "../adapter/table.hpp"
@@ -14,16 +16,42 @@ namespace {
 using spring::Parameters;
 using spring::Spring;
 
+/// The spring's parameters and what exchange between steps adds to them.
+struct FmuParameters : Parameters {
+  double tip_mass = 0.0;
+  bool late_exchange = false;
+};
+
 struct SpringModel final : fmi::Model {
-  Parameters parameters;
+  FmuParameters parameters;
   spring::Inputs inputs;
   double impulse = 0.0;
   std::optional<Spring> spring;
+  std::optional<spring::HeldContact> held;
+  /// Whether tip_displacement was set since the last step; if not, extrapolation is better.
+  bool tip_is_current = true;
 
   void build(double tolerance) override {
     Parameters p = parameters;
     if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
+    held.reset();
+    if (p.contact_law == spring::ContactLaw::normal_compliance && parameters.tip_mass > 0.0) {
+      held.emplace(spring::Compliance(p.compliance_stiffness, p.compliance_exponent), p.mass, parameters.tip_mass,
+                   parameters.late_exchange);
+      p.contact_law = spring::ContactLaw::external;
+    }
     spring.emplace(p);
+    tip_is_current = true;
+  }
+
+  void observe() override {
+    if (held) {
+      if (!tip_is_current) return;
+      held->see(inputs.tip_displacement[0], inputs.tip_velocity);
+      if (held->follows_the_tip()) choose();
+    } else if (parameters.contact_law == spring::ContactLaw::external || tip_is_current) {
+      spring->observe(inputs);
+    }
   }
 
   void step(double size) override {
@@ -33,18 +61,53 @@ struct SpringModel final : fmi::Model {
       if (!before.empty()) spring->restore(before);
       throw fmi::StepDiscarded(why);
     };
+    spring::Inputs acting = inputs;
+    if (held) acting.contact_force = {held->force(), 0.0, 0.0};
     try {
       if (impulse != 0.0) spring->apply_impulse(impulse);
-      spring->step(size, inputs);
+      spring->step(size, acting);
     } catch (const spring::StepFailure& e) {
       discard(std::string(e.what()) + " (" + fmi::text(e.reached) + " s after the start of the step)");
     } catch (const std::domain_error& e) {
       discard(e.what());
     }
+    tip_is_current = false;
+    if (held) {
+      held->advance(size);
+      choose();
+    }
   }
 
-  void save(std::vector<double>& state) const override { spring->save(state); }
-  void restore(const std::vector<double>& state) override { spring->restore(state); }
+  double reaction() const { return held ? held->force() : spring->reaction(); }
+  double contact_energy() const { return held ? held->energy(spring->displacement()) : spring->contact_energy(); }
+
+  void save(std::vector<double>& state) const override {
+    spring->save(state);
+    state.push_back(tip_is_current ? 1.0 : 0.0);
+    if (held) {
+      const auto more = held->state();
+      state.insert(state.end(), more.begin(), more.end());
+    }
+  }
+
+  void restore(const std::vector<double>& state) override {
+    const std::size_t own = 1 + (held ? spring::HeldContact::state_length : 0);
+    if (state.size() < own) throw std::invalid_argument("spring: a saved state is too short");
+    const auto mine = state.end() - static_cast<std::ptrdiff_t>(own);
+    spring->restore({state.begin(), mine});
+    tip_is_current = mine[0] != 0.0;
+    if (held) held->restore(&mine[1]);
+  }
+
+ private:
+  void choose() {
+    spring::Inputs acting = inputs;
+    acting.contact_force = {};
+    spring->observe(acting);
+    held->choose(spring->displacement(), spring->velocity(), spring->acceleration(), spring->seated());
+    acting.contact_force[0] = held->force();
+    spring->observe(acting);
+  }
 };
 
 template <class Value>
@@ -83,6 +146,14 @@ fmi::Table make_table() {
       .at_least(0)
       .scale(1e4);
   parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").at_least(1);
+  parameter("tip_mass", "kg", &FmuParameters::tip_mass,
+            "for contact_law = 2: what the other body's tip opposes to a force within one step (tip_mass of the beam). "
+            "If > 0, the contact force is held over each step at the value that does the law's work for the predicted "
+            "tip; stable where the step does not resolve the contact. 0: the law under the extrapolated tip")
+      .at_least(0);
+  parameter("late_exchange", "", &FmuParameters::late_exchange,
+            "for tip_mass > 0: true if reaction is read and passed on before tip_displacement and tip_velocity are "
+            "set, as tools do that read all outputs first");
   parameter("stop_enabled", "", &Parameters::stop_enabled, "foundation inside, with impacts");
   parameter("stop_position", "m", &Parameters::stop_position, "position phi of the foundation");
   parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation").range(0, 1);
@@ -109,26 +180,34 @@ fmi::Table make_table() {
   add.impulse("impulse", "N.s", "upward impulse, applied at the start of the next step, then 0 again",
               [](SpringModel& m) -> double& { return m.impulse; });
   input("external_force", "N", &Inputs::external_force, "external force f_s, positive upward");
-  polynomial("tip_displacement", "m", &Inputs::tip_displacement,
-             "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives "
-             "or else by tip_velocity");
+  add.polynomial("tip_displacement", "m",
+                 "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its "
+                 "derivatives or else by tip_velocity",
+                 [](SpringModel& m) -> fmi::Polynomial& {
+                   m.tip_is_current = true;
+                   return m.inputs.tip_displacement;
+                 });
   input("tip_velocity", "m/s", &Inputs::tip_velocity, "velocity of the beam's tip, read by contact_law = 2");
 
   add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
-  add.exact_start(&SpringModel::parameters, &Parameters::displacement);
+  add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
   add.output("velocity", "m/s", "velocity z of the top", of(&Spring::velocity), of(&Spring::acceleration));
-  add.exact_start(&SpringModel::parameters, &Parameters::velocity);
+  add.exact_start(&SpringModel::parameters, &FmuParameters::velocity);
   add.output("displacement_integral", "m.s", "integral of displacement over the last step",
              of(&Spring::displacement_integral), of(&Spring::displacement));
   add.output("displacement_integral_2", "m.s2", "double integral of displacement over the last step",
              of(&Spring::displacement_integral_2), of(&Spring::displacement_integral));
-  add.output("reaction", "N", "contact force of the law inside, 0 when contact_law = 1", of(&Spring::reaction));
+  add.output("reaction", "N", "contact force of the law inside, 0 when contact_law = 1", [](const SpringModel& m) { return m.reaction(); })
+      .follows({"tip_displacement"})
+      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});
   add.output("potential_energy", "J", "potential energy of the spring", of(&Spring::potential_energy))
       .from({"linear_stiffness", "cubic_stiffness", "displacement"});
-  add.output("contact_energy", "J", "energy stored in the contact law inside", of(&Spring::contact_energy));
+  add.output("contact_energy", "J", "energy stored in the contact law inside", [](const SpringModel& m) { return m.contact_energy(); })
+      .follows({"tip_displacement"})
+      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Spring::dissipated_energy));
   return t;
 }
