@@ -6,7 +6,7 @@ shape, so that the pictures survive a black-and-white printer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -262,10 +262,22 @@ def _key(ax: Axes) -> None:
 
 
 def _note(ax: Axes, text: str) -> None:
-    """A remark beside the panel, under its key; the last one counts."""
-    for earlier in [t for t in ax.texts if t.get_gid() == "note"]:
-        earlier.remove()
-    ax.text(1.012, 0.0, text, transform=ax.transAxes, va="bottom", gid="note", **_REMARK)
+    """A remark beside the panel, under its key; once, however often it is made."""
+    notes = [note for note in ax.texts if note.get_gid() == "note"]
+    if not notes:
+        ax.text(1.012, 0.0, text, transform=ax.transAxes, va="bottom", gid="note", **_REMARK)
+    elif text not in notes[0].get_text():
+        notes[0].set_text(f"{notes[0].get_text()}\n{text}")
+
+
+def _visible(ax: Axes, trajectory: Trajectory, labels: Mapping[str, str], unit: str) -> list[str]:
+    """The columns that can be seen beside the largest; the others are named beside the panel."""
+    sizes = {name: float(np.max(np.abs(trajectory[name]))) for name in labels}
+    seen = [name for name, size in sizes.items() if size >= _INVISIBLE * max(sizes.values())]
+    unseen = [f"{labels[name]} ≤ {size:.2g} {unit}" for name, size in sizes.items() if size > 0.0 and name not in seen]
+    if unseen:
+        _note(ax, "too small to draw:\n" + "\n".join(unseen))
+    return seen
 
 
 # -- (A), (B): the beam's shape -----------------------------------------------------------------------------------
@@ -484,20 +496,12 @@ def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
 
 
 def _force_panel(timeline: _Timeline, ax: Axes, names: list[str]) -> None:
-    columns = timeline.trajectory.columns
-    sizes = {name: float(np.max(np.abs(columns[name]))) for name in names}
-    largest = max(sizes.values())
-    unit = readable_unit([columns[name] for name in names], "N")
+    trajectory = timeline.trajectory
+    unit = readable_unit([trajectory[name] for name in names], "N")
     ax.axhline(0.0, color=GREY, lw=0.5)
-    unseen = []
-    for name in names:
+    for name in _visible(ax, trajectory, {name: _FORCES[name][0] for name in names}, "N"):
         label, style = _FORCES[name]
-        if sizes[name] >= _INVISIBLE * largest:
-            timeline.line(ax, unit, name, label=label, **style)
-        else:
-            unseen.append(f"{label} ≤ {sizes[name]:.2g} N")
-    if unseen:
-        _note(ax, "too small to draw:\n" + "\n".join(unseen))
+        timeline.line(ax, unit, name, label=label, **style)
     ax.set_ylabel(f"force [{unit.name}]")
     _key(ax)
 
@@ -553,22 +557,17 @@ def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
 
 
 def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
-    """Stacked where the parts are positive and of a size to be seen, else lines, on a log axis if sizes differ much."""
-    columns = timeline.trajectory.columns
-    parts = [name for name in _ENERGIES if name in columns and np.any(columns[name] != 0.0)]
-    sizes = {name: float(np.max(np.abs(columns[name]))) for name in parts}
-    scale = max(sizes.values(), default=0.0)
-    positive = all(np.min(columns[name]) >= -1e-9 * scale for name in parts)
-    comparable = all(size >= _INVISIBLE * scale for size in sizes.values())
-    logarithmic = positive and not comparable
-    unit = (
-        Unit(1.0, "J") if logarithmic else readable_unit([columns["e_total"], *(columns[name] for name in parts)], "J")
-    )
-    if parts and positive and comparable:
-        rows = decimated(columns["time"], columns["e_beam" if "e_beam" in columns else "e_spring"])
+    """Stacked where no part is negative, else lines."""
+    trajectory = timeline.trajectory
+    there = {name: _ENERGIES[name][0] for name in _present(trajectory, *_ENERGIES) if np.any(trajectory[name] != 0.0)}
+    parts = _visible(ax, trajectory, there, "J") if there else []
+    unit = readable_unit([trajectory["e_total"], *(trajectory[name] for name in parts)], "J")
+    least = min((float(np.min(trajectory[name])) for name in parts), default=-1.0)
+    if least >= -1e-9 * float(np.max(trajectory["e_total"])):
+        rows = decimated(trajectory["time"], trajectory[parts[0]])
         ax.stackplot(
-            timeline.unit.factor * columns["time"][rows],
-            *(unit.factor * np.maximum(columns[name][rows], 0.0) for name in parts),
+            timeline.unit.factor * trajectory["time"][rows],
+            *(unit.factor * np.maximum(trajectory[name][rows], 0.0) for name in parts),
             colors=[_ENERGIES[name][1] for name in parts],
             labels=[_ENERGIES[name][0] for name in parts],
             linewidth=0.0,
@@ -577,9 +576,6 @@ def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
     else:
         for name in parts:
             timeline.line(ax, unit, name, color=_ENERGIES[name][1], label=_ENERGIES[name][0])
-    if logarithmic:
-        ax.set_yscale("log")
-        ax.set_ylim(bottom=max(1e-2 * min(sizes.values()), 1e-18 * scale))
     timeline.line(ax, unit, "e_total", color=BLACK, linewidth=1.4, linestyle=(0, (4, 2)), label="total")
     ax.set_ylabel(f"energy [{unit.name}]")
     _key(ax)

@@ -202,12 +202,23 @@ def test_small_forces_are_named_rather_than_drawn_on_the_axis():
     assert any("too small to draw" in text and "1e-09 N" in text for text in texts(figure))
 
 
-def test_energies_are_stacked_or_on_a_log_axis_by_their_size():
-    comparable = plots._gap_and_energy(a_trajectory())
+def test_energies_are_stacked_and_those_too_small_are_named():
+    assert len(plots._gap_and_energy(a_trajectory()).axes[1].collections) > 3
     stiff = plots._gap_and_energy(a_trajectory(e_beam=np.full(400, 4.5e9)))
-    assert comparable.axes[1].get_yscale() == "linear"
-    assert stiff.axes[1].get_yscale() == "log"
-    assert stiff.axes[1].get_ylabel() == "energy [J]"
+    assert stiff.axes[1].get_ylabel() == "energy [GJ]"
+    assert any("spring ≤ 0.01 J" in text for text in texts(stiff))
+
+
+def test_energies_that_become_negative_are_lines():
+    figure = plots._gap_and_energy(a_trajectory(e_spring=np.linspace(-1.0, 1.0, 400)))
+    assert "spring" in [line.get_label() for line in figure.axes[1].lines]
+
+
+def test_remarks_add_up():
+    flips = np.where(np.arange(400) % 2, 1.0, -1.0)
+    figure = plots._velocities_and_forces(a_trajectory(contact_force=flips, compliance_force=np.full(400, 1e-9)))
+    (remark,) = [text.get_text() for text in figure.axes[1].texts]
+    assert remark.count("alternates") == remark.count("too small to draw") == 1
 
 
 def test_residual_is_relative_to_the_largest_energy():
