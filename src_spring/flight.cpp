@@ -16,6 +16,8 @@ constexpr double safety = 0.03, safety_per_rate = 10.0;
 constexpr double noise_margin = 20.0;
 // Taylor terms are used while H × (rate of the spring) is below this; beyond, they would only cancel.
 constexpr double resolved_limit = 3.0;
+// No tolerance is finer than this: relative to y and z (a fraction of their rounding), and absolute.
+constexpr double finest = 0.01 * epsilon, smallest = 1e-150;
 // H / first step = 2ᵏ, so that it does not vary with the forces but in rare jumps. IDA doubles step and order until
 // order 5; k = 3 brings it to order 3 at least.
 constexpr int least_halvings = 3, most_halvings = 48;
@@ -81,9 +83,11 @@ void Flight::prepare(const FlightStart& start) {
   const double velocity = std::abs(z) + std::abs(d[2]) * span;
   const double displacement = std::abs(y) + velocity * span;
   const double share = safety / (1.0 + safety_per_rate * std::min(H * rate, resolved_limit));
-  const double tolerance_z = std::max(share * (laws_.relative_tolerance * velocity + laws_.absolute_tolerance), noise);
-  const double tolerance_y =
-      std::max(share * (laws_.relative_tolerance * displacement + laws_.absolute_tolerance), noise * span);
+  const auto tolerance_of = [&](double size, double least) {
+    return std::max({share * (laws_.relative_tolerance * size + laws_.absolute_tolerance), finest * size, least});
+  };
+  const double tolerance_z = tolerance_of(velocity, std::max(noise, smallest));
+  const double tolerance_y = tolerance_of(displacement, std::max(noise * span, smallest));
   relative_ = std::max(share * laws_.relative_tolerance, 50.0 * epsilon);
   double* tolerance = solver_.absolute_tolerance();
   tolerance[q] = tolerance[A] = tolerance[B] = tolerance_y;
@@ -202,12 +206,12 @@ void Flight::events(double s, const double* Y, double* g) const noexcept {
   const double rise = R_.rise(t) + Y[q], z = R_.rate(t) + Y[p] / H;
   if (std::isfinite(laws_.hilltop)) *g++ = laws_.hilltop - std::abs(start_.y + rise);
   if (laws_.stop) {
-    *g++ = stop_watch_.scaled(start_.gap + rise, t);
-    *g++ = z;
+    *g++ = stop_watch_.distance(start_.gap + rise, t);
+    *g++ = stop_watch_.rate(z, t);
   }
   if (laws_.compliance) {
-    *g++ = contact_watch_.scaled(contact_sign_ * contact_depth(rise, t), t);
-    *g++ = contact_sign_ * (z - start_.loads.tip.rate(t));
+    *g++ = contact_watch_.distance(contact_sign_ * contact_depth(rise, t), t);
+    *g++ = contact_watch_.rate(contact_sign_ * (z - start_.loads.tip.rate(t)), t);
   }
 }
 

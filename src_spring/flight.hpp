@@ -6,9 +6,9 @@
 // where ÿ − R̈ is evaluated without cancellation (motion.hpp). q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H²
 // B. All unknowns are under error control, see tolerances in flight.cpp.
 //
-// Events: [hilltop] |y| reaches the hilltop; [stop] y − φ falls to 0; [contact] y − u_tip changes sign. A gap that
-// starts at 0 is divided by its leading power of τ, so that the start itself is no root; a rate (ẏ, ẏ − u̇_tip) that
-// rises through 0 marks a minimum of the gap, so that a gap that dips below 0 between two internal steps is noticed.
+// Events: [hilltop] |y| reaches the hilltop; [stop] y − φ falls to 0; [contact] y − u_tip changes sign. A rate (ẏ,
+// ẏ − u̇_tip) that rises through 0 marks a minimum of the gap, so that a gap that dips below 0 between two internal
+// steps is noticed. See watch.hpp for gaps that start at 0.
 #pragma once
 
 #include <vector>

@@ -128,11 +128,11 @@ void Seated::events(double s, const double* Y, double* g) const noexcept {
   const auto& u = start_.loads.tip;
   const double depth = contact_depth(Y[eta], t);
   const double contact_rate = touching_ ? -motion_.compliance().continued_slope(depth) * u.rate(t) : 0.0;
-  *g++ = release_watch_.scaled(N_(t) + Y[n], t);
-  *g++ = contact_rate - start_.loads.force.rate(t);
+  *g++ = release_watch_.distance(N_(t) + Y[n], t);
+  *g++ = release_watch_.rate(contact_rate - start_.loads.force.rate(t), t);
   if (laws_.compliance) {
-    *g++ = contact_watch_.scaled(contact_sign_ * depth, t);
-    *g++ = -contact_sign_ * u.rate(t);
+    *g++ = contact_watch_.distance(contact_sign_ * depth, t);
+    *g++ = contact_watch_.rate(-contact_sign_ * u.rate(t), t);
   }
 }
 

@@ -15,6 +15,7 @@ namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr long most_segments = 1'000'000;  ///< in one step; more events than this are refused
+constexpr long most_stalled = 100;         ///< events without progress
 
 /// Everything that a step changes. All members are doubles, so that the flat vector is this struct.
 struct State {
@@ -79,11 +80,14 @@ class Step {
 
   State run() {
     state_.integral = state_.integral_2 = state_.stop_force = state_.stop_impulse = 0.0;
-    double held = 0.0;  // ∫N while seated
-    for (long segments = 0; remaining() > 0.0; ++segments) {
-      if (segments == most_segments)
-        throw StepFailure("spring: more than " + std::to_string(most_segments) + " contact events in one step of " +
-                              number(size_) + " s",
+    double held = 0.0;   // ∫N while seated
+    double last = -1.0;  // event's time
+    for (long segments = 0, stalled = 0; remaining() > 0.0; ++segments) {
+      stalled = t_ > last ? 0 : stalled + 1;
+      last = t_;
+      if (segments == most_segments || stalled == most_stalled)
+        throw StepFailure("spring: too many contact events (" + std::to_string(segments) + ") in one step of " +
+                              number(size_) + " s, " + number(t_) + " s after its start",
                           t_);
       now_ = loads_.shifted(t_);
       if (!depth_) depth_ = laws_.compliance ? state_.y - now_.tip.c[0] : -1.0;

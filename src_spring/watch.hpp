@@ -1,26 +1,33 @@
-// A distance whose fall through 0 is an event, made fit for root finding.
+// A distance whose fall through 0 is an event, and its rate, made fit for root finding.
+//
+// Events start segments, so a distance (or rate) is often exactly 0 at τ = 0, and IDA's first interpolants are too
+// coarse for what it does right after. Such a quantity is divided by its leading power of τ: no root at the start, the
+// same sign after it.
 #pragma once
 
 #include <array>
 
 namespace spring {
 
-/// A distance that is ≥ 0 at the segment's start; its sign change is an event.
 class Watch {
  public:
   Watch() = default;
-  /// `derivatives`: the distance and its rates at τ = 0. A start at 0 must not move below.
+  /// `derivatives`: the distance, ≥ 0, and its time derivatives at τ = 0.
   explicit Watch(const std::array<double, 5>& derivatives);
 
   /// Sign of the first derivative that is not 0: where the distance goes from τ = 0 on.
   static double direction(const std::array<double, 5>& derivatives);
 
-  /// Same sign as the distance for τ > 0, and > 0 at τ = 0.
-  double scaled(double distance, double t) const;
+  double distance(double value, double t) const { return distance_.divided(value, t); }
+  double rate(double value, double t) const { return rate_.divided(value, t); }
 
  private:
-  int power_ = 0;
-  double leading_ = 1.0;
+  struct Scale {
+    int power = 0;
+    double leading = 1.0;  ///< the quotient at τ = 0, where power > 0
+    double divided(double value, double t) const;
+  };
+  Scale distance_, rate_;
 };
 
 }  // namespace spring

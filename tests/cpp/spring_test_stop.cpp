@@ -196,6 +196,26 @@ TEST(SpringStop, StartOnTheStop) {
   EXPECT_NEAR(pushed.displacement(), 0.1 - 0.01, 1e-15);
 }
 
+// A plastic impact under a force that lifts: at rest for an instant, then off with a/γ (t − (1 − e^{−γt})/γ), γ =
+// α_s/m.
+TEST(SpringStop, PlasticImpactUnderALiftingForce) {
+  const double a = 0.07, rate = 11.5, gap = 1e-5, v = 2.0;
+  Parameters p = ball(gap, -v, 0.0);
+  p.damping = rate;
+  Spring s(p);
+  s.step(1e-3, weight(-a));
+  // Down: −(v + a/γ)(1 − e^{−γt})/γ + a t/γ = −gap, so v t to first order; two Newton steps give t to rounding.
+  double t = gap / v;
+  for (int i = 0; i < 4; ++i) {
+    const double decay = std::exp(-rate * t);
+    t += (gap - (v + a / rate) * (1 - decay) / rate + a * t / rate) / ((v + a / rate) * decay - a / rate);
+  }
+  const double tau = 1e-3 - t;
+  EXPECT_NEAR(s.displacement(), a / rate * (tau + std::expm1(-rate * tau) / rate), 1e-18);
+  EXPECT_NEAR(s.velocity(), -a / rate * std::expm1(-rate * tau), 1e-15);
+  EXPECT_FALSE(s.seated());
+}
+
 // The input N is for a master that applies Signorini itself; with the stop inside it is not read.
 TEST(SpringStop, FoundationForceIsNotAddedToTheStopInside) {
   Inputs inputs = weight(2.0);
