@@ -128,8 +128,9 @@ IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings) : imp
   d.check(IDASetMaxNumSteps(ida, max_steps), "IDASetMaxNumSteps");
   if (!crossings.empty()) {
     d.check(IDARootInit(ida, static_cast<int>(crossings.size()), events), "IDARootInit");
-    std::vector<int> directions;
-    for (Crossing crossing : crossings) directions.push_back(static_cast<int>(crossing));
+    std::vector<int> directions(crossings.size());
+    std::transform(crossings.begin(), crossings.end(), directions.begin(),
+                   [](Crossing c) { return static_cast<int>(c); });
     d.check(IDASetRootDirection(ida, directions.data()), "IDASetRootDirection");
     d.check(IDASetNoInactiveRootWarn(ida), "IDASetNoInactiveRootWarn");
   }

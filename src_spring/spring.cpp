@@ -90,10 +90,10 @@ class Step {
                               number(size_) + " s, " + number(t_) + " s after its start",
                           t_);
       now_ = loads_.shifted(t_);
-      if (!depth_) depth_ = laws_.compliance ? state_.y - now_.tip.c[0] : -1.0;
+      depth_ = !laws_.compliance ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip.c[0];
       if (laws_.stop) land();
-      if (state_.seated != 0.0)
-        held += sit();
+      if (seat_ != nullptr && state_.seated != 0.0)
+        held += sit(*seat_);
       else
         fly();
     }
@@ -112,7 +112,7 @@ class Step {
 
   bool touching() const {
     const auto& u = now_.tip.c;
-    return laws_.compliance && Watch::direction({*depth_, state_.z - u[1], -u[2], 0.0, 0.0}) > 0.0;
+    return laws_.compliance && Watch::direction({depth_, state_.z - u[1], -u[2], 0.0, 0.0}) > 0.0;
   }
 
   /// At the foundation: rebound, or come to rest, or leave.
@@ -124,7 +124,7 @@ class Step {
       state_.seated = 0.0;
       return;
     }
-    const auto N = motion_.holding_force(state_.y, now_, touching(), *depth_);
+    const auto N = motion_.holding_force(state_.y, now_, touching(), depth_);
     const bool pressed = Seated::holds(N);
     const double before = state_.z;
     if (before < 0.0) {
@@ -141,7 +141,7 @@ class Step {
 
   void fly() {
     const double gap = laws_.stop ? state_.y - laws_.stop_position : 1.0;
-    const FlightStart start{state_.y, state_.z, now_, remaining(), gap, *depth_, released_};
+    const FlightStart start{state_.y, state_.z, now_, remaining(), gap, depth_, released_};
     const auto event = attempt(flight_, start);
     released_ = false;
     state_.integral_2 += state_.integral * flight_.elapsed() + flight_.integral_2();
@@ -157,24 +157,22 @@ class Step {
     if (laws_.stop)
       state_.y =
           event == Flight::Event::stop ? laws_.stop_position : laws_.stop_position + std::max(flight_.gap(), 0.0);
-    depth_.reset();
-    if (event == Flight::Event::contact) depth_ = 0.0;
+    meeting_ = event == Flight::Event::contact;
     if (event == Flight::Event::none) t_ = size_;
   }
 
   /// @return ∫N
-  double sit() {
-    const auto event = attempt(*seat_, SeatedStart{now_, remaining(), *depth_});
-    const double t = seat_->elapsed();
+  double sit(Seated& seat) {
+    const auto event = attempt(seat, SeatedStart{now_, remaining(), depth_});
+    const double t = seat.elapsed();
     state_.integral_2 += state_.integral * t + state_.y * t * t / 2;
     state_.integral += state_.y * t;
     t_ += t;
     released_ = event == Seated::Event::release;
     if (released_) state_.seated = 0.0;
-    depth_.reset();
-    if (event == Seated::Event::contact) depth_ = 0.0;
+    meeting_ = event == Seated::Event::contact;
     if (event == Seated::Event::none) t_ = size_;
-    return seat_->impulse();
+    return seat.impulse();
   }
 
   template <class Phase, class Start>
@@ -198,10 +196,11 @@ class Step {
   State state_;
   const double size_;
   const Loads loads_;
-  double t_ = 0.0;               ///< since the step's start
-  Loads now_;                    ///< loads_ from t_ on
-  std::optional<double> depth_;  ///< y − u_tip at t_, exactly 0 after a contact event
-  bool released_ = false;        ///< has just left the foundation, N = 0
+  double t_ = 0.0;         ///< since the step's start
+  Loads now_;              ///< loads_ from t_ on
+  double depth_ = -1.0;    ///< y − u_tip at t_
+  bool meeting_ = false;   ///< tip and top are at a contact event: y = u_tip
+  bool released_ = false;  ///< has just left the foundation, N = 0
 };
 
 }  // namespace
