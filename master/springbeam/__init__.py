@@ -1,7 +1,31 @@
 """A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."""
 
-from .runner import RunStopped, simulate
-from .scene import Scene, SceneError, load_scene
-from .trajectory import Event, Trajectory
+from __future__ import annotations
 
-__all__ = ["Event", "RunStopped", "Scene", "SceneError", "Trajectory", "load_scene", "simulate"]
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .runner import RunStopped, simulate
+    from .scene import Scene, SceneError, load_scene, with_changes
+    from .trajectory import Event, Trajectory
+
+__all__ = ["Event", "RunStopped", "Scene", "SceneError", "Trajectory", "load_scene", "simulate", "with_changes"]
+
+_HOME = {
+    "Event": "trajectory",
+    "RunStopped": "runner",
+    "Scene": "scene",
+    "SceneError": "scene",
+    "Trajectory": "trajectory",
+    "load_scene": "scene",
+    "simulate": "runner",
+    "with_changes": "scene",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # FMPy and scipy take a second to load: only for what needs them.
+    if name in _HOME:
+        return getattr(import_module(f".{_HOME[name]}", __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from .scene import Scene, Spring
+from .scene import Spring
 
 
 class Joint(Enum):
@@ -74,18 +74,3 @@ def foundation_impact(
 def spring_force(spring: Spring, y: float) -> float:
     """k1 y + k2 y³ − f_s [N]: what the seated spring hands to the foundation besides C (Ahn & Tate, (6))."""
     return spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
-
-
-def first_contact(scene: Scene) -> float:
-    """t_c [s] of the kinematic approach u = (s₀ + s₁ t) x; 0 where the scene integrates from the start."""
-    beam = scene.beam
-    if beam is None or beam.approach == "elastic":
-        return 0.0
-    if scene.spring is not None:
-        target = scene.spring.equilibrium
-    elif scene.stop is not None:
-        target = scene.stop.position
-    else:
-        return 0.0
-    gap = beam.initial_deflection_slope * beam.length - target
-    return 0.0 if gap == 0.0 else -gap / (beam.initial_velocity_slope * beam.length)

@@ -6,11 +6,10 @@ from importlib.metadata import version
 from time import perf_counter
 from typing import Any
 
-from .contact import first_contact
 from .fmu import FmuBeam, FmuSpring, load_bodies
 from .paper_law import PaperLaw
 from .recording import MemoryRecorder, Recorder
-from .scene import Scene, with_changes
+from .scene import Scene, suspicions, with_changes
 from .simulation import Progress, RunStopped, Simulation
 from .trajectory import Trajectory
 
@@ -28,7 +27,7 @@ def run(scene: Scene, recorder: Recorder, progress: Progress | None = None) -> d
         If an FMU cannot be found or loaded.
     """
     began = perf_counter()
-    start_time = first_contact(scene)
+    start_time = scene.contact_time or 0.0
     paper = scene.contact.law == "paper"
     beam, spring = load_bodies(_as_in_paper(scene) if paper else scene, start_time)
     try:
@@ -57,6 +56,7 @@ def run(scene: Scene, recorder: Recorder, progress: Progress | None = None) -> d
                 "setup_time": loaded - began,
                 "wall_time": perf_counter() - loaded,
             }
+            summary["warnings"] = [*suspicions(scene), *summary["warnings"]]
             recorder.finish(summary)
         return summary
     finally:

@@ -124,7 +124,7 @@ class Simulation:
     scene
         What is simulated.
     start_time
-        Where the run starts [s], `springbeam.contact.first_contact`.
+        Where the run starts [s], `springbeam.scene.Scene.contact_time` or 0.
     beam, spring
         The bodies at the start time; ``None`` where the scene has none.
     recorder
@@ -168,7 +168,8 @@ class Simulation:
         self._foundation: Force = NO_FORCE
         self._smoothed: tuple[float, float] = (0.0, 0.0)
         self._steps_in_phase = 0
-        self._previous_size = 0.0
+        #: (middle, C, N) of the last two steps of this phase.
+        self._middles: list[tuple[float, float, float]] = []
         self._fastest_impact = 0.0
         self._last_opening = -float("inf")
         self._reclosed = False  #: the contact had opened and closed at once: its next step does not open it again
@@ -319,9 +320,7 @@ class Simulation:
             step = self._located(function, bracket)
             if step.size < _NO_TIME * self.H:
                 # Too short for a contact force: velocities that differ would be turned round by an infinite one.
-                for body in self._bodies:
-                    body.rewind()
-                return replace(step, size=0.0, end=step.start), found
+                return self._at_start(step), found
         else:
             found = found or None
         if self._compliant:
@@ -384,15 +383,12 @@ class Simulation:
         f = pick(step)
         if self._degree == 0:
             return self._unilateral_mean(step, kind, f[0])
-        changes = force.sign_changes(f, step.size)
-        if f[0] < 0.0 and self._steps_in_phase == 0:
-            # Right after an event the sign may be a false alarm: it is one if the ends, let go, close.
-            if not self._reclosed and self._opens(changes[0] if changes else step.size, step.start):
-                for body in self._bodies:
-                    body.rewind()
-                return replace(step, size=0.0, end=step.start), kind
+        changes = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
+        if f[0] < 0.0:
+            # The sign at the start may be a false alarm: it is one if the ends, let go, close.
+            if not (self._reclosed and self._steps_in_phase == 0) and self._opens(kind, step):
+                return self._at_start(step), kind
             step = self._settled(step)
-            changes = changes[1:]
         if not changes:
             return None
         # The polynomial tells where the force of the step vanishes; the step is repeated until it ends there.
@@ -407,34 +403,55 @@ class Simulation:
             size += change
         return last, kind
 
-    def _opens(self, size: float, start: tuple[Motion, Motion]) -> bool:
+    def _opens(self, kind: str, step: Step) -> bool:
+        """Do the ends part if they are let go for the step? ("unseated": does the lower end leave the foundation?)"""
         phase = self.phase
-        self.phase = Phase(Joint.FREE, phase.seated and self._spring is not None)
-        tip, low = self._attempt(size, start).end
-        self.phase = phase
+        unseats = kind == "unseated"
+        self.phase = Phase(phase.joint) if unseats else Phase(Joint.FREE, phase.seated and self._spring is not None)
+        try:
+            tip, low = self._attempt(step.size, step.start).end
+        finally:
+            self.phase = phase
+        if unseats:
+            assert self._stop is not None
+            return low.displacement > self._stop
         return tip.displacement > low.displacement
 
-    def _unilateral_mean(self, step: Step, kind: str, c: float) -> tuple[Step, str] | None:
-        """Degree 0: C belongs to the middle of its step; its alternating part is averaged out over two steps."""
-        if self._steps_in_phase == 0:
-            return None
-        before, previous = self._smoothed_before(kind), self._previous_size
-        mean = 0.5 * (c + before)
-        if mean >= 0.0 or (self._steps_in_phase < 2 and c >= 0.0):
-            return None
-        # Zero of the line through the middles, seen from the start of this step.
-        t_before, t_now = -0.5 * previous, 0.5 * step.size
-        at = t_before + (t_now - t_before) * before / (before - c) if before > 0.0 > c else 0.0
-        if at <= 1e-9 * self.H:
-            for body in self._bodies:
-                body.rewind()
-            return replace(step, size=0.0, end=step.start), kind
-        if at >= step.size:
-            return self._settled(step), kind
-        return self._attempt(at, step.start), kind
+    def _at_start(self, step: Step) -> Step:
+        """No step at all: the bodies back at the mark."""
+        for body in self._bodies:
+            body.rewind()
+        return replace(step, size=0.0, end=step.start)
 
-    def _smoothed_before(self, kind: str) -> float:
-        return (self._foundation if kind == "unseated" else self._contact)[0]
+    def _unilateral_mean(self, step: Step, kind: str, c: float) -> tuple[Step, str] | None:
+        """Degree 0: C belongs to the middle of its step and alternates; means of neighbours do not.
+
+        The line through the last two means tells where the force vanishes, also if that is past this step's middle.
+        """
+        if not self._middles:
+            if c < 0.0 and not self._reclosed and self._opens(kind, step):
+                return self._at_start(step), kind
+            self._settled(step)
+            return None
+        middle = self.time + 0.5 * step.size
+        points = [(t, n if kind == "unseated" else f) for t, f, n in self._middles] + [(middle, c)]
+        means = [(0.5 * (t0 + t1), 0.5 * (f0 + f1)) for (t0, f0), (t1, f1) in zip(points, points[1:], strict=False)]
+        time, mean = means[-1]
+        if mean <= 0.0:
+            if len(means) < 2 and c >= 0.0:
+                return None
+            at = 0.0
+            if len(means) == 2 and means[0][1] > 0.0:
+                at = means[0][0] + (time - means[0][0]) * means[0][1] / (means[0][1] - mean) - self.time
+        elif len(means) == 2 and means[0][1] > mean:
+            at = time + (time - means[0][0]) * mean / (means[0][1] - mean) - self.time
+            if at >= step.size:
+                return None
+        else:
+            return None
+        if at <= _NO_TIME * self.H:
+            return self._at_start(step), kind
+        return (self._settled(step) if at >= step.size else self._attempt(at, step.start)), kind
 
     def _pushing(self) -> tuple[str | None, Callable[[Step], Force]]:
         if self.phase.seated:
@@ -488,6 +505,7 @@ class Simulation:
         self._apply(impact)
         if self.phase != before:
             self._steps_in_phase = 0
+            self._middles.clear()
             if self.phase.joint is Joint.FREE:
                 self._contact = NO_FORCE
             if not self.phase.seated:
@@ -599,6 +617,7 @@ class Simulation:
         )
 
     def _accept(self, step: Step, time: float) -> None:
+        self._middles = [*self._middles[-1:], (self.time + 0.5 * step.size, step.contact[0], step.foundation[0])]
         self.time = time
         self.counts.macro_steps += 1
         first = self._steps_in_phase == 0
@@ -608,7 +627,6 @@ class Simulation:
         )
         self._contact = force.shifted(step.contact, step.size)
         self._foundation = force.shifted(step.foundation, step.size)
-        self._previous_size = step.size
         self._steps_in_phase += 1
 
     def _record(self) -> None:

@@ -102,12 +102,12 @@ class Tie:
             residual = r_beam - r_partner
             previous, norm = norm, float(np.abs(residual).max())
             if norm > noise * tolerance and norm > 0.3 * previous:
-                if norm <= _NOISE * tolerance:  # the bodies' own rounding: nothing left to gain
-                    noise = _NOISE
-                elif not measured:
+                if not measured:
                     S = self._measure(partner, time, size, a, r_partner, partner.motion(), 1e-4)
                     self._advance(partner, time, size, a)
                     measured = True
+                elif norm <= _NOISE * tolerance:  # the bodies' own rounding: nothing left to gain
+                    noise = _NOISE
         else:
             raise NotConverged(norm, _MAX_ITERATIONS)
         self._last_size = size
