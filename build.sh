@@ -7,7 +7,7 @@ usage() {
   cat <<'TEXT'
 ./build.sh run [SCENE] [OPTION]…   set up, build, and simulate a scene (default: soft)
 ./build.sh test [PYTEST OPTION]…   set up, build, and run all tests (C++, then Python)
-./build.sh fmus                    set up and build fmus/beam.fmu and fmus/spring.fmu
+./build.sh fmus                    set up and build fmus/beam.fmu, spring.fmu and spring_beam.ssp
 ./build.sh lint                    formatters, linters and type checker
 
 Set-up makes .venv here and installs Python packages into it; as root it also installs the system packages that are
@@ -120,7 +120,7 @@ command=${1:-help}
 [ $# = 0 ] || shift
 case $command in
   run)
-    build beam_fmu spring_fmu
+    build fmus
     [ $# -gt 0 ] || set -- soft
     exec $venv/bin/springbeam run "$@"
     ;;
@@ -133,7 +133,7 @@ case $command in
     $python -m pytest -n auto "$@" || failed="${failed:+$failed and }Python tests"
     [ -z "$failed" ] || die "failed: $failed"
     ;;
-  fmus) build beam_fmu spring_fmu && ls -l fmus/*.fmu ;;
+  fmus) build fmus && ls -l fmus/*.fmu fmus/*.ssp ;;
   lint)
     set_up_python lint
     build beam spring
