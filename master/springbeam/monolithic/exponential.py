@@ -6,8 +6,8 @@ forces r(t) at the interface, collocated at s Gauss points of each step::
     ξ̈ + α_b ω² ξ̇ + ω² ξ = c + Pᵀ r(t),     r = R(w, ẇ),  w = Jξ the interface displacements
     ξ(τ) = C(τ) ξ₀ + S(τ) ξ̇₀ + ∫₀^τ S(τ − σ) (c + Pᵀ r(σ)) dσ,    S the response to a unit impulse, C = Ṡ + α_b ω² S
 
-The steps are as long as the fastest mode's radian: not for accuracy, which a linear phase has at any step, but so that
-no event slips through between two nodes.
+Steps resolve the motion that can be seen at the interface: not for accuracy, which a linear phase has at any step, but
+so that no event slips through between two nodes. Beams whose fast modes stay silent, or are damped out, cost little.
 """
 
 from __future__ import annotations
@@ -18,56 +18,27 @@ import numpy as np
 import scipy.linalg
 
 from .hybrid_system import HybridSystem, Phase, ReferenceFailure
+from .oscillators import GAUSS, STAGES, Oscillators, StepWeights
 from .propagators import Propagator, Segment
 
-_STAGES = 12
-#: Points that integrate S × a polynomial of degree 11 over a step to rounding.
-_QUADRATURE = 24
-_MAX_HALVINGS = 60
 _MAX_ITERATIONS = 60
-#: Step size × largest |root| of the phase: 12 Gauss points interpolate e^{iθ}, θ ≤ 2, to 1e-12.
+#: Step size × rate of the fastest motion that matters: 12 Gauss points interpolate e^{iθ}, θ ≤ 2, to 1e-12.
 _STEP_PHASE = 2.0
+#: What all faster motion together may amount to: of the tip's displacement, of a contact force, of the energy that
+#: damping takes.
+_UNSEEN_DISPLACEMENT, _UNSEEN_FORCE, _UNSEEN_ENERGY = 1e-12, 1e-9, 1e-13
 #: Largest accepted impulse of the last two Legendre coefficients of r over a step, as a share of the momentum there.
 #: The step's end is far more exact: Gauss points integrate what these coefficients leave out.
 _TAIL = 1e-12
+_SMALLEST_SHARE = 2.0**-60
 _CACHED_SIZES = 64
-
-
-class _GaussRule:
-    """Gauss–Legendre collocation on [0, 1]: nodes, weights, Lagrange basis ℓ_k, Legendre transform."""
-
-    def __init__(self, stages: int) -> None:
-        x, w = np.polynomial.legendre.leggauss(stages)
-        self.nodes = 0.5 * (x + 1.0)
-        self.weights = 0.5 * w
-        #: (stages, stages): values at the nodes → Legendre coefficients.
-        self.transform = np.polynomial.legendre.legvander(x, stages - 1).T * w * (np.arange(stages)[:, None] + 0.5)
-        self.stages = stages
-
-    def lagrange(self, c: np.ndarray) -> np.ndarray:
-        """ℓ_k(c), shape c.shape + (stages,)."""
-        return np.asarray(np.polynomial.legendre.legvander(2.0 * c - 1.0, self.stages - 1) @ self.transform)
-
-
-_GAUSS = _GaussRule(_STAGES)
-_INNER = _GaussRule(_QUADRATURE)
-#: Where a step is evaluated: the Gauss points and the end.
-_TARGETS = np.append(_GAUSS.nodes, 1.0)
-#: Quadrature points on [0, c] for each target c, shape (targets, Q), and weight × ℓ_k there, (targets, stages, Q).
-_ELAPSED = _TARGETS[:, None] * _INNER.nodes
-_FORCE_BASIS = np.swapaxes(_GAUSS.lagrange(_ELAPSED) * (_TARGETS[:, None] * _INNER.weights)[..., None], 1, 2)
 
 
 @dataclass(frozen=True)
 class _Weights:
-    """Maps over [0, τᵢ], τᵢ the targets of a step; p modes, o interface outputs, k inputs."""
+    """Those of a step, and what follows from them for the phase; p modes, o interface outputs, k inputs."""
 
-    C: np.ndarray  #: (targets, p): ξ₀ → ξ
-    S: np.ndarray  #: ξ̇₀ → ξ
-    C_dot: np.ndarray  #: ξ₀ → ξ̇
-    S_dot: np.ndarray  #: ξ̇₀ → ξ̇
-    force: np.ndarray  #: (targets, stages, p): ∫ S(τᵢ − σ) ℓ_j(σ) dσ
-    force_dot: np.ndarray
+    modes: StepWeights
     constant: np.ndarray  #: (targets, p): the response to c
     constant_dot: np.ndarray
     interface: np.ndarray  #: (o, stages, k, stages): r at the Gauss points → w there
@@ -88,8 +59,10 @@ class LinearForm:
         the phase has it.
     outputs : (o, p) array
         J: the interface displacements that r depends on: y, then u; each if it moves and matters.
-    radius : float
-        Largest |root| [1/s].
+    watched : (w, p) array
+        Displacements that events depend on: y or u, or both.
+    pressing : (p,) array
+        ω² × this is what a mode adds to the contact force that must not change sign; zeros if there is none.
     """
 
     def __init__(self, system: HybridSystem, phase: Phase) -> None:
@@ -110,12 +83,7 @@ class LinearForm:
             self._separate()
         #: Damping of the spring that α_b × stiffness does not hold yet [N·s/m].
         self.extra_damping = p.damping - system.alpha_b * p.linear_stiffness
-        self.sigma = 0.5 * system.alpha_b * self.omega2
-        discriminant = self.sigma**2 - self.omega2
-        self._over = discriminant > 0.0
-        self._root = np.sqrt(np.abs(discriminant))
-        roots = np.where(self._over, np.abs(self.sigma) + self._root, np.sqrt(np.abs(self.omega2)))
-        self.radius = float(roots.max(initial=0.0))
+        self.oscillators = Oscillators(self.omega2, system.alpha_b)
         self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
         self._cache: dict[str, _Weights] = {}
 
@@ -129,7 +97,8 @@ class LinearForm:
         self.omega2, modes = _modes(s.omega[:, None] * tangent)
         self.basis = tangent @ modes
         self.constant = self.basis.T @ (s.load - s.stiffness * self.offset)
-        self.inputs = self.outputs = np.zeros((0, len(self.omega2)))
+        self.inputs = self.outputs = self.watched = np.zeros((0, len(self.omega2)))
+        self.pressing = self.basis.T @ s.b
         self._to_modes = self.basis.T
 
     def _join(self) -> None:
@@ -148,7 +117,9 @@ class LinearForm:
         self.basis = inverse_root @ modes
         self._to_modes = modes.T @ (identity + (growth - 1.0) * projector)
         self.constant = self.basis.T @ (s.load + s.b * p.external_force)
-        self.inputs = self.outputs = (self.basis.T @ s.b)[None, :]
+        tip = self.basis.T @ s.b
+        self.inputs = self.outputs = self.watched = tip[None, :]
+        self.pressing = tip if self.phase.contact == "touch" else np.zeros_like(tip)
 
     def _separate(self) -> None:
         """Beam and spring side by side, ξ = (a, √m y); the spring only if it moves."""
@@ -169,6 +140,8 @@ class LinearForm:
             outputs.append(tip_row)
         self.inputs = np.array(inputs).reshape(len(inputs), len(self.omega2))
         self.outputs = np.array(outputs).reshape(len(outputs), len(self.omega2))
+        self.watched = np.array([tip_row, spring_row])
+        self.pressing = np.zeros(len(self.omega2))
 
     def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(ξ, ξ̇) of a state."""
@@ -193,36 +166,19 @@ class LinearForm:
             states[:, s.Y], states[:, s.Z] = xi[:, -1] / self.root_mass, xi_dot[:, -1] / self.root_mass
         return states
 
+    def forces_at(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
+        """The forces r of one state, (k, 1)."""
+        return self.forces((self.outputs @ xi)[:, None], (self.outputs @ xi_dot)[:, None], X)
+
     def forces(self, w: np.ndarray, w_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
         """R: forces (k, n) at interface displacements and velocities (o, n)."""
         s = self.system
         result = np.empty((len(self.inputs), w.shape[1]))
-        if self.joined or self.spring_moves:
+        if self.spring_moves:
             result[0] = -self.extra_damping * w_dot[0] - s.spring.cubic_stiffness * w[0] ** 3
         if self.pressed:
             result[-1] = s.compliance_force((w[0] if self.spring_moves else X[s.Y]) - w[-1])
         return result
-
-    def kernels(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """S and Ṡ at times ``tau``, shape tau.shape + (p,)."""
-        t = tau[..., None]
-        x = self._root * t
-        decay = np.exp(-self.sigma * t)
-        S = t * decay * np.sinc(x / np.pi)
-        S_dot = decay * np.cos(x) - self.sigma * S
-        if np.any(self._over):
-            # Roots −σ ± δ, apart or, for small δτ, together; −σ + δ = −ω²/(σ + δ) without the cancellation.
-            over = self._over
-            sigma, delta, x = self.sigma[over], self._root[over], x[..., over]
-            slow, fast = -self.omega2[over] / (delta + sigma), -(delta + sigma)
-            near = t * decay[..., over] * np.sinh(np.minimum(x, 1.0)) / np.where(x > 0.0, np.minimum(x, 1.0), 1.0)
-            near = np.where(x > 0.0, near, t * decay[..., over])
-            e_slow, e_fast = np.exp(slow * t), np.exp(fast * t)
-            S[..., over] = np.where(x < 1.0, near, (e_slow - e_fast) / (2.0 * delta))
-            S_dot[..., over] = 0.5 * (e_slow + e_fast) - sigma * S[..., over]
-            far = (slow * e_slow - fast * e_fast) / (2.0 * delta)
-            S_dot[..., over] = np.where(x < 1.0, S_dot[..., over], far)
-        return S, S_dot
 
     def weights(self, size: float) -> _Weights:
         """Weights of a step of ``size`` [s]; the last ones used are kept."""
@@ -236,27 +192,40 @@ class LinearForm:
         return known
 
     def _new_weights(self, size: float) -> _Weights:
-        S, S_dot = self.kernels(_TARGETS * size)
-        kernel, kernel_dot = self.kernels((_TARGETS[:, None] - _ELAPSED) * size)
-        basis = _FORCE_BASIS * size
-        force, force_dot = np.matmul(basis, kernel), np.matmul(basis, kernel_dot)
-
-        def at_interface(weights: np.ndarray) -> np.ndarray:
-            pairs = self.outputs[:, None, :] * self.inputs  # (o, k, p)
-            return np.asarray(np.einsum("okp,ijp->oikj", pairs, weights[:-1]))
-
+        modes = self.oscillators.weights(size)
+        pairs = self.outputs[:, None, :] * self.inputs  # (o, k, p)
         return _Weights(
-            C=S_dot + 2.0 * self.sigma * S,
-            S=S,
-            C_dot=-self.omega2 * S,
-            S_dot=S_dot,
-            force=force,
-            force_dot=force_dot,
-            constant=self.constant * force.sum(axis=1),
-            constant_dot=self.constant * force_dot.sum(axis=1),
-            interface=at_interface(force),
-            interface_dot=at_interface(force_dot),
+            modes=modes,
+            constant=self.constant * modes.force.sum(axis=1),
+            constant_dot=self.constant * modes.force_dot.sum(axis=1),
+            interface=np.einsum("okp,ijp->oikj", pairs, modes.force[:-1]),
+            interface_dot=np.einsum("okp,ijp->oikj", pairs, modes.force_dot[:-1]),
         )
+
+    def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray) -> float:
+        """Step size [s] that resolves the free motion seen in displacements, contact forces and dissipation.
+
+        ``r`` (k,) are the forces at the start. What is left out is no error: it only may hide an event as small.
+        """
+        if not len(self.omega2):
+            return np.inf
+        rates, amplitudes = self.oscillators.components(xi, xi_dot, self.constant + r @ self.inputs)
+        order = np.argsort(-rates)
+        rates, amplitudes = rates[order], amplitudes[order]
+        mode = order % len(self.omega2)
+        stiffness = np.abs(self.omega2)[mode]
+        limits = [(np.abs(row)[mode] * amplitudes, _UNSEEN_DISPLACEMENT) for row in self.watched]
+        alpha = self.oscillators.alpha
+        limits.append((np.abs(self.pressing)[mode] * stiffness * (1.0 + alpha * rates) * amplitudes, _UNSEEN_FORCE))
+        if alpha > 0.0:
+            limits.append(((stiffness + rates**2) * amplitudes**2, _UNSEEN_ENERGY))
+        fastest = 0.0
+        for shares, unseen in limits:
+            from_fast = np.cumsum(shares)
+            seen = from_fast > unseen * from_fast[-1]
+            if np.any(seen):
+                fastest = max(fastest, float(rates[np.argmax(seen)]))
+        return _STEP_PHASE / fastest if fastest > 0.0 else np.inf
 
 
 def _modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -288,40 +257,44 @@ class ExponentialPropagator(Propagator):
     def __init__(self, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
         self.form, self.X = form, X
         self._speed = speed  #: largest interface velocity so far × √mass, the scale of `_TAIL`
-        self._limit = _STEP_PHASE / form.radius if form.radius > 0.0 else np.inf
-        self._size = 0.0
-        self._halvings = 0
+        self._force_limit = np.inf  #: what resolving r allows [s]
+        self._size, self._steps = 0.0, 0  #: of the present interval, and how many are left
 
     def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
-        while self._halvings < _MAX_HALVINGS:
-            segment = self._step(self._next_size(remaining, resolution))
+        xi, xi_dot = self.form.pack(self.X)
+        r = self.form.forces_at(xi, xi_dot, self.X)
+        limit = self.form.longest_step(xi, xi_dot, r[:, 0])
+        while True:
+            size = self._next_size(remaining, resolution, min(limit, self._force_limit))
+            segment = self._step(size, xi, xi_dot, r)
             if segment is not None:
+                self._steps -= 1
+                self._force_limit = min(2.0 * self._force_limit, 1e300)
                 self.X = segment.states[-1]
-                self._halvings = max(self._halvings - 1, 0)
                 return segment
-            self._halvings += 1
-        raise ReferenceFailure(f"no step resolves the interface force in phase {self.form.phase.name}")
+            self._force_limit = 0.5 * size
+            if size < _SMALLEST_SHARE * remaining:
+                raise ReferenceFailure(f"no step resolves the interface force in phase {self.form.phase.name}")
 
-    def _next_size(self, remaining: float, resolution: float) -> float:
-        """Equal steps to the target; sizes recur where they differ by rounding only, because weights are dear."""
-        if self._halvings > 0:
-            size = min(self._limit, remaining) * 0.5**self._halvings
-            return size if remaining > 1.5 * size else remaining
-        steps = 1.0 if np.isinf(self._limit) else max(np.ceil(remaining / self._limit * (1.0 - 1e-9)), 1.0)
-        if abs(remaining - steps * self._size) > resolution:
-            self._size = remaining / steps
+    def _next_size(self, remaining: float, resolution: float, limit: float) -> float:
+        """The interval to the target in 2ᵏ equal steps, k changing on the way: sizes recur, as weights are dear."""
+        if abs(remaining - self._steps * self._size) > resolution or self._steps == 0:
+            self._size, self._steps = remaining, 1
+        while self._size > limit:
+            self._size, self._steps = 0.5 * self._size, 2 * self._steps
+        while self._steps % 2 == 0 and 2.0 * self._size <= limit:
+            self._size, self._steps = 2.0 * self._size, self._steps // 2
         return self._size
 
-    def _step(self, size: float) -> _ExponentialSegment | None:
-        """One step, or None where it is too long for the forces r."""
+    def _step(self, size: float, xi: np.ndarray, xi_dot: np.ndarray, start: np.ndarray) -> _ExponentialSegment | None:
+        """One step, or None where it is too long for the forces r, whose values at its start are given."""
         form, X = self.form, self.X
-        w = form.weights(size)
-        xi, xi_dot = form.pack(X)
-        free = w.C * xi + w.S * xi_dot + w.constant
-        free_dot = w.C_dot * xi + w.S_dot * xi_dot + w.constant_dot
+        weights = form.weights(size)
+        w = weights.modes
+        free = w.C * xi + w.S * xi_dot + weights.constant
+        free_dot = w.C_dot * xi + w.S_dot * xi_dot + weights.constant_dot
         if len(form.inputs):
-            start = form.forces((form.outputs @ xi)[:, None], (form.outputs @ xi_dot)[:, None], X)
-            r = self._forces(w, free[:-1] @ form.outputs.T, free_dot[:-1] @ form.outputs.T, start)
+            r = self._forces(weights, free[:-1] @ form.outputs.T, free_dot[:-1] @ form.outputs.T, start)
             if r is None:
                 return None
             load = r.T @ form.inputs
@@ -329,20 +302,20 @@ class ExponentialPropagator(Propagator):
             free_dot = free_dot + np.einsum("ikj,kj->ij", w.force_dot, load)
             root_mobility = np.sqrt(form.mobility)
             self._speed = max(self._speed, float(np.max(np.abs(free_dot @ form.inputs.T / root_mobility))))
-            tail = np.sum(np.abs(r @ _GAUSS.transform[-2:].T), axis=1)
+            tail = np.sum(np.abs(r @ GAUSS.transform[-2:].T), axis=1)
             if np.any(tail * size * root_mobility > _TAIL * self._speed):
                 return None
         states = form.unpack(free, free_dot, X)
         if not np.all(np.isfinite(states)):
             return None
         rate = form.system.dissipation_rate(states[:-1])
-        states[-1, form.system.D] = X[form.system.D] + size * float(_GAUSS.weights @ rate)
-        nodes = np.concatenate([[0.0], _GAUSS.nodes * size, [size]])
+        states[-1, form.system.D] = X[form.system.D] + size * float(GAUSS.weights @ rate)
+        nodes = np.concatenate([[0.0], GAUSS.nodes * size, [size]])
         return _ExponentialSegment(form, size, nodes, np.vstack([X, states]), self._speed)
 
     def _forces(self, w: _Weights, free: np.ndarray, free_dot: np.ndarray, start: np.ndarray) -> np.ndarray | None:
         """r = R(w, ẇ) at the Gauss points by fixed-point iteration; ``free`` (stages, o) is w without r."""
-        r = np.repeat(start, _STAGES, axis=1)
+        r = np.repeat(start, STAGES, axis=1)
         for iteration in range(_MAX_ITERATIONS):
             displacement = free.T + np.tensordot(w.interface, r, axes=2)
             velocity = free_dot.T + np.tensordot(w.interface_dot, r, axes=2)

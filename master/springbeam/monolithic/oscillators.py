@@ -1,0 +1,184 @@
+"""Damped oscillators ξ̈ + α ω² ξ̇ + ω² ξ = f(t), many at once, under forces that are polynomials over a step.
+
+Free response and response to a polynomial are exact to rounding for any step, underdamped to overdamped, however
+fast the oscillator. With the roots s₁,₂ = −σ ± √(σ² − ω²), σ = α ω²/2::
+
+    S(τ) = (e^{s₁τ} − e^{s₂τ})/(s₁ − s₂)    response to a unit impulse;    C = Ṡ + 2σ S    to a unit displacement
+    ξ(τ) = C(τ) ξ₀ + S(τ) ξ̇₀ + ∫₀^τ S(τ − ν) f(ν) dν
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+#: Gauss points of a step, at which forces are given.
+STAGES = 12
+#: Points per panel: they integrate e^{iθ} × a polynomial of degree 11 for θ ≤ `_PANEL` to 1e-16.
+_QUADRATURE = 24
+_PANEL = 20.0
+#: Above this |s| h the response to a polynomial is found as a polynomial, whose terms then fall like (288/|s|h)ᵐ.
+_FAST = 2000.0
+#: Roots nearer than this share of σ are moved apart by it: S changes by its square.
+_CRITICAL = 1e-6
+
+
+class GaussRule:
+    """Gauss–Legendre collocation on [0, 1]: nodes, weights, Lagrange basis ℓ_k, Legendre transform."""
+
+    def __init__(self, stages: int) -> None:
+        x, w = np.polynomial.legendre.leggauss(stages)
+        self.nodes = 0.5 * (x + 1.0)
+        self.weights = 0.5 * w
+        #: (stages, stages): values at the nodes → Legendre coefficients.
+        self.transform = np.polynomial.legendre.legvander(x, stages - 1).T * w * (np.arange(stages)[:, None] + 0.5)
+        self.stages = stages
+
+    def lagrange(self, c: np.ndarray) -> np.ndarray:
+        """ℓ_k(c), shape c.shape + (stages,)."""
+        return np.asarray(np.polynomial.legendre.legvander(2.0 * c - 1.0, self.stages - 1) @ self.transform)
+
+
+GAUSS = GaussRule(STAGES)
+_INNER = GaussRule(_QUADRATURE)
+#: Where a step is evaluated: the Gauss points and the end, as fractions of it.
+TARGETS = np.append(GAUSS.nodes, 1.0)
+_AT_TARGETS = np.polynomial.legendre.legvander(2.0 * TARGETS - 1.0, STAGES - 1)
+_AT_START = np.polynomial.legendre.legvander(np.array([-1.0]), STAGES - 1)[0]
+#: d/dx on [0, 1] in Legendre coefficients.
+_DERIVATIVE = np.zeros((STAGES, STAGES))
+for _k in range(1, STAGES):
+    _DERIVATIVE[:_k, _k] = 2.0 * np.polynomial.legendre.legder(np.eye(STAGES)[_k])[:_k]
+
+
+@dataclass(frozen=True)
+class StepWeights:
+    """Maps from the start of a step, and from forces at its Gauss points, to the targets; p oscillators."""
+
+    C: np.ndarray  #: (targets, p): ξ₀ → ξ
+    S: np.ndarray  #: ξ̇₀ → ξ
+    C_dot: np.ndarray  #: ξ₀ → ξ̇
+    S_dot: np.ndarray  #: ξ̇₀ → ξ̇
+    force: np.ndarray  #: (targets, stages, p): ∫₀^τ S(τ − ν) ℓ_k(ν) dν
+    force_dot: np.ndarray  #: the same with Ṡ
+
+
+class Oscillators:
+    """p oscillators.
+
+    Parameters
+    ----------
+    omega2 : (p,) array
+        ω² [1/s²]; may be zero or negative.
+    alpha : float
+        α [s].
+    """
+
+    def __init__(self, omega2: np.ndarray, alpha: float) -> None:
+        self.omega2, self.alpha = omega2, alpha
+        self.sigma = 0.5 * alpha * omega2
+        discriminant = self.sigma**2 - omega2
+        self.over = discriminant > 0.0
+        self.root = np.sqrt(np.abs(discriminant))  #: √|σ² − ω²|
+        apart = np.maximum(self.root, _CRITICAL * np.abs(self.sigma))
+        half = np.where(self.over, apart, 1j * apart)
+        fast = -self.sigma - np.where(self.over, np.copysign(apart, self.sigma), 1j * apart)
+        # The product of the roots is ω²: their sum would cancel.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slow = np.where(self.over & (fast != 0.0), omega2 / fast, -self.sigma + half)
+        #: s₁, s₂ with |s₁| ≤ |s₂|, (p,) complex.
+        self.slow, self.fast = slow, fast
+
+    def kernels(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """S and Ṡ at times ``tau``, shape tau.shape + (p,)."""
+        t = tau[..., None]
+        x = self.root * t
+        decay = np.exp(-self.sigma * t)
+        S = t * decay * np.sinc(x / np.pi)
+        S_dot = decay * np.cos(x) - self.sigma * S
+        if np.any(self.over):
+            over = self.over
+            sigma, x = self.sigma[over], x[..., over]
+            slow, fast = self.slow[over].real, self.fast[over].real
+            e_slow, e_fast = np.exp(slow * t), np.exp(fast * t)
+            clipped = np.clip(x, 1e-150, 1.0)
+            near = t * decay[..., over] * np.sinh(clipped) / clipped  # the roots are close
+            S_over = np.where(x < 1.0, near, (e_slow - e_fast) / (slow - fast))
+            S_dot[..., over] = np.where(
+                x < 1.0, 0.5 * (e_slow + e_fast) - sigma * S_over, (slow * e_slow - fast * e_fast) / (slow - fast)
+            )
+            S[..., over] = S_over
+        return S, S_dot
+
+    def weights(self, size: float) -> StepWeights:
+        """Weights of a step of ``size`` [s]."""
+        S, S_dot = self.kernels(TARGETS * size)
+        shape = (len(TARGETS), STAGES, len(self.omega2))
+        force, force_dot = np.empty(shape), np.empty(shape)
+        near = np.abs(self.fast) * size <= _PANEL
+        if np.any(near):
+            elapsed, basis = _panels(1)
+            kernel, kernel_dot = self._pick(near).kernels((TARGETS[:, None] - elapsed) * size)
+            force[..., near] = np.matmul(basis * size, kernel)
+            force_dot[..., near] = np.matmul(basis * size, kernel_dot)
+        if not np.all(near):
+            far = ~near
+            slow, fast = self.slow[far], self.fast[far]
+            over = self.over[far]
+            with_fast = _convolve(fast, size)
+            with_slow = np.where(over, 0.0, with_fast.conj())
+            if np.any(over):
+                with_slow[..., over] = _convolve(slow[over], size)
+            force[..., far] = ((with_slow - with_fast) / (slow - fast)).real
+            force_dot[..., far] = ((slow * with_slow - fast * with_fast) / (slow - fast)).real
+        return StepWeights(S_dot + 2.0 * self.sigma * S, S, -self.omega2 * S, S_dot, force, force_dot)
+
+    def _pick(self, which: np.ndarray) -> Oscillators:
+        return self if np.all(which) else Oscillators(self.omega2[which], self.alpha)
+
+    def components(self, xi: np.ndarray, xi_dot: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rates |s| [1/s] and amplitudes of the free motion about equilibrium under ``force``, both (2p,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            xi = xi - np.where(self.omega2 != 0.0, force / self.omega2, 0.0)
+            of_slow = np.abs((xi_dot - self.fast * xi) / (self.slow - self.fast))
+            of_fast = np.abs((self.slow * xi - xi_dot) / (self.slow - self.fast))
+        rates = np.abs(np.concatenate([self.slow, self.fast]))
+        amplitudes = np.concatenate([of_slow, of_fast])
+        return rates, np.where(rates > 0.0, np.nan_to_num(amplitudes), 0.0)
+
+
+@lru_cache(maxsize=16)
+def _panels(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Quadrature points on [0, c] for each target c, (targets, Q), and weight × ℓ_k there, (targets, stages, Q)."""
+    nodes = ((np.arange(count)[:, None] + _INNER.nodes) / count).ravel()
+    weights = np.tile(_INNER.weights / count, count)
+    elapsed = TARGETS[:, None] * nodes
+    basis = GAUSS.lagrange(elapsed) * (TARGETS[:, None] * weights)[..., None]
+    return elapsed, np.ascontiguousarray(np.swapaxes(basis, 1, 2))
+
+
+def _convolve(s: np.ndarray, size: float) -> np.ndarray:
+    """∫₀^τ e^{s(τ − ν)} ℓ_k(ν) dν at the targets, for roots s with Re s ≤ 0 or small: (targets, stages, len(s))."""
+    result = np.empty((len(TARGETS), STAGES, len(s)), dtype=complex)
+    phase = np.abs(s) * size
+    level = np.where(phase > _FAST, -1, np.ceil(np.log2(np.maximum(phase / _PANEL, 1.0))).astype(int))
+    for value in np.unique(level):
+        which = level == value
+        if value < 0:
+            result[..., which] = _polynomial_response(s[which], size)
+            continue
+        elapsed, basis = _panels(int(2**value))
+        kernel = np.exp(((TARGETS[:, None] - elapsed) * size)[..., None] * s[which])
+        result[..., which] = np.matmul(basis * size, kernel)
+    return result
+
+
+def _polynomial_response(s: np.ndarray, size: float) -> np.ndarray:
+    """The same for fast roots: with the polynomial p of p'/h − s p = ℓ_k it is p(τ) − e^{sτ} p(0)."""
+    operators = _DERIVATIVE / size - s[:, None, None] * np.eye(STAGES)
+    p = np.linalg.solve(operators, np.broadcast_to(GAUSS.transform, operators.shape))  # (len(s), legendre, k)
+    decay = np.exp(s[:, None] * TARGETS * size)
+    response = _AT_TARGETS @ p - decay[..., None] * (_AT_START @ p)[:, None, :]
+    return np.asarray(np.moveaxis(response, 0, -1))
