@@ -1,6 +1,6 @@
 """The ``springbeam`` command. A command is a thin function: it reads its input, calls the library, prints.
 
-Exit codes: 0 done, 2 bad input, 3 the run stopped early (what was computed is on disk).
+Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the run stopped early (what was computed is on disk).
 Results go to stdout, progress and errors to stderr.
 """
 
@@ -15,7 +15,7 @@ from importlib import metadata
 from itertools import islice
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 from rich.console import Console
@@ -36,6 +36,10 @@ from .recording import (
 from .scene import Scene, SceneError, load_scene, shipped_scenes
 from .trajectory import Event
 
+if TYPE_CHECKING:
+    from .crosscheck import OrderRow, Report
+
+DISAGREES = 1
 BAD_INPUT = 2
 STOPPED = 3
 
@@ -82,26 +86,30 @@ def _complete_scene(incomplete: str) -> list[str]:
     return [name for name in shipped_scenes() if name.startswith(incomplete)]
 
 
+SceneArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="SCENE",
+        help="A scene file (.toml), or the name of a shipped scene (springbeam scenes lists them).",
+        autocompletion=_complete_scene,
+    ),
+]
+SettingsOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="TABLE.KEY=VALUE", help="Change a value of the scene; may be repeated."),
+]
+
+
 @app.command()
 def run(
-    scene: Annotated[
-        str,
-        typer.Argument(
-            metavar="SCENE",
-            help="A scene file (.toml), or the name of a shipped scene (springbeam scenes lists them).",
-            autocompletion=_complete_scene,
-        ),
-    ],
+    scene: SceneArgument,
     out: Annotated[
         Path | None,
         typer.Option(
             "--out", "-o", metavar="DIR", help="Where results go. Default: results/SCENE, or results/SCENE-2, …"
         ),
     ] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="TABLE.KEY=VALUE", help="Change a value of the scene; may be repeated."),
-    ] = None,
+    settings: SettingsOption = None,
     no_plots: Annotated[bool, typer.Option("--no-plots", help="Do not draw pictures.")] = False,
     force: Annotated[bool, typer.Option("--force", "-f", help="Replace results that are already there.")] = False,
     quiet: Annotated[
@@ -156,6 +164,95 @@ def scenes() -> None:
             contents = ", ".join(part for part, there in parts.items() if there is not None)
             table.add_row(name, contents, f"{scene.time.t_end:g}", Text(scene.title))
     Console(highlight=False).print(table)
+
+
+@app.command()
+def crosscheck(
+    scene: SceneArgument,
+    settings: SettingsOption = None,
+    with_orders: Annotated[
+        bool, typer.Option("--orders", help="Repeat at H/2, H/4, H/8 and print observed orders instead.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="PNG", help="Draw both, and errors below bounds, here.")
+    ] = None,
+) -> None:
+    """Compare the co-simulation with the monolithic reference of its law. Exit code 1 if they disagree.
+
+    Example: springbeam crosscheck soft --set coupling.scheme=hermite --set coupling.degree=2 --orders
+    """
+    from .crosscheck import crosscheck as compare
+    from .crosscheck import orders
+    from .monolithic.event_driven import ReferenceFailure
+    from .plots import plot_crosscheck
+    from .runner import RunStopped
+
+    console = Console(highlight=False)
+    with _bad_input_reported():
+        what = load_scene(scene, settings or ())
+        try:
+            if with_orders:
+                console.print(_orders_table(orders(what)))
+                return
+            report = compare(what)
+        except FmuError as error:
+            _fail(BAD_INPUT, str(error))
+        except (RunStopped, ReferenceFailure) as error:
+            _fail(STOPPED, str(error))
+        if out is not None:
+            plot_crosscheck(report, out)
+    for note in report.notes:
+        console.print(Text(note))
+    console.print(_error_table(report))
+    console.print(_event_errors_table(report))
+    begin, end = report.trajectory["time"][0], report.trajectory["time"][-1]
+    console.print(Text(
+        f"comparable from {begin:.6g} to {report.horizon:.6g} s of {end:.6g} s; there a perturbation of the reference "
+        f"has grown {report.growth:.3g} times"
+    ))  # fmt: skip
+    console.print(Text("passed" if report.passed else "FAILED", style="bold green" if report.passed else "bold red"))
+    if not report.passed:
+        raise typer.Exit(DISAGREES)
+
+
+def _error_table(report: Report) -> Table:
+    table = Table("quantity", box=None, pad_edge=False, header_style="bold")
+    for name in ("max error", "at t [s]", "L2 error", "bound", ""):
+        table.add_column(Text(name), justify="right", no_wrap=True)
+    for row in report.rows:
+        verdict = "ok" if row.passed else "FAILED"
+        table.add_row(
+            row.quantity, f"{row.error:.2e}", f"{row.at:.6g}", f"{row.l2:.1e}", f"{row.bound:.1e}", verdict
+        )
+    return table
+
+
+def _event_errors_table(report: Report) -> Table:
+    table = Table("contact", box=None, pad_edge=False, header_style="bold")
+    for name in ("t [s]", "reference [s]", "error [s]", "bound [s]", ""):
+        table.add_column(Text(name), justify="right", no_wrap=True)
+    for row in report.events:
+        error, verdict = row.time - row.reference, "ok" if row.passed else "FAILED"
+        table.add_row(
+            row.kind, f"{row.time:.10f}", f"{row.reference:.10f}", f"{error:.1e}", f"{row.bound:.1e}", verdict
+        )
+    return table
+
+
+def _orders_table(rows: list[OrderRow]) -> Table:
+    table = Table("phase", r"from \[s]", "quantity", box=None, pad_edge=False, header_style="bold", title="max errors at H, H/2, …", title_justify="left")
+    count = len(rows[0].errors) if rows else 0
+    for column in table.columns:
+        column.no_wrap = True
+    for k in range(count):
+        table.add_column(f"H/{2**k}" if k else "H", justify="right", no_wrap=True)
+    table.add_column("orders", justify="right", no_wrap=True)
+    for row in rows:
+        observed = " ".join(f"{order:.1f}" for order in row.orders)
+        table.add_row(
+            row.phase, f"{row.begin:.4f}", row.quantity, *[f"{error:.1e}" for error in row.errors], observed
+        )
+    return table
 
 
 @contextmanager

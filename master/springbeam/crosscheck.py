@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -52,6 +51,9 @@ class Row:
     l2: float  #: root mean square over the window
     bound: float  #: at that time
     passed: bool
+    times: np.ndarray  #: of the compared rows [s]
+    errors: np.ndarray
+    bounds: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -182,14 +184,9 @@ def _quantities(scene: Scene) -> Iterable[tuple[str, Sample]]:
 
 
 def _force(trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
-    """Contact force at macro points.
-
-    A constant force belongs to the middle of its step, so at degree 0 the mean over two steps stands at the macro point
-    between them: one step before its row.
-    """
+    """Contact force at macro points: of a tie the mean of its two limits there, which stands in the row after."""
     size = trajectory.scene.coupling.macro_step
-    held = "contact_force_smoothed" in trajectory.columns and trajectory.scene.coupling.degree == 0
-    if not held or trajectory.scene.contact.law != "transmission" or "reference" in trajectory.summary:
+    if trajectory.scene.contact.law != "transmission" or "reference" in trajectory.summary:
         return _at(trajectory, times, "contact_force")
     steps = np.diff(trajectory.time, prepend=np.nan)
     regular = (np.abs(steps - size) < 1e-6 * size) & (np.abs(np.roll(steps, 1) - size) < 1e-6 * size)
@@ -238,7 +235,7 @@ def _row(name: str, times: np.ndarray, error: np.ndarray, bound: np.ndarray) -> 
     at = worst if error[worst] > bound[worst] else top
     return Row(
         name, float(error[at]), float(times[at]), float(np.sqrt(np.mean(error**2))), float(bound[at]),
-        bool(np.all(error <= bound)),
+        bool(np.all(error <= bound)), times, error, bound,
     )  # fmt: skip
 
 
@@ -391,15 +388,3 @@ def orders(scene: Scene, halvings: int = 3) -> list[OrderRow]:
                 observed = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
             found.append(OrderRow(str(phases), begin, end, name, tuple(errors), tuple(observed.tolist())))
     return found
-
-
-def as_dict(report: Report) -> dict[str, Any]:
-    """JSON-like form."""
-    return {
-        "passed": report.passed,
-        "horizon": report.horizon,
-        "growth": report.growth,
-        "notes": report.notes,
-        "rows": [vars(row) for row in report.rows],
-        "events": [vars(row) for row in report.events],
-    }

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -25,6 +25,9 @@ from matplotlib.ticker import LogLocator
 
 from .recording import PICTURES
 from .trajectory import EVENT_KINDS, SHAPE_POINTS, Trajectory
+
+if TYPE_CHECKING:
+    from .crosscheck import Report
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
@@ -111,6 +114,38 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
                 figure.savefig(path, dpi=_DPI)
                 written.append(path)
     return written
+
+
+def plot_crosscheck(report: Report, path: Path) -> None:
+    """Co-simulation and reference in one picture, and every error below its bound."""
+    trajectory, reference = report.trajectory, report.reference
+    with matplotlib.rc_context(_STYLE):
+        timeline = _Timeline.of(trajectory, "Co-simulation and reference", [2.2, 3.0])
+        above, below = timeline.axes
+        names = _present(trajectory, "u_tip", "y")
+        unit = readable_unit([trajectory[name] for name in names], "m")
+        for name, colour in zip(names, (BLUE, VERMILLION), strict=False):
+            above.plot(
+                timeline.unit.factor * trajectory["time"], unit.factor * trajectory[name], color=colour, lw=2.5, alpha=0.5,
+                label=f"{name}, co-simulation",
+            )  # fmt: skip
+            above.plot(
+                timeline.unit.factor * reference["time"], unit.factor * reference[name], color=BLACK, lw=0.7,
+                label=f"{name}, reference",
+            )  # fmt: skip
+        above.set_ylabel(f"position [{unit.name}]")
+        _key(above)
+        colours = (BLUE, SKY, VERMILLION, ORANGE, GREEN, PURPLE, GREY)
+        for row, colour in zip(report.rows, colours, strict=False):
+            time, tiny = timeline.unit.factor * row.times, np.finfo(float).tiny
+            below.semilogy(time, np.maximum(row.errors, tiny), color=colour, lw=0.9, label=row.quantity)
+            below.semilogy(time, row.bounds, color=colour, lw=0.9, ls=":")
+        low = min((float(r.errors[r.errors > 0.0].min()) for r in report.rows if (r.errors > 0.0).any()), default=1e-16)
+        below.set_ylim(bottom=max(low, 1e-18))
+        below.axvline(timeline.unit.factor * report.horizon, color=BLACK, lw=0.8, ls="--")
+        below.set_ylabel("error (lines), bound (dots)\n[unit of the quantity]")
+        _key(below)
+        timeline.figure.savefig(path, dpi=_DPI)
 
 
 # -- axes ---------------------------------------------------------------------------------------------------------

@@ -166,7 +166,7 @@ class Simulation:
         self._ledger = Ledger()
         self._contact: Force = NO_FORCE
         self._foundation: Force = NO_FORCE
-        self._smoothed: tuple[float, float] = (0.0, 0.0)
+        self._smoothed = 0.0  #: mean of C's two limits at the start of the last step
         self._steps_in_phase = 0
         #: (middle, C, N) of the last two steps of this phase.
         self._middles: list[tuple[float, float, float]] = []
@@ -591,7 +591,7 @@ class Simulation:
         """C at the end of the step as well as the degree tells [N]."""
         if self._degree > 0:
             return force.end_value(step.contact, step.size)
-        return self._smoothed[0]
+        return self._smoothed
 
     # -- bookkeeping --------------------------------------------------------------------------------------------
 
@@ -621,10 +621,8 @@ class Simulation:
         self.time = time
         self.counts.macro_steps += 1
         first = self._steps_in_phase == 0
-        self._smoothed = (
-            step.contact[0] if first or self._degree else 0.5 * (step.contact[0] + self._contact[0]),
-            step.foundation[0] if first or self._degree else 0.5 * (step.foundation[0] + self._foundation[0]),
-        )
+        # At the macro point between two steps both forces are wrong by nearly the same, one up, one down.
+        self._smoothed = step.contact[0] if first else 0.5 * (step.contact[0] + self._contact[0])
         self._contact = force.shifted(step.contact, step.size)
         self._foundation = force.shifted(step.foundation, step.size)
         self._steps_in_phase += 1
@@ -640,7 +638,7 @@ class Simulation:
             contact = compliance_force(-row["gap"], law.stiffness, law.exponent)
         joined = self.phase.joint is not Joint.FREE
         row["contact_force"] = contact
-        row["contact_force_smoothed"] = contact if self._degree or not joined or self._compliant else self._smoothed[0]
+        row["contact_force_smoothed"] = self._smoothed if joined and not self._compliant else contact
         if self._joinable:
             psi = self.scene.spring.equilibrium  # type: ignore[union-attr]
             inside = 0.0 if self._compliant else compliance_force(psi - tip.displacement, law.stiffness, law.exponent)

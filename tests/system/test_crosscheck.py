@@ -1,0 +1,81 @@
+"""`crosscheck` passes where co-simulation and reference solve the same problem, and fails where they do not."""
+
+from __future__ import annotations
+
+import pytest
+from typer.testing import CliRunner
+
+from springbeam import load_scene, with_changes
+from springbeam import crosscheck as module
+from springbeam.cli import app
+from springbeam.crosscheck import crosscheck, orders
+
+SHORT = {"time": {"t_end": 0.2}, "coupling": {"macro_step": 5e-4}}
+
+
+@pytest.mark.parametrize(("scheme", "degree"), [("energy", 0), ("energy", 2), ("hermite", 2)])
+def test_the_same_problem_passes(scheme, degree):
+    scene = with_changes(load_scene("soft"), **{**SHORT, "coupling": {"macro_step": 5e-4, "scheme": scheme, "degree": degree}})
+    report = crosscheck(scene)
+    assert report.passed, report.rows
+    assert report.horizon == pytest.approx(0.2)
+    assert {row.quantity for row in report.rows} >= {"y", "u_tip", "z", "v_tip", "contact_force", "e_beam", "e_spring"}
+    assert [row.kind for row in report.events] == ["closes", "strikes", "opens"]
+
+
+def test_compliance_passes():
+    law = {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}
+    report = crosscheck(with_changes(load_scene("soft"), contact=law, **SHORT))
+    assert report.passed, report.rows
+
+
+WRONG = {
+    "mass": {"spring": {"mass": 1.01}},
+    "sign of the cubic term": {"spring": {"cubic_stiffness": 0.2}},
+    "beam": {"beam": {"density": 1.001}},
+    "law": {"contact": {"law": "compliance", "stiffness": 1e6}},
+    "restitution": {"stop": {"restitution": 0.9}},
+    "load": {"spring": {"external_force": 1e-3}},
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_reference_fails(monkeypatch, what):
+    """The reference is given another problem than the co-simulation: nothing in the bounds may hide that."""
+    right = module.event_driven.simulate
+    monkeypatch.setattr(
+        module.event_driven, "simulate", lambda scene, **options: right(with_changes(scene, **WRONG[what]), **options)
+    )
+    sharp = {"macro_step": 1e-3, "scheme": "energy" if what == "law" else "hermite", "degree": 0 if what == "law" else 2}
+    report = crosscheck(with_changes(load_scene("soft"), **{**SHORT, "coupling": sharp}))
+    assert not report.passed
+
+
+def test_orders_are_those_of_the_scheme():
+    """hermite of degree 2: displacement 6, velocity 6, force 4."""
+    coupling = {"macro_step": 2e-3, "scheme": "hermite", "degree": 2}
+    rows = orders(with_changes(load_scene("soft"), time={"t_end": 0.07}, coupling=coupling))
+    last = {row.quantity: row.orders[1] for row in rows}
+    assert last["y"] == pytest.approx(6.0, abs=0.5)
+    assert last["z"] == pytest.approx(6.0, abs=0.4)
+    assert last["contact_force"] == pytest.approx(4.0, abs=0.4)
+
+
+def test_the_paper_law_agrees_with_algorithm_1():
+    law = {"law": "paper", "impact": "rest"}
+    report = crosscheck(with_changes(load_scene("paper-fig2"), time={"t_end": 1.0}, contact=law, beam={"n_elements": 100}))
+    assert report.passed, report.rows
+
+
+def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
+    picture = tmp_path / "both.png"
+    arguments = ["crosscheck", "duffing", "--set", "time.t_end=1", "--out", str(picture)]
+    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert picture.stat().st_size > 10_000
+    right = module.event_driven.simulate
+    monkeypatch.setattr(
+        module.event_driven,
+        "simulate",
+        lambda scene, **options: right(with_changes(scene, spring={"mass": 1.01}), **options),
+    )
+    assert CliRunner().invoke(app, arguments).exit_code == 1
