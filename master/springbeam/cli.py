@@ -215,6 +215,19 @@ def crosscheck(
         raise typer.Exit(DISAGREES)
 
 
+@app.command()
+def verify() -> None:
+    """Check the FMUs against exact solutions. Exit code 1 if one is missed."""
+    from .verify import report
+
+    try:
+        passed = report(Console(highlight=False))
+    except FmuError as error:
+        _fail(BAD_INPUT, str(error))
+    if not passed:
+        raise typer.Exit(DISAGREES)
+
+
 def _error_table(report: Report) -> Table:
     table = Table("quantity", box=None, pad_edge=False, header_style="bold")
     for name in ("max error", "at t [s]", "L2 error", "bound", ""):
