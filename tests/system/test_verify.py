@@ -1,0 +1,181 @@
+"""`springbeam verify`: every exact solution is met, and a wrong parameter is found out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from rich.console import Console
+from scipy.integrate import quad
+from scipy.linalg import eigh
+from scipy.special import airy
+from typer.testing import CliRunner
+
+from springbeam import simulation, verify
+from springbeam.cli import app
+from springbeam.fmu import FmuBeam, FmuSpring
+from springbeam.subsystem import StepRefused
+from springbeam.verify import Check
+
+
+@pytest.fixture(scope="module")
+def printed() -> str:
+    result = CliRunner().invoke(app, ["verify"], env={"COLUMNS": "80"})
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_every_exact_solution_is_met(printed: str):
+    assert " 0 failed" in printed
+    assert "FAIL" not in printed
+    assert printed.count(" pass ") >= 70
+
+
+def test_the_table_shows_all_sections_and_fits_80_columns(printed: str):
+    for title, _ in verify.SECTIONS:
+        assert title in printed
+    assert all(name in printed for name in ("quantity", "exact", "computed", "error", "bound"))
+    assert max(len(line) for line in printed.splitlines()) <= 80
+    assert "…" not in printed.replace("… one step late", "").replace("… Gauss–Seidel", "")  # nothing cut off
+
+
+def test_what_is_not_judged_says_why(printed: str):
+    assert "not representable" in printed
+    assert "not judged" in printed
+
+
+# -- a wrong parameter fails ----------------------------------------------------------------------------------------
+
+
+def changed(body: type, key: str, factor: float) -> Callable[[pytest.MonkeyPatch], None]:
+    """The body gets ``key`` times ``factor`` instead of what it was asked to have."""
+    right = body.__init__
+
+    def wrong(self, parameters, *rest):
+        right(self, parameters.model_copy(update={key: factor * getattr(parameters, key)}), *rest)
+
+    def mistake(patch: pytest.MonkeyPatch) -> None:
+        patch.setattr(body, "__init__", wrong)
+
+    mistake.__name__ = f"{key}-{factor}"
+    return mistake
+
+
+def force_off(patch: pytest.MonkeyPatch) -> None:
+    """The beam gets 1.01 C."""
+    right = FmuBeam.advance
+    patch.setattr(
+        FmuBeam, "advance", lambda self, t, size, c, *rest: right(self, t, size, (1.01 * c[0], *c[1:]), *rest)
+    )
+
+
+def gap_left_open(patch: pytest.MonkeyPatch) -> None:
+    """The scheme's conditions are met 1e-4 H late."""
+    right = simulation.conditions
+
+    def wrong(scheme, degree):
+        conditions = right(scheme, degree)
+        return lambda m, size: tuple(r + 1e-4 * size * m.velocity for r in conditions(m, size))
+
+    patch.setattr(simulation, "conditions", wrong)
+
+
+@pytest.mark.parametrize(
+    ("section", "mistake"),
+    [
+        (verify.static_deflection, changed(FmuBeam, "young_modulus", 1.01)),
+        (verify.static_deflection, changed(FmuBeam, "shear_modulus", 1.01)),
+        (verify.frequencies, changed(FmuBeam, "density", 1.01)),
+        (verify.frequencies, changed(FmuBeam, "second_moment_of_area", 0.99)),
+        (verify.mesh_convergence, changed(FmuBeam, "density", 1.01)),
+        (verify.beam_energy, force_off),
+        (verify.duffing, changed(FmuSpring, "mass", 1.01)),
+        (verify.duffing, changed(FmuSpring, "cubic_stiffness", 1.01)),
+        (verify.escape, changed(FmuSpring, "cubic_stiffness", 1.01)),
+        (verify.bar_impact, changed(FmuBeam, "density", 1.01)),
+        (verify.two_masses, changed(FmuSpring, "linear_stiffness", 1.01)),
+        (verify.added_mass, changed(FmuSpring, "mass", 1.01)),
+        (verify.added_mass, changed(FmuBeam, "density", 1.01)),
+        (verify.energy_scheme, gap_left_open),
+    ],
+    ids=lambda function: function.__name__,
+)
+def test_a_mistake_of_one_percent_fails(section, mistake, monkeypatch: pytest.MonkeyPatch):
+    mistake(monkeypatch)
+    verdicts = [check.passed for check in section()]
+    assert False in verdicts
+
+
+def test_a_failed_check_is_exit_code_1(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(verify, "SECTIONS", (("Beam", verify.mesh_convergence),))
+    changed(FmuBeam, "density", 1.01)(monkeypatch)
+    result = CliRunner().invoke(app, ["verify"])
+    assert result.exit_code == 1
+    assert "FAIL" in result.output
+
+
+def test_missing_fmus_are_bad_input(tmp_path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
+    result = CliRunner().invoke(app, ["verify"])
+    assert result.exit_code == 2
+    assert str(tmp_path / "beam.fmu") in result.output
+
+
+def test_what_cannot_be_computed_fails_with_its_cause(monkeypatch: pytest.MonkeyPatch):
+    def refused() -> list[Check]:
+        raise StepRefused("spring: too stiff")
+
+    monkeypatch.setattr(verify, "SECTIONS", (("Spring", refused),))
+    console = Console(record=True, width=80)
+    assert not verify.report(console)
+    assert "spring: too stiff" in console.export_text()
+
+
+# -- the exact values themselves ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("check", "passed"),
+    [
+        (Check("", 1.0, 1.1, 0.2, ""), True),
+        (Check("", 1.0, 0.7, 0.2, ""), False),
+        (Check("", 1.0, float("nan"), 0.2, ""), False),
+        (Check("", 1.0, None, 0.2, ""), False),
+        (Check("", 1.0, 5.0, None, ""), None),
+    ],
+)
+def test_a_check_passes_within_its_bound_only(check: Check, passed: bool | None):
+    assert check.passed is passed
+
+
+def p1_frequencies(n: int) -> np.ndarray:
+    """The lowest six of P1 elements, EI = KAG = ρA = ρI = L = 1, in the unknowns (θ, u) of each node."""
+    h = 1.0 / n
+    gradient, mean = np.array([-1.0, 1.0]) / h, np.array([[2.0, 1.0], [1.0, 2.0]]) * h / 6.0
+    M, K = np.zeros((2, 2 * n + 2, 2 * n + 2))
+    for e in range(n):
+        theta, u = [2 * e, 2 * e + 2], [2 * e + 1, 2 * e + 3]
+        for field in (theta, u):
+            M[np.ix_(field, field)] += mean
+            K[np.ix_(field, field)] += h * np.outer(gradient, gradient)
+        K[np.ix_(theta, theta)] += mean
+        cross = -0.5 * h * np.outer(gradient, np.ones(2))
+        K[np.ix_(u, theta)] += cross
+        K[np.ix_(theta, u)] += cross.T
+    return np.sqrt(eigh(K[2:, 2:], M[2:, 2:], eigvals_only=True, subset_by_index=[0, 5]))
+
+
+def test_frequencies_of_the_transfer_matrix_are_the_limit_of_the_mesh():
+    """And its leading error is the predicted one: extrapolation leaves O((kh)⁴), 0.05⁴ relative at n = 160."""
+    w, coarse, fine = np.array(verify.clamped_free_frequencies()), p1_frequencies(80), p1_frequencies(160)
+    assert (4.0 * fine - coarse) / 3.0 == pytest.approx(w, rel=(8.4 / 80.0) ** 4)
+    predicted = np.array([verify._mesh_error(x) for x in w]) / 160**2
+    assert fine - w == pytest.approx(predicted, rel=(8.4 / 160.0) ** 2)
+
+
+def test_the_overshoot_of_a_dispersed_step_is_the_integral_of_airy():
+    """The integral from the first zero on: Ai is negative below it. `itairy` is good for single precision, 1e-7."""
+    first_zero = -2.338107410459767
+    value, _ = quad(lambda x: airy(x)[0], first_zero, 20.0, epsabs=1e-12)
+    assert verify._airy_overshoot() == pytest.approx(value, abs=1e-7)
