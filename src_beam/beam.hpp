@@ -13,19 +13,19 @@ enum class Integrator { modal = 1, generalized_alpha = 2 };
 
 /// All in SI units; defaults are the unit beam of the paper's section 3.
 struct Parameters {
-  double density = 1.0;                 ///< ρ [kg/m³]
-  double area = 1.0;                    ///< A [m²]
-  double second_moment_of_area = 1.0;   ///< I [m⁴]
-  double young_modulus = 1.0;           ///< E [Pa]
-  double shear_modulus = 1.0;           ///< G [Pa]
-  double shear_coefficient = 1.0;       ///< K [–]
-  double length = 1.0;                  ///< L [m]
-  double alpha_b = 0.0;                 ///< Kelvin–Voigt retardation time [s]
-  int n_elements = 50;                  ///< uniform P1 elements
-  int n_modes = 0;                      ///< lowest modes kept by `modal`; 0 = all
-  bool reduced_integration = false;     ///< one-point shear; false = full integration (59)
+  double density = 1.0;                ///< ρ [kg/m³]
+  double area = 1.0;                   ///< A [m²]
+  double second_moment_of_area = 1.0;  ///< I [m⁴]
+  double young_modulus = 1.0;          ///< E [Pa]
+  double shear_modulus = 1.0;          ///< G [Pa]
+  double shear_coefficient = 1.0;      ///< K [–]
+  double length = 1.0;                 ///< L [m]
+  double alpha_b = 0.0;                ///< Kelvin–Voigt retardation time [s]
+  int n_elements = 50;                 ///< uniform P1 elements
+  int n_modes = 0;                     ///< lowest modes kept by `modal`; 0 = all
+  bool reduced_integration = false;    ///< one-point shear; false = full integration (59)
   Integrator integrator = Integrator::modal;
-  double rho_inf = 1.0;                 ///< spectral radius at infinity of generalized-α; 1 = midpoint rule (62)
+  double rho_inf = 1.0;                   ///< spectral radius at infinity of generalized-α; 1 = midpoint rule (62)
   double initial_deflection_slope = 0.0;  ///< s in u⁰ = s·x [–]
   double initial_velocity_slope = 0.0;    ///< s in u_t⁰ = s·x [1/s]
   double tip_load_coefficient = 0.0;      ///< coefficient of the last hat function in f_b [N/m]

@@ -19,7 +19,8 @@ using Factorisation = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::
 
 /// S = mass M + stiffness K of one step size, factorised.
 struct StepMatrix {
-  double mass, stiffness;
+  double mass = 0.0, stiffness = 0.0;
+  Eigen::SparseMatrix<double> matrix;
   Factorisation factorisation;
 };
 
@@ -34,8 +35,8 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
         alpha_f_(p.rho_inf / (p.rho_inf + 1.0)),
         beta_(0.25 * (1.0 - alpha_m_ + alpha_f_) * (1.0 - alpha_m_ + alpha_f_)),
         gamma_(0.5 - alpha_m_ + alpha_f_),
-        M_(mesh_.mass()),
         K_(mesh_.stiffness()),
+        M_(mesh_.mass() + 0.0 * K_),
         uniform_load_(mesh_.uniform_load() / mu_),
         hat_load_(p.tip_load_coefficient / mu_ * mesh_.hat_load()),
         tip_response_(mesh_.mass_solve(mesh_.unit_tip_force()) / mu_),
@@ -51,7 +52,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   }
 
   void step(double size, const TipForce& c, double distributed_load) override {
-    const StepMatrix& S = *cache_.get(size, [this](double h) { return factorise(h); });
+    const StepMatrix& S = cache_.get(size, [this](double h, StepMatrix& matrix) { factorise(h, matrix); });
     if (midpoint_) {
       midpoint_step(S, size, c, distributed_load);
     } else {
@@ -84,9 +85,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   double load_potential() const override { return -mu_ * load_.dot(q_); }
   double tip_mass() const override { return 1.0 / tip_response_[mesh_.tip_index()]; }
   double static_tip_compliance() const override { return compliance_; }
-  void deflection(std::array<double, shape_points>& u) const override {
-    mesh_.sample_deflection(q_.data(), u.data());
-  }
+  void deflection(std::array<double, shape_points>& u) const override { mesh_.sample_deflection(q_.data(), u.data()); }
   void rotation(std::array<double, shape_points>& theta) const override {
     mesh_.sample_scaled_rotation(q_.data(), theta.data());
     for (double& value : theta) value /= mesh_.radius_of_gyration();
@@ -219,16 +218,19 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     return force;
   }
 
-  std::unique_ptr<StepMatrix> factorise(double h) const {
+  void factorise(double h, StepMatrix& S) const {
     const double f = 1.0 - alpha_f_;
-    auto S = std::make_unique<StepMatrix>();
-    S->mass = midpoint_ ? 1.0 : 1.0 - alpha_m_;
-    S->stiffness = midpoint_ ? 0.25 * h * h + 0.5 * alpha_ * h : f * (alpha_ * gamma_ * h + beta_ * h * h);
-    S->factorisation.compute(Eigen::SparseMatrix<double>(S->mass * M_ + S->stiffness * K_));
-    if (S->factorisation.info() != Eigen::Success) {
+    S.mass = midpoint_ ? 1.0 : 1.0 - alpha_m_;
+    S.stiffness = midpoint_ ? 0.25 * h * h + 0.5 * alpha_ * h : f * (alpha_ * gamma_ * h + beta_ * h * h);
+    if (S.matrix.size() == 0) {
+      S.matrix = K_;
+      S.factorisation.analyzePattern(K_);
+    }
+    S.matrix.coeffs() = S.mass * M_.coeffs() + S.stiffness * K_.coeffs();
+    S.factorisation.factorize(S.matrix);
+    if (S.factorisation.info() != Eigen::Success) {
       throw std::domain_error("beam: the matrix of the time step cannot be factorised; use a smaller step size");
     }
-    return S;
   }
 
   Timoshenko mesh_;
@@ -236,7 +238,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   double alpha_;  // α_b [s]
   bool midpoint_;
   double alpha_m_, alpha_f_, beta_, gamma_;
-  Eigen::SparseMatrix<double> M_, K_;
+  Eigen::SparseMatrix<double> K_, M_;  // with the same pattern, that of K
   VectorXd uniform_load_, hat_load_;
   VectorXd tip_response_;  // M⁻¹e/ρA [1/kg], the velocity that a unit impulse leaves
   double compliance_;
@@ -252,7 +254,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   bool started_ = false;
 
   VectorXd rhs_, w_, work_, work2_;  // work space
-  StepCache<std::unique_ptr<StepMatrix>> cache_;
+  StepCache<StepMatrix> cache_;
 };
 
 }  // namespace

@@ -55,30 +55,31 @@ class BeamIntegrator {
 template <typename Value>
 class StepCache {
  public:
-  /// The value of `size`, by `make(size)` if it is not there. Valid until the next call.
+  /// The value of `size`; if it is not there, of the size not used for longest, made over by `make(size, value)`.
+  /// Valid until the next call.
   template <typename Make>
   const Value& get(double size, const Make& make) {
     ++clock_;
     Entry* oldest = &entries_[0];
     for (Entry& entry : entries_) {
-      if (entry.value && entry.size == size) {
+      if (entry.size == size) {
         entry.used = clock_;
-        return *entry.value;
+        return entry.value;
       }
       if (entry.used < oldest->used) oldest = &entry;
     }
-    oldest->value.reset();  // so that a throwing make() leaves no wrong entry
-    oldest->value = std::make_unique<Value>(make(size));
+    oldest->size = 0.0;  // no step size: a throwing make() must not leave a wrong entry
+    make(size, oldest->value);
     oldest->size = size;
     oldest->used = clock_;
-    return *oldest->value;
+    return oldest->value;
   }
 
  private:
   struct Entry {
     double size = 0.0;
     std::size_t used = 0;
-    std::unique_ptr<Value> value;
+    Value value;
   };
   std::array<Entry, 4> entries_;
   std::size_t clock_ = 0;

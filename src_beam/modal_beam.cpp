@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -18,13 +19,16 @@ using Eigen::Index;
 struct Coefficients {
   ArrayXd sign, kick, drift, reflection;  // undamped; reflection = (1 − sign)/ω²
   ArrayXd one_minus_decay, G0, G1;        // damped; 1 − ġ = ω²G₁ + cG₀
-  ArrayXd phi_G1, phi_G2, phi_G3;   // response of v, of v and η, of η to c₁ and c₂
+  ArrayXd phi_G1, phi_G2, phi_G3;         // response of v, of v and η, of η to c₁ and c₂
   // ∫u and ∫∫u: from η₀ and v₀ per mode, from c₀, c₁, c₂, f_b and the hat load in sum.
   ArrayXd integral_eta, integral_v, integral2_eta, integral2_v;
   std::array<double, 5> integral_input, integral2_input;
-  // c∫η̇²: from v₀², v₀r, r², and with c₁, c₂; from c₁², c₁c₂, c₂² in sum.
-  ArrayXd loss_vv, loss_vr, loss_rr, loss_v1, loss_v2, loss_r1, loss_r2;
-  std::array<double, 3> loss_input;
+};
+
+/// c∫η̇² summed over the modes: from v₀², v₀r, r², and with c₁, c₂; from c₁², c₁c₂, c₂² in sum.
+struct Dissipation {
+  ArrayXd vv, vr, rr, v1, v2, r1, r2;
+  std::array<double, 3> input;
 };
 
 class ModalBeam final : public BeamIntegrator {
@@ -50,7 +54,9 @@ class ModalBeam final : public BeamIntegrator {
   }
 
   void step(double size, const TipForce& c, double distributed_load) override {
-    const Coefficients& k = cache_.get(size, [this](double h) { return make_coefficients(h); });
+    add_loss();
+    const Coefficients& k =
+        coefficients_.get(size, [this](double h, Coefficients& value) { make_coefficients(h, value); });
     const double previous_load = distributed_load_;
     if (distributed_load != previous_load) set_distributed_load(distributed_load);
 
@@ -77,18 +83,11 @@ class ModalBeam final : public BeamIntegrator {
       integral += k.integral_input[i] * input[i];
       integral_2 += k.integral2_input[i] * input[i];
     }
-    double loss = 0.0;
-    if (damped_) {
-      loss = (v_ * (k.loss_vv * v_ + k.loss_vr * r_ + c[1] * k.loss_v1 + c[2] * k.loss_v2) +
-              r_ * (k.loss_rr * r_ + c[1] * k.loss_r1 + c[2] * k.loss_r2))
-                 .sum() +
-             (c[1] * (c[1] * k.loss_input[0] + c[2] * k.loss_input[1]) + c[2] * c[2] * k.loss_input[2]);
-    }
 
     const double displacement = (tip_ * eta_next_).sum();
     const double velocity = (tip_ * v_next_).sum();
     if (!std::isfinite(displacement) || !std::isfinite(velocity) || !std::isfinite(integral) ||
-        !std::isfinite(integral_2) || !std::isfinite(dissipated_ + loss)) {
+        !std::isfinite(integral_2)) {
       set_distributed_load(previous_load);
       throw_not_finite(size, c, distributed_load);
     }
@@ -98,11 +97,12 @@ class ModalBeam final : public BeamIntegrator {
     velocity_ = velocity;
     integral_ = integral;
     integral_2_ = integral_2;
-    dissipated_ += loss;
     end_force_ = force_at(c, size);
+    if (damped_) loss_step_ = {size, c[1], c[2]};
   }
 
   void apply_tip_impulse(double impulse) override {
+    add_loss();
     v_next_ = v_ + impulse * tip_;
     const double velocity = (tip_ * v_next_).sum();
     if (!std::isfinite(velocity)) throw_not_finite(0.0, {impulse, 0.0, 0.0}, distributed_load_);
@@ -125,7 +125,10 @@ class ModalBeam final : public BeamIntegrator {
   double tip_displacement_integral_2() const override { return integral_2_; }
   double kinetic_energy() const override { return 0.5 * v_.square().sum(); }
   double strain_energy() const override { return 0.5 * (modes_.omega.array() * eta_).square().sum(); }
-  double dissipated_energy() const override { return dissipated_; }
+  double dissipated_energy() const override {
+    add_loss();
+    return dissipated_;
+  }
   double load_potential() const override { return -(load_ * eta_).sum(); }
   double tip_mass() const override { return 1.0 / inverse_tip_mass_; }
   double static_tip_compliance() const override { return compliance_; }
@@ -136,10 +139,13 @@ class ModalBeam final : public BeamIntegrator {
     Eigen::Map<Eigen::VectorXd>(theta.data(), shape_points).noalias() = modes_.rotation * eta_.matrix();
   }
   std::vector<double> frequencies() const override {
-    return std::vector<double>(modes_.omega.data(), modes_.omega.data() + modes_.omega.size());
+    std::vector<double> omega(modes_.omega.data(), modes_.omega.data() + modes_.omega.size());
+    std::sort(omega.begin(), omega.end());
+    return omega;
   }
 
   void save(std::vector<double>& state) const override {
+    add_loss();
     const auto m = static_cast<std::size_t>(eta_.size());
     state.resize(2 * m + 5);
     Eigen::Map<ArrayXd>(state.data(), eta_.size()) = eta_;
@@ -153,6 +159,7 @@ class ModalBeam final : public BeamIntegrator {
   }
 
   void restore(const std::vector<double>& state) override {
+    loss_step_.size = 0.0;
     const auto m = static_cast<std::size_t>(eta_.size());
     eta_ = Eigen::Map<const ArrayXd>(state.data(), eta_.size());
     v_ = Eigen::Map<const ArrayXd>(state.data() + m, eta_.size());
@@ -166,20 +173,16 @@ class ModalBeam final : public BeamIntegrator {
   }
 
  private:
-  Coefficients make_coefficients(double h) const {
+  void make_coefficients(double h, Coefficients& k) const {
     const Index m = eta_.size();
-    Coefficients k;
-    for (ArrayXd* array : {&k.phi_G1, &k.phi_G2, &k.phi_G3, &k.integral_eta,
-                           &k.integral_v, &k.integral2_eta, &k.integral2_v}) {
+    for (ArrayXd* array :
+         {&k.phi_G1, &k.phi_G2, &k.phi_G3, &k.integral_eta, &k.integral_v, &k.integral2_eta, &k.integral2_v}) {
       array->resize(m);
     }
     k.integral_input.fill(0.0);
     k.integral2_input.fill(0.0);
-    k.loss_input.fill(0.0);
     if (damped_) {
-      for (ArrayXd* array : {&k.one_minus_decay, &k.G0, &k.G1, &k.loss_vv, &k.loss_vr, &k.loss_rr, &k.loss_v1, &k.loss_v2, &k.loss_r1, &k.loss_r2}) {
-        array->resize(m);
-      }
+      for (ArrayXd* array : {&k.one_minus_decay, &k.G0, &k.G1}) array->resize(m);
     } else {
       for (ArrayXd* array : {&k.sign, &k.kick, &k.drift, &k.reflection}) array->resize(m);
     }
@@ -207,17 +210,6 @@ class ModalBeam final : public BeamIntegrator {
         k.one_minus_decay[i] = omega2_[i] * G[1] + c * G[0];
         k.G0[i] = G[0];
         k.G1[i] = G[1];
-        const std::array<double, 10> Q = oscillator_dissipation(modes_.omega[i], c, h);
-        k.loss_vv[i] = Q[0];
-        k.loss_vr[i] = 2.0 * Q[1];
-        k.loss_v1[i] = 2.0 * phi * Q[2];
-        k.loss_v2[i] = 2.0 * phi * Q[3];
-        k.loss_rr[i] = Q[4];
-        k.loss_r1[i] = 2.0 * phi * Q[5];
-        k.loss_r2[i] = 2.0 * phi * Q[6];
-        k.loss_input[0] += phi * phi * Q[7];
-        k.loss_input[1] += 2.0 * phi * phi * Q[8];
-        k.loss_input[2] += phi * phi * Q[9];
       } else {
         const UndampedStep undamped = undamped_step(modes_.omega[i], h);
         k.sign[i] = undamped.sign;
@@ -226,7 +218,40 @@ class ModalBeam final : public BeamIntegrator {
         k.reflection[i] = (1.0 - undamped.sign) / omega2_[i];
       }
     }
-    return k;
+  }
+
+  void make_dissipation(double h, Dissipation& k) const {
+    const Index m = eta_.size();
+    for (ArrayXd* array : {&k.vv, &k.vr, &k.rr, &k.v1, &k.v2, &k.r1, &k.r2}) array->resize(m);
+    k.input.fill(0.0);
+    for (Index i = 0; i < m; ++i) {
+      const double phi = tip_[i];
+      const std::array<double, 10> Q = oscillator_dissipation(modes_.omega[i], damping_[i], h);
+      k.vv[i] = Q[0];
+      k.vr[i] = 2.0 * Q[1];
+      k.v1[i] = 2.0 * phi * Q[2];
+      k.v2[i] = 2.0 * phi * Q[3];
+      k.rr[i] = Q[4];
+      k.r1[i] = 2.0 * phi * Q[5];
+      k.r2[i] = 2.0 * phi * Q[6];
+      k.input[0] += phi * phi * Q[7];
+      k.input[1] += 2.0 * phi * phi * Q[8];
+      k.input[2] += phi * phi * Q[9];
+    }
+  }
+
+  /// Adds the loss of the last step, which is due only when it is asked for or its work space is needed again: a step
+  /// that is tried and taken back, as event location does with ever new sizes, never pays for it.
+  void add_loss() const {
+    if (loss_step_.size == 0.0) return;
+    const Dissipation& k =
+        dissipation_.get(loss_step_.size, [this](double h, Dissipation& value) { make_dissipation(h, value); });
+    const ArrayXd& v = v_next_;  // before the step
+    const double c1 = loss_step_.c1, c2 = loss_step_.c2;
+    dissipated_ +=
+        (v * (k.vv * v + k.vr * r_ + c1 * k.v1 + c2 * k.v2) + r_ * (k.rr * r_ + c1 * k.r1 + c2 * k.r2)).sum() +
+        (c1 * (c1 * k.input[0] + c2 * k.input[1]) + c2 * c2 * k.input[2]);
+    loss_step_.size = 0.0;
   }
 
   void update_tip() {
@@ -235,25 +260,30 @@ class ModalBeam final : public BeamIntegrator {
   }
 
   Modes modes_;
-  ArrayXd tip_;        // φ(L) [1/√kg]
-  ArrayXd omega2_;     // ω² [1/s²]
-  ArrayXd damping_;    // α_b ω² [1/s]
+  ArrayXd tip_;      // φ(L) [1/√kg]
+  ArrayXd omega2_;   // ω² [1/s²]
+  ArrayXd damping_;  // α_b ω² [1/s]
   bool damped_;
-  ArrayXd hat_load_;   // modal force of the hat load [N/√kg]
+  ArrayXd hat_load_;  // modal force of the hat load [N/√kg]
   double hat_coefficient_;
   double inverse_tip_mass_;
   double compliance_;
 
-  ArrayXd eta_, v_;    // state: modal displacement [m √kg] and velocity
-  ArrayXd load_;       // modal force of f_b and the hat load [N/√kg]
+  ArrayXd eta_, v_;  // state: modal displacement [m √kg] and velocity
+  ArrayXd load_;     // modal force of f_b and the hat load [N/√kg]
   double distributed_load_ = 0.0;
   double end_force_ = 0.0;  // C at the end of the last step
   double displacement_ = 0.0, velocity_ = 0.0;
   double integral_ = 0.0, integral_2_ = 0.0;
-  double dissipated_ = 0.0;
+  mutable double dissipated_ = 0.0;
 
-  ArrayXd eta_next_, v_next_, force_, r_;  // work space
-  StepCache<Coefficients> cache_;
+  ArrayXd eta_next_, v_next_, force_, r_;  // work space; after a step v_next_ and r_ are those of its start
+  struct LossStep {
+    double size, c1, c2;
+  };
+  mutable LossStep loss_step_ = {0.0, 0.0, 0.0};  // the step whose loss is not in dissipated_ yet; size 0: none
+  StepCache<Coefficients> coefficients_;
+  mutable StepCache<Dissipation> dissipation_;
 };
 
 }  // namespace

@@ -58,11 +58,11 @@ Double2 times(const Double2& a, double b) {
 
 // Roots of μ² + dμ + x² = 0 as −d/2 ± iw (complex) or −d/2 ± w (real).
 struct Roots {
-  double x, d;    // ωt, ct
-  Double2 w;      // |√(x² − d²/4)|
+  double x, d;  // ωt, ct
+  Double2 w;    // |√(x² − d²/4)|
   bool complex;
-  double slow;    // |μ₊|, the smaller modulus
-  double fast;    // |μ₋|
+  double slow;  // |μ₊|, the smaller modulus
+  double fast;  // |μ₋|
 };
 
 Roots roots(double omega, double c, double t) {

@@ -1,9 +1,9 @@
 #include "modes.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <Spectra/SymGEigsShiftSolver.h>
 #include <Spectra/Util/Version.h>
+#include <Eigen/Cholesky>
+#include <Eigen/SVD>
 
 #include <algorithm>
 #include <cmath>
@@ -120,7 +120,7 @@ MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
   Mass mass(mesh);
   const Index subspace = std::min(mesh.size(), std::max(2 * count, count + 20));
   Spectra::SymGEigsShiftSolver<Flexibility, Mass, Spectra::GEigsMode::ShiftInvert> solver(flexibility, mass, count,
-                                                                                           subspace, 0.0);
+                                                                                          subspace, 0.0);
   solver.init();  // a fixed pseudo-random start
   const Index converged = solver.compute(Spectra::SortRule::LargestMagn, 300, 1e-12, Spectra::SortRule::SmallestAlge);
   if (converged < count) {
@@ -242,7 +242,17 @@ Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
   }
 
   MatrixXd W;
-  modes.omega = rayleigh_ritz(mesh, basis, W);
+  if (count < size) {
+    modes.omega = rayleigh_ritz(mesh, basis, W);
+  } else {
+    // Nothing was added. The Rayleigh quotient is a quotient of sums of squares and errs by the square of the mode's
+    // error only, the singular value by ε ω_max.
+    W = MatrixXd::Identity(size, size);
+    modes.omega.resize(size);
+    for (Index k = 0; k < size; ++k) {
+      modes.omega[k] = std::sqrt(mesh.stiffness_norm2(basis.col(k)) / mesh.mass_norm2(basis.col(k)));
+    }
+  }
 
   // Only rows of Φ = Z W that are ever asked for are formed; from θ̃ to θ, and from M = ∫ to ρA ∫.
   const double norm = 1.0 / std::sqrt(mesh.mass_per_length());

@@ -26,10 +26,10 @@ class Timoshenko {
   /// @pre validate(parameters) passed
   explicit Timoshenko(const Parameters& parameters);
 
-  Eigen::Index size() const { return 2 * n_; }          ///< number of unknowns
-  Eigen::Index elements() const { return n_; }          ///< n
-  double mass_per_length() const { return mu_; }        ///< ρA [kg/m]
-  double radius_of_gyration() const { return r_; }      ///< r = √(I/A) [m]
+  Eigen::Index size() const { return 2 * n_; }                    ///< number of unknowns
+  Eigen::Index elements() const { return n_; }                    ///< n
+  double mass_per_length() const { return mu_; }                  ///< ρA [kg/m]
+  double radius_of_gyration() const { return r_; }                ///< r = √(I/A) [m]
   Eigen::Index tip_index() const { return 2 * n_ - 1; }           ///< of u(L) in q
   Eigen::Index tip_rotation_index() const { return 2 * n_ - 2; }  ///< of θ̃(L) in q
 

@@ -99,8 +99,8 @@ double amplitude(int k, double x, double d) {
 
 double magnitude(Quad value) { return std::fabs(static_cast<double>(value)); }
 
-const std::vector<double> damping_ratios = {0.0,  1e-9, 1e-4, 0.03, 0.3, 0.7,        0.9,  0.999, 1.0 - 1e-9, 1.0, 1.0 + 1e-9,
-                                            1.001, 1.05, 1.3,  2.0,  2.4, 2.6,        4.0,  30.0,  1e3,        1e6};
+const std::vector<double> damping_ratios = {0.0,   1e-9, 1e-4, 0.03, 0.3, 0.7, 0.9, 0.999, 1.0 - 1e-9, 1.0, 1.0 + 1e-9,
+                                            1.001, 1.05, 1.3,  2.0,  2.4, 2.6, 4.0, 30.0,  1e3,        1e6};
 
 TEST(BeamOscillator, IsExactToRoundingForAllFrequenciesAndDampings) {
   // 1e-13 relative to the natural scale of each function: the bound that the header promises.
@@ -123,7 +123,8 @@ TEST(BeamOscillator, IsExactToRoundingForAllFrequenciesAndDampings) {
           const double error = magnitude(Quad(computed) - value) / scale;
           if (!(error <= worst)) {
             worst = error;
-            where = "k = " + std::to_string(k) + ", ωt = " + std::to_string(omega * t) + ", ζ = " + std::to_string(zeta);
+            where =
+                "k = " + std::to_string(k) + ", ωt = " + std::to_string(omega * t) + ", ζ = " + std::to_string(zeta);
           }
         }
         power *= t;
@@ -215,7 +216,8 @@ TEST(BeamOscillator, DissipationEqualsTheQuadratureOfTheDampingForce) {
         sum += (i == intervals ? 1.0 : i % 2 == 1 ? 4.0 : 2.0) * v * v;
       }
       const double quadrature = c * sum * t / intervals / 3.0;
-      const double computed = form(beam::oscillator_dissipation(omega, c, t), {v0, f[0] - omega * omega * eta0, f[1], f[2]});
+      const double computed =
+          form(beam::oscillator_dissipation(omega, c, t), {v0, f[0] - omega * omega * eta0, f[1], f[2]});
       EXPECT_NEAR(computed, quadrature, 2e-7 * quadrature) << "ζ = " << zeta << ", ωt = " << x;
     }
   }

@@ -33,7 +33,8 @@ std::vector<Parameters> variants() {
     all.push_back(p);
     p.n_modes = 4;
     all.push_back(p);
-    for (const double rho_inf : {1.0, 0.7, 0.0}) all.push_back(with_integrator(p, Integrator::generalized_alpha, rho_inf));
+    for (const double rho_inf : {1.0, 0.7, 0.0})
+      all.push_back(with_integrator(p, Integrator::generalized_alpha, rho_inf));
   }
   return all;
 }
@@ -42,10 +43,11 @@ TEST(BeamState, AnImpulseMovesTheTipMassOnly) {
   for (const Parameters& p : variants()) {
     Beam b(p);
     b.step(0.01, {0.3, 0.0, 0.0}, 0.1);
-    const double v = b.tip_velocity(), u = b.tip_displacement(), before = mechanical_energy(b), strain = b.strain_energy();
+    const double v = b.tip_velocity(), u = b.tip_displacement(), before = mechanical_energy(b),
+                 strain = b.strain_energy();
     const double J = 0.37;
     b.apply_tip_impulse(J);
-    EXPECT_NEAR(b.tip_velocity() - v, J / b.tip_mass(), 1e-12 * J / b.tip_mass());  // momentum
+    EXPECT_NEAR(b.tip_velocity() - v, J / b.tip_mass(), 1e-12 * J / b.tip_mass());                 // momentum
     EXPECT_NEAR(mechanical_energy(b) - before, 0.5 * J * (v + b.tip_velocity()), 1e-12 * before);  // its work
     EXPECT_EQ(b.tip_displacement(), u);
     EXPECT_EQ(b.strain_energy(), strain);
@@ -140,7 +142,8 @@ TEST(BeamState, InputsThatAreNotFiniteAreRefused) {
   const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
   Beam b(general_beam(5));
   const std::vector<double> before = outputs(b);
-  for (const double size : {0.0, -0.1, nan, inf}) EXPECT_THROW(b.step(size, {0.0, 0.0, 0.0}, 0.0), std::invalid_argument);
+  for (const double size : {0.0, -0.1, nan, inf})
+    EXPECT_THROW(b.step(size, {0.0, 0.0, 0.0}, 0.0), std::invalid_argument);
   EXPECT_THROW(b.step(0.1, {nan, 0.0, 0.0}, 0.0), std::invalid_argument);
   EXPECT_THROW(b.step(0.1, {0.0, 0.0, inf}, 0.0), std::invalid_argument);
   EXPECT_THROW(b.step(0.1, {0.0, 0.0, 0.0}, nan), std::invalid_argument);
@@ -172,7 +175,8 @@ TEST(BeamState, ParametersAreChecked) {
       {[](Parameters& p) { p.n_elements = 501; }, {"n_modes", "= 0 ", "generalized_alpha", "fewer n_modes"}},
       {[](Parameters& p) { p.n_elements = 501, p.n_modes = 502; }, {"n_modes", "= 502 ", "501"}},
       {[](Parameters& p) { p.integrator = static_cast<Integrator>(3); }, {"integrator", "= 3 ", "modal"}},
-      {[](Parameters& p) { p.integrator = Integrator::generalized_alpha, p.rho_inf = 1.1; }, {"rho_inf", "between 0 and 1"}},
+      {[](Parameters& p) { p.integrator = Integrator::generalized_alpha, p.rho_inf = 1.1; },
+       {"rho_inf", "between 0 and 1"}},
       {[&](Parameters& p) { p.initial_deflection_slope = nan; }, {"initial_deflection_slope"}},
       {[&](Parameters& p) { p.initial_velocity_slope = nan; }, {"initial_velocity_slope"}},
       {[&](Parameters& p) { p.tip_load_coefficient = nan; }, {"tip_load_coefficient"}},

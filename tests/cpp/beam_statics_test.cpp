@@ -53,8 +53,9 @@ TEST(BeamStatics, TipComplianceIsThatOfTheMeshForAnyNumberOfModes) {
     for (const int n_modes : {1, 2, 7, 30, 0}) {
       if (n_modes > 2 * p.n_elements) continue;
       p.n_modes = n_modes;
-      // Rounding, of sums over the mesh and over the modes.
-      EXPECT_NEAR(Beam(p).static_tip_compliance(), exact, 1e-12 * exact) << p.n_elements << " " << n_modes;
+      // Rounding, of sums over the mesh and over the modes; of all modes, ε ω_max/ω₁ with up to 4e5.
+      const double tolerance = n_modes == 0 ? 1e-11 : 1e-12;
+      EXPECT_NEAR(Beam(p).static_tip_compliance(), exact, tolerance * exact) << p.n_elements << " " << n_modes;
     }
     const Beam direct(with_integrator(p, Integrator::generalized_alpha));
     EXPECT_NEAR(direct.static_tip_compliance(), exact, 1e-13 * exact);

@@ -196,9 +196,9 @@ struct EnergyCase {
 
 TEST(BeamStep, EnergyIdentityHoldsToRounding) {
   // E(t+H) − E(t) = C̄ Δu − loss, through random forces, loads, impulses and step sizes.
-  for (const EnergyCase& c : {EnergyCase{Integrator::modal, 0.0, false}, EnergyCase{Integrator::modal, 1e-3, false},
-                              EnergyCase{Integrator::generalized_alpha, 0.0, true},
-                              EnergyCase{Integrator::generalized_alpha, 1e-3, true}}) {
+  for (const EnergyCase& c :
+       {EnergyCase{Integrator::modal, 0.0, false}, EnergyCase{Integrator::modal, 1e-3, false},
+        EnergyCase{Integrator::generalized_alpha, 0.0, true}, EnergyCase{Integrator::generalized_alpha, 1e-3, true}}) {
     for (const double kappa : {1.0, 1e4}) {
       Parameters p = with_integrator(general_beam(40), c.integrator);
       p.young_modulus *= kappa;
@@ -221,7 +221,8 @@ TEST(BeamStep, EnergyIdentityHoldsToRounding) {
         const Force force = {noise(), c.polynomial ? 10.0 * noise() : 0.0, c.polynomial ? 1e3 * noise() : 0.0};
         const double mean = force[0] + H * (force[1] / 2.0 + H * force[2] / 6.0);
         b.set_distributed_load(f_b);
-        const double before = mechanical_energy(b) + b.load_potential() + b.dissipated_energy(), u = b.tip_displacement();
+        const double before = mechanical_energy(b) + b.load_potential() + b.dissipated_energy(),
+                     u = b.tip_displacement();
         b.step(H, force, f_b);
         const double after = mechanical_energy(b) + b.load_potential() + b.dissipated_energy();
         worst = std::max(worst, std::fabs(after - before - mean * (b.tip_displacement() - u)));
@@ -296,7 +297,8 @@ TEST(BeamStep, AccelerationIsTheDerivativeOfTheVelocity) {
   a.step(t - e, force, 0.4);
   b.step(t, force, 0.4);
   c.step(t + e, force, 0.4);
-  EXPECT_NEAR(b.tip_acceleration(), (c.tip_velocity() - a.tip_velocity()) / (2.0 * e), 1e-5 * std::fabs(b.tip_acceleration()));
+  EXPECT_NEAR(b.tip_acceleration(), (c.tip_velocity() - a.tip_velocity()) / (2.0 * e),
+              1e-5 * std::fabs(b.tip_acceleration()));
 
   // The mesh's formula M a = F − Kq − α_b K v, by both integrators, from the same state.
   p.initial_deflection_slope = 0.2;
