@@ -72,7 +72,7 @@ def simulate(
         An impact after which the flight would rise less than this [m] is taken as the last one (e = 0), and the
         spring or tip as seated. Default 1e-12 of the distance |Ψ − φ|, or of the tip's largest deflection if larger.
         What is cut off changes no impulse, and the displacement by less than (velocity × remaining time) of the
-        bounces left out.
+        bounces left out. At e = 1 bounces can be damped without end, ever smaller; then give a larger height.
     t_end
         Ends the run earlier than the scene does [s].
 
@@ -318,7 +318,7 @@ class _Run:
             if name not in armed:
                 if values[k] > noise:
                     armed.add(name)
-                elif values[k] < -noise:
+                elif values[k] < -noise and k > 0:
                     return self._early_crossing(g, segment.nodes[k], noise)
             elif values[k] < 0.0:
                 low, high = segment.nodes[k - 1], segment.nodes[k]
@@ -350,8 +350,18 @@ class _Run:
 
     # Events ---------------------------------------------------------------------------------------------------------
 
+    def _place(self, level: float) -> None:
+        """The spring top, and the tip that is joined to it, exactly where the event has them but for rounding."""
+        s, X = self.system, self.X
+        if s.has_spring:
+            X[s.Y] = level
+        if s.joined(self.phase) or not s.has_spring:
+            X[s.A] += s.b * ((level - float(X[s.A] @ s.b)) / s.inverse_tip_mass)
+
     def _handle(self, name: str) -> None:
         s = self.system
+        if name in ("release", "retie"):
+            self._place(s.spring.equilibrium)
         if name == "meet":
             self._meet()
         elif name == "separate":
@@ -387,6 +397,7 @@ class _Run:
 
     def _meet(self) -> None:
         s, X = self.system, self.X
+        X[s.A] += s.b * ((float(X[s.Y]) - float(X[s.A] @ s.b)) / s.inverse_tip_mass)  # the gap is 0 but for rounding
         if s.compliance:
             self.phase = Phase("touch", self.phase.seated)
             self._emit("impact")
@@ -415,6 +426,7 @@ class _Run:
         s, stop = self.system, self.scene.stop
         assert stop is not None
         e = stop.restitution
+        self._place(stop.position)
         arriving = self.X.copy()
         before = self._mechanical_energy()
         contact_impulse, foundation_impulse, speed = self._bounce(e)
