@@ -93,15 +93,13 @@ void write_types(std::ostream& out, const Table& t, const std::set<std::string>&
     out << "    <SimpleType" << attribute("name", u.quantity) << ">\n      <Real" << attribute("quantity", u.quantity)
         << attribute("unit", u.name) << "/>\n    </SimpleType>\n";
   }
-  for (const Enumeration& e : t.enumerations) {
-    out << "    <SimpleType" << attribute("name", e.name) << attribute("description", e.description)
-        << ">\n      <Enumeration>\n";
-    int value = 0;
-    for (const auto& [name, description] : e.items) {
-      out << "        <Item" << attribute("name", name) << attribute("value", std::to_string(++value))
-          << attribute("description", description) << "/>\n";
+  for (const Choice& c : t.choices) {
+    std::string text = c.description + ":";
+    for (std::size_t i = 0; i < c.items.size(); ++i) {
+      text += (i ? "; " : " ") + std::to_string(i + 1) + " = " + c.items[i];
     }
-    out << "      </Enumeration>\n    </SimpleType>\n";
+    out << "    <SimpleType" << attribute("name", c.name) << attribute("description", text) << ">\n      <Integer"
+        << attribute("min", "1") << attribute("max", std::to_string(c.items.size())) << "/>\n    </SimpleType>\n";
   }
   out << "  </TypeDefinitions>\n";
 }
@@ -123,9 +121,11 @@ void write_variable(std::ostream& out, const Variable& v, std::size_t reference)
         out << attribute("declaredType", u.quantity) << attribute("quantity", u.quantity) << attribute("unit", u.name);
       }
       break;
-    case Type::integer: out << "Integer"; break;
+    case Type::integer:
+      out << "Integer";
+      if (!v.choice.empty()) out << attribute("declaredType", v.choice);
+      break;
     case Type::boolean: out << "Boolean"; break;
-    case Type::enumeration: out << "Enumeration" << attribute("declaredType", v.enumeration); break;
   }
   if (v.type != Type::boolean) {
     if (std::isfinite(v.min)) out << attribute("min", value_text(v, v.min));

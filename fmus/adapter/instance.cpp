@@ -14,14 +14,8 @@ const char* name(Type type) {
     case Type::real: return "Real";
     case Type::integer: return "Integer";
     case Type::boolean: return "Boolean";
-    case Type::enumeration: return "Enumeration";
   }
   return "?";
-}
-
-// Enumerations travel through fmi2GetInteger and fmi2SetInteger.
-bool same_access(Type asked, Type declared) {
-  return asked == declared || (asked == Type::integer && declared == Type::enumeration);
 }
 
 bool is_setting(const Variable& v) { return v.causality == Causality::parameter || v.exact; }
@@ -85,7 +79,7 @@ const Variable& Instance::variable(unsigned reference, Type type, const char* wh
                                 std::to_string(table_.variables.size()) + " variables, numbered from 0");
   }
   const Variable& v = table_.variables[reference];
-  if (!same_access(type, v.type)) {
+  if (type != v.type) {
     throw std::invalid_argument(std::string("cannot ") + what + " '" + v.name + "' (value reference " +
                                 std::to_string(reference) + ") as " + name(type) + ": it is " + name(v.type));
   }

@@ -15,7 +15,7 @@
 
 namespace fmi {
 
-enum class Type { real, integer, boolean, enumeration };
+enum class Type { real, integer, boolean };
 enum class Causality { parameter, input, output };
 
 /// Values of every type are held as double, which represents all of them exactly.
@@ -25,7 +25,7 @@ struct Variable {
   Type type = Type::real;
   std::string unit;  ///< one of units(), empty if dimensionless
   std::string description;
-  std::string enumeration;  ///< name of its type, see Table::enumerations
+  std::string choice;  ///< name of its type, see Table::choices
   double start = 0.0;       ///< of parameters, inputs and exact outputs
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
@@ -48,16 +48,18 @@ struct Variable {
   Variable& follows(std::vector<std::string> names) { return depends_on = std::move(names), *this; }
 };
 
-struct Enumeration {
+/// Named alternatives, numbered from 1. Described as an Integer type and not as an Enumeration: libcosim leaves such
+/// variables out, Maestro refuses the whole FMU.
+struct Choice {
   std::string name, description;
-  std::vector<std::pair<std::string, std::string>> items;  ///< name, description; numbered from 1
+  std::vector<std::string> items;
 };
 
 struct Table {
   std::string identifier;  ///< modelIdentifier
   std::string title, description;
   double stop_time = 1.0, step_size = 1e-3;  ///< DefaultExperiment
-  std::vector<Enumeration> enumerations;
+  std::vector<Choice> choices;
   std::vector<Variable> variables;
 
   const Variable* find(const std::string& name) const;
@@ -79,10 +81,9 @@ class TableBuilder {
   Variable& parameter(const std::string& name, const std::string& unit, P M::*parameters, T B::*field,
                       const std::string& description) {
     Variable& v = add(name, unit, description, Causality::parameter);
-    v.type = std::is_same_v<T, bool>     ? Type::boolean
-             : std::is_integral_v<T>     ? Type::integer
-             : std::is_enum_v<T>         ? Type::enumeration
-                                         : Type::real;
+    v.type = std::is_same_v<T, bool>                            ? Type::boolean
+             : std::is_integral_v<T> || std::is_enum_v<T> ? Type::integer
+                                                          : Type::real;
     v.start = static_cast<double>(P{}.*field);
     v.set = [=](Model& m, const Polynomial& value) { assign(static_cast<M&>(m).*parameters.*field, value[0]); };
     return v;

@@ -60,10 +60,10 @@ fmi::Table make_table() {
       "Viscoelastic (Kelvin-Voigt) Timoshenko beam, clamped at x = 0, loaded at its tip x = L by a contact force";
   t.stop_time = 0.6;
   t.step_size = 1e-3;
-  t.enumerations.push_back({"Integrator",
-                            "time integration of the beam",
-                            {{"modal", "exact step of each mode under a polynomial force"},
-                             {"generalized_alpha", "generalized-alpha rule; rho_inf = 1 is the midpoint rule"}}});
+  t.choices.push_back({"Integrator",
+                       "time integration of the beam",
+                       {"modal, the exact step of each mode under a polynomial force",
+                        "generalized_alpha, with rho_inf = 1 the midpoint rule"}});
 
   fmi::TableBuilder<BeamModel> add(t);
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
@@ -84,7 +84,7 @@ fmi::Table make_table() {
   parameter("reduced_integration", "", &Parameters::reduced_integration,
             "one-point integration of the shear term; false = full integration, which locks for slender beams");
   fmi::Variable& integrator = parameter("integrator", "", &Parameters::integrator, "1 = modal, 2 = generalized_alpha");
-  integrator.range(1, 2).enumeration = "Integrator";
+  integrator.range(1, 2).choice = "Integrator";
   parameter("rho_inf", "", &Parameters::rho_inf, "spectral radius at infinity of generalized_alpha; 1 = midpoint rule")
       .range(0, 1);
   parameter("initial_deflection_slope", "", &Parameters::initial_deflection_slope,

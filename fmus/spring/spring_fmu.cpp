@@ -124,6 +124,11 @@ fmi::Table make_table() {
       "foundation";
   t.stop_time = 0.6;
   t.step_size = 1e-3;
+  t.choices.push_back({"ContactLaw",
+                       "where the contact force comes from",
+                       {"external, the input contact_force",
+                        "normal_compliance, computed inside from tip_displacement and tip_velocity"}});
+
   fmi::TableBuilder<SpringModel> add(t);
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
     return add.parameter(name, unit, &SpringModel::parameters, field, text);
@@ -133,12 +138,9 @@ fmi::Table make_table() {
   parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
   parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness, "cubic stiffness k2; < 0 softens");
   parameter("equilibrium", "m", &Parameters::equilibrium, "position Psi where the top rests");
-  // An Integer: libcosim leaves Enumeration variables out, and without this one the pair cannot be joined by ports.
-  parameter("contact_law", "", &Parameters::contact_law,
-            "where the contact force comes from: 1 = the input contact_force, 2 = normal compliance inside, from "
-            "tip_displacement and tip_velocity")
+  parameter("contact_law", "", &Parameters::contact_law, "1 = external, 2 = normal compliance inside")
       .range(1, 2)
-      .type = fmi::Type::integer;
+      .choice = "ContactLaw";
   parameter("compliance_stiffness", "", &Parameters::compliance_stiffness,
             "lambda in C = lambda*max(0, y - u_tip)^p [N/m^p]")
       .at_least(0)
