@@ -8,6 +8,7 @@ usage() {
 ./build.sh run [SCENE] [OPTION]…   set up, build, and simulate a scene (default: soft)
 ./build.sh test [PYTEST OPTION]…   set up, build, and run all tests (C++, then Python)
 ./build.sh fmus                    set up and build fmus/beam.fmu, spring.fmu and spring_beam.ssp
+./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
 ./build.sh lint                    formatters, linters and type checker
 
 Set-up makes .venv here and installs Python packages into it; as root it also installs the system packages that are
@@ -15,6 +16,7 @@ missing (Debian, Ubuntu), otherwise it names them. Variables:
   PYTHON             the Python to start from, 3.10 or later (default: python3)
   CXX                the C++17 compiler
   SPRINGBEAM_PREFIX  where Eigen, Spectra, SUNDIALS and GoogleTest are if not in the system (also: CMAKE_PREFIX_PATH)
+  SPRINGBEAM_CACHE   where `interop` puts the importers (default: ~/.cache/springbeam)
   JOBS               parallel compilations (default: all processors)
 TEXT
 }
@@ -132,6 +134,12 @@ case $command in
     say "Python tests"
     $python -m pytest -n auto "$@" || failed="${failed:+$failed and }Python tests"
     [ -z "$failed" ] || die "failed: $failed"
+    ;;
+  interop)
+    build fmus
+    cache=${SPRINGBEAM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/springbeam}
+    tests/interop/install.sh "$cache" "$python"
+    SPRINGBEAM_CACHE=$cache exec $python -m pytest tests/interop "$@"
     ;;
   fmus) build fmus && ls -l fmus/*.fmu fmus/*.ssp ;;
   lint)
