@@ -207,17 +207,19 @@ class _Run:
             self._record(self.time, self.X)
             upcoming += 1
         armed: set[str] = set()
-        propagator = self._propagator()
+        propagator, phase_start = self._propagator(), self.time
         while self.t_end - self.time > 1e-14 * self.t_end:
             target = samples[upcoming] if upcoming < len(samples) else self.t_end
             segment = propagator.advance(max(target - self.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
             self.counts["steps"] += 1
             found = self._first_event(segment, armed)
-            reach = segment.size if found is None else found[1]
             begin = self.time
-            end = begin + reach
-            if found is None and abs(end - target) <= 1e-14 * self.t_end:
-                end = target  # the sum is off by rounding
+            if found is None:
+                reach, end = segment.size, phase_start + propagator.elapsed
+                if abs(end - target) <= 1e-14 * self.t_end:
+                    end = target  # the sum is off by rounding
+            else:
+                reach, end = found[1], begin + found[1]
             while upcoming < len(samples) and samples[upcoming] <= end:
                 at = samples[upcoming]
                 inside = at < end
@@ -235,7 +237,7 @@ class _Run:
             if len(self.events) > self.max_events or self._chatters():
                 raise ReferenceFailure(f"{len(self.events)} events by t = {self.time!r} s: they do not end")
             armed.clear()
-            propagator = self._propagator()
+            propagator, phase_start = self._propagator(), self.time
         return self._trajectory(clock.perf_counter() - began)
 
     def _chatters(self) -> bool:

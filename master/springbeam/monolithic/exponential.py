@@ -258,6 +258,7 @@ class ExponentialPropagator(Propagator):
         self.form, self.X = form, X
         self._speed = speed  #: largest interface velocity so far × √mass, the scale of `_TAIL`
         self._force_limit = np.inf  #: what resolving r allows [s]
+        self.elapsed = 0.0
         self._size, self._steps = 0.0, 0  #: of the present interval, and how many are left
 
     def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
@@ -271,6 +272,7 @@ class ExponentialPropagator(Propagator):
                 self._steps -= 1
                 self._force_limit = min(2.0 * self._force_limit, 1e300)
                 self.X = segment.states[-1]
+                self.elapsed += size
                 return segment
             self._force_limit = 0.5 * size
             if size < _SMALLEST_SHARE * remaining:

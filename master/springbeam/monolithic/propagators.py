@@ -32,6 +32,8 @@ class Segment(ABC):
 class Propagator(ABC):
     """Advances a state within one phase."""
 
+    elapsed: float  #: since the start of the phase [s]
+
     @abstractmethod
     def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
         """One step towards ``remaining`` [s] from here, which is known to ``resolution`` [s]; it may end beyond."""
@@ -87,6 +89,7 @@ class RungeKuttaPropagator(Propagator):
         message = solver.step()
         if solver.status == "failed":
             raise ReferenceFailure(f"{self.method} failed in phase {self.phase.name}: {message}")
+        self.elapsed = solver.t
         size = solver.t - begin
         nodes = np.linspace(0.0, size, 10)
         states = solver.dense_output()(begin + nodes).T
