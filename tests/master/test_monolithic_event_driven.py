@@ -355,7 +355,7 @@ def bar(n_elements: int) -> Trajectory:
             "coupling": {"macro_step": 0.01},
         }
     )
-    return simulate(scene, sample_times=np.linspace(0.0, 3.0, 1501))
+    return simulate(scene, sample_times=np.linspace(0.0, 3.0, 601))
 
 
 def test_bar_on_a_stop_approaches_the_exact_impact() -> None:
