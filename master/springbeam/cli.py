@@ -234,9 +234,7 @@ def _error_table(report: Report) -> Table:
         table.add_column(Text(name), justify="right", no_wrap=True)
     for row in report.rows:
         verdict = "ok" if row.passed else "FAILED"
-        table.add_row(
-            row.quantity, f"{row.error:.2e}", f"{row.at:.6g}", f"{row.l2:.1e}", f"{row.bound:.1e}", verdict
-        )
+        table.add_row(row.quantity, f"{row.error:.2e}", f"{row.at:.6g}", f"{row.l2:.1e}", f"{row.bound:.1e}", verdict)
     return table
 
 
@@ -253,7 +251,16 @@ def _event_errors_table(report: Report) -> Table:
 
 
 def _orders_table(rows: list[OrderRow]) -> Table:
-    table = Table("phase", r"from \[s]", "quantity", box=None, pad_edge=False, header_style="bold", title="max errors at H, H/2, …", title_justify="left")
+    table = Table(
+        "phase",
+        r"from \[s]",
+        "quantity",
+        box=None,
+        pad_edge=False,
+        header_style="bold",
+        title="max errors at H, H/2, …",
+        title_justify="left",
+    )
     count = len(rows[0].errors) if rows else 0
     for column in table.columns:
         column.no_wrap = True
@@ -262,9 +269,7 @@ def _orders_table(rows: list[OrderRow]) -> Table:
     table.add_column("orders", justify="right", no_wrap=True)
     for row in rows:
         observed = " ".join(f"{order:.1f}" for order in row.orders)
-        table.add_row(
-            row.phase, f"{row.begin:.4f}", row.quantity, *[f"{error:.1e}" for error in row.errors], observed
-        )
+        table.add_row(row.phase, f"{row.begin:.4f}", row.quantity, *[f"{error:.1e}" for error in row.errors], observed)
     return table
 
 

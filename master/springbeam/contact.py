@@ -59,9 +59,7 @@ def rebound(velocity: float, mass: float, restitution: float) -> tuple[float, fl
     return -(1.0 + restitution) * mass * velocity, 0.5 * mass * velocity**2 * (1.0 - restitution**2)
 
 
-def foundation_impact(
-    z: float | None, mass: float, v: float | None, tip_mass: float, restitution: float
-) -> Impact:
+def foundation_impact(z: float | None, mass: float, v: float | None, tip_mass: float, restitution: float) -> Impact:
     """The lower end strikes the foundation: the spring at ``z``, and the tip at ``v`` if it is tied to it.
 
     ``None`` marks an end that does not take part. Each velocity is reversed by itself, so nothing is lost at e = 1.

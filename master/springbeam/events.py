@@ -54,9 +54,7 @@ def interpolated(start: Motion, end: Motion, size: float, tau: float) -> Sample:
     a, b = Sample(start.displacement, start.velocity), Sample(end.displacement, end.velocity)
     x, rise = tau / size, (end.displacement - start.displacement) / size
     bend = 3.0 * rise - 2.0 * a.rate - b.rate
-    return Sample(
-        cubic_value(a, b, size, tau), a.rate + x * (2.0 * bend + 3.0 * x * (a.rate + b.rate - 2.0 * rise))
-    )
+    return Sample(cubic_value(a, b, size, tau), a.rate + x * (2.0 * bend + 3.0 * x * (a.rate + b.rate - 2.0 * rise)))
 
 
 def cubic_crossing(start: Sample, end: Sample, size: float) -> float:

@@ -15,7 +15,9 @@ SHORT = {"time": {"t_end": 0.2}, "coupling": {"macro_step": 5e-4}}
 
 @pytest.mark.parametrize(("scheme", "degree"), [("energy", 0), ("energy", 2), ("hermite", 2)])
 def test_the_same_problem_passes(scheme, degree):
-    scene = with_changes(load_scene("soft"), **{**SHORT, "coupling": {"macro_step": 5e-4, "scheme": scheme, "degree": degree}})
+    scene = with_changes(
+        load_scene("soft"), **{**SHORT, "coupling": {"macro_step": 5e-4, "scheme": scheme, "degree": degree}}
+    )
     report = crosscheck(scene)
     assert report.passed, report.rows
     assert report.horizon == pytest.approx(0.2)
@@ -46,7 +48,11 @@ def test_a_wrong_reference_fails(monkeypatch, what):
     monkeypatch.setattr(
         module.event_driven, "simulate", lambda scene, **options: right(with_changes(scene, **WRONG[what]), **options)
     )
-    sharp = {"macro_step": 1e-3, "scheme": "energy" if what == "law" else "hermite", "degree": 0 if what == "law" else 2}
+    sharp = {
+        "macro_step": 1e-3,
+        "scheme": "energy" if what == "law" else "hermite",
+        "degree": 0 if what == "law" else 2,
+    }
     report = crosscheck(with_changes(load_scene("soft"), **{**SHORT, "coupling": sharp}))
     assert not report.passed
 
@@ -63,7 +69,9 @@ def test_orders_are_those_of_the_scheme():
 
 def test_the_paper_law_agrees_with_algorithm_1():
     law = {"law": "paper", "impact": "rest"}
-    report = crosscheck(with_changes(load_scene("paper-fig2"), time={"t_end": 1.0}, contact=law, beam={"n_elements": 100}))
+    report = crosscheck(
+        with_changes(load_scene("paper-fig2"), time={"t_end": 1.0}, contact=law, beam={"n_elements": 100})
+    )
     assert report.passed, report.rows
 
 

@@ -80,7 +80,10 @@ def test_hermite_keeps_its_order_through_events():
     """Foundation impact, release, second meeting at H = 1e-3: 1e-10, 1e-10, 1e-7 s; and 6th order from 2H to H."""
     reference = event_driven.simulate(run("soft", 1e-3, "hermite", 2, 0.3).scene).events
     errors = {
-        size: [a.time - b.time for a, b in zip(run("soft", size, "hermite", 2, 0.3).events[1:4], reference[1:4], strict=True)]
+        size: [
+            a.time - b.time
+            for a, b in zip(run("soft", size, "hermite", 2, 0.3).events[1:4], reference[1:4], strict=True)
+        ]
         for size in (2e-3, 1e-3)
     }
     assert np.all(np.abs(errors[1e-3]) < [1e-10, 1e-10, 1e-7])
@@ -245,8 +248,10 @@ def test_run_leaves_the_promised_files(tmp_path):
         "e_impact_loss,e_total,energy_residual"
     )
     assert set(promised.split(",")) <= set(header)
-    assert (out / "events.csv").read_text().startswith(
-        "time,kind,y,z,u_tip,v_tip,impulse_contact,impulse_foundation,energy_loss\n"
+    assert (
+        (out / "events.csv")
+        .read_text()
+        .startswith("time,kind,y,z,u_tip,v_tip,impulse_contact,impulse_foundation,energy_loss\n")
     )
     summary = json.loads((out / "summary.json").read_text())
     assert {"scene", "version", "wall_time", "macro_steps", "beam_steps", "spring_steps", "events", "warnings"} <= set(

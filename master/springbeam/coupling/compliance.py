@@ -34,9 +34,7 @@ def discrete_gradient(p0: float, p1: float, stiffness: float, exponent: float) -
     """[Φ(p1) − Φ(p0)]/(p1 − p0) [N], without cancellation as p1 → p0."""
     change, size = p1 - p0, max(abs(p0), abs(p1))
     if abs(change) > 0.1 * size:
-        return (
-            compliance_energy(p1, stiffness, exponent) - compliance_energy(p0, stiffness, exponent)
-        ) / change
+        return (compliance_energy(p1, stiffness, exponent) - compliance_energy(p0, stiffness, exponent)) / change
     # Same sign throughout: the mean of λ p^q over the straight path is a polynomial-like integral.
     if size == 0.0 or p0 <= 0.0:
         return 0.0
