@@ -347,7 +347,7 @@ def bar(n_elements: int) -> Trajectory:
             "time": {"t_end": 3.0},
             "beam": {
                 "n_elements": n_elements,
-                "young_modulus": 1e8,
+                "young_modulus": 1e3,
                 "initial_deflection_slope": 0.5,
                 "approach": "elastic",
             },
