@@ -1,0 +1,60 @@
+"""Write an FMU's documentation/index.html from its modelDescription.xml and its equations.
+
+Usage: document.py modelDescription.xml equations.html OUT
+"""
+
+from __future__ import annotations
+
+import sys
+import xml.etree.ElementTree as ET
+from html import escape
+from pathlib import Path
+
+STYLE = (
+    "body{font:15px/1.5 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}"
+    "table{border-collapse:collapse;width:100%}td,th{border:1px solid #ccc;padding:.2em .5em;text-align:left;"
+    "vertical-align:top}code{white-space:nowrap}"
+)
+HEADINGS = {"parameter": "Parameters", "input": "Inputs", "output": "Outputs"}
+
+
+def row(variable: ET.Element) -> str:
+    kind = variable[0]
+    bounds = f"[{kind.get('min', '−∞')}, {kind.get('max', '∞')}]" if kind.get("min") or kind.get("max") else ""
+    cells = [
+        f"<code>{escape(variable.get('name', ''))}</code>",
+        escape(kind.tag),
+        escape(kind.get("unit", "–")),
+        escape(kind.get("start", "")),
+        bounds,
+        escape(variable.get("description", "")),
+    ]
+    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+
+
+def document(description: ET.Element, equations: str) -> str:
+    parts = [
+        "<!DOCTYPE html>",
+        f'<html lang="en"><head><meta charset="utf-8"><title>{escape(description.get("modelName", ""))}</title>',
+        f"<style>{STYLE}</style></head><body>",
+        f"<h1>{escape(description.get('modelName', ''))}</h1>",
+        f"<p>{escape(description.get('description', ''))}. Version {escape(description.get('version', ''))}.</p>",
+        equations,
+    ]
+    variables = list(description.iter("ScalarVariable"))
+    for causality, heading in HEADINGS.items():
+        parts.append(f"<h2>{heading}</h2><table>")
+        parts.append(
+            "<tr>" + "".join(f"<th>{h}</th>" for h in ("Name", "Type", "Unit", "Start", "Range", "")) + "</tr>"
+        )
+        parts += [row(v) for v in variables if v.get("causality") == causality]
+        parts.append("</table>")
+    parts.append('<h2>Licences</h2><p>See <a href="licenses/">licenses/</a>.</p></body></html>')
+    return "\n".join(parts) + "\n"
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 4:
+        sys.exit(__doc__)
+    xml, equations, out = (Path(argument) for argument in sys.argv[1:])
+    out.write_text(document(ET.parse(xml).getroot(), equations.read_text(encoding="utf-8")), encoding="utf-8")
