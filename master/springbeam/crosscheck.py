@@ -6,8 +6,8 @@ The bound of a quantity at time t is
 
 what halving the macro step changes is an upper estimate of the discretisation error for any order ≥ 1 (twice the
 difference at order 1), doubled again because events mix orders; the second term is the tolerance of the spring's
-integrator in every step and the rounding of the beam's modes, grown as fast as the reference grows a perturbation. Nothing in it knows the reference, so a
-wrong sign, mass or law, which converges to something else, fails.
+integrator in every step and the rounding of the beam's modes, grown as fast as the reference grows a perturbation.
+Nothing in it knows the reference, so a wrong sign, mass or law, which converges to something else, fails.
 
 Nonsmooth trajectories separate: comparable is what comes before the first change of contact that the macro step, or a
 tiny perturbation of the reference, moves to another place in the order of events.
@@ -15,6 +15,7 @@ tiny perturbation of the reference, moves to another place in the order of event
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -171,7 +172,7 @@ def _rounding(scene: Scene) -> float:
     fastest = 12.0 / h**2 * max(bending / line_inertia, shear / line_mass) + shear / line_inertia
     compliance = beam.length**3 / (3.0 * bending) + beam.length / shear
     slowest = 4.0 / (line_mass * beam.length * compliance)
-    return float(np.finfo(float).eps) * max(1.0, fastest / slowest) ** 0.5
+    return float(np.finfo(float).eps * np.sqrt(max(1.0, fastest / slowest)))
 
 
 # -- times ----------------------------------------------------------------------------------------------------------
@@ -411,7 +412,7 @@ def orders(scene: Scene, halvings: int = 3) -> list[OrderRow]:
     changes = contact_changes(reference.events, _SHORT * size)
     edges = [scene.contact_time or 0.0, *(time for _, time in changes), float(runs[0].time[-1])]
     found: list[OrderRow] = []
-    for begin, end in zip(edges, edges[1:], strict=False):
+    for begin, end in itertools.pairwise(edges):
         inside = times[(times > begin + (_SHORT + 0.5) * size) & (times < end - (_SHORT + 0.5) * size)]
         if len(inside) < 4:
             continue

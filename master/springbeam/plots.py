@@ -126,8 +126,8 @@ def plot_crosscheck(report: Report, path: Path) -> None:
         unit = readable_unit([trajectory[name] for name in names], "m")
         for name, colour in zip(names, (BLUE, VERMILLION), strict=False):
             above.plot(
-                timeline.unit.factor * trajectory["time"], unit.factor * trajectory[name], color=colour, lw=2.5, alpha=0.5,
-                label=f"{name}, co-simulation",
+                timeline.unit.factor * trajectory["time"], unit.factor * trajectory[name],
+                color=colour, lw=2.5, alpha=0.5, label=f"{name}, co-simulation",
             )  # fmt: skip
             above.plot(
                 timeline.unit.factor * reference["time"], unit.factor * reference[name], color=BLACK, lw=0.7,

@@ -33,7 +33,8 @@ def run(scene: Scene, recorder: Recorder, progress: Progress | None = None) -> d
     try:
         simulation: Simulation | PaperLaw
         if paper:
-            assert beam is not None and spring is not None
+            assert beam is not None
+            assert spring is not None
             simulation = PaperLaw(scene, start_time, beam, spring, recorder, progress)
         else:
             simulation = Simulation(scene, start_time, beam, spring, recorder, progress)

@@ -7,6 +7,7 @@ the step to itself, acts, and the run goes on from there.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -242,7 +243,8 @@ class Simulation:
         upper, lower, spring = self._upper, self._lower, self._spring
         ends = None if self._held is None or not self.phase.seated else self._held
         if self._compliant:
-            assert upper is not None and lower is not None
+            assert upper is not None
+            assert lower is not None
             penetration = start[1].displacement - start[0].displacement
             contact = self._compliance.solve(upper, ends or lower, self.time, size, self._contact, penetration)
         elif self.phase.joint is Joint.FREE:
@@ -253,7 +255,8 @@ class Simulation:
                 lower.rewind()
                 lower.advance(self.time, size, NO_FORCE)
         else:
-            assert upper is not None and lower is not None
+            assert upper is not None
+            assert lower is not None
             contact = self._tie.solve(upper, ends or lower, self.time, size, self._contact, start[0])
         if self.phase.seated:
             foundation = contact
@@ -353,7 +356,7 @@ class Simulation:
         return last
 
     def _touched_inside(self, step: Step) -> Step:
-        """Compliance: a contact that closes and opens inside the step would be missed; the step is cut to its middle."""
+        """Compliance: a contact that closes and opens inside the step would be missed; it is cut to its middle."""
         start, end = (Sample(m[0].displacement - m[1].displacement, m[0].velocity - m[1].velocity)
                       for m in (step.start, step.end))  # fmt: skip
         if start.value < 0.0 or end.value < 0.0:
@@ -435,7 +438,7 @@ class Simulation:
             return None
         middle = self.time + 0.5 * step.size
         points = [(t, n if kind == "unseated" else f) for t, f, n in self._middles] + [(middle, c)]
-        means = [(0.5 * (t0 + t1), 0.5 * (f0 + f1)) for (t0, f0), (t1, f1) in zip(points, points[1:], strict=False)]
+        means = [(0.5 * (t0 + t1), 0.5 * (f0 + f1)) for (t0, f0), (t1, f1) in itertools.pairwise(points)]
         time, mean = means[-1]
         if mean <= 0.0:
             if len(means) < 2 and c >= 0.0:
@@ -540,7 +543,8 @@ class Simulation:
         self.recorder.event(Event(step.time + at, "impact" if touching else "separation", *values))
 
     def _meet(self, tip: Motion, low: Motion) -> Impact:
-        assert self._beam is not None and self._spring is not None
+        assert self._beam is not None
+        assert self._spring is not None
         below = low.displacement < self.scene.spring.equilibrium  # type: ignore[union-attr]
         if self.phase.seated:
             # The seated spring does not move: the tip strikes the foundation through it.
@@ -548,12 +552,13 @@ class Simulation:
             return foundation_impact(None, 0.0, tip.velocity, self._beam.mass, 0.0)
         impact = meeting(self.scene.contact.impact, tip.velocity, low.velocity, self._beam.mass, self._spring.mass)
         common = low.velocity + impact.on_spring / self._spring.mass
-        self.phase = Phase(Joint.TIED if below or common <= 0.0 and self._at_equilibrium(low) else Joint.TOUCH)
+        self.phase = Phase(Joint.TIED if below or (common <= 0.0 and self._at_equilibrium(low)) else Joint.TOUCH)
         return impact
 
     def _at_equilibrium(self, low: Motion) -> bool:
         psi = self.scene.spring.equilibrium  # type: ignore[union-attr]
-        return abs(low.displacement - psi) <= 4.0 * self._position_tolerance((low, low)) + 1e-12 * abs(psi)
+        tolerance = 4.0 * self._position_tolerance((low, low)) + 1e-12 * abs(psi)
+        return bool(abs(low.displacement - psi) <= tolerance)
 
     def _strike(self, tip: Motion, low: Motion) -> tuple[Impact, str]:
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
@@ -562,12 +567,12 @@ class Simulation:
         tied = beam is not None and self.phase.joint is not Joint.FREE and not self._compliant
         if spring is None:
             assert beam is not None
-            ends = (None, 0.0, tip.velocity, beam.mass)
+            ends: tuple[float | None, float, float | None, float] = (None, 0.0, tip.velocity, beam.mass)
         else:
             ends = (low.velocity, spring.mass, tip.velocity if tied else None, beam.mass if tied and beam else 0.0)
         speed = max(abs(v) for v in (ends[0], ends[2]) if v is not None)
         self._fastest_impact = max(self._fastest_impact, speed)
-        if e * speed <= _SEATING_SPEED * self._fastest_impact and e < 1.0 or speed == 0.0:
+        if (e * speed <= _SEATING_SPEED * self._fastest_impact and e < 1.0) or speed == 0.0:
             joint = self.phase.joint if spring is not None else Joint.TIED
             self.phase = Phase(joint, seated=True)
             return foundation_impact(*ends, 0.0), "seated"

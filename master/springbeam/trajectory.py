@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,7 +82,8 @@ class Trajectory:
 
     def __getattr__(self, name: str) -> np.ndarray:
         try:
-            return self.__dict__["columns"][name]
+            columns: dict[str, np.ndarray] = self.__dict__["columns"]
+            return columns[name]
         except KeyError:
             raise AttributeError(name) from None
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
-from springbeam import load_scene, with_changes
 from springbeam import crosscheck as module
+from springbeam import load_scene, with_changes
 from springbeam.cli import app
 from springbeam.crosscheck import crosscheck, orders
 

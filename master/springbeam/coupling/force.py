@@ -12,7 +12,7 @@ from ..subsystem import Force, Motion
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
 
 
-def derivatives(a: Sequence[float], size: float) -> Force:
+def derivatives(a: Sequence[float] | np.ndarray, size: float) -> Force:
     """(C, Ċ, C̈) at the step's start [N, N/s, N/s²] of Legendre coefficients ``a`` [N] (1 to 3 of them)."""
     if len(a) == 1:
         return (float(a[0]), 0.0, 0.0)

@@ -126,7 +126,7 @@ class Tie:
         if partner.mass == float("inf"):
             return np.zeros((self._degree + 1, self._degree + 1))
         unit = force.free_mass_response(self._degree, size, partner.mass)
-        return np.array([self._conditions(m, size) for m in unit]).T
+        return np.column_stack([self._conditions(m, size) for m in unit])
 
     def _measure(
         self, body: Body, time: float, size: float, a: np.ndarray, r: np.ndarray, end: Motion, fraction: float
@@ -142,7 +142,7 @@ class Tie:
             changed = a.copy()
             changed[k] += delta
             columns.append((self._advance(body, time, size, changed) - r) / delta)
-        return np.array(columns).T
+        return np.column_stack(columns)
 
     def _absolute_tolerance(
         self, start: Motion, beam: Motion, partner: Motion, size: float, by_force: np.ndarray
