@@ -1,0 +1,105 @@
+// Lets an FMU that was linked on a new system load on an old one. What libstdc++.a, libgcc_eh.a and libm of the build
+// machine would ask of a new glibc is defined here, hidden, with what every glibc since 2.14 has.
+// Only for x86-64; the test tests/contract/test_package.py states the version that is left.
+#include <features.h>
+
+#if defined(__GLIBC__) && defined(__x86_64__)
+
+#include <dlfcn.h>
+#include <link.h>
+
+#include <cerrno>
+#include <cstddef>
+
+// Hidden by -fvisibility and by the version script.
+#define HIDDEN extern "C"
+
+// The versions before 2.29 differ in how they set errno only.
+extern "C" {
+double old_exp(double);
+double old_log(double);
+double old_log2(double);
+double old_pow(double, double);
+}
+__asm__(".symver old_exp,exp@GLIBC_2.2.5");
+__asm__(".symver old_log,log@GLIBC_2.2.5");
+__asm__(".symver old_log2,log2@GLIBC_2.2.5");
+__asm__(".symver old_pow,pow@GLIBC_2.2.5");
+HIDDEN double exp(double x) noexcept { return old_exp(x); }
+HIDDEN double log(double x) noexcept { return old_log(x); }
+HIDDEN double log2(double x) noexcept { return old_log2(x); }
+HIDDEN double pow(double x, double y) noexcept { return old_pow(x, y); }
+
+#if __GLIBC_PREREQ(2, 32)
+// "There may be threads": reference counts stay atomic.
+extern "C" {
+char __libc_single_threaded = 0;
+}
+#endif
+
+#if __GLIBC_PREREQ(2, 34)
+HIDDEN int pthread_once(int* control, void (*routine)()) noexcept(false) {
+  enum { untouched, running, done };
+  int expected = untouched;
+  if (__atomic_compare_exchange_n(control, &expected, running, false, __ATOMIC_ACQUIRE, __ATOMIC_ACQUIRE)) {
+    routine();
+    __atomic_store_n(control, done, __ATOMIC_RELEASE);
+  }
+  while (__atomic_load_n(control, __ATOMIC_ACQUIRE) != done) {
+  }
+  return 0;
+}
+// Only asked whether it exists, which means: threads are possible.
+HIDDEN int __pthread_key_create(unsigned*, void (*)(void*)) noexcept { return ENOSYS; }
+#endif
+
+#if __GLIBC_PREREQ(2, 35)
+// Where the unwinder finds the tables of a program address.
+namespace {
+struct Search {
+  unsigned long pc;
+  dl_find_object* found;
+};
+int visit(dl_phdr_info* object, std::size_t, void* data) {
+  auto& search = *static_cast<Search*>(data);
+  unsigned long begin = ~0UL, end = 0;
+  void* tables = nullptr;
+  bool inside = false;
+  for (int i = 0; i < object->dlpi_phnum; ++i) {
+    const auto& header = object->dlpi_phdr[i];
+    const unsigned long address = object->dlpi_addr + header.p_vaddr;
+    if (header.p_type == PT_GNU_EH_FRAME) tables = reinterpret_cast<void*>(address);
+    if (header.p_type != PT_LOAD) continue;
+    if (address < begin) begin = address;
+    if (address + header.p_memsz > end) end = address + header.p_memsz;
+    inside = inside || (search.pc >= address && search.pc < address + header.p_memsz);
+  }
+  if (!inside || !tables) return 0;
+  *search.found = dl_find_object{};
+  search.found->dlfo_map_start = reinterpret_cast<void*>(begin);
+  search.found->dlfo_map_end = reinterpret_cast<void*>(end);
+  search.found->dlfo_eh_frame = tables;
+  return 1;
+}
+}  // namespace
+HIDDEN int _dl_find_object(void* pc, dl_find_object* found) noexcept {
+  Search search{reinterpret_cast<unsigned long>(pc), found};
+  return dl_iterate_phdr(visit, &search) ? 0 : -1;
+}
+#endif
+
+#if __GLIBC_PREREQ(2, 38)
+// C23 reads "0b…" numbers; nothing here does.
+#define OLD_STRTO(type, name)                                      \
+  extern "C" type old_##name(const char*, char**, int);            \
+  __asm__(".symver old_" #name "," #name "@GLIBC_2.2.5");          \
+  HIDDEN type __isoc23_##name(const char* s, char** e, int base) { \
+    return old_##name(s, e, base);                                 \
+  }
+OLD_STRTO(long, strtol)
+OLD_STRTO(unsigned long, strtoul)
+OLD_STRTO(long long, strtoll)
+OLD_STRTO(unsigned long long, strtoull)
+#endif
+
+#endif
