@@ -11,7 +11,7 @@ import pytest
 from scipy.special import ellipk
 from typer.testing import CliRunner
 
-from springbeam import load_scene, simulate
+from springbeam import RunStopped, load_scene, simulate
 from springbeam.cli import app
 from springbeam.monolithic import event_driven
 from springbeam.scene import Scene, shipped_scenes, with_changes
@@ -117,9 +117,13 @@ def test_energy_of_higher_degree_conserves_too(degree):
 
 
 def test_hermite_says_when_the_macro_step_is_too_large():
-    summary = run("soft", 6e-3, "hermite", 2).summary
+    """ω_max H = 7 is beyond its stability: the energy changes, and the run says so; at 17 it stops."""
+    summary = run("soft", 4e-3, "hermite", 2).summary
     assert summary["max_energy_residual"] > 1e-3
     assert any("hermite of degree 2" in warning for warning in summary["warnings"])
+    with pytest.raises(RunStopped, match="hermite of degree 2") as stopped:
+        run("soft", 1e-2, "hermite", 2)
+    assert 0.0 < stopped.value.time < 0.6
 
 
 # -- other parameter sets against the reference ---------------------------------------------------------------------
@@ -207,7 +211,7 @@ def test_a_missing_body_is_neither_loaded_nor_stepped(name, loaded, absent):
 
 
 def test_bar_impact_converges_to_the_exact_impulse():
-    """u_tt = u_xx on a rigid stop: contact from 1 to 2, impulse 1/2, energy 1/8. First order in mesh and H."""
+    """u_tt = u_xx on a rigid stop: contact from 1 to 2, impulse 1/2, energy 1/8. The front goes as h^(2/3)."""
     errors = []
     for n in (25, 50, 100):
         scene = with_changes(load_scene("bar-impact"), beam={"n_elements": n}, coupling={"macro_step": 0.5 / n})
