@@ -220,7 +220,8 @@ std::array<double, 10> oscillator_dissipation(double omega, double c, double t) 
   // In units of the current length t_j the state is z = (v, r t_j, f₁ t_j², f₂ t_j³), and v(σ t_j) = basis · z.
   const Roots whole = roots(omega, c, t);
   int doublings = 0;
-  for (double m = whole.fast; m > 1.0; m *= 0.5) ++doublings;
+  std::frexp(whole.fast, &doublings);  // |μ₋| < 2^doublings
+  doublings = std::max(doublings, 0);
   double length = std::ldexp(t, -doublings);
 
   double Q[n][n] = {};

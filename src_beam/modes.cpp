@@ -208,7 +208,7 @@ VectorXd rayleigh_ritz(const Timoshenko& mesh, const MatrixXd& Z, MatrixXd& W) {
 Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
   const Index size = mesh.size();
   const Index count = p.n_modes == 0 ? size : p.n_modes;
-  const bool dense = size <= 200 || (size <= max_dense_unknowns && count > size / 4);
+  const bool dense = size <= 40 || (size <= max_dense_unknowns && count > size / 4);
 
   Index columns = count;
   MatrixXd basis(size, std::min(size, count + 4));

@@ -1,5 +1,6 @@
 #include "validate.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -59,9 +60,10 @@ void validate(const Parameters& p) {
                "between 0 (all) and " + std::to_string(unknowns) + ", the unknowns of " + std::to_string(p.n_elements) +
                    " elements");
       }
-      if (unknowns > max_dense_unknowns && (p.n_modes == 0 || p.n_modes > unknowns / 2)) {
+      const int most = std::min(unknowns / 2, max_dense_unknowns);
+      if (unknowns > max_dense_unknowns && (p.n_modes == 0 || p.n_modes > most)) {
         reject("n_modes", p.n_modes,
-               "between 1 and " + std::to_string(unknowns / 2) + " with " + std::to_string(p.n_elements) +
+               "between 1 and " + std::to_string(most) + " with " + std::to_string(p.n_elements) +
                    " elements (all modes only up to " + std::to_string(max_dense_unknowns / 2) +
                    " elements); keep fewer n_modes, or use the integrator generalized_alpha");
       }

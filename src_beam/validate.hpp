@@ -8,7 +8,8 @@ namespace beam {
 /// Most elements that a beam may have; bounds memory, not the mathematics.
 inline constexpr int max_elements = 1000000;
 
-/// Most unknowns (two per element) of a dense eigenproblem, which "all modes" needs.
+/// Most unknowns of a dense eigenproblem: of the mesh (two per element) where all modes are wanted, of the reduced
+/// basis where some are.
 inline constexpr int max_dense_unknowns = 1000;
 
 /// @throws std::invalid_argument for the first parameter that is not allowed
