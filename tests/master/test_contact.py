@@ -1,0 +1,98 @@
+"""Impacts: momentum, and losses that are what the kinetic energy loses."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+
+from springbeam.contact import Impact, Joint, Phase, foundation_impact, meeting, rebound, spring_force
+from springbeam.scene import Spring
+
+MASSES = [(0.25, 1.0), (1.0, 0.01), (3.0, 100.0)]
+VELOCITIES = [(-1.0, 0.0), (-0.2, 0.7), (0.1, 0.3)]
+
+
+def kinetic(v: float, z: float, tip_mass: float, mass: float) -> float:
+    return 0.5 * tip_mass * v * v + 0.5 * mass * z * z
+
+
+def after(impact: Impact, v: float, z: float, tip_mass: float, mass: float) -> tuple[float, float]:
+    return v + impact.on_beam / tip_mass, z + impact.on_spring / mass
+
+
+@pytest.mark.parametrize(("v", "z"), VELOCITIES)
+@pytest.mark.parametrize(("tip_mass", "mass"), MASSES)
+def test_inelastic_meeting_leaves_one_velocity(v, z, tip_mass, mass):
+    """That of the centre of mass; the impulses are equal and opposite."""
+    impact = meeting("inelastic", v, z, tip_mass, mass)
+    assert impact.on_beam == -impact.on_spring
+    assert impact.of_foundation == 0.0
+    common = (tip_mass * v + mass * z) / (tip_mass + mass)
+    scale = abs(v) + abs(z)
+    assert after(impact, v, z, tip_mass, mass) == pytest.approx((common, common), abs=1e-14 * scale)
+
+
+@pytest.mark.parametrize("kind", ["inelastic", "tip", "rest"])
+@pytest.mark.parametrize(("v", "z"), VELOCITIES)
+@pytest.mark.parametrize(("tip_mass", "mass"), MASSES)
+def test_a_meeting_loses_the_difference_of_kinetic_energy(kind, v, z, tip_mass, mass):
+    impact = meeting(kind, v, z, tip_mass, mass)
+    before, left = kinetic(v, z, tip_mass, mass), kinetic(*after(impact, v, z, tip_mass, mass), tip_mass, mass)
+    assert impact.energy_loss == pytest.approx(before - left, abs=1e-13 * (before + left))
+
+
+def test_tip_gives_the_spring_the_tips_velocity_and_books_the_energy_made():
+    """z := v = −1 m/s for 2 kg at rest: J = −2 N·s, 1 J from nowhere."""
+    assert meeting("tip", -1.0, 0.0, 0.25, 2.0) == Impact(on_spring=-2.0, energy_loss=-1.0)
+
+
+def test_rest_does_nothing():
+    assert meeting("rest", -1.0, 0.5, 0.25, 2.0) == Impact()
+
+
+@pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
+def test_rebound_reverses_to_e_times_the_velocity(e):
+    impulse, loss = rebound(-0.8, 2.0, e)
+    assert -0.8 + impulse / 2.0 == pytest.approx(0.8 * e, abs=1e-16)
+    assert loss == pytest.approx(0.5 * 2.0 * 0.8**2 * (1.0 - e**2), rel=1e-15)
+    assert (loss == 0.0) == (e == 1.0)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize(("z", "v"), [(-0.7, -0.7), (-0.7, -0.5), (-0.7, 0.1), (-0.7, None), (None, -0.5)])
+def test_foundation_reverses_each_end_by_itself(z, v, e):
+    """Also ends whose velocities differ: each leaves with −e times its own, so nothing is lost at e = 1."""
+    tip_mass, mass = 0.25, 2.0
+    impact = foundation_impact(z, mass, v, tip_mass, e)
+    assert impact.of_foundation == pytest.approx(impact.on_beam + impact.on_spring, rel=1e-15)
+    v1, z1 = after(impact, v or 0.0, z or 0.0, tip_mass, mass)
+    assert (v1, z1) == pytest.approx((-e * (v or 0.0), -e * (z or 0.0)), abs=1e-15)
+    before = kinetic(v or 0.0, z or 0.0, tip_mass, mass)
+    assert impact.energy_loss == pytest.approx(before - kinetic(v1, z1, tip_mass, mass), abs=1e-15)
+    if e == 1.0:
+        assert impact.energy_loss == 0.0
+
+
+@pytest.mark.parametrize(
+    ("part", "absent"), [((None, 2.0, -0.5, 0.25), "on_spring"), ((-0.7, 2.0, None, 0.25), "on_beam")]
+)
+def test_an_end_that_takes_no_part_gets_no_impulse(part, absent):
+    assert getattr(foundation_impact(*part, 0.5), absent) == 0.0
+
+
+def test_meeting_of_equal_masses_halves_the_velocity_and_the_energy():
+    assert meeting("inelastic", -1.0, 0.0, 1.0, 1.0) == Impact(on_beam=0.5, on_spring=-0.5, energy_loss=0.25)
+
+
+@pytest.mark.parametrize(("y", "load"), list(product([-0.5, 0.0, 0.2], [0.0, 1.5])))
+def test_spring_force_is_that_of_the_duffing_law(y, load):
+    spring = Spring(linear_stiffness=3.0, cubic_stiffness=-0.2, external_force=load)
+    # The derivative of k1 y²/2 + k2 y⁴/4 − f_s y by a central difference: error k2 y δ² and rounding 1e-16/δ.
+    potential = lambda x: 1.5 * x * x - 0.05 * x**4 - load * x  # noqa: E731
+    assert spring_force(spring, y) == pytest.approx((potential(y + 1e-5) - potential(y - 1e-5)) / 2e-5, abs=1e-10)
+
+
+def test_a_phase_is_named_by_its_joint_unless_seated():
+    names = [str(Phase(joint, seated)) for joint in Joint for seated in (False, True)]
+    assert names == ["free", "seated", "tied", "seated", "touch", "seated"]

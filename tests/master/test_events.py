@@ -1,0 +1,111 @@
+"""Where an event is: the cubic through both ends against numpy, and location to rounding."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from springbeam.events import Sample, cubic_crossing, cubic_value, interpolated, locate, lowest_inside
+from springbeam.subsystem import Motion
+
+SIZE = 0.02
+#: Coefficients in x = τ/H, ascending.
+CUBICS = [(1.0, -3.0, 0.5, 0.2), (0.2, -2.0, 3.0, -0.7), (0.3, 1.0, -4.0, 1.5), (0.1, -1.0, 1.0, 1.0), (1.0, 2.0)]
+
+
+def ends(coefficients) -> tuple[Polynomial, Sample, Sample]:
+    p = Polynomial(coefficients)(Polynomial((0.0, 1.0 / SIZE)))
+    return p, *(Sample(float(p(t)), float(p.deriv()(t))) for t in (0.0, SIZE))
+
+
+@pytest.mark.parametrize("coefficients", CUBICS)
+def test_cubic_value_is_the_cubic(coefficients):
+    p, start, end = ends(coefficients)
+    for tau in (0.0, 0.003, 0.017, SIZE):
+        assert cubic_value(start, end, SIZE, tau) == pytest.approx(p(tau), abs=1e-14)
+
+
+@pytest.mark.parametrize("coefficients", CUBICS)
+def test_interpolated_is_the_cubic_and_its_rate(coefficients):
+    p, start, end = ends(coefficients)
+    for tau in (0.0, 0.003, 0.017, SIZE):
+        got = interpolated(Motion(*start, 0.0, 0.0), Motion(*end, 0.0, 0.0), SIZE, tau)
+        assert got.value == pytest.approx(p(tau), abs=1e-14)
+        assert got.rate == pytest.approx(p.deriv()(tau), abs=1e-12)  # 1e-14/H, rounded up
+
+
+@pytest.mark.parametrize("coefficients", [*CUBICS, (0.0, -1.0, 2.0), (1.0, -2.0), (0.0, -1.0, 0.0, 2.0)])
+def test_lowest_inside_is_the_minimum(coefficients):
+    """Cubics, a parabola and a line; the roots of ṗ where p̈ > 0, if they lie inside."""
+    p, start, end = ends(coefficients)
+    roots = p.deriv().trim().roots() if p.trim().degree() > 1 else []
+    inside = [
+        float(r.real) for r in roots if abs(r.imag) < 1e-12 and 1e-9 < r.real < SIZE - 1e-9 and p.deriv(2)(r.real) > 0.0
+    ]
+    lowest = lowest_inside(start, end, SIZE)
+    assert (lowest is None) == (not inside)
+    if inside:
+        assert lowest == pytest.approx(inside[0], rel=1e-12)
+        assert p(lowest) < min(start.value, end.value)
+
+
+def test_the_set_of_cubics_has_both_answers():
+    found = [lowest_inside(*ends(c)[1:], SIZE) is not None for c in CUBICS]
+    assert 1 < sum(found) < len(found)
+
+
+@pytest.mark.parametrize("x", [1e-6, 0.25, 0.5, 0.999])
+@pytest.mark.parametrize("bend", [0.0, 2.0, -0.5])
+def test_cubic_crossing_is_the_falling_root(x, bend):
+    """(x* − x)(1 + bend x²) falls through zero once in (0, 1); bisection ends at the ulp of H."""
+    p = Polynomial((x, -1.0)) * Polynomial((1.0, 0.0, bend))
+    _, start, end = ends(p.coef)
+    assert cubic_crossing(start, end, SIZE) == pytest.approx(x * SIZE, abs=4e-16 * SIZE)
+
+
+def test_crossing_of_a_start_on_zero_that_rises_first():
+    """x (1 − 2x) starts on zero, rises, and is through at 1/2: zero at the start is not the event."""
+    _, start, end = ends((0.0, 1.0, -2.0))
+    assert cubic_crossing(start, end, SIZE) == pytest.approx(0.5 * SIZE, rel=1e-12)
+
+
+class Counted:
+    """f = cos(ωτ) − level; falls through zero at acos(level)/ω."""
+
+    def __init__(self, omega: float, level: float, slope_sign: float = 1.0) -> None:
+        self.omega, self.level, self.slope_sign = omega, level, slope_sign
+        self.sizes: list[float] = []
+
+    def __call__(self, size: float) -> Sample:
+        self.sizes.append(size)
+        angle = self.omega * size
+        return Sample(math.cos(angle) - self.level, -self.slope_sign * self.omega * math.sin(angle))
+
+
+@pytest.mark.parametrize("level", [0.999, 0.3, -0.9])
+def test_locate_finds_the_event_to_the_tolerance(level):
+    f = Counted(1.0, level)
+    h = locate(f, f(0.0), f(3.0), 3.0, 1e-14, 0.0)
+    # δτ = δf/|ḟ|
+    assert h == pytest.approx(math.acos(level), abs=2e-14 / math.sin(math.acos(level)))
+    assert f.sizes[-1] == h  # the bodies are left there
+    assert len(f.sizes) - 2 <= 8  # Newton: digits double
+
+
+def test_locate_survives_a_rate_of_the_wrong_sign():
+    """Without a usable rate it bisects: 52 halvings to rounding at most."""
+    f = Counted(1.0, 0.3, slope_sign=-1.0)
+    h = locate(f, f(0.0), f(3.0), 3.0, 1e-15, 0.0)
+    assert h == pytest.approx(math.acos(0.3), abs=1e-14)
+    assert len(f.sizes) - 2 <= 55
+
+
+def test_locate_gives_up_where_time_itself_is_rounded():
+    """At t = 1e6 steps that differ by 4 ulp of t are one: no more evaluations are spent on a tolerance of zero."""
+    f = Counted(1.0, 0.3)
+    h = locate(f, f(0.0), f(3.0), 3.0, 0.0, 1e6)
+    assert abs(h - math.acos(0.3)) <= 4.0 * np.finfo(float).eps * 1e6
+    assert len(f.sizes) - 2 <= 35  # 3/(4 ulp of 1e6) = 2^31.6

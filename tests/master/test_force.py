@@ -1,0 +1,93 @@
+"""The polynomial contact force of one step against numpy's polynomials and closed forms."""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+import pytest
+from numpy.polynomial import Legendre, Polynomial
+
+from springbeam.coupling import force
+
+EPS = float(np.finfo(float).eps)
+#: Of degree 0, 1 and 2, with coefficients of both signs.
+COEFFICIENTS = [(0.7,), (0.7, -2.3), (0.7, -2.3, 1.9), (1e-6, 40.0, -3e3)]
+
+
+@pytest.mark.parametrize("size", [1e-5, 1e-3, 2.0])
+@pytest.mark.parametrize("a", COEFFICIENTS)
+def test_legendre_coefficients_and_derivatives_are_one_polynomial(a, size):
+    """To a few ulp of the largest coefficient: the conversions are sums of at most three terms."""
+    bound = 16 * EPS * max(map(abs, a))
+    f = force.derivatives(a, size)
+    exact = Legendre(a, domain=(0.0, size))
+    assert f[0] == pytest.approx(exact(0.0), abs=bound)
+    for k in (1, 2):
+        # In units of the force, like the coefficients.
+        assert f[k] * size**k == pytest.approx(exact.deriv(k)(0.0) * size**k, abs=12 * bound)
+    assert force.legendre(f, size, len(a) - 1) == pytest.approx(a, abs=bound)
+    for tau in (0.0, 0.31 * size, size):
+        assert force.value(f, tau) == pytest.approx(exact(tau), abs=2 * bound)
+    assert force.end_value(f, size) == pytest.approx(sum(a), abs=2 * bound)  # P_k(1) = 1
+    assert force.mean(f, size) == pytest.approx(a[0], abs=2 * bound)  # P_k ⊥ 1 for k > 0
+
+
+def test_cut_above_a_degree_is_the_best_fit():
+    """Legendre series are cut by dropping terms: the rest is the L² projection."""
+    f = force.derivatives((0.7, -2.3, 1.9), 0.01)
+    assert force.legendre(f, 0.01, 1) == pytest.approx([0.7, -2.3], rel=1e-14)
+    assert force.legendre(f, 0.01, 0) == pytest.approx([0.7], rel=1e-14)
+
+
+def test_shifted_is_the_same_polynomial():
+    f, size = force.derivatives((0.7, -2.3, 1.9), 0.25), 0.25
+    g = force.shifted(f, size)
+    assert g[0] == force.end_value(f, size)
+    assert [force.value(g, tau) for tau in (-0.25, 0.1)] == pytest.approx(
+        [force.value(f, tau + size) for tau in (-0.25, 0.1)], rel=1e-14
+    )
+    assert force.legendre(force.shifted(g, -size), size, 2) == pytest.approx([0.7, -2.3, 1.9], rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("inside", "outside"),
+    [((), ()), ((), (-0.3,)), ((), (-0.3, 1.7)), ((0.2,), ()), ((0.2,), (-0.3,)), ((0.2,), (1.7,)), ((0.2, 0.9), ())],
+)
+def test_sign_changes_are_the_roots_inside(inside, outside):
+    size = 0.01
+    roots = [size * x for x in (*inside, *outside)]
+    c = (3.0 * Polynomial.fromroots(roots)).coef if roots else np.array([3.0])
+    f = tuple(float(x) for x in (np.append(c, (0.0, 0.0))[:3] * (1.0, 1.0, 2.0)))
+    expected = sorted(r.real for r in np.roots(c[::-1]) if abs(r.imag) < 1e-12 and 0.0 < r.real < size)
+    assert len(expected) == len(inside)
+    assert force.sign_changes(f, size) == pytest.approx(expected, rel=1e-13)
+
+
+def test_sign_changes_near_the_start_do_not_cancel():
+    """Roots 1e-12 and 1: the naive quadratic formula leaves four digits of the small one."""
+    assert force.sign_changes((1e-12, -(1.0 + 1e-12), 2.0), 2.0) == pytest.approx([1e-12, 1.0], rel=1e-15)
+
+
+@pytest.mark.parametrize("f", [(1.0, 0.0, 0.0), (1.0, -2.0, 2.0), (1.0, -2.0, 4.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
+def test_no_sign_change_where_the_force_only_touches_zero(f):
+    """Constant; double root; complex roots; a root at the start itself."""
+    assert force.sign_changes(f, 5.0) == []
+
+
+@pytest.mark.parametrize("size", [1e-4, 0.5])
+def test_free_mass_response_is_the_repeated_integral(size):
+    """m y⁽²⁾ = −P_k from rest: displacement, velocity and both integrals are its 2nd, 1st, 3rd, 4th integrals."""
+    mass = 0.37
+    for k, motion in enumerate(force.free_mass_response(2, size, mass)):
+        p = Legendre.basis(k, domain=(0.0, size))
+        exact = [-p.integ(n, lbnd=0.0)(size) / mass for n in (2, 1, 3, 4)]
+        scales = [size**n / mass for n in (2, 1, 3, 4)]
+        for got, want, scale in zip(motion, exact, scales, strict=True):
+            assert got == pytest.approx(want, abs=4 * EPS * scale)
+
+
+def test_free_mass_response_to_a_constant_force():
+    """−1 N on 1 kg: −Hⁿ/n!."""
+    (motion,) = force.free_mass_response(0, 2.0, 1.0)
+    assert motion == pytest.approx([-(2.0**n) / factorial(n) for n in (2, 1, 3, 4)], rel=1e-15)
