@@ -136,7 +136,16 @@ class _Fmu:
             raise FmuError(f"{self.path}: has no variable {name!r}") from None
 
     def references(self, *names: str) -> Any:
-        return (c_uint * len(names))(*[self.reference(name) for name in names])
+        """Value references of Real variables; read once here, so that a wrong one is found before the run."""
+        found = (c_uint * len(names))(*[self.reference(name) for name in names])
+        for name in names:
+            if self._variables[name].type != "Real":
+                raise FmuError(f"{self.path}: variable {name!r} is {self._variables[name].type}, expected Real")
+        try:
+            self.get(found, (c_double * len(names))())
+        except FMICallException as error:
+            raise FmuError(f"{self.path}: cannot read {', '.join(names)}: {self._cause(error)}") from error
+        return found
 
     def mark(self) -> None:
         self._slave.fmi2GetFMUstate(self._slave.component, byref(self._state))

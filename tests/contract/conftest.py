@@ -141,9 +141,7 @@ class Instance:
     def derive(self, name: str, order: int, value: float) -> int:
         """Set an input's derivative."""
         reference = (ct.c_uint * 1)(self.fmu.variables[name].valueReference)
-        return self.call(
-            "fmi2SetRealInputDerivatives", reference, 1, (ct.c_int * 1)(order), (ct.c_double * 1)(value)
-        )
+        return self.call("fmi2SetRealInputDerivatives", reference, 1, (ct.c_int * 1)(order), (ct.c_double * 1)(value))
 
     def derivative(self, name: str, order: int = 1) -> tuple[int, float]:
         reference = (ct.c_uint * 1)(self.fmu.variables[name].valueReference)

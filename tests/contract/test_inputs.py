@@ -26,9 +26,7 @@ def test_free_mass_under_a_polynomial_force_is_exact(spring: Any) -> None:
     assert y == pytest.approx(y0 + z0 * H + f[0] * H**2 / 2 + f[1] * H**3 / 6 + f[2] * H**4 / 24, rel=1e-10)
     powers = [y0, z0, f[0], f[1], f[2]]
     factorials = [1, 1, 2, 6, 24, 120, 720]
-    assert integral == pytest.approx(
-        sum(p * H ** (i + 1) / factorials[i + 1] for i, p in enumerate(powers)), rel=1e-10
-    )
+    assert integral == pytest.approx(sum(p * H ** (i + 1) / factorials[i + 1] for i, p in enumerate(powers)), rel=1e-10)
     assert integral_2 == pytest.approx(
         sum(p * H ** (i + 2) / factorials[i + 2] for i, p in enumerate(powers)), rel=1e-10
     )

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import springbeam
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
+
+import springbeam
 
 TIMES = np.array([0.05, 0.1, 0.2, 0.4])  # in contact, after the first and further foundation impacts
 LAW = {"compliance_stiffness": 1e6, "compliance_exponent": 1.5}

@@ -1,0 +1,119 @@
+"""Broken FMUs: the master names the file and the cause."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import springbeam
+from springbeam.fmu import FmuError, load_bodies
+
+Files = dict[str, bytes]
+XML = "modelDescription.xml"
+BINARY = "binaries/linux64/beam.so"
+
+
+def edited(pattern: str, replacement: str) -> Callable[[Files], None]:
+    def edit(files: Files) -> None:
+        before = files[XML].decode()
+        after = re.sub(pattern, replacement, before, count=1, flags=re.S)
+        assert after != before, pattern
+        files[XML] = after.encode()
+
+    return edit
+
+
+def without(name: str) -> Callable[[Files], None]:
+    return lambda files: files.__delitem__(name)
+
+
+def replaced(name: str, content: bytes) -> Callable[[Files], None]:
+    return lambda files: files.__setitem__(name, content)
+
+
+def renamed(old: str, new: str) -> Callable[[Files], None]:
+    return lambda files: files.__setitem__(new, files.pop(old))
+
+
+TIP_FORCE = r'(name="tip_force" valueReference=")\d+'
+BROKEN: dict[str, tuple[Callable[[Files], None], str]] = {
+    "no description": (without(XML), "modelDescription.xml"),
+    "description is not XML": (replaced(XML, b"<fmiModelDescription"), "XML|markup|parse|syntax|find end"),
+    "description breaks the schema": (edited(r"<CoSimulation", '<CoSimulation colour="red"'), "colour"),
+    "another FMI version": (edited(r'fmiVersion="2.0"', 'fmiVersion="9.9"'), r"9\.9|version"),
+    "no co-simulation": (edited(r"<CoSimulation[^>]*/>", '<ModelExchange modelIdentifier="beam"/>'), "co-simulation"),
+    "another model identifier": (edited(r'modelIdentifier="beam"', 'modelIdentifier="cable"'), "'cable'"),
+    "wrong GUID": (edited(r'guid="\{[^"]*\}"', 'guid="{0}"'), r"fmuGUID = \{0\} is not that of this FMU"),
+    "no binary": (without(BINARY), r"beam\.so|platform|binary|binaries"),
+    "binary of another platform": (renamed(BINARY, "binaries/win64/beam.dll"), r"linux64|platform|beam\.so|binar"),
+    "binary is no library": (replaced(BINARY, b"not an ELF file"), r"ELF|invalid|header|too short"),
+    "empty binary": (replaced(BINARY, b""), r"file too short|ELF|empty"),
+    "a variable is missing": (edited(r'name="tip_force"', 'name="tip_farce"'), "tip_force"),
+    "value reference that does not exist": (edited(TIP_FORCE, r"\g<1>4711"), "4711|tip_force"),
+    "wrong type": (
+        edited(r'(name="tip_impulse".*?)<Real[^>]*/>', r'\1<Integer start="0"/>'),
+        "tip_impulse",
+    ),
+}
+
+
+@pytest.fixture
+def folder(fmu_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name in ("beam", "spring"):
+        shutil.copy(fmu_folder / f"{name}.fmu", tmp_path)
+    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
+    return tmp_path
+
+
+def refusal(folder: Path) -> str:
+    with pytest.raises(FmuError) as caught:
+        load_bodies(springbeam.load_scene("soft"), 0.0)
+    message = str(caught.value)
+    assert str(folder / "beam.fmu") in message
+    return message
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_content_is_named(folder: Path, name: str) -> None:
+    damage, cause = BROKEN[name]
+    path = folder / "beam.fmu"
+    with zipfile.ZipFile(path) as archive:
+        files = {entry: archive.read(entry) for entry in archive.namelist()}
+    damage(files)
+    with zipfile.ZipFile(path, "w") as archive:
+        for entry, content in files.items():
+            archive.writestr(entry, content)
+    assert re.search(cause, refusal(folder).replace(str(path), ""))
+
+
+def test_missing_file_is_named(folder: Path) -> None:
+    (folder / "beam.fmu").unlink()
+    assert "not found" in refusal(folder)
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip"])
+def test_file_that_is_no_archive_is_named(folder: Path, content: bytes) -> None:
+    (folder / "beam.fmu").write_bytes(content)
+    assert "zip" in refusal(folder).lower()
+
+
+def test_truncated_archive_is_named(folder: Path) -> None:
+    path = folder / "beam.fmu"
+    path.write_bytes(path.read_bytes()[:-2000])
+    assert "zip" in refusal(folder).lower()
+
+
+def test_library_of_the_other_fmu_is_refused(folder: Path, fmu_folder: Path) -> None:
+    path = folder / "beam.fmu"
+    with zipfile.ZipFile(path) as archive, zipfile.ZipFile(fmu_folder / "spring.fmu") as other:
+        files = {entry: archive.read(entry) for entry in archive.namelist()}
+        files[BINARY] = other.read("binaries/linux64/spring.so")
+    with zipfile.ZipFile(path, "w") as archive:
+        for entry, content in files.items():
+            archive.writestr(entry, content)
+    assert "is not that of this FMU" in refusal(folder)
