@@ -16,7 +16,6 @@ from math import factorial
 import numpy as np
 from scipy.linalg import eigh, expm
 
-from springbeam.contact import first_contact
 from springbeam.recording import MemoryRecorder
 from springbeam.scene import Beam, Scene
 from springbeam.simulation import RunStopped, Simulation
@@ -320,7 +319,7 @@ def simulate(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> Trajecto
     """The master's run with the doubles (``wrap`` may replace them); ``summary["stopped"]`` holds a RunStopped."""
     beam, spring = wrap(*bodies(scene))
     recorder = MemoryRecorder(scene)
-    simulation = Simulation(scene, first_contact(scene), beam, spring, recorder)
+    simulation = Simulation(scene, (scene.contact_time or 0.0), beam, spring, recorder)
     stopped = None
     try:
         simulation.run()

@@ -2,7 +2,7 @@
 
 g(H) = 0, ġ(H) = 0 and, for degree 2, ∫ g dτ = 0. Because the velocities agree wherever a step ends, a step that ends
 on an event hands the right velocities to it, and the order holds through events. The price is stability: the work
-∫ C ġ dτ does not vanish, and the scheme amplifies modes with ωH beyond a bound that `springbeam.stability` computes.
+∫ C ġ dτ does not vanish, and the scheme amplifies modes beyond a bound on ωH (``docs/coupling.md`` has it measured).
 """
 
 from __future__ import annotations
