@@ -52,11 +52,20 @@ std::string escaped(const std::string& s) {
   std::string out;
   for (char c : s) {
     switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
     }
   }
   return out;
@@ -109,8 +118,12 @@ void write_variable(std::ostream& out, const Variable& v, std::size_t reference)
   const bool is_parameter = v.causality == Causality::parameter;
   out << "    <ScalarVariable" << attribute("name", v.name) << attribute("valueReference", std::to_string(reference))
       << attribute("description", v.description)
-      << attribute("causality", is_output ? "output" : is_parameter ? "parameter" : "input")
-      << attribute("variability", is_parameter ? "fixed" : v.consumed || v.type != Type::real ? "discrete" : "continuous");
+      << attribute("causality", is_output      ? "output"
+                                : is_parameter ? "parameter"
+                                               : "input")
+      << attribute("variability", is_parameter                         ? "fixed"
+                                  : v.consumed || v.type != Type::real ? "discrete"
+                                                                       : "continuous");
   if (is_parameter || is_output) out << attribute("initial", is_parameter || v.exact ? "exact" : "calculated");
   out << ">\n      <";
   switch (v.type) {
@@ -125,7 +138,9 @@ void write_variable(std::ostream& out, const Variable& v, std::size_t reference)
       out << "Integer";
       if (!v.choice.empty()) out << attribute("declaredType", v.choice);
       break;
-    case Type::boolean: out << "Boolean"; break;
+    case Type::boolean:
+      out << "Boolean";
+      break;
   }
   if (v.type != Type::boolean) {
     if (std::isfinite(v.min)) out << attribute("min", value_text(v, v.min));
@@ -169,9 +184,8 @@ std::string document(const Table& t, const std::string& identity, const std::str
       << attribute("version", SPRINGBEAM_VERSION) << attribute("license", "BSD-3-Clause")
       << attribute("generationTool", "springbeam " SPRINGBEAM_VERSION)
       << attribute("variableNamingConvention", "structured") << attribute("numberOfEventIndicators", "0") << ">\n";
-  out << "  <CoSimulation" << attribute("modelIdentifier", t.identifier)
-      << attribute("needsExecutionTool", "false") << attribute("canHandleVariableCommunicationStepSize", "true")
-      << attribute("canInterpolateInputs", "true")
+  out << "  <CoSimulation" << attribute("modelIdentifier", t.identifier) << attribute("needsExecutionTool", "false")
+      << attribute("canHandleVariableCommunicationStepSize", "true") << attribute("canInterpolateInputs", "true")
       << attribute("maxOutputDerivativeOrder", std::to_string(max_output_derivative_order))
       << attribute("canRunAsynchronuously", "false") << attribute("canBeInstantiatedOnlyOncePerProcess", "false")
       << attribute("canNotUseMemoryManagementFunctions", "true") << attribute("canGetAndSetFMUstate", "true")

@@ -19,8 +19,8 @@ namespace {
 using fmi::Phase;
 using fmi::Snapshot;
 
-constexpr unsigned any_phase = fmi::instantiated | fmi::initialization | fmi::step_complete | fmi::step_failed |
-                               fmi::terminated | fmi::error;
+constexpr unsigned any_phase =
+    fmi::instantiated | fmi::initialization | fmi::step_complete | fmi::step_failed | fmi::terminated | fmi::error;
 constexpr unsigned after_instantiation = any_phase & ~static_cast<unsigned>(fmi::instantiated);
 // Inputs are accepted before initialization too: several importers set them there.
 constexpr unsigned settable = fmi::instantiated | fmi::initialization | fmi::step_complete;
@@ -82,12 +82,24 @@ fmi2Status guard(fmi2Component c, const char* function, unsigned legal, Body bod
       if ((component.instance.phase & legal) == 0) {
         const char* phase = "?";
         switch (component.instance.phase) {
-          case fmi::instantiated: phase = "before initialization"; break;
-          case fmi::initialization: phase = "in initialization mode"; break;
-          case fmi::step_complete: phase = "between steps"; break;
-          case fmi::step_failed: phase = "after a discarded step (restore a state or reset first)"; break;
-          case fmi::terminated: phase = "after fmi2Terminate"; break;
-          case fmi::error: phase = "after an error (restore a state or reset first)"; break;
+          case fmi::instantiated:
+            phase = "before initialization";
+            break;
+          case fmi::initialization:
+            phase = "in initialization mode";
+            break;
+          case fmi::step_complete:
+            phase = "between steps";
+            break;
+          case fmi::step_failed:
+            phase = "after a discarded step (restore a state or reset first)";
+            break;
+          case fmi::terminated:
+            phase = "after fmi2Terminate";
+            break;
+          case fmi::error:
+            phase = "after an error (restore a state or reset first)";
+            break;
         }
         throw std::logic_error(std::string("not allowed ") + phase);
       }
@@ -239,8 +251,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
-  return guard(c, "fmi2GetReal", any_phase,
-               [&](Component& k) { get_values(k, vr, nvr, value, fmi::Type::real); });
+  return guard(c, "fmi2GetReal", any_phase, [&](Component& k) { get_values(k, vr, nvr, value, fmi::Type::real); });
 }
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
   return guard(c, "fmi2GetInteger", any_phase,
@@ -255,16 +266,13 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
-  return guard(c, "fmi2SetReal", settable,
-               [&](Component& k) { set_values(k, vr, nvr, value, fmi::Type::real); });
+  return guard(c, "fmi2SetReal", settable, [&](Component& k) { set_values(k, vr, nvr, value, fmi::Type::real); });
 }
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[]) {
-  return guard(c, "fmi2SetInteger", settable,
-               [&](Component& k) { set_values(k, vr, nvr, value, fmi::Type::integer); });
+  return guard(c, "fmi2SetInteger", settable, [&](Component& k) { set_values(k, vr, nvr, value, fmi::Type::integer); });
 }
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[]) {
-  return guard(c, "fmi2SetBoolean", settable,
-               [&](Component& k) { set_values(k, vr, nvr, value, fmi::Type::boolean); });
+  return guard(c, "fmi2SetBoolean", settable, [&](Component& k) { set_values(k, vr, nvr, value, fmi::Type::boolean); });
 }
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String[]) {
   return guard(c, "fmi2SetString", settable, [&](Component&) { no_strings(vr, nvr); });
@@ -321,8 +329,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
   return guard(c, "fmi2DeSerializeFMUstate", any_phase, [&](Component& k) {
     require(serializedState, "serializedState");
     require(FMUstate, "FMUstate");
-    Snapshot snapshot =
-        fmi::deserialize(serializedState, size, fmi::guid(fmi::table()), fmi::table().variables.size());
+    Snapshot snapshot = fmi::deserialize(serializedState, size, fmi::guid(fmi::table()), fmi::table().variables.size());
     if (*FMUstate) {
       k.state(*FMUstate) = std::move(snapshot);
     } else {
@@ -331,8 +338,8 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
   });
 }
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference[], size_t,
-                                        const fmi2ValueReference[], size_t, const fmi2Real[], fmi2Real[]) {
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference[], size_t, const fmi2ValueReference[],
+                                        size_t, const fmi2Real[], fmi2Real[]) {
   return guard(c, "fmi2GetDirectionalDerivative", after_instantiation,
                [](Component&) { throw std::logic_error("not provided (providesDirectionalDerivative=\"false\")"); });
 }

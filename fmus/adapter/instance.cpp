@@ -11,9 +11,12 @@ namespace {
 
 const char* name(Type type) {
   switch (type) {
-    case Type::real: return "Real";
-    case Type::integer: return "Integer";
-    case Type::boolean: return "Boolean";
+    case Type::real:
+      return "Real";
+    case Type::integer:
+      return "Integer";
+    case Type::boolean:
+      return "Boolean";
   }
   return "?";
 }
@@ -153,8 +156,8 @@ void Instance::step(double time, double size) {
     throw std::invalid_argument("currentCommunicationPoint = " + text(time) + ", but the slave is at " + text(time_));
   }
   if (time + size > stop_time_ + 1e-6 * size + 1e-9 * std::abs(stop_time_)) {
-    throw std::invalid_argument("a step from " + text(time) + " to " + text(time + size) +
-                                " goes past the stop time " + text(stop_time_));
+    throw std::invalid_argument("a step from " + text(time) + " to " + text(time + size) + " goes past the stop time " +
+                                text(stop_time_));
   }
   ensure_built();
   push_inputs();

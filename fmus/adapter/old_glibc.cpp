@@ -90,12 +90,10 @@ HIDDEN int _dl_find_object(void* pc, dl_find_object* found) noexcept {
 
 #if __GLIBC_PREREQ(2, 38)
 // C23 reads "0b…" numbers; nothing here does.
-#define OLD_STRTO(type, name)                                      \
-  extern "C" type old_##name(const char*, char**, int);            \
-  __asm__(".symver old_" #name "," #name "@GLIBC_2.2.5");          \
-  HIDDEN type __isoc23_##name(const char* s, char** e, int base) { \
-    return old_##name(s, e, base);                                 \
-  }
+#define OLD_STRTO(type, name)                             \
+  extern "C" type old_##name(const char*, char**, int);   \
+  __asm__(".symver old_" #name "," #name "@GLIBC_2.2.5"); \
+  HIDDEN type __isoc23_##name(const char* s, char** e, int base) { return old_##name(s, e, base); }
 OLD_STRTO(long, strtol)
 OLD_STRTO(unsigned long, strtoul)
 OLD_STRTO(long long, strtoll)

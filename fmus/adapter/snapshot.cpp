@@ -41,13 +41,9 @@ std::size_t count(const Snapshot& s) { return fixed_count + 3 * s.settings.size(
 std::size_t serialized_size(const Snapshot& snapshot) { return sizeof(Header) + count(snapshot) * sizeof(double); }
 
 void serialize(const Snapshot& s, const std::string& guid, char* bytes) {
-  std::vector<double> values{static_cast<double>(s.phase),
-                             static_cast<double>(s.last_status),
-                             s.time,
-                             s.stop_time,
-                             s.tolerance,
-                             s.built ? 1.0 : 0.0,
-                             static_cast<double>(s.numerics.size())};
+  std::vector<double> values{
+      static_cast<double>(s.phase), static_cast<double>(s.last_status),    s.time, s.stop_time, s.tolerance,
+      s.built ? 1.0 : 0.0,          static_cast<double>(s.numerics.size())};
   for (const Polynomial& p : s.settings) values.insert(values.end(), p.begin(), p.end());
   values.insert(values.end(), s.numerics.begin(), s.numerics.end());
 

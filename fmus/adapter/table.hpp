@@ -26,19 +26,19 @@ struct Variable {
   std::string unit;  ///< one of units(), empty if dimensionless
   std::string description;
   std::string choice;  ///< name of its type, see Table::choices
-  double start = 0.0;       ///< of parameters, inputs and exact outputs
+  double start = 0.0;  ///< of parameters, inputs and exact outputs
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
   double nominal = 1.0;
   bool exact = false;     ///< an output whose start is the initial state (initial="exact")
   bool consumed = false;  ///< an input that acts once: read back as 0 after the step that used it
 
-  std::function<void(Model&, const Polynomial&)> set;    ///< parameters, inputs, exact outputs
-  std::function<double(const Model&)> get;               ///< outputs
-  std::function<double(const Model&)> derivative;        ///< outputs that know their time derivative
-  bool interpolated = false;                             ///< an input that takes derivatives
-  std::vector<std::string> depends_on;                   ///< inputs that an output follows without a step
-  std::vector<std::string> starts_from;                  ///< what an output depends on at initialization
+  std::function<void(Model&, const Polynomial&)> set;  ///< parameters, inputs, exact outputs
+  std::function<double(const Model&)> get;             ///< outputs
+  std::function<double(const Model&)> derivative;      ///< outputs that know their time derivative
+  bool interpolated = false;                           ///< an input that takes derivatives
+  std::vector<std::string> depends_on;                 ///< inputs that an output follows without a step
+  std::vector<std::string> starts_from;                ///< what an output depends on at initialization
 
   // Named arguments.
   Variable& range(double low, double high) { return min = low, max = high, *this; }
@@ -81,7 +81,7 @@ class TableBuilder {
   Variable& parameter(const std::string& name, const std::string& unit, P M::*parameters, T B::*field,
                       const std::string& description) {
     Variable& v = add(name, unit, description, Causality::parameter);
-    v.type = std::is_same_v<T, bool>                            ? Type::boolean
+    v.type = std::is_same_v<T, bool>                      ? Type::boolean
              : std::is_integral_v<T> || std::is_enum_v<T> ? Type::integer
                                                           : Type::real;
     v.start = static_cast<double>(P{}.*field);
@@ -152,8 +152,7 @@ class TableBuilder {
     }
   }
 
-  Variable& add(const std::string& name, const std::string& unit, const std::string& description,
-                Causality causality) {
+  Variable& add(const std::string& name, const std::string& unit, const std::string& description, Causality causality) {
     Variable v;
     v.name = name;
     v.unit = unit;

@@ -22,6 +22,8 @@ struct BeamModel final : fmi::Model {
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override { beam.emplace(parameters); }
 
+  void observe() override { beam->set_distributed_load(distributed_load); }
+
   void step(double size) override {
     std::vector<double> before;
     if (tip_impulse != 0.0) beam->save(before);
@@ -89,7 +91,8 @@ fmi::Table make_table() {
       .range(0, 1);
   parameter("initial_deflection_slope", "", &Parameters::initial_deflection_slope,
             "s in the initial deflection u = s*x");
-  parameter("initial_velocity_slope", "1/s", &Parameters::initial_velocity_slope, "s in the initial velocity u_t = s*x");
+  parameter("initial_velocity_slope", "1/s", &Parameters::initial_velocity_slope,
+            "s in the initial velocity u_t = s*x");
   parameter("tip_load_coefficient", "N/m", &Parameters::tip_load_coefficient,
             "coefficient of the last hat function in the distributed load");
 
@@ -104,30 +107,42 @@ fmi::Table make_table() {
 
   const std::vector<std::string> start_u{"initial_deflection_slope", "length"};
   const std::vector<std::string> start_v{"initial_velocity_slope", "length"};
+  // What the modal basis depends on: the start is projected onto the modes that are kept.
+  const std::vector<std::string> basis{
+      "density",    "area",    "second_moment_of_area", "young_modulus", "shear_modulus", "length", "shear_coefficient",
+      "n_elements", "n_modes", "reduced_integration",   "integrator"};
+  std::vector<std::string> start_shape = basis;
+  start_shape.push_back("initial_deflection_slope");
   add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),
              of(&Beam::tip_velocity))
       .from(start_u);
   add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
       .from(start_v);
-  add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation));
+  add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation))
+      .from(start_shape);
   add.output("tip_displacement_integral", "m.s", "integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral), of(&Beam::tip_displacement));
   add.output("tip_displacement_integral_2", "m.s2", "double integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral_2), of(&Beam::tip_displacement_integral));
-  add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy));
-  add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy));
+  add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy))
+      .from({"density", "area", "length", "initial_velocity_slope"});
+  add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy))
+      .from({"area", "shear_modulus", "shear_coefficient", "length", "initial_deflection_slope"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy));
-  add.output("load_potential", "J", "potential of the distributed load of the last step", of(&Beam::load_potential));
-  add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam",
-             of(&Beam::tip_mass));
+  add.output("load_potential", "J", "potential of the distributed load of the last step", of(&Beam::load_potential))
+      .from({"length", "n_elements", "initial_deflection_slope", "tip_load_coefficient"});
+  add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
+      .from(basis);
   for (int i = 0; i < beam::shape_points; ++i) {
     const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
-    add.output("deflection[" + std::to_string(i + 1) + "]", "m", "deflection" + x, point(i, &Beam::deflection));
+    add.output("deflection[" + std::to_string(i + 1) + "]", "m", "deflection" + x, point(i, &Beam::deflection))
+        .from(i == 0 ? std::vector<std::string>{} : start_u);
   }
   for (int i = 0; i < beam::shape_points; ++i) {
     const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
     add.output("rotation[" + std::to_string(i + 1) + "]", "rad", "rotation of the cross-section" + x,
-               point(i, &Beam::rotation));
+               point(i, &Beam::rotation))
+        .from(i == 0 ? std::vector<std::string>{} : start_shape);
   }
   return t;
 }

@@ -197,7 +197,8 @@ fmi::Table make_table() {
              of(&Spring::displacement_integral), of(&Spring::displacement));
   add.output("displacement_integral_2", "m.s2", "double integral of displacement over the last step",
              of(&Spring::displacement_integral_2), of(&Spring::displacement_integral));
-  add.output("reaction", "N", "contact force of the law inside, 0 when contact_law = 1", [](const SpringModel& m) { return m.reaction(); })
+  add.output("reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
+             [](const SpringModel& m) { return m.reaction(); })
       .follows({"tip_displacement"})
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
@@ -205,7 +206,8 @@ fmi::Table make_table() {
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});
   add.output("potential_energy", "J", "potential energy of the spring", of(&Spring::potential_energy))
       .from({"linear_stiffness", "cubic_stiffness", "displacement"});
-  add.output("contact_energy", "J", "energy stored in the contact law inside", [](const SpringModel& m) { return m.contact_energy(); })
+  add.output("contact_energy", "J", "energy stored in the contact law inside",
+             [](const SpringModel& m) { return m.contact_energy(); })
       .follows({"tip_displacement"})
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Spring::dissipated_energy));

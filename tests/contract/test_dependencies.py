@@ -1,0 +1,116 @@
+"""ModelStructure says what outputs depend on, no more and no less: found out by changing one thing at a time."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from typing import Any
+
+# Base points: between them every declared dependency shows.
+BASES: dict[str, list[dict[str, float]]] = {
+    "beam": [
+        {},
+        {"n_modes": 3},
+        {"integrator": 2},
+        {"integrator": 2, "reduced_integration": True},
+    ],
+    "spring": [
+        {},
+        {"contact_law": 2},
+        {"contact_law": 2, "tip_mass": 0.1},
+        {"contact_law": 2, "tip_mass": 0.1, "late_exchange": True},
+    ],
+}
+COMMON: dict[str, dict[str, float]] = {
+    "beam": {
+        "young_modulus": 100.0,
+        "shear_modulus": 70.0,
+        "n_elements": 10,
+        "initial_deflection_slope": 0.3,
+        "initial_velocity_slope": -1.0,
+        "distributed_load": 0.5,
+        "tip_load_coefficient": 0.2,
+        "tip_force": 0.1,
+    },
+    "spring": {
+        "mass": 1.2,
+        "damping": 0.1,
+        "linear_stiffness": 3.0,
+        "cubic_stiffness": -0.2,
+        "displacement": 0.3,
+        "velocity": -1.0,
+        "tip_displacement": 0.1,
+        "tip_velocity": 0.2,
+        "contact_force": 0.3,
+        "stop_enabled": True,
+    },
+}
+# Values that are not a factor of the base's.
+CHANGES: dict[str, list[float]] = {
+    "n_elements": [12],
+    "n_modes": [0, 4],
+    "reduced_integration": [True, False],
+    "integrator": [1, 2],
+    "contact_law": [1, 2],
+    "late_exchange": [True, False],
+    "stop_enabled": [True, False],
+    "rho_inf": [0.5],
+    "restitution": [0.5],
+    "relative_tolerance": [1e-8],
+    "absolute_tolerance": [1e-9],
+}
+
+
+def started(case: Any, values: dict[str, float]) -> dict[str, float]:
+    k = case.fmu.instance()
+    k.setup()
+    for name, value in values.items():
+        k.set(name, value)
+    assert k.call("fmi2EnterInitializationMode") == 0
+    outputs = dict(zip(case.fmu.outputs, k.outputs(), strict=True))
+    k.free()
+    return outputs
+
+
+def declared(case: Any, section: str) -> dict[str, set[str]]:
+    root = ET.parse(case.fmu.folder / "modelDescription.xml").getroot()
+    names = [v.get("name", "") for v in root.iter("ScalarVariable")]
+    return {
+        names[int(u.get("index", "")) - 1]: {names[int(i) - 1] for i in u.get("dependencies", "").split()}
+        for u in root.iterfind(f"ModelStructure/{section}/Unknown")
+    }
+
+
+def differ(a: float, b: float) -> bool:
+    return abs(a - b) > 1e-9 * max(abs(a), abs(b), 1e-9)  # rounding is no dependence
+
+
+def test_initial_unknowns(case: Any) -> None:
+    found: dict[str, set[str]] = {name: set() for name in case.fmu.outputs}
+    knobs = [v.name for v in case.fmu.description.modelVariables if v.causality != "output" or v.initial == "exact"]
+    for base in BASES[case.name]:
+        values = {**COMMON[case.name], **base}
+        before = started(case, values)
+        for name in knobs:
+            start = values.get(name, float(case.fmu.variables[name].start or 0.0) if name not in CHANGES else 0.0)
+            for value in CHANGES.get(name, [1.25 * start + 0.01]):
+                after = started(case, {**values, name: value})
+                for output in case.fmu.outputs:
+                    if differ(before[output], after[output]):
+                        found[output].add(name)
+    exact = {v.name for v in case.fmu.description.modelVariables if v.causality == "output" and v.initial == "exact"}
+    assert {name: found[name] for name in found if name not in exact} == declared(case, "InitialUnknowns")
+
+
+def test_outputs_follow_between_steps_what_is_declared(case: Any) -> None:
+    found: dict[str, set[str]] = {name: set() for name in case.fmu.outputs}
+    for base in BASES[case.name]:
+        for name in [v.name for v in case.fmu.description.modelVariables if v.causality == "input"]:
+            k = case.fmu.running(**{**COMMON[case.name], **base})
+            k.step(0.0, 1e-3)
+            before = k.outputs()
+            k.set(name, k.get(name) - 0.05)
+            for output, a, b in zip(case.fmu.outputs, before, k.outputs(), strict=True):
+                if differ(a, b):
+                    found[output].add(name)
+            k.free()
+    assert found == declared(case, "Outputs")
