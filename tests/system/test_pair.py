@@ -158,6 +158,14 @@ def test_agrees_with_the_reference(case):
     assert trajectory.summary["max_energy_residual"] < 1e-9
 
 
+def test_the_ledger_starts_with_the_potential_of_the_loads():
+    """A deflected beam under f_b holds −∫f_b u dx = −f_b s/2 before the first step."""
+    beam = {"distributed_load": -2.0, "initial_deflection_slope": 0.05, "approach": "elastic"}
+    trajectory = simulate(with_changes(load_scene("soft"), time={"t_end": 0.1}, beam=beam))
+    assert trajectory.e_load[0] == pytest.approx(0.05, rel=1e-12)
+    assert trajectory.summary["max_energy_residual"] < 1e-9
+
+
 def test_bounces_die_out_and_the_spring_stays_seated():
     """A constant load presses tip and spring onto the foundation: N settles at the static balance."""
     scene = with_changes(
