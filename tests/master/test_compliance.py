@@ -73,11 +73,11 @@ def test_energy_is_conserved_at_any_stiffness(stiffness, q):
     assert np.abs(energies - energies[0]).max() < 1e-11 * energies[0]
 
 
-@pytest.mark.parametrize(("stiffness", "q"), [(1e2, 1.0), (1e3, 1.0), (1e5, 2.0)])
+@pytest.mark.parametrize(("stiffness", "q"), [(1e3, 1.0), (1e5, 2.0)])
 def test_second_order_in_a_smooth_contact(stiffness, q):
     """Displacements and velocities at t = 0.05, against the run at H/8: its own error shifts orders by 0.02."""
     t = 0.05
-    last = [couple(stiffness, q, t / n, n + 1)[0][-1, :4] for n in (25, 50, 100, 800)]
+    last = [couple(stiffness, q, t / n, n + 1)[0][-1, :4] for n in (50, 100, 200, 1600)]
     errors = np.abs(np.array(last[:3]) - last[3])
     for column in errors.T:
         assert orders(column, (4.0, 2.0, 1.0)) == pytest.approx([2.0, 2.0], abs=0.25)
