@@ -1,0 +1,251 @@
+"""The tie by itself, on bodies exact to rounding: conditions, energy, orders, cost, stability, failures."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from bodies import DuffingBody, ModalBody, drift, modal_beam, orders
+
+from springbeam.coupling import conditions, force
+from springbeam.coupling.tie import NotConverged, Tie
+from springbeam.subsystem import NO_FORCE, Force, Motion, StepRefused
+
+SCHEMES = [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
+
+
+class Row(NamedTuple):
+    beam: Motion
+    spring: Motion
+    force: Force
+    energy: float  #: after the step
+
+
+def after_impact(n: int, stiffness: float = 100.0, **spring: float) -> tuple[ModalBody, DuffingBody]:
+    """A beam that has just met a spring top at rest inelastically."""
+    beam, top = modal_beam(n, stiffness), DuffingBody(**spring)
+    j = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
+    beam.apply_impulse(j)
+    top.apply_impulse(-j)
+    return beam, top
+
+
+def couple(scheme: str, degree: int, size: float, steps: int, beam, spring) -> list[Row]:
+    tie = Tie(conditions(scheme, degree), degree, 1e-12, size)
+    rows, guess = [], NO_FORCE
+    for i in range(steps):
+        for body in (beam, spring):
+            body.mark()
+        f = tie.solve(beam, spring, i * size, size, guess, beam.motion())
+        guess = force.shifted(f, size)
+        rows.append(Row(beam.motion(), spring.motion(), f, drift((beam, spring))))
+    return rows
+
+
+# -- the conditions -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("scheme", "degree"), SCHEMES)
+@pytest.mark.parametrize("mass", [0.01, 1.0, 100.0])
+def test_the_conditions_of_the_scheme_hold(scheme, degree, mass):
+    """To the tolerance, 1e-12 of the motion over the step: here H·|u̇| ≤ 2 mm."""
+    size = 2e-3
+    beam, spring = after_impact(6, mass=mass, k2=300.0)
+    for row in couple(scheme, degree, size, 20, beam, spring):
+        gap = np.subtract(row.beam, row.spring)
+        s = (gap[2] - 2.0 * gap[3] / size) / size  # mean of s·g, s = 2τ/H − 1
+        vanishing = {
+            "energy": (gap[0], gap[2] / size, s),
+            "hermite": (gap[0], size * gap[1], gap[2] / size),
+        }[scheme][: degree + 1]
+        assert np.abs(vanishing).max() <= 1e-12 * size
+
+
+@pytest.mark.parametrize(("scheme", "degree"), [("energy", 1), ("energy", 2), ("hermite", 2)])
+def test_the_reported_integrals_are_those_of_the_gap(scheme, degree):
+    """The step repeated to Gauss points: ∫g and ∫τg vanish as integrals of what the ends really do."""
+    size = 5e-3
+    beam, spring = after_impact(3)
+    (row,) = couple(scheme, degree, size, 1, beam, spring)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    gaps = []
+    for x in nodes:
+        for body in (beam, spring):
+            body.rewind()
+            body.advance(0.0, 0.5 * (x + 1.0) * size, row.force)
+        gaps.append(beam.motion().displacement - spring.motion().displacement)
+    moments = [float(np.sum(weights * np.array(gaps) * nodes**j)) for j in range(degree if scheme == "energy" else 1)]
+    assert np.abs(gaps).max() > 1e-9  # the gap itself does not vanish
+    assert np.abs(moments).max() < 1e-15
+
+
+# -- energy ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("frequency", [0.5, 5.0, 50.0, 1000.0])
+@pytest.mark.parametrize(("mass", "k2"), [(0.01, 0.0), (0.01, 0.3), (1.0, 0.0), (1.0, 3e3), (100.0, 0.0), (100.0, 3e3)])
+def test_energy_schemes_conserve_energy(degree, frequency, mass, k2):
+    """60 steps. A gap of the tolerance costs C·1e-12·(motion), at most 1e-11 of the energy where C is the image of
+    mismatched velocities; hermite changes it by 1e-4 and more."""
+    beam, spring = after_impact(6, 1e6, mass=mass, k1=3.0, k2=k2)
+    start = drift((beam, spring))
+    rows = couple("energy", degree, frequency / beam.omega.max(), 60, beam, spring)
+    assert max(abs(row.energy - start) for row in rows) < 1e-9 * start
+
+
+def step_matrix(scheme: str, degree: int, size: float, mass: float) -> np.ndarray:
+    """One tied step of a linear pair as a map of (ωa, ȧ, y, z), column by column."""
+    beam = modal_beam(4)
+    spring = DuffingBody(mass=mass, k1=3.0, k2=0.0)
+    r = len(beam.omega)
+    columns = []
+    for unit in np.eye(2 * r + 2):
+        beam.a, beam.v = unit[:r] / beam.omega, unit[r : 2 * r].copy()
+        spring.y, spring.z = unit[2 * r :]
+        couple(scheme, degree, size, 1, beam, spring)
+        columns.append(np.concatenate([beam.omega * beam.a, beam.v, [spring.y, spring.z]]))
+    return np.array(columns).T
+
+
+def growth(scheme: str, degree: int, frequency: float, mass: float) -> float:
+    matrix = step_matrix(scheme, degree, frequency / modal_beam(4).omega.max(), mass)
+    return float(np.abs(np.linalg.eigvals(matrix)).max()) - 1.0
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("mass", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize("frequency", [1.0, 6.0, 100.0])
+def test_energy_schemes_are_stable_at_any_step(degree, mass, frequency):
+    """Spectral radius 1 to the tolerance of the conditions; below, hermite exceeds it by 0.1 and more."""
+    assert abs(growth("energy", degree, frequency, mass)) < 1e-8
+
+
+@pytest.mark.parametrize(("degree", "stable", "unstable"), [(1, 2.0, 8.0), (2, 3.5, 10.0)])
+@pytest.mark.parametrize("mass", [1.0, 100.0])
+def test_hermite_grows_beyond_its_bound(degree, stable, unstable, mass):
+    """ω_max·H: stable below 2 (degree 1) and 4 (degree 2); well above, energy grows by half in a few steps."""
+    assert growth("hermite", degree, stable, mass) < 1e-8
+    assert growth("hermite", degree, unstable, mass) > 0.1
+
+
+# -- orders ---------------------------------------------------------------------------------------------------------
+
+T = 0.064
+
+
+def smooth_phase(scheme: str, degree: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """u, u̇ and the mean of both limits of C at the macro points inside (0, T), shape (count − 1,) each."""
+    size = T / count
+    rows = couple(scheme, degree, size, count, *after_impact(3))
+    u = np.array([(row.beam.displacement, row.beam.velocity) for row in rows[:-1]]).T
+    c = [0.5 * (force.end_value(a.force, size) + b.force[0]) for a, b in pairwise(rows)]
+    return u[0], u[1], np.array(c)
+
+
+@pytest.fixture(scope="module")
+def reference() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """hermite of degree 2 at T/512: displacement and velocity to 1e-15, C to 1e-10 N."""
+    return smooth_phase("hermite", 2, 512)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "degree", "counts", "expected"),
+    [
+        ("energy", 0, (64, 128), (4, 2, 2)),
+        ("energy", 1, (32, 64), (4, 2, 2)),
+        ("energy", 2, (8, 16), (8, 4, 4)),
+        ("hermite", 1, (32, 64), (4, 4, 2)),
+        ("hermite", 2, (16, 32), (6, 6, 4)),
+    ],
+)
+def test_orders_of_displacement_velocity_and_force(scheme, degree, counts, expected, reference):
+    """Smooth tied phase. Steps of each scheme are such that the errors are above rounding and ω_max·H < 1."""
+    errors = []
+    for count in counts:
+        every = 512 // count
+        inside = slice(count // 8, None)  # the force of the first steps carries the impact
+        differences = [
+            np.abs(ours - exact[every - 1 :: every])
+            for ours, exact in zip(smooth_phase(scheme, degree, count), reference, strict=True)
+        ]
+        errors.append([differences[0].max(), differences[1].max(), differences[2][inside].max()])
+    observed = [orders(column, (2.0, 1.0))[0] for column in np.array(errors).T]
+    assert observed == pytest.approx(expected, abs=0.4)
+
+
+# -- cost and failures ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("scheme", "degree", "springs"),
+    [("energy", 0, 3.0), ("energy", 1, 3.75), ("energy", 2, 3.25), ("hermite", 1, 3.25), ("hermite", 2, 3.25)],
+)
+def test_a_step_costs_two_beam_advances_and_about_three_of_the_spring(scheme, degree, springs):
+    """Regular steps, after the response matrices are known: guess and check of the beam; the spring's iterations."""
+    size, count = 1e-3, 60
+    beam, spring = after_impact(10)
+    couple(scheme, degree, size, 2, beam, spring)
+    beam.steps = spring.steps = 0
+    couple(scheme, degree, size, count, beam, spring)
+    assert beam.steps <= 2 * count + 3  # three: the response is measured anew by a new solver
+    assert spring.steps <= springs * count
+
+
+class Refusing(DuffingBody):
+    """Completes a number of steps and refuses the next."""
+
+    left = 4
+
+    def advance(self, *args, **kwargs):
+        self.left -= 1
+        if self.left < 0:
+            raise StepRefused("enough")
+        super().advance(*args, **kwargs)
+
+
+def test_a_refused_step_propagates_and_the_marks_are_kept():
+    beam, spring = modal_beam(4), Refusing()
+    tie = Tie(conditions("energy", 1), 1, 1e-12, 1e-3)
+    start = [beam.motion(), spring.motion()]
+    for body in (beam, spring):
+        body.mark()
+    spring.left = 1
+    with pytest.raises(StepRefused, match="enough"):
+        tie.solve(beam, spring, 0.0, 1e-3, NO_FORCE, start[0])
+    for body in (beam, spring):
+        body.rewind()
+    assert [beam.motion(), spring.motion()] == start
+
+
+class Deaf(DuffingBody):
+    """Jumps to where the contact force does not push the tip: no force closes the gap."""
+
+    def advance(self, time, size, contact, foundation=NO_FORCE):
+        super().advance(time, size, NO_FORCE, foundation)
+        self.y = -0.5 if contact[0] > 0.0 else 0.5
+
+
+def test_not_converged_carries_the_gap_that_is_left():
+    beam, spring = modal_beam(4), Deaf()
+    tie = Tie(conditions("energy", 0), 0, 1e-12, 1e-3)
+    for body in (beam, spring):
+        body.mark()
+    with pytest.raises(NotConverged) as caught:
+        tie.solve(beam, spring, 0.0, 1e-3, NO_FORCE, beam.motion())
+    # The tip, falling 1 mm, is on the other side of zero from where the end jumps to: 0.5 m at least.
+    assert 0.499 <= caught.value.residual < float("inf")
+    assert f"{caught.value.residual:.3g} m" in str(caught.value)
+
+
+def test_a_body_that_is_not_finite_does_not_converge():
+    beam, spring = modal_beam(4), DuffingBody(external=float("inf"))
+    spring._reach = lambda y, size: size  # its step control needs finite numbers
+    tie = Tie(conditions("energy", 0), 0, 1e-12, 1e-3)
+    for body in (beam, spring):
+        body.mark()
+    with pytest.raises(NotConverged) as caught:
+        tie.solve(beam, spring, 0.0, 1e-3, NO_FORCE, beam.motion())
+    assert not caught.value.residual < float("inf")
