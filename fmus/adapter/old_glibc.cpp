@@ -1,6 +1,7 @@
 // Lets an FMU that was linked on a new system load on an old one. What libstdc++.a, libgcc_eh.a and libm of the build
 // machine would ask of a new glibc is defined here, hidden, with what every glibc since 2.14 has.
 // Only for x86-64; the test tests/contract/test_package.py states the version that is left.
+// NOLINTBEGIN(bugprone-reserved-identifier,performance-no-int-to-ptr)
 #include <features.h>
 
 #if defined(__GLIBC__) && defined(__x86_64__)
@@ -101,3 +102,4 @@ OLD_STRTO(unsigned long long, strtoull)
 #endif
 
 #endif
+// NOLINTEND(bugprone-reserved-identifier,performance-no-int-to-ptr)
