@@ -153,6 +153,7 @@ void write_variable(std::ostream& out, const Variable& v, std::size_t reference)
 
 void write_unknown(std::ostream& out, const Table& t, std::size_t i, const std::vector<std::string>& names) {
   std::vector<std::size_t> dependencies;
+  dependencies.reserve(names.size());
   for (const std::string& name : names) dependencies.push_back(t.index(name) + 1);
   std::sort(dependencies.begin(), dependencies.end());
   std::string list;
