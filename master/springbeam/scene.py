@@ -107,8 +107,12 @@ class Contact(_Table):
     exponent: Annotated[float, Field(ge=1.0)] = 3.0  #: p
 
 
+#: Schemes that exchange once per macro step, as ordinary masters do.
+ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
+
+
 class Coupling(_Table):
-    scheme: Literal["energy", "hermite"] = "energy"
+    scheme: Literal["energy", "hermite", "gauss_seidel", "jacobi"] = "energy"
     degree: Annotated[int, Field(ge=0, le=2)] = 0  #: of the contact force over a step
     macro_step: Positive = 0.004  #: H [s]
     tolerance: Annotated[float, Field(gt=0.0, le=1e-3)] = 1.0e-12
@@ -117,6 +121,8 @@ class Coupling(_Table):
     def _degree_of_scheme(self) -> Coupling:
         if self.scheme == "hermite" and self.degree == 0:
             raise ValueError('degree = 0: scheme = "hermite" needs degree 1 or 2')
+        if self.scheme in ORDINARY_SCHEMES and self.degree > 1:
+            raise ValueError(f'degree = {self.degree}: scheme = "{self.scheme}" extrapolates with degree 0 or 1')
         return self
 
 
@@ -221,11 +227,16 @@ def _law_applies(scene: Scene) -> Iterator[str]:
     if contact.law == "compliance":
         if contact.stiffness == 0.0:
             yield '[contact] stiffness = 0.0: with law = "compliance" nothing would hold the bodies apart'
-        if coupling.scheme != "energy" or coupling.degree != 0:
+        if coupling.scheme not in ORDINARY_SCHEMES and (coupling.scheme != "energy" or coupling.degree != 0):
             yield (
                 f'[coupling] scheme = "{coupling.scheme}", degree = {coupling.degree}: [contact] law = "compliance" '
-                'needs scheme = "energy" and degree = 0 (its discrete gradient)'
+                'needs scheme = "energy" and degree = 0 (its discrete gradient), "gauss_seidel" or "jacobi"'
             )
+    elif coupling.scheme in ORDINARY_SCHEMES:
+        yield (
+            f'[coupling] scheme = "{coupling.scheme}": exchanges the force of [contact] law = "compliance"; '
+            f'law = "{contact.law}" needs "energy" or "hermite"'
+        )
 
 
 def _coupling_resolves(scene: Scene) -> Iterator[str]:

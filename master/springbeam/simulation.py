@@ -17,10 +17,11 @@ import numpy as np
 from .contact import Impact, Joint, Phase, foundation_impact, meeting, spring_force
 from .coupling import conditions, force
 from .coupling.compliance import Compliance, compliance_energy, compliance_force
+from .coupling.exchange import Exchange
 from .coupling.tie import NotConverged, Tie
 from .events import Sample, cubic_crossing, cubic_value, interpolated, locate, lowest_inside
 from .recording import NonFiniteValue, Recorder
-from .scene import Scene
+from .scene import ORDINARY_SCHEMES, Scene
 from .subsystem import NO_FORCE, Body, Energies, Force, Held, Motion, StepRefused
 from .trajectory import Event
 
@@ -38,8 +39,8 @@ _AT_ONCE, _MAX_EVENTS_AT_ONCE = 1e-6, 100
 _SEATING_SPEED = 1e-8
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
 _SHORT_REMAINDER = 0.25
-#: Relative energy residual at which `hermite` is said to be unstable, and at which the run stops.
-_HERMITE_WARNS, _HERMITE_STOPS = 1e-3, 0.1
+#: Relative energy residual at which a scheme that may create energy says so, and at which the run stops.
+_ENERGY_WARNS, _ENERGY_STOPS = 1e-3, 0.1
 #: Velocity mismatch of tip and spring top, relative to their speed, above which the motion is called unresolved.
 _UNRESOLVED = 0.2
 #: Repetitions to end a step where the contact force vanishes.
@@ -157,9 +158,15 @@ class Simulation:
         coupling = scene.coupling
         self.H = coupling.macro_step
         self._compliant = scene.contact.law == "compliance" and self._joinable
-        self._tie = Tie(conditions(coupling.scheme, coupling.degree), coupling.degree, coupling.tolerance, self.H)
-        self._compliance = Compliance(scene.contact.stiffness, scene.contact.exponent, coupling.tolerance, self.H)
-        self._hermite = coupling.scheme == "hermite" and not self._compliant
+        law = (scene.contact.stiffness, scene.contact.exponent)
+        self._exchange: Exchange | None = None
+        if coupling.scheme in ORDINARY_SCHEMES:
+            self._exchange = Exchange(coupling.scheme == "gauss_seidel", coupling.degree, *law)
+        scheme = "energy" if self._exchange is not None else coupling.scheme
+        self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance, self.H)
+        self._compliance = Compliance(*law, coupling.tolerance, self.H)
+        #: Whether the coupling may create energy, so that its residual is watched.
+        self._lossy = scheme == "hermite" or self._exchange is not None
         self._degree = 0 if self._compliant else coupling.degree
         self.counts = Counts()
         self.time = start_time
@@ -245,8 +252,11 @@ class Simulation:
         if self._compliant:
             assert upper is not None
             assert lower is not None
-            penetration = start[1].displacement - start[0].displacement
-            contact = self._compliance.solve(upper, ends or lower, self.time, size, self._contact, penetration)
+            if self._exchange is not None:
+                contact = self._exchange.solve(upper, ends or lower, self.time, size, start)
+            else:
+                penetration = start[1].displacement - start[0].displacement
+                contact = self._compliance.solve(upper, ends or lower, self.time, size, self._contact, penetration)
         elif self.phase.joint is Joint.FREE:
             if upper is not None:
                 upper.rewind()
@@ -660,12 +670,13 @@ class Simulation:
         except NonFiniteValue as error:
             raise RunStopped(str(error), self.time) from error
         self._record_shape(joined)
-        if self._hermite and self._ledger.relative > _HERMITE_STOPS:
-            raise RunStopped(self._hermite_cause(), self.time)
+        if self._lossy and self._ledger.relative > _ENERGY_STOPS:
+            raise RunStopped(self._energy_cause(), self.time)
 
-    def _hermite_cause(self) -> str:
+    def _energy_cause(self) -> str:
+        coupling, percent = self.scene.coupling, 100.0 * self._ledger.relative
         return (
-            f"hermite of degree {self._degree} has changed the energy by {100.0 * self._ledger.relative:.2g} %: the "
+            f"{coupling.scheme} of degree {coupling.degree} has changed the energy by {percent:.2g} %: the "
             f"macro step {self.H:g} s is too large for it; take a smaller one, or coupling.scheme = 'energy'"
         )
 
@@ -684,8 +695,8 @@ class Simulation:
     def summary(self) -> dict[str, Any]:
         """Counts, residuals and warnings, as they go into ``summary.json``."""
         warnings = []
-        if self._hermite and self._ledger.relative > _HERMITE_WARNS:
-            warnings.append(self._hermite_cause())
+        if self._lossy and self._ledger.relative > _ENERGY_WARNS:
+            warnings.append(self._energy_cause())
         if self._largest_mismatch > _UNRESOLVED * self._largest_speed:
             warnings.append(
                 f"not resolved: the joined ends' velocities differ by up to {self._largest_mismatch:.3g} m/s of "
