@@ -1,0 +1,236 @@
+"""The master on exact bodies: events against the event-driven reference, refused steps, the ledger."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+from bodies import simulate
+
+from springbeam.monolithic import event_driven
+from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
+from springbeam.subsystem import StepRefused
+from springbeam.trajectory import Trajectory
+
+
+def soft(n: int = 6, **tables: dict[str, Any]) -> Scene:
+    """The scene `soft` on a coarse beam, for a tie, a foundation impact, a release and a second meeting."""
+    tables["beam"] = {"n_elements": n, **tables.get("beam", {})}
+    tables.setdefault("time", {"t_end": 0.3})
+    coupling = {"scheme": "hermite", "degree": 2, "macro_step": 1e-3}
+    return with_changes(load_scene("soft"), **{**tables, "coupling": {**coupling, **tables.get("coupling", {})}})
+
+
+def kinds(trajectory: Trajectory) -> list[str]:
+    return [event.kind for event in trajectory.events]
+
+
+@lru_cache(maxsize=8)
+def reference(scene: Scene) -> Trajectory:
+    return event_driven.simulate(scene)
+
+
+def error(trajectory: Trajectory, exact: Trajectory, column: str) -> float:
+    """Largest error on the macro grid after the start, relative to the largest value."""
+    _, ours, theirs = np.intersect1d(np.round(trajectory.time, 12), np.round(exact.time, 12), return_indices=True)
+    assert len(ours) > 0.9 * trajectory.scene.time.t_end / trajectory.scene.coupling.macro_step
+    difference = (trajectory[column][ours] - exact[column][theirs])[1:]
+    return float(np.abs(difference).max() / np.abs(exact[column]).max())
+
+
+# -- against the reference ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("changes", [{}, {"stop": {"restitution": 0.3}}, {"beam": {"distributed_load": 1.0}}])
+def test_hermite_has_the_events_of_the_reference(changes):
+    """Same sequence; times and velocities to 1e-7: order 6 with ω_max·H = 0.2."""
+    scene = soft(**changes)
+    ours, theirs = simulate(scene).events, event_driven.simulate(scene).events
+    assert [e.kind for e in ours] == [e.kind for e in theirs]
+    assert len(ours) >= 3
+    for a, b in zip(ours, theirs, strict=True):
+        assert a.time == pytest.approx(b.time, abs=1e-7)
+        assert (a.z, a.v_tip) == pytest.approx((b.z, b.v_tip), abs=1e-6)
+        assert a.energy_loss == pytest.approx(b.energy_loss, abs=1e-7)
+
+
+def scene_of(size: float, scheme: str, degree: int, stop: dict | None = None, *, beam: dict, spring: dict) -> Scene:
+    tables: dict[str, Any] = {"time": {"t_end": 0.4}, "beam": beam, "spring": spring}
+    tables["coupling"] = {"scheme": scheme, "degree": degree, "macro_step": size}
+    return scene_from_dict(tables if stop is None else {**tables, "stop": stop})
+
+
+@pytest.mark.parametrize(("degree", "bound"), [(1, 5e-4), (2, 1e-6)])
+def test_a_contact_that_ends_at_once_does_not_stick(degree, bound):
+    """A second meeting above Ψ: it separates by itself. A contact that stuck would be wrong by the displacement
+    itself; left is O(H²) of the mismatched velocities at degree 1, O(H⁴) at degree 2."""
+    scene = scene_of(
+        5e-4,
+        "energy",
+        degree,
+        beam={
+            "n_elements": 8,
+            "young_modulus": 17.0,
+            "shear_modulus": 290.0,
+            "initial_velocity_slope": -0.28,
+            "distributed_load": 1.216,
+        },
+        spring={"mass": 0.63, "linear_stiffness": 51.0, "cubic_stiffness": -0.2, "damping": 0.79},
+    )
+    trajectory, exact = simulate(scene), reference(scene)
+    assert kinds(trajectory)[:4] == kinds(exact)[:4] == ["impact", "release", "impact", "separation"]
+    assert max(error(trajectory, exact, q) for q in ("u_tip", "y")) < bound
+
+
+@pytest.mark.parametrize("scheme", ["energy", "hermite"])
+def test_a_spring_leaves_the_foundation_and_is_seated_again_when_the_reference_says(scheme):
+    """Bounces die out (e = 0.3), N vanishes, bounces die out again: a false re-seat would hold y at φ for good."""
+    scene = scene_of(
+        1e-3,
+        scheme,
+        2,
+        {"position": -0.043, "restitution": 0.3},
+        beam={
+            "n_elements": 8,
+            "young_modulus": 29.0,
+            "shear_modulus": 29.0,
+            "initial_velocity_slope": -0.86,
+            "initial_deflection_slope": 0.1,
+            "approach": "elastic",
+        },
+        spring={"mass": 0.15, "linear_stiffness": 8.6, "cubic_stiffness": 5.0, "damping": 0.36},
+    )
+    trajectory, exact = simulate(scene), reference(scene)
+    assert max(error(trajectory, exact, q) for q in ("u_tip", "y")) < 1e-8
+    for kind in ("seated", "unseated"):
+        ours, theirs = ([e.time for e in t.events if e.kind == kind] for t in (trajectory, exact))
+        assert len(theirs) == 2
+        assert ours[0] == pytest.approx(theirs[0], abs=2e-6)
+        # Rebounds below 1e-8 of the fastest are not followed: at the second time both last bounces are within that.
+        assert min(abs(t - theirs[1]) for t in ours) < 1e-6
+
+
+@pytest.mark.parametrize(("size", "bound"), [(5e-4, 5e-4), (2.5e-4, 2e-3)])
+def test_an_inelastic_foundation_is_left_at_once(size, bound):
+    """e = 0 with a load that lifts: seated and unseated at one time, and the motion after it is that of the reference.
+    Degree 0 errs by O(H²) in the velocities handed to each event, with a sign that depends on the grid."""
+    scene = scene_of(
+        size,
+        "energy",
+        0,
+        {"position": -0.012, "restitution": 0.0},
+        beam={
+            "n_elements": 4,
+            "young_modulus": 410.0,
+            "shear_modulus": 410.0,
+            "initial_velocity_slope": -1.1,
+            "distributed_load": 2.989,
+        },
+        spring={"mass": 1.0, "linear_stiffness": 3.3, "cubic_stiffness": 5.0, "damping": 0.23},
+    )
+    trajectory, exact = simulate(scene), reference(scene)
+    assert kinds(trajectory)[:4] == kinds(exact)[:4] == ["impact", "seated", "unseated", "release"]
+    assert [e.time for e in trajectory.events[:4]] == pytest.approx([e.time for e in exact.events[:4]], abs=1e-6)
+    assert max(error(trajectory, exact, q) for q in ("u_tip", "y")) < bound
+
+
+# -- steps that fail ------------------------------------------------------------------------------------------------
+
+
+def wrapped(**overrides):
+    """A `wrap` for `simulate`: the spring with methods that get the body's own one first."""
+
+    def wrap(beam, spring):
+        for name, function in overrides.items():
+            own = getattr(spring, name)
+            setattr(spring, name, lambda *a, f=function, own=own: f(own, *a))
+        return beam, spring
+
+    return wrap
+
+
+def test_refused_steps_are_halved():
+    """Nothing above 0.3 ms is accepted between 20 and 25 ms: quarters of H = 1 ms there, the motion as before."""
+
+    def advance(own, time, size, *forces):
+        if 0.02 <= time < 0.0249 and size > 3e-4:
+            raise StepRefused("too long")
+        own(time, size, *forces)
+
+    scene = soft(time={"t_end": 0.05})
+    halved, exact = simulate(scene, wrapped(advance=advance)), reference(scene)
+    steps = np.diff(halved.time)
+    refused = (halved.time[:-1] >= 0.02) & (halved.time[:-1] < 0.0249)
+    assert steps[refused].max() <= 3e-4
+    assert steps[~refused].max() == pytest.approx(1e-3, rel=1e-9)
+    assert halved.summary["halved_steps"] >= 2 * 5
+    assert error(halved, exact, "y") < 1e-9
+    assert halved.time[-1] == 0.05
+
+
+def test_a_step_that_is_always_refused_stops_the_run_with_cause_and_time():
+    """20 halvings, then RunStopped; what was computed before is kept, and is what it would have been."""
+
+    def advance(own, time, size, *forces):
+        if time + size > 0.0205:
+            raise StepRefused("the spring is broken")
+        own(time, size, *forces)
+
+    scene = soft(time={"t_end": 0.05})
+    stopped, whole = simulate(scene, wrapped(advance=advance)), simulate(scene)
+    cause = stopped.summary["stopped"]
+    assert cause.cause == "the spring is broken"
+    # Halving reaches the limit to H/2²⁰.
+    assert cause.time == pytest.approx(0.0205, abs=2e-9)
+    assert stopped.time[-1] == cause.time
+    assert f"{cause.time:.9g}" in str(cause)
+    assert np.array_equal(stopped.y[:20], whole.y[:20])
+
+
+def test_a_value_that_is_not_finite_stops_the_run():
+    def energies(own):
+        values = own()
+        return values if values.kinetic < 2e-3 else values._replace(kinetic=float("nan"))
+
+    stopped = simulate(soft(), wrapped(energies=energies))
+    cause = stopped.summary["stopped"]
+    assert "e_spring" in cause.cause
+    assert stopped.time[-1] < cause.time <= 0.3
+    assert np.isfinite(stopped.e_total).all()
+
+
+# -- the ledger -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("size", [1e-3, 2e-2])
+def test_the_ledger_closes(degree, size):
+    """Damping, loads, lossy impacts; H = 20 ms is ω_max·H = 4: the energy schemes conserve at any."""
+    scene = soft(
+        beam={"alpha_b": 1e-3, "distributed_load": -0.7},
+        spring={"damping": 0.5, "external_force": 0.2},
+        stop={"restitution": 0.5},
+        coupling={"scheme": "energy", "degree": degree, "macro_step": size},
+    )
+    trajectory = simulate(scene)
+    assert trajectory.summary["stopped"] is None
+    assert trajectory.summary["max_energy_residual"] < 1e-11
+    assert trajectory.e_dissipated[-1] > 1e-3
+    assert trajectory.e_impact_loss[-1] == pytest.approx(sum(e.energy_loss for e in trajectory.events), rel=1e-14)
+    assert "stop_impact" in kinds(trajectory)
+
+
+def test_the_ledger_shows_what_is_taken_from_it():
+    """1 % of the spring's kinetic energy unaccounted for is the residual, to the digit."""
+    scene = soft(time={"t_end": 0.05}, coupling={"scheme": "energy", "degree": 0})
+
+    def energies(own):
+        return own()._replace(kinetic=1.01 * own().kinetic)
+
+    true, wrong = simulate(scene), simulate(scene, wrapped(energies=energies))
+    extra = 0.01 * 0.5 * true.z**2
+    # The ledger starts before the impact, with the spring at rest.
+    assert wrong.energy_residual == pytest.approx(extra, abs=1e-14)
+    assert extra.max() > 1e-6
