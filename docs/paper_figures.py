@@ -202,7 +202,8 @@ def report(label: str, scene: Scene, **choices: Any) -> None:
             raise
         run, broke = failure.trajectory, f"  STOPPED: {failure}"
     e = energy(run)
-    print(f"  {label:30s} iterations {run.summary['newton']['spring']:.4f}  apart {run.summary['steps_apart']}  |z| ≤ {np.abs(run.z).max():.3g}  |u| ≤ "
+    solves, apart = run.summary["newton"]["spring"], run.summary["steps_apart"]
+    print(f"  {label:30s} iterations {solves:.4f}  apart {apart}  |z| ≤ {np.abs(run.z).max():.3g}  |u| ≤ "
           f"{np.abs(run.u_tip).max():.3g}  y ≥ {run.y.min():.3g}  E {e[0]:.3g} -> ≤ {e.max():.3g} J  "
           f"N ≤ {run.foundation_force.max():.3g}{broke}")  # fmt: skip
 
