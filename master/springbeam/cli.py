@@ -207,7 +207,7 @@ def crosscheck(
     console.print(_event_errors_table(report))
     begin, end = report.trajectory["time"][0], report.trajectory["time"][-1]
     console.print(Text(
-        f"comparable from {begin:.6g} to {report.horizon:.6g} s of {end:.6g} s; there a perturbation of the reference "
+        f"comparable from {begin:.9g} to {report.horizon:.9g} s of {end:.9g} s; there a perturbation of the reference "
         f"has grown {report.growth:.3g} times"
     ))  # fmt: skip
     console.print(Text("passed" if report.passed else "FAILED", style="bold green" if report.passed else "bold red"))

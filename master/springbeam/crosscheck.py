@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .monolithic import algorithm1, event_driven
-from .runner import simulate
+from .runner import RunStopped, simulate
 from .scene import Scene, SceneError, with_changes
 from .trajectory import Event, Trajectory
 
@@ -32,7 +32,7 @@ _IDA_TOLERANCE = 1e-12
 #: Relative change of the initial velocity that measures how fast the reference separates from itself.
 _PERTURBATION = 1e-7
 #: A scene whose comparable window is shorter than this many macro steps is resolved further, 4 times at a go.
-_ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 12
+_ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 16
 #: Macro steps of a window that had to be resolved further.
 _WINDOW_STEPS = 400
 #: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
@@ -102,12 +102,15 @@ def crosscheck(scene: Scene) -> Report:
         return _crosscheck_paper(scene)
     if scene.contact.impact == "rest" and scene.contact.law == "transmission" and scene.beam and scene.spring:
         raise SceneError("contact.impact = 'rest': a rigid tie has no reference there; take 'inelastic' or 'tip'")
-    asked, note = scene, ""
+    asked, note, failure = scene, "", None
     for _ in range(_MAX_REFINEMENTS):
-        coarse, fine, own_horizon = _pair(scene)
-        start, size = float(coarse.time[0]), scene.coupling.macro_step
-        if own_horizon - start >= min(_ENOUGH_STEPS * size, 0.5 * (scene.time.t_end - start)):
-            break
+        start, size = scene.contact_time or 0.0, scene.coupling.macro_step
+        try:
+            coarse, fine, own_horizon = _pair(scene)
+            if own_horizon - start >= min(_ENOUGH_STEPS * size, 0.5 * (scene.time.t_end - start)):
+                break
+        except RunStopped as stopped:  # a finer step may get through
+            failure = stopped
         size /= _REFINEMENT
         t_end = min(asked.time.t_end, start + _WINDOW_STEPS * size)
         scene = with_changes(scene, time={"t_end": t_end}, coupling={"macro_step": size})
@@ -115,6 +118,8 @@ def crosscheck(scene: Scene) -> Report:
             f"At the scene's own macro step, {asked.coupling.macro_step:g} s, the motion is not resolved: halving it "
             f"changes the motion from the first contact on. Compared instead: {size:.3g} s, up to {t_end:.9g} s."
         )
+    else:
+        raise failure or SceneError(f"{note} Nothing could be compared at any macro step")
     report = _compare(scene, coarse, fine, own_horizon)
     if note:
         report.notes.insert(0, note)
@@ -124,12 +129,15 @@ def crosscheck(scene: Scene) -> Report:
 def _pair(scene: Scene) -> tuple[Trajectory, Trajectory, float]:
     """The run, the run at half the macro step, and the time up to which both tell the same story.
 
-    That is the same events, and displacements and velocities, away from events, that halving hardly changes.
+    That is the same events, a run that does not call itself unresolved, and displacements and velocities, away from
+    events, that halving hardly changes.
     """
     size = scene.coupling.macro_step
     coarse, fine = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
     changes = [contact_changes(run.events, _SHORT * size) for run in (coarse, fine)]
     horizon = _agree_until(changes[0], changes[1], float(coarse.time[0]), float(coarse.time[-1]))
+    if any(warning.startswith("not resolved") for warning in coarse.summary["warnings"]):
+        return coarse, fine, float(coarse.time[0])
     times = _grid(coarse, scene)
     for name in (*_DISPLACEMENTS, *_VELOCITIES):
         if name in coarse.columns:

@@ -335,7 +335,8 @@ class _Run:
     def _root(g: Callable[[float], float], low: float, high: float) -> float:
         if g(high) >= 0.0:  # the dense output and the exact state differ by less than either's error
             return float(high)
-        return float(brentq(g, low, high, xtol=1e-300, rtol=8.9e-16, maxiter=200))
+        # A root at a segment's very start needs no more than the rounding of the segment.
+        return float(brentq(g, low, high, xtol=1e-16 * high, rtol=8.9e-16, maxiter=200))
 
     def _early_crossing(self, g: Callable[[float], float], first: float, noise: float) -> float:
         """A function that starts at zero and is negative at the first node: where it was positive between them."""
