@@ -137,11 +137,14 @@ def plot_crosscheck(report: Report, path: Path) -> None:
         _key(above)
         colours = (BLUE, SKY, VERMILLION, ORANGE, GREEN, PURPLE, GREY)
         for row, colour in zip(report.rows, colours, strict=False):
-            time, tiny = timeline.unit.factor * row.times, np.finfo(float).tiny
-            below.semilogy(time, np.maximum(row.errors, tiny), color=colour, lw=0.9, label=row.quantity)
+            time = timeline.unit.factor * row.times
+            below.semilogy(
+                time, np.where(row.errors > 0.0, row.errors, np.nan), color=colour, lw=0.9, label=row.quantity
+            )
             below.semilogy(time, row.bounds, color=colour, lw=0.9, ls=":")
         low = min((float(r.errors[r.errors > 0.0].min()) for r in report.rows if (r.errors > 0.0).any()), default=1e-16)
-        below.set_ylim(bottom=max(low, 1e-18))
+        high = max((float(max(r.errors.max(), r.bounds.max())) for r in report.rows), default=1.0)
+        below.set_ylim(max(low, 1e-18), 10.0 * high)
         below.axvline(timeline.unit.factor * report.horizon, color=BLACK, lw=0.8, ls="--")
         below.set_ylabel("error (lines), bound (dots)\n[unit of the quantity]")
         _key(below)
