@@ -129,8 +129,9 @@ fmi::Table make_table() {
   add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy))
       .from({"area", "shear_modulus", "shear_coefficient", "length", "initial_deflection_slope"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy));
-  add.output("load_potential", "J", "potential of the distributed load of the last step", of(&Beam::load_potential))
-      .from({"length", "n_elements", "initial_deflection_slope", "tip_load_coefficient"});
+  add.output("load_potential", "J", "potential of the distributed load", of(&Beam::load_potential))
+      .from({"length", "n_elements", "initial_deflection_slope", "tip_load_coefficient", "distributed_load"})
+      .follows({"distributed_load"});
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
       .from(basis);
   for (int i = 0; i < beam::shape_points; ++i) {
