@@ -8,6 +8,7 @@ usage() {
 ./build.sh run [SCENE] [OPTION]…   set up, build, and simulate a scene (default: soft)
 ./build.sh test [PYTEST OPTION]…   set up, build, and run all tests (C++, then Python)
 ./build.sh fmus                    set up and build fmus/beam.fmu, spring.fmu and spring_beam.ssp
+./build.sh win64                   also cross-compile for 64-bit Windows; the FMUs then carry both
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
 ./build.sh lint                    formatters, linters and type checker
 
@@ -113,6 +114,8 @@ build() {
     mv build.log build/configure.log
     printf '%s' "$configured" >build/.configured
   fi
+  # Once asked for, Windows is kept up to date with the rest.
+  [ ! -f build/win64/beam.dll ] || fmus/win64/build.sh build/win64 $python
   say "building"
   $venv/bin/ninja -C build ${JOBS:+-j "$JOBS"} --quiet "$@" >&2 || die "the build stopped, see above"
   exec 9<&-
@@ -134,6 +137,11 @@ case $command in
     say "Python tests"
     $python -m pytest -n auto "$@" || failed="${failed:+$failed and }Python tests"
     [ -z "$failed" ] || die "failed: $failed"
+    ;;
+  win64)
+    build fmus
+    fmus/win64/build.sh build/win64 $python
+    build fmus && ls -l fmus/*.fmu
     ;;
   interop)
     build fmus

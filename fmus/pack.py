@@ -1,6 +1,6 @@
 """Pack files into a zip whose bytes depend on their contents alone: fixed order, dates and modes.
 
-Usage: pack.py OUT name=file… — `name` is the place inside, `file` a file or a folder.
+Usage: pack.py OUT name=file… — `name` is the place inside, `file` a file or a folder; `name?=file` may be missing.
 """
 
 from __future__ import annotations
@@ -19,6 +19,10 @@ def members(arguments: list[str]) -> dict[str, Path]:
     for argument in arguments:
         name, _, source = argument.partition("=")
         path = Path(source)
+        if name.endswith("?"):
+            if not path.exists():
+                continue
+            name = name[:-1]
         if path.is_dir():
             for file in sorted(p for p in path.rglob("*") if p.is_file()):
                 found[f"{name}/{file.relative_to(path).as_posix()}"] = file

@@ -1,0 +1,88 @@
+#!/usr/bin/env bash
+# build.sh OUT PYTHON — cross-compiles beam.dll and spring.dll for 64-bit Windows into OUT, with zig from PyPI, self-
+# contained but for what Windows 10 has. SUNDIALS is built from source: SPRINGBEAM_SUNDIALS_SOURCE names its folder,
+# otherwise Debian's source package is fetched. Eigen and Spectra are the system's or those of SPRINGBEAM_PREFIX.
+set -euo pipefail
+mkdir -p "$1"
+out=$(cd "$1" && pwd)
+python=$(cd "$(dirname "$2")" && pwd)/$(basename "$2")
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+tools=$(dirname "$python")
+readonly zig_version=0.17.0
+
+say() { printf '== %s\n' "$*" >&2; }
+die() {
+  printf '\nwin64: %s\n' "$*" >&2
+  exit 1
+}
+quietly() { # LOG COMMAND…
+  local log=$out/$1.log
+  shift
+  "$@" >"$log" 2>&1 || { tail -n 30 "$log" >&2; die "stopped; the whole log is in $log"; }
+}
+
+if ! [ -x "$out/zig/bin/python" ]; then
+  say "installing ziglang $zig_version"
+  "$python" -m venv "$out/zig"
+  quietly zig "$out/zig/bin/pip" install -q "ziglang==$zig_version"
+fi
+
+source=${SPRINGBEAM_SUNDIALS_SOURCE:-}
+if [ -z "$source" ]; then
+  source=$(find "$out/source" -maxdepth 1 -name 'sundials-*' -type d 2>/dev/null | head -n 1)
+  if [ -z "$source" ]; then
+    command -v apt-get >/dev/null || die "name a folder with the source of SUNDIALS 6 or 7: SPRINGBEAM_SUNDIALS_SOURCE=…"
+    say "fetching Debian's source package of SUNDIALS"
+    mkdir -p "$out/source/lists/partial"
+    echo "deb-src http://deb.debian.org/debian bookworm main" >"$out/source/sources.list"
+    apt=(apt-get -qq -o "Dir::Etc::sourcelist=$out/source/sources.list" -o Dir::Etc::sourceparts=/dev/null
+      -o "Dir::State::lists=$out/source/lists" -o APT::Sandbox::User=root)
+    (cd "$out/source" && "${apt[@]}" update && "${apt[@]}" source --download-only sundials &&
+      tar xf sundials_*.orig.tar.*) >"$out/source.log" 2>&1 ||
+      die "could not fetch it (see $out/source.log); name a folder: SPRINGBEAM_SUNDIALS_SOURCE=…"
+    source=$(find "$out/source" -maxdepth 1 -name 'sundials-*' -type d | head -n 1)
+  fi
+fi
+
+for tool in cc c++ ar ranlib; do
+  target=
+  case $tool in cc | c++) target="-target x86_64-windows-gnu" ;; esac
+  printf '#!/bin/sh\nexec "%s" -m ziglang %s %s "$@"\n' "$out/zig/bin/python" "$tool" "$target" >"$out/zig-$tool"
+  chmod +x "$out/zig-$tool"
+done
+cat >"$out/toolchain.cmake" <<TEXT
+set(CMAKE_SYSTEM_NAME Windows)
+set(CMAKE_SYSTEM_PROCESSOR x86_64)
+set(CMAKE_C_COMPILER "$out/zig-cc")
+set(CMAKE_CXX_COMPILER "$out/zig-c++")
+set(CMAKE_AR "$out/zig-ar" CACHE FILEPATH "")
+set(CMAKE_RANLIB "$out/zig-ranlib" CACHE FILEPATH "")
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+TEXT
+cross=(-G Ninja "-DCMAKE_MAKE_PROGRAM=$tools/ninja" "-DCMAKE_TOOLCHAIN_FILE=$out/toolchain.cmake"
+  -DCMAKE_BUILD_TYPE=Release)
+
+if ! [ -f "$out/prefix/lib/libsundials_ida.a" ]; then
+  say "building SUNDIALS for win64"
+  off=()
+  for part in ARKODE CVODE CVODES IDAS KINSOL; do off+=("-DBUILD_$part=OFF"); done
+  quietly sundials-configure "$tools/cmake" -S "$source" -B "$out/sundials" "${cross[@]}" "${off[@]}" \
+    "-DCMAKE_INSTALL_PREFIX=$out/prefix" -DBUILD_SHARED_LIBS=OFF -DEXAMPLES_ENABLE_C=OFF -DEXAMPLES_INSTALL=OFF \
+    -DCMAKE_C_FLAGS=-ffp-contract=off
+  quietly sundials "$tools/ninja" -C "$out/sundials" install
+fi
+
+# The headers alone: the system's include folder would bring Linux' own with them.
+mkdir -p "$out/include"
+for prefix in "${SPRINGBEAM_PREFIX:-}" /usr /usr/local; do
+  [ -d "$prefix/include/Spectra" ] && ln -sfn "$prefix/include/Spectra" "$out/include/Spectra" && break
+done
+if ! [ -f "$out/project/build.ninja" ]; then
+  quietly configure "$tools/cmake" -S "$root" -B "$out/project" "${cross[@]}" "-DPython3_EXECUTABLE=$python" \
+    -DSPRINGBEAM_TESTS=OFF "-DCMAKE_PREFIX_PATH=$out/prefix;${SPRINGBEAM_PREFIX:-}" \
+    "-DSPECTRA_INCLUDE_DIR=$out/include" -DEigen3_ROOT=/usr -DEigen3_DIR="${Eigen3_DIR:-/usr/share/eigen3/cmake}"
+fi
+say "building for win64"
+quietly build "$tools/ninja" -C "$out/project" beam spring
+cmp -s "$out/project/fmus/beam.dll" "$out/beam.dll" || cp "$out/project/fmus/beam.dll" "$out/"
+cmp -s "$out/project/fmus/spring.dll" "$out/spring.dll" || cp "$out/project/fmus/spring.dll" "$out/"

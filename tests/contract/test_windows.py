@@ -1,0 +1,77 @@
+"""The Windows binaries under Wine, by the same C host as the Linux ones."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import pytest
+
+HERE = Path(__file__).resolve().parent
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+ZIG = HERE.parents[1] / "build" / "win64" / "zig-cc"
+
+
+def run(*command: str | Path, **options: Any) -> str:
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=300, **options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def arguments(case: Any) -> list[str]:
+    names = [case.force, case.impulse, case.displacement, case.velocity, "kinetic_energy", "dissipated_energy"]
+    return [case.fmu.description.guid, *(str(case.fmu.variables[n].valueReference) for n in names)]
+
+
+def rows(output: str) -> list[list[str]]:
+    return [line.split() for line in output.splitlines()]
+
+
+@pytest.fixture(scope="module")
+def linux_host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    compiler = shutil.which(os.environ.get("CC", "cc"))
+    if compiler is None:
+        pytest.skip("no C compiler: the FMUs are not tried in a C host")
+    host = tmp_path_factory.mktemp("host") / "host"
+    run(compiler, "-O1", "-isystem", HEADERS, HERE / "host.c", "-o", host, "-ldl")
+    return host
+
+
+@pytest.fixture(scope="module")
+def wine_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Made by the first run; takes half a minute."""
+    return tmp_path_factory.mktemp("wine") / "prefix"
+
+
+def test_c_host(case: Any, linux_host: Path) -> None:
+    result = rows(run(linux_host, case.fmu.binary, *arguments(case)))
+    repeated = [row for row in result if row[0] == "100"]
+    assert len(repeated) == 8  # step 100 was made twice, from the same state
+    assert repeated[:4] == repeated[4:]
+
+
+def test_windows_binary_under_wine(case: Any, linux_host: Path, wine_prefix: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(case.fmu.path) as archive:
+        name = f"binaries/win64/{case.name}.dll"
+        if name not in archive.namelist():
+            pytest.skip(f"{case.fmu.path.name} has no Windows binary: ./build.sh win64 makes one")
+        archive.extract(name, tmp_path)
+    wine = shutil.which("wine64") or shutil.which("wine") or shutil.which("wine64", path="/usr/lib/wine")
+    if wine is None or not ZIG.is_file():
+        pytest.skip("Wine is not installed (Debian: wine64): THE WINDOWS BINARIES ARE NOT TESTED")
+    host = tmp_path / "host.exe"
+    run(ZIG, "-O1", "-isystem", HEADERS, HERE / "host.c", "-o", host)
+    environment = {**os.environ, "WINEPREFIX": str(wine_prefix), "WINEDEBUG": "-all"}
+    theirs = rows(run(wine, host, f"binaries\\win64\\{case.name}.dll", *arguments(case), cwd=tmp_path, env=environment))
+    ours = rows(run(linux_host, case.fmu.binary, *arguments(case)))
+    assert [row[:2] for row in theirs] == [row[:2] for row in ours]
+    repeated = [row for row in theirs if row[0] == "100"]
+    assert repeated[:4] == repeated[4:]
+    # Another compiler and C library: elementary functions may differ in the last place.
+    for mine, its in zip(ours, theirs, strict=True):
+        assert float(its[3]) == pytest.approx(float(mine[3]), rel=1e-10, abs=1e-14)
