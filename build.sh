@@ -141,6 +141,11 @@ case $command in
   win64)
     build fmus
     fmus/win64/build.sh build/win64 $python
+    if ! command -v wine64 wine >/dev/null && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+      say "installing wine64, to test them"
+      DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends wine64 wine >/dev/null 2>&1 ||
+        say "Wine could not be installed: the Windows binaries will not be tested"
+    fi
     build fmus && ls -l fmus/*.fmu
     ;;
   interop)
