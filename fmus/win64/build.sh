@@ -34,7 +34,9 @@ if [ -z "$source" ]; then
     command -v apt-get >/dev/null || die "name a folder with the source of SUNDIALS 6 or 7: SPRINGBEAM_SUNDIALS_SOURCE=…"
     say "fetching Debian's source package of SUNDIALS"
     mkdir -p "$out/source/lists/partial"
-    echo "deb-src http://deb.debian.org/debian bookworm main" >"$out/source/sources.list"
+    # The archive this machine installs from has the sources too.
+    apt-get indextargets --format '$(REPO_URI) $(CODENAME) $(COMPONENT)' 'Created-By: Packages' |
+      sed -n '1s/^/deb-src /p' >"$out/source/sources.list"
     apt=(apt-get -qq -o "Dir::Etc::sourcelist=$out/source/sources.list" -o Dir::Etc::sourceparts=/dev/null
       -o "Dir::State::lists=$out/source/lists" -o APT::Sandbox::User=root)
     (cd "$out/source" && "${apt[@]}" update && "${apt[@]}" source --download-only sundials &&
