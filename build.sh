@@ -146,7 +146,8 @@ case $command in
       DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends wine64 wine >/dev/null 2>&1 ||
         say "Wine could not be installed: the Windows binaries will not be tested"
     fi
-    build fmus && ls -l fmus/*.fmu
+    build fmus
+    ls -l fmus/*.fmu
     ;;
   interop)
     build fmus
@@ -154,7 +155,10 @@ case $command in
     tests/interop/install.sh "$cache" "$python"
     SPRINGBEAM_CACHE=$cache exec $python -m pytest tests/interop "$@"
     ;;
-  fmus) build fmus && ls -l fmus/*.fmu fmus/*.ssp ;;
+  fmus)
+    build fmus
+    ls -l fmus/*.fmu fmus/*.ssp
+    ;;
   lint)
     set_up_python lint
     build beam spring
