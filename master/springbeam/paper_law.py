@@ -99,8 +99,10 @@ class PaperLaw:
         self._beam.rewind()
         self._beam_response = ends[1] - ends[0]
 
-    def _law(self, w: float) -> float:
-        return compliance_force(self._parameters.equilibrium - w, self._stiffness, self.scene.contact.exponent)
+    def _law(self, w: float, stiffness: float | None = None) -> float:
+        """λ (Ψ − w)₊^p [N] with the λ_nc that lines 12 and 15 have left, or with ``stiffness``."""
+        acting = self._stiffness if stiffness is None else stiffness
+        return compliance_force(self._parameters.equilibrium - w, acting, self.scene.contact.exponent)
 
     def _step(self) -> tuple[str, float, float, float]:
         """Lines 8–30. Returns the phase and the means of the tip's force, λ_nc(Ψ−u)₊^p and N over the step [N]."""
@@ -135,9 +137,7 @@ class PaperLaw:
         contact = (u_new - u_free) / self._beam_response  # lines 13, 19, 22
         beam.rewind()
         beam.advance(self.time, self.h, (contact, 0.0, 0.0))
-        stiffness, self._stiffness = self._stiffness, acting
-        inside = 0.5 * (self._law(u_new) + self._law(u))
-        self._stiffness = stiffness
+        inside = 0.5 * (self._law(u_new, acting) + self._law(u, acting))
         # What no force of the model does: the overwritten tip's work on the beam, the exchanged yˡ on the spring.
         self._injected["beam"] += (contact - inside) * (u_new - u)
         worked = (foundation - pressing + self._parameters.external_force) * (y_new - y)

@@ -35,7 +35,7 @@ def discrete_gradient(p0: float, p1: float, stiffness: float, exponent: float) -
     change, size = p1 - p0, max(abs(p0), abs(p1))
     if abs(change) > 0.1 * size:
         return (compliance_energy(p1, stiffness, exponent) - compliance_energy(p0, stiffness, exponent)) / change
-    # Same sign throughout: the mean of λ p^q over the straight path is a polynomial-like integral.
+    # One sign throughout: the quotient is the mean of λ p^q over the straight path.
     if size == 0.0 or p0 <= 0.0:
         return 0.0
     return stiffness * float(_WEIGHTS @ (p0 + change * _NODES) ** exponent)
@@ -82,7 +82,7 @@ class Compliance:
                 break
             self.iterations += 1
             new = self._model_root(start, p, c, response)
-            if new == c:
+            if new == c:  # the model cannot tell C any better
                 break
             p_new = self._penetration(beam, partner, time, size, new)
             measured = (p - p_new) / (new - c)
