@@ -550,7 +550,9 @@ def _impulse_panel(timeline: _Timeline, ax: Axes) -> None:
     sizes = np.array([getattr(e, name) for e in events for name, *_ in kinds if getattr(e, name) != 0.0])
     logarithmic = bool(np.all(sizes > 0.0) and np.max(sizes) > 30.0 * np.min(sizes))
     unit = Unit(1.0, "N·s") if logarithmic else readable_unit([sizes], "N·s")
-    foot = 0.3 * unit.factor * float(np.min(sizes)) if logarithmic else 0.0
+    # Impulses of rounding size would stretch the axis over the ones that matter.
+    smallest = max(float(np.min(sizes)), 1e-8 * float(np.max(sizes)))
+    foot = 0.3 * unit.factor * smallest if logarithmic else 0.0
     for name, label, colour, marker in kinds:
         points = np.array([(e.time, getattr(e, name)) for e in events if getattr(e, name) != 0.0])
         if len(points):
