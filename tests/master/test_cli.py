@@ -19,6 +19,7 @@ from typer.testing import CliRunner
 
 import springbeam.runner
 from springbeam import cli
+from springbeam.cli import common
 from springbeam.fmu import FmuError
 from springbeam.recording import PICTURES, load_trajectory
 from springbeam.runner import RunStopped
@@ -276,7 +277,7 @@ cli.main()
 
 
 def slow_command(here, *arguments, stderr=subprocess.PIPE):
-    environment = {**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[1]), "TERM": "xterm", "COLUMNS": "80"}
+    environment = {**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[2]), "TERM": "xterm", "COLUMNS": "80"}
     return subprocess.Popen(
         [sys.executable, "-c", SLOW, "run", "soft", "--no-plots", *arguments],
         cwd=here, env=environment, stdout=subprocess.PIPE, stderr=stderr, text=True,
@@ -387,8 +388,8 @@ def test_help_of_run_teaches_by_an_example(here):
 
 
 def test_completion_offers_shipped_scenes():
-    assert cli._complete_scene("so") == ["soft"]
-    assert cli._complete_scene("") == list(shipped_scenes())
+    assert common.complete_scene("so") == ["soft"]
+    assert common.complete_scene("") == list(shipped_scenes())
 
 
 def test_summary_in_the_directory_is_the_runners(here):

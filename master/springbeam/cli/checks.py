@@ -1,0 +1,128 @@
+"""``springbeam crosscheck`` and ``springbeam verify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..fmu import FmuError
+from ..scene import load_scene
+from .common import BAD_INPUT, DISAGREES, STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail
+
+if TYPE_CHECKING:
+    from ..crosscheck import OrderRow, Report
+
+
+def register(app: typer.Typer) -> None:
+    app.command()(crosscheck)
+    app.command()(verify)
+
+
+def crosscheck(
+    scene: SceneArgument,
+    settings: SettingsOption = None,
+    with_orders: Annotated[
+        bool, typer.Option("--orders", help="Repeat at H/2, H/4, H/8 and print observed orders instead.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", metavar="PNG", help="Draw both, and errors below bounds, here.")
+    ] = None,
+) -> None:
+    """Compare the co-simulation with the monolithic reference of its law. Exit code 1 if they disagree.
+
+    Example: springbeam crosscheck soft --set coupling.scheme=hermite --set coupling.degree=2 --orders
+    """
+    from ..crosscheck import crosscheck as compare
+    from ..crosscheck import orders
+    from ..monolithic.event_driven import ReferenceFailure
+    from ..plots import plot_crosscheck
+    from ..runner import RunStopped
+
+    console = Console(highlight=False)
+    with bad_input_reported():
+        what = load_scene(scene, settings or ())
+        try:
+            if with_orders:
+                console.print(_orders_table(orders(what)))
+                return
+            report = compare(what)
+        except FmuError as error:
+            fail(BAD_INPUT, str(error))
+        except (RunStopped, ReferenceFailure) as error:
+            fail(STOPPED, str(error))
+        if out is not None:
+            plot_crosscheck(report, out)
+    for note in report.notes:
+        console.print(Text(note))
+    console.print(_error_table(report))
+    console.print(_event_errors_table(report))
+    begin, end = report.trajectory["time"][0], report.trajectory["time"][-1]
+    console.print(Text(
+        f"comparable from {begin:.9g} to {report.horizon:.9g} s of {end:.9g} s; there a perturbation of the reference "
+        f"has grown {report.growth:.3g} times"
+    ))  # fmt: skip
+    console.print(Text("passed" if report.passed else "FAILED", style="bold green" if report.passed else "bold red"))
+    if not report.passed:
+        raise typer.Exit(DISAGREES)
+
+
+def verify() -> None:
+    """Check the FMUs against exact solutions. Exit code 1 if one is missed."""
+    from ..verify import report
+
+    try:
+        passed = report(Console(highlight=False))
+    except FmuError as error:
+        fail(BAD_INPUT, str(error))
+    if not passed:
+        raise typer.Exit(DISAGREES)
+
+
+def _error_table(report: Report) -> Table:
+    table = Table("quantity", box=None, pad_edge=False, header_style="bold")
+    for name in ("max error", "at t [s]", "L2 error", "bound", ""):
+        table.add_column(Text(name), justify="right", no_wrap=True)
+    for row in report.rows:
+        verdict = "ok" if row.passed else "FAILED"
+        table.add_row(row.quantity, f"{row.error:.2e}", f"{row.at:.6g}", f"{row.l2:.1e}", f"{row.bound:.1e}", verdict)
+    return table
+
+
+def _event_errors_table(report: Report) -> Table:
+    table = Table("contact", box=None, pad_edge=False, header_style="bold")
+    for name in ("t [s]", "reference [s]", "error [s]", "bound [s]", ""):
+        table.add_column(Text(name), justify="right", no_wrap=True)
+    for row in report.events:
+        error, verdict = row.time - row.reference, "ok" if row.passed else "FAILED"
+        table.add_row(
+            row.kind, f"{row.time:.10f}", f"{row.reference:.10f}", f"{error:.1e}", f"{row.bound:.1e}", verdict
+        )
+    return table
+
+
+def _orders_table(rows: list[OrderRow]) -> Table:
+    table = Table(
+        "phase",
+        r"from \[s]",
+        "quantity",
+        box=None,
+        pad_edge=False,
+        header_style="bold",
+        title="max errors at H, H/2, …",
+        title_justify="left",
+    )
+    count = len(rows[0].errors) if rows else 0
+    for column in table.columns:
+        column.no_wrap = True
+    for k in range(count):
+        table.add_column(f"H/{2**k}" if k else "H", justify="right", no_wrap=True)
+    table.add_column("orders", justify="right", no_wrap=True)
+    for row in rows:
+        observed = " ".join(f"{order:.1f}" for order in row.orders)
+        table.add_row(row.phase, f"{row.begin:.4f}", row.quantity, *[f"{error:.1e}" for error in row.errors], observed)
+    return table

@@ -1,0 +1,209 @@
+"""``springbeam run``."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections import Counter, deque
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from itertools import islice
+from pathlib import Path
+from time import monotonic
+from typing import Annotated, Any, NoReturn
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from ..fmu import FmuError
+from ..recording import FileRecorder, NonFiniteValue, RunDirectory, load_events, load_summary, load_trajectory
+from ..scene import Scene, load_scene
+from ..trajectory import Event
+from .common import BAD_INPUT, STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail
+
+_FIRST_EVENTS, _LAST_EVENTS = 10, 3
+_REFRESH_SECONDS = 0.1
+
+
+def register(app: typer.Typer) -> None:
+    app.command()(run)
+
+
+def run(
+    scene: SceneArgument,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Where results go. Default: results/SCENE, or results/SCENE-2, …"
+        ),
+    ] = None,
+    settings: SettingsOption = None,
+    no_plots: Annotated[bool, typer.Option("--no-plots", help="Do not draw pictures.")] = False,
+    force: Annotated[bool, typer.Option("--force", "-f", help="Replace results that are already there.")] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="No progress bar and no report; print only where the results are.")
+    ] = False,
+) -> None:
+    """Run a scene; write its results, events and pictures into a directory.
+
+    Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
+    """
+    with bad_input_reported():
+        what = load_scene(scene, settings or ())
+        directory = _run_directory(scene, out, force)
+    console = Console(quiet=quiet, highlight=False)
+    try:
+        error = _run_into(directory, what, quiet=quiet)
+    except FmuError as missing:
+        directory.remove()
+        fail(BAD_INPUT, str(missing))
+    _report(console, directory, what)
+    if not no_plots:
+        _draw(console, directory)
+    if quiet:
+        typer.echo(directory.path)
+    if error is not None:
+        fail(STOPPED, f"{error}\nwhat was computed is in {directory.path}")
+
+
+def _draw(console: Console, directory: RunDirectory) -> None:
+    from ..plots import plot_run  # matplotlib takes a second to load
+
+    try:
+        pictures = plot_run(load_trajectory(directory.path), directory.path)
+    except KeyboardInterrupt:
+        fail(STOPPED, f"interrupted while drawing; the results in {directory.path} are complete")
+    if pictures:
+        console.print(Text(f"pictures  {directory.path / '*.png'} ({len(pictures)})"), soft_wrap=True)
+
+
+def _run_directory(scene: str, out: Path | None, force: bool) -> RunDirectory:
+    default = Path("results") / Path(scene).stem
+    if out is None and not force:
+        return RunDirectory.create_numbered(default)
+    return RunDirectory.create(out or default, replace=force)
+
+
+def _run_into(directory: RunDirectory, scene: Scene, *, quiet: bool) -> str | None:
+    """Run ``scene``; returns why it stopped early, or ``None``. The results are closed and complete either way."""
+    from ..runner import RunStopped
+    from ..runner import run as run_scene
+
+    with FileRecorder(scene, directory) as recorder, _ProgressBar(scene.time.t_end, quiet=quiet) as progress:
+        try:
+            with _termination_as_interrupt():
+                run_scene(scene, recorder, progress)
+            return None
+        except RunStopped as stopped:
+            status, cause = "stopped", str(stopped)
+        except NonFiniteValue as error:
+            status, cause = "stopped", str(error)
+        except OSError as error:
+            status, cause = "stopped", f"{error.filename or directory.path}: {error.strerror or error}"
+        except KeyboardInterrupt:
+            status, cause = "interrupted", "interrupted"
+        reached = 0.0 if recorder.time is None else recorder.time
+        if not recorder.finished:
+            with suppress(OSError):  # on a full disk: the rows that fit are there, and the cause is reported
+                recorder.finish({"status": status, "cause": cause, "time": reached})
+    where = f"{cause} (reached t = {reached:.9g} s of {scene.time.t_end:g} s)"
+    return where if status == "interrupted" else f"the run stopped early: {where}"
+
+
+@contextmanager
+def _termination_as_interrupt() -> Iterator[None]:
+    """SIGTERM, which batch systems send, ends a run as Ctrl-C does: with its results on disk."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def interrupt(*_: Any) -> NoReturn:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+class _ProgressBar:
+    """Simulated time, phase and speed on stderr, when that is a terminal."""
+
+    def __init__(self, t_end: float, *, quiet: bool) -> None:
+        console = Console(stderr=True)
+        self._bar = Progress(
+            BarColumn(bar_width=20),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[state]}"),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+            redirect_stdout=False,
+            disable=quiet or not console.is_terminal,
+        )
+        self._t_end = t_end
+        self._task = self._bar.add_task("", total=t_end, state="starting")
+        self._start = self._shown = monotonic()
+
+    def __enter__(self) -> _ProgressBar:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def __call__(self, time: float, phase: str, macro_steps: int) -> None:
+        now = monotonic()
+        if self._bar.disable or now - self._shown < _REFRESH_SECONDS:
+            return
+        self._shown = now
+        speed = macro_steps / (now - self._start)
+        state = f"t = {time:.4g}/{self._t_end:g} s  {phase:<7}{speed:7.0f} steps/s"
+        self._bar.update(self._task, completed=time, state=state)
+
+
+def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
+    summary = load_summary(directory.path)
+    console.print(Text(scene.title or "(untitled scene)", style="bold"))
+    events = load_events(directory.path)
+    first = list(islice(events, _FIRST_EVENTS))
+    kinds = Counter(event.kind for event in first)
+    last: deque[Event] = deque(maxlen=_LAST_EVENTS)
+    for event in events:
+        kinds[event.kind] += 1
+        last.append(event)
+    if first:
+        console.print(_event_table(first, list(last), kinds.total() - len(first) - len(last), scene))
+        counts = ", ".join(f"{number} {kind}" for kind, number in kinds.most_common())
+        console.print(f"events    {counts}")
+    if "macro_steps" in summary and "wall_time" in summary:
+        console.print(f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s")
+    if "max_energy_residual" in summary:
+        console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}")
+    for warning in summary.get("warnings", ()):
+        console.print(Text(f"warning   {warning}"))
+    console.print(Text(f"results   {directory.path}"), soft_wrap=True)
+
+
+def _event_table(first: list[Event], last: list[Event], between: int, scene: Scene) -> Table:
+    position, speed = ("u_tip", "v_tip") if scene.spring is None else ("y", "z")
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("event", no_wrap=True)
+    units = {"t": "s", position: "m", speed: "m/s", "J_contact": "N·s", "J_stop": "N·s", "loss": "J"}
+    for name, unit in units.items():
+        table.add_column(Text(f"{name}\n[{unit}]"), justify="right", no_wrap=True)
+    for event in [*first, *last]:
+        if between and last and event is last[0]:
+            table.add_row("⋮", Text(f"{between} more"))
+        impulses = (event.impulse_contact, event.impulse_foundation)
+        table.add_row(
+            event.kind,
+            f"{event.time:.8f}",
+            *("" if value is None else f"{value:.4g}" for value in (getattr(event, position), getattr(event, speed))),
+            *(f"{value:.3g}" if value else "" for value in (*impulses, event.energy_loss)),
+        )
+    return table
