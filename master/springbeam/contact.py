@@ -1,4 +1,4 @@
-"""Contact laws and phases: who is joined to whom, what an impact does, when a contact ends. Pure functions.
+"""Phases and impacts: who is joined to whom, and what an event changes.
 
 ``docs/model.md`` states the laws; section names below are its.
 """
@@ -8,7 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from .scene import Spring
+from .scene import Scene, Spring
+from .subsystem import Motion
+
+#: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only).
+_SEATING_SPEED = 1e-8
 
 
 class Joint(Enum):
@@ -72,3 +76,80 @@ def foundation_impact(z: float | None, mass: float, v: float | None, tip_mass: f
 def spring_force(spring: Spring, y: float) -> float:
     """k1 y + k2 y³ − f_s [N]: what the seated spring hands to the foundation besides C (Ahn & Tate, (6))."""
     return spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
+
+
+class Transitions:
+    """What each kind of event does to the phase and to the velocities.
+
+    Parameters
+    ----------
+    scene
+        With the contact law.
+    tip_mass, mass
+        What an impulse meets at the tip and at the spring top [kg]; ``None`` for an absent body.
+    """
+
+    def __init__(self, scene: Scene, tip_mass: float | None, mass: float | None) -> None:
+        self._scene, self._tip_mass, self._mass = scene, tip_mass, mass
+        self._fastest_impact = 0.0
+
+    def happens(
+        self, kind: str, phase: Phase, ends: tuple[Motion, Motion], end_force: float, tolerance: float
+    ) -> tuple[str, Phase, Impact]:
+        """The event's kind (an impact on the foundation may end seated), the phase after it, and the impact.
+
+        ``ends`` are (tip, lower end) before it, ``end_force`` is C there [N], ``tolerance`` what positions can be told
+        apart to [m].
+        """
+        tip, low = ends
+        if kind == "impact":
+            return kind, *self._meet(phase, tip, low, tolerance)
+        if kind == "stop_impact":
+            return self._strike(phase, tip, low)
+        if kind == "release":
+            if end_force > 0.0:
+                return kind, Phase(Joint.TOUCH), Impact()
+            return kind, Phase(Joint.FREE), self._part(phase, tip, low)
+        if kind == "retie":
+            return kind, Phase(Joint.TIED), Impact()
+        if kind == "unseated":
+            return kind, Phase(phase.joint), Impact()
+        assert kind == "separation"
+        opened = Phase(Joint.FREE, seated=phase.seated and self._mass is not None)
+        return kind, opened, self._part(opened, tip, low)
+
+    def _meet(self, phase: Phase, tip: Motion, low: Motion, tolerance: float) -> tuple[Phase, Impact]:
+        assert self._tip_mass is not None
+        assert self._mass is not None
+        assert self._scene.spring is not None
+        psi = self._scene.spring.equilibrium
+        if phase.seated:
+            # The seated spring does not move: the tip strikes the foundation through it.
+            return Phase(Joint.TIED, seated=True), foundation_impact(None, 0.0, tip.velocity, self._tip_mass, 0.0)
+        impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
+        common = low.velocity + impact.on_spring / self._mass
+        at_equilibrium = abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
+        tied = low.displacement < psi or (common <= 0.0 and at_equilibrium)
+        return Phase(Joint.TIED if tied else Joint.TOUCH), impact
+
+    def _strike(self, phase: Phase, tip: Motion, low: Motion) -> tuple[str, Phase, Impact]:
+        """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
+        assert self._scene.stop is not None
+        e = self._scene.stop.restitution
+        tied = self._tip_mass is not None and phase.joint is not Joint.FREE and self._scene.contact.law != "compliance"
+        z = low.velocity if self._mass is not None else None
+        v = tip.velocity if tied or self._mass is None else None
+        ends = (z, self._mass or 0.0, v, self._tip_mass or 0.0)
+        speed = max(abs(w) for w in (z, v) if w is not None)
+        self._fastest_impact = max(self._fastest_impact, speed)
+        if (e * speed <= _SEATING_SPEED * self._fastest_impact and e < 1.0) or speed == 0.0:
+            joint = phase.joint if self._mass is not None else Joint.TIED
+            return "seated", Phase(joint, seated=True), foundation_impact(*ends, restitution=0.0)
+        return "stop_impact", phase, foundation_impact(*ends, restitution=e)
+
+    def _part(self, opened: Phase, tip: Motion, low: Motion) -> Impact:
+        """A tie that opens while its ends still close (the energy scheme lets velocities differ): they meet first."""
+        closing = tip.velocity - low.velocity
+        if self._mass is None or self._tip_mass is None or closing >= 0.0 or opened.seated:
+            return Impact()
+        return meeting("inelastic", tip.velocity, low.velocity, self._tip_mass, self._mass)

@@ -1,4 +1,4 @@
-"""Where inside a step something happens.
+"""Event functions, and where inside a step one of them vanishes.
 
 An event function f is positive while nothing happens and falls through zero at the event. A step knows f and ḟ at
 both ends; the cubic through them tells where to look, also for a contact that opens and closes again inside the step.
@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .contact import Joint, Phase
+from .scene import Scene
 from .subsystem import Motion
 
 _EPS = float(np.finfo(float).eps)
@@ -22,6 +24,63 @@ class Sample(NamedTuple):
 
     value: float
     rate: float
+
+
+#: f, ḟ of the ends (tip, lower end).
+EventFunction = Callable[[tuple[Motion, Motion]], Sample]
+
+
+def gap(ends: tuple[Motion, Motion]) -> Sample:
+    """g = u_tip − y, or what lies below the tip instead of y."""
+    tip, low = ends
+    return Sample(tip.displacement - low.displacement, tip.velocity - low.velocity)
+
+
+def _above(end: int, level: float) -> EventFunction:
+    return lambda ends: Sample(ends[end].displacement - level, ends[end].velocity)
+
+
+def _below(end: int, level: float) -> EventFunction:
+    return lambda ends: Sample(level - ends[end].displacement, -ends[end].velocity)
+
+
+class EventFunctions:
+    """Which event functions each phase of a scene has, by the kind of their event."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._ties = scene.beam is not None and scene.spring is not None and scene.contact.law != "compliance"
+        self._of_phase: dict[Phase, list[tuple[str, EventFunction]]] = {}
+
+    def of(self, phase: Phase) -> list[tuple[str, EventFunction]]:
+        functions = self._of_phase.get(phase)
+        if functions is None:
+            functions = self._of_phase[phase] = self._built(phase)
+        return functions
+
+    def _built(self, phase: Phase) -> list[tuple[str, EventFunction]]:
+        tip, low = 0, 1
+        spring, stop = self._scene.spring, self._scene.stop
+        functions: list[tuple[str, EventFunction]] = []
+        if self._ties:
+            assert spring is not None
+            if phase.joint is Joint.FREE:
+                functions.append(("impact", gap))
+            if phase.joint is Joint.TIED and not phase.seated:
+                functions.append(("release", _below(low, spring.equilibrium)))
+            if phase.joint is Joint.TOUCH:
+                functions.append(("retie", _above(low, spring.equilibrium)))
+        if stop is not None and not phase.seated:
+            functions.append(("stop_impact", _above(tip if spring is None else low, stop.position)))
+        return functions
+
+
+def position_tolerance(ends: tuple[Motion, Motion], level: float, macro_step: float) -> float:
+    """What positions can be told apart to [m]: rounding of the displacements, and of the foundation's ``level``."""
+    tip, low = ends
+    length = max(abs(tip.displacement), abs(low.displacement), abs(level))
+    speed = max(abs(tip.velocity), abs(low.velocity))
+    return 8.0 * _EPS * length + 1e-15 * speed * macro_step
 
 
 def lowest_inside(start: Sample, end: Sample, size: float) -> float | None:

@@ -13,10 +13,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from .coupling.compliance import compliance_force
+from .ledger import Ledger
 from .recording import NonFiniteValue, Recorder
 from .scene import Scene
-from .simulation import BeamBody, Ledger, Progress, RunStopped
-from .subsystem import NO_FORCE, Body, StepRefused
+from .simulation import Progress, RunStopped
+from .subsystem import NO_FORCE, BeamBody, Body, StepRefused
 from .trajectory import Event
 
 _MAX_ITERATIONS = 50

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
 NO_FORCE: Force = (0.0, 0.0, 0.0)
@@ -59,6 +61,11 @@ class Body(Protocol):
 
     def close(self) -> None:
         """Free what the body holds; it is not used afterwards."""
+
+
+class BeamBody(Body, Protocol):
+    def shape(self) -> np.ndarray:
+        """Deflection [m] at `springbeam.trajectory.SHAPE_POINTS`, shape (21,)."""
 
 
 class Held:

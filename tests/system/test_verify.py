@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 from scipy.special import airy
 from typer.testing import CliRunner
 
-from springbeam import simulation, verify
+from springbeam import stepping, verify
 from springbeam.cli import app
 from springbeam.fmu import FmuBeam, FmuSpring
 from springbeam.subsystem import StepRefused
@@ -72,13 +72,13 @@ def force_off(patch: pytest.MonkeyPatch) -> None:
 
 def gap_left_open(patch: pytest.MonkeyPatch) -> None:
     """The scheme's conditions are met 1e-4 H late."""
-    right = simulation.conditions
+    right = stepping.conditions
 
     def wrong(scheme, degree):
         conditions = right(scheme, degree)
         return lambda m, size: tuple(r + 1e-4 * size * m.velocity for r in conditions(m, size))
 
-    patch.setattr(simulation, "conditions", wrong)
+    patch.setattr(stepping, "conditions", wrong)
 
 
 @pytest.mark.parametrize(

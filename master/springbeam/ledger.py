@@ -1,0 +1,43 @@
+"""The energy ledger of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .subsystem import Energies
+
+
+@dataclass
+class Ledger:
+    """E_beam + E_spring + E_contact + dissipated + impact losses − work of external loads = constant."""
+
+    impact_loss: float = 0.0  #: [J], by whoever applies an impact
+    initial: float | None = None  #: the total of the first row [J]
+    scale: float = 0.0  #: the largest energy so far [J]
+    largest_residual: float = 0.0  #: [J]
+    relative: float = 0.0  #: the largest residual over the scale at its time
+
+    def book(self, beam: Energies, spring: Energies, contact: float) -> dict[str, float]:
+        """The row's energies [J] under their column names; ``contact`` is the energy of the contact law."""
+        e_beam = beam.kinetic + beam.potential
+        e_spring = spring.kinetic + spring.potential
+        dissipated = beam.dissipated + spring.dissipated
+        load = beam.load_potential + spring.load_potential
+        total = e_beam + e_spring + contact + dissipated + self.impact_loss + load
+        if self.initial is None:
+            self.initial = total
+        residual = total - self.initial
+        self.scale = max(self.scale, abs(self.initial), e_beam + abs(e_spring) + contact)
+        self.largest_residual = max(self.largest_residual, abs(residual))
+        if self.scale > 0.0:
+            self.relative = max(self.relative, abs(residual) / self.scale)
+        return {
+            "e_beam": e_beam,
+            "e_spring": e_spring,
+            "e_contact": contact,
+            "e_dissipated": dissipated,
+            "e_impact_loss": self.impact_loss,
+            "e_load": load,
+            "e_total": total,
+            "energy_residual": residual,
+        }

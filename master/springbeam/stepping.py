@@ -1,0 +1,189 @@
+"""One attempted step: both bodies from their marks, by any size, under the law of the phase."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from .contact import Joint, Phase, spring_force
+from .coupling import conditions, force
+from .coupling.compliance import Compliance, compliance_energy
+from .coupling.exchange import Exchange
+from .coupling.tie import Tie
+from .scene import ORDINARY_SCHEMES, Scene
+from .subsystem import NO_FORCE, BeamBody, Body, Energies, Force, Held, Motion
+
+#: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
+Ends = tuple[Motion, Motion]
+
+_AT_REST = Motion(0.0, 0.0, 0.0, 0.0)
+_NOTHING = Energies(0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Step:
+    """An attempted step and what the bodies' ends did on it."""
+
+    time: float
+    size: float
+    contact: Force  #: C on the step
+    foundation: Force  #: N on the step
+    start: Ends  #: at the mark
+    end: Ends
+
+
+@dataclass
+class State:
+    """Where the run is, and what of the last steps the next one needs."""
+
+    time: float
+    phase: Phase = field(default_factory=Phase)
+    contact: Force = NO_FORCE  #: C of the last step, continued
+    foundation: Force = NO_FORCE  #: N of the last step, continued
+    smoothed: float = 0.0  #: mean of C's two limits at the start of the last step [N]
+    steps_in_phase: int = 0
+    #: (middle, C, N) of the last two steps of this phase.
+    middles: list[tuple[float, float, float]] = field(default_factory=list)
+    reclosed: bool = False  #: the contact had opened and closed at once: its next step does not open it again
+
+    def accept(self, step: Step, time: float) -> None:
+        """The step that ends at ``time`` is made."""
+        self.middles = [*self.middles[-1:], (self.time + 0.5 * step.size, step.contact[0], step.foundation[0])]
+        self.time = time
+        first = self.steps_in_phase == 0
+        # At the macro point between two steps both forces are wrong by nearly the same, one up, one down.
+        self.smoothed = step.contact[0] if first else 0.5 * (step.contact[0] + self.contact[0])
+        self.contact = force.shifted(step.contact, step.size)
+        self.foundation = force.shifted(step.foundation, step.size)
+        self.steps_in_phase += 1
+
+    def enter(self, phase: Phase) -> None:
+        """Another phase begins: what was known of the forces holds no longer."""
+        if phase == self.phase:
+            return
+        self.phase = phase
+        self.steps_in_phase = 0
+        self.middles.clear()
+        if phase.joint is Joint.FREE:
+            self.contact = NO_FORCE
+        if not phase.seated:
+            self.foundation = NO_FORCE
+
+
+class Pair:
+    """Beam and spring of a scene, one of them possibly missing, and the law between them.
+
+    Parameters
+    ----------
+    scene
+        Whose contact law and coupling scheme hold.
+    beam, spring
+        The bodies; ``None`` where the scene has none.
+    """
+
+    def __init__(self, scene: Scene, beam: BeamBody | None, spring: Body | None) -> None:
+        self._scene = scene
+        self.beam, self.spring = beam, spring
+        self.stop = None if scene.stop is None else scene.stop.position
+        self._held = None if self.stop is None else Held(self.stop)
+        self.lower: Body | None = self._held if spring is None else spring
+        self._bodies: list[Body] = [body for body in (beam, self.lower) if body is not None]
+        self.joinable = beam is not None and spring is not None
+        self.compliant = scene.contact.law == "compliance" and self.joinable
+        coupling, law = scene.coupling, (scene.contact.stiffness, scene.contact.exponent)
+        self._exchange: Exchange | None = None
+        if coupling.scheme in ORDINARY_SCHEMES:
+            self._exchange = Exchange(coupling.scheme == "gauss_seidel", coupling.degree, *law)
+        scheme = "energy" if self._exchange is not None else coupling.scheme
+        self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance, coupling.macro_step)
+        self._compliance = Compliance(*law, coupling.tolerance, coupling.macro_step)
+        #: Of the contact force over a step.
+        self.degree = 0 if self.compliant else coupling.degree
+        #: Whether the coupling may create energy, so that its residual is watched.
+        self.lossy = scheme == "hermite" or self._exchange is not None
+
+    @property
+    def iterations(self) -> int:
+        return self._tie.iterations + self._compliance.iterations
+
+    def mark(self) -> None:
+        """Remember the bodies' states as those that steps start from."""
+        for body in self._bodies:
+            body.mark()
+
+    def rewind(self) -> None:
+        for body in self._bodies:
+            body.rewind()
+
+    def attempt(self, state: State, size: float, start: Ends, phase: Phase | None = None) -> Step:
+        """From the mark by ``size`` [s] under the law of the phase (``phase`` instead of the state's own).
+
+        Raises StepRefused.
+        """
+        phase = state.phase if phase is None else phase
+        contact = foundation = NO_FORCE
+        upper, lower, spring = self.beam, self.lower, self.spring
+        partner = self._held if phase.seated else lower
+        if self.compliant:
+            assert upper is not None
+            assert partner is not None
+            if self._exchange is not None:
+                contact = self._exchange.solve(upper, partner, state.time, size, start)
+            else:
+                penetration = start[1].displacement - start[0].displacement
+                contact = self._compliance.solve(upper, partner, state.time, size, state.contact, penetration)
+        elif phase.joint is Joint.FREE:
+            if upper is not None:
+                upper.rewind()
+                upper.advance(state.time, size, NO_FORCE)
+            if lower is not None and not phase.seated:
+                lower.rewind()
+                lower.advance(state.time, size, NO_FORCE)
+        else:
+            assert upper is not None
+            assert partner is not None
+            contact = self._tie.solve(upper, partner, state.time, size, state.contact, start[0])
+        if phase.seated:
+            foundation = contact
+            if spring is not None:
+                static = spring_force(self._scene.spring, self.stop)  # type: ignore[arg-type]
+                foundation = (contact[0] + static, contact[1], contact[2])
+                spring.rewind()
+                spring.advance(state.time, size, contact, foundation)
+        return Step(state.time, size, contact, foundation, start, self.ends())
+
+    def settled(self, state: State, step: Step) -> Step:
+        """Leave the bodies at the end of ``step`` (a look inside it may have moved them)."""
+        if self.ends() == step.end:
+            return step
+        return self.attempt(state, step.size, step.start)
+
+    def apply_impulses(self, on_beam: float, on_spring: float) -> None:
+        """Upward impulses [N·s]."""
+        if self.beam is not None and on_beam != 0.0:
+            self.beam.apply_impulse(on_beam)
+        if self.spring is not None and on_spring != 0.0:
+            self.spring.apply_impulse(on_spring)
+
+    def ends(self) -> Ends:
+        """(tip, lower end); the one that is missing is at rest at 0."""
+        return (
+            _AT_REST if self.beam is None else self.beam.motion(),
+            _AT_REST if self.lower is None else self.lower.motion(),
+        )
+
+    def energies(self) -> tuple[Energies, Energies, float]:
+        """Of the beam, of the spring, and of the contact law [J]."""
+        contact = 0.0
+        if self.compliant:
+            tip, low = self.ends()
+            law = self._scene.contact
+            contact = compliance_energy(low.displacement - tip.displacement, law.stiffness, law.exponent)
+        return (
+            _NOTHING if self.beam is None else self.beam.energies(),
+            _NOTHING if self.spring is None else self.spring.energies(),
+            contact,
+        )
+
+    def end_force(self, state: State, step: Step) -> float:
+        """C at the end of the step as well as the degree tells [N]."""
+        return force.end_value(step.contact, step.size) if self.degree > 0 else state.smoothed
