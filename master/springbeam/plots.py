@@ -1,15 +1,15 @@
 """Pictures of a run, after the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5.
 
-Colours are those of Okabe and Ito, told apart with any colour vision; lines also differ in width or dashes, events in
-shape, so that the pictures survive a black-and-white printer.
+Besides colours, lines differ in width or dashes and events in shape, so that the pictures survive a black-and-white
+printer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -23,35 +23,64 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator
 
+from .drawing import (
+    BLACK,
+    BLUE,
+    ENERGIES,
+    EVENT_LOOKS,
+    FORCES,
+    GREEN,
+    GREY,
+    IMPULSES,
+    ORANGE,
+    OTHER_SHADES,
+    PHASE_SHADES,
+    PHASE_WORDS,
+    POSITIONS,
+    PURPLE,
+    SKY,
+    VELOCITIES,
+    VERMILLION,
+    Look,
+    Unit,
+    alternates,
+    decimated,
+    energy_scale,
+    first_contact,
+    levels,
+    much_smaller,
+    phase_intervals,
+    present,
+    readable_unit,
+    sizes_beside_the_largest,
+)
 from .recording import PICTURES
-from .trajectory import EVENT_KINDS, SHAPE_POINTS, Trajectory
+from .trajectory import SHAPE_POINTS, Trajectory
 
 if TYPE_CHECKING:
     from .crosscheck import Report
 
-BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
-YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
-GREY = "#777777"
-
-_PHASE_SHADES = {"free": "#FFFFFF", "tied": "#D6EAF7", "touch": "#FFF1B8", "seated": "#CFE8DD"}
-_OTHER_SHADES = ("#EADCE7", "#E4E4E4", "#F7DCC8")
-_PHASE_WORDS = {
-    "free": "free",
-    "tied": "tied (u = y < Ψ)",
-    "touch": "touch (y ≥ Ψ)",
-    "seated": "seated (at φ)",
+#: What tells lines apart besides their colour.
+_LINES: dict[str, dict[str, Any]] = {
+    "u_tip": {"linewidth": 2.2, "alpha": 0.75},
+    "y": {"linewidth": 0.9},
+    "contact_force": {"linewidth": 0.7},
+    "contact_force_smoothed": {"linewidth": 1.2},
+    "compliance_force": {"linewidth": 1.0, "linestyle": "--"},
+    "foundation_force": {"linewidth": 0.9},
+    "e_total": {"linewidth": 1.4, "linestyle": (0, (4, 2))},
 }
-#: Colour, marker and words of each kind of event.
-_EVENT_MARKS: dict[str, tuple[str, str, str]] = {
-    "impact": (VERMILLION, "v", "impact tip–spring"),
-    "stop_impact": (BLACK, "^", "impact on foundation"),
-    "release": (BLUE, "o", "release"),
-    "retie": (PURPLE, "s", "retie"),
-    "separation": (GREEN, "D", "separation"),
-    "seated": (GREY, "<", "seated"),
-    "unseated": (GREY, ">", "unseated"),
+_EVENT_MARKERS = {
+    "impact": "v",
+    "stop_impact": "^",
+    "release": "o",
+    "retie": "s",
+    "separation": "D",
+    "seated": "<",
+    "unseated": ">",
 }
-assert tuple(_EVENT_MARKS) == EVENT_KINDS
+_LEVEL_LINES: dict[str, dict[str, Any]] = {"Ψ": {"lw": 0.8, "ls": (0, (4, 3))}, "φ": {"lw": 1.3}}
+_IMPULSE_MARKERS = {"impulse_contact": "o", "impulse_foundation": "^"}
 
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -69,14 +98,10 @@ _STYLE: dict[Any, Any] = {
 _REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
 _DPI = 160
 _WIDTH = 8.2  # inches
-#: Columns of pixels of a time axis, roughly; more points than a few per column cannot be seen.
-_PIXEL_COLUMNS = 1000
 _MANY_EVENTS = 60
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
 _MARK_HEIGHT, _MARK_ROW = 1.045, 0.04
 _KEY_COLUMNS = 4
-#: Forces and energies below this part of the largest one are not seen beside it.
-_INVISIBLE = 5e-3
 #: Early to late, dark to light, but not so light that a line is lost on paper.
 _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 256)), "clock")
 
@@ -122,7 +147,7 @@ def plot_crosscheck(report: Report, path: Path) -> None:
     with matplotlib.rc_context(_STYLE):
         timeline = _Timeline.of(trajectory, "Co-simulation and reference", [2.2, 3.0])
         above, below = timeline.axes
-        names = _present(trajectory, "u_tip", "y")
+        names = present(trajectory, POSITIONS)
         unit = readable_unit([trajectory[name] for name in names], "m")
         for name, colour in zip(names, (BLUE, VERMILLION), strict=False):
             above.plot(
@@ -154,64 +179,6 @@ def plot_crosscheck(report: Report, path: Path) -> None:
 # -- axes ---------------------------------------------------------------------------------------------------------
 
 
-class Unit(NamedTuple):
-    """A unit with an SI prefix: values are multiplied by ``factor`` before they are drawn."""
-
-    factor: float
-    name: str
-
-
-def readable_unit(values: Iterable[np.ndarray], unit: str) -> Unit:
-    """The prefix with which the largest of ``values`` reads well: 0.015 m as 15 mm, 4.5e9 J as 4.5 GJ."""
-    largest = max((float(np.max(np.abs(v), initial=0.0)) for v in values), default=0.0)
-    if largest == 0.0 or 0.1 <= largest < 1e4:
-        return Unit(1.0, unit)
-    power = min(max(int(np.floor(np.log10(largest) / 3.0)), -4), 4)
-    return Unit(10.0 ** (-3 * power), f"{'pnµm kMGT'[power + 4].strip()}{unit}")
-
-
-def decimated(time: np.ndarray, values: np.ndarray, columns: int = _PIXEL_COLUMNS) -> np.ndarray:
-    """Indices of the rows to draw: of each of ``columns`` equal spans of time the first, last, lowest and highest.
-
-    A line through them covers the same pixels as one through all rows. ``time`` does not decrease.
-    """
-    if len(time) <= 4 * columns:
-        return np.arange(len(time))
-    edges = np.searchsorted(time, np.linspace(time[0], time[-1], columns + 1)[1:-1])
-    keep = []
-    for span in np.split(np.arange(len(time)), edges):
-        if len(span):
-            part = values[span]
-            keep += [span[0], span[int(np.argmin(part))], span[int(np.argmax(part))], span[-1]]
-    return np.unique(keep)
-
-
-def alternates(values: np.ndarray) -> bool:
-    """Whether ``values`` mostly jump up and down from row to row: the steps are longer than what they should show."""
-    if len(values) < 20:
-        return False
-    jumps = np.diff(values)
-    reversals = np.mean(jumps[1:] * jumps[:-1] < 0.0)
-    usual_range = np.subtract(*np.quantile(values, (0.95, 0.05)))
-    return bool(reversals > 0.6 and np.mean(np.abs(jumps)) > 0.15 * usual_range)
-
-
-def phase_intervals(
-    time: np.ndarray, phase: np.ndarray, columns: int = _PIXEL_COLUMNS
-) -> list[tuple[str, float, float]]:
-    """``(phase, start, end)`` in turn; a row's phase holds until the next row.
-
-    More intervals than can be seen are replaced by the phases at ``columns`` equally spaced times.
-    """
-    starts = np.flatnonzero(np.r_[True, phase[1:] != phase[:-1]])
-    if len(starts) > columns:
-        samples = np.linspace(time[0], time[-1], columns + 1)
-        at = np.searchsorted(time, 0.5 * (samples[1:] + samples[:-1]), side="right") - 1
-        return phase_intervals(samples, phase[np.append(at, at[-1])], columns + 1)
-    ends = np.r_[time[starts[1:]], time[-1]]
-    return [(str(phase[i]), float(time[i]), float(end)) for i, end in zip(starts, ends, strict=True) if end > time[i]]
-
-
 @dataclass
 class _Timeline:
     """A figure of panels over a common time axis, phases shaded and events marked."""
@@ -236,8 +203,9 @@ class _Timeline:
             figure.legend(handles=keys, loc="outside lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
         return timeline
 
-    def line(self, ax: Axes, unit: Unit, name: str, **style: Any) -> None:
+    def line(self, ax: Axes, unit: Unit, name: str, look: Look, **style: Any) -> None:
         """A column over time; where it alternates from step to step, as dots on a faint line."""
+        style = {"color": look.colour, "label": look.words, **_LINES.get(name, {}), **style}
         values = self.trajectory[name]
         rows = decimated(self.trajectory["time"], values)
         t, v = self.unit.factor * self.trajectory["time"][rows], unit.factor * values[rows]
@@ -250,17 +218,17 @@ class _Timeline:
         spans: dict[str, list[tuple[float, float]]] = {}
         for phase, start, end in phase_intervals(self.trajectory["time"], self.trajectory["phase"]):
             spans.setdefault(phase, []).append((self.unit.factor * start, self.unit.factor * (end - start)))
-        others = iter(_OTHER_SHADES * len(spans))
+        others = iter(OTHER_SHADES * len(spans))
         patches = []
         if spans.keys() == {"free"}:
             return []
         for phase, intervals in spans.items():
-            colour = _PHASE_SHADES.get(phase) or next(others)
+            colour = PHASE_SHADES.get(phase) or next(others)
             for ax in self.axes:
                 ax.broken_barh(
                     intervals, (0.0, 1.0), transform=ax.get_xaxis_transform(), color=colour, lw=0.0, zorder=0
                 )
-            patches.append(Patch(facecolor=colour, edgecolor=GREY, linewidth=0.5, label=_PHASE_WORDS.get(phase, phase)))
+            patches.append(Patch(facecolor=colour, edgecolor=GREY, linewidth=0.5, label=PHASE_WORDS.get(phase, phase)))
         return patches
 
     def _mark_events(self) -> list[Line2D]:
@@ -268,12 +236,13 @@ class _Timeline:
         events = self.trajectory.events
         many = len(events) > _MANY_EVENTS
         handles: list[Line2D] = []
-        for kind, (colour, marker, words) in _EVENT_MARKS.items():
+        for kind, (colour, words) in EVENT_LOOKS.items():
             times = self.unit.factor * np.array([event.time for event in events if event.kind == kind])
             if not len(times):
                 continue
             height = _MARK_HEIGHT + (_MARK_ROW * len(handles) if many else 0.0)
-            look: dict[str, Any] = {"color": colour, "marker": "|" if many else marker, "markersize": 4.0, "ls": "none"}
+            marker = "|" if many else _EVENT_MARKERS[kind]
+            look: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 4.0, "ls": "none"}
             visible = times[decimated(times, times)]
             first = self.axes[0]
             first.plot(
@@ -308,29 +277,23 @@ def _note(ax: Axes, text: str) -> None:
         notes[0].set_text(f"{notes[0].get_text()}\n{text}")
 
 
-def _visible(ax: Axes, trajectory: Trajectory, labels: Mapping[str, str], unit: str) -> list[str]:
+def _visible(ax: Axes, trajectory: Trajectory, looks: Mapping[str, Look], unit: str) -> list[str]:
     """The columns that can be seen beside the largest; the others are named beside the panel."""
-    sizes = {name: float(np.max(np.abs(trajectory[name]))) for name in labels}
-    seen = [name for name, size in sizes.items() if size >= _INVISIBLE * max(sizes.values())]
-    unseen = [f"{labels[name]} ≤ {size:.2g} {unit}" for name, size in sizes.items() if size > 0.0 and name not in seen]
+    seen, unseen = sizes_beside_the_largest(trajectory, looks)
     if unseen:
-        _note(ax, "too small to draw:\n" + "\n".join(unseen))
+        sizes = [f"{looks[name].words} ≤ {size:.2g} {unit}" for name, size in unseen.items()]
+        _note(ax, "too small to draw:\n" + "\n".join(sizes))
     return seen
 
 
 # -- (A), (B): the beam's shape -----------------------------------------------------------------------------------
 
 
-def _first_contact(trajectory: Trajectory) -> float:
-    times = (event.time for event in trajectory.events if event.kind in ("impact", "stop_impact"))
-    return next(times, float(trajectory["time"][0]))
-
-
 def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     if trajectory.shapes is None:
         return None
     times, shapes = trajectory.shapes
-    first = int(np.searchsorted(times, _first_contact(trajectory)))
+    first = int(np.searchsorted(times, first_contact(trajectory)))
     times, shapes = times[first : first + _SHAPES_EARLY], shapes[first : first + _SHAPES_EARLY]
     if len(times) < 2:
         return None
@@ -359,7 +322,7 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
     if trajectory.shapes is None:
         return None
     times, shapes = trajectory.shapes
-    first = int(np.searchsorted(times, _first_contact(trajectory)))
+    first = int(np.searchsorted(times, first_contact(trajectory)))
     times, shapes = times[first:], shapes[first:]
     if len(times) < _SHAPES_EARLY:
         return None
@@ -430,11 +393,11 @@ def _levels(ax: Axes, trajectory: Trajectory, unit: Unit, *, whole_width: bool =
     """Ψ and φ, across the panel or as ticks at the tip, unless what moves is tiny beside their distance."""
     low, high = ax.get_ylim()
     reach = 1.5 * (high - low)
-    for value, symbol, style in _level_values(trajectory):
+    for symbol, value in levels(trajectory.scene).items():
         level = unit.factor * value
         if not low - reach <= level <= high + reach:
             continue
-        ax.axhline(level, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **style)
+        ax.axhline(level, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **_LEVEL_LINES[symbol])
         place: dict[str, Any] = {"xytext": (3.0, 0.0), "va": "center"}
         if whole_width:  # beside the panel is the key
             place = {"xytext": (-2.0, 1.5), "ha": "right"}
@@ -442,47 +405,26 @@ def _levels(ax: Axes, trajectory: Trajectory, unit: Unit, *, whole_width: bool =
                     **place)  # fmt: skip
 
 
-def _level_values(trajectory: Trajectory) -> list[tuple[float, str, dict[str, Any]]]:
-    scene, levels = trajectory.scene, []
-    if scene.spring is not None:
-        levels.append((scene.spring.equilibrium, "Ψ", {"lw": 0.8, "ls": (0, (4, 3))}))
-    if scene.stop is not None:
-        levels.append((scene.stop.position, "φ", {"lw": 1.3}))
-    return levels
-
-
 # -- (C), (D), (E): over time -------------------------------------------------------------------------------------
-
-_LABELS: dict[str, tuple[str, dict[str, Any]]] = {
-    "u_tip": ("tip u(t, L)", {"color": BLUE, "linewidth": 2.2, "alpha": 0.75}),
-    "y": ("spring top y", {"color": VERMILLION, "linewidth": 0.9}),
-    "v_tip": ("tip v(t, L)", {"color": BLUE}),
-    "z": ("spring top z", {"color": VERMILLION}),
-}
-
-
-def _present(trajectory: Trajectory, *names: str) -> list[str]:
-    return [name for name in names if name in trajectory.columns]
 
 
 def _positions(trajectory: Trajectory) -> Figure | None:
-    positions = _present(trajectory, "u_tip", "y")
-    speeds = _present(trajectory, "v_tip") or _present(trajectory, "z")
+    positions = present(trajectory, POSITIONS)
+    speeds = present(trajectory, VELOCITIES)[:1]
     whose = "beam's tip" if "v_tip" in speeds else "spring's top"
     title = "(C) Positions, and velocity" if len(positions) > 1 else "(C) Position and velocity"
-    hidden = _much_smaller(trajectory, positions)
+    hidden = much_smaller(trajectory, positions)
     timeline = _Timeline.of(trajectory, f"{title} of the {whose}", [2.4] + [1.2] * bool(hidden) + [1.6])
     above, *close, below = timeline.axes
     unit = readable_unit([trajectory[name] for name in positions], "m")
     for name in positions:
-        label, style = _LABELS[name]
-        timeline.line(above, unit, name, label=label, **style)
+        timeline.line(above, unit, name, POSITIONS[name])
     _levels(above, trajectory, unit, whole_width=True)
     above.set_ylabel(f"position [{unit.name}]")
     for ax, name in zip(close, hidden, strict=True):
         unit = readable_unit([trajectory[name]], "m")
-        label, style = _LABELS[name]
-        timeline.line(ax, unit, name, label=f"{label}, enlarged", **{**style, "linewidth": 1.0})
+        look = POSITIONS[name]
+        timeline.line(ax, unit, name, look._replace(words=f"{look.words}, enlarged"), linewidth=1.0)
         ax.set_ylabel(f"position [{unit.name}]")
     _velocity_panel(timeline, below, speeds)
     for ax in timeline.axes:
@@ -490,33 +432,18 @@ def _positions(trajectory: Trajectory) -> Figure | None:
     return timeline.figure
 
 
-def _much_smaller(trajectory: Trajectory, names: list[str]) -> list[str]:
-    """The one of two whose motion cannot be seen beside the other's, if it moves at all."""
-    ranges = {name: float(np.ptp(trajectory[name])) for name in names}
-    return [name for name, size in ranges.items() if 0.0 < size < 0.02 * max(ranges.values())]
-
-
 def _velocity_panel(timeline: _Timeline, ax: Axes, names: list[str]) -> None:
     unit = readable_unit([timeline.trajectory[name] for name in names], "m/s")
     ax.axhline(0.0, color=GREY, lw=0.5)
     for name in names:
-        label, style = _LABELS[name]
-        timeline.line(ax, unit, name, label=label, **style)
+        timeline.line(ax, unit, name, VELOCITIES[name])
     ax.set_ylabel(f"velocity [{unit.name}]")
     _key(ax)
 
 
-_FORCES: dict[str, tuple[str, dict[str, Any]]] = {
-    "contact_force": ("contact C, as applied", {"color": SKY, "linewidth": 0.7}),
-    "contact_force_smoothed": ("contact C, smoothed", {"color": BLUE, "linewidth": 1.2}),
-    "compliance_force": (r"part $\lambda_{nc}(\Psi-u)_+^p$", {"color": GREEN, "linewidth": 1.0, "linestyle": "--"}),
-    "foundation_force": ("foundation N", {"color": BLACK, "linewidth": 0.9}),
-}
-
-
 def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
-    forces = [name for name in _present(trajectory, *_FORCES) if np.any(trajectory[name] != 0.0)]
-    speeds = _present(trajectory, "z")
+    forces = [name for name in present(trajectory, FORCES) if np.any(trajectory[name] != 0.0)]
+    speeds = present(trajectory, ["z"])
     impulses = [e for e in trajectory.events if e.impulse_contact != 0.0 or e.impulse_foundation != 0.0]
     panels = [1.6] * bool(speeds) + [2.0] * bool(forces) + [1.2] * bool(impulses)
     if not forces and not impulses:
@@ -537,28 +464,26 @@ def _force_panel(timeline: _Timeline, ax: Axes, names: list[str]) -> None:
     trajectory = timeline.trajectory
     unit = readable_unit([trajectory[name] for name in names], "N")
     ax.axhline(0.0, color=GREY, lw=0.5)
-    for name in _visible(ax, trajectory, {name: _FORCES[name][0] for name in names}, "N"):
-        label, style = _FORCES[name]
-        timeline.line(ax, unit, name, label=label, **style)
+    for name in _visible(ax, trajectory, {name: FORCES[name] for name in names}, "N"):
+        timeline.line(ax, unit, name, FORCES[name])
     ax.set_ylabel(f"force [{unit.name}]")
     _key(ax)
 
 
 def _impulse_panel(timeline: _Timeline, ax: Axes) -> None:
     events = timeline.trajectory.events
-    kinds = (("impulse_contact", "on the tip", BLUE, "o"), ("impulse_foundation", "of the foundation", BLACK, "^"))
-    sizes = np.array([getattr(e, name) for e in events for name, *_ in kinds if getattr(e, name) != 0.0])
+    sizes = np.array([getattr(e, name) for e in events for name in IMPULSES if getattr(e, name) != 0.0])
     logarithmic = bool(np.all(sizes > 0.0) and np.max(sizes) > 30.0 * np.min(sizes))
     unit = Unit(1.0, "N·s") if logarithmic else readable_unit([sizes], "N·s")
     # Impulses of rounding size would stretch the axis over the ones that matter.
     smallest = max(float(np.min(sizes)), 1e-8 * float(np.max(sizes)))
     foot = 0.3 * unit.factor * smallest if logarithmic else 0.0
-    for name, label, colour, marker in kinds:
+    for name, (colour, label) in IMPULSES.items():
         points = np.array([(e.time, getattr(e, name)) for e in events if getattr(e, name) != 0.0])
         if len(points):
             t, j = timeline.unit.factor * points[:, 0], unit.factor * points[:, 1]
             ax.vlines(t, foot, j, color=colour, lw=1.0)
-            ax.plot(t, j, color=colour, marker=marker, markersize=3.5, linestyle="none", label=label)
+            ax.plot(t, j, color=colour, marker=_IMPULSE_MARKERS[name], markersize=3.5, linestyle="none", label=label)
     if logarithmic:
         ax.set_yscale("log")
         ax.set_ylim(foot, 2.0 * unit.factor * float(np.max(sizes)))
@@ -568,27 +493,16 @@ def _impulse_panel(timeline: _Timeline, ax: Axes) -> None:
     _key(ax)
 
 
-_ENERGIES: dict[str, tuple[str, str]] = {
-    "e_beam": ("beam", SKY),
-    "e_spring": ("spring", ORANGE),
-    "e_contact": ("contact", YELLOW),
-    "e_dissipated": ("dissipated", PURPLE),
-    "e_impact_loss": ("impact losses", GREY),
-    "e_load": ("loads (potential)", GREEN),
-}
-
-
 def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
-    gap = _present(trajectory, "gap")
+    gap = present(trajectory, ["gap"])
     title = "(E) Gap and energy" if gap else "(E) Energy"
     timeline = _Timeline.of(trajectory, title, [1.5] * bool(gap) + [2.2, 1.4])
     *above, energies, residual = timeline.axes
     if gap:
         unit = readable_unit([trajectory["gap"]], "m")
         above[0].axhline(0.0, color=GREY, lw=0.5)
-        timeline.line(
-            above[0], unit, "gap", color=BLUE, label="u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ"
-        )
+        words = "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ"
+        timeline.line(above[0], unit, "gap", Look(BLUE, words))
         above[0].set_ylabel(f"gap [{unit.name}]")
         _key(above[0])
     _energy_panel(timeline, energies)
@@ -599,7 +513,7 @@ def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
 def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
     """Stacked where no part is negative, else lines."""
     trajectory = timeline.trajectory
-    there = {name: _ENERGIES[name][0] for name in _present(trajectory, *_ENERGIES) if np.any(trajectory[name] != 0.0)}
+    there = {name: ENERGIES[name] for name in present(trajectory, ENERGIES) if np.any(trajectory[name] != 0.0)}
     parts = _visible(ax, trajectory, there, "J") if there else []
     unit = readable_unit([trajectory["e_total"], *(trajectory[name] for name in parts)], "J")
     least = min((float(np.min(trajectory[name])) for name in parts), default=-1.0)
@@ -608,24 +522,22 @@ def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
         ax.stackplot(
             timeline.unit.factor * trajectory["time"][rows],
             *(unit.factor * np.maximum(trajectory[name][rows], 0.0) for name in parts),
-            colors=[_ENERGIES[name][1] for name in parts],
-            labels=[_ENERGIES[name][0] for name in parts],
+            colors=[ENERGIES[name].colour for name in parts],
+            labels=[ENERGIES[name].words for name in parts],
             linewidth=0.0,
         )
         ax.set_ylim(bottom=0.0)
     else:
         for name in parts:
-            timeline.line(ax, unit, name, color=_ENERGIES[name][1], label=_ENERGIES[name][0])
-    timeline.line(ax, unit, "e_total", color=BLACK, linewidth=1.4, linestyle=(0, (4, 2)), label="total")
+            timeline.line(ax, unit, name, ENERGIES[name])
+    timeline.line(ax, unit, "e_total", Look(BLACK, "total"))
     ax.set_ylabel(f"energy [{unit.name}]")
     _key(ax)
 
 
 def _residual_panel(timeline: _Timeline, ax: Axes) -> None:
     columns = timeline.trajectory.columns
-    stored = sum(np.abs(columns[name]) for name in ("e_beam", "e_spring", "e_contact") if name in columns)
-    scale = float(max(np.max(stored), abs(columns["e_total"][0]))) or 1.0
-    relative = np.abs(columns["energy_residual"]) / scale
+    relative = np.abs(columns["energy_residual"]) / energy_scale(timeline.trajectory)
     rows = decimated(columns["time"], relative)
     rows = rows[relative[rows] > 0.0]
     ax.plot(timeline.unit.factor * columns["time"][rows], relative[rows], color=VERMILLION, lw=0.8)

@@ -13,7 +13,8 @@ from hypothesis.extra import numpy as npst
 from matplotlib.image import imread
 
 from springbeam import plots
-from springbeam.plots import alternates, decimated, phase_intervals, plot_run, readable_unit
+from springbeam.drawing import EVENT_LOOKS, PIXEL_COLUMNS, alternates, decimated, phase_intervals, readable_unit
+from springbeam.plots import plot_run
 from springbeam.recording import PICTURES, columns_of
 from springbeam.scene import load_scene, with_changes
 from springbeam.trajectory import EVENT_KINDS, SHAPE_POINTS, Event, Trajectory
@@ -125,7 +126,7 @@ def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(draw
         assert ax.get_ylabel().endswith("]")
     key = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {"free", "tied (u = y < Ψ)"} <= set(key)
-    assert {f"{words} (1)" for _, _, words in plots._EVENT_MARKS.values()} <= set(key)
+    assert {f"{look.words} (1)" for look in EVENT_LOOKS.values()} <= set(key)
 
 
 @pytest.mark.parametrize("draw", [plots._shapes_after_contact, plots._shapes_later])
@@ -252,7 +253,7 @@ def test_thinning_keeps_ends_order_and_the_extremes_of_every_column_of_pixels(va
 
 
 def test_a_short_run_is_not_thinned():
-    time = np.linspace(0.0, 1.0, 4 * plots._PIXEL_COLUMNS)
+    time = np.linspace(0.0, 1.0, 4 * PIXEL_COLUMNS)
     assert np.array_equal(decimated(time, time), np.arange(len(time)))
 
 
@@ -266,7 +267,7 @@ def test_one_wild_row_of_a_million_is_in_the_picture():
 def test_a_long_run_is_drawn_from_few_points(tmp_path):
     figure = plots._positions(a_trajectory(n=200_000))
     for ax in figure.axes:
-        assert all(len(line.get_xdata()) <= 4 * plots._PIXEL_COLUMNS for line in ax.lines)
+        assert all(len(line.get_xdata()) <= 4 * PIXEL_COLUMNS for line in ax.lines)
 
 
 def test_phases_hold_until_the_next_row():
