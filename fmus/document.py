@@ -49,6 +49,16 @@ def document(description: ET.Element, equations: str) -> str:
         )
         parts += [row(v) for v in variables if v.get("causality") == causality]
         parts.append("</table>")
+    parts.append("<h2>Sources</h2><p>")
+    if description.find(".//SourceFiles") is not None:
+        parts.append(
+            "The files that modelDescription.xml names are compiled as C++17 and C, with <code>sources/</code> as the "
+            "only include folder (<code>fmpy compile</code>). <code>-fvisibility=hidden -ffp-contract=off</code> "
+            "are what the binaries here were made with."
+        )
+    else:
+        parts.append("To read: the source of SUNDIALS, which is needed to compile them, is not packed.")
+    parts.append("</p>")
     parts.append('<h2>Licences</h2><p>See <a href="licenses/">licenses/</a>.</p></body></html>')
     return "\n".join(parts) + "\n"
 

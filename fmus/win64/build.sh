@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # build.sh OUT PYTHON — cross-compiles beam.dll and spring.dll for 64-bit Windows into OUT, with zig from PyPI, self-
-# contained but for what Windows 10 has. SUNDIALS is built from source: SPRINGBEAM_SUNDIALS_SOURCE names its folder,
-# otherwise Debian's source package is fetched. Eigen and Spectra are the system's or those of SPRINGBEAM_PREFIX.
+# contained but for what Windows 10 has. SUNDIALS is built from source (fmus/sundials_source.sh); Eigen and Spectra are
+# the system's or those of SPRINGBEAM_PREFIX.
 set -euo pipefail
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
@@ -27,32 +27,6 @@ if ! [ -x "$out/zig/bin/python" ]; then
   quietly zig "$out/zig/bin/pip" install -q "ziglang==$zig_version"
 fi
 
-# Sets `source`.
-find_sundials() {
-  source=${SPRINGBEAM_SUNDIALS_SOURCE:-}
-  [ -z "$source" ] || return 0
-  mkdir -p "$out/source/lists/partial"
-  source=$(find "$out/source" -maxdepth 1 -name 'sundials-*' -type d | head -n 1)
-  [ -z "$source" ] || return 0
-  command -v apt-get >/dev/null || die "name a folder with the source of SUNDIALS 6 or 7: SPRINGBEAM_SUNDIALS_SOURCE=…"
-  say "fetching Debian's source package of SUNDIALS"
-  # The machine's own package sources, asked for sources: most systems have only the binaries enabled.
-  mkdir -p "$out/source/parts"
-  sed -n 's/^deb /deb-src /p' /etc/apt/sources.list >"$out/source/sources.list" 2>/dev/null || true
-  local list
-  for list in debian ubuntu; do
-    [ ! -f "/etc/apt/sources.list.d/$list.sources" ] ||
-      sed 's/^Types:.*/Types: deb-src/' "/etc/apt/sources.list.d/$list.sources" >"$out/source/parts/$list.sources"
-  done
-  local apt=(apt-get -qq -o "Dir::Etc::sourcelist=$out/source/sources.list"
-    -o "Dir::Etc::sourceparts=$out/source/parts" -o "Dir::State::lists=$out/source/lists")
-  (cd "$out/source" && "${apt[@]}" -o APT::Sandbox::User=root update &&
-    "${apt[@]}" -o APT::Sandbox::User=root source --download-only sundials &&
-    tar xf sundials_*.orig.tar.*) >"$out/source.log" 2>&1 ||
-    die "could not fetch it (see $out/source.log); name a folder: SPRINGBEAM_SUNDIALS_SOURCE=…"
-  source=$(find "$out/source" -maxdepth 1 -name 'sundials-*' -type d | head -n 1)
-}
-
 for tool in cc c++ ar ranlib; do
   target=
   case $tool in cc | c++) target="-target x86_64-windows-gnu" ;; esac
@@ -72,7 +46,7 @@ cross=(-G Ninja "-DCMAKE_MAKE_PROGRAM=$tools/ninja" "-DCMAKE_TOOLCHAIN_FILE=$out
   -DCMAKE_BUILD_TYPE=Release)
 
 if ! [ -f "$out/prefix/lib/libsundials_ida.a" ]; then
-  find_sundials
+  source=$("$root/fmus/sundials_source.sh" "$out/../source")
   say "building SUNDIALS for win64"
   off=()
   for part in ARKODE CVODE CVODES IDAS KINSOL; do off+=("-DBUILD_$part=OFF"); done

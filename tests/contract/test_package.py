@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import zipfile
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from fmpy import simulate_fmu
 from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 
+ROOT = Path(__file__).resolve().parents[2]
 ROOT_LIBRARIES = {"libc.so.6", "libm.so.6", "ld-linux-x86-64.so.2"}
 
 
@@ -21,6 +23,28 @@ def output(*command: str) -> str:
 
 def test_fmpy_validation_reports_nothing(case: Any) -> None:
     assert validate_fmu(str(case.fmu.path)) == []
+
+
+def test_static_model_is_the_packed_one_and_fmpy_reports_nothing(case: Any, tmp_path: Path) -> None:
+    # The description printed from the table, before there is a binary. Only the list of sources is added to it.
+    printed = tmp_path / "modelDescription.xml"
+    printed.write_text(output(str(ROOT / "build" / "fmus" / f"describe_{case.name}")), encoding="utf-8")
+    assert validate_fmu(str(tmp_path)) == []
+    packed = (case.fmu.folder / "modelDescription.xml").read_text(encoding="utf-8")
+    without_list = re.sub(r">\n    <SourceFiles>.*</CoSimulation>", "/>", packed, flags=re.DOTALL)
+    assert without_list == printed.read_text(encoding="utf-8")
+
+
+def test_sources_that_are_named_are_packed(case: Any) -> None:
+    # That they compile is for tests/interop/test_compile.py. Without the source of SUNDIALS the spring's are not named.
+    sources = case.fmu.folder / "sources"
+    own = {p.name for p in sources.rglob("*.cpp")}
+    assert own >= {f"{case.name}_fmu.cpp", "fmi2_slave.cpp", "instance.cpp", f"{case.name}.cpp"}
+    named = [n for b in case.fmu.description.buildConfigurations for s in b.sourceFileSets for n in s.sourceFiles]
+    assert {Path(n).name for n in named if n.endswith(".cpp")} == (own if named else set())
+    assert [n for n in named if not (sources / n).is_file()] == []
+    if case.name == "beam" or (sources / "ida").exists():
+        assert named
 
 
 def test_binary_needs_only_libc_and_libm(case: Any) -> None:

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -17,13 +15,10 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+from importers import installed, run
 
 pytestmark = pytest.mark.interop
 
-CACHE = Path(
-    os.environ.get("SPRINGBEAM_CACHE")
-    or Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "springbeam"
-)
 HERE = Path(__file__).resolve().parent
 TIMES = np.array([0.05, 0.1, 0.2, 0.4])
 SIZE = 2.5e-4  # these importers read all outputs before they set inputs; see tests/contract/test_pair.py
@@ -48,19 +43,6 @@ PARAMETERS: dict[str, float | int | bool] = {
     "spring.stop_enabled": True,
     "spring.stop_position": -0.015,
 }
-
-
-def installed(name: str) -> Path:
-    folder = CACHE / name
-    if not (folder / ".installed").is_file():
-        pytest.skip(f"{name} is not in {CACHE}: ./build.sh interop installs it")
-    return folder
-
-
-def run(*command: str | Path, cwd: Path | None = None) -> str:
-    done = subprocess.run([str(c) for c in command], cwd=cwd, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-    return done.stdout
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,156 @@
+"""Gather what an FMU can be compiled from: its C++ files, all headers they include, and SUNDIALS if it is at hand.
+
+Usage: sources.py OUT [--sundials FOLDER | --without NAME] [--headers PREFIX=FOLDER]… FILE…
+
+OUT/sources is filled as the FMU's sources/: files of this project where they are in its tree, other headers by the
+name they are included under, so that sources/ itself is the one include folder. OUT/list has the names to compile, one
+per line; with `--without` (a library that has to be compiled too but is not at hand) it is empty. OUT/list.d names what
+was read, for the build tool.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shutil
+from pathlib import Path
+
+PROJECT = Path(__file__).resolve().parents[1]
+INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]', re.MULTILINE)
+# Parts of Eigen that have to be asked for: graphics processors, and other libraries in place of its own code.
+OPTIONAL = re.compile(
+    r"/arch/(CUDA|GPU|HIP|SYCL)/|/misc/(lapack|lapacke|lapacke_mangling|blas)\.h$|_(BLAS|LAPACKE|MKL)\.h$"
+)
+
+# Of SUNDIALS: IDA, its vectors, matrices and solvers as far as the spring or IDA itself uses them.
+SUNDIALS_FOLDERS = ("ida", "sundials", "nvector/serial", "sunmatrix/dense", "sunmatrix/band", "sunlinsol/dense")
+SUNDIALS_FOLDERS += ("sunnonlinsol/newton",)
+# Fortran, MPI and other bindings; the profiler is only needed when asked for.
+SUNDIALS_WITHOUT = re.compile(r"^f|_(futils|xbraid|profiler|mpi_errors|bbdpre)\.c$")
+SUNDIALS_HAS = {
+    "SUNDIALS_C_COMPILER_HAS_MATH_PRECISIONS",
+    "SUNDIALS_C_COMPILER_HAS_ISINF_ISNAN",
+    "SUNDIALS_C_COMPILER_HAS_INLINE",
+    "SUNDIALS_C_COMPILER_HAS_SNPRINTF_AND_VA_COPY",
+}
+# Hidden: inside a tool that has its own SUNDIALS the names must not meet.
+SUNDIALS_EXPORT = """\
+#ifndef SUNDIALS_EXPORT_H
+#define SUNDIALS_EXPORT_H
+#ifdef __GNUC__
+#define SUNDIALS_EXPORT __attribute__((visibility("hidden")))
+#else
+#define SUNDIALS_EXPORT
+#endif
+#define SUNDIALS_NO_EXPORT SUNDIALS_EXPORT
+#define SUNDIALS_DEPRECATED
+#define SUNDIALS_DEPRECATED_EXPORT SUNDIALS_EXPORT
+#define SUNDIALS_DEPRECATED_NO_EXPORT SUNDIALS_EXPORT
+#endif
+"""
+
+
+def sundials_config(source: Path) -> str:
+    """sundials_config.h as SUNDIALS' own configuration writes it for a plain C compiler: doubles, nothing optional."""
+    cmake = (source / "CMakeLists.txt").read_text(encoding="utf-8")
+    parts = dict(re.findall(r'set\(PACKAGE_VERSION_(MAJOR|MINOR|PATCH) "(\d+)"', cmake))
+    values = {f"PACKAGE_VERSION_{name}": value for name, value in parts.items()}
+    values |= {
+        "PACKAGE_VERSION": ".".join(parts[name] for name in ("MAJOR", "MINOR", "PATCH")),
+        "PRECISION_LEVEL": "#define SUNDIALS_DOUBLE_PRECISION 1",
+        "INDEX_TYPE": "#define SUNDIALS_INT64_T 1",
+        "SUNDIALS_CINDEX_TYPE": "int64_t",
+        "SUNDIALS_LOGGING_LEVEL": "0",
+    }
+    text = (source / "include/sundials/sundials_config.in").read_text(encoding="utf-8")
+    text = re.sub(r"#cmakedefine01 (\w+)", r"#define \1 0", text)
+    text = re.sub(
+        r"#cmakedefine (\w+).*",
+        lambda m: f"#define {m[1]}" if m[1] in SUNDIALS_HAS else f"/* #undef {m[1]} */",
+        text,
+    )
+    return re.sub(r"@(\w+)@", lambda m: values.get(m[1], ""), text)
+
+
+class Gathered:
+    """Files by their place in sources/."""
+
+    def __init__(self, headers: list[tuple[str, Path]]) -> None:
+        self.headers = headers
+        self.files: dict[str, Path] = {}
+
+    def add(self, place: str, file: Path) -> None:
+        """A file and, one after the other, all it includes that is not the compiler's own."""
+        waiting = [(place, file)]
+        while waiting:
+            place, file = waiting.pop()
+            if place in self.files or OPTIONAL.search("/" + place):
+                continue
+            self.files[place] = file
+            for name in INCLUDE.findall(file.read_text(encoding="utf-8", errors="replace")):
+                beside = file.parent / name
+                if beside.is_file():
+                    # Resolved by hand: the file itself may be a link into another folder.
+                    waiting.append((_normal(f"{place.rpartition('/')[0]}/{name}"), beside))
+                    continue
+                for prefix, folder in self.headers:
+                    if name.startswith(prefix) and (folder / name).is_file():
+                        waiting.append((name, folder / name))
+                        break
+
+
+def _normal(place: str) -> str:
+    parts: list[str] = []
+    for part in place.split("/"):
+        if part == "..":
+            parts.pop()
+        elif part not in ("", "."):
+            parts.append(part)
+    return "/".join(parts)
+
+
+def gather(arguments: argparse.Namespace) -> None:
+    headers = [(prefix, Path(folder)) for prefix, _, folder in (h.partition("=") for h in arguments.headers)]
+    units = {file.resolve().relative_to(PROJECT).as_posix(): file for file in arguments.files}
+    written: dict[str, str] = {}
+    licences: dict[str, Path] = {}
+    if arguments.sundials:
+        source = arguments.sundials
+        for folder in ("ida", "nvector", "sundials", "sunlinsol", "sunmatrix", "sunnonlinsol"):
+            headers.append((folder + "/", source / "include"))
+        headers.append(("sundials_", source / "src/sundials"))
+        for folder in SUNDIALS_FOLDERS:
+            for file in sorted((source / "src" / folder).glob("*.c")):
+                if not SUNDIALS_WITHOUT.search(file.name):
+                    units[f"sundials_src/{folder}/{file.name}"] = file
+        written = {"sundials/sundials_config.h": sundials_config(source), "sundials/sundials_export.h": SUNDIALS_EXPORT}
+        licences = {f"sundials/{name}": source / name for name in ("LICENSE", "NOTICE")}
+    gathered = Gathered(headers)
+    for place, file in units.items():
+        gathered.add(place, file)
+    files = gathered.files | licences
+
+    out: Path = arguments.out
+    shutil.rmtree(out / "sources", ignore_errors=True)
+    for place, file in files.items():
+        target = out / "sources" / place
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(file.read_bytes())
+    for place, text in written.items():
+        (out / "sources" / place).write_text(text, encoding="utf-8")
+    read = " ".join(str(file).replace(" ", r"\ ") for file in files.values())
+    (out / "list.d").write_text(f"{out / 'list'}: {read}\n", encoding="utf-8")
+    names = "" if arguments.without else "".join(f"{place}\n" for place in units)
+    if arguments.without:
+        print(f"{out.name}.fmu: its sources/ can be read but not compiled without {arguments.without}")
+    (out / "list").write_text(names, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(usage=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("files", type=Path, nargs="+")
+    parser.add_argument("--headers", action="append", default=[])
+    parser.add_argument("--sundials", type=Path)
+    parser.add_argument("--without")
+    gather(parser.parse_args())
