@@ -46,7 +46,10 @@ BROKEN: dict[str, tuple[Callable[[Files], None], str]] = {
     "description is not XML": (replaced(XML, b"<fmiModelDescription"), "XML|markup|parse|syntax|find end"),
     "description breaks the schema": (edited(r"<CoSimulation", '<CoSimulation colour="red"'), "colour"),
     "another FMI version": (edited(r'fmiVersion="2.0"', 'fmiVersion="9.9"'), r"9\.9|version"),
-    "no co-simulation": (edited(r"<CoSimulation[^>]*/>", '<ModelExchange modelIdentifier="beam"/>'), "co-simulation"),
+    "no co-simulation": (
+        edited(r"<CoSimulation.*</CoSimulation>", '<ModelExchange modelIdentifier="beam"/>'),
+        "co-simulation",
+    ),
     "another model identifier": (edited(r'modelIdentifier="beam"', 'modelIdentifier="cable"'), "'cable'"),
     "wrong GUID": (edited(r'guid="\{[^"]*\}"', 'guid="{0}"'), r"fmuGUID = \{0\} is not that of this FMU"),
     "no binary": (without(BINARY), r"beam\.so|platform|binary|binaries"),
