@@ -49,6 +49,7 @@ def simulate(
     method: str = "exponential",
     rtol: float = 1e-12,
     atol: float = 1e-15,
+    nodes: int = 10,
     sample_times: Sequence[float] | np.ndarray | None = None,
     velocity_perturbation: float = 0.0,
     seat_height: float | None = None,
@@ -60,8 +61,10 @@ def simulate(
     Parameters
     ----------
     method
-        ``"exponential"``: exact modal form of each phase, for soft and stiff beams alike. ``"DOP853"``, ``"Radau"``:
-        scipy on the same equations, for soft beams, with ``rtol`` and ``atol``.
+        ``"exponential"``: exact modal form of each phase, for soft and stiff beams alike. ``"DOP853"``, ``"LSODA"``,
+        ``"Radau"``: scipy on the same equations, for soft beams, with ``rtol`` and ``atol``.
+    nodes
+        Points of a scipy step at which events are looked for; 2, its ends, is what `scipy.integrate.solve_ivp` does.
     sample_times
         Times of the rows [s]. Default: multiples of ``coupling.macro_step`` from the start, and a row before and
         after each event.
@@ -90,7 +93,7 @@ def simulate(
     """
     if method not in ("exponential", *SCIPY_METHODS):
         raise ValueError(f"method = {method!r}: one of exponential, {', '.join(SCIPY_METHODS)}")
-    run = _Run(scene, method, rtol, atol, velocity_perturbation, seat_height, max_events, t_end)
+    run = _Run(scene, method, rtol, atol, nodes, velocity_perturbation, seat_height, max_events, t_end)
     return run.execute(sample_times)
 
 
@@ -111,6 +114,7 @@ class _Run:
         method: str,
         rtol: float,
         atol: float,
+        nodes: int,
         velocity_perturbation: float,
         seat_height: float | None,
         max_events: int,
@@ -118,7 +122,7 @@ class _Run:
     ) -> None:
         self.scene = scene
         self.system = HybridSystem(scene)
-        self.method, self.rtol, self.atol = method, rtol, atol
+        self.method, self.rtol, self.atol, self._nodes = method, rtol, atol, nodes
         self.max_events = max_events
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
         if self.system.two_bodies and not self.system.compliance and scene.contact.impact == "rest":
@@ -256,7 +260,9 @@ class _Run:
                 self._forms[key] = LinearForm(self.system, key)
             return ExponentialPropagator(self._forms[key], self.X)
         horizon = max(self.t_end - self.time, 1e-300)
-        return RungeKuttaPropagator(self.system, self.phase, self.X, horizon, self.method, self.rtol, self.atol)
+        return RungeKuttaPropagator(
+            self.system, self.phase, self.X, horizon, self.method, self.rtol, self.atol, self._nodes
+        )
 
     def _record(self, time: float, X: np.ndarray) -> None:
         self.rows.times.append(time)

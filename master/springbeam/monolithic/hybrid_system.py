@@ -83,6 +83,10 @@ class HybridSystem:
         self.Y, self.Z, self.D = 2 * self.r, 2 * self.r + 1, 2 * self.r + 2
 
     @property
+    def dissipative(self) -> bool:
+        return self.alpha_b > 0.0 or self.spring.damping > 0.0
+
+    @property
     def two_bodies(self) -> bool:
         return self.beam is not None and self.has_spring
 
@@ -106,31 +110,62 @@ class HybridSystem:
         p = self.load - self.stiffness * (a + self.alpha_b * v)
         u_tip, v_tip = a @ self.b, v @ self.b
         s = self.spring_force(y, z) if self.has_spring else np.zeros_like(y)
-        N = np.zeros_like(y)
-        if self.joined(phase) or (phase.seated and not self.has_spring):
-            if phase.seated:
-                C = -(p @ self.b) / self.inverse_tip_mass
-                N = C - s
-            else:
-                C = (s * self.inverse_mass - p @ self.b) / (self.inverse_tip_mass + self.inverse_mass)
-        else:
-            in_contact = self.two_bodies and self.compliance and phase.contact != "free"
-            C = self.compliance_force(y - u_tip) if in_contact else np.zeros_like(y)
-            if phase.seated:
-                N = C - s
+        C = self._contact_force(phase, p, y - u_tip, s)
+        N = C - s if phase.seated else np.zeros_like(y)
         z_dot = np.zeros_like(y) if phase.seated else (s - C) * self.inverse_mass
         return Motion(u_tip, v_tip, y, z, C, N, p + self.b * C[..., None], z_dot)
 
+    def _contact_force(self, phase: Phase, p: np.ndarray, penetration: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """C [N] of beam forces p (..., r), penetration y − u and spring force s (...)."""
+        if phase.seated and (self.joined(phase) or not self.has_spring):
+            return np.asarray(-(p @ self.b) / self.inverse_tip_mass)
+        if self.joined(phase):
+            return np.asarray((s * self.inverse_mass - p @ self.b) / (self.inverse_tip_mass + self.inverse_mass))
+        if self.two_bodies and self.compliance and phase.contact != "free":
+            return self.compliance_force(penetration)
+        return np.zeros_like(s)
+
     def derivative(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """dX/dt for one state."""
-        m = self.motion(phase, X)
+        a, v, y, z = X[self.A], X[self.V], X[self.Y], X[self.Z]
+        p = self.load - self.stiffness * (a + self.alpha_b * v)
+        s = self.spring_force(y, z) if self.has_spring else y * 0.0
+        C = self._contact_force(phase, p, y - a @ self.b, s)
         dX = np.empty_like(X)
-        dX[self.A] = X[self.V]
-        dX[self.V] = m.a
-        dX[self.Y] = 0.0 if phase.seated else X[self.Z]
-        dX[self.Z] = m.z_dot
-        dX[self.D] = self.dissipation_rate(X)
+        dX[self.A] = v
+        dX[self.V] = p + self.b * C
+        dX[self.Y] = 0.0 if phase.seated else z
+        dX[self.Z] = 0.0 if phase.seated else (s - C) * self.inverse_mass
+        dX[self.D] = self.dissipation_rate(X) if self.dissipative else 0.0
         return dX
+
+    def jacobian(self, phase: Phase, X: np.ndarray) -> np.ndarray:
+        """∂(dX/dt)/∂X for one state, (2r + 3, 2r + 3), but for the dissipated energy, which nothing depends on."""
+        A, V, Y, Z, b = self.A, self.V, self.Y, self.Z, self.b
+        p = self.spring
+        J = np.zeros((self.size, self.size))
+        rows = np.arange(self.r)
+        J[rows, self.r + rows] = 1.0
+        J[self.r + rows, rows] = -self.stiffness
+        J[self.r + rows, self.r + rows] = -self.alpha_b * self.stiffness
+        s = np.zeros(self.size)
+        if self.has_spring:
+            s[Y] = -p.linear_stiffness - 3.0 * p.cubic_stiffness * X[Y] ** 2
+            s[Z] = -p.damping
+        C = np.zeros(self.size)
+        if phase.seated and (self.joined(phase) or not self.has_spring):
+            C = -(b @ J[V]) / self.inverse_tip_mass
+        elif self.joined(phase):
+            C = (s * self.inverse_mass - b @ J[V]) / (self.inverse_tip_mass + self.inverse_mass)
+        elif self.two_bodies and self.compliance and phase.contact != "free":
+            law, depth = self.scene.contact, max(float(X[Y] - X[A] @ b), 0.0)
+            slope = law.stiffness * law.exponent * depth ** (law.exponent - 1.0)
+            C[A], C[Y] = -slope * b, slope
+        J[V] += np.outer(b, C)
+        if not phase.seated:
+            J[Y, Z] = 1.0
+            J[Z] = (s - C) * self.inverse_mass
+        return J
 
     def dissipation_rate(self, X: np.ndarray) -> np.ndarray:
         """α_b ȧᵀω²ȧ + α_s z² [W]."""

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.integrate import DOP853, Radau, solve_ivp
+from scipy.integrate import DOP853, LSODA, Radau, solve_ivp
 
 from .hybrid_system import HybridSystem, Phase, ReferenceFailure
 
-SCIPY_METHODS = {"DOP853": DOP853, "Radau": Radau}
+SCIPY_METHODS = {"DOP853": DOP853, "LSODA": LSODA, "Radau": Radau}
 
 
 class Segment(ABC):
@@ -51,20 +51,15 @@ class _RungeKuttaSegment(Segment):
         if tau <= 0.0:
             return np.array(self.start)
         # Again from the start, because the dense output is a power of the step less accurate.
+        owner = self.owner
         solution = solve_ivp(
-            self.owner.rhs,
-            (0.0, tau),
-            self.start,
-            method=self.owner.method,
-            rtol=self.owner.rtol,
-            atol=self.owner.atol,
-            first_step=tau,
+            owner.rhs, (0.0, tau), self.start, method=owner.method, first_step=tau, **owner.options
         )
         return self.owner.system.synchronise(self.owner.phase, solution.y[:, -1].copy())
 
 
 class RungeKuttaPropagator(Propagator):
-    """scipy's DOP853 or Radau on the modal form."""
+    """scipy's DOP853, LSODA or Radau on the modal form."""
 
     def __init__(
         self,
@@ -75,10 +70,14 @@ class RungeKuttaPropagator(Propagator):
         method: str,
         rtol: float,
         atol: float,
+        nodes: int,
     ) -> None:
-        self.system, self.phase, self.method, self.rtol, self.atol = system, phase, method, rtol, atol
+        self.system, self.phase, self.method, self._nodes = system, phase, method, nodes
+        self.options: dict[str, Any] = {"rtol": rtol, "atol": atol}
+        if method != "DOP853":
+            self.options["jac"] = lambda _time, X: system.jacobian(phase, X)
         solver: Any = SCIPY_METHODS[method]
-        self._solver = solver(self.rhs, 0.0, X.copy(), horizon, rtol=rtol, atol=atol)
+        self._solver = solver(self.rhs, 0.0, X.copy(), horizon, **self.options)
 
     def rhs(self, _time: float, X: np.ndarray) -> np.ndarray:
         return self.system.derivative(self.phase, X)
@@ -91,7 +90,7 @@ class RungeKuttaPropagator(Propagator):
             raise ReferenceFailure(f"{self.method} failed in phase {self.phase.name}: {message}")
         self.elapsed = solver.t
         size = solver.t - begin
-        nodes = np.linspace(0.0, size, 10)
-        states = solver.dense_output()(begin + nodes).T
+        nodes = np.linspace(0.0, size, self._nodes)
+        states = np.array([start, solver.y]) if self._nodes == 2 else solver.dense_output()(begin + nodes).T
         states[0], states[-1] = start, solver.y
         return _RungeKuttaSegment(self, start, size, nodes, self.system.synchronise(self.phase, states))
