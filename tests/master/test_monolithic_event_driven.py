@@ -10,6 +10,7 @@ from scipy.linalg import expm
 from scipy.special import ellipj, ellipk
 
 from springbeam.monolithic.event_driven import ReferenceFailure, simulate
+from springbeam.monolithic.hybrid_system import HybridSystem, Phase
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
 from springbeam.trajectory import COLUMNS, EVENT_KINDS, Trajectory
@@ -430,3 +431,23 @@ def test_stiff_beam_of_the_paper_is_resolved() -> None:
     # Times near 0.5 are known to 1e-16 s, where v_tip changes by 1e-8 of itself.
     np.testing.assert_allclose(one.y, two.y, atol=1e-13)
     assert one.summary["largest_relative_energy_residual"] < 1e-11
+
+
+@pytest.mark.parametrize("law", ["transmission", "compliance"])
+@pytest.mark.parametrize("phase", [Phase("free"), Phase("tied"), Phase("tied", seated=True), Phase("touch")])
+def test_jacobian_is_the_derivative_of_the_right_hand_side(law, phase):
+    soft = with_changes(
+        load_scene("soft"),
+        beam={"n_elements": 4, "alpha_b": 0.01},
+        spring={"damping": 0.3},
+        contact={"law": law, "exponent": 1.5},
+    )
+    system = HybridSystem(soft)
+    X = np.random.default_rng(1).standard_normal(system.size)
+    X[system.Y] = X[system.A] @ system.b + 0.1  # penetrating
+    direction = np.random.default_rng(2).standard_normal(system.size)
+    # The only curvature is that of y³ and of the contact law: central differences are good to h².
+    h = 1e-6
+    rates = (system.derivative(phase, X + h * direction) - system.derivative(phase, X - h * direction)) / (2.0 * h)
+    expected = system.jacobian(phase, X) @ direction
+    np.testing.assert_allclose(rates[:-1], expected[:-1], atol=1e-8 * np.abs(expected).max())

@@ -52,9 +52,7 @@ class _RungeKuttaSegment(Segment):
             return np.array(self.start)
         # Again from the start, because the dense output is a power of the step less accurate.
         owner = self.owner
-        solution = solve_ivp(
-            owner.rhs, (0.0, tau), self.start, method=owner.method, first_step=tau, **owner.options
-        )
+        solution = solve_ivp(owner.rhs, (0.0, tau), self.start, method=owner.method, first_step=tau, **owner.options)
         return self.owner.system.synchronise(self.owner.phase, solution.y[:, -1].copy())
 
 
