@@ -1,6 +1,6 @@
 // The viscoelastic (Kelvin–Voigt) Timoshenko beam, clamped at x = 0, loaded at its tip x = L by the contact force C.
-// Semi-discrete form:  M q̈ + α_b K q̇ + K q = e C(t) + F,   q = (θ₁,u₁, …, θₙ,uₙ),  e picks u(L).
-// Ahn & Tate, eqs. (1)–(5), (59).  Up is positive; C > 0 lifts the tip.
+// Semi-discrete form:  M q̈ + α_b K q̇ + K q = e C(t) + F,   q = (θ₁,u₁, …, θₙ,uₙ) for elements of degree 1,  e picks
+// u(L). Ahn & Tate, eqs. (1)–(5), (59).  Up is positive; C > 0 lifts the tip.
 #pragma once
 
 #include <array>
@@ -22,9 +22,10 @@ struct Parameters {
   double shear_coefficient = 1.0;      ///< K [–]
   double length = 1.0;                 ///< L [m]
   double alpha_b = 0.0;                ///< Kelvin–Voigt retardation time [s]
-  int n_elements = 50;                 ///< uniform P1 elements
+  int n_elements = 50;                 ///< uniform elements
+  int element_degree = 1;              ///< polynomial degree of u and θ in an element, 1 … 12; 1 = P1
   int n_modes = 0;                     ///< lowest modes kept by `modal`; 0 = all
-  bool reduced_integration = false;    ///< one-point shear; false = full integration (59)
+  bool reduced_integration = false;    ///< p-point Gauss rule for the shear; false = exact (59)
   Integrator integrator = Integrator::modal;
   double rho_inf = 1.0;                   ///< spectral radius at infinity of generalized-α; 1 = midpoint rule (62)
   double initial_deflection_slope = 0.0;  ///< s in u⁰ = s·x [–]

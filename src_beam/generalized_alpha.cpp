@@ -36,7 +36,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
         beta_(0.25 * (1.0 - alpha_m_ + alpha_f_) * (1.0 - alpha_m_ + alpha_f_)),
         gamma_(0.5 - alpha_m_ + alpha_f_),
         K_(mesh_.stiffness()),
-        M_(mesh_.mass() + 0.0 * K_),
+        M_(mesh_.mass()),
         uniform_load_(mesh_.uniform_load() / mu_),
         hat_load_(p.tip_load_coefficient / mu_ * mesh_.hat_load()),
         tip_response_(mesh_.mass_solve(mesh_.unit_tip_force()) / mu_),
@@ -238,7 +238,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   double alpha_;  // α_b [s]
   bool midpoint_;
   double alpha_m_, alpha_f_, beta_, gamma_;
-  Eigen::SparseMatrix<double> K_, M_;  // with the same pattern, that of K
+  Eigen::SparseMatrix<double> K_, M_;  // with the same pattern
   VectorXd uniform_load_, hat_load_;
   VectorXd tip_response_;  // M⁻¹e/ρA [1/kg], the velocity that a unit impulse leaves
   double compliance_;

@@ -132,24 +132,12 @@ MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
   return solver.eigenvectors();
 }
 
-/// Solves C x = y or, for all columns, overwrites y by x; C the upper bidiagonal factor of M.
-void solve_upper(const VectorXd& d, const VectorXd& l, MatrixXd& y) {
-  for (Index i = d.size() - 1; i >= 0; --i) {
-    for (Index f = 0; f < 2; ++f) {
-      if (i + 1 < d.size()) y.row(2 * i + f) -= l[i] * y.row(2 * i + 2 + f);
-      y.row(2 * i + f) /= d[i];
-    }
-  }
-}
-
 /// Lowest modes from the singular values of G C⁻¹, where K = GᵀG and M = CᵀC: a dense decomposition, but its error
 /// relative to ω₁ is ε ω_max/ω₁, where that of the eigenproblem of K would be the square of the ratio.
 MatrixXd dense_modes(const Timoshenko& mesh, Index count) {
   const Index size = mesh.size();
-  VectorXd d, l;
-  mesh.mass_cholesky(d, l);
-  MatrixXd X = MatrixXd::Identity(size, size);
-  solve_upper(d, l, X);
+  const Timoshenko::MassFactor M(mesh.mass());
+  MatrixXd X = M.matrixU().solve(MatrixXd::Identity(size, size));
   VectorXd strains(size);
   for (Index j = 0; j < size; ++j) {
     mesh.weighted_strains(X.col(j).data(), strains.data());
@@ -157,8 +145,7 @@ MatrixXd dense_modes(const Timoshenko& mesh, Index count) {
   }
   const Eigen::BDCSVD<MatrixXd> svd(X, Eigen::ComputeThinV);
   MatrixXd modes = svd.matrixV().rightCols(count).rowwise().reverse();
-  solve_upper(d, l, modes);
-  return modes;
+  return M.matrixU().solve(modes);
 }
 
 /// Appends what `shape` has outside the M-orthonormal columns of `basis`, normalised; nothing if that is nothing.

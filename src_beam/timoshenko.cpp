@@ -1,98 +1,198 @@
 #include "timoshenko.hpp"
 
+#include <array>
 #include <cmath>
 #include <vector>
 
+#include "validate.hpp"
+
 namespace beam {
+
+using Eigen::Index;
+
+/// Legendre coefficients of an element's strains, j < p: h κ_j [m] and γ_j [–].
+struct Timoshenko::Strains {
+  std::array<double, max_element_degree> h_kappa, gamma;
+};
+
+/// One field of an element: the end values of its linear part P_0, P_1, and its coefficients f_j of P_j, 2 ≤ j ≤ p.
+/// ∫f² dx = h/6 (l² + r² + (l + r)²) + Σ h/(2j+1) f_j².
+struct Timoshenko::Field {
+  double left, right;
+  std::array<double, max_element_degree + 1> f;
+};
 
 Timoshenko::Timoshenko(const Parameters& p)
     : n_(p.n_elements),
+      p_(p.element_degree),
       h_(p.length / p.n_elements),
       mu_(p.density * p.area),
       r_(std::sqrt(p.second_moment_of_area / p.area)),
       b_(p.young_modulus / p.density),
+      b_top_(b_),
       s_(p.shear_modulus * p.shear_coefficient / p.density) {
-  if (!p.reduced_integration) b_ += s_ * (h_ / r_) * (h_ / r_) / 12.0;
+  if (!p.reduced_integration) b_top_ += s_ * (h_ / r_) * (h_ / r_) / (4.0 * static_cast<double>(4 * p_ * p_ - 1));
+}
+
+// q is the element's part of the unknowns, its bubbles and its right node; θ̃₀ and u₀ are those of its left node.
+Timoshenko::Strains Timoshenko::strains(double theta0, double u0, const double* q) const {
+  const double half = 0.5 / r_, theta1 = q[2 * p_ - 2], u1 = q[2 * p_ - 1];
+  Strains s;
+  s.h_kappa[0] = theta1 - theta0;
+  s.gamma[0] = (u1 - u0) / h_ - half * (theta0 + theta1);
+  for (Index k = 2; k <= p_; ++k) {
+    s.h_kappa[k - 1] = 2.0 * q[2 * k - 4];
+    s.gamma[k - 1] = 2.0 * q[2 * k - 3] / h_;
+  }
+  if (p_ > 1) s.gamma[1] -= half * (theta1 - theta0);
+  for (Index k = 2; k <= p_; ++k) {
+    const double slope = q[2 * k - 4] / (static_cast<double>(2 * k - 1) * r_);
+    s.gamma[k - 2] += slope;
+    if (k < p_) s.gamma[k] -= slope;
+  }
+  return s;
+}
+
+// q points to the field's part of the element; its unknowns are every other one.
+Timoshenko::Field Timoshenko::field(double left, const double* q) const {
+  Field v;
+  v.left = left;
+  v.right = q[2 * p_ - 2];
+  for (Index k = 2; k <= p_; ++k) {
+    const double part = q[2 * k - 4] / static_cast<double>(2 * k - 1);
+    v.f[k] = part;
+    if (k == 2) {
+      v.left -= part;
+      v.right -= part;
+    } else if (k == 3) {
+      v.left += part;
+      v.right -= part;
+    } else {
+      v.f[k - 2] -= part;
+    }
+  }
+  return v;
 }
 
 void Timoshenko::mass_times(const double* x, double* y) const {
   const double m = h_ / 6.0;
-  double t0 = 0.0, u0 = 0.0;  // left neighbour; the clamp to begin with
-  Eigen::Index i = 0;
-  for (; i < 2 * n_ - 2; i += 2) {
-    y[i] = m * (t0 + 4.0 * x[i] + x[i + 2]);
-    y[i + 1] = m * (u0 + 4.0 * x[i + 1] + x[i + 3]);
-    t0 = x[i];
-    u0 = x[i + 1];
+  const Index block = 2 * p_;
+  for (Index f = 0; f < 2; ++f) {
+    double node = 0.0;        // value at the left end; the clamp to begin with
+    double l = 0.0, r = 0.0;  // linear part of the element to the left
+    for (Index e = 0; e < n_; ++e) {
+      const double* q = x + e * block + f;
+      double* out = y + e * block + f;
+      const Field v = field(node, q);
+      if (e > 0) *(out - 2) = m * (l + 2.0 * (r + v.left) + v.right);
+      l = v.left;
+      r = v.right;
+      node = q[block - 2];
+      // Moments of the field with P_j: with P_0 and P_1 from the ends, with the others h f_j/(2j+1).
+      std::array<double, max_element_degree + 1> moment;
+      moment[0] = 3.0 * m * (l + r);
+      moment[1] = m * (r - l);
+      for (Index k = 2; k <= p_; ++k) {
+        moment[k] = h_ * v.f[k] / static_cast<double>(2 * k + 1);
+        out[2 * k - 4] = (moment[k] - moment[k - 2]) / static_cast<double>(2 * k - 1);
+      }
+    }
+    y[(n_ - 1) * block + f + block - 2] = m * (l + 2.0 * r);
   }
-  y[i] = m * (t0 + 2.0 * x[i]);
-  y[i + 1] = m * (u0 + 2.0 * x[i + 1]);
 }
 
 void Timoshenko::stiffness_times(const double* x, double* y) const {
-  const double half = 0.5 / r_, bend = b_ / h_, lever = 0.5 * h_ / r_;
-  double t0 = 0.0, u0 = 0.0;
+  const double lever = 0.5 * h_ / r_;
+  const Index block = 2 * p_;
+  double theta0 = 0.0, u0 = 0.0;
   double moment = 0.0, shear = 0.0;  // of the element to the left
-  for (Eigen::Index i = 0; i < 2 * n_; i += 2) {
-    const double t1 = x[i], u1 = x[i + 1];
-    const double moment1 = bend * (t1 - t0);
-    const double shear1 = s_ * ((u1 - u0) / h_ - half * (t0 + t1));
-    if (i > 0) {
-      y[i - 2] = (moment - moment1) - lever * (shear + shear1);
-      y[i - 1] = shear - shear1;
+  for (Index e = 0; e < n_; ++e) {
+    const double* q = x + e * block;
+    double* out = y + e * block;
+    Strains s = strains(theta0, u0, q);
+    for (Index j = 0; j < p_; ++j) {  // strains become stresses
+      const double legendre = static_cast<double>(2 * j + 1);
+      s.h_kappa[j] *= bending_stiffness(j) / (h_ * legendre);
+      s.gamma[j] *= s_ / legendre;
+    }
+    const double moment1 = p_ > 1 ? s.h_kappa[0] - lever * s.gamma[1] : s.h_kappa[0], shear1 = s.gamma[0];
+    if (e > 0) {
+      *(out - 2) = (moment - moment1) - lever * (shear + shear1);
+      *(out - 1) = shear - shear1;
+    }
+    for (Index k = 2; k <= p_; ++k) {
+      const double jump = k < p_ ? s.gamma[k - 2] - s.gamma[k] : s.gamma[k - 2];
+      out[2 * k - 4] = 2.0 * s.h_kappa[k - 1] + 2.0 * lever / static_cast<double>(2 * k - 1) * jump;
+      out[2 * k - 3] = 2.0 * s.gamma[k - 1];
     }
     moment = moment1;
     shear = shear1;
-    t0 = t1;
-    u0 = u1;
+    theta0 = q[block - 2];
+    u0 = q[block - 1];
   }
-  y[2 * n_ - 2] = moment - lever * shear;
-  y[2 * n_ - 1] = shear;
+  y[tip_rotation_index()] = moment - lever * shear;
+  y[tip_index()] = shear;
 }
 
 void Timoshenko::flexibility_times(const double* x, double* y) const {
-  // Equilibrium from the tip: y holds (moment, shear force) of the element left of each node.
+  // Equilibrium from the tip: y holds the stresses of each element, (M_j, S_j) for j = 1 … p − 1, then for j = 0.
   const double lever = 0.5 * h_ / r_;
+  const Index block = 2 * p_;
   double moment = 0.0, shear = 0.0;
-  for (Eigen::Index i = 2 * n_ - 2; i >= 0; i -= 2) {
-    const double shear1 = shear + x[i + 1];
-    moment += x[i] + lever * (shear + shear1);
+  for (Index e = n_ - 1; e >= 0; --e) {
+    const double* load = x + e * block;
+    double* stress = y + e * block;
+    const double shear1 = shear + load[block - 1];
+    moment += load[block - 2] + lever * (shear + shear1);
     shear = shear1;
-    y[i] = moment;
-    y[i + 1] = shear;
+    stress[block - 2] = moment;
+    stress[block - 1] = shear;
+    for (Index k = 2; k <= p_; ++k) stress[2 * k - 3] = 0.5 * load[2 * k - 3];
+    for (Index k = 2; k <= p_; ++k) {
+      double jump = k > 2 ? stress[2 * k - 5] : shear;
+      if (k < p_) jump -= stress[2 * k - 1];
+      stress[2 * k - 4] = 0.5 * load[2 * k - 4] - lever / static_cast<double>(2 * k - 1) * jump;
+    }
+    if (p_ > 1) stress[block - 2] += lever * stress[1];
   }
   // Strains and displacements from the clamp.
-  const double bend = h_ / b_, slide = h_ / s_;
-  double t0 = 0.0, u0 = 0.0;
-  for (Eigen::Index i = 0; i < 2 * n_; i += 2) {
-    const double t1 = t0 + bend * y[i];
-    u0 += slide * y[i + 1] + lever * (t0 + t1);
-    t0 = t1;
-    y[i] = t0;
-    y[i + 1] = u0;
+  const double bend = h_ / bending_stiffness(0), slide = h_ / s_;
+  double theta0 = 0.0, u0 = 0.0;
+  for (Index e = 0; e < n_; ++e) {
+    double* q = y + e * block;
+    const double theta1 = theta0 + bend * q[block - 2];
+    u0 += slide * q[block - 1] + lever * (theta0 + theta1);
+    for (Index k = 2; k <= p_; ++k) {
+      const double legendre = static_cast<double>(2 * k - 1);
+      q[2 * k - 4] *= 0.5 * h_ * legendre / bending_stiffness(k - 1);
+      q[2 * k - 3] *= 0.5 * slide * legendre;
+    }
+    if (p_ > 1) {
+      u0 -= 2.0 * lever / 3.0 * q[0];
+      q[1] += 0.5 * lever * (theta1 - theta0);
+    }
+    for (Index k = 2; k <= p_; ++k) {
+      const double slope = lever * q[2 * k - 4] / static_cast<double>(2 * k - 1);
+      if (k > 2) q[2 * k - 5] -= slope;
+      if (k < p_) q[2 * k - 1] += slope;
+    }
+    theta0 = theta1;
+    q[block - 2] = theta0;
+    q[block - 1] = u0;
   }
 }
 
-void Timoshenko::weighted_strains(const double* x, double* strains) const {
-  const double half = 0.5 / r_, wb = std::sqrt(b_ / h_), ws = std::sqrt(s_ * h_);
-  double t0 = 0.0, u0 = 0.0;
-  for (Eigen::Index i = 0; i < 2 * n_; i += 2) {
-    strains[i] = wb * (x[i] - t0);
-    strains[i + 1] = ws * ((x[i + 1] - u0) / h_ - half * (t0 + x[i]));
-    t0 = x[i];
-    u0 = x[i + 1];
-  }
-}
-
-void Timoshenko::mass_cholesky(Eigen::VectorXd& diagonal, Eigen::VectorXd& super) const {
-  diagonal.resize(n_);
-  super.resize(n_);  // the last entry is unused and zero
-  const double off = h_ / 6.0;
-  double left = 0.0;
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    const double main = (i + 1 < n_ ? 4.0 : 2.0) * off;
-    diagonal[i] = std::sqrt(main - left * left);
-    left = super[i] = i + 1 < n_ ? off / diagonal[i] : 0.0;
+void Timoshenko::weighted_strains(const double* x, double* out) const {
+  double theta0 = 0.0, u0 = 0.0;
+  for (Index i = 0; i < size(); i += 2 * p_) {
+    const Strains s = strains(theta0, u0, x + i);
+    for (Index j = 0; j < p_; ++j) {
+      const double legendre = static_cast<double>(2 * j + 1);
+      out[i + 2 * j] = std::sqrt(bending_stiffness(j) / (h_ * legendre)) * s.h_kappa[j];
+      out[i + 2 * j + 1] = std::sqrt(s_ * h_ / legendre) * s.gamma[j];
+    }
+    theta0 = x[i + 2 * p_ - 2];
+    u0 = x[i + 2 * p_ - 1];
   }
 }
 
@@ -114,87 +214,104 @@ Eigen::VectorXd Timoshenko::flexibility_times(const Eigen::VectorXd& x) const {
   return y;
 }
 
-Eigen::VectorXd Timoshenko::mass_solve(const Eigen::VectorXd& x) const {
-  Eigen::VectorXd d, l, y = x;
-  mass_cholesky(d, l);
-  for (Eigen::Index i = 0; i < n_; ++i) {
-    for (Eigen::Index f = 0; f < 2; ++f) {
-      if (i > 0) y[2 * i + f] -= l[i - 1] * y[2 * i - 2 + f];
-      y[2 * i + f] /= d[i];
-    }
-  }
-  for (Eigen::Index i = n_ - 1; i >= 0; --i) {
-    for (Eigen::Index f = 0; f < 2; ++f) {
-      if (i + 1 < n_) y[2 * i + f] -= l[i] * y[2 * i + 2 + f];
-      y[2 * i + f] /= d[i];
-    }
-  }
-  return y;
-}
+Eigen::VectorXd Timoshenko::mass_solve(const Eigen::VectorXd& x) const { return MassFactor(mass()).solve(x); }
 
 double Timoshenko::mass_norm2(const Eigen::VectorXd& x) const {
-  // ∫ of the square of a linear function over an element: h (a² + ab + b²)/3, here as a sum of squares.
-  double sum = 0.0, t0 = 0.0, u0 = 0.0;
-  for (Eigen::Index i = 0; i < 2 * n_; i += 2) {
-    const double t1 = x[i], u1 = x[i + 1];
-    sum += (t0 * t0 + t1 * t1 + (t0 + t1) * (t0 + t1)) + (u0 * u0 + u1 * u1 + (u0 + u1) * (u0 + u1));
-    t0 = t1;
-    u0 = u1;
+  double linear = 0.0, rest = 0.0, theta0 = 0.0, u0 = 0.0;
+  for (Index i = 0; i < size(); i += 2 * p_) {
+    const double* q = x.data() + i;
+    const Field t = field(theta0, q), u = field(u0, q + 1);
+    linear += (t.left * t.left + t.right * t.right + (t.left + t.right) * (t.left + t.right)) +
+              (u.left * u.left + u.right * u.right + (u.left + u.right) * (u.left + u.right));
+    for (Index j = 2; j <= p_; ++j) rest += (t.f[j] * t.f[j] + u.f[j] * u.f[j]) / static_cast<double>(2 * j + 1);
+    theta0 = q[2 * p_ - 2];
+    u0 = q[2 * p_ - 1];
   }
-  return sum * h_ / 6.0;
+  return linear * h_ / 6.0 + h_ * rest;
 }
 
 double Timoshenko::stiffness_norm2(const Eigen::VectorXd& x) const {
-  const double half = 0.5 / r_;
-  double bend = 0.0, shear = 0.0, t0 = 0.0, u0 = 0.0;
-  for (Eigen::Index i = 0; i < 2 * n_; i += 2) {
-    const double kappa = (x[i] - t0) / h_, gamma = (x[i + 1] - u0) / h_ - half * (t0 + x[i]);
-    bend += kappa * kappa;
-    shear += gamma * gamma;
-    t0 = x[i];
-    u0 = x[i + 1];
+  double bend = 0.0, top = 0.0, shear = 0.0, theta0 = 0.0, u0 = 0.0;
+  for (Index i = 0; i < size(); i += 2 * p_) {
+    const Strains s = strains(theta0, u0, x.data() + i);
+    for (Index j = 0; j < p_; ++j) {
+      const double kappa = s.h_kappa[j] / h_, legendre = static_cast<double>(2 * j + 1);
+      (j + 1 < p_ ? bend : top) += kappa * kappa / legendre;
+      shear += s.gamma[j] * s.gamma[j] / legendre;
+    }
+    theta0 = x[i + 2 * p_ - 2];
+    u0 = x[i + 2 * p_ - 1];
   }
-  return h_ * (b_ * bend + s_ * shear);
+  return h_ * (b_ * bend + b_top_ * top + s_ * shear);
 }
 
-Eigen::SparseMatrix<double> Timoshenko::mass() const {
+// All entries of every element, also where they are 0: M and K have one pattern.
+template <typename Entry>
+Eigen::SparseMatrix<double> Timoshenko::assemble(const Entry& entry) const {
   std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(4 * static_cast<std::size_t>(n_));
-  const double m = h_ / 6.0;
-  for (int i = 0; i < 2 * n_; ++i) {
-    entries.emplace_back(i, i, (i < 2 * n_ - 2 ? 4.0 : 2.0) * m);
-    if (i >= 2) entries.emplace_back(i, i - 2, m);
-  }
-  Eigen::SparseMatrix<double> M(size(), size());
-  M.setFromTriplets(entries.begin(), entries.end());
-  return M;
-}
-
-Eigen::SparseMatrix<double> Timoshenko::stiffness() const {
-  const double half = 0.5 / r_;
-  std::vector<Eigen::Triplet<double>> entries;
-  entries.reserve(10 * static_cast<std::size_t>(n_));
-  for (int e = 0; e < n_; ++e) {
-    // κ and γ as rows over (θ̃₀, u₀, θ̃₁, u₁)
-    const double kappa[4] = {-1.0 / h_, 0.0, 1.0 / h_, 0.0};
-    const double gamma[4] = {-half, -1.0 / h_, -half, 1.0 / h_};
-    for (int i = 0; i < 4; ++i) {
-      for (int j = 0; j <= i; ++j) {
-        const int row = 2 * (e - 1) + i, column = 2 * (e - 1) + j;
-        if (column >= 0) entries.emplace_back(row, column, h_ * (b_ * kappa[i] * kappa[j] + s_ * gamma[i] * gamma[j]));
+  const Index local = 2 * (p_ + 1);
+  entries.reserve(static_cast<std::size_t>(n_ * local * (local + 1) / 2));
+  for (Index e = 0; e < n_; ++e) {
+    const Index first = 2 * (e * p_ - 1);
+    for (Index i = 0; i < local; ++i) {
+      for (Index j = 0; j <= i; ++j) {
+        if (first + j >= 0) {
+          entries.emplace_back(static_cast<int>(first + i), static_cast<int>(first + j), entry(i, j));
+        }
       }
     }
   }
-  Eigen::SparseMatrix<double> K(size(), size());
-  K.setFromTriplets(entries.begin(), entries.end());
-  return K;
+  Eigen::SparseMatrix<double> A(size(), size());
+  A.setFromTriplets(entries.begin(), entries.end());
+  return A;
+}
+
+Eigen::SparseMatrix<double> Timoshenko::mass() const {
+  // Of one field over (left node, bubbles, right node), column by column.
+  Eigen::MatrixXd element(p_ + 1, p_ + 1);
+  for (Index j = 0; j <= p_; ++j) {
+    Eigen::VectorXd unit = Eigen::VectorXd::Zero(2 * p_);
+    if (j > 0) unit[2 * j - 2] = 1.0;
+    const Field v = field(j == 0 ? 1.0 : 0.0, unit.data());
+    const double m = h_ / 6.0;
+    element(0, j) = m * (2.0 * v.left + v.right);
+    element(p_, j) = m * (v.left + 2.0 * v.right);
+    double below[2] = {3.0 * m * (v.left + v.right), m * (v.right - v.left)};
+    for (Index k = 2; k <= p_; ++k) {
+      const double moment = h_ * v.f[k] / static_cast<double>(2 * k + 1);
+      element(k - 1, j) = (moment - below[k % 2]) / static_cast<double>(2 * k - 1);
+      below[k % 2] = moment;
+    }
+  }
+  return assemble([&](Index i, Index j) { return i % 2 == j % 2 ? element(i / 2, j / 2) : 0.0; });
+}
+
+Eigen::SparseMatrix<double> Timoshenko::stiffness() const {
+  std::vector<Strains> columns;
+  for (Index i = 0; i < 2 * (p_ + 1); ++i) {
+    Eigen::VectorXd unit = Eigen::VectorXd::Zero(2 * (p_ + 1));
+    unit[i] = 1.0;
+    columns.push_back(strains(unit[0], unit[1], unit.data() + 2));
+  }
+  return assemble([&](Index i, Index j) {
+    const Strains &a = columns[i], &b = columns[j];
+    double sum = 0.0;
+    for (Index k = 0; k < p_; ++k) {
+      const double bend = bending_stiffness(k) * (a.h_kappa[k] / h_) * (b.h_kappa[k] / h_);
+      sum += h_ / static_cast<double>(2 * k + 1) * (bend + s_ * a.gamma[k] * b.gamma[k]);
+    }
+    return sum;
+  });
 }
 
 Eigen::VectorXd Timoshenko::unit_tip_force() const { return Eigen::VectorXd::Unit(size(), tip_index()); }
 
 Eigen::VectorXd Timoshenko::uniform_load() const {
   Eigen::VectorXd F = Eigen::VectorXd::Zero(size());
-  for (Eigen::Index i = 1; i < 2 * n_; i += 2) F[i] = h_;
+  for (Index i = 0; i < size(); i += 2 * p_) {
+    if (p_ > 1) F[i + 1] = -h_ / 3.0;  // N_2; the others are orthogonal to 1
+    F[i + 2 * p_ - 1] = h_;
+  }
   F[tip_index()] = 0.5 * h_;
   return F;
 }
@@ -202,23 +319,40 @@ Eigen::VectorXd Timoshenko::uniform_load() const {
 Eigen::VectorXd Timoshenko::hat_load() const {
   Eigen::VectorXd F = Eigen::VectorXd::Zero(size());
   F[tip_index()] = h_ / 3.0;
-  if (n_ > 1) F[tip_index() - 2] = h_ / 6.0;
+  if (n_ > 1) F[tip_index() - 2 * p_] = h_ / 6.0;
+  const Index last = size() - 2 * p_;
+  if (p_ > 1) F[last + 1] = -h_ / 6.0;
+  if (p_ > 2) F[last + 3] = -h_ / 30.0;
   return F;
 }
 
 Eigen::VectorXd Timoshenko::linear_shape() const {
   Eigen::VectorXd q = Eigen::VectorXd::Zero(size());
-  for (Eigen::Index i = 0; i < n_; ++i) q[2 * i + 1] = static_cast<double>(i + 1) * h_;
+  for (Index e = 1; e <= n_; ++e) q[2 * p_ * e - 1] = static_cast<double>(e) * h_;
   return q;
 }
 
 void Timoshenko::sample(const double* q, int field, double* values) const {
-  constexpr Eigen::Index intervals = shape_points - 1;
-  for (Eigen::Index j = 0; j <= intervals; ++j) {
-    const Eigen::Index left = j * n_ / intervals;  // node at or left of x_j
+  constexpr Index intervals = shape_points - 1;
+  for (Index j = 0; j <= intervals; ++j) {
+    const Index left = j * n_ / intervals;  // node at or left of x_j
     const double part = static_cast<double>(j * n_ % intervals) / static_cast<double>(intervals);
-    const double a = left > 0 ? q[2 * (left - 1) + field] : 0.0;
-    values[j] = part > 0.0 ? a + part * (q[2 * left + field] - a) : a;
+    const double* element = q + 2 * p_ * left + field;
+    const double a = left > 0 ? *(element - 2) : 0.0;
+    if (part == 0.0) {
+      values[j] = a;
+      continue;
+    }
+    values[j] = a + part * (element[2 * p_ - 2] - a);
+    const double xi = 2.0 * part - 1.0;
+    double before = 1.0, legendre = xi;  // P_{k−2}, P_{k−1}
+    for (Index k = 2; k <= p_; ++k) {
+      const double degree = static_cast<double>(k);
+      const double next = ((2.0 * degree - 1.0) * xi * legendre - (degree - 1.0) * before) / degree;
+      values[j] += element[2 * k - 4] * (next - before) / (2.0 * degree - 1.0);
+      before = legendre;
+      legendre = next;
+    }
   }
 }
 

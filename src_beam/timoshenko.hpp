@@ -1,20 +1,33 @@
-// P1/P1 Timoshenko elements on a uniform mesh, clamped at x = 0 (Ahn & Tate, eqs. (57)–(59)).
+// Timoshenko elements of degree p on a uniform mesh, clamped at x = 0; p = 1 are the P1/P1 elements of Ahn & Tate,
+// eqs. (57)–(59).
 //
-// Unknowns, interleaved so that every matrix is banded (half-bandwidth 3):
-//   q = (θ̃₁,u₁, …, θ̃ₙ,uₙ) [m],   θ̃ = r θ,   r = √(I/A) the radius of gyration [m].
+// In an element, ξ ∈ [−1, 1], both fields have a hierarchical basis (Szabó & Babuška, Finite Element Analysis, 1991):
+// the two hat functions, and for k = 2 … p the bubbles, integrated Legendre polynomials that vanish at its ends,
+//   N_k(ξ) = ∫_{−1}^ξ P_{k−1} = (P_k − P_{k−2})/(2k−1).
+// Unknowns by element, bubbles before its right node, so that every matrix is banded (half-bandwidth 2p + 1):
+//   q = (… | θ̃_{e,2},u_{e,2}, …, θ̃_{e,p},u_{e,p}, θ̃_e,u_e | …) [m],   θ̃ = r θ,   r = √(I/A) the radius of gyration [m].
 // With θ̃ both fields carry the same mass, and all is divided by ρA:
 //   M q̈ + α_b K q̇ + K q = F/ρA,
-//   qᵀMq = ∫ θ̃² + u² dx,   qᵀKq = Σ_e h (b κ_e² + s γ_e²),
-//   κ_e = (θ̃_i − θ̃_{i−1})/h,   γ_e = (u_i − u_{i−1})/h − (θ̃_{i−1} + θ̃_i)/2r   in element e = [x_{i−1}, x_i],
-//   s = KG/ρ,   b = (EI + KAG h²/12)/ρI with full integration,   b = E/ρ with one point for the shear [m²/s²].
-// Full integration of a linear shear strain is its mean square plus KAG h²/12 κ²: the same element with a stiffer
-// bending term, which is how it locks.
+//   qᵀMq = ∫ θ̃² + u² dx,   qᵀKq = ∫ E/ρ θ̃_x² + s (u_x − θ̃/r)² dx,   s = KG/ρ [m²/s²].
 //
-// The cantilever is statically determinate, so K⁻¹ is two sweeps: forces from the tip, displacements from the clamp.
-// Nothing is subtracted there, and K⁻¹F is accurate to rounding where factorising K would lose cond(K) ~ KAG/EI·n⁴.
+// Both are sums of squares of Legendre coefficients, which integrates them exactly:
+//   qᵀKq = Σ_e Σ_{j<p} h/(2j+1) (b_j κ_j² + s γ_j²),
+//   κ_0 = (θ̃_e − θ̃_{e−1})/h,   κ_j = 2θ̃_{e,j+1}/h,
+//   γ_0 = (u_e − u_{e−1})/h − (θ̃_{e−1} + θ̃_e)/2r + θ̃_{e,2}/3r,
+//   γ_1 = 2u_{e,2}/h − (θ̃_e − θ̃_{e−1})/2r + θ̃_{e,3}/5r,
+//   γ_j = 2u_{e,j+1}/h − θ̃_{e,j}/(2j−1)r + θ̃_{e,j+2}/(2j+3)r,   bubbles beyond p being 0.
+// The shear strain has one more coefficient, γ_p = −h κ_{p−1}/((2p−1) 2r): a stiffer bending term,
+//   b_{p−1} = E/ρ + s (h/2r)²/(4p²−1) with full integration,   E/ρ without it,   b_j = E/ρ for j < p − 1.
+// Leaving it out is reduced integration: p Gauss points, the zeros of P_p, for the shear. With p = 1 the stiffer term
+// is all of the bending, which is how the element locks.
+//
+// So an element has as many strains as unknowns: the discrete cantilever is statically determinate, like the real one,
+// and K⁻¹ is two sweeps: forces from the tip, displacements from the clamp. It is accurate to rounding where
+// factorising K would lose cond(K) ~ KAG/EI·n⁴.
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
 #include "beam.hpp"
@@ -23,56 +36,65 @@ namespace beam {
 
 class Timoshenko {
  public:
+  /// M = CᵀC, C = matrixU(); banded as it is ordered.
+  using MassFactor = Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
+
   /// @pre validate(parameters) passed
   explicit Timoshenko(const Parameters& parameters);
 
-  Eigen::Index size() const { return 2 * n_; }                    ///< number of unknowns
+  Eigen::Index size() const { return 2 * p_ * n_; }               ///< number of unknowns
   Eigen::Index elements() const { return n_; }                    ///< n
   double mass_per_length() const { return mu_; }                  ///< ρA [kg/m]
   double radius_of_gyration() const { return r_; }                ///< r = √(I/A) [m]
-  Eigen::Index tip_index() const { return 2 * n_ - 1; }           ///< of u(L) in q
-  Eigen::Index tip_rotation_index() const { return 2 * n_ - 2; }  ///< of θ̃(L) in q
+  Eigen::Index tip_index() const { return size() - 1; }           ///< of u(L) in q
+  Eigen::Index tip_rotation_index() const { return size() - 2; }  ///< of θ̃(L) in q
 
   /// y = M x; x and y of size() doubles, not overlapping.
   void mass_times(const double* x, double* y) const;
   /// y = K x, element by element; x and y not overlapping.
   void stiffness_times(const double* x, double* y) const;
-  /// y = K⁻¹ x in O(n), see above; x and y not overlapping.
+  /// y = K⁻¹ x in O(n p), see above; x and y not overlapping.
   void flexibility_times(const double* x, double* y) const;
-  /// √h (√b κ_e, √s γ_e) of all elements, interleaved: its squared norm is xᵀKx.
+  /// √(h/(2j+1)) (√b_j κ_j, √s γ_j) of all elements, interleaved: its squared norm is xᵀKx.
   void weighted_strains(const double* x, double* strains) const;
-  /// The upper bidiagonal C of M = CᵀC, the same for θ̃ and u: its diagonal and superdiagonal by node.
-  void mass_cholesky(Eigen::VectorXd& diagonal, Eigen::VectorXd& super) const;
 
   Eigen::VectorXd mass_times(const Eigen::VectorXd& x) const;
   Eigen::VectorXd stiffness_times(const Eigen::VectorXd& x) const;
   Eigen::VectorXd flexibility_times(const Eigen::VectorXd& x) const;
   Eigen::VectorXd mass_solve(const Eigen::VectorXd& x) const;  ///< M⁻¹ x
 
-  double mass_norm2(const Eigen::VectorXd& x) const;       ///< xᵀMx
+  double mass_norm2(const Eigen::VectorXd& x) const;       ///< xᵀMx, as a sum of squares
   double stiffness_norm2(const Eigen::VectorXd& x) const;  ///< xᵀKx, as a sum of squares
 
   Eigen::SparseMatrix<double> mass() const;       ///< M, lower triangle
-  Eigen::SparseMatrix<double> stiffness() const;  ///< K, lower triangle
+  Eigen::SparseMatrix<double> stiffness() const;  ///< K, lower triangle, with the pattern of M
 
   Eigen::VectorXd unit_tip_force() const;  ///< e: 1 in the row of u(L)
   Eigen::VectorXd uniform_load() const;    ///< ∫ψ_i dx in the rows of u: F of f_b = 1 N/m
-  Eigen::VectorXd hat_load() const;        ///< ∫ψ_i ψ_n dx in the rows of u: F of f_b = ψ_n
-  Eigen::VectorXd linear_shape() const;    ///< u = x, θ = 0
+  Eigen::VectorXd hat_load() const;  ///< ∫ψ_i ψ dx in the rows of u, ψ the hat function of the tip: F of f_b = ψ
+  Eigen::VectorXd linear_shape() const;  ///< u = x, θ = 0
 
-  /// Fields at x = 0, L/20, …, L: `values[j]` = u or θ̃, by linear interpolation.
+  /// Fields at x = 0, L/20, …, L: `values[j]` = u or θ̃.
   void sample_deflection(const double* q, double* values) const { sample(q, 1, values); }
   void sample_scaled_rotation(const double* q, double* values) const { sample(q, 0, values); }
 
  private:
+  struct Strains;
+  struct Field;
+  Strains strains(double theta0, double u0, const double* q) const;
+  Field field(double left, const double* q) const;
+  double bending_stiffness(Eigen::Index j) const { return j + 1 < p_ ? b_ : b_top_; }
+  template <typename Entry>
+  Eigen::SparseMatrix<double> assemble(const Entry& entry) const;
   void sample(const double* q, int field, double* values) const;
 
-  Eigen::Index n_;
-  double h_;   // element length [m]
-  double mu_;  // ρA [kg/m]
-  double r_;   // √(I/A) [m]
-  double b_;   // bending stiffness per ρI [m²/s²]
-  double s_;   // shear stiffness per ρA [m²/s²]
+  Eigen::Index n_, p_;
+  double h_;      // element length [m]
+  double mu_;     // ρA [kg/m]
+  double r_;      // √(I/A) [m]
+  double b_;      // bending stiffness per ρI, b_j [m²/s²]
+  double b_top_;  // b_{p−1}
+  double s_;      // shear stiffness per ρA [m²/s²]
 };
 
 }  // namespace beam

@@ -49,23 +49,27 @@ void validate(const Parameters& p) {
   require_positive("shear_modulus * shear_coefficient / density [m2/s2]",
                    p.shear_modulus * p.shear_coefficient / p.density);
 
-  if (p.n_elements < 1 || p.n_elements > max_elements) {
-    reject("n_elements", p.n_elements, "between 1 and " + std::to_string(max_elements));
+  if (p.element_degree < 1 || p.element_degree > max_element_degree) {
+    reject("element_degree", p.element_degree, "between 1 and " + std::to_string(max_element_degree));
+  }
+  if (p.n_elements < 1 || p.n_elements > max_elements / p.element_degree) {
+    reject("n_elements", p.n_elements,
+           "between 1 and " + std::to_string(max_elements / p.element_degree) + " (" + std::to_string(max_elements) +
+               " over element_degree)");
   }
   switch (p.integrator) {
     case Integrator::modal: {
-      const int unknowns = 2 * p.n_elements;
+      const int unknowns = 2 * p.n_elements * p.element_degree;
+      const std::string mesh = std::to_string(p.n_elements) + " elements of degree " + std::to_string(p.element_degree);
       if (p.n_modes < 0 || p.n_modes > unknowns) {
-        reject("n_modes", p.n_modes,
-               "between 0 (all) and " + std::to_string(unknowns) + ", the unknowns of " + std::to_string(p.n_elements) +
-                   " elements");
+        reject("n_modes", p.n_modes, "between 0 (all) and " + std::to_string(unknowns) + ", the unknowns of " + mesh);
       }
       const int most = std::min(unknowns / 2, max_dense_unknowns);
       if (unknowns > max_dense_unknowns && (p.n_modes == 0 || p.n_modes > most)) {
         reject("n_modes", p.n_modes,
-               "between 1 and " + std::to_string(most) + " with " + std::to_string(p.n_elements) +
-                   " elements (all modes only up to " + std::to_string(max_dense_unknowns / 2) +
-                   " elements); keep fewer n_modes, or use the integrator generalized_alpha");
+               "between 1 and " + std::to_string(most) + " with " + mesh + " (all modes only up to " +
+                   std::to_string(max_dense_unknowns) +
+                   " unknowns); keep fewer n_modes, or use the integrator generalized_alpha");
       }
       break;
     }

@@ -81,10 +81,15 @@ fmi::Table make_table() {
   parameter("length", "m", &Parameters::length, "length L, > 0").at_least(0);
   parameter("alpha_b", "s", &Parameters::alpha_b, "Kelvin-Voigt retardation time: damping = alpha_b * stiffness")
       .at_least(0);
-  parameter("n_elements", "", &Parameters::n_elements, "uniform linear elements").range(1, 1000000);
+  parameter("n_elements", "", &Parameters::n_elements, "uniform elements").range(1, 1000000);
+  parameter("element_degree", "", &Parameters::element_degree,
+            "polynomial degree of deflection and rotation in an element; 1 = linear elements")
+      .range(1, 12);
   parameter("n_modes", "", &Parameters::n_modes, "lowest modes kept by the modal integrator; 0 = all").at_least(0);
-  parameter("reduced_integration", "", &Parameters::reduced_integration,
-            "one-point integration of the shear term; false = full integration, which locks for slender beams");
+  parameter(
+      "reduced_integration", "", &Parameters::reduced_integration,
+      "as many Gauss points for the shear term as element_degree; false = exact integration, which locks for slender "
+      "beams of degree 1");
   fmi::Variable& integrator = parameter("integrator", "", &Parameters::integrator, "1 = modal, 2 = generalized_alpha");
   integrator.range(1, 2).choice = "Integrator";
   parameter("rho_inf", "", &Parameters::rho_inf, "spectral radius at infinity of generalized_alpha; 1 = midpoint rule")
@@ -108,9 +113,9 @@ fmi::Table make_table() {
   const std::vector<std::string> start_u{"initial_deflection_slope", "length"};
   const std::vector<std::string> start_v{"initial_velocity_slope", "length"};
   // What the modal basis depends on: the start is projected onto the modes that are kept.
-  const std::vector<std::string> basis{
-      "density",    "area",    "second_moment_of_area", "young_modulus", "shear_modulus", "length", "shear_coefficient",
-      "n_elements", "n_modes", "reduced_integration",   "integrator"};
+  const std::vector<std::string> basis{"density",        "area",    "second_moment_of_area", "young_modulus",
+                                       "shear_modulus",  "length",  "shear_coefficient",     "n_elements",
+                                       "element_degree", "n_modes", "reduced_integration",   "integrator"};
   std::vector<std::string> start_shape = basis;
   start_shape.push_back("initial_deflection_slope");
   add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),

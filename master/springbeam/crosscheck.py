@@ -176,8 +176,10 @@ def _rounding(scene: Scene) -> float:
     bending = beam.young_modulus * beam.second_moment_of_area
     shear = beam.shear_coefficient * beam.shear_modulus * beam.area
     line_mass, line_inertia = beam.density * beam.area, beam.density * beam.second_moment_of_area
-    h = beam.length / beam.n_elements
-    fastest = 12.0 / h**2 * max(bending / line_inertia, shear / line_mass) + shear / line_inertia
+    h, p = beam.length / beam.n_elements, beam.element_degree
+    # Of ∫v'²/∫v² over polynomials: 12/h² for p = 1, 60/h² for p = 2, then a little more than the exact value.
+    gradient = p * (p + 1) * (p + 2) * (p + 3) / (2.0 * h**2)
+    fastest = gradient * max(bending / line_inertia, shear / line_mass) + shear / line_inertia
     compliance = beam.length**3 / (3.0 * bending) + beam.length / shear
     slowest = 4.0 / (line_mass * beam.length * compliance)
     return float(np.finfo(float).eps * np.sqrt(max(1.0, fastest / slowest)))

@@ -24,8 +24,10 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-#: Up to this many elements all modes may be kept; the full eigenproblem grows with the cube.
-ALL_MODES_UP_TO = 500
+#: Up to this many unknowns all modes may be kept; the full eigenproblem grows with the cube.
+ALL_MODES_UP_TO = 1000
+#: Most elements times their degree.
+MOST_ELEMENTS = 1_000_000
 #: Two weeks at a microsecond a step: a mistyped macro step, not a run.
 MOST_MACRO_STEPS = 1e12
 
@@ -56,7 +58,8 @@ class Beam(_Table):
     shear_coefficient: Positive = 1.0  #: K [–]
     length: Positive = 1.0  #: L [m]
     alpha_b: NonNegative = 0.0  #: Kelvin–Voigt retardation time [s]
-    n_elements: Annotated[int, Field(ge=1, le=1_000_000)] = 50
+    n_elements: Annotated[int, Field(ge=1, le=MOST_ELEMENTS)] = 50
+    element_degree: Annotated[int, Field(ge=1, le=12)] = 1  #: of u and θ in an element; 1 is the paper's
     n_modes: Annotated[int, Field(ge=0)] = 0  #: lowest modes kept; 0 = all
     reduced_integration: bool = False
     integrator: Literal["modal", "generalized_alpha"] = "modal"
@@ -69,14 +72,18 @@ class Beam(_Table):
 
     @model_validator(mode="after")
     def _modes_exist(self) -> Beam:
-        if self.n_modes > 2 * self.n_elements:
+        unknowns, degree = 2 * self.n_elements * self.element_degree, self.element_degree
+        mesh = f"n_elements = {self.n_elements}" + (f" of element_degree = {degree}" if degree > 1 else "")
+        if self.n_elements * degree > MOST_ELEMENTS:
             raise ValueError(
-                f"n_modes = {self.n_modes}: n_elements = {self.n_elements} has only {2 * self.n_elements} modes"
+                f"n_elements = {self.n_elements}: times element_degree = {degree} it must be at most {MOST_ELEMENTS}"
             )
-        if self.integrator == "modal" and self.n_modes == 0 and self.n_elements > ALL_MODES_UP_TO:
+        if self.n_modes > unknowns:
+            raise ValueError(f"n_modes = {self.n_modes}: {mesh} has only {unknowns} modes")
+        if self.integrator == "modal" and self.n_modes == 0 and unknowns > ALL_MODES_UP_TO:
             raise ValueError(
-                f"n_modes = 0: n_elements = {self.n_elements} has too many modes to keep them all (allowed up to "
-                f'{ALL_MODES_UP_TO} elements); use n_modes = 64, or integrator = "generalized_alpha"'
+                f"n_modes = 0: {mesh} has {unknowns} modes, too many to keep them all (allowed up to "
+                f'{ALL_MODES_UP_TO}); use n_modes = 64, or integrator = "generalized_alpha"'
             )
         return self
 
@@ -269,19 +276,28 @@ _TABLES: dict[str, type[_Table]] = {
 }
 
 
+def _locking(beam: Beam) -> float:
+    """Static tip stiffness of the mesh over that of the beam, with full integration (model.md, "Locking")."""
+    if beam.reduced_integration or beam.element_degree > 2:
+        return 1.0
+    shear = beam.shear_coefficient * beam.shear_modulus * beam.area
+    bending = beam.young_modulus * beam.second_moment_of_area
+    h = beam.length / beam.n_elements
+    if beam.element_degree == 1:
+        return 1.0 + shear * h**2 / (12.0 * bending)
+    compliance = beam.length**3 / (3.0 * bending) + beam.length / shear
+    missing = beam.length * h**2 / (12.0 * bending) / (1.0 + 60.0 * bending / (shear * h**2))
+    return compliance / (compliance - missing)
+
+
 def suspicions(scene: Scene) -> list[str]:
     """What can be run but may not be meant; for a run's warnings."""
     found = []
-    if (beam := scene.beam) is not None and not beam.reduced_integration:
-        # Static tip compliance of full integration: the exact one over 1 + KAG h²/12EI.
-        shear = beam.shear_coefficient * beam.shear_modulus * beam.area
-        bending = beam.young_modulus * beam.second_moment_of_area
-        factor = 1.0 + shear * (beam.length / beam.n_elements) ** 2 / (12.0 * bending)
-        if factor > 1.05:
-            found.append(
-                f"[beam] n_elements = {beam.n_elements}: full integration locks, the beam is {factor:.3g} times too "
-                "stiff; use reduced_integration = true or more elements"
-            )
+    if (beam := scene.beam) is not None and (factor := _locking(beam)) > 1.05:
+        found.append(
+            f"[beam] n_elements = {beam.n_elements}: full integration locks, the beam is {factor:.3g} times too "
+            "stiff; use reduced_integration = true, element_degree = 3, or more elements"
+        )
     return found
 
 

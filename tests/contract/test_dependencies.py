@@ -47,6 +47,7 @@ COMMON: dict[str, dict[str, float]] = {
 # Values that are not a factor of the base's.
 CHANGES: dict[str, list[float]] = {
     "n_elements": [12],
+    "element_degree": [3],
     "n_modes": [0, 4],
     "reduced_integration": [True, False],
     "integrator": [1, 2],

@@ -24,17 +24,19 @@ using testing::with_integrator;
 
 std::vector<Parameters> variants() {
   std::vector<Parameters> all;
-  for (const double alpha_b : {0.0, 2e-3}) {
-    Parameters p = general_beam(25);
-    p.alpha_b = alpha_b;
+  for (Parameters p : {general_beam(25), general_beam(3, 5)}) {
     p.initial_velocity_slope = -1.0;
     p.initial_deflection_slope = 0.05;
     p.tip_load_coefficient = -0.2;
-    all.push_back(p);
-    p.n_modes = 4;
-    all.push_back(p);
-    for (const double rho_inf : {1.0, 0.7, 0.0})
-      all.push_back(with_integrator(p, Integrator::generalized_alpha, rho_inf));
+    for (const double alpha_b : {0.0, 2e-3}) {
+      p.alpha_b = alpha_b;
+      p.n_modes = 0;
+      all.push_back(p);
+      p.n_modes = 4;
+      all.push_back(p);
+      for (const double rho_inf : {1.0, 0.7, 0.0})
+        all.push_back(with_integrator(p, Integrator::generalized_alpha, rho_inf));
+    }
   }
   return all;
 }
@@ -170,6 +172,11 @@ TEST(BeamState, ParametersAreChecked) {
       {[](Parameters& p) { p.alpha_b = -1e-3; }, {"alpha_b", "-0.001", ">= 0"}},
       {[](Parameters& p) { p.n_elements = 0; }, {"n_elements", "= 0 ", "between 1 and"}},
       {[](Parameters& p) { p.n_elements = 2000000; }, {"n_elements"}},
+      {[](Parameters& p) { p.element_degree = 0; }, {"element_degree", "= 0 ", "between 1 and 12"}},
+      {[](Parameters& p) { p.element_degree = 13; }, {"element_degree", "= 13 ", "between 1 and 12"}},
+      {[](Parameters& p) { p.element_degree = 8, p.n_elements = 125001; }, {"n_elements", "125000", "element_degree"}},
+      {[](Parameters& p) { p.element_degree = 2, p.n_modes = 201; }, {"n_modes", "200", "50 elements of degree 2"}},
+      {[](Parameters& p) { p.element_degree = 11; }, {"n_modes", "= 0 ", "550", "1000 unknowns"}},
       {[](Parameters& p) { p.n_modes = -1; }, {"n_modes", "= -1 "}},
       {[](Parameters& p) { p.n_modes = 101; }, {"n_modes", "= 101 ", "100"}},
       {[](Parameters& p) { p.n_elements = 501; }, {"n_modes", "= 0 ", "generalized_alpha", "fewer n_modes"}},

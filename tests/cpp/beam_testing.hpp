@@ -21,7 +21,7 @@ inline Parameters unit_beam(int n_elements, double kappa = 1.0) {
 }
 
 /// No two parameters alike, so that a forgotten factor shows.
-inline Parameters general_beam(int n_elements) {
+inline Parameters general_beam(int n_elements, int element_degree = 1) {
   Parameters p;
   p.density = 3.0;
   p.area = 0.7;
@@ -31,6 +31,7 @@ inline Parameters general_beam(int n_elements) {
   p.shear_coefficient = 0.85;
   p.length = 1.3;
   p.n_elements = n_elements;
+  p.element_degree = element_degree;
   return p;
 }
 
@@ -38,6 +39,14 @@ inline Parameters with_integrator(Parameters p, Integrator integrator, double rh
   p.integrator = integrator;
   p.rho_inf = rho_inf;
   return p;
+}
+
+/// Clamped–free, EI = KAG = ρA = ρI = L = 1: zeros of det [[X_MM, X_MQ], [X_QM, X_QQ]] of X = exp(A), A from
+/// θ' = M/EI, M' = −Q − ρIω²θ, u' = Q/KAG + θ, Q' = −ρAω²u.
+inline const std::vector<double>& clamped_free_frequencies() {
+  static const std::vector<double> omega = {1.27396492100357,  1.893962818707578, 4.644109211156441,
+                                            4.830446154139584, 7.81367505095888,  7.925418160665796};
+  return omega;
 }
 
 /// C(τ) seen from τ₀ on: the same polynomial re-expanded.

@@ -41,6 +41,16 @@ def test_full_integration_locks_and_reduced_does_not() -> None:
     assert reduced == pytest.approx(0.9975, abs=5e-5)
 
 
+@pytest.mark.parametrize("degree", [3, 4, 7, 12])
+@pytest.mark.parametrize("reduced", [False, True])
+def test_one_element_of_degree_three_or_more_is_statically_exact(degree: int, reduced: bool) -> None:
+    """L³/3EI + L/KAG: under a tip force θ has degree 2 and u degree 3."""
+    d = assemble(beam(2.0, 7.0, n_elements=1, element_degree=degree, length=1.5, reduced_integration=reduced))
+    u = np.linalg.solve(d.K.toarray(), d.tip_vector)[d.tip]
+    # Rounding × condition number of K, some p⁴.
+    assert u == pytest.approx(1.5**3 / 6.0 + 1.5 / 7.0, rel=1e-11)
+
+
 def exact_frequencies(count: int) -> list[float]:
     """Clamped–free Timoshenko beam with all constants 1: zeros of det X_MM X_MQ; X_QM X_QQ, X = exp(A)."""
 
@@ -72,9 +82,45 @@ def test_frequencies_converge_to_the_exact_ones_at_second_order() -> None:
     assert errors[1][0] * exact[0] == pytest.approx(1.67e-5, rel=0.3)
 
 
+@pytest.mark.parametrize(("degree", "n"), [(2, 16), (3, 8), (4, 5)])
+@pytest.mark.parametrize("reduced", [False, True])
+def test_the_order_of_the_frequencies_is_twice_the_degree(degree: int, n: int, reduced: bool) -> None:
+    exact = np.array(exact_frequencies(4))[2:]
+    elements = {"element_degree": degree, "reduced_integration": reduced}
+    errors = [modal_beam(beam(n_elements=m, **elements)).omega[2:4] / exact - 1.0 for m in (n, 2 * n)]
+    orders = np.log2(errors[0] / errors[1])
+    assert np.all(np.abs(orders - 2 * degree) < 0.08 * degree)
+
+
 def test_frequencies_scale_with_the_root_of_the_stiffness() -> None:
     soft, stiff = modal_beam(beam(n_elements=20)), modal_beam(beam(3.6e10, 3.6e10, n_elements=20))
     np.testing.assert_allclose(stiff.omega, soft.omega * np.sqrt(3.6e10), rtol=1e-12)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 8, 12])
+def test_forms_are_the_integrals_of_polynomials(degree: int) -> None:
+    """θ = x^p, u = x^p/2 lie in the space: ∫ of their squares and strains, ∫u and ∫ψₙu in closed form."""
+    n, length, p = 2, 1.4, degree
+    b = beam(3.0, 5.0, n_elements=n, element_degree=p, length=length, density=7.0, area=0.5,
+             second_moment_of_area=0.25)  # fmt: skip
+    d = assemble(b)
+    # Values at the nodes, which are where u = x of the slope shape says.
+    x = d.slope_shape[1::2]
+    q = np.zeros(d.size)
+    q[0::2], q[1::2] = x**p, 0.5 * x**p
+    moment = 3.0 * 0.25 * p * p * length ** (2 * p - 1) / (2 * p - 1)
+    slope, product, square = (length ** (2 * p - 1 + k) / (2 * p - 1 + k) for k in range(3))
+    shear = 5.0 * 0.5 * (0.25 * p * p * slope - p * product + square)
+    assert q @ d.K @ q == pytest.approx(moment + shear, rel=1e-12)
+    assert q @ d.M @ q == pytest.approx(7.0 * (0.25 + 0.25 * 0.5) * square, rel=1e-13)
+    assert d.uniform_load @ q == pytest.approx(0.5 * length ** (p + 1) / (p + 1), rel=1e-13)
+    h = length / n
+    left = length - h
+    hat = sum(
+        sign * (length**k - left**k) / k * factor for sign, k, factor in ((1, p + 2, 1 / h), (-1, p + 1, left / h))
+    )
+    assert d.hat_load @ q == pytest.approx(0.5 * hat, rel=1e-12)
+    np.testing.assert_allclose(d.deflection_sampler() @ q, 0.5 * (SHAPE_POINTS * length) ** p, atol=1e-14)
 
 
 @pytest.mark.parametrize("reduced", [False, True])

@@ -111,6 +111,8 @@ BAD = {
     "alpha_b negative": (changed(beam={"alpha_b": -1e-9}), ["alpha_b = -1e-09", "at least 0"]),
     "no elements": (changed(beam={"n_elements": 0}), ["n_elements = 0", "at least 1", "at most 1000000"]),
     "too many elements": (changed(beam={"n_elements": 2_000_000}), ["n_elements = 2000000", "at most 1000000"]),
+    "degree of elements 0": (changed(beam={"element_degree": 0}), ["element_degree = 0", "at least 1 and at most 12"]),
+    "degree of elements 13": (changed(beam={"element_degree": 13}), ["element_degree = 13", "at most 12"]),
     "modes negative": (changed(beam={"n_modes": -1}), ["n_modes = -1", "at least 0"]),
     "rho_inf above 1": (changed(beam={"rho_inf": 1.1}), ["rho_inf = 1.1", "at least 0 and at most 1"]),
     "rho_inf negative": (changed(beam={"rho_inf": -0.1}), ["rho_inf = -0.1", "at least 0 and at most 1"]),
@@ -135,6 +137,18 @@ BAD = {
     "scheme": (changed(coupling={"scheme": "jacoby"}), ["[coupling] scheme", '"energy"', '"hermite"']),
     # values that do not go together
     "more modes than there are": (changed(beam={"n_elements": 5, "n_modes": 11}), ["n_modes = 11", "only 10 modes"]),
+    "more modes than a higher degree has": (
+        changed(beam={"n_elements": 5, "element_degree": 3, "n_modes": 31}),
+        ["n_modes = 31", "element_degree = 3", "only 30 modes"],
+    ),
+    "all modes of a high degree": (
+        changed(beam={"n_elements": 50, "element_degree": 11}),
+        ["[beam] n_modes = 0", "element_degree = 11", "1100 modes", "1000"],
+    ),
+    "too many elements for their degree": (
+        changed(beam={"n_elements": 500_001, "element_degree": 2, "n_modes": 5}),
+        ["n_elements = 500001", "element_degree = 2", "1000000"],
+    ),
     "all modes of many elements": (
         changed(beam={"n_elements": 501}),
         ["[beam] n_modes = 0", "n_elements = 501", "n_modes = 64", "generalized_alpha"],
@@ -313,6 +327,18 @@ def test_locking_of_full_integration_is_suspected_with_its_size():
     assert "2 times too stiff" in suspicion
     assert "reduced_integration = true" in suspicion
     assert suspicions(scene_from_dict(changed(beam={**slender, "reduced_integration": True}))) == []
+
+
+@pytest.mark.parametrize(
+    ("degree", "n", "factor"), [(2, 1, 4.0 / 3.0), (2, 2, 16.0 / 15.0), (2, 3, None), (3, 1, None)]
+)
+def test_locking_of_higher_degrees_is_bounded(degree, n, factor):
+    """In the limit KAG → ∞ full integration at degree 2 loses L h²/12EI of L³/3EI, at degree 3 nothing."""
+    slender = {"young_modulus": 1.0, "shear_modulus": 1e9, "n_elements": n, "element_degree": degree}
+    found = suspicions(scene_from_dict(changed(beam=slender)))
+    assert len(found) == (factor is not None)
+    if factor is not None:
+        assert f"{factor:.3g} times too stiff" in found[0]
 
 
 def test_shipped_scenes_are_valid_and_titled():

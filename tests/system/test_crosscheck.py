@@ -25,6 +25,21 @@ def test_the_same_problem_passes(scheme, degree):
     assert [row.kind for row in report.events] == ["closes", "strikes", "opens"]
 
 
+@pytest.mark.parametrize(
+    "beam",
+    [
+        {"n_elements": 2, "element_degree": 6},
+        {"n_elements": 6, "element_degree": 2, "reduced_integration": True, "tip_load_coefficient": -6.0},
+        {"n_elements": 30, "element_degree": 10, "n_modes": 8, "distributed_load": -2.0, "alpha_b": 1e-3},
+    ],
+)
+def test_elements_of_higher_degree_pass(beam):
+    """The reference assembles another basis (Lagrange, by quadrature) of the same space."""
+    report = crosscheck(with_changes(load_scene("soft"), beam=beam, **{**SHORT, "time": {"t_end": 0.1}}))
+    assert report.passed, report.rows
+    assert report.horizon == pytest.approx(0.1)
+
+
 def test_compliance_passes():
     law = {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}
     report = crosscheck(with_changes(load_scene("soft"), contact=law, **SHORT))
@@ -35,6 +50,7 @@ WRONG = {
     "mass": {"spring": {"mass": 1.01}},
     "sign of the cubic term": {"spring": {"cubic_stiffness": 0.2}},
     "beam": {"beam": {"density": 1.001}},
+    "degree": {"beam": {"element_degree": 2}},
     "law": {"contact": {"law": "compliance", "stiffness": 1e6}},
     "restitution": {"stop": {"restitution": 0.9}},
     "load": {"spring": {"external_force": 1e-3}},

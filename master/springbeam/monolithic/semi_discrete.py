@@ -1,11 +1,12 @@
-"""The Timoshenko beam in space: P1/P1 elements on a uniform mesh, and the basis in which it is integrated.
+"""The Timoshenko beam in space: elements of degree p on a uniform mesh, and the basis in which it is integrated.
 
-Semi-discrete form (Ahn & Tate, eqs. (1)–(5), (59))::
+Semi-discrete form (Ahn & Tate, eqs. (1)–(5), (59); theirs is p = 1)::
 
-    M q̈ + α_b K q̇ + K q = e C(t) + F,     q = (θ₁, u₁, …, θₙ, uₙ),     eᵀq = u(L)
+    M q̈ + α_b K q̇ + K q = e C(t) + F,     q = (θ₁, u₁, …, θ_N, u_N),     eᵀq = u(L)
 
-The stiffness is also kept as K = BᵀB, where B holds √weight × strain at the integration points: frequencies are
-taken as singular values of B, since eigenvalues of K carry an absolute error ε·ω_max² that spoils the low ones.
+u and θ are Lagrange polynomials on the Gauss–Lobatto nodes of each element, so q holds their values there. The
+stiffness is also kept as K = BᵀB, where B holds √weight × strain at the Gauss points: frequencies are taken as
+singular values of B, since eigenvalues of K carry an absolute error ε·ω_max² that spoils the low ones.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from numpy.polynomial import legendre
 
 from ..scene import Beam
 from ..trajectory import SHAPE_POINTS
@@ -26,23 +28,29 @@ _DENSE_SIZE = 400
 
 @dataclass(frozen=True)
 class SemiDiscreteBeam:
-    """Matrices of the clamped beam; N = 2n unknowns, node i has θᵢ at 2(i−1) and uᵢ at 2(i−1)+1.
+    """Matrices of the clamped beam; 2N unknowns, N = n p, node i has θᵢ at 2(i−1) and uᵢ at 2(i−1)+1.
 
     Attributes
     ----------
-    M, K : (N, N) csc matrices
+    n_elements, degree : int
+        n and p.
+    length : float
+        L [m].
+    M, K : (2N, 2N) csc matrices
         Consistent mass [kg·m², kg] and stiffness [N·m, N, N/m].
-    B : (rows, N) csr matrix
+    B : (rows, 2N) csr matrix
         Strain factor, K = BᵀB.
-    uniform_load : (N,) array
+    uniform_load : (2N,) array
         ∫ ψ dx in the deflection rows: the load vector of f_b = 1 N/m.
-    hat_load : (N,) array
-        ∫ ψₙ ψ dx in the deflection rows: the load vector of f_b = ψₙ(x) (Figures 3 and 5).
-    slope_shape : (N,) array
+    hat_load : (2N,) array
+        ∫ ψₙ ψ dx in the deflection rows, ψₙ the tip's linear hat function: the load vector of f_b = ψₙ(x)
+        (Figures 3 and 5).
+    slope_shape : (2N,) array
         u = x, θ = 0.
     """
 
     n_elements: int
+    degree: int
     length: float
     M: sp.csc_matrix
     K: sp.csc_matrix
@@ -53,7 +61,7 @@ class SemiDiscreteBeam:
 
     @property
     def size(self) -> int:
-        return 2 * self.n_elements
+        return 2 * self.n_elements * self.degree
 
     @property
     def tip(self) -> int:
@@ -68,56 +76,85 @@ class SemiDiscreteBeam:
         return e
 
     def deflection_sampler(self) -> sp.csr_matrix:
-        """(21, N) matrix: q → u at the fractions `SHAPE_POINTS` of the length (linear interpolation)."""
+        """(21, 2N) matrix: q → u at the fractions `SHAPE_POINTS` of the length."""
         position = SHAPE_POINTS * self.n_elements
-        left = np.minimum(position.astype(int), self.n_elements - 1)
-        weight = position - left
+        element = np.minimum(position.astype(int), self.n_elements - 1)
         sampler = sp.lil_matrix((len(SHAPE_POINTS), self.size))
-        for row, (node, w) in enumerate(zip(left, weight, strict=True)):
-            if node > 0:
-                sampler[row, 2 * node - 1] = 1.0 - w
-            sampler[row, 2 * node + 1] = w
+        for row, (e, part) in enumerate(zip(element, position - element, strict=True)):
+            values, _ = _lagrange(self.degree, np.array([part]))
+            for local, value in enumerate(values[0]):
+                node = e * self.degree + local
+                if node > 0:
+                    sampler[row, 2 * node - 1] = value
         return sampler.tocsr()
 
 
+def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values and derivatives at ``x`` in [0, 1] of the Lagrange polynomials on the p + 1 Gauss–Lobatto nodes there.
+
+    Shapes (len(x), p + 1). The nodes are the ends and the zeros of P_p'.
+    """
+    nodes = _lobatto(degree)
+    to_legendre = np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, degree))
+    values = legendre.legvander(2.0 * x - 1.0, degree) @ to_legendre
+    slopes = legendre.legval(2.0 * x - 1.0, 2.0 * legendre.legder(to_legendre)).T
+    return values, slopes
+
+
+def _lobatto(degree: int) -> np.ndarray:
+    """The p + 1 Gauss–Lobatto nodes in [0, 1]."""
+    inner = legendre.legroots(legendre.legder([0.0] * degree + [1.0])) if degree > 1 else np.zeros(0)
+    return np.concatenate([[0.0], 0.5 + 0.5 * np.sort(inner), [1.0]])
+
+
+def _gauss(points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights of the Gauss–Legendre rule on [0, 1]."""
+    nodes, weights = legendre.leggauss(points)
+    return 0.5 + 0.5 * nodes, 0.5 * weights
+
+
 def assemble(beam: Beam) -> SemiDiscreteBeam:
-    """Assemble the beam of a scene, with full or one-point (``reduced_integration``) integration of the shear."""
-    n = beam.n_elements
+    """Assemble the beam of a scene; with ``reduced_integration`` the shear takes p Gauss points instead of p + 1."""
+    n, p = beam.n_elements, beam.element_degree
     h = beam.length / n
     bending = beam.young_modulus * beam.second_moment_of_area
     shear = beam.shear_coefficient * beam.area * beam.shear_modulus
     inertia = np.diag([beam.density * beam.second_moment_of_area, beam.density * beam.area])
 
-    # Element unknowns (θ₀, u₀, θ₁, u₁).
-    mass = np.kron(h / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]]), inertia)
-    points = [0.5] if beam.reduced_integration else [0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)]
-    strains = [np.sqrt(bending * h) * np.array([-1.0 / h, 0.0, 1.0 / h, 0.0])]
-    strains += [np.sqrt(shear * h / len(points)) * np.array([-(1.0 - x), -1.0 / h, -x, 1.0 / h]) for x in points]
-    strain = np.array(strains)
+    # Element unknowns (θ₀, u₀, …, θ_p, u_p). p + 1 points integrate squares of degree p exactly.
+    x, w = _gauss(p + 1)
+    values, _ = _lagrange(p, x)
+    mass = np.kron(h * (values.T * w) @ values, inertia)
+    x_bend, w_bend = _gauss(p)
+    _, slopes = _lagrange(p, x_bend)
+    bend = np.sqrt(bending / h * w_bend)[:, None] * np.kron(slopes, [1.0, 0.0])
+    x_shear, w_shear = _gauss(p if beam.reduced_integration else p + 1)
+    at, slopes = _lagrange(p, x_shear)
+    slide = np.sqrt(shear * h * w_shear)[:, None] * (np.kron(slopes / h, [0.0, 1.0]) - np.kron(at, [1.0, 0.0]))
+    strain = np.concatenate([bend, slide])
 
-    nodes = np.arange(n)
-    columns = 2 * nodes[:, None] + np.arange(4)  # with the clamped node's two unknowns still in front
-    M = _scatter(np.repeat(columns[:, :, None], 4, axis=2), np.repeat(columns[:, None, :], 4, axis=1), mass, n)
-    rows = len(strain) * nodes[:, None] + np.arange(len(strain))
-    B = _scatter(np.repeat(rows[:, :, None], 4, axis=2), np.repeat(columns[:, None, :], len(strain), axis=1), strain, n)
+    elements = np.arange(n)
+    width = 2 * (p + 1)
+    columns = 2 * p * elements[:, None] + np.arange(width)  # with the clamped node's two unknowns still in front
+    M = _scatter(np.repeat(columns[:, :, None], width, axis=2), np.repeat(columns[:, None, :], width, axis=1), mass)
+    rows = len(strain) * elements[:, None] + np.arange(len(strain))
+    B = _scatter(
+        np.repeat(rows[:, :, None], width, axis=2), np.repeat(columns[:, None, :], len(strain), axis=1), strain
+    )
     M = M[2:, 2:].tocsc()
     B = B[:, 2:].tocsr()
 
-    uniform = np.zeros(2 * n)
-    uniform[1::2] = h
-    uniform[-1] = h / 2.0
-    hat = np.zeros(2 * n)
-    hat[-1] = h / 3.0
-    if n > 1:
-        hat[-3] = h / 6.0
-    slope = np.zeros(2 * n)
-    slope[1::2] = h * np.arange(1, n + 1)
-    return SemiDiscreteBeam(n, beam.length, M, (B.T @ B).tocsc(), B, uniform, hat, slope)
+    uniform, hat, slope = (np.zeros(2 * (n * p + 1)) for _ in range(3))
+    for column in columns:
+        uniform[column[1::2]] += h * w @ values
+    hat[columns[-1][1::2]] = h * (w * x) @ values
+    slope[columns[:, 1::2]] = h * (elements[:, None] + _lobatto(p))
+    return SemiDiscreteBeam(n, p, beam.length, M, (B.T @ B).tocsc(), B, uniform[2:], hat[2:], slope[2:])
 
 
-def _scatter(rows: np.ndarray, columns: np.ndarray, element: np.ndarray, n: int) -> sp.csr_matrix:
-    values = np.broadcast_to(element, (n, *element.shape))
-    shape = (int(rows.max()) + 1, 2 * (n + 1))
+def _scatter(rows: np.ndarray, columns: np.ndarray, element: np.ndarray) -> sp.csr_matrix:
+    values = np.broadcast_to(element, (len(rows), *element.shape))
+    shape = (int(rows.max()) + 1, int(columns.max()) + 1)
     return sp.coo_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape).tocsr()
 
 

@@ -1,0 +1,106 @@
+"""The table "Few elements of high degree" of docs/model.md:  .venv/bin/python docs/elements.py   (a minute)
+
+Times are the smallest of several repetitions, in one process, and printed as ratios to the first row.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import closing
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from springbeam import Scene, load_scene, simulate, with_changes
+from springbeam.fmu import FmuBeam
+from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.scene import Beam
+
+MESHES: tuple[tuple[int, int, int], ...] = (  # elements, degree, modes
+    (1000, 1, 64), (1000, 1, 250), (500, 1, 0), (100, 1, 0), (50, 1, 0), (10, 5, 0),
+    (1, 12, 0), (2, 12, 0), (4, 12, 0), (8, 12, 0), (16, 12, 0),
+)  # fmt: skip
+FINEST = (41, 12, 0)
+TIMES = np.linspace(0.001, 0.07, 70)
+MACRO_STEP = 2.5e-4
+
+
+def exact_frequencies(count: int) -> np.ndarray:
+    """Clamped–free Timoshenko beam with all constants 1: zeros of the determinant of the transfer matrix."""
+
+    def determinant(w: float) -> float:
+        X = expm(np.array([[0, 1, 0, 0], [-w * w, 0, 0, -1], [1, 0, 0, 1], [0, 0, -w * w, 0]]))
+        return float(X[1, 1] * X[3, 3] - X[1, 3] * X[3, 1])
+
+    grid = np.arange(0.5, 30.0, 0.05)
+    values = [determinant(w) for w in grid]
+    zeros = [
+        float(brentq(determinant, a, b, xtol=1e-14))
+        for (a, b), (p, q) in zip(pairwise(grid), pairwise(values), strict=True)
+        if p * q < 0.0
+    ]
+    return np.array(zeros[:count])
+
+
+def mesh(n: int, degree: int, modes: int) -> dict[str, Any]:
+    return {"n_elements": n, "element_degree": degree, "n_modes": modes}
+
+
+def soft(beam: dict[str, Any]) -> Scene:
+    coupling = {"degree": 2, "macro_step": MACRO_STEP}
+    return with_changes(load_scene("soft"), beam=beam, time={"t_end": 0.07}, coupling=coupling)
+
+
+def spring_top(beam: dict[str, Any]) -> np.ndarray:
+    run = simulate(soft(beam))
+    return np.asarray(run.y[np.searchsorted(run.time, TIMES - 1e-9)])
+
+
+def shortest(action: Callable[[], object], repetitions: int) -> float:
+    best = float("inf")
+    for _ in range(repetitions):
+        start = time.perf_counter()
+        action()
+        best = min(best, time.perf_counter() - start)
+    return best
+
+
+def times(beam: Beam) -> tuple[float, float]:
+    """(initialisation, one step) of the FMU [s]."""
+    initialisation = shortest(lambda: FmuBeam(beam, 0.0, 0.0).close(), 5)
+    with closing(FmuBeam(beam, 0.0, 0.0)) as body:
+        clock = 0.0
+
+        def hundred_steps() -> None:
+            nonlocal clock
+            for _ in range(100):
+                body.advance(clock, MACRO_STEP, (1.0, 0.0, 0.0))
+                clock += MACRO_STEP
+
+        hundred_steps()
+        return initialisation, shortest(hundred_steps, 10) / 100.0
+
+
+def main() -> None:
+    exact, finest = exact_frequencies(10), spring_top(mesh(*FINEST))
+    print("| elements × degree | modes | ω₁ … ω₁₀ | y, t ≤ 0.07 s [m] | y at 0.07 s [m] | initialisation | step |")
+    print("|---|---|---|---|---|---|---|")
+    unit: tuple[float, float] | None = None
+    for n, degree, modes in MESHES:
+        beam = mesh(n, degree, modes)
+        omega = modal_beam(Beam(**beam)).omega[:10]
+        error = np.abs(spring_top(beam) - finest)
+        own = times(soft(beam).beam or Beam())
+        unit = unit or own
+        print(
+            f"| {n} × {degree} | {modes or f'all {2 * n * degree}'} | {np.abs(omega / exact - 1.0).max():.1e} "
+            f"| {error.max():.1e} | {error[-1]:.1e} | {own[0] / unit[0]:.2g} | {own[1] / unit[1]:.2g} |"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,360 @@
+// Elements of degree 1 … 12: the forms against quadrature, exact statics, order 2p of the frequencies.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "beam.hpp"
+#include "beam_testing.hpp"
+#include "timoshenko.hpp"
+#include "validate.hpp"
+
+namespace beam {
+namespace {
+
+using testing::clamped_free_frequencies;
+using testing::general_beam;
+using testing::Noise;
+using testing::unit_beam;
+using testing::with_integrator;
+
+Parameters of_degree(Parameters p, int degree) {
+  p.element_degree = degree;
+  return p;
+}
+
+/// P_k(ξ) and its derivative by Bonnet's recursion.
+std::array<double, 2> legendre(int k, double xi) {
+  double before = 0.0, value = 1.0, slope_before = 0.0, slope = 0.0;
+  for (int j = 1; j <= k; ++j) {
+    const double next = ((2 * j - 1) * xi * value - (j - 1) * before) / j;
+    const double slope_next = slope_before + (2 * j - 1) * value;
+    before = value;
+    value = next;
+    slope_before = slope;
+    slope = slope_next;
+  }
+  return {value, slope};
+}
+
+/// Gauss–Legendre nodes and weights on (−1, 1): Newton's method from cos(π(i + ¾)/(m + ½)).
+std::vector<std::array<double, 2>> gauss(int m) {
+  std::vector<std::array<double, 2>> rule;
+  for (int i = 0; i < m; ++i) {
+    double xi = std::cos(M_PI * (i + 0.75) / (m + 0.5));
+    for (int k = 0; k < 20; ++k) xi -= legendre(m, xi)[0] / legendre(m, xi)[1];
+    const double slope = legendre(m, xi)[1];
+    rule.push_back({xi, 2.0 / ((1.0 - xi * xi) * slope * slope)});
+  }
+  return rule;
+}
+
+/// θ̃, u and their derivatives by x at ξ in element e, from the definition of the basis.
+struct Point {
+  double theta, u, theta_x, u_x;
+};
+Point evaluate(const Parameters& p, const Eigen::VectorXd& q, int e, double xi) {
+  const int block = 2 * p.element_degree;
+  const double h = p.length / p.n_elements;
+  double value[2], slope[2];
+  for (int f = 0; f < 2; ++f) {
+    const double left = e > 0 ? q[e * block - 2 + f] : 0.0, right = q[e * block + block - 2 + f];
+    value[f] = 0.5 * (1.0 - xi) * left + 0.5 * (1.0 + xi) * right;
+    slope[f] = (right - left) / h;
+    for (int k = 2; k <= p.element_degree; ++k) {
+      const double c = q[e * block + 2 * (k - 2) + f];
+      value[f] += c * (legendre(k, xi)[0] - legendre(k - 2, xi)[0]) / (2 * k - 1);
+      slope[f] += c * legendre(k - 1, xi)[0] * 2.0 / h;
+    }
+  }
+  return {value[0], value[1], slope[0], slope[1]};
+}
+
+Eigen::VectorXd noise(Eigen::Index size) {
+  Noise random;
+  Eigen::VectorXd x(size);
+  for (double& value : x) value = random();
+  return x;
+}
+
+double dot(const Eigen::VectorXd& a, const Eigen::VectorXd& b) { return a.dot(b); }
+
+TEST(BeamDegree, FormsAreTheIntegralsOfTheirDefinition) {
+  for (int degree = 1; degree <= max_element_degree; ++degree) {
+    for (const int n : {1, 3}) {
+      for (const bool reduced : {false, true}) {
+        Parameters p = general_beam(n, degree);
+        p.reduced_integration = reduced;
+        const Timoshenko mesh(p);
+        ASSERT_EQ(mesh.size(), 2 * n * degree);
+        const Eigen::VectorXd q = noise(mesh.size());
+        const double h = p.length / n, r = std::sqrt(p.second_moment_of_area / p.area);
+        double mass = 0.0, bending = 0.0, shear = 0.0, uniform = 0.0, hat = 0.0;
+        for (int e = 0; e < n; ++e) {
+          for (const auto& [xi, w] : gauss(degree + 1)) {  // exact to degree 2p + 1
+            const Point at = evaluate(p, q, e, xi);
+            mass += 0.5 * h * w * (at.theta * at.theta + at.u * at.u);
+            bending += 0.5 * h * w * at.theta_x * at.theta_x;
+            if (!reduced) shear += 0.5 * h * w * std::pow(at.u_x - at.theta / r, 2);
+            uniform += 0.5 * h * w * at.u;
+            if (e == n - 1) hat += 0.5 * h * w * 0.5 * (1.0 + xi) * at.u;
+          }
+          if (reduced) {
+            for (const auto& [xi, w] : gauss(degree)) {
+              const Point at = evaluate(p, q, e, xi);
+              shear += 0.5 * h * w * std::pow(at.u_x - at.theta / r, 2);
+            }
+          }
+        }
+        const double stiffness =
+            p.young_modulus / p.density * bending + p.shear_modulus * p.shear_coefficient / p.density * shear;
+        const double rounding = 1e-13;  // sums of a few hundred terms of one sign
+        EXPECT_NEAR(mesh.mass_norm2(q), mass, rounding * mass) << degree;
+        EXPECT_NEAR(dot(q, mesh.mass_times(q)), mass, rounding * mass) << degree;
+        EXPECT_NEAR(mesh.stiffness_norm2(q), stiffness, rounding * stiffness) << degree;
+        EXPECT_NEAR(dot(q, mesh.stiffness_times(q)), stiffness, rounding * stiffness) << degree;
+        EXPECT_NEAR(mesh.uniform_load().dot(q), uniform, 1e-14 * degree) << degree;
+        EXPECT_NEAR(mesh.hat_load().dot(q), hat, 1e-14 * degree) << degree;
+
+        Eigen::VectorXd strains(mesh.size());
+        mesh.weighted_strains(q.data(), strains.data());
+        EXPECT_NEAR(strains.squaredNorm(), stiffness, rounding * stiffness) << degree;
+        const Eigen::VectorXd Mq = mesh.mass().selfadjointView<Eigen::Lower>() * q;
+        const Eigen::VectorXd Kq = mesh.stiffness().selfadjointView<Eigen::Lower>() * q;
+        EXPECT_LT((Mq - mesh.mass_times(q)).norm(), 1e-14 * Mq.norm()) << degree;
+        EXPECT_LT((Kq - mesh.stiffness_times(q)).norm(), 1e-13 * Kq.norm()) << degree;
+        // Relative to q: ε times the condition of the strains' map, at most p² n here.
+        const Eigen::VectorXd same = mesh.flexibility_times(Kq);
+        EXPECT_LT((same - q).norm(), 1e-12 * q.norm()) << degree;
+        EXPECT_LT((mesh.mass_solve(Mq) - q).norm(), 1e-12 * q.norm()) << degree;
+
+        std::array<double, shape_points> u, theta;
+        mesh.sample_deflection(q.data(), u.data());
+        mesh.sample_scaled_rotation(q.data(), theta.data());
+        for (int j = 0; j < shape_points; ++j) {
+          const int e = std::min(n - 1, j * n / (shape_points - 1));
+          const Point at = evaluate(p, q, e, 2.0 * (static_cast<double>(j * n) / (shape_points - 1) - e) - 1.0);
+          EXPECT_NEAR(u[static_cast<std::size_t>(j)], at.u, 1e-14) << degree;
+          EXPECT_NEAR(theta[static_cast<std::size_t>(j)], at.theta, 1e-14) << degree;
+        }
+      }
+    }
+  }
+}
+
+TEST(BeamDegree, OneIsThePapersElementBitByBit) {
+  // (57)–(59) node by node, as they have been evaluated since before other degrees existed.
+  for (const int n : {1, 2, 17}) {
+    for (const bool reduced : {false, true}) {
+      Parameters p = general_beam(n);
+      p.reduced_integration = reduced;
+      const Timoshenko mesh(p);
+      const Eigen::VectorXd q = noise(2 * n);
+      const double h = p.length / n, r = std::sqrt(p.second_moment_of_area / p.area), m = h / 6.0;
+      const double s = p.shear_modulus * p.shear_coefficient / p.density;
+      double b = p.young_modulus / p.density;
+      if (!reduced) b += s * (h / r) * (h / r) / 12.0;
+      const double half = 0.5 / r, lever = 0.5 * h / r, bend = b / h;
+      const auto at = [&](int i, int field) { return i > 0 ? q[2 * (i - 1) + field] : 0.0; };
+      const auto moment = [&](int e) { return bend * (at(e, 0) - at(e - 1, 0)); };
+      const auto shear = [&](int e) { return s * ((at(e, 1) - at(e - 1, 1)) / h - half * (at(e - 1, 0) + at(e, 0))); };
+      const Eigen::VectorXd Mq = mesh.mass_times(q), Kq = mesh.stiffness_times(q);
+      for (int i = 1; i <= n; ++i) {
+        for (int f = 0; f < 2; ++f) {
+          const double node =
+              i < n ? m * (at(i - 1, f) + 4.0 * at(i, f) + at(i + 1, f)) : m * (at(i - 1, f) + 2.0 * at(i, f));
+          EXPECT_EQ(Mq[2 * (i - 1) + f], node);
+        }
+        const double theta =
+            i < n ? (moment(i) - moment(i + 1)) - lever * (shear(i) + shear(i + 1)) : moment(i) - lever * shear(i);
+        EXPECT_EQ(Kq[2 * (i - 1)], theta);
+        EXPECT_EQ(Kq[2 * (i - 1) + 1], i < n ? shear(i) - shear(i + 1) : shear(i));
+      }
+      double M = 0.0, bending = 0.0, shearing = 0.0;
+      for (int e = 1; e <= n; ++e) {
+        const double t0 = at(e - 1, 0), t1 = at(e, 0), u0 = at(e - 1, 1), u1 = at(e, 1);
+        M += (t0 * t0 + t1 * t1 + (t0 + t1) * (t0 + t1)) + (u0 * u0 + u1 * u1 + (u0 + u1) * (u0 + u1));
+        const double kappa = (t1 - t0) / h, gamma = (u1 - u0) / h - half * (t0 + t1);
+        bending += kappa * kappa;
+        shearing += gamma * gamma;
+      }
+      EXPECT_EQ(mesh.mass_norm2(q), M * h / 6.0);
+      EXPECT_EQ(mesh.stiffness_norm2(q), h * (b * bending + s * shearing));
+      // K⁻¹: forces from the tip, displacements from the clamp.
+      Eigen::VectorXd y(2 * n);
+      double M1 = 0.0, S1 = 0.0, t0 = 0.0, u0 = 0.0;
+      for (int i = 2 * n - 2; i >= 0; i -= 2) {
+        const double S = S1 + q[i + 1];
+        M1 += q[i] + lever * (S1 + S);
+        S1 = S;
+        y[i] = M1;
+        y[i + 1] = S1;
+      }
+      for (int i = 0; i < 2 * n; i += 2) {
+        const double t1 = t0 + h / b * y[i];
+        u0 += h / s * y[i + 1] + lever * (t0 + t1);
+        t0 = t1;
+        y[i] = t0;
+        y[i + 1] = u0;
+      }
+      const Eigen::VectorXd x = mesh.flexibility_times(q);
+      for (Eigen::Index i = 0; i < 2 * n; ++i) EXPECT_EQ(x[i], y[i]);
+    }
+  }
+}
+
+double bending(const Parameters& p) { return p.young_modulus * p.second_moment_of_area; }
+double shearing(const Parameters& p) { return p.shear_modulus * p.shear_coefficient * p.area; }
+
+TEST(BeamDegree, OneElementHasTheExactTipComplianceFromDegreeThree) {
+  // The static shape under a tip force has θ of degree 2 and u of degree 3, so it lies in the space from p = 3 on; with
+  // p Gauss points the moment need only be linear, p = 2. Full integration at p = 2 stiffens the linear part of the
+  // moment, −h/2 P_1 in each element, by 1 + f, f = KAG h²/60EI: L³/3 loses (L h²/12) f/(1 + f).
+  for (const double shear_modulus : {1.0, 1e6}) {
+    for (int degree = 2; degree <= max_element_degree; ++degree) {
+      for (const int n : {1, 4}) {
+        for (const bool reduced : {false, true}) {
+          Parameters p = general_beam(n, degree);
+          p.shear_modulus *= shear_modulus;
+          p.reduced_integration = reduced;
+          const double L = p.length, h = L / n, EI = bending(p), KAG = shearing(p);
+          double exact = L * L * L / (3.0 * EI) + L / KAG;
+          if (degree == 2 && !reduced) {
+            const double f = KAG * h * h / (60.0 * EI);
+            exact -= L * h * h / (12.0 * EI) * f / (1.0 + f);
+          }
+          for (const int n_modes : {0, 1, 3}) {
+            p.n_modes = n_modes;
+            // Rounding of the modes' sum: ε ω_max/ω₁, ω_max/ω₁ up to some p² n √(KAG/EI).
+            const double tolerance = n_modes == 0 && shear_modulus > 1.0 ? 1e-10 : 1e-12;
+            EXPECT_NEAR(Beam(p).static_tip_compliance(), exact, tolerance * exact) << degree << " " << n;
+          }
+          const Beam direct(with_integrator(p, Integrator::generalized_alpha));
+          EXPECT_NEAR(direct.static_tip_compliance(), exact, 1e-13 * exact) << degree << " " << n;
+        }
+      }
+    }
+  }
+}
+
+TEST(BeamDegree, AUniformLoadIsExactFromDegreeFour) {
+  // u is of degree 4, θ of degree 3: u(L) = f_b (L⁴/8EI + L²/2KAG). One degree less suffices with p Gauss points.
+  for (int degree = 3; degree <= max_element_degree; ++degree) {
+    for (const bool reduced : {false, true}) {
+      if (degree == 3 && !reduced) continue;
+      Parameters p = general_beam(2, degree);
+      p.reduced_integration = reduced;
+      const Timoshenko mesh(p);
+      const double L = p.length, exact = L * L * L * L / (8.0 * bending(p)) + L * L / (2.0 * shearing(p));
+      const double u = mesh.flexibility_times(mesh.uniform_load())[mesh.tip_index()] / (p.density * p.area);
+      EXPECT_NEAR(u, exact, 1e-13 * exact) << degree;
+    }
+  }
+}
+
+TEST(BeamDegree, FrequenciesConvergeWithTwiceTheDegree) {
+  const std::vector<double>& exact = clamped_free_frequencies();
+  struct Mesh {
+    int degree, coarse, fine;
+  };
+  // Meshes whose errors lie between the pre-asymptotic range and rounding (1e-13).
+  for (const Mesh& mesh : {Mesh{1, 80, 160}, Mesh{2, 16, 32}, Mesh{3, 8, 16}, Mesh{4, 6, 9}, Mesh{5, 4, 6}}) {
+    for (const bool reduced : {false, true}) {
+      Parameters p = of_degree(unit_beam(mesh.coarse), mesh.degree);
+      p.reduced_integration = reduced;
+      const std::vector<double> coarse = Beam(p).frequencies();
+      p.n_elements = mesh.fine;
+      const std::vector<double> fine = Beam(p).frequencies();
+      for (const std::size_t k : {2U, 3U}) {
+        const double e1 = coarse[k] / exact[k] - 1.0, e2 = fine[k] / exact[k] - 1.0;
+        const double order =
+            std::log(e1 / e2) / std::log(static_cast<double>(mesh.fine) / static_cast<double>(mesh.coarse));
+        EXPECT_NEAR(order, 2.0 * mesh.degree, 0.08 * mesh.degree) << mesh.degree << " " << k << " " << reduced;
+        if (!reduced) {
+          EXPECT_GT(e2, 0.0);  // from above: Rayleigh–Ritz
+        }
+      }
+    }
+  }
+}
+
+TEST(BeamDegree, OneElementOfHighDegreeHasTheExactFrequencies) {
+  // The modes are entire functions: the error falls faster than any power of p, to rounding ε ω_max/ω = 1e-13.
+  const std::vector<double>& exact = clamped_free_frequencies();
+  double previous = 1.0;
+  for (const int degree : {4, 6, 8, 10}) {
+    const std::vector<double> one = Beam(of_degree(unit_beam(1), degree)).frequencies();
+    const double error = std::fabs(one[3] / exact[3] - 1.0);
+    EXPECT_LT(error, 0.03 * previous) << degree;
+    previous = error;
+  }
+  const std::vector<double> twelve = Beam(of_degree(unit_beam(1), 12)).frequencies();
+  for (const std::size_t k : {0U, 1U, 2U, 3U}) EXPECT_NEAR(twelve[k], exact[k], 1e-11 * exact[k]) << k;
+}
+
+TEST(BeamDegree, SlenderBeamsDoNotLockFromDegreeThree) {
+  // KAG/EI = 1e6, ρI = 1e-6 ρA: Euler–Bernoulli's 1.8751041² rad/s less 4.7e-6 of it for shear and rotary inertia;
+  // zero of the determinant of `clamped_free_frequencies` with these constants. Degree 1 locks by 72; from then on each
+  // degree gains, and p Gauss points for the shear are as good as one degree more.
+  const double exact = 3.515998926987939;
+  Parameters p = unit_beam(4);
+  p.second_moment_of_area = 1e-6;
+  p.young_modulus = 1e6;
+  p.shear_modulus = 1e6;
+  const auto error = [&](int degree, bool reduced) {
+    Parameters mesh = of_degree(p, degree);
+    mesh.reduced_integration = reduced;
+    return Beam(mesh).frequencies()[0] / exact - 1.0;
+  };
+  EXPECT_GT(error(1, false), 70.0);
+  EXPECT_NEAR(error(2, false), 1.22e-2, 0.01e-2);
+  EXPECT_NEAR(error(3, false), 3.26e-5, 0.01e-5);
+  EXPECT_NEAR(error(4, false), 6.9e-8, 0.1e-8);
+  EXPECT_NEAR(error(1, true), 7.08e-3, 0.01e-3);
+  EXPECT_NEAR(error(2, true), 1.01e-4, 0.01e-4);
+  EXPECT_NEAR(error(3, true), 4.3e-8, 0.1e-8);
+  EXPECT_NEAR(error(5, false), 0.0, 1e-10);
+}
+
+TEST(BeamDegree, TheTipMassOfOneElement) {
+  // min ∫v² over polynomials of degree p with v(0) = 0, v(L) = 1 is L/(p(p + 2)): the reproducing kernel of P_p,
+  // k(±1,1) = (p + 1)²/2 and (−1)^p (p + 1)/2, reduced by the clamp to k(1,1) − k(−1,1)²/k(−1,−1) = p(p + 2)/2.
+  for (int degree = 1; degree <= max_element_degree; ++degree) {
+    for (const Integrator integrator : {Integrator::modal, Integrator::generalized_alpha}) {
+      const Parameters p = with_integrator(general_beam(1, degree), integrator);
+      const double exact = p.density * p.area * p.length / (degree * (degree + 2));
+      EXPECT_NEAR(Beam(p).tip_mass(), exact, 1e-12 * exact) << degree;
+    }
+  }
+}
+
+TEST(BeamDegree, TheStartIsExactAtAnyDegree) {
+  for (const int degree : {1, 2, 5, 12}) {
+    for (const int n_modes : {0, 2}) {
+      for (const Integrator integrator : {Integrator::modal, Integrator::generalized_alpha}) {
+        Parameters p = with_integrator(general_beam(3, degree), integrator);
+        p.n_modes = n_modes;
+        p.initial_deflection_slope = 0.2;
+        p.initial_velocity_slope = -1.5;
+        const Beam b(p);
+        const double L = p.length;
+        EXPECT_NEAR(b.strain_energy(), 0.5 * shearing(p) * 0.04 * L, 1e-11);
+        EXPECT_NEAR(b.kinetic_energy(), 0.5 * p.density * p.area * 2.25 * L * L * L / 3.0, 1e-11);
+        EXPECT_NEAR(b.tip_velocity(), -1.5 * L, 1e-12);
+        std::array<double, shape_points> u;
+        b.deflection(u);
+        for (std::size_t j = 0; j < shape_points; ++j) {
+          EXPECT_NEAR(u[j], 0.2 * L * static_cast<double>(j) / 20.0, 1e-12) << degree;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace beam
