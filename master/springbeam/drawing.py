@@ -5,7 +5,7 @@ Colours are those of Okabe and Ito, told apart with any colour vision.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -145,6 +145,13 @@ def levels(scene: Scene) -> dict[str, float]:
     return heights
 
 
+def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
+    """Those of `levels` that do not dwarf what moves [m]: at most one and a half times its range away from it."""
+    low, high = min(float(np.min(part)) for part in moving), max(float(np.max(part)) for part in moving)
+    reach = 1.5 * (high - low)
+    return {symbol: height for symbol, height in levels(scene).items() if low - reach <= height <= high + reach}
+
+
 def first_contact(trajectory: Trajectory) -> float:
     """When the tip first meets something [s]; without such an event, the start."""
     times = (event.time for event in trajectory.events if event.kind in ("impact", "stop_impact"))
@@ -169,3 +176,19 @@ def sizes_beside_the_largest(trajectory: Trajectory, names: Iterable[str]) -> tu
     sizes = {name: float(np.max(np.abs(trajectory[name]))) for name in names}
     seen = [name for name, size in sizes.items() if size >= INVISIBLE * max(sizes.values())]
     return seen, {name: size for name, size in sizes.items() if size > 0.0 and name not in seen}
+
+
+def stackable(trajectory: Trajectory, parts: Iterable[str]) -> bool:
+    """Whether the energies ``parts`` can be stacked: there are some, and none is negative but by rounding."""
+    least = min((float(np.min(trajectory[name])) for name in parts), default=-1.0)
+    return least >= -1e-9 * float(np.max(trajectory["e_total"]))
+
+
+def stem_foot(sizes: np.ndarray) -> float | None:
+    """Where stems of ``sizes`` begin on a logarithmic axis; ``None`` where a linear one shows them all.
+
+    Impulses of rounding size would stretch the axis over the ones that matter.
+    """
+    if np.any(sizes <= 0.0) or np.max(sizes) <= 30.0 * np.min(sizes):
+        return None
+    return 0.3 * max(float(np.min(sizes)), 1e-8 * float(np.max(sizes)))

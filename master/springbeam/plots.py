@@ -53,6 +53,8 @@ from .drawing import (
     present,
     readable_unit,
     sizes_beside_the_largest,
+    stackable,
+    stem_foot,
 )
 from .recording import PICTURES
 from .trajectory import SHAPE_POINTS, Trajectory
@@ -473,22 +475,19 @@ def _force_panel(timeline: _Timeline, ax: Axes, names: list[str]) -> None:
 def _impulse_panel(timeline: _Timeline, ax: Axes) -> None:
     events = timeline.trajectory.events
     sizes = np.array([getattr(e, name) for e in events for name in IMPULSES if getattr(e, name) != 0.0])
-    logarithmic = bool(np.all(sizes > 0.0) and np.max(sizes) > 30.0 * np.min(sizes))
-    unit = Unit(1.0, "N·s") if logarithmic else readable_unit([sizes], "N·s")
-    # Impulses of rounding size would stretch the axis over the ones that matter.
-    smallest = max(float(np.min(sizes)), 1e-8 * float(np.max(sizes)))
-    foot = 0.3 * unit.factor * smallest if logarithmic else 0.0
+    foot = stem_foot(sizes)
+    unit = readable_unit([sizes], "N·s") if foot is None else Unit(1.0, "N·s")
     for name, (colour, label) in IMPULSES.items():
         points = np.array([(e.time, getattr(e, name)) for e in events if getattr(e, name) != 0.0])
         if len(points):
             t, j = timeline.unit.factor * points[:, 0], unit.factor * points[:, 1]
-            ax.vlines(t, foot, j, color=colour, lw=1.0)
+            ax.vlines(t, foot or 0.0, j, color=colour, lw=1.0)
             ax.plot(t, j, color=colour, marker=_IMPULSE_MARKERS[name], markersize=3.5, linestyle="none", label=label)
-    if logarithmic:
-        ax.set_yscale("log")
-        ax.set_ylim(foot, 2.0 * unit.factor * float(np.max(sizes)))
-    else:
+    if foot is None:
         ax.axhline(0.0, color=GREY, lw=0.5)
+    else:
+        ax.set_yscale("log")
+        ax.set_ylim(foot, 2.0 * float(np.max(sizes)))
     ax.set_ylabel(f"impulse [{unit.name}]")
     _key(ax)
 
@@ -516,8 +515,7 @@ def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
     there = {name: ENERGIES[name] for name in present(trajectory, ENERGIES) if np.any(trajectory[name] != 0.0)}
     parts = _visible(ax, trajectory, there, "J") if there else []
     unit = readable_unit([trajectory["e_total"], *(trajectory[name] for name in parts)], "J")
-    least = min((float(np.min(trajectory[name])) for name in parts), default=-1.0)
-    if least >= -1e-9 * float(np.max(trajectory["e_total"])):
+    if stackable(trajectory, parts):
         rows = decimated(trajectory["time"], trajectory[parts[0]])
         ax.stackplot(
             timeline.unit.factor * trajectory["time"][rows],

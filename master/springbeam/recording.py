@@ -33,6 +33,10 @@ PICTURES = (
     "e_gap_and_energy.png",
 )
 
+#: What `springbeam report` and `springbeam animate` may leave there.
+REPORT = "report.html"
+ANIMATIONS = ("animation.gif", "animation.mp4")
+
 _OF_BEAM = frozenset({"u_tip", "v_tip", "e_beam"})
 _OF_SPRING = frozenset({"y", "z", "e_spring"})
 _OF_PAIR = frozenset(
@@ -260,9 +264,10 @@ class RunDirectory:
         return [self.path / name for name in PICTURES if (self.path / name).exists()]
 
     def results(self) -> list[Path]:
-        """The result files that are there."""
-        files = (self.trajectory, self.events, self.shapes, self.summary)
-        return [file for file in files if file.exists()] + self.pictures
+        """The result files that are there, and what was made from them."""
+        made = (self.path / name for name in (REPORT, *ANIMATIONS))
+        files = (self.trajectory, self.events, self.shapes, self.summary, *self.pictures, *made)
+        return [file for file in files if file.exists()]
 
     def remove(self) -> None:
         """Remove the results, and the directory if nothing else is in it."""

@@ -11,7 +11,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from ..recording import ResultsExist
+from ..recording import ResultsExist, ResultsUnreadable
 from ..scene import SceneError, shipped_scenes
 
 DISAGREES = 1
@@ -43,7 +43,7 @@ def bad_input_reported() -> Iterator[None]:
         yield
     except ResultsExist as error:
         fail(BAD_INPUT, f"{error}; --force replaces them, --out DIR puts the new ones elsewhere")
-    except SceneError as error:
+    except (SceneError, ResultsUnreadable) as error:
         fail(BAD_INPUT, str(error))
     except OSError as error:
         fail(BAD_INPUT, f"{error.filename or 'results'}: {error.strerror or error}")

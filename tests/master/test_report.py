@@ -1,0 +1,424 @@
+"""The report: one valid page that needs nothing else, holds the run's own numbers, and says what is wrong with them."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import json
+import shlex
+import sys
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from runs import EVERY_EVENT, PAIR, a_trajectory
+from typer.testing import CliRunner
+
+from springbeam import cli
+from springbeam.drawing import EVENT_LOOKS, PIXEL_COLUMNS, readable_unit
+from springbeam.motion import COIL_HEIGHTS, MOST_FRAMES, motion_of
+from springbeam.recording import REPORT, FileRecorder, RunDirectory
+from springbeam.report import page, shipped_command
+from springbeam.scene import load_scene, scene_from_dict, shipped_scenes, with_changes
+from springbeam.trajectory import SHAPE_POINTS, Event
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+VOID = {"meta", "input", "br", "link", "img", "hr"}
+LOADS = {"src", "href", "srcset", "poster", "data", "action", "formaction", "background"}
+
+
+class Page(HTMLParser):
+    """Elements by id, with their text; fails on an element that is not closed in order."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.ids, self.texts, self.addresses, self.headings = [], [], {}, [], []
+        self.tags = set()
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        self.tags.add(tag)
+        self.addresses += [value for name, value in attributes.items() if name in LOADS]
+        if "id" in attributes:
+            self.ids.append(attributes["id"])
+        if tag not in VOID:
+            self.open.append((tag, attributes.get("id")))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop()[0] == tag
+
+    def handle_data(self, data):
+        for tag, name in self.open:
+            for key in (name, f"<{tag}>"):
+                if key is not None:
+                    self.texts[key] = self.texts.get(key, "") + data
+        if self.open and self.open[-1][0] in ("h1", "h2"):
+            self.headings.append(data.strip())
+
+    @property
+    def data(self):
+        return json.loads(self.texts["data"])
+
+
+def array(spec):
+    """What plotly's JSON has for an array."""
+    if isinstance(spec, dict):
+        values = np.frombuffer(base64.b64decode(spec["bdata"]), dtype=spec["dtype"])
+        return values.reshape([int(n) for n in str(spec.get("shape", values.size)).split(",")])
+    return np.array(spec)
+
+
+def curves(data):
+    """Curves over time by the column they show."""
+    return {
+        curve["meta"]: curve for name in data["overTime"] for curve in data["charts"][name]["data"] if "meta" in curve
+    }
+
+
+SCENES = {
+    "all": (PAIR, {"positions", "velocities", "forces", "impulses", "gap", "energies", "residual", "timeline"}),
+    "no stop": (with_changes(PAIR, stop=None), {"positions", "velocities", "forces", "gap", "impulses", "timeline"}),
+    "no spring": (with_changes(PAIR, spring=None), {"positions", "velocities", "forces", "gap", "impulses"}),
+    "beam": (with_changes(PAIR, spring=None, stop=None), {"positions", "velocities", "energies", "residual"}),
+    "spring and stop": (with_changes(PAIR, beam=None), {"positions", "velocities", "forces", "impulses"}),
+    "spring": (with_changes(PAIR, beam=None, stop=None), {"positions", "velocities", "energies", "residual"}),
+}
+
+
+# -- the page -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("scene", "expected"), SCENES.values(), ids=SCENES)
+def test_every_scene_has_one_valid_page_that_loads_nothing(scene, expected):
+    text = page(a_trajectory(scene, events=EVERY_EVENT))
+    found = Page(text)
+    assert len(found.ids) == len(set(found.ids))
+    assert all(address.startswith("data:") for address in found.addresses)
+    assert "link" not in found.tags
+    assert "@import" not in found.texts["<style>"]
+    assert "url(" not in found.texts["<style>"]
+    assert expected | {"motion", "slider", "play", "numbers", "scene", "reproduce", "about"} <= set(found.ids)
+    data = found.data
+    assert {"motion", *data["overTime"]} == set(data["charts"])
+    assert set(data["charts"]) <= set(found.ids)
+    absent = {"u_tip": scene.beam, "y": scene.spring, "foundation_force": scene.stop}
+    assert not [name for name, body in absent.items() if body is None and name in curves(data)]
+
+
+def test_the_same_run_gives_the_same_page():
+    assert page(a_trajectory(events=EVERY_EVENT)) == page(a_trajectory(events=EVERY_EVENT))
+
+
+def test_what_a_scene_says_is_text_not_markup():
+    scene = PAIR.model_copy(update={"title": "</script><script>alert(1)</script>"})
+    found = Page(page(a_trajectory(scene)))
+    assert found.headings[0] == scene.title
+    assert found.texts["<script>"].count("alert(1)") == 0
+
+
+# -- its numbers --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scene", [scene for scene, _ in SCENES.values()], ids=SCENES)
+def test_curves_are_the_columns_bit_for_bit(scene):
+    run = a_trajectory(scene, events=EVERY_EVENT)
+    data = Page(page(run)).data
+    shown = curves(data)
+    for group, unit in (
+        (["u_tip", "y"], "m"),
+        (["v_tip", "z"], "m/s"),
+        (["contact_force", "contact_force_smoothed", "compliance_force", "foundation_force"], "N"),
+        (["gap"], "m"),
+    ):
+        there = [name for name in group if name in run.columns]
+        factor = readable_unit([run[name] for name in there], unit).factor
+        for name in there:
+            assert np.array_equal(array(shown[name]["x"]), run.time)
+            assert np.array_equal(array(shown[name]["y"]), factor * run[name])
+    for name, curve in shown.items():
+        if name.startswith("e_"):
+            factor = readable_unit([run["e_total"]], "J").factor
+            assert np.array_equal(array(curve["y"]), factor * run[name])
+
+
+def test_parts_of_the_energy_are_stacked_to_the_total():
+    run = a_trajectory()
+    shown = curves(Page(page(run)).data)
+    parts = [array(curve["y"]) for curve in shown.values() if curve.get("stackgroup") == "energy"]
+    assert len(parts) == 5  # all but the loads, which are zero
+    assert np.allclose(np.sum(parts, axis=0), array(shown["e_total"]["y"]), rtol=1e-14)
+
+
+def test_energies_that_become_negative_are_not_stacked():
+    found = Page(page(a_trajectory(e_spring=np.linspace(-1.0, 1.0, 400))))
+    assert not any("stackgroup" in curve for curve in curves(found.data).values())
+
+
+def test_a_long_run_is_thinned_without_losing_an_extreme_and_the_page_says_so():
+    n = 300_000
+    wild = np.zeros(n)
+    wild[123_456] = -7.0
+    run = a_trajectory(n=n, gap=wild)
+    text = page(run)
+    found = Page(text)
+    for name in ("gap", "u_tip", "contact_force", "e_beam"):
+        curve = array(curves(found.data)[name]["y"])
+        assert len(curve) <= 4 * PIXEL_COLUMNS * 6  # stacked curves share the rows of all
+        factor = 1.0 if name == "gap" else 1e3
+        assert curve.min() == factor * run[name].min()
+        assert curve.max() == factor * run[name].max()
+    assert "Drawn from 300000 rows" in found.texts["about"]
+    assert "thinned" in found.texts["about"]
+    assert "thinned" not in Page(page(a_trajectory())).texts["about"]
+    assert len(found.data["motion"]["time"]) <= MOST_FRAMES
+    assert len(text) < 7.5e6
+
+
+def test_events_are_marked_when_they_happened():
+    run = a_trajectory(events=EVERY_EVENT)
+    found = Page(page(run))
+    for curve in found.data["charts"]["timeline"]["data"]:
+        (expected,) = [event.time for event in EVERY_EVENT if event.kind == curve["meta"]]
+        assert array(curve["x"]).tolist() == [expected]
+    for look in EVENT_LOOKS.values():
+        assert look.words in found.texts["events"]
+        assert f"{look.words} (1)" in found.texts["over-time"]
+    for name, size in (("impulse_contact", 0.1), ("impulse_foundation", 0.2)):
+        assert array(curves(found.data)[name]["y"]).tolist() == [size] * len(EVERY_EVENT)
+
+
+def test_many_events_are_not_drawn_through_the_charts_nor_all_listed():
+    few, many = (
+        Page(page(a_trajectory(events=[Event(0.6 * i / n, "impact", 0, 0, 0, 0) for i in range(n)]))) for n in (60, 300)
+    )
+    assert len(few.data["backdrop"]) == 3
+    assert len(many.data["backdrop"]) == 2
+    assert "100 more are in events.csv" in many.texts["events"]
+
+
+def test_phases_are_shaded_where_they_hold():
+    run = a_trajectory(phase=np.where(np.linspace(0.0, 0.6, 400) < 0.3, "tied", "free"))
+    tied, free = Page(page(run)).data["backdrop"]
+    change = float(run.time[run.phase == "free"][0])
+    assert tied["path"] == f"M0.0,0V1H{change!r}V0Z"
+    assert free["path"] == f"M{change!r},0V1H0.6V0Z"
+    assert Page(page(a_trajectory(phase=np.full(400, "free")))).data["backdrop"] == []
+
+
+# -- motion -------------------------------------------------------------------------------------------------------
+
+
+def test_frames_are_the_recorded_shapes_with_the_spring_of_the_same_time():
+    run = a_trajectory()
+    times = run.time[::3]
+    sparse = dataclasses.replace(run, shapes=(times, run.shapes[1][::3]))
+    motion = Page(page(sparse)).data["motion"]
+    assert motion["time"] == times.tolist()
+    assert motion["deflection"] == sparse.shapes[1].tolist()
+    assert motion["y"] == run.y[::3].tolist()
+
+
+def test_the_coil_stands_below_the_stop_and_ends_at_the_spring():
+    motion = motion_of(a_trajectory())
+    assert motion.foot < PAIR.stop.position
+    for frame in (0, 17, len(motion.time) - 1):
+        heights = motion.coil(frame)
+        assert (heights[0], heights[-1]) == (motion.foot, pytest.approx(motion.y[frame], rel=1e-15, abs=1e-15))
+        assert np.all(np.diff(heights) > 0.0)
+    assert np.all(np.diff(COIL_HEIGHTS) > 0.0)
+
+
+def test_frames_that_alternate_are_thinned_in_pairs():
+    n = 10_000
+    flips = np.where(np.arange(n) % 2, 1.0, -1.0)
+    run = a_trajectory(n=n)
+    run.shapes[1][:] = np.outer(flips, SHAPE_POINTS)
+    motion = motion_of(run)
+    assert len(motion.time) <= MOST_FRAMES
+    tips = motion.deflection[:, -1]
+    assert abs(np.mean(tips)) < 0.01
+    assert set(tips) == {-1.0, 1.0}
+
+
+def test_a_beam_lost_beside_the_spring_is_drawn_once_more_enlarged():
+    t = np.linspace(0.0, 0.6, 400)
+    tiny = 2e-6 * np.sin(9.0 * t)
+    run = a_trajectory(u_tip=tiny, y=-1e-2 * np.sin(5.0 * t))
+    run = dataclasses.replace(run, shapes=(t, np.outer(tiny, SHAPE_POINTS)))
+    data = Page(page(run)).data
+    assert data["motion"]["parts"].keys() == {"motion", "motion-beam"}
+    assert data["motion"]["parts"]["motion-beam"]["factor"] == pytest.approx(1e6)
+    assert "position-u_tip" in data["overTime"]
+    assert Page(page(a_trajectory())).data["motion"]["parts"].keys() == {"motion"}
+
+
+# -- what is wrong with them --------------------------------------------------------------------------------------
+
+
+def test_warnings_come_first():
+    run = a_trajectory(v_tip=np.where(np.arange(400) % 2, 1.0, -1.0))
+    found = Page(page(dataclasses.replace(run, summary={"status": "done", "warnings": ["take care"]})))
+    assert found.ids[0] == "warnings"
+    assert "take care" in found.texts["warnings"]
+    assert "tip v(t, L): alternates from step to step: not resolved" in " ".join(found.texts["warnings"].split())
+    assert "alternates from step to step: not resolved" in found.texts["over-time"]
+    assert "warnings" not in Page(page(a_trajectory())).ids
+
+
+@pytest.mark.parametrize(
+    ("summary", "words"),
+    [
+        ({"status": "stopped", "cause": "no convergence", "time": 0.25}, "stopped at t = 0.25 s: no convergence"),
+        ({"status": "interrupted", "cause": "interrupted", "time": 0.25}, "interrupted at t = 0.25 s"),
+        ({"status": "running"}, "not finished"),
+    ],
+    ids=["stopped", "interrupted", "killed"],
+)
+def test_a_run_that_did_not_end_says_so(summary, words):
+    assert words in Page(page(dataclasses.replace(a_trajectory(), summary=summary))).texts["warnings"]
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2])
+@pytest.mark.parametrize("scene", [PAIR, with_changes(PAIR, beam=None)], ids=["pair", "spring"])
+def test_a_run_that_stopped_at_once_has_a_page(scene, rows):
+    whole = a_trajectory(scene)
+    shapes = None if whole.shapes is None else (whole.shapes[0][:rows], whole.shapes[1][:rows])
+    columns = {name: values[:rows] for name, values in whole.columns.items()}
+    found = Page(page(dataclasses.replace(whole, columns=columns, shapes=shapes, summary={"status": "stopped"})))
+    assert ("slider" in found.ids) == (rows == 2)
+    assert (found.data is None) == (rows < 2)
+    assert "stopped" in found.texts["warnings"]
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        {name: np.zeros(400) for name in PAIR_COLUMNS}
+        for PAIR_COLUMNS in [
+            ["u_tip", "y", "v_tip", "z", "gap"],
+            ["energy_residual"],
+            ["e_beam", "e_spring", "e_total"],
+        ]
+    ]
+    + [{"phase": np.full(400, "a phase to come")}, {"u_tip": np.full(400, 1e-300), "y": np.full(400, -1e300)}],
+    ids=["no motion", "no residual", "no energy", "unknown phase", "extreme"],
+)
+def test_odd_columns_have_a_page(columns):
+    Page(page(a_trajectory(events=EVERY_EVENT, **columns)))
+
+
+# -- how to run it again ------------------------------------------------------------------------------------------
+
+
+CHANGES = {
+    "as shipped": {},
+    "a float": {"coupling": {"macro_step": 1.25e-4}},
+    "words and numbers": {
+        "coupling": {"scheme": "hermite", "degree": 2},
+        "beam": {"reduced_integration": True, "n_modes": 7},
+    },
+}
+
+
+@pytest.mark.parametrize("changes", CHANGES.values(), ids=CHANGES)
+def test_the_command_gives_the_scene_as_run(changes):
+    scene = with_changes(PAIR, **changes)
+    program, command, name, *settings = shlex.split(shipped_command(scene))
+    assert (program, command) == ("springbeam", "run")
+    assert settings[::2] == ["--set"] * (len(settings) // 2)
+    assert load_scene(name, settings[1::2]) == scene
+    assert shipped_command(scene) in Page(page(a_trajectory(scene))).texts["reproduce"]
+
+
+@pytest.mark.parametrize("name", shipped_scenes())
+def test_shipped_scenes_are_known(name):
+    assert shipped_command(load_scene(name)) == f"springbeam run {name}"
+
+
+def test_a_scene_of_ones_own_is_run_from_the_page():
+    own = with_changes(PAIR, stop=None)
+    assert shipped_command(own) is None
+    found = Page(page(a_trajectory(own)))
+    assert "springbeam run scene.toml" in found.texts["reproduce"]
+    assert scene_from_dict(tomllib.loads(found.texts["scene"].split("Scene as run")[1])) == own
+
+
+# -- the command --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def directory(tmp_path):
+    run = a_trajectory(events=EVERY_EVENT)
+    with FileRecorder(run.scene, RunDirectory.create(tmp_path / "run")) as recorder:
+        for i in range(len(run)):
+            recorder.row({name: values[i] for name, values in run.columns.items()})
+            recorder.shape(run.time[i], run.shapes[1][i])
+        for event in run.events:
+            recorder.event(event)
+        recorder.finish({"status": "done", "warnings": []})
+    return tmp_path / "run"
+
+
+def command(*arguments):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+def test_the_command_writes_the_page_into_the_directory_and_says_where(directory):
+    result = command("report", directory)
+    assert (result.exit_code, result.stdout) == (0, f"{directory / REPORT}\n")
+    assert "positions" in Page((directory / REPORT).read_text(encoding="utf-8")).ids
+
+
+def test_a_report_is_not_overwritten_unasked(directory):
+    (directory / REPORT).write_text("mine")
+    result = command("report", directory)
+    assert result.exit_code == 2
+    assert f"{directory / REPORT} already exists; --force" in result.stderr
+    assert (directory / REPORT).read_text() == "mine"
+    assert command("report", directory, "--out", directory.parent / "other.html").exit_code == 0
+    assert command("report", directory, "--force").exit_code == 0
+    assert (directory / REPORT).read_bytes() == (directory.parent / "other.html").read_bytes()
+
+
+def test_a_new_run_in_the_directory_removes_the_report_of_the_old_one(directory):
+    command("report", directory)
+    RunDirectory.create(directory, replace=True)
+    assert not (directory / REPORT).exists()
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda d: (d / "summary.json").unlink(), "summary.json: missing"),
+        (lambda d: (d / "trajectory.csv").unlink(), "trajectory.csv"),
+        (lambda d: (d / "trajectory.csv").write_text("time,u_tip\n0.0,nonsense\n"), "trajectory.csv: after the header"),
+        (lambda d: (d / "summary.json").write_text('{"scene": {}}'), "[time]: missing table"),
+    ],
+    ids=["no summary", "no rows", "no numbers", "no scene"],
+)
+def test_a_damaged_directory_is_one_clear_error(directory, damage, message):
+    damage(directory)
+    result = command("report", directory)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (directory / REPORT).exists()
+
+
+def test_no_directory_is_one_clear_error(tmp_path):
+    result = command("report", tmp_path / "nowhere")
+    assert result.exit_code == 2
+    assert "is not a run directory" in result.stderr
+
+
+def test_a_place_that_cannot_be_written_is_one_clear_error(directory):
+    result = command("report", directory, "--out", directory / "no" / "such" / "report.html")
+    assert result.exit_code == 2
+    assert "No such file" in result.stderr
