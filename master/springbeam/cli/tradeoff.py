@@ -1,0 +1,146 @@
+"""``springbeam tradeoff``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+from rich.text import Text
+
+from ..fmu import FmuError
+from ..recording import RunDirectory
+from ..scene import load_scene
+from .common import BAD_INPUT, STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail
+
+if TYPE_CHECKING:
+    from ..tradeoff import Choice, Point, Study
+
+
+def register(app: typer.Typer) -> None:
+    app.command()(tradeoff)
+
+
+def tradeoff(
+    scene: SceneArgument,
+    settings: SettingsOption = None,
+    until: Annotated[
+        float | None,
+        typer.Option("--until", metavar="SECONDS", help="End of the compared window. Default: as far as it can be."),
+    ] = None,
+    repeats: Annotated[
+        int, typer.Option("--repeats", min=1, help="Timings of each configuration; the median counts.")
+    ] = 3,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", metavar="DIR", help="Where tradeoff.csv and tradeoff.png go. Default: results/…"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", "-f", help="Replace what is already there.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
+) -> None:
+    """Measure error against cost over schemes, macro steps, modes, meshes and tolerances, beside scipy's solvers.
+
+    Example: springbeam tradeoff soft --until 0.0712
+    """
+    from ..monolithic.event_driven import ReferenceFailure
+    from ..tradeoff import study, write_csv
+    from ..tradeoff.picture import draw
+
+    console = Console(highlight=False, quiet=as_json)
+    with bad_input_reported():
+        what = load_scene(scene, settings or ())
+        default = Path("results") / f"{Path(scene).stem}-tradeoff"
+        directory = (
+            RunDirectory.create_numbered(default)
+            if out is None and not force
+            else RunDirectory.create(out or default, replace=force)
+        )
+        bar = Progress(
+            BarColumn(bar_width=20), MofNCompleteColumn(), TextColumn("{task.fields[name]}"),
+            console=Console(stderr=True), transient=True, disable=not Console(stderr=True).is_terminal or as_json,
+        )  # fmt: skip
+        try:
+            with bar:
+                task = bar.add_task("", total=None, name="")
+                found = study(
+                    what,
+                    until,
+                    repeats,
+                    lambda done, total, name: bar.update(task, completed=done, total=total, name=name),
+                )
+        except FmuError as error:
+            directory.remove()
+            fail(BAD_INPUT, str(error))
+        except ReferenceFailure as error:
+            directory.remove()
+            fail(STOPPED, str(error))
+        except BaseException:
+            directory.remove()
+            raise
+        write_csv(found, directory.path / "tradeoff.csv")
+        draw(found, directory.path / "tradeoff.png")
+    if as_json:
+        typer.echo(json.dumps(_as_json(found), indent=1))
+    console.print(
+        Text(f"{found.scene.title}: up to t = {found.scene.time.t_end:.6g} s, {len(found.points)} configurations")
+    )
+    console.print(_table(found))
+    console.print(_front_table(found))
+    for note in found.notes:
+        console.print(Text(f"note      {note}"))
+    console.print(Text(f"results   {directory.path}"), soft_wrap=True)
+
+
+def _table(found: Study) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold", title="cheapest for an error", title_justify="left")
+    for name in ("error", "co-simulation", "solve [ms]", "scipy", "solve [ms]", "ratio"):
+        table.add_column(Text(name), justify="left" if name in ("co-simulation", "scipy") else "right")
+    for choice in found.choices():
+        ratio = f"{choice.ratio:.1f}" if choice.ours and choice.scipy else ""
+        table.add_row(f"{choice.target:.0e}", *_cells(choice.ours), *_cells(choice.scipy), ratio)
+    return table
+
+
+def _cells(point: Point | None) -> tuple[str, str]:
+    return ("none gets there", "") if point is None else (point.configuration.name, f"{1e3 * point.solve:.3g}")
+
+
+def _front_table(found: Study) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold", title="Pareto front", title_justify="left")
+    table.add_column("configuration", no_wrap=True)
+    for name in ("error", "event [s]", "solve [ms]", "set-up [ms]", "doSteps"):
+        table.add_column(Text(name), justify="right", no_wrap=True)
+    for point in found.front():
+        assert point.errors is not None
+        calls = point.beam_steps + point.spring_steps
+        table.add_row(
+            point.configuration.name, f"{point.displacement:.1e}", f"{point.errors.event_time:.1e}",
+            f"{1e3 * point.solve:.3g}", f"{1e3 * point.setup:.3g}", str(calls) if calls else "",
+        )  # fmt: skip
+    return table
+
+
+def _as_json(found: Study) -> dict[str, Any]:
+    def described(point: Point | None) -> dict[str, Any] | None:
+        if point is None:
+            return None
+        return {
+            "name": point.configuration.name,
+            "error": point.displacement,
+            "solve": point.solve,
+            "setup": point.setup,
+        }
+
+    def chosen(choice: Choice) -> dict[str, Any]:
+        return {"error": choice.target, "co_simulation": described(choice.ours), "scipy": described(choice.scipy)}
+
+    return {
+        "until": found.scene.time.t_end,
+        "cheapest": [chosen(choice) for choice in found.choices()],
+        "front": [described(point) for point in found.front()],
+        "notes": found.notes,
+    }

@@ -1,0 +1,130 @@
+"""What the sweep of `springbeam.tradeoff` runs: ways to pay for accuracy, one axis at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from ..scene import ALL_MODES_UP_TO, Scene, SceneError, with_changes
+
+#: Macro steps are the scene's times powers of 2 between these, where a run has this many of them.
+_COARSEST, _FINEST = 6, -2
+_FEWEST_STEPS, _MOST_STEPS = 4, 20_000
+_ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+_IDA_TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
+_MODES = (2, 4, 8, 16, 32, 64, 128)
+_MESHES = (0.25, 0.5, 1.0, 2.0)
+#: Relative tolerances of scipy's solvers; they are stable from loose ones on, at the step their stability asks.
+SCIPY_TOLERANCES = {
+    "DOP853": (1e-2, 1e-4, 1e-6, 1e-8, 1e-10),
+    "LSODA": (1e-3, 1e-5, 1e-7, 1e-9),
+    "Radau": (1e-2, 1e-4, 1e-6, 1e-8),
+}
+ALGORITHM_1 = "Algorithm 1"
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """One point of the sweep."""
+
+    family: str  #: points of a family are joined by a line
+    setting: str  #: what varies in it
+    scene: Scene  #: as run
+    method: str = "co-simulation"  #: or one of `SCIPY_TOLERANCES`, or `ALGORITHM_1`
+    rtol: float = 0.0  #: of scipy's methods
+    refined: bool = False  #: judged by the reference on a finer mesh: the model is what varies
+
+    @property
+    def name(self) -> str:
+        return f"{self.family}, {self.setting}"
+
+    @property
+    def unknowns(self) -> int:
+        """Of the beam as integrated: modes kept, or all degrees of freedom of the mesh."""
+        beam = self.scene.beam
+        return 0 if beam is None else beam.n_modes or 2 * beam.n_elements
+
+    @property
+    def monolithic(self) -> bool:
+        return self.method != "co-simulation"
+
+
+def configurations(scene: Scene) -> list[Configuration]:
+    """The sweep for a scene; settings that the scene cannot have are left out."""
+    return [*_macro_steps(scene), *_adaptive(scene), *_ida(scene), *_models(scene), *_rivals(scene)]
+
+
+def _changed(scene: Scene, **tables: Any) -> Iterator[Scene]:
+    try:
+        yield with_changes(scene, **tables)
+    except SceneError:
+        return
+
+
+def _schemes(scene: Scene) -> list[tuple[str, int]]:
+    if scene.contact.law == "compliance":
+        return [("energy", 0), ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
+    return [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
+
+
+def _sizes(scene: Scene) -> list[float]:
+    span = scene.time.t_end - (scene.contact_time or 0.0)
+    sizes = [scene.coupling.macro_step * 2.0**k for k in range(_COARSEST, _FINEST - 1, -1)]
+    return [H for H in sizes if _FEWEST_STEPS <= span / H <= _MOST_STEPS]
+
+
+def _macro_steps(scene: Scene) -> Iterator[Configuration]:
+    for scheme, degree in _schemes(scene):
+        for H in _sizes(scene):
+            coupling = {"scheme": scheme, "degree": degree, "macro_step": H}
+            for changed in _changed(scene, coupling=coupling):
+                yield Configuration(f"{scheme} {degree}", f"H = {H:.3g} s", changed)
+
+
+def _adaptive(scene: Scene) -> Iterator[Configuration]:
+    return iter(())
+
+
+def _ida(scene: Scene) -> Iterator[Configuration]:
+    if scene.spring is None:
+        return
+    for tolerance in _IDA_TOLERANCES:
+        for changed in _changed(
+            scene, spring={"relative_tolerance": tolerance, "absolute_tolerance": tolerance * 1e-2}
+        ):
+            yield Configuration("IDA tolerance", f"{tolerance:.0e}", changed)
+
+
+def finer(scene: Scene) -> Scene | None:
+    """The scene on a mesh that stands for the continuum beside the scene's own; ``None`` if there is none."""
+    if scene.beam is None or scene.beam.integrator != "modal":
+        return None
+    n = min(4 * scene.beam.n_elements, ALL_MODES_UP_TO)
+    if n < 2 * scene.beam.n_elements:
+        return None
+    return with_changes(scene, beam={"n_elements": n, "n_modes": 0})
+
+
+def _models(scene: Scene) -> Iterator[Configuration]:
+    if scene.beam is None or finer(scene) is None:
+        return
+    n = scene.beam.n_elements
+    for modes in _MODES:
+        if modes < 2 * n:
+            for changed in _changed(scene, beam={"n_modes": modes}):
+                yield Configuration("modes", f"{modes}", changed, refined=True)
+    for factor in _MESHES:
+        for changed in _changed(scene, beam={"n_elements": max(1, round(factor * n)), "n_modes": 0}):
+            yield Configuration("elements", f"{max(1, round(factor * n))}", changed, refined=True)
+
+
+def _rivals(scene: Scene) -> Iterator[Configuration]:
+    for method, tolerances in SCIPY_TOLERANCES.items():
+        for rtol in tolerances:
+            yield Configuration(method, f"rtol = {rtol:.0e}", scene, method, rtol)
+    if scene.beam is not None and scene.spring is not None and scene.stop is not None:
+        for H in _sizes(scene):
+            paper = {"contact": {"law": "paper"}, "coupling": {"scheme": "energy", "degree": 0, "macro_step": H}}
+            for changed in _changed(scene, beam={"n_modes": 0}, **paper):
+                yield Configuration(ALGORITHM_1, f"H = {H:.3g} s", changed, ALGORITHM_1)
