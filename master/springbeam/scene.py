@@ -98,6 +98,8 @@ class Spring(_Table):
     equilibrium: float = 0.0  #: Ψ [m]: where the top starts
     external_force: float = 0.0  #: f_s [N]
     initial_velocity: float = 0.0  #: z at the start [m/s]
+    relative_tolerance: Annotated[float, Field(gt=0.0, le=1e-2)] = 1e-12  #: of IDA
+    absolute_tolerance: Annotated[float, Field(gt=0.0, le=1e-2)] = 1e-14  #: of IDA
 
 
 class Stop(_Table):

@@ -15,6 +15,8 @@ _ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 _IDA_TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 _MODES = (2, 4, 8, 16, 32, 64, 128)
 _MESHES = (0.25, 0.5, 1.0, 2.0)
+_DEGREES = (1, 4, 8)
+_HIGHEST_DEGREE = 8
 #: Relative tolerances of scipy's solvers; they are stable from loose ones on, at the step their stability asks.
 SCIPY_TOLERANCES = {
     "DOP853": (1e-2, 1e-4, 1e-6, 1e-8, 1e-10),
@@ -43,7 +45,7 @@ class Configuration:
     def unknowns(self) -> int:
         """Of the beam as integrated: modes kept, or all degrees of freedom of the mesh."""
         beam = self.scene.beam
-        return 0 if beam is None else beam.n_modes or 2 * beam.n_elements
+        return 0 if beam is None else beam.n_modes or 2 * beam.n_elements * beam.element_degree
 
     @property
     def monolithic(self) -> bool:
@@ -97,26 +99,34 @@ def _ida(scene: Scene) -> Iterator[Configuration]:
 
 
 def finer(scene: Scene) -> Scene | None:
-    """The scene on a mesh that stands for the continuum beside the scene's own; ``None`` if there is none."""
-    if scene.beam is None or scene.beam.integrator != "modal":
+    """The scene with elements of higher degree, which stand for the continuum; ``None`` if that is too large."""
+    beam = scene.beam
+    if beam is None or beam.integrator != "modal":
         return None
-    n = min(4 * scene.beam.n_elements, ALL_MODES_UP_TO)
-    if n < 2 * scene.beam.n_elements:
+    degree = min(_HIGHEST_DEGREE, ALL_MODES_UP_TO // (2 * beam.n_elements))
+    if degree < 2 * beam.element_degree:
         return None
-    return with_changes(scene, beam={"n_elements": n, "n_modes": 0})
+    return with_changes(scene, beam={"element_degree": degree, "n_modes": 0, "reduced_integration": False})
 
 
 def _models(scene: Scene) -> Iterator[Configuration]:
-    if scene.beam is None or finer(scene) is None:
+    beam, fine = scene.beam, finer(scene)
+    if beam is None or fine is None or fine.beam is None:
         return
-    n = scene.beam.n_elements
+    limit = fine.beam.n_elements * fine.beam.element_degree
     for modes in _MODES:
-        if modes < 2 * n:
+        if modes < 2 * beam.n_elements * beam.element_degree:
             for changed in _changed(scene, beam={"n_modes": modes}):
                 yield Configuration("modes", f"{modes}", changed, refined=True)
-    for factor in _MESHES:
-        for changed in _changed(scene, beam={"n_elements": max(1, round(factor * n)), "n_modes": 0}):
-            yield Configuration("elements", f"{max(1, round(factor * n))}", changed, refined=True)
+    for degree in _DEGREES:
+        for factor in _MESHES:
+            n = round(factor * beam.n_elements / degree)
+            if n >= 1 and 2 * n * degree <= limit:
+                mesh = {"n_elements": n, "element_degree": degree, "n_modes": 0}
+                if degree > 2:
+                    mesh["reduced_integration"] = False
+                for changed in _changed(scene, beam=mesh):
+                    yield Configuration(f"elements of degree {degree}", f"{n}", changed, refined=True)
 
 
 def _rivals(scene: Scene) -> Iterator[Configuration]:

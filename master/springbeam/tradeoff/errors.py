@@ -76,7 +76,7 @@ def _event_time(run: Trajectory, reference: Trajectory, window: float) -> float:
 def _impulse(run: Trajectory, reference: Trajectory) -> float:
     def total(trajectory: Trajectory) -> np.ndarray:
         events = [(e.impulse_contact, e.impulse_foundation) for e in trajectory.events]
-        return np.array(events).reshape(-1, 2).sum(axis=0, initial=0.0)
+        return np.asarray(np.sum(np.reshape(events, (-1, 2)), axis=0))
 
     exact = total(reference)
     scale = float(np.abs(exact).sum())

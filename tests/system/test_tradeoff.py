@@ -1,0 +1,129 @@
+"""The trade between error and cost, on the FMUs: what is swept, judged and named."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from springbeam import tradeoff
+from springbeam.cli import app
+from springbeam.monolithic import event_driven
+from springbeam.scene import SceneError, load_scene, with_changes
+from springbeam.tradeoff.configurations import configurations
+from springbeam.tradeoff.errors import errors
+
+
+@pytest.fixture(scope="module")
+def found():
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 6}, coupling={"macro_step": 1e-3})
+    return tradeoff.study(scene, until=0.06, repeats=1)
+
+
+def by_family(found, family):
+    return [p for p in found.points if p.configuration.family == family]
+
+
+def test_the_sweep_covers_every_axis(found):
+    families = {p.configuration.family for p in found.points}
+    assert {"energy 0", "energy 1", "energy 2", "hermite 1", "hermite 2"} <= families
+    assert {
+        "IDA tolerance",
+        "modes",
+        "elements of degree 1",
+        "elements of degree 4",
+        "DOP853",
+        "LSODA",
+        "Radau",
+        "Algorithm 1",
+    } <= families
+
+
+@pytest.mark.parametrize(("family", "order"), [("energy 0", 4.0), ("energy 1", 4.0), ("hermite 1", 4.0)])
+def test_errors_fall_with_the_order_of_the_scheme(found, family, order):
+    points = [p for p in by_family(found, family) if 1e-10 < p.displacement < 1e-5]
+    assert len(points) >= 2
+    rates = [np.log2(a.displacement / b.displacement) for a, b in itertools.pairwise(points)]
+    assert order - 0.7 < np.median(rates) < order + 0.7
+
+
+def test_more_steps_cost_more_calls(found):
+    for family in ("energy 0", "energy 2", "hermite 2"):
+        calls = [p.beam_steps + p.spring_steps for p in by_family(found, family)]
+        assert calls == sorted(calls)
+        assert all(p.rollbacks > 0 for p in by_family(found, family))
+
+
+def test_no_point_beats_the_front(found):
+    front = found.front()
+    assert len(front) >= 3
+    for point in found.points:
+        if not point.configuration.refined and point.displacement < 1.0:
+            assert any(f.solve <= point.solve and f.displacement <= point.displacement for f in front)
+
+
+def test_choices_are_the_cheapest_that_keep_the_error(found):
+    for choice in found.choices():
+        good = [
+            p
+            for p in found.points
+            if p.displacement <= choice.target and not p.configuration.refined and not p.configuration.monolithic
+        ]
+        assert (choice.ours is None) == (not good)
+        if choice.ours is not None:
+            assert choice.ours.solve == min(p.solve for p in good)
+    assert found.choices()[1].ours is not None
+    assert found.choices()[1].scipy is not None
+
+
+def test_modes_converge_to_the_mesh_and_not_beyond(found):
+    modes = by_family(found, "modes")
+    assert [p.displacement for p in modes] == sorted((p.displacement for p in modes), reverse=True)
+    own = next(p for p in by_family(found, "elements of degree 1") if p.configuration.setting == "6")
+    assert all(p.displacement > 0.5 * own.displacement for p in modes)
+
+
+def test_the_reference_has_no_error_and_a_shifted_one_has():
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 4}, time={"t_end": 0.1})
+    times = np.linspace(0.0, 0.1, 101)
+    exact = event_driven.simulate(scene, sample_times=times)
+    same = errors(exact, exact, 1e-3)
+    assert (same.displacement, same.event_time, same.impulse) == (0.0, 0.0, 0.0)
+    moved = event_driven.simulate(scene, sample_times=times)
+    moved.columns["y"] = exact.y + 0.01 * np.abs(exact.y - exact.y[0]).max()
+    assert errors(moved, exact, 1e-3).displacement == pytest.approx(0.01, rel=1e-12)
+    moved.events.pop()
+    assert np.isnan(errors(moved, exact, 1e-3).event_time)
+
+
+@pytest.mark.parametrize(
+    ("tables", "word"),
+    [({"contact": {"law": "paper"}}, "Algorithm 1"), ({"contact": {"impact": "rest"}}, "rigid tie")],
+)
+def test_a_scene_without_a_reference_is_refused(tables, word):
+    with pytest.raises(SceneError, match=word):
+        tradeoff.study(with_changes(load_scene("soft"), **tables))
+
+
+def test_compliance_is_swept_with_the_ordinary_exchanges():
+    scene = with_changes(load_scene("soft"), contact={"law": "compliance"}, time={"t_end": 0.05})
+    families = {c.family for c in configurations(scene)}
+    assert {"energy 0", "jacobi 0", "jacobi 1", "gauss_seidel 0", "gauss_seidel 1"} <= families
+    assert not families & {"energy 1", "hermite 2"}
+
+
+def test_command(tmp_path):
+    arguments = ["tradeoff", "duffing", "--until", "0.5", "--repeats", "1", "--json", "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    table = json.loads(result.stdout)
+    assert [row["error"] for row in table["cheapest"]] == [1e-2, 1e-4, 1e-6, 1e-8]
+    assert table["cheapest"][3]["co_simulation"]["error"] <= 1e-8
+    rows = list(csv.DictReader((tmp_path / "out" / "tradeoff.csv").open()))
+    assert {row["family"] for row in rows} >= {"energy 0", "DOP853"}
+    assert all(row["u_tip_max"] == "" for row in rows)
+    assert (tmp_path / "out" / "tradeoff.png").stat().st_size > 10_000
