@@ -329,12 +329,9 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
   return guard(c, "fmi2DeSerializeFMUstate", any_phase, [&](Component& k) {
     require(serializedState, "serializedState");
     require(FMUstate, "FMUstate");
-    Snapshot snapshot = fmi::deserialize(serializedState, size, fmi::guid(fmi::table()), fmi::table().variables.size());
-    if (*FMUstate) {
-      k.state(*FMUstate) = std::move(snapshot);
-    } else {
-      *FMUstate = k.keep(std::move(snapshot));
-    }
+    // Purely an output, unlike fmi2GetFMUstate's: importers leave anything in it.
+    *FMUstate =
+        k.keep(fmi::deserialize(serializedState, size, fmi::guid(fmi::table()), fmi::table().variables.size()));
   });
 }
 
