@@ -47,9 +47,22 @@ fmi_sim() {
   BINDGEN_EXTRA_CLANG_ARGS="-I$(cc -print-file-name=include)" \
     cargo install --locked --version "$1" --root "$2" fmi-sim && rm -rf "$2/venv"
 }
+# Its library needs TBB, which is on PyPI too.
+ecos() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "ecospy==$1" tbb==2023.2.0; }
+fmucontainer() { "$python" -m venv "$2/venv" && "$2/venv/bin/pip" install -q "fmu-manipulation-toolbox==$1"; }
+# FMI4j and JavaFMI; the versions are in java.xml.
+java_importers() {
+  command -v mvn && command -v javac || return 1
+  cp "$here/java.xml" "$2/pom.xml" &&
+    maven -f "$2/pom.xml" org.apache.maven.plugins:maven-dependency-plugin:3.6.1:build-classpath \
+      -Dmdep.outputFile="$2/classpath"
+}
 
 attempt libcosim 0.0.6 libcosim
 attempt vdmcheck 1.1.3 vdmcheck
 attempt maestro 3.1.1 maestro
+attempt ecos 0.7.2 ecos
+attempt fmucontainer 2.0 fmucontainer
+attempt java "$(cksum <"$here/java.xml")" java_importers
 attempt fmi-sim 0.7.0 fmi_sim
 exit 0
