@@ -356,6 +356,15 @@ def with_changes(scene: Scene, **tables: Mapping[str, Any] | None) -> Scene:
     return scene_from_dict({table: content for table, content in data.items() if content is not None})
 
 
+def key_is_whole(table: str, key: str) -> bool:
+    """Whether ``[table] key`` takes whole numbers. Raises SceneError if there is no such key."""
+    if table not in _TABLES:
+        raise SceneError(_explain_top("extra_forbidden", {}, table))
+    if key not in _TABLES[table].model_fields:
+        raise SceneError(f"[{table}] {key}: unknown key; {_nearest_key(table, key)}")
+    return _TABLES[table].model_fields[key].annotation is int
+
+
 def _scene_file(path_or_name: str | Path) -> Path:
     shipped = shipped_scenes()
     if str(path_or_name) in shipped:
@@ -377,10 +386,11 @@ def _override(data: dict[str, Any], override: str) -> None:
     content = data.setdefault(table, {})
     if not isinstance(content, dict):
         raise SceneError(f"--set {override}: {table} is not a table; tables: {', '.join(_TABLES)}")
-    content[key] = _override_value(text.strip())
+    content[key] = parse_value(text.strip())
 
 
-def _override_value(text: str) -> Any:
+def parse_value(text: str) -> Any:
+    """A value in TOML syntax; what is none is a bare word, taken as a string."""
     try:
         parsed = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
