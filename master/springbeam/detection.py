@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import replace
 
 from .contact import Joint, Phase
 from .coupling import force
@@ -21,6 +20,7 @@ from .events import (
     locate,
     lowest_inside,
     position_tolerance,
+    stays_above,
 )
 from .scene import Scene
 from .stepping import Ends, Pair, State, Step
@@ -30,6 +30,11 @@ from .subsystem import Force
 _NO_TIME = 1e-9
 #: Repetitions to end a step where the contact force vanishes.
 _MAX_FORCE_CUTS = 8
+
+
+def _rest(ends: Ends) -> float:
+    """Speed below which ends do not move against each other [m/s]."""
+    return 1e-12 * max(abs(ends[0].velocity), abs(ends[1].velocity))
 
 
 class Detector:
@@ -45,10 +50,10 @@ class Detector:
 
     def at_start(self, state: State, start: Ends) -> str | None:
         """The event that is due before any step: its function is 0 and falling."""
-        rest = 1e-12 * max(abs(start[0].velocity), abs(start[1].velocity))
+        rest = _rest(start)
         for kind, function in self._functions.of(state.phase):
-            sample = function(start)
-            if sample.value <= self.tolerance(start) and sample.rate < -rest:
+            value, rate = function(start)
+            if rate < -rest and value <= self.tolerance(start):
                 return kind
         return None
 
@@ -57,11 +62,11 @@ class Detector:
         found: str | None = None
         functions = self._functions.of(state.phase)
         for _ in range(2 * len(functions) + 1):
-            candidates = []
+            candidates, tolerance = [], self.tolerance(step.end)
             for kind, function in functions:
                 if kind == found:
                     continue
-                bracket = self._bracket(state, function, step)
+                bracket = self._bracket(state, function, step, tolerance)
                 if bracket is not None:
                     crossing = cubic_crossing(function(step.start), function(bracket.end), bracket.size)
                     candidates.append((crossing, kind, function, bracket))
@@ -80,21 +85,27 @@ class Detector:
     def _no_step(self, step: Step) -> Step:
         """No step at all: the bodies back at the mark."""
         self._pair.rewind()
-        return replace(step, size=0.0, end=step.start)
+        return step._replace(size=0.0, end=step.start)
 
     # -- events told by positions -----------------------------------------------------------------------------------
 
-    def _bracket(self, state: State, function: EventFunction, step: Step) -> Step | None:
+    def _bracket(self, state: State, function: EventFunction, step: Step, tolerance: float) -> Step | None:
         """The step itself if ``function`` ends below zero, a shorter one if it dips below zero inside, or None."""
-        tolerance = self.tolerance(step.end)
         start, end = function(step.start), function(step.end)
-        if end.value < -tolerance:
+        # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
+        floor = min(start[0], 0.0) - tolerance
+        if stays_above(start, end, step.size, floor):
+            return None
+        if end[0] < floor:
             return step
+        if abs(start[1]) <= _rest(step.start):
+            # Ends that have just parted may close a little first, by the error of the time at which they were let go.
+            return None
         inside = lowest_inside(start, end, step.size)
-        if inside is None or cubic_value(start, end, step.size, inside) >= -tolerance:
+        if inside is None or cubic_value(start, end, step.size, inside) >= floor:
             return None
         dip = self._pair.attempt(state, inside, step.start)
-        return dip if function(dip.end).value < -tolerance else None
+        return dip if function(dip.end)[0] < floor else None
 
     def _located(self, state: State, function: EventFunction, bracket: Step) -> Step:
         last = bracket
@@ -111,7 +122,7 @@ class Detector:
     def _touched_inside(self, state: State, step: Step) -> Step:
         """Compliance: a contact that closes and opens inside the step would be missed; it is cut to its middle."""
         start, end = gap(step.start), gap(step.end)
-        if start.value < 0.0 or end.value < 0.0:
+        if start[0] < 0.0 or end[0] < 0.0:
             return step
         inside = lowest_inside(start, end, step.size)
         if inside is None or cubic_value(start, end, step.size, inside) >= 0.0:

@@ -7,7 +7,6 @@ both ends; the cubic through them tells where to look, also for a contact that o
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,13 +18,8 @@ _EPS = float(np.finfo(float).eps)
 _MAX_EVALUATIONS = 60
 
 
-class Sample(NamedTuple):
-    """f and ḟ at one time."""
-
-    value: float
-    rate: float
-
-
+#: f and ḟ at one time.
+Sample = tuple[float, float]
 #: f, ḟ of the ends (tip, lower end).
 EventFunction = Callable[[tuple[Motion, Motion]], Sample]
 
@@ -33,15 +27,15 @@ EventFunction = Callable[[tuple[Motion, Motion]], Sample]
 def gap(ends: tuple[Motion, Motion]) -> Sample:
     """g = u_tip − y, or what lies below the tip instead of y."""
     tip, low = ends
-    return Sample(tip.displacement - low.displacement, tip.velocity - low.velocity)
+    return tip.displacement - low.displacement, tip.velocity - low.velocity
 
 
 def _above(end: int, level: float) -> EventFunction:
-    return lambda ends: Sample(ends[end].displacement - level, ends[end].velocity)
+    return lambda ends: (ends[end].displacement - level, ends[end].velocity)
 
 
 def _below(end: int, level: float) -> EventFunction:
-    return lambda ends: Sample(level - ends[end].displacement, -ends[end].velocity)
+    return lambda ends: (level - ends[end].displacement, -ends[end].velocity)
 
 
 class EventFunctions:
@@ -50,13 +44,13 @@ class EventFunctions:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._ties = scene.beam is not None and scene.spring is not None and scene.contact.law != "compliance"
-        self._of_phase: dict[Phase, list[tuple[str, EventFunction]]] = {}
+        self._phase: Phase | None = None
+        self._functions: list[tuple[str, EventFunction]] = []
 
     def of(self, phase: Phase) -> list[tuple[str, EventFunction]]:
-        functions = self._of_phase.get(phase)
-        if functions is None:
-            functions = self._of_phase[phase] = self._built(phase)
-        return functions
+        if phase is not self._phase:
+            self._phase, self._functions = phase, self._built(phase)
+        return self._functions
 
     def _built(self, phase: Phase) -> list[tuple[str, EventFunction]]:
         tip, low = 0, 1
@@ -83,41 +77,48 @@ def position_tolerance(ends: tuple[Motion, Motion], level: float, macro_step: fl
     return 8.0 * _EPS * length + 1e-15 * speed * macro_step
 
 
+def stays_above(start: Sample, end: Sample, size: float, level: float) -> bool:
+    """Whether the cubic is bound to stay above ``level``: its Bézier points do, and it lies in their hull."""
+    third = size / 3.0
+    return min(start[0], start[0] + third * start[1], end[0] - third * end[1], end[0]) >= level
+
+
 def lowest_inside(start: Sample, end: Sample, size: float) -> float | None:
     """τ in (0, size) where the cubic through both samples has its minimum, if it has one inside."""
-    d0, d1 = start.rate * size, end.rate * size
-    rise = end.value - start.value
+    d0, d1 = start[1] * size, end[1] * size
+    rise = end[0] - start[0]
     # f(x) = f0 + d0 x + b x² + a x³ on [0, 1]
     a, b = d0 + d1 - 2.0 * rise, 3.0 * rise - 2.0 * d0 - d1
     discriminant = b * b - 3.0 * a * d0
     if discriminant <= 0.0:
         return None
-    # The root with f'' > 0; written so that a → 0 does no harm.
-    denominator = b + discriminant**0.5
+    # The root of f' with f'' > 0, in the form that does not cancel.
+    root = discriminant**0.5
+    denominator = b + root if b > 0.0 else 3.0 * a
     if denominator == 0.0:
         return None
-    x = -d0 / denominator
+    x = (-d0 if b > 0.0 else root - b) / denominator
     return x * size if 0.0 < x < 1.0 else None
 
 
 def cubic_value(start: Sample, end: Sample, size: float, tau: float) -> float:
     """The cubic's value at τ."""
     x = tau / size
-    d0, d1 = start.rate * size, end.rate * size
-    rise = end.value - start.value
-    return start.value + x * (d0 + x * (3.0 * rise - 2.0 * d0 - d1 + x * (d0 + d1 - 2.0 * rise)))
+    d0, d1 = start[1] * size, end[1] * size
+    rise = end[0] - start[0]
+    return start[0] + x * (d0 + x * (3.0 * rise - 2.0 * d0 - d1 + x * (d0 + d1 - 2.0 * rise)))
 
 
 def interpolated(start: Motion, end: Motion, size: float, tau: float) -> Sample:
     """Displacement and velocity at τ of the cubic through both ends of a step."""
-    a, b = Sample(start.displacement, start.velocity), Sample(end.displacement, end.velocity)
+    v, w = start.velocity, end.velocity
     x, rise = tau / size, (end.displacement - start.displacement) / size
-    bend = 3.0 * rise - 2.0 * a.rate - b.rate
-    return Sample(cubic_value(a, b, size, tau), a.rate + x * (2.0 * bend + 3.0 * x * (a.rate + b.rate - 2.0 * rise)))
+    rate = v + x * (2.0 * (3.0 * rise - 2.0 * v - w) + 3.0 * x * (v + w - 2.0 * rise))
+    return cubic_value((start.displacement, v), (end.displacement, w), size, tau), rate
 
 
 def cubic_crossing(start: Sample, end: Sample, size: float) -> float:
-    """τ where the cubic falls through zero, by bisection; ``end.value`` < 0."""
+    """τ where the cubic falls through zero, by bisection; f(size) < 0."""
     low, high = 0.0, size
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -137,21 +138,21 @@ def locate(
 
     ``evaluate(h)`` repeats the step with size h and returns f, ḟ at its end; the last size evaluated is the one
     returned, so the bodies are left there. f(0) ≥ 0 > f(size); ``time`` is the step's start (its rounding bounds what
-    can be told apart).
+    can be told apart). A zero that f rises from, as it may at the start, is none of these.
     """
     low, high = 0.0, size
     h = cubic_crossing(start, end, size)
     for _ in range(_MAX_EVALUATIONS):
-        sample = evaluate(h)
-        if abs(sample.value) <= tolerance:
+        value, rate = evaluate(h)
+        if abs(value) <= tolerance and rate < 0.0:
             return h
-        if sample.value > 0.0:
+        if value > 0.0 or (value >= -tolerance and rate >= 0.0):
             low = h
         else:
             high = h
         if high - low <= 4.0 * _EPS * max(abs(time), size):
             return h
-        h = h - sample.value / sample.rate if sample.rate < 0.0 else 0.5 * (low + high)
+        h = h - value / rate if rate < 0.0 else 0.5 * (low + high)
         if not low < h < high:
             h = 0.5 * (low + high)
     return h

@@ -6,8 +6,9 @@ import atexit
 import os
 import shutil
 import tempfile
-from ctypes import byref, c_double, c_int, c_uint
-from functools import lru_cache
+from collections.abc import Callable
+from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p
+from functools import lru_cache, partial
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,8 @@ from .subsystem import NO_FORCE, Energies, Force, Motion, StepRefused
 from .trajectory import SHAPE_POINTS
 
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
-_DISCARD, _ERROR = 2, 3
+_WARNING, _DISCARD, _ERROR = 1, 2, 3
+_STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
 
 class FmuError(RuntimeError):
@@ -59,18 +61,47 @@ def _unpacked(path: Path, modified: int) -> tuple[Path, ModelDescription]:
     return folder, description
 
 
-class _Fmu:
-    """One instance of a co-simulation FMU, its state and its scalar inputs and outputs."""
+class Reals:
+    """Some Real variables of an FMU, read and written together; the arguments are converted to C once."""
+
+    def __init__(self, fmu: Fmu, *names: str) -> None:
+        n = len(names)
+        self._names = ", ".join(names)
+        self._fmu = fmu
+        self._values: Any = (c_double * n)()
+        references = (c_uint * n)(*[fmu.reference(name, "Real") for name in names])
+        self._read = fmu.prepared("fmi2GetReal", references, c_size_t(n), self._values)
+        self._write = fmu.prepared("fmi2SetReal", references, c_size_t(n), self._values)
+
+    def get(self) -> list[float]:
+        if (status := self._read()) > _WARNING:
+            raise self._fmu.failed(status, f"cannot read {self._names}")
+        values: list[float] = self._values[:]
+        return values
+
+    def set(self, values: list[float]) -> None:
+        self._values[:] = values
+        self._fmu.moved = True
+        if (status := self._write()) > _WARNING:
+            raise self._fmu.failed(status, f"cannot set {self._names}")
+
+
+class Fmu:
+    """One instance of a co-simulation FMU and its state."""
 
     def __init__(self, name: str, path: Path, parameters: dict[str, float | int | bool], start_time: float) -> None:
         self.path, self._name = path, name
         self._messages: list[str] = []
         self._slave = self._load()
-        self._parameters = parameters
         self._state = fmi2FMUstate()
-        self._moved = False
+        #: Whether anything happened since the state was marked.
+        self.moved = False
         #: doStep calls, and how often the state was set back.
         self.steps = self.rewinds = 0
+        self._time, self._size = c_double(), c_double()
+        self._do_step = self.prepared("fmi2DoStep", self._time, self._size, c_int(0))
+        self._get_state = self.prepared("fmi2GetFMUstate", byref(self._state))
+        self._set_state = self.prepared("fmi2SetFMUstate", self._state)
         self.initialise(start_time, parameters)
 
     def _load(self) -> FMU2Slave:
@@ -108,8 +139,8 @@ class _Fmu:
         try:
             slave.setupExperiment(startTime=time)
             for name, value in parameters.items():
-                reference = [self.reference(name)]
-                kind = self._variables[name].type
+                kind = self._variables[name].type if name in self._variables else "Real"
+                reference = [self.reference(name, kind)]
                 if kind == "Boolean":
                     slave.setBoolean(reference, [bool(value)])
                 elif kind == "Real":
@@ -127,60 +158,59 @@ class _Fmu:
         """Start again at ``time`` with the given parameters."""
         self._slave.reset()
         self.initialise(time, parameters)
-        self._moved = True
+        self.moved = True
 
-    def reference(self, name: str) -> int:
+    def prepared(self, name: str, *arguments: Any) -> Callable[[], int]:
+        """An FMI function of this instance with its arguments, which are converted to C once; returns its status.
+
+        A pointer of our own to the function that FMPy has loaded: FMPy's wrapper converts and checks types at each
+        call, which costs as much as the call.
+        """
+        function = self._slave.dll[name]
+        function.restype = c_int
+        return partial(function, c_void_p(self._slave.component), *arguments)
+
+    def reference(self, name: str, kind: str) -> int:
+        """Value reference of a variable of type ``kind``."""
         try:
-            return int(self._variables[name].valueReference)
+            variable = self._variables[name]
         except KeyError:
             raise FmuError(f"{self.path}: has no variable {name!r}") from None
-
-    def references(self, *names: str) -> Any:
-        """Value references of Real variables; read once here, so that a wrong one is found before the run."""
-        found = (c_uint * len(names))(*[self.reference(name) for name in names])
-        for name in names:
-            if self._variables[name].type != "Real":
-                raise FmuError(f"{self.path}: variable {name!r} is {self._variables[name].type}, expected Real")
-        try:
-            self.get(found, (c_double * len(names))())
-        except FMICallException as error:
-            raise FmuError(f"{self.path}: cannot read {', '.join(names)}: {self._cause(error)}") from error
-        return found
+        if variable.type != kind:
+            raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, expected {kind}")
+        return int(variable.valueReference)
 
     def mark(self) -> None:
-        self._slave.fmi2GetFMUstate(self._slave.component, byref(self._state))
-        self._moved = False
+        self._check(self._get_state(), "cannot save the state")
+        self.moved = False
 
     def rewind(self) -> None:
-        if self._moved:
-            self._slave.fmi2SetFMUstate(self._slave.component, self._state)
-            self._moved = False
+        if self.moved:
+            self._check(self._set_state(), "cannot restore the state")
+            self.moved = False
             self.rewinds += 1
-
-    def set(self, references: Any, values: Any) -> None:
-        self._slave.fmi2SetReal(self._slave.component, references, len(references), values)
-        self._moved = True
-
-    def set_derivatives(self, references: Any, orders: Any, values: Any) -> None:
-        self._slave.fmi2SetRealInputDerivatives(self._slave.component, references, len(references), orders, values)
-        self._moved = True
-
-    def get(self, references: Any, values: Any) -> Any:
-        self._slave.fmi2GetReal(self._slave.component, references, len(references), values)
-        return values
 
     def step(self, time: float, size: float) -> None:
         self.steps += 1
-        self._moved = True
-        try:
-            self._slave.fmi2DoStep(self._slave.component, time, size, 0)
-        except FMICallException as error:
-            if error.status not in (_DISCARD, _ERROR):
-                raise FmuError(f"{self.path}: {self._cause(error)} at t = {time:.9g} s") from error
-            reached = ""
-            if error.status == _DISCARD:
-                reached = f" (reached t = {self._slave.getRealStatus(fmi2LastSuccessfulTime):.9g} s)"
-            raise StepRefused(f"{self._name}: {self._cause(error)}{reached}") from error
+        self.moved = True
+        self._time.value, self._size.value = time, size
+        status = self._do_step()
+        if status <= _WARNING:
+            return
+        if status not in (_DISCARD, _ERROR):
+            raise self.failed(status, f"cannot step at t = {time:.9g} s")
+        reached = ""
+        if status == _DISCARD:
+            reached = f" (reached t = {self._slave.getRealStatus(fmi2LastSuccessfulTime):.9g} s)"
+        raise StepRefused(f"{self._name}: {self._cause(f'fmi2DoStep returned {_STATUS[status]}')}{reached}")
+
+    def failed(self, status: int, what: str) -> FmuError:
+        """The error of a call that returned ``status``, with what the FMU has logged."""
+        return FmuError(f"{self.path}: {what}: {self._cause(f'it returned {_STATUS[status]}')}")
+
+    def _check(self, status: int, what: str) -> None:
+        if status > _WARNING:
+            raise self.failed(status, what)
 
     def close(self) -> None:
         slave, self._slave = getattr(self, "_slave", None), None
@@ -194,9 +224,9 @@ class _Fmu:
         if status > 0:
             self._messages = [*self._messages[-3:], message.decode("utf-8", "replace")]
 
-    def _cause(self, error: Exception) -> str:
+    def _cause(self, otherwise: Exception | str) -> str:
         messages, self._messages = self._messages, []
-        return messages[-1] if messages else str(error)
+        return messages[-1] if messages else str(otherwise)
 
 
 class _FmuBody:
@@ -207,17 +237,17 @@ class _FmuBody:
     _IMPULSE: str
     _FORCES: tuple[str, ...]
 
-    def __init__(self, fmu: _Fmu) -> None:
+    def __init__(self, fmu: Fmu) -> None:
         self.fmu = fmu
-        self._motion_refs, self._motion_values = fmu.references(*self._MOTION), (c_double * 4)()
-        self._energy_refs = fmu.references(*self._ENERGIES)
-        self._energy_values = (c_double * len(self._ENERGIES))()
-        n = len(self._FORCES)
-        self._force_refs, self._force_values = fmu.references(*self._FORCES), (c_double * n)()
+        self._motion, self._energies = Reals(fmu, *self._MOTION), Reals(fmu, *self._ENERGIES)
+        self._forces, self._impulse = Reals(fmu, *self._FORCES), Reals(fmu, self._IMPULSE)
         names = [name for name in self._FORCES for _ in (1, 2)]
-        self._slope_refs, self._slope_values = fmu.references(*names), (c_double * (2 * n))()
-        self._slope_orders = (c_int * (2 * n))(*[1, 2] * n)
-        self._impulse_refs, self._impulse_values = fmu.references(self._IMPULSE), (c_double * 1)()
+        references = (c_uint * len(names))(*[fmu.reference(name, "Real") for name in names])
+        orders = (c_int * len(names))(*[1, 2] * len(self._FORCES))
+        self._slopes: Any = (c_double * len(names))()
+        self._set_slopes = fmu.prepared(
+            "fmi2SetRealInputDerivatives", references, c_size_t(len(names)), orders, self._slopes
+        )
         self._pending = self._marked_pending = 0.0
         self.mass = self._mass()
         self._current = self._marked_motion = self._read_motion()
@@ -249,34 +279,33 @@ class _FmuBody:
     def apply_impulse(self, impulse: float) -> None:
         # The FMU applies it at the start of its next step; motion and energies already show it.
         self._pending += impulse
-        self._impulse_values[0] = self._pending
-        self.fmu.set(self._impulse_refs, self._impulse_values)
+        self._impulse.set([self._pending])
         self._current = self._current._replace(velocity=self._current.velocity + impulse / self.mass)
 
-    def _advance(self, time: float, size: float, forces: tuple[Force, ...]) -> None:
-        for i, (value, slope, bend) in enumerate(forces):
-            self._force_values[i] = value
-            self._slope_values[2 * i], self._slope_values[2 * i + 1] = slope, bend
-        self.fmu.set(self._force_refs, self._force_values)
-        if any(f[1] != 0.0 or f[2] != 0.0 for f in forces):
-            self.fmu.set_derivatives(self._slope_refs, self._slope_orders, self._slope_values)
+    def _advance(self, time: float, size: float, values: list[float], slopes: list[float]) -> None:
+        """``values`` of the forces and their ``slopes`` (Ḟ, F̈ of each) at the start of the step."""
+        self._forces.set(values)
+        if any(slopes):
+            self._slopes[:] = slopes
+            if (status := self._set_slopes()) > _WARNING:
+                raise self.fmu.failed(status, "cannot set input derivatives")
         self.fmu.step(time, size)
         self._pending = 0.0
         self._current = self._read_motion()
 
     def _read_motion(self) -> Motion:
-        motion = Motion(*self.fmu.get(self._motion_refs, self._motion_values))
+        motion = Motion(*self._motion.get())
         if not isfinite(sum(motion)):
             raise StepRefused(f"{self.fmu.path.name}: not finite: {motion}")
         return motion
 
-    def _stored(self) -> tuple[float, float, float]:
-        """(kinetic, potential, dissipated) [J]; the kinetic energy with the impulse that is still pending."""
-        kinetic, potential, dissipated = self.fmu.get(self._energy_refs, self._energy_values)[:3]
+    def _stored(self) -> list[float]:
+        """The energies [J]; the kinetic one with the impulse that is still pending."""
+        energies = self._energies.get()
         if self._pending != 0.0:
             before = self._current.velocity - self._pending / self.mass
-            kinetic += 0.5 * self._pending * (before + self._current.velocity)
-        return kinetic, potential, dissipated
+            energies[0] += 0.5 * self._pending * (before + self._current.velocity)
+        return energies
 
     def close(self) -> None:
         self.fmu.close()
@@ -300,25 +329,22 @@ class FmuBeam(_FmuBody):
         parameters: dict[str, float | int | bool] = beam.model_dump(exclude={"approach"})
         parameters["integrator"] = _INTEGRATORS[beam.integrator]
         parameters["initial_deflection_slope"] = deflection_slope
-        fmu = _Fmu("beam", fmu_directory() / "beam.fmu", parameters, start_time)
-        n = len(SHAPE_POINTS)
-        self._shape_refs = fmu.references(*[f"deflection[{i}]" for i in range(1, n + 1)])
-        self._shape_values = (c_double * n)()
+        fmu = Fmu("beam", fmu_directory() / "beam.fmu", parameters, start_time)
+        self._shape = Reals(fmu, *[f"deflection[{i}]" for i in range(1, len(SHAPE_POINTS) + 1)])
         super().__init__(fmu)
 
     def _mass(self) -> float:
-        return float(self.fmu.get(self.fmu.references("tip_mass"), (c_double * 1)())[0])
+        return Reals(self.fmu, "tip_mass").get()[0]
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
-        self._advance(time, size, (contact,))
+        self._advance(time, size, [contact[0]], [contact[1], contact[2]])
 
     def energies(self) -> Energies:
-        kinetic, strain, dissipated = self._stored()
-        return Energies(kinetic, strain, dissipated, self._energy_values[3])
+        return Energies(*self._stored())
 
     def shape(self) -> np.ndarray:
         """Deflection [m] at `SHAPE_POINTS`, shape (21,)."""
-        return np.array(self.fmu.get(self._shape_refs, self._shape_values))
+        return np.array(self._shape.get())
 
 
 class FmuSpring(_FmuBody):
@@ -334,13 +360,14 @@ class FmuSpring(_FmuBody):
         self._parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
         self._parameters["displacement"] = spring.equilibrium
         self._parameters["velocity"] = spring.initial_velocity
-        super().__init__(_Fmu("spring", fmu_directory() / "spring.fmu", self._parameters, start_time))
+        super().__init__(Fmu("spring", fmu_directory() / "spring.fmu", self._parameters, start_time))
 
     def _mass(self) -> float:
         return self._spring.mass
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
-        self._advance(time, size, (contact, foundation))
+        (c, dc, ddc), (n, dn, ddn) = contact, foundation
+        self._advance(time, size, [c, n], [dc, ddc, dn, ddn])
 
     def energies(self) -> Energies:
         kinetic, potential, dissipated = self._stored()

@@ -3,8 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from .subsystem import Energies
+
+
+class Booked(NamedTuple):
+    """A row's energies [J], in the order of `springbeam.trajectory.COLUMNS`."""
+
+    e_beam: float
+    e_spring: float
+    e_contact: float
+    e_dissipated: float
+    e_impact_loss: float
+    e_load: float
+    e_total: float
+    energy_residual: float
 
 
 @dataclass
@@ -17,8 +31,8 @@ class Ledger:
     largest_residual: float = 0.0  #: [J]
     relative: float = 0.0  #: the largest residual over the scale at its time
 
-    def book(self, beam: Energies, spring: Energies, contact: float) -> dict[str, float]:
-        """The row's energies [J] under their column names; ``contact`` is the energy of the contact law."""
+    def book(self, beam: Energies, spring: Energies, contact: float) -> Booked:
+        """The next row; ``contact`` is the energy of the contact law [J]."""
         e_beam = beam.kinetic + beam.potential
         e_spring = spring.kinetic + spring.potential
         dissipated = beam.dissipated + spring.dissipated
@@ -31,13 +45,4 @@ class Ledger:
         self.largest_residual = max(self.largest_residual, abs(residual))
         if self.scale > 0.0:
             self.relative = max(self.relative, abs(residual) / self.scale)
-        return {
-            "e_beam": e_beam,
-            "e_spring": e_spring,
-            "e_contact": contact,
-            "e_dissipated": dissipated,
-            "e_impact_loss": self.impact_loss,
-            "e_load": load,
-            "e_total": total,
-            "energy_residual": residual,
-        }
+        return Booked(e_beam, e_spring, contact, dissipated, self.impact_loss, load, total, residual)

@@ -218,7 +218,7 @@ class PaperLaw:
             "velocity_mismatch": tip.velocity - top.velocity if phase != "free" else 0.0,
             "phase": phase,
         }
-        row.update(self._ledger.book(self._beam.energies(), self._spring.energies(), 0.0))
+        row.update(self._ledger.book(self._beam.energies(), self._spring.energies(), 0.0)._asdict())
         self.recorder.row(row)
         self.recorder.shape(self.time, self._beam.shape())
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from operator import itemgetter
 
 from .contact import Joint
 from .coupling.compliance import compliance_force
@@ -10,6 +10,7 @@ from .ledger import Ledger
 from .recording import Recorder
 from .scene import Scene
 from .stepping import Pair, State
+from .trajectory import COLUMNS
 
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
@@ -22,6 +23,9 @@ class Rows:
         self._scene, self._pair, self._ledger, self._recorder = scene, pair, ledger, recorder
         self._shapes_left = _SHAPES_AFTER_CONTACT
         self._next_shape = start_time
+        self._equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
+        #: The columns of the scene, out of all.
+        self._present = itemgetter(*(COLUMNS.index(name) for name in recorder.columns))
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
         self.largest_speed = 0.0  #: of tip and lower end [m/s]
 
@@ -29,29 +33,24 @@ class Rows:
         """The row of the present state. Raises NonFiniteValue."""
         pair, law = self._pair, self._scene.contact
         tip, low = pair.ends()
-        row: dict[str, Any] = {"time": state.time, "phase": str(state.phase)}
-        row.update(u_tip=tip.displacement, v_tip=tip.velocity, y=low.displacement, z=low.velocity)
-        row["gap"] = tip.displacement - low.displacement
-        contact = state.contact[0]
-        if pair.compliant:
-            contact = compliance_force(-row["gap"], law.stiffness, law.exponent)
+        (u, v), (y, z) = tip[:2], low[:2]
         joined = state.phase.joint is not Joint.FREE
-        row["contact_force"] = contact
-        row["contact_force_smoothed"] = state.smoothed if joined and not pair.compliant else contact
-        if pair.joinable:
-            assert self._scene.spring is not None
-            depth = self._scene.spring.equilibrium - tip.displacement
-            row["compliance_force"] = (
-                contact if pair.compliant else compliance_force(depth, law.stiffness, law.exponent)
-            )
-            row["tie_reaction"] = contact - row["compliance_force"]
-            row["velocity_mismatch"] = tip.velocity - low.velocity if joined else 0.0
-            if joined and not pair.compliant:
-                self.largest_mismatch = max(self.largest_mismatch, abs(row["velocity_mismatch"]))
-        row["foundation_force"] = state.foundation[0]
-        self.largest_speed = max(self.largest_speed, abs(tip.velocity), abs(low.velocity))
-        row.update(self._ledger.book(*pair.energies()))
-        self._recorder.row(row)
+        contact = smoothed = state.contact[0]
+        inside = mismatch = 0.0
+        if pair.compliant:
+            contact = smoothed = inside = compliance_force(y - u, law.stiffness, law.exponent)
+        elif joined:
+            smoothed = state.smoothed
+        if pair.joinable and not pair.compliant:
+            inside = compliance_force(self._equilibrium - u, law.stiffness, law.exponent)
+        if joined:
+            mismatch = v - z
+            if not pair.compliant:
+                self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
+        self.largest_speed = max(self.largest_speed, abs(v), abs(z))
+        forces = (contact, smoothed, inside, contact - inside, state.foundation[0])
+        row = (state.time, u, v, y, z, *forces, u - y, mismatch, str(state.phase))
+        self._recorder.row(self._present((*row, *self._ledger.book(*pair.energies()))))
         self._shape(state.time, joined)
 
     def _shape(self, time: float, joined: bool) -> None:

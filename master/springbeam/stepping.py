@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from .contact import Joint, Phase, spring_force
 from .coupling import conditions, force
@@ -19,8 +20,7 @@ _AT_REST = Motion(0.0, 0.0, 0.0, 0.0)
 _NOTHING = Energies(0.0, 0.0, 0.0, 0.0)
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """An attempted step and what the bodies' ends did on it."""
 
     time: float
@@ -94,7 +94,7 @@ class Pair:
         if coupling.scheme in ORDINARY_SCHEMES:
             self._exchange = Exchange(coupling.scheme == "gauss_seidel", coupling.degree, *law)
         scheme = "energy" if self._exchange is not None else coupling.scheme
-        self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance, coupling.macro_step)
+        self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance)
         self._compliance = Compliance(*law, coupling.tolerance, coupling.macro_step)
         #: Of the contact force over a step.
         self.degree = 0 if self.compliant else coupling.degree

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from ctypes import c_double
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -28,7 +27,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.special import ai_zeros, ellipk, itairy, j0
 
-from .fmu import FmuBeam, FmuError, FmuSpring
+from .fmu import FmuBeam, FmuError, FmuSpring, Reals
 from .runner import RunStopped, simulate
 from .scene import Beam, Coupling, Scene, Spring, Time, load_scene, with_changes
 from .subsystem import NO_FORCE, StepRefused
@@ -267,7 +266,7 @@ _IDA = "IDA: BDF of order ≤ 5 takes some ε^(−1/6) internal steps a radian, 
 
 
 def _read(body: FmuBeam | FmuSpring, name: str) -> float:
-    return float(body.fmu.get(body.fmu.references(name), (c_double * 1)())[0])
+    return Reals(body.fmu, name).get()[0]
 
 
 def _ida_error(body: FmuSpring, radians: float) -> float:
@@ -464,7 +463,7 @@ def two_masses() -> list[Check]:
     by_force = Spring(linear_stiffness=k_own)
     by_displacement = Spring(linear_stiffness=k_own + k_between)
     with closing(FmuSpring(by_force, 0.0)) as f, closing(FmuSpring(by_displacement, 0.0)) as d:
-        load = d.fmu.references("external_force")
+        load = Reals(d.fmu, "external_force")
 
         def under_force(y: float, z: float, force: float, size: float) -> tuple[float, float]:
             f.restart(0.0, y, z)
@@ -473,7 +472,7 @@ def two_masses() -> list[Check]:
 
         def beside(y: float, z: float, other: float, size: float) -> tuple[float, float]:
             d.restart(0.0, y, z)
-            d.fmu.set(load, (c_double * 1)(k_between * other))
+            load.set([k_between * other])
             d.advance(0.0, size, NO_FORCE)
             return d.motion()[:2]
 

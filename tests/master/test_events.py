@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from springbeam.events import Sample, cubic_crossing, cubic_value, interpolated, locate, lowest_inside
+from springbeam.events import (
+    Sample,
+    cubic_crossing,
+    cubic_value,
+    interpolated,
+    locate,
+    lowest_inside,
+    stays_above,
+)
 from springbeam.subsystem import Motion
 
 SIZE = 0.02
@@ -18,7 +26,7 @@ CUBICS = [(1.0, -3.0, 0.5, 0.2), (0.2, -2.0, 3.0, -0.7), (0.3, 1.0, -4.0, 1.5), 
 
 def ends(coefficients) -> tuple[Polynomial, Sample, Sample]:
     p = Polynomial(coefficients)(Polynomial((0.0, 1.0 / SIZE)))
-    return p, *(Sample(float(p(t)), float(p.deriv()(t))) for t in (0.0, SIZE))
+    return p, *((float(p(t)), float(p.deriv()(t))) for t in (0.0, SIZE))
 
 
 @pytest.mark.parametrize("coefficients", CUBICS)
@@ -33,13 +41,16 @@ def test_interpolated_is_the_cubic_and_its_rate(coefficients):
     p, start, end = ends(coefficients)
     for tau in (0.0, 0.003, 0.017, SIZE):
         got = interpolated(Motion(*start, 0.0, 0.0), Motion(*end, 0.0, 0.0), SIZE, tau)
-        assert got.value == pytest.approx(p(tau), abs=1e-14)
-        assert got.rate == pytest.approx(p.deriv()(tau), abs=1e-12)  # 1e-14/H, rounded up
+        assert got[0] == pytest.approx(p(tau), abs=1e-14)
+        assert got[1] == pytest.approx(p.deriv()(tau), abs=1e-12)  # 1e-14/H, rounded up
 
 
-@pytest.mark.parametrize("coefficients", [*CUBICS, (0.0, -1.0, 2.0), (1.0, -2.0), (0.0, -1.0, 0.0, 2.0)])
+@pytest.mark.parametrize(
+    "coefficients",
+    [*CUBICS, (0.0, -1.0, 2.0), (1.0, -2.0), (0.0, -1.0, 0.0, 2.0), (0.0, 0.0, -1.0, 2.0)],
+)
 def test_lowest_inside_is_the_minimum(coefficients):
-    """Cubics, a parabola and a line; the roots of ṗ where p̈ > 0, if they lie inside."""
+    """Cubics (one from rest), a parabola and a line; the roots of ṗ where p̈ > 0, if they lie inside."""
     p, start, end = ends(coefficients)
     roots = p.deriv().trim().roots() if p.trim().degree() > 1 else []
     inside = [
@@ -49,7 +60,16 @@ def test_lowest_inside_is_the_minimum(coefficients):
     assert (lowest is None) == (not inside)
     if inside:
         assert lowest == pytest.approx(inside[0], rel=1e-12)
-        assert p(lowest) < min(start.value, end.value)
+        assert p(lowest) < min(start[0], end[0])
+
+
+@pytest.mark.parametrize("coefficients", CUBICS)
+def test_a_cubic_bound_to_stay_above_a_level_does(coefficients):
+    """The hull is never above the cubic, and at most as far below as its points are apart."""
+    p, start, end = ends(coefficients)
+    least = float(p(np.linspace(0.0, SIZE, 2001)).min())
+    assert not stays_above(start, end, SIZE, least + 1e-9)
+    assert stays_above(start, end, SIZE, least - (max(abs(start[1]), abs(end[1])) * SIZE + abs(end[0] - start[0])))
 
 
 def test_the_set_of_cubics_has_both_answers():
@@ -82,7 +102,7 @@ class Counted:
     def __call__(self, size: float) -> Sample:
         self.sizes.append(size)
         angle = self.omega * size
-        return Sample(math.cos(angle) - self.level, -self.slope_sign * self.omega * math.sin(angle))
+        return math.cos(angle) - self.level, -self.slope_sign * self.omega * math.sin(angle)
 
 
 @pytest.mark.parametrize("level", [0.999, 0.3, -0.9])
@@ -93,6 +113,17 @@ def test_locate_finds_the_event_to_the_tolerance(level):
     assert h == pytest.approx(math.acos(level), abs=2e-14 / math.sin(math.acos(level)))
     assert f.sizes[-1] == h  # the bodies are left there
     assert len(f.sizes) - 2 <= 8  # Newton: digits double
+
+
+def test_locate_does_not_take_a_zero_that_the_function_rises_from():
+    """f = τ² cos τ rises from zero; the cubic through (0, π) falls from there."""
+
+    def f(size: float) -> Sample:
+        return size**2 * math.cos(size), 2.0 * size * math.cos(size) - size**2 * math.sin(size)
+
+    assert cubic_crossing(f(0.0), f(math.pi), math.pi) < 1e-12
+    # ḟ(π/2) = −(π/2)²
+    assert locate(f, f(0.0), f(math.pi), math.pi, 1e-14, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-14)
 
 
 def test_locate_survives_a_rate_of_the_wrong_sign():

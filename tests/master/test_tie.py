@@ -33,7 +33,7 @@ def after_impact(n: int, stiffness: float = 100.0, **spring: float) -> tuple[Mod
 
 
 def couple(scheme: str, degree: int, size: float, steps: int, beam, spring) -> list[Row]:
-    tie = Tie(conditions(scheme, degree), degree, 1e-12, size)
+    tie = Tie(conditions(scheme, degree), degree, 1e-12)
     rows, guess = [], NO_FORCE
     for i in range(steps):
         for body in (beam, spring):
@@ -181,9 +181,9 @@ def test_orders_of_displacement_velocity_and_force(scheme, degree, counts, expec
 
 @pytest.mark.parametrize(
     ("scheme", "degree", "springs"),
-    [("energy", 0, 3.0), ("energy", 1, 3.75), ("energy", 2, 3.25), ("hermite", 1, 3.25), ("hermite", 2, 3.25)],
+    [("energy", 0, 2.1), ("energy", 1, 3.0), ("energy", 2, 2.4), ("hermite", 1, 2.4), ("hermite", 2, 2.4)],
 )
-def test_a_step_costs_two_beam_advances_and_about_three_of_the_spring(scheme, degree, springs):
+def test_a_step_costs_two_beam_advances_and_two_to_three_of_the_spring(scheme, degree, springs):
     """Regular steps, after the response matrices are known: guess and check of the beam; the spring's iterations."""
     size, count = 1e-3, 60
     beam, spring = after_impact(10)
@@ -208,7 +208,7 @@ class Refusing(DuffingBody):
 
 def test_a_refused_step_propagates_and_the_marks_are_kept():
     beam, spring = modal_beam(4), Refusing()
-    tie = Tie(conditions("energy", 1), 1, 1e-12, 1e-3)
+    tie = Tie(conditions("energy", 1), 1, 1e-12)
     start = [beam.motion(), spring.motion()]
     for body in (beam, spring):
         body.mark()
@@ -230,7 +230,7 @@ class Deaf(DuffingBody):
 
 def test_not_converged_carries_the_gap_that_is_left():
     beam, spring = modal_beam(4), Deaf()
-    tie = Tie(conditions("energy", 0), 0, 1e-12, 1e-3)
+    tie = Tie(conditions("energy", 0), 0, 1e-12)
     for body in (beam, spring):
         body.mark()
     with pytest.raises(NotConverged) as caught:
@@ -243,7 +243,7 @@ def test_not_converged_carries_the_gap_that_is_left():
 def test_a_body_that_is_not_finite_does_not_converge():
     beam, spring = modal_beam(4), DuffingBody(external=float("inf"))
     spring._reach = lambda y, size: size  # its step control needs finite numbers
-    tie = Tie(conditions("energy", 0), 0, 1e-12, 1e-3)
+    tie = Tie(conditions("energy", 0), 0, 1e-12)
     for body in (beam, spring):
         body.mark()
     with pytest.raises(NotConverged) as caught:

@@ -12,17 +12,13 @@ from ..subsystem import Force, Motion
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
 
 
-def derivatives(a: Sequence[float] | np.ndarray, size: float) -> Force:
+def derivatives(a: Sequence[float], size: float) -> Force:
     """(C, Ċ, C̈) at the step's start [N, N/s, N/s²] of Legendre coefficients ``a`` [N] (1 to 3 of them)."""
     if len(a) == 1:
-        return (float(a[0]), 0.0, 0.0)
+        return (a[0], 0.0, 0.0)
     if len(a) == 2:
-        return (float(a[0] - a[1]), float(2.0 * a[1] / size), 0.0)
-    return (
-        float(a[0] - a[1] + a[2]),
-        float((2.0 * a[1] - 6.0 * a[2]) / size),
-        float(12.0 * a[2] / (size * size)),
-    )
+        return (a[0] - a[1], 2.0 * a[1] / size, 0.0)
+    return (a[0] - a[1] + a[2], (2.0 * a[1] - 6.0 * a[2]) / size, 12.0 * a[2] / (size * size))
 
 
 def end_value(force: Force, size: float) -> float:
@@ -59,11 +55,10 @@ def shifted(force: Force, tau: float) -> Force:
     return (value(force, tau), force[1] + tau * force[2], force[2])
 
 
-def legendre(force: Force, size: float, degree: int) -> np.ndarray:
-    """Legendre coefficients, shape (degree + 1,), of the polynomial (cut above ``degree``)."""
+def legendre(force: Force, size: float, degree: int) -> list[float]:
+    """The degree + 1 Legendre coefficients of the polynomial (cut above ``degree``)."""
     slope, bend = size * force[1], size * size * force[2]
-    a = (force[0] + slope / 2.0 + bend / 6.0, slope / 2.0 + bend / 4.0, bend / 12.0)
-    return np.array(a[: degree + 1])
+    return [force[0] + slope / 2.0 + bend / 6.0, slope / 2.0 + bend / 4.0, bend / 12.0][: degree + 1]
 
 
 def free_mass_response(degree: int, size: float, mass: float) -> list[Motion]:

@@ -3,10 +3,13 @@
 Unknowns are the Legendre coefficients a of C; residuals are the conditions of the gap, in metres. The beam is linear:
 its conditions are affine in a with a matrix that depends on H alone, which is measured once per H and remembered.
 The spring's matrix starts as that of a free mass and follows by Broyden's rank-one updates, so a step usually costs two
-beam steps and two or three spring steps.
+beam steps and two spring steps.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterable
+from operator import add, mul, sub
 
 import numpy as np
 
@@ -21,6 +24,13 @@ _NOISE = 1e3
 _REACH_OF_GUESS = 4.0
 
 
+#: Step sizes whose responses are remembered: the macro step's, and some of steps cut by events.
+_SIZES_REMEMBERED = 64
+
+Vector = list[float]
+Matrix = list[list[float]]
+
+
 class NotConverged(StepRefused):
     """The conditions could not be met."""
 
@@ -32,6 +42,8 @@ class NotConverged(StepRefused):
 class Tie:
     """Solver for one scheme; keeps the response matrices between steps.
 
+    Vectors and matrices of its 1 to 3 unknowns are lists of floats: numpy's overhead would be most of a step's time.
+
     Parameters
     ----------
     conditions
@@ -40,17 +52,14 @@ class Tie:
         Degree of the contact force.
     tolerance
         Of the conditions, relative to the motion over the step, the larger of H·max(|u̇|, |ẏ|) and |Δu|.
-    regular_size
-        The macro step: only its response matrices are worth keeping.
     """
 
-    def __init__(self, conditions: Conditions, degree: int, tolerance: float, regular_size: float) -> None:
+    def __init__(self, conditions: Conditions, degree: int, tolerance: float) -> None:
         self._conditions = conditions
         self._degree = degree
         self._tolerance = tolerance
-        self._regular_size = regular_size
-        self._beam_matrix: dict[float, np.ndarray] = {}
-        self._partner_matrix: dict[type, np.ndarray] = {}
+        #: By the size of the step: B, and by partner the inverse of B − S.
+        self._responses: dict[float, tuple[Matrix, dict[type, Matrix]]] = {}
         self._last_size = 0.0
         self._reach = 0.0  #: largest displacement of an end so far [m]
         self.iterations = 0  #: Newton updates since the start
@@ -66,71 +75,70 @@ class Tie:
         a = force.legendre(guess, size, self._degree)
         r_beam = self._advance(beam, time, size, a)
         beam_end = beam.motion()
-        B = self._beam_matrix.get(size)
-        at_beam: np.ndarray | None = a
-        if B is None:
-            B, at_beam = self._measure(beam, time, size, a, r_beam, beam_end, 1.0), None
-            if size == self._regular_size:
-                self._beam_matrix[size] = B
+        at_beam: Vector | None = a
+        known = self._responses.pop(size, None)
+        if known is None:
+            at_beam = None
+            known = self._measure(beam, time, size, a, r_beam, beam_end, 1.0), {}
+        B, inverses = self._responses[size] = known  # the last one used comes last
+        if len(self._responses) > _SIZES_REMEMBERED:
+            del self._responses[next(iter(self._responses))]
+        inverse = inverses.get(type(partner)) or _inverse(B, self._free_response(partner, size))
         r_partner = self._advance(partner, time, size, a)
-        S = self._partner_response(partner, size)
-        tolerance = self._absolute_tolerance(start, beam_end, partner.motion(), size, B @ a)
-        residual = r_beam - r_partner
-        norm = float(np.abs(residual).max())
+        tolerance = self._absolute_tolerance(start, beam_end, partner.motion(), size, _times(B, a))
+        residual = list(map(sub, r_beam, r_partner))
+        norm = max(map(abs, residual))
         measured = False
         noise = 1.0
         for iteration in range(_MAX_ITERATIONS):
             if not norm < float("inf"):
                 raise NotConverged(norm, iteration)
+            previous = norm
             if norm <= noise * tolerance:
                 if at_beam is a:
                     break
                 r_beam, at_beam = self._advance(beam, time, size, a), a  # in place of the affine prediction
                 # A bad guess moves the bodies far: what counts is the motion under the force found.
-                tolerance = self._absolute_tolerance(start, beam.motion(), partner.motion(), size, B @ a)
+                tolerance = self._absolute_tolerance(start, beam.motion(), partner.motion(), size, _times(B, a))
+                residual = list(map(sub, r_beam, r_partner))
+                norm = max(map(abs, residual))
             else:
                 self.iterations += 1
-                try:
-                    step = np.linalg.solve(B - S, -residual)
-                except np.linalg.LinAlgError:
-                    raise NotConverged(norm, iteration) from None
-                a = a + step
-                r_beam = r_beam + B @ step
-                r_new = self._advance(partner, time, size, a)
-                S = S + np.outer(r_new - r_partner - S @ step, step) / (step @ step)
-                r_partner = r_new
-            residual = r_beam - r_partner
-            previous, norm = norm, float(np.abs(residual).max())
+                step = [-x for x in _times(inverse, residual)]
+                a = list(map(add, a, step))
+                r_beam = list(map(add, r_beam, _times(B, step)))
+                r_partner = self._advance(partner, time, size, a)
+                residual = list(map(sub, r_beam, r_partner))
+                norm = max(map(abs, residual))
+                if norm > noise * tolerance:  # below, the difference is rounding and would spoil what is known
+                    inverse = _broyden(inverse, step, residual)
             if norm > noise * tolerance and norm > 0.3 * previous:
                 if not measured:
                     S = self._measure(partner, time, size, a, r_partner, partner.motion(), 1e-4)
                     self._advance(partner, time, size, a)
-                    measured = True
+                    inverse, measured = _inverse(B, S), True
                 elif norm <= _NOISE * tolerance:  # the bodies' own rounding: nothing left to gain
                     noise = _NOISE
         else:
             raise NotConverged(norm, _MAX_ITERATIONS)
         self._last_size = size
-        if size == self._regular_size:
-            self._partner_matrix[type(partner)] = S
+        inverses[type(partner)] = inverse
         return force.derivatives(a, size)
 
-    def _advance(self, body: Body, time: float, size: float, a: np.ndarray) -> np.ndarray:
+    def _advance(self, body: Body, time: float, size: float, a: Vector) -> Vector:
         body.rewind()
         body.advance(time, size, force.derivatives(a, size))
-        return np.array(self._conditions(body.motion(), size))
+        return list(self._conditions(body.motion(), size))
 
-    def _partner_response(self, partner: Body, size: float) -> np.ndarray:
-        if size == self._regular_size and type(partner) in self._partner_matrix:
-            return self._partner_matrix[type(partner)]
+    def _free_response(self, partner: Body, size: float) -> Matrix:
         if partner.mass == float("inf"):
-            return np.zeros((self._degree + 1, self._degree + 1))
+            return [[0.0] * (self._degree + 1)] * (self._degree + 1)
         unit = force.free_mass_response(self._degree, size, partner.mass)
-        return np.column_stack([self._conditions(m, size) for m in unit])
+        return _transposed([self._conditions(m, size) for m in unit])
 
     def _measure(
-        self, body: Body, time: float, size: float, a: np.ndarray, r: np.ndarray, end: Motion, fraction: float
-    ) -> np.ndarray:
+        self, body: Body, time: float, size: float, a: Vector, r: Vector, end: Motion, fraction: float
+    ) -> Matrix:
         """Columns ∂conditions/∂a_k by differences about ``a``, where they are ``r`` and the motion ends at ``end``.
 
         The difference would move a free mass by ``fraction`` of the motion; it is exact where the body is linear.
@@ -141,15 +149,43 @@ class Tie:
         for k in range(len(a)):
             changed = a.copy()
             changed[k] += delta
-            columns.append((self._advance(body, time, size, changed) - r) / delta)
-        return np.column_stack(columns)
+            columns.append([(x - y) / delta for x, y in zip(self._advance(body, time, size, changed), r, strict=True)])
+        return _transposed(columns)
 
-    def _absolute_tolerance(
-        self, start: Motion, beam: Motion, partner: Motion, size: float, by_force: np.ndarray
-    ) -> float:
+    def _absolute_tolerance(self, start: Motion, beam: Motion, partner: Motion, size: float, by_force: Vector) -> float:
         speed = max(abs(start.velocity), abs(beam.velocity), abs(partner.velocity))
         change = max(size * speed, abs(beam.displacement - start.displacement))
         self._reach = max(self._reach, abs(start.displacement), abs(beam.displacement), abs(partner.displacement))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
-        rounding = 16.0 * _EPS * max(self._reach, float(np.abs(by_force).max()))
+        rounding = 16.0 * _EPS * max(self._reach, *map(abs, by_force))
         return max(self._tolerance * change, rounding)
+
+
+def _times(A: Matrix, x: Vector) -> Vector:
+    return [sum(map(mul, row, x)) for row in A]
+
+
+def _transposed(rows: Iterable[Iterable[float]]) -> Matrix:
+    return [list(column) for column in zip(*rows, strict=True)]
+
+
+def _inverse(B: Matrix, S: Matrix) -> Matrix:
+    """(B − S)⁻¹. Raises NotConverged if there is none."""
+    try:
+        inverse: Matrix = np.linalg.inv(np.subtract(B, S)).tolist()
+    except np.linalg.LinAlgError:
+        raise NotConverged(float("nan"), 0) from None
+    return inverse
+
+
+def _broyden(inverse: Matrix, step: Vector, residual: Vector) -> Matrix:
+    """Broyden's rank-one update of the inverse Jacobian after ``step``, which was to leave no residual.
+
+    J⁻¹ + d (sᵀJ⁻¹) / (sᵀ(s − d)) with d = −J⁻¹r: Broyden (1965), in the form of Sherman and Morrison.
+    """
+    d = [-x for x in _times(inverse, residual)]
+    denominator = sum(s * (s - x) for s, x in zip(step, d, strict=True))
+    if denominator == 0.0:
+        return inverse
+    row = [sum(map(mul, step, column)) / denominator for column in zip(*inverse, strict=True)]
+    return [[x + y * z for x, z in zip(line, row, strict=True)] for line, y in zip(inverse, d, strict=True)]
