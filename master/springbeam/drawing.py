@@ -15,7 +15,7 @@ from .trajectory import EVENT_KINDS, Trajectory
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
-GREY = "#777777"
+GREY, STONE = "#777777", "#B8B8B8"
 
 PHASE_SHADES = {"free": "#FFFFFF", "tied": "#D6EAF7", "touch": "#FFF1B8", "seated": "#CFE8DD"}
 OTHER_SHADES = ("#EADCE7", "#E4E4E4", "#F7DCC8")
@@ -112,6 +112,12 @@ def alternates(values: np.ndarray) -> bool:
     reversals = np.mean(jumps[1:] * jumps[:-1] < 0.0)
     usual_range = np.subtract(*np.quantile(values, (0.95, 0.05)))
     return bool(reversals > 0.6 and np.mean(np.abs(jumps)) > 0.15 * usual_range)
+
+
+def unresolved(trajectory: Trajectory) -> list[str]:
+    """Words for the quantities that alternate from step to step."""
+    looks = POSITIONS | VELOCITIES | FORCES
+    return [looks[name].words for name in present(trajectory, looks) if alternates(trajectory[name])]
 
 
 def phase_intervals(

@@ -16,6 +16,8 @@ _TURNS = 6
 _ROOM, _COIL = 0.08, 0.4
 #: A coil of unit height and half-width, from its foot up; only the heights follow the spring.
 COIL_ACROSS = np.array([0.0, 0.0, *(-1.0, 1.0) * _TURNS, 0.0, 0.0])
+#: Half-widths of coil and stop, as parts of the beam's length.
+COIL_WIDTH, STOP_WIDTH = 0.035, 0.08
 COIL_HEIGHTS = np.array([0.0, 0.12, *np.linspace(0.12, 0.92, 2 * _TURNS + 2)[1:-1], 0.92, 1.0])
 
 

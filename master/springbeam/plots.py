@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from .crosscheck import Report
 
 #: What tells lines apart besides their colour.
-_LINES: dict[str, dict[str, Any]] = {
+LINES: dict[str, dict[str, Any]] = {
     "u_tip": {"linewidth": 2.2, "alpha": 0.75},
     "y": {"linewidth": 0.9},
     "contact_force": {"linewidth": 0.7},
@@ -84,7 +84,7 @@ _EVENT_MARKERS = {
 _LEVEL_LINES: dict[str, dict[str, Any]] = {"Ψ": {"lw": 0.8, "ls": (0, (4, 3))}, "φ": {"lw": 1.3}}
 _IMPULSE_MARKERS = {"impulse_contact": "o", "impulse_foundation": "^"}
 
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.titlesize": 9.0,
     "axes.labelsize": 9.0,
@@ -133,7 +133,7 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
         _gap_and_energy,
     )
     written = []
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         for name, draw in zip(PICTURES, drawings, strict=True):
             figure = draw(trajectory)
             if figure is not None:
@@ -146,7 +146,7 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
 def plot_crosscheck(report: Report, path: Path) -> None:
     """Co-simulation and reference in one picture, and every error below its bound."""
     trajectory, reference = report.trajectory, report.reference
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         timeline = _Timeline.of(trajectory, "Co-simulation and reference", [2.2, 3.0])
         above, below = timeline.axes
         names = present(trajectory, POSITIONS)
@@ -207,7 +207,7 @@ class _Timeline:
 
     def line(self, ax: Axes, unit: Unit, name: str, look: Look, **style: Any) -> None:
         """A column over time; where it alternates from step to step, as dots on a faint line."""
-        style = {"color": look.colour, "label": look.words, **_LINES.get(name, {}), **style}
+        style = {"color": look.colour, "label": look.words, **LINES.get(name, {}), **style}
         values = self.trajectory[name]
         rows = decimated(self.trajectory["time"], values)
         t, v = self.unit.factor * self.trajectory["time"][rows], unit.factor * values[rows]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
+from rich.progress import track
 
-from ..recording import REPORT, load_trajectory
+from ..recording import ANIMATIONS, REPORT, load_trajectory
 from .common import BAD_INPUT, bad_input_reported, fail
 
 RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Where springbeam run has left its results.")]
@@ -16,6 +19,7 @@ ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace a file
 
 def register(app: typer.Typer) -> None:
     app.command()(report)
+    app.command()(animate)
 
 
 def report(
@@ -35,6 +39,40 @@ def report(
         from ..report import page  # plotly takes a second to load
 
         target.write_text(page(trajectory), encoding="utf-8")
+    typer.echo(target)
+
+
+def animate(
+    directory: RunArgument,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="FILE", help=f"A .gif, or an .mp4 (needs ffmpeg). Default: DIR/{ANIMATIONS[0]}"
+        ),
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=0.1, max=600.0, help="How long it plays.")] = 10.0,
+    fps: Annotated[int, typer.Option(min=1, max=50, help="Frames per second.")] = 20,
+    force: ForceOption = False,
+) -> None:
+    """Write a run as an animation: beam and spring above their positions over time.
+
+    Example: springbeam animate results/soft --out soft.mp4
+    """
+    with bad_input_reported():
+        trajectory = load_trajectory(directory)
+        target = _free(out or directory / ANIMATIONS[0], force)
+        from ..animation import AnimationError
+        from ..animation import animate as write
+
+        console = Console(stderr=True)
+
+        def progress(times: Sequence[float]) -> Iterable[float]:
+            return track(times, "drawing", console=console, transient=True, disable=not console.is_terminal)
+
+        try:
+            write(trajectory, target, seconds=seconds, fps=fps, progress=progress)
+        except AnimationError as error:
+            fail(BAD_INPUT, str(error))
     typer.echo(target)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import tomli_w
 from plotly.offline import get_plotlyjs
 
-from ..drawing import EVENT_LOOKS, FORCES, IMPULSES, POSITIONS, present, readable_unit
+from ..drawing import EVENT_LOOKS, FORCES, IMPULSES, POSITIONS, present, readable_unit, unresolved
 from ..motion import Motion, motion_of
 from ..scene import Scene, load_scene, shipped_scenes
 from ..trajectory import Trajectory
@@ -28,7 +28,6 @@ from .figures import (
     moving_parts,
     phase_key,
     time_unit,
-    unresolved,
 )
 
 _HERE = Path(__file__).parent

@@ -22,6 +22,7 @@ from ..drawing import (
     PHASE_SHADES,
     PHASE_WORDS,
     POSITIONS,
+    STONE,
     VELOCITIES,
     VERMILLION,
     Look,
@@ -38,7 +39,7 @@ from ..drawing import (
     stackable,
     stem_foot,
 )
-from ..motion import COIL_ACROSS, COIL_HEIGHTS, Motion
+from ..motion import COIL_ACROSS, COIL_HEIGHTS, COIL_WIDTH, STOP_WIDTH, Motion
 from ..trajectory import SHAPE_POINTS, Trajectory
 
 NOT_RESOLVED = "alternates from step to step: not resolved"
@@ -76,8 +77,6 @@ _EVENT_SIGNS = {
 }
 _IMPULSE_SYMBOLS = {"impulse_contact": "circle", "impulse_foundation": "triangle-up"}
 _GRID = "#E3E3E3"
-#: Half-widths of coil and stop, as parts of the beam's length.
-_COIL_WIDTH, _STOP_WIDTH = 0.035, 0.08
 
 
 @dataclass
@@ -134,12 +133,6 @@ def charts(trajectory: Trajectory) -> list[Chart]:
         found.append(_lines(trajectory, "gap", "Gap", {"gap": gap}, "gap", "m"))
     found += [_energies(trajectory), _residual(trajectory)]
     return found
-
-
-def unresolved(trajectory: Trajectory) -> list[str]:
-    """Words for the quantities that alternate from step to step."""
-    looks = POSITIONS | VELOCITIES | FORCES
-    return [looks[name].words for name in present(trajectory, looks) if alternates(trajectory[name])]
 
 
 # -- over time ----------------------------------------------------------------------------------------------------
@@ -462,7 +455,7 @@ def _motion(trajectory: Trajectory, motion: Motion) -> Chart:
     figure.update_xaxes(range=[-0.02 * length, 1.12 * length], title_text=f"position along the beam x [{along.name}]")
     if beam is None:
         figure.update_xaxes(visible=False, range=[0.5 * length, 1.5 * length])
-    solid = {"type": "rect", "line": {"width": 0.0}, "fillcolor": "#B8B8B8", "layer": "below"}
+    solid = {"type": "rect", "line": {"width": 0.0}, "fillcolor": STONE, "layer": "below"}
     if beam is not None:
         figure.add_shape(**solid, x0=-0.02 * length, x1=0.0, y0=0.0, y1=1.0, yref="paper")
         figure.add_shape(
@@ -470,19 +463,19 @@ def _motion(trajectory: Trajectory, motion: Motion) -> Chart:
         )
     for symbol, value in motion.levels.items():
         level = unit.factor * value
-        where = {"x0": length * (1.0 - _STOP_WIDTH), "x1": length * (1.0 + _STOP_WIDTH), "y1": level}
+        where = {"x0": length * (1.0 - STOP_WIDTH), "x1": length * (1.0 + STOP_WIDTH), "y1": level}
         if symbol == "φ":
             # Two blocks where a spring stands between them.
-            inner = 1.2 * _COIL_WIDTH * length if motion.y is not None else 0.0
+            inner = 1.2 * COIL_WIDTH * length if motion.y is not None else 0.0
             for side in (-1.0, 1.0):
-                edges = {"x0": length + side * inner, "x1": length * (1.0 + side * _STOP_WIDTH)}
+                edges = {"x0": length + side * inner, "x1": length * (1.0 + side * STOP_WIDTH)}
                 figure.add_shape(**solid, **edges, y0=low, y1=level)
             figure.add_shape(type="line", **where, y0=level, line={"color": BLACK, "width": 1.0})
         else:
             figure.add_shape(type="line", **where, y0=level, line={"color": BLACK, "width": 1.0, "dash": "dash"})
         figure.add_annotation(x=where["x1"], y=level, text=symbol, showarrow=False, xanchor="left", xshift=3)
     if motion.y is not None:
-        half = _COIL_WIDTH * length
+        half = COIL_WIDTH * length
         figure.add_scatter(
             x=length + half * COIL_ACROSS, y=unit.factor * motion.coil(0), mode="lines", meta="coil",
             line={"color": VERMILLION, "width": 2.0}, name="spring", hoverinfo="skip",

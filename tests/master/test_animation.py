@@ -1,0 +1,180 @@
+"""The animation: its frames are the recorded ones, it plays as long as asked, and it says why it cannot be made."""
+
+from __future__ import annotations
+
+import subprocess
+from itertools import pairwise
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.animation import FFMpegWriter
+from PIL import Image
+from runs import PAIR, a_trajectory
+from typer.testing import CliRunner
+
+from springbeam import animation, cli
+from springbeam.animation import AnimationError, animate
+from springbeam.motion import motion_of
+from springbeam.recording import FileRecorder, RunDirectory
+from springbeam.scene import with_changes
+
+SCENES = {
+    "pair": PAIR,
+    "no stop": with_changes(PAIR, stop=None),
+    "no spring": with_changes(PAIR, spring=None),
+    "spring": with_changes(PAIR, beam=None),
+}
+
+
+@pytest.fixture
+def picture():
+    run = a_trajectory()
+    with matplotlib.rc_context(animation.STYLE):
+        return animation._Picture(run, motion_of(run)), run
+
+
+def test_each_frame_is_a_recorded_one(picture):
+    shown, run = picture
+    motion = motion_of(run)
+    for frame in (0, 123, 399):
+        shown.show(frame)
+        drawn = {part: line.get_ydata() / factor for line, part, factor in shown._moving}
+        assert np.allclose(drawn["beam"], run.shapes[1][frame], rtol=1e-15)
+        assert np.allclose(drawn["coil"], motion.coil(frame), rtol=1e-15)
+        assert np.allclose(drawn["top"], run.y[frame], rtol=1e-15)
+        assert shown._cursor.get_xdata() == [run.time[frame]] * 2
+        assert shown._words.get_text().split() == ["t", "=", f"{run.time[frame]:.4f}", "s", str(run.phase[frame])]
+
+
+def test_what_stands_still_is_drawn_as_it_was_laid_out(picture):
+    """The frozen background with the moving parts upon it is the picture drawn in full, but for lines that cross."""
+    shown, run = picture
+    shown.show(77)
+    frozen = pixels(shown.figure)
+    with matplotlib.rc_context(animation.STYLE), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(animation._Picture, "_freeze", lambda self: None)
+        whole = animation._Picture(run, motion_of(run))
+    whole.show(77)
+    full = pixels(whole.figure)
+    assert frozen.shape == full.shape == (500, 800, 3)
+    assert np.mean(np.any(np.abs(frozen - full) > 40.0, axis=2)) < 0.005
+    assert full.std() > 20.0
+
+
+def pixels(figure):
+    canvas = animation.FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].astype(float)
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+def test_a_gif_plays_as_long_as_asked(tmp_path, recwarn, scene):
+    path = tmp_path / "run.gif"
+    animate(a_trajectory(scene), path, seconds=0.5, fps=20)
+    with Image.open(path) as gif:
+        assert gif.size == (800, 500)
+        assert gif.n_frames == 10
+        durations, images = [], []
+        for frame in range(gif.n_frames):
+            gif.seek(frame)
+            durations.append(gif.info["duration"])
+            images.append(np.asarray(gif.convert("RGB"), dtype=float))
+    assert sum(durations) == 500
+    assert all(np.any(a != b) for a, b in pairwise(images))
+    assert [str(warning.message) for warning in recwarn] == []
+
+
+def test_a_motion_that_is_not_resolved_is_said_to_be(tmp_path):
+    def titles(run):
+        with matplotlib.rc_context(animation.STYLE):
+            return [ax.get_title("right") for ax in animation._Picture(run, motion_of(run)).figure.axes]
+
+    assert not any(titles(a_trajectory()))
+    assert "not resolved" in titles(a_trajectory(v_tip=np.where(np.arange(400) % 2, 1.0, -1.0)))[0]
+    warned = a_trajectory()
+    warned.summary["warnings"] = ["not resolved: take smaller steps"]
+    assert "not resolved" in titles(warned)[0]
+
+
+def test_mp4_holds_every_frame(tmp_path):
+    if not FFMpegWriter.isAvailable():
+        pytest.skip("ffmpeg is not installed: MP4 files are not tested")
+    path = tmp_path / "run.mp4"
+    animate(a_trajectory(), path, seconds=1.0, fps=10)
+    decoded = subprocess.run(
+        ["ffmpeg", "-v", "error", "-i", path, "-f", "framemd5", "-"], capture_output=True, text=True, check=True
+    ).stdout
+    frames = [line for line in decoded.splitlines() if not line.startswith("#")]
+    assert len(frames) == 10
+    assert len({line.split(",")[-1] for line in frames}) == 10
+
+
+def test_without_ffmpeg_an_mp4_is_refused_with_the_remedy(tmp_path, monkeypatch):
+    monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", "/no/such/ffmpeg")
+    with pytest.raises(AnimationError, match=r"needs ffmpeg.*apt-get install ffmpeg.*or write a .gif"):
+        animate(a_trajectory(), tmp_path / "run.mp4")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_ffmpeg_that_fails_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", "false")
+    with pytest.raises(AnimationError, match="ffmpeg could not write it"):
+        animate(a_trajectory(), tmp_path / "run.mp4", seconds=0.2)
+    assert list(tmp_path.iterdir()) == []
+
+
+# -- the command --------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def directory(tmp_path):
+    run = a_trajectory(n=30)
+    with FileRecorder(run.scene, RunDirectory.create(tmp_path / "run")) as recorder:
+        for i in range(len(run)):
+            recorder.row({name: values[i] for name, values in run.columns.items()})
+            recorder.shape(run.time[i], run.shapes[1][i])
+        recorder.finish({"status": "done", "warnings": []})
+    return tmp_path / "run"
+
+
+def command(*arguments):
+    return CliRunner().invoke(cli.app, ["animate", *(str(argument) for argument in arguments)])
+
+
+def test_the_command_writes_a_gif_into_the_directory_and_says_where(directory):
+    result = command(directory, "--seconds", 0.2, "--fps", 10)
+    assert (result.exit_code, result.stdout) == (0, f"{directory / 'animation.gif'}\n")
+    with Image.open(directory / "animation.gif") as gif:
+        assert gif.n_frames == 2
+    again = command(directory, "--seconds", 0.2)
+    assert again.exit_code == 2
+    assert "already exists; --force replaces it" in again.stderr
+    RunDirectory.create(directory, replace=True)
+    assert list(directory.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nowhere"], "is not a run directory"),
+        (["run", "--out", "run.avi"], "an animation is a .gif or a .mp4 file"),
+        (["run", "--out", "no/such/run.gif"], "No such file"),
+        (["run", "--fps", "0"], "--fps"),
+        (["run", "--seconds", "0"], "--seconds"),
+    ],
+)
+def test_bad_input_is_one_clear_error(directory, monkeypatch, arguments, message):
+    monkeypatch.chdir(directory.parent)
+    result = command(*arguments)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert not list(directory.parent.rglob("*.gif"))
+
+
+def test_a_run_of_one_row_has_nothing_to_animate(tmp_path):
+    with FileRecorder(PAIR, RunDirectory.create(tmp_path / "run")) as recorder:
+        recorder.finish({"status": "stopped"})
+    result = command(tmp_path / "run")
+    assert result.exit_code == 2
+    assert "nothing to animate" in result.stderr
