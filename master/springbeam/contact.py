@@ -129,7 +129,7 @@ class Transitions:
         impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
         at_equilibrium = abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
-        tied = low.displacement < psi or (common <= 0.0 and at_equilibrium)
+        tied = common <= 0.0 if at_equilibrium else low.displacement < psi
         return Phase(Joint.TIED if tied else Joint.TOUCH), impact
 
     def _strike(self, phase: Phase, tip: Motion, low: Motion) -> tuple[str, Phase, Impact]:
@@ -142,7 +142,10 @@ class Transitions:
         ends = (z, self._mass or 0.0, v, self._tip_mass or 0.0)
         speed = max(abs(w) for w in (z, v) if w is not None)
         self._fastest_impact = max(self._fastest_impact, speed)
-        if (e * speed <= _SEATING_SPEED * self._fastest_impact and e < 1.0) or speed == 0.0:
+        # It strikes while rising if the rebound would be over in no time.
+        rising = (low if self._mass is not None else tip).velocity > 0.0
+        dies_out = rising or e * speed <= _SEATING_SPEED * self._fastest_impact
+        if (dies_out and e < 1.0) or speed == 0.0:
             joint = phase.joint if self._mass is not None else Joint.TIED
             return "seated", Phase(joint, seated=True), foundation_impact(*ends, restitution=0.0)
         return "stop_impact", phase, foundation_impact(*ends, restitution=e)

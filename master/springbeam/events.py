@@ -134,14 +134,16 @@ def cubic_crossing(start: Sample, end: Sample, size: float) -> float:
 def locate(
     evaluate: Callable[[float], Sample], start: Sample, end: Sample, size: float, tolerance: float, time: float
 ) -> float:
-    """Step size at which f = 0 to ``tolerance``, by Newton's method inside a bracket.
+    """Step size at which f = 0 to ``tolerance``, by Newton's method inside a bracket, then by secants.
 
     ``evaluate(h)`` repeats the step with size h and returns f, ḟ at its end; the last size evaluated is the one
     returned, so the bodies are left there. f(0) ≥ 0 > f(size); ``time`` is the step's start (its rounding bounds what
-    can be told apart). A zero that f rises from, as it may at the start, is none of these.
+    can be told apart). A zero that f rises from, as it may at the start, is none of these. ḟ is only the first guess of
+    df/dh: where both ends differ in velocity, the force of a step, and with it the motion, changes with h.
     """
     low, high = 0.0, size
     h = cubic_crossing(start, end, size)
+    last: tuple[float, float] | None = None
     for _ in range(_MAX_EVALUATIONS):
         value, rate = evaluate(h)
         if abs(value) <= tolerance and rate < 0.0:
@@ -152,7 +154,13 @@ def locate(
             high = h
         if high - low <= 4.0 * _EPS * max(abs(time), size):
             return h
-        h = h - value / rate if rate < 0.0 else 0.5 * (low + high)
+        slope = rate
+        if last is not None:
+            slope = (value - last[1]) / (h - last[0])
+            if abs(value) > 0.5 * abs(last[1]):
+                slope = 0.0  # no progress: the bracket is halved
+        last = (h, value)
+        h = h - value / slope if slope < 0.0 else 0.5 * (low + high)
         if not low < h < high:
             h = 0.5 * (low + high)
     return h

@@ -30,6 +30,7 @@ class Ledger:
     scale: float = 0.0  #: the largest energy so far [J]
     largest_residual: float = 0.0  #: [J]
     relative: float = 0.0  #: the largest residual over the scale at its time
+    gain: float = 0.0  #: the same of the residuals that are positive
 
     def book(self, beam: Energies, spring: Energies, contact: float) -> Booked:
         """The next row; ``contact`` is the energy of the contact law [J]."""
@@ -45,4 +46,5 @@ class Ledger:
         self.largest_residual = max(self.largest_residual, abs(residual))
         if self.scale > 0.0:
             self.relative = max(self.relative, abs(residual) / self.scale)
+            self.gain = max(self.gain, residual / self.scale)
         return Booked(e_beam, e_spring, contact, dissipated, self.impact_loss, load, total, residual)

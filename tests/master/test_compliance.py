@@ -8,7 +8,7 @@ from bodies import DuffingBody, drift, modal_beam, orders
 from scipy.integrate import quad
 
 from springbeam.coupling.compliance import Compliance, compliance_energy, compliance_force, discrete_gradient
-from springbeam.subsystem import NO_FORCE
+from springbeam.subsystem import NO_FORCE, Motion
 
 EPS = float(np.finfo(float).eps)
 PAIRS = [(0.0, 1e-3), (1e-3, 0.0), (1e-3, -2e-3), (-1e-3, 5e-4), (1e-3, 1.05e-3), (1e-3, 1.2e-3), (-1e-3, -2e-3)]
@@ -89,3 +89,28 @@ def test_a_step_of_contact_costs_a_few_advances(stiffness):
     _, _, bodies = couple(stiffness, 1.0, 1e-3, 200)
     for body in bodies:
         assert body.steps <= 4 * 200
+
+
+class Affine:
+    """Ends a step at ``free`` + ``response``·C [m]."""
+
+    def __init__(self, free: float, response: float, size: float):
+        self.free, self.response, self.mass = free, response, 0.5 * size**2 / abs(response)
+
+    def rewind(self): ...
+
+    def advance(self, time, size, contact):
+        self.w = self.free + self.response * contact[0]
+
+    def motion(self):
+        return Motion(self.w, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("response", [1e-12, 1.0, 1e4])
+@pytest.mark.parametrize("depth", [1e-9, 10.0])
+def test_forces_are_found_however_far_they_move_the_ends(depth, response):
+    """λ = 1e12 N/m, q = 1, contact from the start of the step: C = λ p⁺/2 with p⁺ = depth − 2·response·C. The force at
+    C = 0 is up to 1e16 times the one that is looked for."""
+    law = Compliance(1e12, 1.0, 1e-12, 1e-3)
+    c = law.solve(Affine(-depth, response, 1e-3), Affine(0.0, -response, 1e-3), 0.0, 1e-3, NO_FORCE, 0.0)[0]
+    assert c == pytest.approx(1e12 * depth / (2.0 + 2e12 * response), rel=1e-11)

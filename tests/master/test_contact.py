@@ -6,8 +6,9 @@ from itertools import product
 
 import pytest
 
-from springbeam.contact import Impact, Joint, Phase, foundation_impact, meeting, rebound, spring_force
-from springbeam.scene import Spring
+from springbeam.contact import Impact, Joint, Phase, Transitions, foundation_impact, meeting, rebound, spring_force
+from springbeam.scene import Spring, load_scene
+from springbeam.subsystem import Motion
 
 MASSES = [(0.25, 1.0), (1.0, 0.01), (3.0, 100.0)]
 VELOCITIES = [(-1.0, 0.0), (-0.2, 0.7), (0.1, 0.3)]
@@ -96,3 +97,14 @@ def test_spring_force_is_that_of_the_duffing_law(y, load):
 def test_a_phase_is_named_by_its_joint_unless_seated():
     names = [str(Phase(joint, seated)) for joint in Joint for seated in (False, True)]
     assert names == ["free", "seated", "tied", "seated", "touch", "seated"]
+
+
+@pytest.mark.parametrize("y", [-1e-18, 0.0, 1e-18])
+@pytest.mark.parametrize(("speed", "joint"), [(0.3, Joint.TOUCH), (0.0, Joint.TIED), (-0.3, Joint.TIED)])
+def test_a_meeting_at_the_equilibrium_is_told_by_the_velocity(y, speed, joint):
+    """Within rounding of Ψ: tied while rising it would be released at once, and meet again, for ever."""
+    transitions = Transitions(load_scene("soft"), tip_mass=0.01, mass=1.0)
+    end = Motion(y, speed, 0.0, 0.0)
+    _, phase, impact = transitions.happens("impact", Phase(), (end, end), 0.0, 1e-17)
+    assert phase.joint is joint
+    assert impact.energy_loss == 0.0

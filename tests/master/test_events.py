@@ -134,6 +134,16 @@ def test_locate_survives_a_rate_of_the_wrong_sign():
     assert len(f.sizes) - 2 <= 55
 
 
+@pytest.mark.parametrize("share", [0.25, 4.0, 50.0])
+def test_locate_with_a_rate_that_is_not_the_slope(share):
+    """ḟ of a motion that itself depends on h is df/dh but for a factor: secants find the root nevertheless, where
+    Newton's method with that factor converges linearly or not at all."""
+    f = Counted(1.0, 0.3, slope_sign=share)
+    h = locate(f, f(0.0), f(3.0), 3.0, 1e-15, 0.0)
+    assert h == pytest.approx(math.acos(0.3), abs=3e-15)
+    assert len(f.sizes) - 2 <= 25
+
+
 def test_locate_gives_up_where_time_itself_is_rounded():
     """At t = 1e6 steps that differ by 4 ulp of t are one: no more evaluations are spent on a tolerance of zero."""
     f = Counted(1.0, 0.3)

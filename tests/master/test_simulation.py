@@ -136,6 +136,27 @@ def test_an_inelastic_foundation_is_left_at_once(size, bound):
     assert max(error(trajectory, exact, q) for q in ("u_tip", "y")) < bound
 
 
+@pytest.mark.parametrize(("e", "size"), [(0.5, 1e-3), (0.97, 10.0), (0.985, 1.0)])
+def test_a_bouncing_mass_comes_to_rest_after_its_geometric_series(e, size):
+    """Constant load g, from height d: rest after t₁ + 2 v₁ (e + e² + …)/g, where e ≥ 0.97 bounces hundreds of times at
+    once. Cut off are rebounds below 1e-8 v₁ or over within 1e-9 H; all of the energy is booked as impact losses."""
+    g, d = 10.0, 0.05
+    v, t1 = (2.0 * g * d) ** 0.5, (2.0 * d / g) ** 0.5
+    rest = t1 + 2.0 * v / g * e / (1.0 - e)
+    scene = scene_from_dict({
+        "time": {"t_end": rest + 5.0 * size},
+        "spring": {"linear_stiffness": 0.0, "external_force": -g, "equilibrium": d},
+        "stop": {"position": 0.0, "restitution": e},
+        "coupling": {"macro_step": size},
+    })  # fmt: skip
+    trajectory = simulate(scene)
+    assert trajectory.summary["stopped"] is None
+    assert [event.kind for event in trajectory.events].count("seated") == 1
+    assert trajectory.events[-1].time == pytest.approx(rest, abs=(2e-8 * v / g + 1e-9 * size) / (1.0 - e))
+    assert trajectory.e_impact_loss[-1] == pytest.approx(g * d, rel=1e-12)
+    assert trajectory.z[-1] == 0.0
+
+
 # -- steps that fail ------------------------------------------------------------------------------------------------
 
 
@@ -234,3 +255,22 @@ def test_the_ledger_shows_what_is_taken_from_it():
     # The ledger starts before the impact, with the spring at rest.
     assert wrong.energy_residual == pytest.approx(extra, abs=1e-14)
     assert extra.max() > 1e-6
+
+
+@pytest.mark.parametrize(("share", "stops"), [(5e-4, False), (0.02, False), (0.3, True)])
+def test_energy_that_appears_is_named_whatever_the_scheme(share, stops):
+    """A spring that reports more kinetic energy than it has: a warning from 1e-3 of the energy on, a stop at 0.1."""
+    scene = soft(time={"t_end": 0.05}, coupling={"scheme": "energy", "degree": 0})
+    total = simulate(scene).e_total[0]
+
+    def energies(own):
+        values = own()
+        return values._replace(kinetic=values.kinetic + share * total * (values.kinetic > 0.0))
+
+    trajectory = simulate(scene, wrapped(energies=energies))
+    named = [w for w in trajectory.summary["warnings"] if "changed the energy" in w]
+    assert len(named) == (share > 1e-3)
+    if stops:
+        assert named[0] in str(trajectory.summary["stopped"])
+    else:
+        assert trajectory.summary["stopped"] is None

@@ -118,4 +118,6 @@ class Compliance:
         high = discrete_gradient(start, p + response * c, *self._law)
         if high <= 0.0:
             return 0.0
-        return float(brentq(mismatch, 0.0, high, xtol=1e-300, rtol=4.0 * _EPS))
+        # A force that moves the penetration by less than its rounding need not be told from zero.
+        unseen = max(1e-3 * _EPS * self._scale / response, 1e-300)
+        return float(brentq(mismatch, 0.0, high, xtol=unseen, rtol=4.0 * _EPS, maxiter=1000))
