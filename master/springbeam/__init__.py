@@ -6,11 +6,21 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .runner import RunStopped, simulate
+    from .runner import RunStopped, resume, simulate
     from .scene import Scene, SceneError, load_scene, with_changes
     from .trajectory import Event, Trajectory
 
-__all__ = ["Event", "RunStopped", "Scene", "SceneError", "Trajectory", "load_scene", "simulate", "with_changes"]
+__all__ = [
+    "Event",
+    "RunStopped",
+    "Scene",
+    "SceneError",
+    "Trajectory",
+    "load_scene",
+    "resume",
+    "simulate",
+    "with_changes",
+]
 
 _HOME = {
     "Event": "trajectory",
@@ -19,6 +29,7 @@ _HOME = {
     "SceneError": "scene",
     "Trajectory": "trajectory",
     "load_scene": "scene",
+    "resume": "runner",
     "simulate": "runner",
     "with_changes": "scene",
 }

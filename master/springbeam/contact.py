@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from .memory import Memory
 from .scene import Scene, Spring
 from .subsystem import Motion
 
@@ -78,7 +79,7 @@ def spring_force(spring: Spring, y: float) -> float:
     return spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
 
 
-class Transitions:
+class Transitions(Memory):
     """What each kind of event does to the phase and to the velocities.
 
     Parameters
@@ -88,6 +89,8 @@ class Transitions:
     tip_mass, mass
         What an impulse meets at the tip and at the spring top [kg]; ``None`` for an absent body.
     """
+
+    REMEMBERED = ("_fastest_impact",)
 
     def __init__(self, scene: Scene, tip_mass: float | None, mass: float | None) -> None:
         self._scene, self._tip_mass, self._mass = scene, tip_mass, mass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import hashlib
 import os
 import shutil
 import tempfile
@@ -26,6 +27,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.model_description import ModelDescription, read_model_description
 
+from .memory import Memory
 from .scene import Beam, Scene, Spring
 from .subsystem import NO_FORCE, Energies, Force, Motion, StepRefused
 from .trajectory import SHAPE_POINTS
@@ -47,6 +49,19 @@ def fmu_directory() -> Path:
     here = Path(__file__).resolve().parent
     installed = here / "fmus"
     return installed if installed.is_dir() else here.parents[1] / "fmus"
+
+
+def fingerprints(scene: Scene) -> dict[str, str]:
+    """SHA-256 of the files of the FMUs that ``scene`` contains. Raises FmuError if one is missing."""
+    found = {}
+    for name in ("beam", "spring"):
+        if getattr(scene, name) is not None:
+            path = fmu_directory() / f"{name}.fmu"
+            try:
+                found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+            except OSError as error:
+                raise FmuError(f"{path}: {error.strerror}; ./build.sh fmus builds it") from error
+    return found
 
 
 @lru_cache(maxsize=8)
@@ -86,8 +101,10 @@ class Reals:
             raise self._fmu.failed(status, f"cannot set {self._names}")
 
 
-class Fmu:
+class Fmu(Memory):
     """One instance of a co-simulation FMU and its state."""
+
+    REMEMBERED = ("steps", "rewinds")
 
     def __init__(self, name: str, path: Path, parameters: dict[str, float | int | bool], start_time: float) -> None:
         self.path, self._name = path, name
@@ -212,6 +229,25 @@ class Fmu:
         if status > _WARNING:
             raise self.failed(status, what)
 
+    def save(self) -> dict[str, Any]:
+        try:
+            state = self._slave.getFMUstate()
+            serialized = self._slave.serializeFMUstate(state)
+            self._slave.freeFMUstate(state)
+        except FMICallException as error:
+            raise self.failed(error.status, "cannot save the state") from error
+        return {**super().save(), "state": serialized}
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        counts = dict(saved)
+        try:
+            state = self._slave.deSerializeFMUstate(counts.pop("state", b""), fmi2FMUstate())
+            self._slave.setFMUstate(state)
+            self._slave.freeFMUstate(state)
+        except FMICallException as error:
+            raise self.failed(error.status, "cannot restore the state") from error
+        super().restore(counts)
+
     def close(self) -> None:
         slave, self._slave = getattr(self, "_slave", None), None
         if slave is None:
@@ -229,8 +265,10 @@ class Fmu:
         return messages[-1] if messages else str(otherwise)
 
 
-class _FmuBody:
+class _FmuBody(Memory):
     """What both bodies do alike; a subclass names its variables."""
+
+    REMEMBERED = ("fmu", "_pending", "_current")
 
     _MOTION: tuple[str, ...]
     _ENERGIES: tuple[str, ...]

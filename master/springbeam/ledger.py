@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from .memory import Memory
 from .subsystem import Energies
 
 
@@ -22,8 +23,10 @@ class Booked(NamedTuple):
 
 
 @dataclass
-class Ledger:
+class Ledger(Memory):
     """E_beam + E_spring + E_contact + dissipated + impact losses − work of external loads = constant."""
+
+    REMEMBERED = ("impact_loss", "initial", "scale", "largest_residual", "relative")
 
     impact_loss: float = 0.0  #: [J], by whoever applies an impact
     initial: float | None = None  #: the total of the first row [J]

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from .memory import Memory
+
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
 _SHORT_REMAINDER = 0.25
 #: Times closer than this fraction of H are one.
 _SAME = 1e-9
 
 
-class MacroGrid:
+class MacroGrid(Memory):
     """The grid t₀ + k H up to t_end [s]."""
+
+    REMEMBERED = ("_index",)
 
     def __init__(self, start: float, end: float, macro_step: float) -> None:
         self._start, self._end, self._H = start, end, macro_step

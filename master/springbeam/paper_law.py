@@ -14,6 +14,7 @@ import numpy as np
 
 from .coupling.compliance import compliance_force
 from .ledger import Ledger
+from .memory import Memory
 from .recording import NonFiniteValue, Recorder
 from .scene import Scene
 from .simulation import Progress, RunStopped
@@ -30,8 +31,24 @@ class RestartableBody(Body, Protocol):
         """Start again at ``time`` [s] from a displacement [m] and velocity [m/s]."""
 
 
-class PaperLaw:
+class PaperLaw(Memory):
     """One run of Algorithm 1 with given bodies; parameters as of `springbeam.simulation.Simulation`."""
+
+    REMEMBERED = (
+        "_beam",
+        "_spring",
+        "time",
+        "_begun",
+        "_touched",
+        "_stiffness",
+        "_ledger",
+        "_injected",
+        "_solves",
+        "_iterations",
+        "_steps",
+        "_events",
+        "_beam_response",
+    )
 
     def __init__(
         self,
@@ -48,25 +65,23 @@ class PaperLaw:
         self._parameters = scene.spring
         self._phi = -np.inf if scene.stop is None else scene.stop.position
         self.h = scene.coupling.macro_step
-        self.time = start_time
+        self.time = self._start_time = start_time
+        self._begun = self._touched = False
+        self._stiffness = 0.0  #: λ_nc as lines 12 and 15 have left it
         self._ledger = Ledger()
         self._injected = {"beam": 0.0, "spring": 0.0}
-        self._iterations: list[int] = []
+        self._solves = self._iterations = 0
         self._steps = self._events = 0
         #: u_tip per unit tip force over one step [m/N]; the beam is linear.
         self._beam_response = 0.0
 
     def run(self) -> None:
         """Until t_end. Raises RunStopped; what was computed is with the recorder."""
-        t0, t_end = self.time, self.scene.time.t_end
+        t0, t_end = self._start_time, self.scene.time.t_end
         psi = self._parameters.equilibrium
-        self._touched = self._beam.motion().displacement <= psi
-        self._stiffness = self.scene.contact.stiffness if self._touched else 0.0
         try:
-            if self._touched:
-                self._first_contact()
-            self._record("tied" if self._touched else "free", 0.0, 0.0, 0.0)
-            self._measure_beam()
+            if not self._begun:
+                self._begin()
             while t0 + (self._steps + 1) * self.h <= t_end * (1.0 + 1e-12):
                 phase, contact, inside, foundation = self._step()
                 self._steps += 1
@@ -81,6 +96,15 @@ class PaperLaw:
                     self._progress(self.time, phase, self._steps)
         except (StepRefused, NonFiniteValue) as error:
             raise RunStopped(str(error), self.time) from error
+
+    def _begin(self) -> None:
+        self._touched = self._beam.motion().displacement <= self._parameters.equilibrium
+        if self._touched:
+            self._stiffness = self.scene.contact.stiffness
+            self._first_contact()
+        self._record("tied" if self._touched else "free", 0.0, 0.0, 0.0)
+        self._measure_beam()
+        self._begun = True
 
     def _first_contact(self) -> None:
         """Line 5, or ẏ(t_c) as the scene has it."""
@@ -173,7 +197,8 @@ class PaperLaw:
             slope = -self.scene.contact.exponent * self._law(end) / depth if depth > 0.0 else 0.0
             change = (end - reached) / (1.0 + 0.5 * response * slope)
             if abs(change) <= _TOLERANCE:
-                self._iterations.append(k)
+                self._solves += 1
+                self._iterations += k
                 return reached, pressing
             end -= change
         raise StepRefused("lines 10 and 17 of Algorithm 1: Newton's method for the spring does not converge")
@@ -229,8 +254,8 @@ class PaperLaw:
             "macro_steps": self._steps,
             "events": self._events,
             "halved_steps": 0,
-            "iterations": sum(self._iterations),
-            "spring_steps_per_solve": float(np.mean(self._iterations)) if self._iterations else 0.0,
+            "iterations": self._iterations,
+            "spring_steps_per_solve": self._iterations / self._solves if self._solves else 0.0,
             "max_energy_residual": self._ledger.relative,
             "max_energy_residual_joule": self._ledger.largest_residual,
             "injected_into_beam": self._injected["beam"],

@@ -10,20 +10,26 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from itertools import count
 from math import isfinite
 from pathlib import Path
-from time import monotonic
 from types import TracebackType
-from typing import Any, Protocol, TextIO
+from typing import Any, BinaryIO, Protocol
+from zlib import crc32
 
 import numpy as np
 from pydantic_core import to_json
 
 from .scene import Scene, scene_from_dict
 from .trajectory import COLUMNS, EVENT_COLUMNS, EVENT_KINDS, SHAPE_POINTS, Event, Trajectory
+
+try:
+    import fcntl
+except ImportError:  # Windows: two processes in one directory are not noticed
+    fcntl = None  # type: ignore[assignment]
 
 #: Pictures `springbeam.plots.plot_run` may leave in a run directory.
 PICTURES = (
@@ -43,13 +49,19 @@ _OF_SPRING = frozenset({"y", "z", "e_spring"})
 _OF_PAIR = frozenset(
     {"contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction", "velocity_mismatch", "e_contact"}
 )
+_TRAJECTORY, _EVENTS, _SHAPES = "trajectory.csv", "events.csv", "shapes.csv"
 _SHAPE_HEADER = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
-_FLUSH_SECONDS = 1.0
+#: Of a summary; longer ones are written if the disk has room.
+_SUMMARY_ROOM = 16384
 _PHASE_WIDTH = 32
 
 
 class ResultsExist(FileExistsError):
     """The directory already holds results, which are never overwritten unasked."""
+
+
+class ResultsInUse(RuntimeError):
+    """Another process is writing results into the directory."""
 
 
 class ResultsUnreadable(ValueError):
@@ -244,19 +256,24 @@ class RunDirectory:
 
     @property
     def trajectory(self) -> Path:
-        return self.path / "trajectory.csv"
+        return self.path / _TRAJECTORY
 
     @property
     def events(self) -> Path:
-        return self.path / "events.csv"
+        return self.path / _EVENTS
 
     @property
     def shapes(self) -> Path:
-        return self.path / "shapes.csv"
+        return self.path / _SHAPES
 
     @property
     def summary(self) -> Path:
         return self.path / "summary.json"
+
+    @property
+    def checkpoint(self) -> Path:
+        """There as long as the run is not done, if it was to take checkpoints (`springbeam.checkpoint`)."""
+        return self.path / "run.checkpoint"
 
     @property
     def pictures(self) -> list[Path]:
@@ -265,40 +282,48 @@ class RunDirectory:
 
     def results(self) -> list[Path]:
         """The result files that are there, and what was made from them."""
+        files = (self.summary, self.trajectory, self.events, self.shapes, self.checkpoint)
         made = (self.path / name for name in (REPORT, *ANIMATIONS))
-        files = (self.trajectory, self.events, self.shapes, self.summary, *self.pictures, *made)
-        return [file for file in files if file.exists()]
+        return [file for file in (*files, *self.pictures, *made) if file.exists()]
 
-    def remove(self) -> None:
-        """Remove the results, and the directory if nothing else is in it."""
-        for file in self.results():
-            file.unlink()
-        if not any(self.path.iterdir()):
+    def discard(self) -> None:
+        """Remove the directory if nothing is in it."""
+        with suppress(OSError):
             self.path.rmdir()
 
     @classmethod
     def create(cls, path: str | Path, *, replace: bool = False) -> RunDirectory:
-        """The directory ``path``, made if need be, without results; files that are not results stay.
+        """The directory ``path``, made if need be; what is in it stays until a `FileRecorder` begins to write there.
 
         Parameters
         ----------
         path
             The directory.
         replace
-            Remove results of an earlier run.
+            It may hold results of an earlier run.
 
         Raises
         ------
         ResultsExist
             If it holds results and ``replace`` is false.
+        ResultsInUse
+            If another process is writing them.
+        OSError
+            If the directory cannot be made or written to.
         """
         directory = cls(Path(path))
         directory.path.mkdir(parents=True, exist_ok=True)
         results = directory.results()
         if results and not replace:
             raise ResultsExist(f"{directory.path} already holds results ({results[0].name})")
-        for file in results:
-            file.unlink()
+        if directory.trajectory.exists():
+            with directory.trajectory.open("rb") as file:
+                _lock(file)
+        try:
+            tempfile.TemporaryFile(dir=directory.path).close()
+        except OSError as error:
+            directory.discard()
+            raise OSError(error.errno, error.strerror, str(directory.path)) from error
         return directory
 
     @classmethod
@@ -319,18 +344,64 @@ class RunDirectory:
         raise AssertionError("unreachable")
 
 
+def _lock(file: BinaryIO) -> None:
+    """Hold ``file`` until it is closed or the process ends. Raises ResultsInUse if another process does."""
+    if fcntl is None:
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise ResultsInUse(f"{file.name}: another process is writing to it") from None
+    except OSError:  # a file system without locks
+        return
+
+
+class _Lines:
+    """A result file that grows line by line; each is the operating system's at once, so a killed run loses none."""
+
+    def __init__(self, path: Path, size: int, crc: int) -> None:
+        if not path.is_file():
+            raise ResultsUnreadable(f"{path}: missing")
+        self.path = path
+        self.size, self.crc = size, crc  #: of the lines written [bytes], and their CRC-32
+        self.file = path.open("ab", buffering=0)
+
+    def check(self) -> None:
+        """Raises ResultsUnreadable if the file does not begin with the lines written."""
+        found, left = 0, self.size
+        with self.path.open("rb") as file:
+            while left > 0 and (chunk := file.read(min(left, 1 << 20))):
+                found, left = crc32(chunk, found), left - len(chunk)
+        if left > 0:
+            raise ResultsUnreadable(f"{self.path}: {self.size - left} bytes, fewer than the {self.size} once written")
+        if found != self.crc:
+            raise ResultsUnreadable(f"{self.path}: changed since it was written")
+
+    def cut(self) -> None:
+        """Remove what follows the lines written."""
+        self.file.truncate(self.size)
+
+    def write(self, line: bytes) -> None:
+        written = self.file.write(line)
+        while written < len(line):  # a disk that is almost full takes a part, and then refuses
+            written += self.file.write(line[written:])
+        self.size += len(line)
+        self.crc = crc32(line, self.crc)
+
+
 class FileRecorder(_Checks):
     """Streams into a `RunDirectory` and keeps nothing, so that memory does not grow with the run.
 
-    What was computed is on disk a second later, and ``summary.json`` says from the start which scene it belongs to:
-    the results of a run that was killed can be loaded.
+    A row is in its file when `row` returns, and ``summary.json`` says from the start which scene it belongs to: the
+    results of a run that was killed can be loaded. Results of an earlier run stay until this one has something to
+    record, and are gone then.
 
     Parameters
     ----------
     scene
         The scene as run.
     directory
-        A directory without results (`RunDirectory.create`).
+        Where the results go (`RunDirectory.create`).
     columns
         Names in row order, starting with ``time``; default `columns_of(scene)`.
     """
@@ -341,12 +412,10 @@ class FileRecorder(_Checks):
         self.finished = False
         #: Of the last row [s]; ``None`` before the first.
         self.time: float | None = None
-        self._files: list[TextIO] = []
-        self._rows = self._open(directory.trajectory, self.columns)
-        self._events = self._open(directory.events, EVENT_COLUMNS)
-        self._shapes = None if scene.beam is None else self._open(directory.shapes, _SHAPE_HEADER)
-        self._write_summary({"status": "running"})
-        self._flushed = monotonic()
+        self._headers = {_TRAJECTORY: self.columns, _EVENTS: EVENT_COLUMNS}
+        if scene.beam is not None:
+            self._headers[_SHAPES] = _SHAPE_HEADER
+        self._files: dict[str, _Lines] = {}
 
     def __enter__(self) -> FileRecorder:
         return self
@@ -354,60 +423,126 @@ class FileRecorder(_Checks):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        if not self.finished and error is not None:
+        if self.begun and not self.finished and error is not None:
             self.finish({"status": "stopped", "cause": f"{type(error).__name__}: {error}", "time": self.time})
         self.close()
 
+    @property
+    def begun(self) -> bool:
+        """Whether the directory holds results of this run."""
+        return bool(self._files)
+
     def row(self, values: Mapping[str, Any] | Sequence[Any]) -> None:
         row, phase = self._checked_row(values)
-        self.time = row[0]
         fields: list[float | str] = [*row]
         if self._phase_at >= 0:
             fields.insert(self._phase_at, phase)
-        self._rows.write(_line(fields))
-        if monotonic() - self._flushed > _FLUSH_SECONDS:
-            self.flush()
+        self._file(_TRAJECTORY).write(_line(fields))
+        self.time = row[0]
 
     def event(self, event: Event) -> None:
         values = [getattr(self._checked_event(event), name) for name in EVENT_COLUMNS]
         fields = ["" if v is None else v if isinstance(v, str) else repr(float(v)) for v in values]
-        self._events.write(",".join(fields) + "\n")
+        self._file(_EVENTS).write((",".join(fields) + "\n").encode())
 
     def shape(self, time: float, deflection: np.ndarray) -> None:
         shape = self._checked_shape(time, deflection)
-        if self._shapes is None:
+        if self.scene.beam is None:
             raise ValueError("a beam's shape in a scene without a beam")
-        self._shapes.write(_line([float(time), *shape.tolist()]))
+        self._file(_SHAPES).write(_line([float(time), *shape.tolist()]))
 
     def finish(self, summary: Mapping[str, Any]) -> None:
+        self._begin()
         self.close()
         self._write_summary(summary)
+        if summary.get("status") == "done":
+            self.directory.checkpoint.unlink(missing_ok=True)
         self.finished = True
-
-    def flush(self) -> None:
-        """Hand everything to the operating system."""
-        for file in self._files:
-            file.flush()
-        self._flushed = monotonic()
 
     def close(self) -> None:
         with ExitStack() as files:  # each is closed, also when another cannot be (a full disk)
-            for file in self._files:
-                files.callback(file.close)
+            for lines in self._files.values():
+                files.callback(lines.file.close)
 
-    def _open(self, path: Path, header: Iterable[str]) -> TextIO:
-        file = path.open("x", encoding="utf-8", newline="\n")
-        self._files.append(file)
-        file.write(",".join(header) + "\n")
-        file.flush()
-        return file
+    def save(self) -> dict[str, Any]:
+        """Put what was recorded on the disk, and return what `restore` needs."""
+        self._begin()
+        for lines in self._files.values():
+            os.fsync(lines.file.fileno())
+        return {"time": self.time, "files": {name: (f.size, f.crc) for name, f in self._files.items()}}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on from what `save` of a recorder in the same directory returned; later rows are removed.
+
+        Raises
+        ------
+        ResultsUnreadable
+            If a file is missing or has changed; nothing is removed then.
+        ResultsInUse
+            If another process is writing them.
+        """
+        with ExitStack() as opened:
+            files: dict[str, _Lines] = {}
+            for name in self._headers:
+                files[name] = _Lines(self.directory.path / name, *saved["files"][name])
+                opened.callback(files[name].file.close)
+            _lock(files[_TRAJECTORY].file)
+            for lines in files.values():
+                lines.check()
+            opened.pop_all()
+        self._files = files
+        for lines in files.values():
+            lines.cut()
+        self.time = saved["time"]
+        self._write_summary({"status": "running"})
+        self._reserve_summary()
+
+    def _file(self, name: str) -> _Lines:
+        if not self._files:
+            self._begin()
+        return self._files[name]
+
+    def _begin(self) -> None:
+        """The files with their headers, in place of earlier results once they are written."""
+        if self._files:
+            return
+        headers = {name: (",".join(columns) + "\n").encode() for name, columns in self._headers.items()}
+        parts = {name: self.directory.path / f"{name}.part" for name in headers}
+        try:
+            for name, header in headers.items():
+                parts[name].write_bytes(header)
+            self._reserve_summary()
+        except OSError:
+            for part in (*parts.values(), self._summary_part):
+                with suppress(OSError):
+                    part.unlink()
+            raise
+        for file in self.directory.results():
+            file.unlink()
+        for name, part in parts.items():
+            path = self.directory.path / name
+            os.replace(part, path)
+            self._files[name] = _Lines(path, len(headers[name]), crc32(headers[name]))
+        _lock(self._files[_TRAJECTORY].file)
+        # Last: where there is a summary, there is a run that can be loaded.
+        self._write_summary({"status": "running"})
+        self._reserve_summary()
+
+    @property
+    def _summary_part(self) -> Path:
+        return self.directory.summary.with_suffix(".json.part")
+
+    def _reserve_summary(self) -> None:
+        """Room on the disk for the last summary, which has to say so when the disk is full."""
+        self._summary_part.write_bytes(b" " * _SUMMARY_ROOM)
 
     def _write_summary(self, summary: Mapping[str, Any]) -> None:
         text = json.dumps(_json_ready(_with_scene(summary, self.scene)), indent=2, allow_nan=False, ensure_ascii=False)
         # A reader, or a run killed at this moment, finds the old summary or the new one, never half of it.
-        scratch = self.directory.summary.with_suffix(".json.part")
-        scratch.write_text(text + "\n", encoding="utf-8")
-        os.replace(scratch, self.directory.summary)
+        with self._summary_part.open("r+b" if self._summary_part.exists() else "wb") as file:
+            file.write(text.encode() + b"\n")
+            file.truncate()
+        os.replace(self._summary_part, self.directory.summary)
 
 
 def load_trajectory(directory: str | Path) -> Trajectory:
@@ -466,9 +601,9 @@ def load_events(directory: str | Path) -> Iterator[Event]:
             raise ResultsUnreadable(f"{path}: line {number}: {error}") from None
 
 
-def _line(fields: list[Any]) -> str:
+def _line(fields: list[Any]) -> bytes:
     """Numbers and plain words as a line of CSV; JSON writes numbers the same way, seven times faster than repr."""
-    return to_json(fields)[1:-1].decode().replace('"', "") + "\n"
+    return to_json(fields)[1:-1].replace(b'"', b"") + b"\n"
 
 
 def _complete_lines(path: Path) -> tuple[tuple[str, ...], Iterator[str]]:

@@ -7,6 +7,7 @@ from operator import itemgetter
 from .contact import Joint
 from .coupling.compliance import compliance_force
 from .ledger import Ledger
+from .memory import Memory
 from .recording import Recorder
 from .scene import Scene
 from .stepping import Pair, State
@@ -16,8 +17,10 @@ from .trajectory import COLUMNS
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
 
 
-class Rows:
+class Rows(Memory):
     """Writes rows and shapes of a pair into a recorder, and keeps their extremes."""
+
+    REMEMBERED = ("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed")
 
     def __init__(self, scene: Scene, pair: Pair, ledger: Ledger, recorder: Recorder, start_time: float) -> None:
         self._scene, self._pair, self._ledger, self._recorder = scene, pair, ledger, recorder

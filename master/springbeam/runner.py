@@ -3,21 +3,45 @@
 from __future__ import annotations
 
 from importlib.metadata import version
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from .fmu import FmuBeam, FmuSpring, load_bodies
+from .checkpoint import Checkpoint, CheckpointRefused, Checkpoints
+from .fmu import FmuBeam, FmuSpring, fingerprints, load_bodies
+from .memory import Memory
 from .paper_law import PaperLaw
-from .recording import MemoryRecorder, Recorder
-from .scene import Scene, suspicions, with_changes
+from .recording import FileRecorder, MemoryRecorder, Recorder, RunDirectory, load_summary, load_trajectory
+from .scene import Scene, scene_from_dict, suspicions, with_changes
 from .simulation import Progress, RunStopped, Simulation
 from .trajectory import Trajectory
 
-__all__ = ["RunStopped", "run", "simulate"]
+__all__ = ["RunStopped", "last_checkpoint", "resume", "run", "simulate"]
 
 
-def run(scene: Scene, recorder: Recorder, progress: Progress | None = None) -> dict[str, Any]:
+def run(
+    scene: Scene,
+    recorder: Recorder,
+    progress: Progress | None = None,
+    *,
+    seconds: float | None = None,
+    start: Checkpoint | None = None,
+) -> dict[str, Any]:
     """Co-simulate ``scene`` into ``recorder`` and return the summary.
+
+    Parameters
+    ----------
+    scene
+        What is simulated.
+    recorder
+        Receives the results.
+    progress
+        Called once per accepted step.
+    seconds
+        Take a checkpoint into the directory of ``recorder``, which is then a `FileRecorder`, after the first step and
+        whenever so much time of the clock has passed [s].
+    start
+        Go on from here, `last_checkpoint` of the directory of ``recorder``, instead of from the start.
 
     Raises
     ------
@@ -25,8 +49,22 @@ def run(scene: Scene, recorder: Recorder, progress: Progress | None = None) -> d
         If the run ends early; what was computed has been recorded and the summary written.
     FmuError
         If an FMU cannot be found or loaded.
+    ResultsUnreadable, ResultsInUse
+        If the results do not belong to ``start``, or another process is writing them.
     """
     began = perf_counter()
+    before = 0.0 if start is None else start.wall_time
+    after_step = progress
+    if seconds is not None:
+        if not isinstance(recorder, FileRecorder):
+            raise TypeError("checkpoints belong to results in a directory")
+        checkpoints = Checkpoints(recorder, seconds, version("springbeam"), fingerprints(scene), before)
+
+        def after_step(time: float, phase: str, macro_steps: int) -> None:
+            if progress is not None:
+                progress(time, phase, macro_steps)
+            checkpoints.take_when_due(simulation)
+
     start_time = scene.contact_time or 0.0
     paper = scene.contact.law == "paper"
     beam, spring = load_bodies(_as_in_paper(scene) if paper else scene, start_time)
@@ -35,15 +73,20 @@ def run(scene: Scene, recorder: Recorder, progress: Progress | None = None) -> d
         if paper:
             assert beam is not None
             assert spring is not None
-            simulation = PaperLaw(scene, start_time, beam, spring, recorder, progress)
+            simulation = PaperLaw(scene, start_time, beam, spring, recorder, after_step)
         else:
-            simulation = Simulation(scene, start_time, beam, spring, recorder, progress)
+            simulation = Simulation(scene, start_time, beam, spring, recorder, after_step)
+        if start is not None:
+            _go_on(simulation, recorder, start)
         loaded = perf_counter()
         status: dict[str, Any] = {"status": "done"}
         try:
             simulation.run()
         except RunStopped as stopped:
             status = {"status": "stopped", "cause": stopped.cause, "residual": stopped.residual}
+            raise
+        except Exception as error:
+            status = {"status": "stopped", "cause": f"{type(error).__name__}: {error}"}
             raise
         except BaseException as error:
             status = {"status": "interrupted", "cause": type(error).__name__}
@@ -55,7 +98,7 @@ def run(scene: Scene, recorder: Recorder, progress: Progress | None = None) -> d
                 **simulation.summary(),
                 **_calls(beam, spring),
                 "setup_time": loaded - began,
-                "wall_time": perf_counter() - loaded,
+                "wall_time": before + perf_counter() - loaded,
             }
             summary["warnings"] = [*suspicions(scene), *summary["warnings"]]
             recorder.finish(summary)
@@ -64,6 +107,61 @@ def run(scene: Scene, recorder: Recorder, progress: Progress | None = None) -> d
         for body in (beam, spring):
             if body is not None:
                 body.close()
+
+
+def _go_on(simulation: Memory, recorder: Recorder, start: Checkpoint) -> None:
+    if not isinstance(recorder, FileRecorder):
+        raise TypeError("a run goes on in the directory of its results")
+    try:
+        simulation.restore(start.simulation)
+    except ValueError as error:
+        raise CheckpointRefused(f"{recorder.directory.checkpoint}: written by another version: {error}") from error
+    recorder.restore(start.results)
+
+
+def last_checkpoint(directory: str | Path) -> Checkpoint:
+    """The checkpoint of a run that is not done.
+
+    Raises
+    ------
+    CheckpointRefused
+        If the run is done, has no checkpoint, or would not go on as it began: another version of springbeam, another
+        FMU, another scene.
+    ResultsUnreadable
+        If ``directory`` holds no run.
+    FmuError
+        If an FMU is missing.
+    """
+    results = RunDirectory(Path(directory))
+    summary = load_summary(results.path)
+    if summary.get("status") == "done":
+        raise CheckpointRefused(f"{results.path}: the run is done, nothing to resume")
+    if not results.checkpoint.exists():
+        raise CheckpointRefused(f"{results.path}: no checkpoint; springbeam run --checkpoint SECONDS takes them")
+    start = Checkpoint.read(results.checkpoint)
+    if start.version != version("springbeam"):
+        raise CheckpointRefused(
+            f"{results.checkpoint}: written by springbeam {start.version}, this is {version('springbeam')}"
+        )
+    if start.scene != scene_from_dict(summary["scene"], source=f"{results.summary}: scene"):
+        raise CheckpointRefused(f"{results.summary}: its scene is not the one that was run")
+    found = fingerprints(start.scene)
+    changed = [f"{name}.fmu" for name in found if found[name] != start.fmus.get(name)]
+    if changed:
+        raise CheckpointRefused(f"{results.checkpoint}: the run began with another {' and another '.join(changed)}")
+    return start
+
+
+def resume(directory: str | Path, progress: Progress | None = None) -> Trajectory:
+    """Go on with a run that was killed or stopped, from its last checkpoint to its end, and return all of it.
+
+    The files in ``directory`` then are those of a run that was never stopped, to the last bit. Raises as
+    `last_checkpoint` and `run` do.
+    """
+    start = last_checkpoint(directory)
+    with FileRecorder(start.scene, RunDirectory(Path(directory))) as recorder:
+        run(start.scene, recorder, progress, seconds=start.seconds, start=start)
+    return load_trajectory(directory)
 
 
 def simulate(scene: Scene, progress: Progress | None = None) -> Trajectory:

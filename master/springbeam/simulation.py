@@ -17,6 +17,7 @@ from .detection import Detector
 from .events import interpolated
 from .ledger import Ledger
 from .macro_grid import MacroGrid
+from .memory import Memory
 from .recording import NonFiniteValue, Recorder
 from .rows import Rows
 from .scene import Scene
@@ -47,7 +48,7 @@ class RunStopped(RuntimeError):
         self.cause, self.time, self.residual = cause, time, residual
 
 
-class Simulation:
+class Simulation(Memory):
     """One run of a scene with given bodies.
 
     Parameters
@@ -64,6 +65,21 @@ class Simulation:
         Called once per accepted step.
     """
 
+    REMEMBERED = (
+        "_pair",
+        "_state",
+        "_grid",
+        "_transitions",
+        "_ledger",
+        "_rows",
+        "_begun",
+        "_last_opening",
+        "_at_once",
+        "_macro_steps",
+        "_events",
+        "_halvings",
+    )
+
     def __init__(
         self,
         scene: Scene,
@@ -77,30 +93,37 @@ class Simulation:
         self._H = scene.coupling.macro_step
         self._pair = Pair(scene, beam, spring)
         self._state = State(start_time)
+        self._grid = MacroGrid(start_time, scene.time.t_end, self._H)
         self._detector = Detector(scene, self._pair)
         self._transitions = Transitions(
             scene, None if beam is None else beam.mass, None if spring is None else spring.mass
         )
         self._ledger = Ledger()
         self._rows = Rows(scene, self._pair, self._ledger, recorder, start_time)
+        self._begun = False
         self._last_opening = -float("inf")
+        self._at_once = (0, start_time)  #: events at once, and since when [s]
         self._macro_steps = self._events = self._halvings = 0
 
     def run(self) -> None:
-        """Until t_end. Raises RunStopped; what was computed is with the recorder."""
-        state, t_end = self._state, self._scene.time.t_end
-        grid = MacroGrid(state.time, t_end, self._H)
-        self._settle_start()
-        self._record()
-        at_once, since = 0, state.time
+        """Until t_end, from the start or from where `restore` has put it.
+
+        Raises RunStopped; what was computed is with the recorder.
+        """
+        state, grid, t_end = self._state, self._grid, self._scene.time.t_end
+        if not self._begun:
+            self._settle_start()
+            self._record()
+            self._begun = True
         while state.time < t_end:
             target, size = grid.next(state.time)
             step, event = self._advance(size)
+            at_once, since = self._at_once
             if state.time + step.size - since > _AT_ONCE * self._H:
                 at_once, since = 0, state.time + step.size
-            at_once += 1
-            if at_once > _MAX_EVENTS_AT_ONCE:
-                raise RunStopped(f"the contact chatters: {at_once} events at once", state.time)
+            self._at_once = (at_once + 1, since)
+            if at_once >= _MAX_EVENTS_AT_ONCE:
+                raise RunStopped(f"the contact chatters: {at_once + 1} events at once", state.time)
             if step.size > 0.0:
                 whole = event is None and abs(step.size - size) <= 1e-9 * self._H
                 state.accept(step, target if whole else state.time + step.size)

@@ -10,6 +10,7 @@ from .coupling import conditions, force
 from .coupling.compliance import Compliance, compliance_energy
 from .coupling.exchange import Exchange
 from .coupling.tie import Tie
+from .memory import Memory
 from .scene import ORDINARY_SCHEMES, Scene
 from .subsystem import NO_FORCE, BeamBody, Body, Energies, Force, Held, Motion
 
@@ -32,8 +33,10 @@ class Step(NamedTuple):
 
 
 @dataclass
-class State:
+class State(Memory):
     """Where the run is, and what of the last steps the next one needs."""
+
+    REMEMBERED = ("time", "phase", "contact", "foundation", "smoothed", "steps_in_phase", "middles", "reclosed")
 
     time: float
     phase: Phase = field(default_factory=Phase)
@@ -69,7 +72,7 @@ class State:
             self.foundation = NO_FORCE
 
 
-class Pair:
+class Pair(Memory):
     """Beam and spring of a scene, one of them possibly missing, and the law between them.
 
     Parameters
@@ -79,6 +82,8 @@ class Pair:
     beam, spring
         The bodies; ``None`` where the scene has none.
     """
+
+    REMEMBERED = ("beam", "spring", "_held", "_tie", "_compliance")
 
     def __init__(self, scene: Scene, beam: BeamBody | None, spring: Body | None) -> None:
         self._scene = scene

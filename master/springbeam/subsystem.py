@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+
+from .memory import Memory
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
@@ -59,6 +61,12 @@ class Body(Protocol):
     def apply_impulse(self, impulse: float) -> None:
         """Upward impulse [N·s]."""
 
+    def save(self) -> dict[str, Any]:
+        """Everything that the body's future depends on, and its counts, as `springbeam.memory.Memory.save`."""
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        """Go on from what ``save`` of a body with the same parameters returned, to the last bit as that would have."""
+
     def close(self) -> None:
         """Free what the body holds; it is not used afterwards."""
 
@@ -68,8 +76,10 @@ class BeamBody(Body, Protocol):
         """Deflection [m] at `springbeam.trajectory.SHAPE_POINTS`, shape (21,)."""
 
 
-class Held:
+class Held(Memory):
     """An end held at rest at a fixed position: the foundation, or a spring seated on it."""
+
+    REMEMBERED = ("_size",)
 
     mass = float("inf")
 

@@ -29,7 +29,7 @@ from springbeam.trajectory import Event
 SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
 
 
-def fake_run(scene, recorder, progress=None):
+def fake_run(scene, recorder, progress=None, **checkpoints):
     """Steps, as the real runner reports them."""
     for i in range(31):
         t = i / 30 * scene.time.t_end
@@ -57,7 +57,7 @@ def springbeam_command(*arguments):
 
 
 def replace_run(monkeypatch, error, after=fake_run):
-    def run(scene, recorder, progress=None):
+    def run(scene, recorder, progress=None, **checkpoints):
         class Stop:
             columns = recorder.columns
             row, event, shape = recorder.row, recorder.event, recorder.shape
@@ -133,7 +133,7 @@ def test_quiet_prints_only_where(here):
 
 
 def test_report_fits_80_columns_and_says_how_many_events_are_not_shown(here, monkeypatch):
-    def many(scene, recorder, progress=None):
+    def many(scene, recorder, progress=None, **checkpoints):
         for i in range(40):
             recorder.event(Event(123.456789 + i, "stop_impact", -1.2345e-5, -1.234e-5, 0.1, 0.1, -1.234e-7, 1e-9, 1e-9))
         fake_run(scene, recorder)
@@ -149,7 +149,7 @@ def test_report_fits_80_columns_and_says_how_many_events_are_not_shown(here, mon
 
 
 def test_warnings_are_shown_as_they_are(here, monkeypatch):
-    def warned(scene, recorder, progress=None):
+    def warned(scene, recorder, progress=None, **checkpoints):
         fake_run(scene, recorder)
         recorder.finish({**SUMMARY, "warnings": ["[beam] is [bold]coarse[/bold]"]})
 
@@ -237,7 +237,7 @@ def test_a_run_that_stops_early(here, monkeypatch, error, status, fragments):
 
 
 def test_a_value_that_is_not_finite_stops_the_run(here, monkeypatch):
-    def run(scene, recorder, progress=None):
+    def run(scene, recorder, progress=None, **checkpoints):
         fake_run(scene, recorder)
         recorder.row(dict.fromkeys(recorder.columns, float("nan")) | {"time": 0.7, "phase": "free"})
 
@@ -260,7 +260,7 @@ import sys, time
 import springbeam.runner
 from springbeam import cli
 
-def run(scene, recorder, progress=None):
+def run(scene, recorder, progress=None, **checkpoints):
     for i in range(60_000):  # a minute, should nobody interrupt it
         t = 1e-5 * i
         recorder.row(dict.fromkeys(recorder.columns, 0.5) | {"time": t, "phase": "tied"})
@@ -305,11 +305,10 @@ def test_an_interrupted_run_leaves_its_results(here, number):
 def test_a_killed_run_can_be_loaded(here):
     process = slow_command(here, "--quiet")
     assert process.stdout.readline() == "going\n"
-    time.sleep(2.5)  # results reach the disk every second
     process.kill()
     process.communicate(timeout=60)
     trajectory = load_trajectory(here / "results" / "soft")
-    assert len(trajectory) > 50
+    assert len(trajectory) > 50  # all that there were: none waits in a buffer
     assert trajectory.summary["status"] == "running"
     assert trajectory.scene.title
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import signal
-import threading
 from collections import Counter, deque
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any, NoReturn
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -18,14 +15,21 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 from rich.text import Text
 
+from ..checkpoint import Checkpoint
 from ..fmu import FmuError
 from ..recording import FileRecorder, NonFiniteValue, RunDirectory, load_events, load_summary, load_trajectory
 from ..scene import Scene, load_scene
 from ..trajectory import Event
-from .common import BAD_INPUT, STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail
+from .common import STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail, interruptible
 
 _FIRST_EVENTS, _LAST_EVENTS = 10, 3
 _REFRESH_SECONDS = 0.1
+
+
+NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Do not draw pictures.")]
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="No progress bar and no report; print only where the results are.")
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -41,43 +45,70 @@ def run(
         ),
     ] = None,
     settings: SettingsOption = None,
-    no_plots: Annotated[bool, typer.Option("--no-plots", help="Do not draw pictures.")] = False,
+    checkpoint: Annotated[
+        float | None,
+        typer.Option(
+            "--checkpoint",
+            metavar="SECONDS",
+            min=0.0,
+            help="Every so many seconds save what springbeam resume needs, should the run be killed.",
+        ),
+    ] = None,
+    no_plots: NoPlotsOption = False,
     force: Annotated[bool, typer.Option("--force", "-f", help="Replace results that are already there.")] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="No progress bar and no report; print only where the results are.")
-    ] = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Run a scene; write its results, events and pictures into a directory.
 
     Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
     """
-    with bad_input_reported():
-        what = load_scene(scene, settings or ())
-        directory = _run_directory(scene, out, force)
+    with interruptible():
+        with bad_input_reported():
+            what = load_scene(scene, settings or ())
+            directory = _run_directory(scene, out, force)
+        carry_out(what, directory, seconds=checkpoint, no_plots=no_plots, quiet=quiet)
+
+
+def carry_out(
+    scene: Scene,
+    directory: RunDirectory,
+    *,
+    seconds: float | None,
+    start: Checkpoint | None = None,
+    no_plots: bool,
+    quiet: bool,
+) -> None:
+    """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.runner.run`."""
     console = Console(quiet=quiet, highlight=False)
+    recorder = FileRecorder(scene, directory)
     try:
-        error = _run_into(directory, what, quiet=quiet)
-    except FmuError as missing:
-        directory.remove()
-        fail(BAD_INPUT, str(missing))
-    _report(console, directory, what)
+        with bad_input_reported():
+            error = _run_into(recorder, seconds, start, quiet=quiet)
+    finally:
+        if not recorder.begun:
+            directory.discard()
+    _report(console, directory, scene)
     if not no_plots:
-        _draw(console, directory)
+        error = _draw(console, directory) or error
     if quiet:
         typer.echo(directory.path)
     if error is not None:
         fail(STOPPED, f"{error}\nwhat was computed is in {directory.path}")
 
 
-def _draw(console: Console, directory: RunDirectory) -> None:
+def _draw(console: Console, directory: RunDirectory) -> str | None:
+    """Returns why there are no pictures, or ``None``."""
     from ..plots import plot_run  # matplotlib takes a second to load
 
     try:
         pictures = plot_run(load_trajectory(directory.path), directory.path)
     except KeyboardInterrupt:
-        fail(STOPPED, f"interrupted while drawing; the results in {directory.path} are complete")
+        return "interrupted while drawing"
+    except OSError as error:
+        return f"no pictures: {error.filename or directory.path}: {error.strerror or error}"
     if pictures:
         console.print(Text(f"pictures  {directory.path / '*.png'} ({len(pictures)})"), soft_wrap=True)
+    return None
 
 
 def _run_directory(scene: str, out: Path | None, force: bool) -> RunDirectory:
@@ -87,47 +118,42 @@ def _run_directory(scene: str, out: Path | None, force: bool) -> RunDirectory:
     return RunDirectory.create(out or default, replace=force)
 
 
-def _run_into(directory: RunDirectory, scene: Scene, *, quiet: bool) -> str | None:
-    """Run ``scene``; returns why it stopped early, or ``None``. The results are closed and complete either way."""
+def _run_into(recorder: FileRecorder, seconds: float | None, start: Checkpoint | None, *, quiet: bool) -> str | None:
+    """Returns why the run stopped early, or ``None``; the results are closed and can be loaded either way.
+
+    What keeps it from recording anything is raised.
+    """
     from ..runner import RunStopped
     from ..runner import run as run_scene
 
-    with FileRecorder(scene, directory) as recorder, _ProgressBar(scene.time.t_end, quiet=quiet) as progress:
+    t_end = recorder.scene.time.t_end
+    with recorder, _ProgressBar(t_end, quiet=quiet) as progress:
         try:
-            with _termination_as_interrupt():
-                run_scene(scene, recorder, progress)
+            run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start)
             return None
         except RunStopped as stopped:
             status, cause = "stopped", str(stopped)
         except NonFiniteValue as error:
             status, cause = "stopped", str(error)
         except OSError as error:
-            status, cause = "stopped", f"{error.filename or directory.path}: {error.strerror or error}"
+            if not recorder.begun:
+                raise
+            status = "stopped"
+            cause = f"{error.filename or recorder.directory.path}: {error.strerror or error}"
+        except FmuError as error:
+            if not recorder.begun:
+                raise
+            status, cause = "stopped", str(error)
         except KeyboardInterrupt:
+            if not recorder.begun:
+                raise
             status, cause = "interrupted", "interrupted"
         reached = 0.0 if recorder.time is None else recorder.time
         if not recorder.finished:
             with suppress(OSError):  # on a full disk: the rows that fit are there, and the cause is reported
                 recorder.finish({"status": status, "cause": cause, "time": reached})
-    where = f"{cause} (reached t = {reached:.9g} s of {scene.time.t_end:g} s)"
+    where = f"{cause} (reached t = {reached:.9g} s of {t_end:g} s)"
     return where if status == "interrupted" else f"the run stopped early: {where}"
-
-
-@contextmanager
-def _termination_as_interrupt() -> Iterator[None]:
-    """SIGTERM, which batch systems send, ends a run as Ctrl-C does: with its results on disk."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def interrupt(*_: Any) -> NoReturn:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 class _ProgressBar:

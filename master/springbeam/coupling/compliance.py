@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
+from ..memory import Memory
 from ..subsystem import Body, Force, Motion
 from .tie import NotConverged
 
@@ -41,7 +42,7 @@ def discrete_gradient(p0: float, p1: float, stiffness: float, exponent: float) -
     return stiffness * float(_WEIGHTS @ (p0 + change * _NODES) ** exponent)
 
 
-class Compliance:
+class Compliance(Memory):
     """Solver for the step's force; the response of p⁺ to C is remembered between steps.
 
     Parameters
@@ -51,6 +52,8 @@ class Compliance:
     tolerance
         Relative tolerance of the force.
     """
+
+    REMEMBERED = ("_regular_response", "iterations", "_scale")
 
     def __init__(self, stiffness: float, exponent: float, tolerance: float, regular_size: float) -> None:
         self._law = (stiffness, exponent)

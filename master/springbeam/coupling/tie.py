@@ -13,6 +13,7 @@ from operator import add, mul, sub
 
 import numpy as np
 
+from ..memory import Memory
 from ..subsystem import Body, Force, Motion, StepRefused
 from . import Conditions, force
 
@@ -39,7 +40,7 @@ class NotConverged(StepRefused):
         self.residual = residual
 
 
-class Tie:
+class Tie(Memory):
     """Solver for one scheme; keeps the response matrices between steps.
 
     Vectors and matrices of its 1 to 3 unknowns are lists of floats: numpy's overhead would be most of a step's time.
@@ -54,12 +55,14 @@ class Tie:
         Of the conditions, relative to the motion over the step, the larger of H·max(|u̇|, |ẏ|) and |Δu|.
     """
 
+    REMEMBERED = ("_responses", "_last_size", "_reach", "iterations")
+
     def __init__(self, conditions: Conditions, degree: int, tolerance: float) -> None:
         self._conditions = conditions
         self._degree = degree
         self._tolerance = tolerance
-        #: By the size of the step: B, and by partner the inverse of B − S.
-        self._responses: dict[float, tuple[Matrix, dict[type, Matrix]]] = {}
+        #: By the size of the step: B, and by kind of partner the inverse of B − S.
+        self._responses: dict[float, tuple[Matrix, dict[str, Matrix]]] = {}
         self._last_size = 0.0
         self._reach = 0.0  #: largest displacement of an end so far [m]
         self.iterations = 0  #: Newton updates since the start
@@ -83,7 +86,8 @@ class Tie:
         B, inverses = self._responses[size] = known  # the last one used comes last
         if len(self._responses) > _SIZES_REMEMBERED:
             del self._responses[next(iter(self._responses))]
-        inverse = inverses.get(type(partner)) or _inverse(B, self._free_response(partner, size))
+        kind = type(partner).__name__
+        inverse = inverses.get(kind) or _inverse(B, self._free_response(partner, size))
         r_partner = self._advance(partner, time, size, a)
         tolerance = self._absolute_tolerance(start, beam_end, partner.motion(), size, _times(B, a))
         residual = list(map(sub, r_beam, r_partner))
@@ -122,7 +126,7 @@ class Tie:
         else:
             raise NotConverged(norm, _MAX_ITERATIONS)
         self._last_size = size
-        inverses[type(partner)] = inverse
+        inverses[kind] = inverse
         return force.derivatives(a, size)
 
     def _advance(self, body: Body, time: float, size: float, a: Vector) -> Vector:

@@ -1,0 +1,36 @@
+"""``springbeam resume``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..recording import RunDirectory
+from .common import bad_input_reported, interruptible
+from .run import NoPlotsOption, QuietOption, carry_out
+
+
+def register(app: typer.Typer) -> None:
+    app.command()(resume)
+
+
+def resume(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="The directory of the run.", show_default=False)],
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Go on with a run that was killed or stopped, from its last checkpoint.
+
+    Needs a run begun with --checkpoint; the results are those of a run that was never stopped, to the last bit.
+
+    Example: springbeam resume results/soft
+    """
+    from ..runner import last_checkpoint
+
+    with interruptible():
+        with bad_input_reported():
+            start = last_checkpoint(directory)
+        results = RunDirectory(directory)
+        carry_out(start.scene, results, seconds=start.seconds, start=start, no_plots=no_plots, quiet=quiet)

@@ -1,0 +1,168 @@
+"""A run goes on from a checkpoint to the same bits, whenever it was stopped and whatever it was doing."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections.abc import Iterator
+from contextlib import suppress
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import BaseModel
+
+from springbeam.checkpoint import decoded, encoded
+from springbeam.contact import Phase
+from springbeam.fmu import load_bodies
+from springbeam.memory import Memory
+from springbeam.paper_law import PaperLaw
+from springbeam.recording import MemoryRecorder
+from springbeam.runner import _as_in_paper
+from springbeam.scene import Scene, load_scene, with_changes
+from springbeam.simulation import Simulation
+
+pytestmark = pytest.mark.usefixtures("fmu_folder")
+
+SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 2e-3})
+COMPLIANCE = {"law": "compliance", "exponent": 1.0}
+SCENES = {
+    "energy": SOFT,
+    "energy 2, damped": with_changes(SOFT, beam={"alpha_b": 1e-3}, spring={"damping": 0.5}, coupling={"degree": 2}),
+    "hermite 2": with_changes(SOFT, coupling={"scheme": "hermite", "degree": 2, "macro_step": 1e-3}),
+    "generalized_alpha": with_changes(SOFT, beam={"integrator": "generalized_alpha", "rho_inf": 0.8}),
+    "compliance": with_changes(SOFT, contact=COMPLIANCE),
+    "gauss_seidel": with_changes(
+        SOFT,
+        contact={**COMPLIANCE, "stiffness": 100.0},
+        coupling={"scheme": "gauss_seidel", "macro_step": 4e-4},
+        time={"t_end": 0.4},
+    ),
+    # The load presses tip and spring onto the foundation until they stay there.
+    "seated": with_changes(
+        SOFT,
+        beam={"distributed_load": -6.0, "alpha_b": 2e-2},
+        spring={"damping": 2.0},
+        stop={"restitution": 0.3},
+        time={"t_end": 1.0},
+    ),
+    "beam on a stop": with_changes(SOFT, spring=None, stop={"restitution": 0.4}, beam={"alpha_b": 1e-3}),
+    "spring on a stop": with_changes(
+        SOFT, beam=None, stop={"restitution": 0.7}, spring={"initial_velocity": -1.0}, time={"t_end": 4.0}
+    ),
+    "elastic approach": with_changes(
+        SOFT, beam={"approach": "elastic", "initial_deflection_slope": 0.05}, contact={"impact": "rest"}
+    ),
+    "retie": with_changes(load_scene("paper-fig4"), beam={"n_elements": 20, "n_modes": 0}, time={"t_end": 1.2}),
+    "paper": with_changes(
+        load_scene("paper-fig4"),
+        beam={"n_elements": 20, "n_modes": 0},
+        contact={"law": "paper"},
+        time={"t_end": 1.2},
+    ),
+}
+
+
+class Run:
+    """A run into memory, and what it remembered: after each step, or at the end only."""
+
+    def __init__(self, scene: Scene, *, each_step: bool = False) -> None:
+        start_time = scene.contact_time or 0.0
+        paper = scene.contact.law == "paper"
+        self.bodies = load_bodies(_as_in_paper(scene) if paper else scene, start_time)
+        self.recorder = MemoryRecorder(scene)
+        self.saved: list[str] = []
+        self.simulation: Any = (PaperLaw if paper else Simulation)(
+            scene, start_time, *self.bodies, self.recorder, self._save if each_step else None
+        )
+
+    def _save(self, *_: object) -> None:
+        self.saved.append(json.dumps(encoded(self.simulation.save())))
+
+    def finish(self) -> Run:
+        self.simulation.run()
+        self._save()
+        self.recorder.finish(self.simulation.summary())
+        self.trajectory = self.recorder.trajectory()
+        self.close()
+        return self
+
+    def close(self) -> None:
+        for body in self.bodies:
+            if body is not None:
+                body.close()
+
+
+def same_end(rest: np.ndarray, whole: np.ndarray) -> bool:
+    return np.array_equal(rest, whole[len(whole) - len(rest) :])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_run_goes_on_from_any_step_to_the_same_bits(name):
+    scene = SCENES[name]
+    whole = Run(scene, each_step=True).finish()
+    steps = len(whole.saved) - 1
+    assert steps > 100
+    # After steps that ended on an event, and in between.
+    at_events = np.searchsorted(whole.trajectory.time, [event.time for event in whole.trajectory.events])
+    assert len(at_events) > 0
+    chosen = {int(k) for k in at_events[:: max(1, len(at_events) // 6)]} | set(range(0, steps, steps // 2))
+    for k in sorted(k for k in chosen if k < steps):
+        rest = Run(scene)
+        rest.simulation.restore(decoded(json.loads(whole.saved[k])))
+        rest.finish()
+        # Everything remembered, counts of steps and rollbacks among it.
+        assert rest.saved[-1] == whole.saved[-1]
+        assert len(whole.trajectory) - len(rest.trajectory) == k + 2  # the row at the start, and one per step
+        for column in rest.trajectory.columns:
+            assert same_end(rest.trajectory[column], whole.trajectory[column])
+        n = len(rest.trajectory.events)
+        assert rest.trajectory.events == whole.trajectory.events[len(whole.trajectory.events) - n :]
+        if scene.beam is not None:
+            assert all(map(same_end, rest.trajectory.shapes, whole.trajectory.shapes))
+        assert rest.trajectory.summary == whole.trajectory.summary
+
+
+def test_the_scenes_pass_every_phase_and_event():
+    trajectories = [Run(SCENES[name]).finish().trajectory for name in ("energy", "seated", "retie")]
+    assert {phase for t in trajectories for phase in t.phase} == {"free", "tied", "touch", "seated"}
+    kinds = {event.kind for t in trajectories for event in t.events}
+    assert kinds >= {"impact", "stop_impact", "release", "retie", "separation", "seated"}
+
+
+#: What changes during a run, but is set anew before it is used.
+SET_ANEW = {"_marked_pending", "_marked_motion", "_moved", "moved", "_time", "_size", "_messages"}
+
+
+def attributes(part: Any, path: str = "", seen: tuple[int, ...] = ()) -> Iterator[tuple[str, bool, Any]]:
+    """(path, whether it is remembered, value) of everything that ``part`` consists of."""
+    for name, value in vars(part).items():
+        ours = type(value).__module__.startswith("springbeam.") and hasattr(value, "__dict__")
+        if ours and not isinstance(value, (Phase, Enum)):
+            if id(value) not in seen and not isinstance(value, (BaseModel, MemoryRecorder)):
+                yield from attributes(value, f"{path}.{name}", (*seen, id(value)))
+        else:
+            yield f"{path}.{name}", isinstance(part, Memory) and name in part.REMEMBERED, value
+
+
+def snapshot(part: Any) -> dict[str, tuple[bool, bytes]]:
+    found = {}
+    for path, remembered, value in attributes(part):
+        with suppress(TypeError, AttributeError, ValueError, pickle.PicklingError):  # functions, what belongs to C
+            found[path] = (remembered, pickle.dumps(value))
+    return found
+
+
+@pytest.mark.parametrize("name", ["energy 2, damped", "compliance", "seated", "paper"])
+def test_everything_that_changes_is_remembered_or_set_anew(name):
+    """An attribute that is forgotten in REMEMBERED is named here, before a resumed run differs."""
+    run = Run(SCENES[name])
+    before = snapshot(run.simulation)
+    run.simulation.run()
+    after = snapshot(run.simulation)
+    run.close()
+    changed = {path for path in after if path not in before or before[path] != after[path]}
+    assert len(changed) > 10
+    forgotten = {path for path in changed if not after[path][0] and path.rpartition(".")[2] not in SET_ANEW}
+    assert forgotten == set()
