@@ -389,7 +389,9 @@ def test_a_report_is_not_overwritten_unasked(directory):
 
 def test_a_new_run_in_the_directory_removes_the_report_of_the_old_one(directory):
     command("report", directory)
-    RunDirectory.create(directory, replace=True)
+    assert (directory / REPORT).exists()
+    recorder = FileRecorder(PAIR, RunDirectory.create(directory, replace=True))
+    recorder.finish({})
     assert not (directory / REPORT).exists()
 
 

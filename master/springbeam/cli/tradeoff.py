@@ -73,13 +73,13 @@ def tradeoff(
                     lambda done, total, name: bar.update(task, completed=done, total=total, name=name),
                 )
         except FmuError as error:
-            directory.remove()
+            directory.discard()
             fail(BAD_INPUT, str(error))
         except ReferenceFailure as error:
-            directory.remove()
+            directory.discard()
             fail(STOPPED, str(error))
         except BaseException:
-            directory.remove()
+            directory.discard()
             raise
         write_csv(found, directory.path / "tradeoff.csv")
         draw(found, directory.path / "tradeoff.png")
