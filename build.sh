@@ -11,6 +11,7 @@ usage() {
 ./build.sh sources                 also get the source of SUNDIALS: spring.fmu can then be compiled from its own sources/
 ./build.sh win64                   also cross-compile for 64-bit Windows; the FMUs then carry both
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
+./build.sh browser                 install playwright and Chromium and look at the report in it
 ./build.sh lint                    formatters, linters and type checker
 
 Set-up makes .venv here and installs Python packages into it; as root it also installs the system packages that are
@@ -19,6 +20,7 @@ missing (Debian, Ubuntu), otherwise it names them. Variables:
   CXX                the C++17 compiler
   SPRINGBEAM_PREFIX  where Eigen, Spectra, SUNDIALS and GoogleTest are if not in the system (also: CMAKE_PREFIX_PATH)
   SPRINGBEAM_CACHE   where `interop` puts the importers (default: ~/.cache/springbeam)
+  CHROMIUM           the browser for `browser` (default: chromium, chromium-browser or google-chrome)
   JOBS               parallel compilations (default: all processors)
 TEXT
 }
@@ -162,6 +164,12 @@ case $command in
     cache=${SPRINGBEAM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/springbeam}
     tests/interop/install.sh "$cache" "$python"
     SPRINGBEAM_CACHE=$cache exec $python -m pytest tests/interop "$@"
+    ;;
+  browser)
+    build fmus
+    set_up_python browser
+    command -v "${CHROMIUM:-chromium}" chromium-browser google-chrome >/dev/null || install_packages "Chromium is" chromium
+    exec $python -m pytest tests/browser "$@"
     ;;
   fmus)
     build fmus

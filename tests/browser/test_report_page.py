@@ -1,0 +1,211 @@
+"""The report in headless Chromium: it loads by itself, the slider moves the bodies to where the run has them.
+
+`./build.sh browser` installs what is needed; without it these tests are skipped, with the reason.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from springbeam.cli import app
+from springbeam.recording import REPORT, load_trajectory
+from springbeam.scene import shipped_scenes
+from springbeam.trajectory import Trajectory
+
+pytestmark = pytest.mark.browser
+
+DESKTOP, PHONE = {"width": 1200, "height": 900}, {"width": 390, "height": 800}
+#: Shorter where nothing new happens later.
+T_END = {"soft": 0.3, "duffing": 4.0, "bar-impact": 2.2}
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    remedy = "./build.sh browser installs what these tests need"
+    playwright = pytest.importorskip("playwright.sync_api", reason=f"playwright is not installed; {remedy}")
+    names = (os.environ.get("CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome")
+    chromium = next((found for name in names if name and (found := shutil.which(name))), None)
+    if chromium is None:
+        pytest.skip(f"no Chromium found; {remedy}")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory, fmu_folder: Path) -> Path:
+    return tmp_path_factory.mktemp("runs")
+
+
+def run_and_report(folder: Path, scene: str) -> Path:
+    """The directory of a run of ``scene`` with its report; made once."""
+    directory = folder / scene
+    if not directory.exists():
+        shorter = ["--set", f"time.t_end={T_END[scene]}"] if scene in T_END else []
+        made = CliRunner().invoke(app, ["run", scene, "--out", str(directory), "--no-plots", *shorter])
+        assert made.exit_code == 0, made.output
+        made = CliRunner().invoke(app, ["report", str(directory)])
+        assert made.exit_code == 0, made.output
+    return directory
+
+
+class Shown:
+    """A report in a page of the browser, with everything it asked for and complained of."""
+
+    def __init__(self, browser: Any, directory: Path, size: dict[str, int] = DESKTOP) -> None:
+        self.trajectory: Trajectory = load_trajectory(directory)
+        self.url = (directory / REPORT).as_uri()
+        self.page = browser.new_page(viewport=size)
+        self.requests: list[str] = []
+        self.complaints: list[str] = []
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.page.on("console", lambda message: self.complaints.append(message.text))
+        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.goto(self.url)
+        self.data = json.loads(self.page.locator("#data").inner_text())
+
+    def path(self, part: str) -> str:
+        """The path that is drawn of a part of the motion."""
+        index = self.data["motion"]["parts"]["motion"]["traces"].index(part)
+        return str(self.page.locator("#motion .scatterlayer .js-line").nth(index).get_attribute("d"))
+
+    def height_of_end(self, part: str) -> float:
+        """Where a part's path ends [m], from its pixels and the axis."""
+        pixel = float(self.path(part).replace("L", " ").replace("M", " ").split()[-1].split(",")[1])
+        low, high, length = self.page.evaluate(
+            "() => { const a = document.getElementById('motion')._fullLayout.yaxis; return [...a.range, a._length]; }"
+        )
+        return float((high + (low - high) * pixel / length) / self.data["motion"]["parts"]["motion"]["factor"])
+
+    def set_slider(self, frame: int) -> None:
+        self.page.locator("#slider").fill(str(frame))
+
+    def frame(self) -> int:
+        return int(self.page.locator("#slider").input_value())
+
+
+@pytest.fixture
+def soft(browser: Any, folder: Path) -> Iterator[Shown]:
+    shown = Shown(browser, run_and_report(folder, "soft"))
+    yield shown
+    assert shown.complaints == []
+    shown.page.close()
+
+
+@pytest.mark.parametrize("scene", shipped_scenes())
+def test_every_shipped_scene_loads_alone_and_moves(browser: Any, folder: Path, scene: str) -> None:
+    shown = Shown(browser, run_and_report(folder, scene))
+    frames = len(shown.data["motion"]["time"])
+    for part in shown.data["motion"]["parts"]["motion"]["traces"]:
+        drawn = set()
+        for frame in (0, frames // 7, frames // 3):
+            shown.set_slider(frame)
+            drawn.add(shown.path(part))
+        # A bar held by its stop and a spring that nothing meets rest now and then, never in all three.
+        assert len(drawn) > 1
+    for name in shown.data["overTime"]:
+        assert shown.page.locator(f"#{name} .main-svg").count() > 0
+    assert shown.requests == [shown.url]
+    assert shown.complaints == []
+    not_resolved = "not resolved" in shown.page.locator("main").inner_text()
+    assert not_resolved == any("not resolved" in warning for warning in shown.trajectory.summary["warnings"])
+    shown.page.set_viewport_size(PHONE)
+    shown.page.wait_for_function(f"document.documentElement.scrollWidth === {PHONE['width']}")
+    shown.page.close()
+
+
+def test_bodies_are_drawn_where_the_run_has_them(soft: Shown) -> None:
+    times, shapes = soft.trajectory.shapes  # type: ignore[misc]
+    before = soft.path("beam")
+    for frame in (10, 200, len(times) - 1):
+        soft.set_slider(frame)
+        assert soft.path("beam") != before
+        row = int(np.searchsorted(soft.trajectory.time, times[frame], side="right")) - 1
+        # Paths are written with hundredths of a pixel, here 0.4 mm high.
+        assert soft.height_of_end("beam") == pytest.approx(shapes[frame, -1], abs=5e-6)
+        assert soft.height_of_end("coil") == pytest.approx(soft.trajectory.y[row], abs=5e-6)
+        reading = soft.page.locator("#reading").inner_text()
+        assert f"t = {times[frame]:#.6g} s" in reading
+        assert str(soft.trajectory.phase[row]) in reading
+
+
+def test_play_goes_on_and_pauses(soft: Shown) -> None:
+    button = soft.page.locator("#play")
+    button.click()
+    soft.page.wait_for_function("Number(document.getElementById('slider').value) > 3")
+    button.click()
+    assert button.get_attribute("aria-label") == "Play"
+    paused = soft.frame()
+    soft.page.wait_for_timeout(300)
+    assert soft.frame() == paused
+
+
+def test_play_ends_with_the_run(soft: Shown) -> None:
+    last = len(soft.data["motion"]["time"]) - 1
+    soft.set_slider(last - 3)
+    soft.page.locator("#play").click()
+    soft.page.wait_for_function(f"document.getElementById('slider').value === '{last}'")
+    soft.page.wait_for_function("document.getElementById('play').getAttribute('aria-label') === 'Play'")
+
+
+def test_arrow_keys_and_events_set_the_time(soft: Shown) -> None:
+    soft.page.locator("#slider").focus()
+    soft.page.keyboard.press("ArrowRight")
+    assert soft.frame() == 1
+    event = soft.trajectory.events[2]
+    soft.page.locator(".jump").nth(2).click()
+    times = np.array(soft.data["motion"]["time"])
+    assert soft.frame() == int(np.searchsorted(times, event.time, side="right")) - 1
+
+
+def test_a_click_into_a_chart_sets_the_time_of_all(soft: Shown) -> None:
+    chart = soft.page.locator("#gap .nsewdrag")
+    chart.scroll_into_view_if_needed()
+    area = chart.bounding_box()
+    chart.hover(position={"x": area["width"] / 2, "y": area["height"] / 2})
+    soft.page.wait_for_selector("#gap .hoverlayer .hovertext")
+    chart.click(position={"x": area["width"] / 2, "y": area["height"] / 2})
+    times = np.array(soft.data["motion"]["time"])
+    soft.page.wait_for_function("document.getElementById('slider').value !== '0'")
+    middle = 0.5 * (times[0] + times[-1])
+    assert times[soft.frame()] == pytest.approx(middle, abs=2.0 * np.max(np.diff(times)))
+    # The cursors stand there, to a pixel.
+    for name in soft.data["overTime"]:
+        cursor = soft.page.locator(f"#{name} .cursor").bounding_box()
+        plot = soft.page.locator(f"#{name} .nsewdrag").bounding_box()
+        part = (times[soft.frame()] - times[0]) / (times[-1] - times[0])
+        assert cursor["x"] + 1.0 - plot["x"] == pytest.approx(part * plot["width"], abs=1.0)
+        assert cursor["height"] == pytest.approx(plot["height"], abs=1.0)
+
+
+def test_zooming_one_time_axis_zooms_all(soft: Shown) -> None:
+    ranges = "() => [...document.querySelectorAll('#over-time .chart')].map(c => c.layout.xaxis.range)"
+    assert len({tuple(r) for r in soft.page.evaluate(ranges)}) == 1
+    soft.page.evaluate("Plotly.relayout('gap', {'xaxis.range': [0.05, 0.1]})")
+    soft.page.wait_for_function(f"({ranges})().every(r => r[0] === 0.05 && r[1] === 0.1)")
+    soft.page.evaluate("Plotly.relayout('forces', {'xaxis.autorange': true})")
+    soft.page.wait_for_function(f"({ranges})().every(r => r[0] === 0 && r[1] === 0.3)")
+
+
+def test_in_print_everything_fits_the_paper_and_controls_are_gone(soft: Shown, tmp_path: Path) -> None:
+    widths = "() => [...document.querySelectorAll('.chart')].map(c => c._fullLayout.width)"
+    wide = soft.page.evaluate(widths)
+    soft.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert set(soft.page.evaluate(widths)) == {680}
+    soft.page.emulate_media(media="print")
+    assert not soft.page.locator("#controls").is_visible()
+    soft.page.emulate_media(media="screen")
+    soft.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+    soft.page.wait_for_function(f"JSON.stringify(({widths})()) === '{json.dumps(wide, separators=(',', ':'))}'")
+    soft.page.pdf(path=tmp_path / "report.pdf", format="A4")
+    assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
