@@ -26,8 +26,6 @@ class Booked(NamedTuple):
 class Ledger(Memory):
     """E_beam + E_spring + E_contact + dissipated + impact losses − work of external loads = constant."""
 
-    REMEMBERED = ("impact_loss", "initial", "scale", "largest_residual", "relative")
-
     impact_loss: float = 0.0  #: [J], by whoever applies an impact
     initial: float | None = None  #: the total of the first row [J]
     scale: float = 0.0  #: the largest energy so far [J]

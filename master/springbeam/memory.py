@@ -1,11 +1,12 @@
 """What a run carries from one step to the next, so that a checkpoint can hold it.
 
 Every part of a run that changes while it runs is a `Memory` and names the attributes that change. Whatever is not
-named must follow from the scene or be recomputed to the same bits.
+named must follow from the scene or be computed anew to the same bits.
 """
 
 from __future__ import annotations
 
+from dataclasses import fields, is_dataclass
 from typing import Any, ClassVar
 
 
@@ -15,15 +16,21 @@ class Memory:
     #: The attributes that a checkpoint holds: further parts, or plain values (`springbeam.checkpoint` lists the types).
     REMEMBERED: ClassVar[tuple[str, ...]] = ()
 
+    @classmethod
+    def remembered(cls) -> tuple[str, ...]:
+        """`REMEMBERED`, or all fields of a dataclass."""
+        return tuple(field.name for field in fields(cls)) if is_dataclass(cls) else cls.REMEMBERED
+
     def save(self) -> dict[str, Any]:
         """The remembered attributes by name, parts as nested dicts; lists and arrays are the run's own."""
-        return {name: _saved(getattr(self, name)) for name in self.REMEMBERED}
+        return {name: _saved(getattr(self, name)) for name in self.remembered()}
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Continue from what `save` of an equal part returned. Raises ValueError if it was another kind of part."""
-        if not isinstance(saved, dict) or saved.keys() != set(self.REMEMBERED):
-            raise ValueError(f"{type(self).__name__} remembers {', '.join(self.REMEMBERED)}; not found")
-        for name in self.REMEMBERED:
+        names = self.remembered()
+        if not isinstance(saved, dict) or saved.keys() != set(names):
+            raise ValueError(f"{type(self).__name__} remembers {', '.join(names)}; not found")
+        for name in names:
             part = getattr(self, name)
             if isinstance(part, Memory):
                 part.restore(saved[name])

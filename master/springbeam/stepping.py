@@ -36,8 +36,6 @@ class Step(NamedTuple):
 class State(Memory):
     """Where the run is, and what of the last steps the next one needs."""
 
-    REMEMBERED = ("time", "phase", "contact", "foundation", "smoothed", "steps_in_phase", "middles", "reclosed")
-
     time: float
     phase: Phase = field(default_factory=Phase)
     contact: Force = NO_FORCE  #: C of the last step, continued

@@ -148,7 +148,7 @@ def attributes(part: Any, seen: dict[int, Any]) -> Iterator[tuple[str, bool, Any
             if id(value) not in seen and not isinstance(value, (BaseModel, MemoryRecorder)):
                 yield from attributes(value, seen)
         else:
-            yield f"{type(part).__name__}.{name}", isinstance(part, Memory) and name in part.REMEMBERED, value
+            yield f"{type(part).__name__}.{name}", isinstance(part, Memory) and name in part.remembered(), value
 
 
 def snapshot(part: Any) -> list[tuple[str, bool, bytes]]:
