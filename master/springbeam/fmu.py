@@ -87,6 +87,7 @@ class Reals:
         references = (c_uint * n)(*[fmu.reference(name, "Real") for name in names])
         self._read = fmu.prepared("fmi2GetReal", references, c_size_t(n), self._values)
         self._write = fmu.prepared("fmi2SetReal", references, c_size_t(n), self._values)
+        self.get()  # a wrong reference is found before the run
 
     def get(self) -> list[float]:
         if (status := self._read()) > _WARNING:
@@ -153,17 +154,20 @@ class Fmu(Memory):
     def initialise(self, time: float, parameters: dict[str, float | int | bool]) -> None:
         """Set parameters and start values and leave initialization mode at ``time`` [s]."""
         slave = self._slave
+        setters: dict[str, tuple[Any, type]] = {
+            "Real": (slave.setReal, float),
+            "Integer": (slave.setInteger, int),
+            "Boolean": (slave.setBoolean, bool),
+        }
+        of_kind: dict[str, dict[int, Any]] = {kind: {} for kind in setters}
+        for name, value in parameters.items():
+            variable = self._variable(name)
+            of_kind[variable.type][variable.valueReference] = setters[variable.type][1](value)
         try:
             slave.setupExperiment(startTime=time)
-            for name, value in parameters.items():
-                kind = self._variables[name].type if name in self._variables else "Real"
-                reference = [self.reference(name, kind)]
-                if kind == "Boolean":
-                    slave.setBoolean(reference, [bool(value)])
-                elif kind == "Real":
-                    slave.setReal(reference, [float(value)])
-                else:
-                    slave.setInteger(reference, [int(value)])
+            for kind, values in of_kind.items():
+                if values:
+                    setters[kind][0](list(values), list(values.values()))
             slave.enterInitializationMode()
             slave.exitInitializationMode()
         except FMICallException as error:
@@ -187,12 +191,15 @@ class Fmu(Memory):
         function.restype = c_int
         return partial(function, c_void_p(self._slave.component), *arguments)
 
-    def reference(self, name: str, kind: str) -> int:
-        """Value reference of a variable of type ``kind``."""
+    def _variable(self, name: str) -> Any:
         try:
-            variable = self._variables[name]
+            return self._variables[name]
         except KeyError:
             raise FmuError(f"{self.path}: has no variable {name!r}") from None
+
+    def reference(self, name: str, kind: str) -> int:
+        """Value reference of a variable of type ``kind``."""
+        variable = self._variable(name)
         if variable.type != kind:
             raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, expected {kind}")
         return int(variable.valueReference)

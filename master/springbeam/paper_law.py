@@ -158,7 +158,11 @@ class PaperLaw(Memory):
                 pressing = 0.5 * (self._law(y_new) + self._law(y))
                 foundation = self._foundation_force(pressing)
             u_new = y_new  # lines 18, 21
-            spring.restart(self.time + self.h, y_new, 2.0 * (y_new - y) / self.h - z)  # line 29
+            z_new = 2.0 * (y_new - y) / self.h - z  # line 29
+            if phase == "seated":
+                spring.restart(self.time + self.h, y_new, z_new)
+            else:  # the spring has come to y_new: only its velocity is another
+                spring.apply_impulse(spring.mass * (z_new - spring.motion().velocity))
         contact = (u_new - u_free) / self._beam_response  # lines 13, 19, 22
         beam.rewind()
         beam.advance(self.time, self.h, (contact, 0.0, 0.0))
@@ -228,23 +232,11 @@ class PaperLaw(Memory):
 
     def _record(self, phase: str, contact: float, inside: float, foundation: float) -> None:
         tip, top = self._beam.motion(), self._spring.motion()
-        row: dict[str, Any] = {
-            "time": self.time,
-            "u_tip": tip.displacement,
-            "v_tip": tip.velocity,
-            "y": top.displacement,
-            "z": top.velocity,
-            "contact_force": contact,
-            "contact_force_smoothed": contact,
-            "compliance_force": inside,
-            "tie_reaction": contact - inside,
-            "foundation_force": foundation,
-            "gap": tip.displacement - top.displacement,
-            "velocity_mismatch": tip.velocity - top.velocity if phase != "free" else 0.0,
-            "phase": phase,
-        }
-        row.update(self._ledger.book(self._beam.energies(), self._spring.energies(), 0.0)._asdict())
-        self.recorder.row(row)
+        (u, v), (y, z) = tip[:2], top[:2]
+        mismatch = v - z if phase != "free" else 0.0
+        forces = (contact, contact, inside, contact - inside, foundation)
+        energies = self._ledger.book(self._beam.energies(), self._spring.energies(), 0.0)
+        self.recorder.row((self.time, u, v, y, z, *forces, u - y, mismatch, phase, *energies))
         self.recorder.shape(self.time, self._beam.shape())
 
     def summary(self) -> dict[str, Any]:

@@ -107,6 +107,16 @@ TEST(BeamState, AStepRepeatedFromTheSameStateIsBitIdentical) {
       b.restore(state);
       b.step(0.007, {1.0, 0.0, 0.0}, 0.0);
       EXPECT_EQ(outputs(other), outputs(b));
+
+      // Nor that the step was tried with another force or load before.
+      for (const double load : {0.0, 0.6}) {
+        b.restore(state);
+        b.step(0.007, {-3.0, 2.0, 0.0}, load);
+        Beam fresh(p);
+        fresh.restore(state);
+        fresh.step(0.007, {-3.0, 2.0, 0.0}, load);
+        EXPECT_EQ(outputs(fresh), outputs(b));
+      }
     }
   }
 }
