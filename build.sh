@@ -12,6 +12,7 @@ usage() {
 ./build.sh win64                   also cross-compile for 64-bit Windows; the FMUs then carry both
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
 ./build.sh browser                 install playwright and Chromium and look at the report in it
+./build.sh wheel                   build a source archive, and from that a wheel, into dist/, and test the wheel
 ./build.sh lint                    formatters, linters and type checker
 
 Set-up makes .venv here and installs Python packages into it; as root it also installs the system packages that are
@@ -170,6 +171,13 @@ case $command in
     set_up_python browser
     command -v "${CHROMIUM:-chromium}" chromium-browser google-chrome >/dev/null || install_packages "Chromium is" chromium
     exec $python -m pytest tests/browser "$@"
+    ;;
+  wheel)
+    build fmus
+    $python -m pip install --quiet --disable-pip-version-check build
+    rm -rf dist
+    $python -m build --outdir dist .
+    SPRINGBEAM_WHEEL=$(echo "$PWD"/dist/*.whl) exec $python -m pytest tests/system/test_installation.py "$@"
     ;;
   fmus)
     build fmus

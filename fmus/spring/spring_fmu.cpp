@@ -211,6 +211,8 @@ fmi::Table make_table() {
       .follows({"tip_displacement"})
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Spring::dissipated_energy));
+  add.output("internal_steps", "", "steps that IDA took since the start",
+             [](const SpringModel& m) { return static_cast<double>(m.spring->ida_steps()); });
   return t;
 }
 

@@ -418,6 +418,11 @@ class FmuSpring(_FmuBody):
         kinetic, potential, dissipated = self._stored()
         return Energies(kinetic, potential, dissipated, -self._spring.external_force * self._current.displacement)
 
+    @property
+    def internal_steps(self) -> int:
+        """Steps that IDA took on the way here; those of steps that were taken back are not among them."""
+        return round(Reals(self.fmu, "internal_steps").get()[0])
+
     def restart(self, time: float, displacement: float, velocity: float) -> None:
         """Start again at ``time`` [s] from y [m] and z [m/s], by the exact start values of the FMU."""
         self.fmu.reset(time, {**self._parameters, "displacement": displacement, "velocity": velocity})

@@ -183,4 +183,6 @@ def _calls(beam: FmuBeam | None, spring: FmuSpring | None) -> dict[str, int]:
         if body is not None:
             counts[f"{name}_steps"] = body.steps
             counts[f"{name}_rollbacks"] = body.rewinds
+    if spring is not None:
+        counts["spring_internal_steps"] = spring.internal_steps
     return counts

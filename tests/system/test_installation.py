@@ -1,0 +1,61 @@
+"""What `pip install` and `springbeam doctor` promise."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import zipfile
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from springbeam.cli import app
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_doctor_finds_and_loads_both_fmus():
+    result = CliRunner().invoke(app, ["doctor"])
+    assert result.exit_code == 0, result.output
+    assert metadata.version("springbeam") in result.stdout
+    assert result.stdout.count("fmu: loads; binaries for linux64") == 2
+
+
+def test_doctor_says_what_is_wrong(monkeypatch, tmp_path):
+    (tmp_path / "beam.fmu").write_bytes(b"not an archive")
+    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
+    result = CliRunner().invoke(app, ["doctor"])
+    assert result.exit_code == 1
+    assert f"{tmp_path / 'beam.fmu'}: not a usable FMU" in result.stdout
+    assert f"{tmp_path / 'spring.fmu'}: not found" in result.stdout
+
+
+@pytest.fixture
+def wheel():
+    """Built by `./build.sh wheel`, which names it."""
+    if "SPRINGBEAM_WHEEL" not in os.environ:
+        pytest.skip("no wheel: ./build.sh wheel builds one and runs this test")
+    return Path(os.environ["SPRINGBEAM_WHEEL"])
+
+
+def test_a_wheel_brings_the_fmus_and_runs_where_there_is_no_checkout(wheel, tmp_path):
+    assert wheel.name.startswith(f"springbeam-{metadata.version('springbeam')}-py3-none-")
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        archive.extractall(tmp_path / "site")
+    assert {f"springbeam/fmus/{name}" for name in ("beam.fmu", "spring.fmu", "spring_beam.ssp")} <= names
+    assert {f"springbeam/scenes/{p.name}" for p in (ROOT / "master/springbeam/scenes").iterdir()} <= names
+    script = """
+import sys
+sys.meta_path = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]
+import springbeam
+print(springbeam.__file__, len(springbeam.simulate(springbeam.load_scene("duffing"))))
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", script], env={"PYTHONPATH": str(tmp_path / "site"), "PATH": ""}, cwd=tmp_path,
+        capture_output=True, text=True, check=True, timeout=100,
+    )  # fmt: skip
+    assert run.stdout.split() == [str(tmp_path / "site/springbeam/__init__.py"), "2001"]
