@@ -82,7 +82,11 @@ _EVENT_MARKERS = {
     "unseated": ">",
 }
 _LEVEL_LINES: dict[str, dict[str, Any]] = {"Ψ": {"lw": 0.8, "ls": (0, (4, 3))}, "φ": {"lw": 1.3}}
-_IMPULSE_MARKERS = {"impulse_contact": "o", "impulse_foundation": "^"}
+#: Of a beam on a stop both are equal: one within the other.
+_IMPULSE_MARKERS: dict[str, dict[str, Any]] = {
+    "impulse_contact": {"marker": "o", "markersize": 5.5, "markerfacecolor": "none"},
+    "impulse_foundation": {"marker": "^", "markersize": 3.0},
+}
 
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -254,7 +258,8 @@ class _Timeline:
                 ax.vlines(
                     visible, 0.0, 1.0, transform=ax.get_xaxis_transform(), color=colour, lw=0.4, alpha=0.6, zorder=1
                 )
-            handles.append(Line2D([], [], label=f"{words} ({len(times)})", **look))
+            key = {"markersize": 8.0, "markeredgewidth": 1.5} if many else {}
+            handles.append(Line2D([], [], label=f"{words} ({len(times)})", **(look | key)))
         return handles
 
 
@@ -310,7 +315,7 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     _curves(figure, right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s", bar=True)
     seen = (trajectory["time"] >= times[0]) & (trajectory["time"] <= times[-1])
     fastest = float(np.max(np.abs(trajectory["v_tip"][seen]), initial=0.0))
-    if fastest > 3.0 * float(np.max(np.abs(velocities[:, -1]))):
+    if fastest > 3.0 * float(np.max(np.abs(velocities))):
         unit = readable_unit([np.array([fastest])], "m/s")
         right.set_title(
             f"mean from shape to shape; the tip's own velocity reaches {unit.factor * fastest:.2g} {unit.name}:\n"
@@ -329,7 +334,7 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
     if len(times) < _SHAPES_EARLY:
         return None
     figure = _figure(trajectory, "(B) Subsequent motion of the beam", 3.6)
-    left, right = figure.subplots(1, 2)
+    left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     jumpy = alternates(shapes[:, -1])
     # Of shapes that alternate, evenly spaced ones may all be of one kind: pairs show both.
     wanted = np.linspace(times[0], times[-1], _SHAPES_LATER // 2 if jumpy else _SHAPES_LATER)
@@ -482,7 +487,7 @@ def _impulse_panel(timeline: _Timeline, ax: Axes) -> None:
         if len(points):
             t, j = timeline.unit.factor * points[:, 0], unit.factor * points[:, 1]
             ax.vlines(t, foot or 0.0, j, color=colour, lw=1.0)
-            ax.plot(t, j, color=colour, marker=_IMPULSE_MARKERS[name], markersize=3.5, linestyle="none", label=label)
+            ax.plot(t, j, color=colour, linestyle="none", label=label, **_IMPULSE_MARKERS[name])
     if foot is None:
         ax.axhline(0.0, color=GREY, lw=0.5)
     else:

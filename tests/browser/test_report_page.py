@@ -134,7 +134,7 @@ def test_bodies_are_drawn_where_the_run_has_them(soft: Shown) -> None:
         # Paths are written with hundredths of a pixel, here 0.4 mm high.
         assert soft.height_of_end("beam") == pytest.approx(shapes[frame, -1], abs=5e-6)
         assert soft.height_of_end("coil") == pytest.approx(soft.trajectory.y[row], abs=5e-6)
-        reading = soft.page.locator("#reading").inner_text()
+        reading = " ".join(soft.page.locator("#reading").inner_text().split())
         assert f"t = {times[frame]:#.6g} s" in reading
         assert str(soft.trajectory.phase[row]) in reading
 

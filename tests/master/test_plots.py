@@ -152,6 +152,13 @@ def test_shapes_too_far_apart_for_the_motion_say_so():
     assert any("1 km/s" in text or "1e+03 m/s" in text for text in texts(plots._shapes_after_contact(fast)))
 
 
+def test_a_tip_that_bounces_while_the_beam_moves_as_fast_is_not_called_too_fast():
+    t = np.linspace(0.0, 0.6, 400)
+    inner = np.outer(t, np.sin(np.pi * SHAPE_POINTS))  # 1 m/s in the middle, the tip at rest
+    bouncing = dataclasses.replace(a_trajectory(v_tip=np.full(400, 0.5)), shapes=(t, inner))
+    assert not any("faster than the steps" in text for text in texts(plots._shapes_after_contact(bouncing)))
+
+
 def test_equilibrium_and_foundation_are_drawn_unless_far_outside():
     figure = plots._positions(a_trajectory())
     assert {"Ψ", "φ"} <= set(texts(figure))

@@ -75,7 +75,11 @@ _EVENT_SIGNS = {
     "triangle-left": "◀",
     "triangle-right": "▶",
 }
-_IMPULSE_SYMBOLS = {"impulse_contact": "circle", "impulse_foundation": "triangle-up"}
+#: Of a beam on a stop both are equal: one within the other.
+_IMPULSE_MARKERS: dict[str, dict[str, Any]] = {
+    "impulse_contact": {"symbol": "circle-open", "size": 10},
+    "impulse_foundation": {"symbol": "triangle-up", "size": 6},
+}
 _GRID = "#E3E3E3"
 
 
@@ -343,7 +347,7 @@ def _impulses(trajectory: Trajectory) -> Chart:
                 "thickness": 1.5,
             },
             mode="markers",
-            marker={"symbol": _IMPULSE_SYMBOLS[name], "size": 7, "color": look.colour},
+            marker={**_IMPULSE_MARKERS[name], "color": look.colour},
             cliponaxis=False,
             name=look.words,
             meta=name,

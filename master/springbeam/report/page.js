@@ -79,7 +79,8 @@
     shown = page.unit.factor * motion.time[k];
     cursors.forEach(place);
     const values = motion.readings.map((r) => `${r.words} = ${(r.factor * r.values[k]).toPrecision(4)} ${r.unit}`);
-    reading.textContent = [`t = ${motion.time[k].toPrecision(6)} s`, motion.phase[k], ...values].join("  ·  ");
+    const items = [`t = ${motion.time[k].toPrecision(6)} s`, motion.phase[k], ...values];
+    reading.textContent = items.map((item) => item.replaceAll(" ", "\u00a0")).join(" · ");
   }
 
   // The last frame not after a time [s].
