@@ -49,8 +49,9 @@ def meeting(kind: str, v: float, z: float, tip_mass: float, mass: float) -> Impa
 
     ``inelastic``: J = (z − v)/(1/m_tip + 1/m), equal and opposite, both leave with one velocity; ``rest``: velocities
     are kept; ``tip``: z := v (Ahn & Tate, Algorithm 1, line 5), which takes the energy from nowhere and books it.
+    A massless tip takes no impulse.
     """
-    if kind == "inelastic":
+    if kind == "inelastic" and tip_mass > 0.0:
         reduced = 1.0 / (1.0 / tip_mass + 1.0 / mass)
         j = reduced * (z - v)
         return Impact(on_beam=j, on_spring=-j, energy_loss=0.5 * reduced * (z - v) ** 2)

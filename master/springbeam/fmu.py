@@ -28,6 +28,7 @@ from fmpy.fmi2 import (
 from fmpy.model_description import ModelDescription, read_model_description
 
 from .memory import Memory
+from .quasi_static import QuasiStaticBeam
 from .scene import Beam, Scene, Spring
 from .subsystem import NO_FORCE, Energies, Force, Motion, StepRefused
 from .trajectory import SHAPE_POINTS
@@ -54,13 +55,12 @@ def fmu_directory() -> Path:
 def fingerprints(scene: Scene) -> dict[str, str]:
     """SHA-256 of the files of the FMUs that ``scene`` contains. Raises FmuError if one is missing."""
     found = {}
-    for name in ("beam", "spring"):
-        if getattr(scene, name) is not None:
-            path = fmu_directory() / f"{name}.fmu"
-            try:
-                found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
-            except OSError as error:
-                raise FmuError(f"{path}: {error.strerror}; ./build.sh fmus builds it") from error
+    for name in scene.fmus:
+        path = fmu_directory() / f"{name}.fmu"
+        try:
+            found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+        except OSError as error:
+            raise FmuError(f"{path}: {error.strerror}; ./build.sh fmus builds it") from error
     return found
 
 
@@ -371,7 +371,7 @@ class FmuBeam(_FmuBody):
 
     def __init__(self, beam: Beam, start_time: float, deflection_slope: float) -> None:
         """At ``start_time`` [s], with u = ``deflection_slope``·x."""
-        parameters: dict[str, float | int | bool] = beam.model_dump(exclude={"approach"})
+        parameters: dict[str, float | int | bool] = beam.model_dump(exclude={"approach", "fidelity"})
         parameters["integrator"] = _INTEGRATORS[beam.integrator]
         parameters["initial_deflection_slope"] = deflection_slope
         fmu = Fmu("beam", fmu_directory() / "beam.fmu", parameters, start_time)
@@ -430,12 +430,22 @@ class FmuSpring(_FmuBody):
         self._current = self._read_motion()
 
 
-def load_bodies(scene: Scene, start_time: float) -> tuple[FmuBeam | None, FmuSpring | None]:
-    """The FMUs that ``scene`` contains, at ``start_time`` [s], where the beam is as the approach leaves it."""
-    beam = None
+def load_bodies(scene: Scene, start_time: float) -> tuple[FmuBeam | QuasiStaticBeam | None, FmuSpring | None]:
+    """The bodies that ``scene`` contains, at ``start_time`` [s], where the beam is as the approach leaves it.
+
+    They are FMUs, but for a beam without inertia.
+    """
+    beam: FmuBeam | QuasiStaticBeam | None = None
     if scene.beam is not None:
-        slope = scene.beam.initial_deflection_slope + start_time * scene.beam.initial_velocity_slope
-        beam = FmuBeam(scene.beam, start_time, slope)
+        rate = scene.beam.initial_velocity_slope
+        if "beam" not in scene.fmus:
+            assert scene.initial_tip is not None
+            tip, velocity = scene.initial_tip + start_time * rate * scene.beam.length, rate * scene.beam.length
+            beam = QuasiStaticBeam(scene.beam, scene.coupling.degree, tip, velocity)
+            if scene.beam.approach == "elastic":
+                beam.release()
+        else:
+            beam = FmuBeam(scene.beam, start_time, scene.beam.initial_deflection_slope + start_time * rate)
     try:
         return beam, None if scene.spring is None else FmuSpring(scene.spring, start_time)
     except BaseException:

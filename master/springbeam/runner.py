@@ -11,6 +11,7 @@ from .checkpoint import Checkpoint, CheckpointRefused, Checkpoints
 from .fmu import FmuBeam, FmuSpring, fingerprints, load_bodies
 from .memory import Memory
 from .paper_law import PaperLaw
+from .quasi_static import QuasiStaticBeam
 from .recording import FileRecorder, MemoryRecorder, Recorder, RunDirectory, load_summary, load_trajectory
 from .scene import Scene, scene_from_dict, suspicions, with_changes
 from .simulation import Progress, RunStopped, Simulation
@@ -71,7 +72,7 @@ def run(
     try:
         simulation: Simulation | PaperLaw
         if paper:
-            assert beam is not None
+            assert isinstance(beam, FmuBeam)
             assert spring is not None
             simulation = PaperLaw(scene, start_time, beam, spring, recorder, after_step)
         else:
@@ -96,7 +97,7 @@ def run(
                 **status,
                 "version": version("springbeam"),
                 **simulation.summary(),
-                **_calls(beam, spring),
+                **_calls(beam=beam, spring=spring),
                 "setup_time": loaded - began,
                 "wall_time": before + perf_counter() - loaded,
             }
@@ -176,13 +177,12 @@ def _as_in_paper(scene: Scene) -> Scene:
     return with_changes(scene, beam={"integrator": "generalized_alpha", "rho_inf": 1.0, "n_modes": 0})
 
 
-def _calls(beam: FmuBeam | None, spring: FmuSpring | None) -> dict[str, int]:
-    bodies = {"beam": beam, "spring": spring}
+def _calls(**bodies: FmuBeam | FmuSpring | QuasiStaticBeam | None) -> dict[str, int]:
     counts = {}
     for name, body in bodies.items():
-        if body is not None:
+        if isinstance(body, (FmuBeam, FmuSpring)):
             counts[f"{name}_steps"] = body.steps
             counts[f"{name}_rollbacks"] = body.rewinds
-    if spring is not None:
-        counts["spring_internal_steps"] = spring.internal_steps
+        if isinstance(body, FmuSpring):
+            counts["spring_internal_steps"] = body.internal_steps
     return counts

@@ -19,6 +19,8 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
+from .statics import bending_stiffness, shear_stiffness, tip_compliance, tip_inertia, tip_load_deflection
+
 if sys.version_info >= (3, 11):
     import tomllib
 else:
@@ -69,6 +71,8 @@ class Beam(_Table):
     initial_deflection_slope: float = 0.0  #: u⁰ = s x
     initial_velocity_slope: float = 0.0  #: u_t⁰ = s x [1/s]
     approach: Literal["undeformed", "elastic"] = "undeformed"
+    #: "quasi_static": without inertia, a tip compliance; mesh, modes, integrator and density then play no part.
+    fidelity: Literal["dynamic", "quasi_static"] = "dynamic"
 
     @model_validator(mode="after")
     def _modes_exist(self) -> Beam:
@@ -153,6 +157,12 @@ class Scene(_Table):
         return self
 
     @property
+    def fmus(self) -> tuple[str, ...]:
+        """Names of the FMUs that the scene is made of; a beam without inertia is none."""
+        beam = self.beam is not None and self.beam.fidelity == "dynamic"
+        return ("beam",) * beam + ("spring",) * (self.spring is not None)
+
+    @property
     def tip_target(self) -> tuple[str, float] | None:
         """What the beam's tip meets first, as ``("[table] key", height [m])``: the spring, else the stop."""
         if self.beam is None:
@@ -162,11 +172,21 @@ class Scene(_Table):
         return None if self.stop is None else ("[stop] position", self.stop.position)
 
     @property
+    def initial_tip(self) -> float | None:
+        """u_tip at the start [m]: s₀ L, or the static deflection of a beam let go without inertia and damping."""
+        if (beam := self.beam) is None:
+            return None
+        if beam.fidelity == "quasi_static" and beam.approach == "elastic" and beam.alpha_b == 0.0:
+            return tip_load_deflection(beam)
+        return beam.initial_deflection_slope * beam.length
+
+    @property
     def initial_clearance(self) -> float | None:
         """Height [m] of the tip above `tip_target` at the start, 0 where only rounding separates them."""
-        if self.beam is None or self.tip_target is None:
+        tip = self.initial_tip
+        if tip is None or self.tip_target is None:
             return None
-        tip, target = self.beam.initial_deflection_slope * self.beam.length, self.tip_target[1]
+        target = self.tip_target[1]
         return 0.0 if math.isclose(tip, target, rel_tol=1e-12) else tip - target
 
     @property
@@ -248,6 +268,43 @@ def _law_applies(scene: Scene) -> Iterator[str]:
         )
 
 
+def _inertia_needed(scene: Scene) -> Iterator[str]:
+    beam, contact, scheme = scene.beam, scene.contact, scene.coupling.scheme
+    if beam is None or beam.fidelity == "dynamic":
+        return
+    name = '[beam] fidelity = "quasi_static"'
+    if scene.spring is None:
+        yield f'{name}: a beam without inertia moves with a [spring] or not at all; use fidelity = "dynamic"'
+    if contact.law == "compliance":
+        yield (
+            f'{name}: is in series with the compliance of [contact] law = "compliance", and what lies between them has '
+            'no inertia; use law = "transmission", or fidelity = "dynamic"'
+        )
+    if contact.law == "paper":
+        yield f'{name}: [contact] law = "paper" integrates the beam by (62); use fidelity = "dynamic"'
+    if contact.law == "transmission" and contact.impact == "tip":
+        yield (
+            f'{name}: [contact] impact = "tip" gives the spring the velocity of the tip, which without inertia has '
+            'none of its own; use impact = "inelastic"'
+        )
+    if scheme == "hermite":
+        yield (
+            f'{name}: [coupling] scheme = "hermite" sets the velocity of the tip, which without inertia is the '
+            'spring\'s; use scheme = "energy"'
+        )
+    if beam.approach == "elastic":
+        if beam.initial_velocity_slope != 0.0:
+            yield (
+                f"[beam] initial_velocity_slope = {beam.initial_velocity_slope}: without inertia, and approach = "
+                '"elastic", nothing carries a velocity; use 0.0, or fidelity = "dynamic"'
+            )
+        if beam.alpha_b == 0.0 and beam.initial_deflection_slope != 0.0:
+            yield (
+                f"[beam] initial_deflection_slope = {beam.initial_deflection_slope}: without inertia and damping the "
+                'beam starts in its static deflection; use 0.0, approach = "undeformed", or alpha_b > 0'
+            )
+
+
 def _coupling_resolves(scene: Scene) -> Iterator[str]:
     beam, coupling, t_end = scene.beam, scene.coupling, scene.time.t_end
     if coupling.macro_step > t_end:
@@ -266,7 +323,7 @@ def _coupling_resolves(scene: Scene) -> Iterator[str]:
 
 
 #: What cannot be run although each value is allowed; each yields ``[table] key = value: reason and remedy``.
-_CHECKS = (_bodies, _spring_holds, _tip_arrives, _law_applies, _coupling_resolves)
+_CHECKS = (_bodies, _spring_holds, _tip_arrives, _law_applies, _inertia_needed, _coupling_resolves)
 
 _TABLES: dict[str, type[_Table]] = {
     "time": Time,
@@ -280,14 +337,12 @@ _TABLES: dict[str, type[_Table]] = {
 
 def _locking(beam: Beam) -> float:
     """Static tip stiffness of the mesh over that of the beam, with full integration (model.md, "Locking")."""
-    if beam.reduced_integration or beam.element_degree > 2:
+    if beam.fidelity == "quasi_static" or beam.reduced_integration or beam.element_degree > 2:
         return 1.0
-    shear = beam.shear_coefficient * beam.shear_modulus * beam.area
-    bending = beam.young_modulus * beam.second_moment_of_area
-    h = beam.length / beam.n_elements
+    bending, shear, h = bending_stiffness(beam), shear_stiffness(beam), beam.length / beam.n_elements
     if beam.element_degree == 1:
         return 1.0 + shear * h**2 / (12.0 * bending)
-    compliance = beam.length**3 / (3.0 * bending) + beam.length / shear
+    compliance = tip_compliance(beam)
     missing = beam.length * h**2 / (12.0 * bending) / (1.0 + 60.0 * bending / (shear * h**2))
     return compliance / (compliance - missing)
 
@@ -295,11 +350,25 @@ def _locking(beam: Beam) -> float:
 def suspicions(scene: Scene) -> list[str]:
     """What can be run but may not be meant; for a run's warnings."""
     found = []
-    if (beam := scene.beam) is not None and (factor := _locking(beam)) > 1.05:
+    beam = scene.beam
+    if beam is not None and (factor := _locking(beam)) > 1.05:
         found.append(
             f"[beam] n_elements = {beam.n_elements}: full integration locks, the beam is {factor:.3g} times too "
             "stiff; use reduced_integration = true, element_degree = 3, or more elements"
         )
+    if beam is not None and beam.fidelity == "quasi_static" and scene.spring is not None:
+        share = tip_inertia(beam) / scene.spring.mass
+        if share > 0.05:
+            found.append(
+                f'[beam] fidelity = "quasi_static": leaves out an inertia that at the tip is {share:.2g} of the '
+                f"spring's mass; the joined motion is about {math.sqrt(1.0 + share) - 1.0:.0%} too fast"
+            )
+        if beam.approach == "undeformed" and beam.initial_velocity_slope != 0.0:
+            energy = beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
+            found.append(
+                f'[beam] fidelity = "quasi_static": the beam arrives without its kinetic energy, {energy:.3g} J; its '
+                "blow, and the vibration it leaves, are not in the result"
+            )
     return found
 
 

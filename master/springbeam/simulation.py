@@ -186,7 +186,8 @@ class Simulation(Memory):
             kind, state.phase, ends, pair.end_force(state, step), self._detector.tolerance(ends)
         )
         pair.apply_impulses(impact.on_beam, impact.on_spring)
-        self._ledger.impact_loss += impact.energy_loss
+        lost = impact.energy_loss + pair.massless_tip(phase)
+        self._ledger.impact_loss += lost
         state.enter(phase)
         tip, low = pair.ends()
         beam, spring = pair.beam is not None, pair.spring is not None
@@ -201,7 +202,7 @@ class Simulation(Memory):
                 tip.velocity if beam else None,
                 impact.on_beam,
                 impact.of_foundation,
-                impact.energy_loss,
+                lost,
             )
         )
 

@@ -11,6 +11,7 @@ from .coupling.compliance import Compliance, compliance_energy
 from .coupling.exchange import Exchange
 from .coupling.tie import Tie
 from .memory import Memory
+from .quasi_static import QuasiStaticBeam
 from .scene import ORDINARY_SCHEMES, Scene
 from .subsystem import NO_FORCE, BeamBody, Body, Energies, Force, Held, Motion
 
@@ -166,6 +167,16 @@ class Pair(Memory):
             self.beam.apply_impulse(on_beam)
         if self.spring is not None and on_spring != 0.0:
             self.spring.apply_impulse(on_spring)
+
+    def massless_tip(self, phase: Phase) -> float:
+        """A massless tip takes the velocity of what ``phase`` joins it to, or springs back; the energy it loses [J]."""
+        if not isinstance(self.beam, QuasiStaticBeam):
+            return 0.0
+        if phase.joint is Joint.FREE:
+            return self.beam.release()
+        assert self.lower is not None
+        self.beam.join(self.lower.motion().velocity)
+        return 0.0
 
     def ends(self) -> Ends:
         """(tip, lower end); the one that is missing is at rest at 0."""

@@ -10,6 +10,7 @@ from .memory import Memory
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
+#: Nothing touches the end. (A contact force that comes out as 0 is another tuple: a massless end tells them apart.)
 NO_FORCE: Force = (0.0, 0.0, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""As much model as a scene needs: elements of any degree."""
+"""As much model as a scene needs: elements of any degree, a beam without inertia."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from contextlib import closing
 import numpy as np
 import pytest
 
+from springbeam import fmu, simulate, with_changes
+from springbeam.crosscheck import crosscheck
 from springbeam.fmu import FmuBeam
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene import Beam
+from springbeam.scene import Beam, Scene, scene_from_dict
 from springbeam.subsystem import NO_FORCE
 
 
@@ -28,3 +30,56 @@ def test_the_fmu_vibrates_with_the_frequencies_of_the_reference(degree, n, reduc
             exact = np.sum(modes.tip**2 * np.cos(modes.omega * t))
             # Two independent eigenproblems: ω_max t ≈ 500 rad with frequencies to 1e-13.
             assert body.motion().velocity == pytest.approx(exact, abs=1e-10 * modes.inverse_tip_mass)
+
+
+def quasi_static(**beam: object) -> Scene:
+    """A loaded beam comes down on a heavy spring that moves already."""
+    return scene_from_dict(
+        {
+            "time": {"t_end": 2.0},
+            "beam": {
+                "fidelity": "quasi_static", "young_modulus": 30.0, "shear_modulus": 50.0, "alpha_b": 0.05,
+                "distributed_load": -1.0, "initial_velocity_slope": -1.0, **beam,
+            },
+            "spring": {"mass": 2.0, "linear_stiffness": 3.0, "initial_velocity": -0.5},
+            "coupling": {"degree": 2, "macro_step": 0.01},
+        }
+    )  # fmt: skip
+
+
+def test_without_inertia_is_the_limit_of_a_light_beam():
+    """The beam FMU at density ρ → 0: the difference is of first order in ρ, through meeting, release and retie."""
+    light = simulate(quasi_static())
+    differences = []
+    for density in (1e-3, 1e-4, 1e-5):
+        beam = {"fidelity": "dynamic", "density": density, "element_degree": 4, "n_elements": 2}
+        run = simulate(with_changes(light.scene, beam=beam))
+        assert [e.kind for e in run.events] == [e.kind for e in light.events] == ["impact", "release", "retie"]
+        differences.append(np.abs(np.interp(light.time, run.time, run.y) - light.y)[light.time < 0.8].max())
+    assert differences[0] / differences[1] == pytest.approx(10.0, rel=0.01)
+    assert differences[1] / differences[2] == pytest.approx(10.0, rel=0.01)
+    assert differences[2] < 1e-6
+
+
+def test_without_inertia_no_beam_fmu_is_loaded(monkeypatch):
+    loaded: list[str] = []
+    load = fmu.Fmu.__init__
+
+    def counted(self: fmu.Fmu, name: str, *rest: object) -> None:
+        loaded.append(name)
+        load(self, name, *rest)
+
+    monkeypatch.setattr(fmu.Fmu, "__init__", counted)
+    run = simulate(quasi_static())
+    assert loaded == ["spring"]
+    assert "beam_steps" not in run.summary
+    assert run.shapes[1].shape[1] == 21
+    assert run.summary["max_energy_residual"] < 1e-11
+    assert any("without its kinetic energy" in warning for warning in run.summary["warnings"])
+
+
+def test_crosscheck_knows_the_beam_without_inertia():
+    report = crosscheck(quasi_static())
+    assert report.passed, report.rows
+    assert report.horizon == 2.0
+    assert report.reference.summary["reference"] == "quasi_static"

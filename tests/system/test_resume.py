@@ -32,6 +32,9 @@ SCENES = {
     "energy 2, damped": with_changes(SOFT, beam={"alpha_b": 1e-3}, spring={"damping": 0.5}, coupling={"degree": 2}),
     "hermite 2": with_changes(SOFT, coupling={"scheme": "hermite", "degree": 2, "macro_step": 1e-3}),
     "generalized_alpha": with_changes(SOFT, beam={"integrator": "generalized_alpha", "rho_inf": 0.8}),
+    "quasi-static": with_changes(
+        SOFT, beam={"fidelity": "quasi_static", "alpha_b": 0.1, "distributed_load": -20.0}, coupling={"degree": 1}
+    ),
     "compliance": with_changes(SOFT, contact=COMPLIANCE),
     "gauss_seidel": with_changes(
         SOFT,

@@ -145,10 +145,11 @@ class Tie(Memory):
     ) -> Matrix:
         """Columns ∂conditions/∂a_k by differences about ``a``, where they are ``r`` and the motion ends at ``end``.
 
-        The difference would move a free mass by ``fraction`` of the motion; it is exact where the body is linear.
+        The difference would move a free mass by ``fraction`` of the motion; it is exact where the body is linear, as
+        the massless beam is.
         """
         length = max(abs(end.displacement), size * abs(end.velocity), 1e-150)
-        delta = fraction * 2.0 * body.mass * length / (size * size)
+        delta = fraction * 2.0 * body.mass * length / (size * size) or 1.0
         columns = []
         for k in range(len(a)):
             changed = a.copy()

@@ -36,6 +36,7 @@ from ..trajectory import COLUMNS, Event, Trajectory
 from .exponential import ExponentialPropagator, LinearForm
 from .hybrid_system import HybridSystem, Motion, Phase, ReferenceFailure
 from .propagators import SCIPY_METHODS, Propagator, RungeKuttaPropagator, Segment
+from .quasi_static import simulate as simulate_quasi_static
 
 __all__ = ["ReferenceFailure", "simulate"]
 
@@ -62,7 +63,8 @@ def simulate(
     ----------
     method
         ``"exponential"``: exact modal form of each phase, for soft and stiff beams alike. ``"DOP853"``, ``"LSODA"``,
-        ``"Radau"``: scipy on the same equations, for soft beams, with ``rtol`` and ``atol``.
+        ``"Radau"``: scipy on the same equations, for soft beams, with ``rtol`` and ``atol``. A scene with a
+        quasi-static beam is left to `quasi_static.simulate`.
     nodes
         Points of a scipy step at which events are looked for; 2, its ends, is what `scipy.integrate.solve_ivp` does.
     sample_times
@@ -91,6 +93,12 @@ def simulate(
     ValueError
         If the scene is outside what this reference defines.
     """
+    if scene.beam is not None and scene.beam.fidelity == "quasi_static":
+        if method not in ("exponential", "DOP853"):
+            raise ValueError(f"method = {method!r}: a scene with a quasi-static beam is integrated by DOP853")
+        return simulate_quasi_static(
+            scene, sample_times=sample_times, velocity_perturbation=velocity_perturbation, t_end=t_end
+        )
     if method not in ("exponential", *SCIPY_METHODS):
         raise ValueError(f"method = {method!r}: one of exponential, {', '.join(SCIPY_METHODS)}")
     run = _Run(scene, method, rtol, atol, nodes, velocity_perturbation, seat_height, max_events, t_end)

@@ -1,0 +1,301 @@
+"""A beam without inertia: statics against the mesh, the joined motion against its closed form, the ledger."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from bodies import DuffingBody, orders
+from scipy.sparse.linalg import spsolve
+
+from springbeam import statics
+from springbeam.contact import Joint, Phase, meeting
+from springbeam.crosscheck import contact_changes
+from springbeam.monolithic import event_driven
+from springbeam.monolithic.semi_discrete import assemble
+from springbeam.quasi_static import QuasiStaticBeam
+from springbeam.recording import MemoryRecorder
+from springbeam.scene import Beam, Scene, SceneError, scene_from_dict, suspicions
+from springbeam.simulation import Simulation
+from springbeam.stepping import Pair
+from springbeam.subsystem import NO_FORCE
+from springbeam.trajectory import SHAPE_POINTS, Trajectory
+
+BEAM = Beam(
+    density=2.0, area=0.5, second_moment_of_area=0.3, young_modulus=30.0, shear_modulus=50.0, shear_coefficient=0.8,
+    length=1.3, n_elements=4, distributed_load=-1.5, tip_load_coefficient=4.0,
+)  # fmt: skip
+STIFFNESS = 1.0 / statics.tip_compliance(BEAM)
+
+
+def body(alpha: float = 0.0, degree: int = 0, tip: float = 0.1) -> QuasiStaticBeam:
+    return QuasiStaticBeam(BEAM.model_copy(update={"alpha_b": alpha}), degree, tip, 0.0)
+
+
+# -- statics --------------------------------------------------------------------------------------------------------
+
+
+def test_statics_are_those_of_a_mesh_that_holds_them() -> None:
+    """Degree 5 holds the deflection under a load that is linear in each element (u of degree 5, θ of degree 4)."""
+    d = assemble(BEAM.model_copy(update={"element_degree": 5}))
+    load = BEAM.distributed_load * d.uniform_load + BEAM.tip_load_coefficient * d.hat_load
+    by_force, by_load = spsolve(d.K, d.tip_vector), spsolve(d.K, load)
+    assert statics.tip_compliance(BEAM) == pytest.approx(by_force[d.tip], rel=1e-12)
+    assert statics.tip_load_deflection(BEAM) == pytest.approx(by_load[d.tip], rel=1e-12)
+    assert statics.load_energy(BEAM) == pytest.approx(load @ by_load, rel=1e-12)
+    sampler = d.deflection_sampler()
+    np.testing.assert_allclose(statics.tip_force_shape(BEAM, SHAPE_POINTS), sampler @ by_force, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(statics.load_shape(BEAM, SHAPE_POINTS), sampler @ by_load, rtol=1e-11, atol=1e-15)
+    shape = by_force / by_force[d.tip]
+    assert statics.tip_inertia(BEAM) == pytest.approx(shape @ d.M @ shape, rel=1e-12)
+
+
+def test_a_slender_beam_moves_33_of_140_of_its_mass() -> None:
+    slender = Beam(second_moment_of_area=1e-8, young_modulus=1e8, shear_modulus=1e8)
+    assert statics.tip_inertia(slender) == pytest.approx(33.0 / 140.0, rel=1e-6)
+
+
+# -- the body -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.03, 5.0])
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_the_work_of_the_force_is_accounted_for_exactly(alpha: float, degree: int) -> None:
+    """∫C ẇ = Δ(strain energy + load potential) + dissipated, with ∫C ẇ from the integrals that the coupling uses."""
+    beam, rng = body(alpha, degree), np.random.default_rng(1)
+    for size in (1e-3, 0.1, 7.0):
+        coefficients = rng.normal(size=3) * (np.arange(3) <= degree)
+        force = (coefficients[0], coefficients[1] / size, coefficients[2] / size**2)
+        before, u0 = sum(beam.energies()), beam.motion().displacement
+        beam.advance(0.0, size, force)
+        u1, _, once, twice = beam.motion()
+        end = force[0] + size * (force[1] + 0.5 * size * force[2])
+        work = end * u1 - force[0] * u0 - force[1] * once - force[2] * (size * once - twice)
+        assert sum(beam.energies()) - before == pytest.approx(work, abs=1e-13 * (abs(u0) + abs(u1) + 1.0) * 10.0)
+        assert beam.energies().kinetic == 0.0
+
+
+def test_damping_takes_energy_and_its_absence_none() -> None:
+    for alpha in (0.0, 0.02):
+        beam = body(alpha)
+        beam.advance(0.0, 0.1, (1.0, 0.0, 0.0))
+        assert (beam.energies().dissipated > 0.0) == (alpha > 0.0)
+
+
+@pytest.mark.parametrize("alpha", [1e-3, 0.2, 4.0])
+def test_let_go_it_relaxes_exponentially(alpha: float) -> None:
+    beam, rest = body(alpha), statics.tip_load_deflection(BEAM)
+    w0, size = 0.1 - rest, 0.5
+    beam.release()
+    assert beam.motion().velocity == pytest.approx(-w0 / alpha, rel=1e-14)
+    beam.advance(0.0, size, NO_FORCE)
+    w, v, once, twice = w0 * np.exp(-size / alpha), -w0 / alpha * np.exp(-size / alpha), 0.0, 0.0
+    once = rest * size + alpha * (w0 - w)
+    twice = 0.5 * rest * size**2 + alpha * (w0 * size - alpha * (w0 - w))
+    assert beam.motion() == pytest.approx((rest + w, v, once, twice), rel=1e-12)
+    assert beam.energies().dissipated == pytest.approx(0.5 * STIFFNESS * (w0**2 - w**2), rel=1e-12)
+
+
+def test_let_go_undamped_it_is_at_rest_at_once_and_says_what_that_costs() -> None:
+    beam, w = body(), 0.1 - statics.tip_load_deflection(BEAM)
+    before = sum(beam.energies())
+    lost = beam.release()
+    assert lost == pytest.approx(0.5 * STIFFNESS * w * w, rel=1e-14)
+    assert sum(beam.energies()) + lost == pytest.approx(before, rel=1e-14)
+    np.testing.assert_allclose(beam.shape(), statics.load_shape(BEAM, SHAPE_POINTS), atol=1e-16)
+
+
+def test_a_rewound_step_leaves_nothing() -> None:
+    beam = body(0.1, 2)
+    beam.advance(0.0, 0.1, (1.0, 2.0, 3.0))
+    beam.mark()
+    before = (beam.motion(), beam.energies())
+    beam.advance(0.1, 0.2, (-4.0, 1.0, 0.0))
+    first = (beam.motion(), beam.energies())
+    beam.rewind()
+    assert (beam.motion(), beam.energies()) == before
+    beam.advance(0.1, 0.2, (-4.0, 1.0, 0.0))
+    assert (beam.motion(), beam.energies()) == first
+
+
+def test_a_massless_tip_takes_no_impulse() -> None:
+    for kind in ("inelastic", "rest"):
+        impact = meeting(kind, -3.0, 1.0, 0.0, 2.0)
+        assert (impact.on_beam, impact.on_spring, impact.energy_loss) == (0.0, 0.0, 0.0)
+
+
+# -- the pair -------------------------------------------------------------------------------------------------------
+
+
+def scene(**tables: dict[str, Any]) -> Scene:
+    """A stiff beam under a load on a spring that it meets in motion; no cubic term, no foundation."""
+    data: dict[str, dict[str, Any]] = {
+        "time": {"t_end": 0.7},
+        "beam": {
+            "fidelity": "quasi_static", "young_modulus": 30.0, "shear_modulus": 50.0, "density": 0.1,
+            "distributed_load": -1.0, "initial_velocity_slope": -1.0,
+        },
+        "spring": {"mass": 2.0, "linear_stiffness": 3.0, "initial_velocity": -0.5},
+        "coupling": {"macro_step": 0.01},
+    }  # fmt: skip
+    return scene_from_dict({table: {**data.get(table, {}), **tables.get(table, {})} for table in {**data, **tables}})
+
+
+def simulate(given: Scene) -> Trajectory:
+    """With an exact spring, so that the coupling is tested by itself."""
+    assert given.beam is not None
+    assert given.spring is not None
+    start, s, rate = given.contact_time or 0.0, given.spring, given.beam.initial_velocity_slope * given.beam.length
+    beam = QuasiStaticBeam(given.beam, given.coupling.degree, (given.initial_tip or 0.0) + start * rate, rate)
+    if given.beam.approach == "elastic":
+        beam.release()
+    spring = DuffingBody(
+        s.mass, s.linear_stiffness, s.cubic_stiffness, s.equilibrium, s.initial_velocity, s.damping, s.external_force
+    )
+    recorder = MemoryRecorder(given)
+    simulation = Simulation(given, start, beam, spring, recorder)
+    simulation.run()
+    recorder.finish(simulation.summary())
+    return recorder.trajectory()
+
+
+@pytest.mark.parametrize("alpha", [0.0, 0.02, 0.4])
+@pytest.mark.parametrize(
+    ("degree", "sizes", "order"), [(0, (0.02, 0.01), 2), (1, (0.02, 0.01), 4), (2, (0.07, 0.035), 6)]
+)
+def test_tied_it_is_a_spring_in_parallel(degree: int, sizes: tuple[float, float], order: int, alpha: float) -> None:
+    """m ÿ + k α ẏ + (k1 + k) y = k u_F in closed form; order 2d + 2, and no energy lost or gained at any step."""
+    errors = []
+    for size in sizes:
+        run = simulate(scene(beam={"alpha_b": alpha}, coupling={"macro_step": size, "degree": degree}))
+        assert [e.kind for e in run.events] == ["impact"]
+        assert run.events[0].energy_loss == 0.0
+        assert run.events[0].z == -0.5
+        beam = run.scene.beam
+        k, rest, m = 1.0 / statics.tip_compliance(beam), statics.tip_load_deflection(beam), 2.0
+        roots = np.roots([m, k * alpha, 3.0 + k]).astype(complex)
+        mean = k * rest / (3.0 + k)
+        amplitudes = np.linalg.solve(np.vstack([np.ones(2), roots]), [-mean, -0.5])
+        exact = mean + (np.exp(np.outer(run.time, roots)) @ amplitudes).real
+        errors.append(np.abs(run.y - exact).max())
+        assert run.summary["max_energy_residual"] < 1e-13
+        # Of the motion over a step, up to 0.5 m/s · H, the coupling's tolerance.
+        assert np.abs(run.u_tip - run.y).max() < 1e-12 * 0.6 * size + 1e-15
+        assert run.e_dissipated[-1] > 0.0 if alpha else run.e_dissipated[-1] == 0.0
+    assert orders(errors, sizes)[0] == pytest.approx(order, abs=0.25)
+
+
+LIFE = {
+    "foundation": {"stop": {"position": -0.03}},
+    "damped, restitution": {"stop": {"position": -0.05, "restitution": 0.5}, "beam": {"alpha_b": 0.02}},
+    "thrown up": {
+        "spring": {"initial_velocity": 1.0, "equilibrium": -0.2},
+        "beam": {"approach": "elastic", "initial_velocity_slope": 0.0},
+    },
+    "thrown up, damped": {
+        "spring": {"initial_velocity": 1.0, "equilibrium": -0.2, "damping": 0.1},
+        "beam": {"approach": "elastic", "initial_velocity_slope": 0.0, "alpha_b": 0.2},
+    },
+    "let go from a deflection": {
+        "spring": {"initial_velocity": 1.0, "equilibrium": -0.2},
+        "beam": {
+            "approach": "elastic", "initial_deflection_slope": 0.1, "initial_velocity_slope": 0.0, "alpha_b": 0.2,
+            "tip_load_coefficient": -6.0,
+        },
+    },
+    "load upward": {"beam": {"distributed_load": 3.0}, "stop": {"position": -0.2}},
+    "hardening, pressed": {
+        "spring": {"external_force": -3.0, "cubic_stiffness": 4.0},
+        "stop": {"position": -0.2, "restitution": 0.3},
+    },
+    "comes to rest on the foundation": {
+        "spring": {"external_force": -6.0},
+        "stop": {"position": -0.05, "restitution": 0.1},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", LIFE)
+def test_the_whole_life_is_that_of_the_reference(what: str) -> None:
+    """`monolithic.quasi_static` integrates each phase as one ODE; degree 2 at H = 0.01 s leaves 1e-10 m in y.
+
+    A tip that is let go is so where the force polynomial of the step vanishes, which is of order 3.
+    """
+    run = simulate(scene(**{**LIFE[what], "time": {"t_end": 2.0}, "coupling": {"degree": 2, "macro_step": 0.01}}))
+    exact = event_driven.simulate(run.scene)
+    # Bounces that die out end by different rules, so what follows within 1 ms is not compared.
+    changes, expected = (contact_changes(t.events, 1e-3) for t in (run, exact))
+    assert [kind for kind, _ in changes] == [kind for kind, _ in expected]
+    assert [time for _, time in changes] == pytest.approx([time for _, time in expected], abs=1e-6)
+    assert run.e_impact_loss[-1] == pytest.approx(exact.e_impact_loss[-1], abs=1e-8)
+    apart = [np.min([abs(t - e.time) for e in exact.events]) > 1e-6 for t in run.time]
+    _, mine, other = np.intersect1d(np.round(run.time[apart], 12), np.round(exact.time, 12), return_indices=True)
+    assert len(mine) > 150
+    assert np.abs(run.y[apart][mine] - exact.y[other]).max() < 1e-10
+    assert np.abs(run.u_tip[apart][mine] - exact.u_tip[other]).max() < 1e-10
+    assert run.summary["max_energy_residual"] < 1e-12
+    assert np.abs(exact.energy_residual).max() < 1e-12
+
+
+def test_a_snap_back_is_booked() -> None:
+    """A load that lifts pulls the tied spring; let go at Ψ, the tip jumps to u_F and ½ k u_F² is lost."""
+    run = simulate(scene(**{**LIFE["load upward"], "coupling": {"degree": 2}}))
+    release = next(e for e in run.events if e.kind == "release")
+    k, rest = 1.0 / statics.tip_compliance(run.scene.beam), statics.tip_load_deflection(run.scene.beam)
+    assert release.energy_loss == pytest.approx(0.5 * k * rest**2, rel=1e-9)
+    assert release.u_tip == pytest.approx(rest, rel=1e-12)
+    assert run.e_impact_loss[-1] == pytest.approx(release.energy_loss, rel=1e-9)
+
+
+# -- what is refused, and what is said -------------------------------------------------------------------------------
+
+REFUSED: dict[str, tuple[dict[str, Any], list[str]]] = {
+    "compliance": ({"contact": {"law": "compliance"}}, ["in series", '"transmission"', '"dynamic"']),
+    "paper": ({"contact": {"law": "paper"}, "stop": {"position": -1.0}}, ['law = "paper"', '"dynamic"']),
+    "tip": ({"contact": {"impact": "tip"}}, ['impact = "tip"', '"inelastic"']),
+    "hermite": ({"coupling": {"scheme": "hermite", "degree": 1}}, ['"hermite"', '"energy"']),
+    "velocity": ({"beam": {"approach": "elastic"}}, ["initial_velocity_slope = -1.0", "carries", "0.0"]),
+    "deflection": (
+        {"beam": {"approach": "elastic", "initial_velocity_slope": 0.0, "initial_deflection_slope": 0.3}},
+        ["initial_deflection_slope = 0.3", "static deflection", "alpha_b > 0"],
+    ),
+    "below the spring": (
+        {"beam": {"approach": "elastic", "initial_velocity_slope": 0.0}},
+        ["m below [spring] equilibrium"],
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_scenes_that_need_inertia_are_refused(what: str) -> None:
+    changes, words = REFUSED[what]
+    with pytest.raises(SceneError) as refused:
+        scene(**changes)
+    for word in words:
+        assert word in str(refused.value)
+
+
+def test_a_beam_alone_needs_inertia() -> None:
+    with pytest.raises(SceneError, match="moves with a \\[spring\\] or not at all"):
+        scene_from_dict({"time": {"t_end": 1.0}, "beam": {"fidelity": "quasi_static"}, "coupling": {"macro_step": 0.1}})
+
+
+def test_what_is_left_out_is_said_with_its_size() -> None:
+    """Inertia: 33/140 ρAL of a slender beam beside the spring's mass. Blow: ½ρA s² L³/3."""
+    slender = {"second_moment_of_area": 1e-8, "young_modulus": 1e9, "shear_modulus": 1e9, "density": 2.0}
+    inertia, blow = suspicions(scene(beam=slender))
+    assert "0.24 of the spring's mass" in inertia
+    assert "11%" in inertia  # √(1 + 33/140) − 1
+    assert "0.333 J" in blow
+    assert suspicions(scene(beam={**slender, "density": 0.01, "initial_velocity_slope": 0.0})) == []
+
+
+def test_phases_are_told_to_the_tip() -> None:
+    given = scene()
+    beam, spring = QuasiStaticBeam(given.beam, 0, 0.2, -1.0), DuffingBody(2.0, 3.0, 0.0, 0.0, -0.5)
+    pair = Pair(given, beam, spring)
+    assert pair.massless_tip(Phase(Joint.TIED)) == 0.0
+    assert beam.motion().velocity == -0.5
+    assert pair.massless_tip(Phase(Joint.FREE)) > 0.0
+    assert beam.motion().velocity == 0.0
