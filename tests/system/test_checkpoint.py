@@ -1,0 +1,438 @@
+"""What a checkpoint refuses to go on from, and runs that ended early for another reason than a kill."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+import springbeam
+from springbeam import cli, runner
+from springbeam.checkpoint import Checkpoint, CheckpointRefused, decoded, encoded
+from springbeam.contact import Joint, Phase
+from springbeam.fmu import FmuError
+from springbeam.recording import FileRecorder, MemoryRecorder, ResultsUnreadable, RunDirectory, load_trajectory
+from springbeam.scene import load_scene, with_changes
+from springbeam.subsystem import Motion
+
+pytestmark = pytest.mark.usefixtures("fmu_folder")
+
+SCENE = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 2e-3})
+CHANGES = ["--set", "beam.n_elements=10", "--set", "coupling.macro_step=2e-3"]
+
+
+class Interrupt:
+    """Ctrl-C after so many steps."""
+
+    def __init__(self, steps: int) -> None:
+        self.left = steps
+
+    def __call__(self, *_: object) -> None:
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+def interrupted_into(directory: Path, steps: int = 200, scene=SCENE) -> Path:
+    with (
+        pytest.raises(KeyboardInterrupt),
+        FileRecorder(scene, RunDirectory.create(directory)) as recorder,
+    ):
+        runner.run(scene, recorder, Interrupt(steps), seconds=0.02)
+    return directory
+
+
+@pytest.fixture
+def interrupted(tmp_path: Path) -> Path:
+    return interrupted_into(tmp_path / "run")
+
+
+def files(directory: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
+def results(directory: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.glob("*.csv")}
+
+
+def command(*arguments: object):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, fmu_folder: Path) -> Path:
+    directory = tmp_path_factory.mktemp("whole")
+    with FileRecorder(SCENE, RunDirectory.create(directory)) as recorder:
+        runner.run(SCENE, recorder)
+    return directory
+
+
+# -- values ---------------------------------------------------------------------------------------------------------
+
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text() | st.binary(),
+    lambda inner: (
+        st.lists(inner, max_size=4)
+        | st.lists(inner, max_size=4).map(tuple)
+        | st.dictionaries(st.text(max_size=4) | st.floats(allow_nan=False), inner, max_size=4)
+    ),
+    max_leaves=12,
+)
+
+
+@given(plain)
+def test_plain_values_come_back_to_the_last_bit(value):
+    back = decoded(json.loads(json.dumps(encoded(value))))
+    assert repr(back) == repr(value)  # tells −0.0 from 0.0 and lists from tuples
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        Phase(Joint.TIED, seated=True),
+        Motion(1.0 / 3.0, -0.0, 5e-324, 1.7976931348623157e308),
+        {"a": {1e-3: ([[0.1]], {"FmuSpring": [[2.0]]})}},
+        {"$tuple": [1, 2]},
+        -float("inf"),
+    ],
+)
+def test_values_of_a_run_come_back(value):
+    assert decoded(json.loads(json.dumps(encoded(value)))) == value
+
+
+def test_arrays_come_back():
+    array = np.array([[1.0 / 3.0, -0.0], [1e-320, 2.0]])
+    assert decoded(json.loads(json.dumps(encoded(array)))).tobytes() == array.tobytes()
+
+
+@pytest.mark.parametrize("value", [object(), {1, 2}, np.float32(1.0), np.arange(3), lambda: None])
+def test_what_would_not_come_back_is_refused(value):
+    with pytest.raises(TypeError, match="a checkpoint cannot hold"):
+        encoded({"here": [value]})
+
+
+# -- refused --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("flip", [0, 10, 22, 40, 100, 3000, -1])
+def test_a_damaged_checkpoint_is_refused_and_nothing_is_touched(interrupted, flip):
+    path = interrupted / "run.checkpoint"
+    content = bytearray(path.read_bytes())
+    content[flip] ^= 0x04
+    path.write_bytes(content)
+    before = files(interrupted)
+    result = command("resume", interrupted)
+    assert result.exit_code == 2
+    assert f"error: {path}: " in result.stderr
+    assert any(why in result.stderr for why in ("damaged", "not a checkpoint of springbeam", "of format"))
+    assert files(interrupted) == before
+
+
+@pytest.mark.parametrize("size", [0, 1, 21, 60, 120, 2000, -1])
+def test_a_truncated_checkpoint_is_refused(interrupted, size):
+    path = interrupted / "run.checkpoint"
+    path.write_bytes(path.read_bytes()[:size])
+    with pytest.raises(CheckpointRefused, match=r"run\.checkpoint: (damaged|not a checkpoint)"):
+        springbeam.resume(interrupted)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"PK\x03\x04", b"{}", b"\xff" * 100, b"springbeam checkpoint\n", b"springbeam checkpoint 1 sha256\n"],
+)
+def test_a_foreign_file_is_refused(interrupted, content):
+    (interrupted / "run.checkpoint").write_bytes(content)
+    with pytest.raises(CheckpointRefused, match="not a checkpoint of springbeam"):
+        springbeam.resume(interrupted)
+
+
+def with_content(path: Path, change) -> None:
+    """A file with a good checksum of changed content: no accident, but no traceback either."""
+    import hashlib
+
+    _, _, content = path.read_bytes().partition(b"\n")
+    content = change(content)
+    path.write_bytes(b"springbeam checkpoint 1 sha256 %s\n%s" % (hashlib.sha256(content).hexdigest().encode(), content))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda content: b"[]",
+        lambda content: b"[" * 100_000,
+        lambda content: b"nonsense",
+        lambda content: content.replace(b'"version"', b'"vision"', 1),
+        lambda content: content.replace(b'"_macro_steps"', b'"_micro_steps"', 1),
+        lambda content: content.replace(b'"$Joint"', b'"$Phase"', 1),
+        lambda content: content.replace(b'"$bytes": "', b'"$bytes": "!', 1),
+        lambda content: content.replace(b'"$bytes": "c3By', b'"$bytes": "AAAA', 1),
+    ],
+)
+def test_content_that_no_run_writes_is_refused(interrupted, change):
+    with_content(interrupted / "run.checkpoint", change)
+    before = files(interrupted)
+    result = command("resume", interrupted)
+    assert result.exit_code == 2
+    assert "Traceback" not in result.output
+    assert result.stderr.startswith("error: ")
+    assert files(interrupted) == before
+
+
+def test_a_run_that_is_done_has_nothing_to_resume(whole):
+    result = command("resume", whole)
+    assert result.exit_code == 2
+    assert result.stderr == f"error: {whole}: the run is done, nothing to resume\n"
+
+
+def test_a_run_without_checkpoints_says_how_to_take_them(interrupted):
+    (interrupted / "run.checkpoint").unlink()
+    result = command("resume", interrupted)
+    assert result.exit_code == 2
+    assert "no checkpoint; springbeam run --checkpoint SECONDS takes them" in result.stderr
+
+
+def test_a_folder_that_is_no_run(tmp_path):
+    result = command("resume", tmp_path)
+    assert result.exit_code == 2
+    assert "not a run directory" in result.stderr
+
+
+def test_another_version_is_refused(interrupted, monkeypatch):
+    monkeypatch.setattr(runner, "version", lambda name: "9.9")
+    with pytest.raises(CheckpointRefused, match=r"written by springbeam 0\.1\.0, this is 9\.9"):
+        springbeam.resume(interrupted)
+
+
+def test_another_scene_is_refused(interrupted):
+    summary = json.loads((interrupted / "summary.json").read_text())
+    summary["scene"]["stop"]["restitution"] = 0.5
+    (interrupted / "summary.json").write_text(json.dumps(summary))
+    with pytest.raises(CheckpointRefused, match=r"summary\.json: its scene is not the one that was run"):
+        springbeam.resume(interrupted)
+
+
+@pytest.mark.parametrize("name", ["beam", "spring"])
+def test_another_fmu_is_refused(interrupted, tmp_path, fmu_folder, monkeypatch, name):
+    for fmu in ("beam.fmu", "spring.fmu"):
+        shutil.copy(fmu_folder / fmu, tmp_path / fmu)
+    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
+    with (tmp_path / f"{name}.fmu").open("ab") as file:
+        file.write(b" ")
+    with pytest.raises(CheckpointRefused, match=rf"the run began with another {name}\.fmu"):
+        springbeam.resume(interrupted)
+    (tmp_path / f"{name}.fmu").unlink()
+    with pytest.raises(FmuError, match=rf"{name}\.fmu"):
+        springbeam.resume(interrupted)
+
+
+@pytest.mark.parametrize("name", ["trajectory.csv", "events.csv", "shapes.csv"])
+def test_changed_results_are_refused_and_not_touched(interrupted, name):
+    path = interrupted / name
+    content = bytearray(path.read_bytes())
+    content[200] = ord("7") if content[200] != ord("7") else ord("8")
+    path.write_bytes(content)
+    before = files(interrupted)
+    with pytest.raises(ResultsUnreadable, match=rf"{name}: changed since it was written"):
+        springbeam.resume(interrupted)
+    assert files(interrupted) == before
+
+
+def test_checkpoints_need_a_directory():
+    with pytest.raises(TypeError, match="directory"):
+        runner.run(SCENE, MemoryRecorder(SCENE), seconds=1.0)
+
+
+# -- atomic ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_last_checkpoint_stays_when_the_next_cannot_be_written(interrupted, monkeypatch):
+    path = interrupted / "run.checkpoint"
+    before, names = path.read_bytes(), sorted(os.listdir(interrupted))
+    checkpoint = Checkpoint.read(path)
+
+    def no_room(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    for function in ("fsync", "replace"):
+        with monkeypatch.context() as patched:
+            patched.setattr(os, function, no_room)
+            with pytest.raises(OSError, match="No space left"):
+                checkpoint.write(path)
+        assert path.read_bytes() == before
+        assert sorted(os.listdir(interrupted)) == names
+    checkpoint.write(path)
+    assert path.read_bytes() == before
+
+
+def test_rows_reach_the_disk_before_the_checkpoint_that_counts_them(tmp_path, monkeypatch):
+    calls = []
+    for name in ("fsync", "replace"):
+        original = getattr(os, name)
+
+        def noted(*arguments, name=name, original=original):
+            what = arguments[0] if name == "replace" else os.readlink(f"/proc/self/fd/{arguments[0]}")
+            calls.append((name, Path(what).name))
+            return original(*arguments)
+
+        monkeypatch.setattr(os, name, noted)
+    if not Path("/proc/self/fd").exists():
+        pytest.skip("no /proc")
+    recorder = FileRecorder(SCENE, RunDirectory.create(tmp_path / "run"))
+    with recorder, pytest.raises(KeyboardInterrupt):
+        runner.run(SCENE, recorder, Interrupt(2), seconds=0.0)
+    at = calls.index(("fsync", "trajectory.csv"))
+    assert calls[at : at + 6] == [
+        ("fsync", "trajectory.csv"),
+        ("fsync", "events.csv"),
+        ("fsync", "shapes.csv"),
+        ("fsync", "run.checkpoint.part"),
+        ("replace", "run.checkpoint.part"),
+        ("fsync", "run"),
+    ]
+
+
+# -- runs that ended early ------------------------------------------------------------------------------------------
+
+
+def test_an_interrupted_run_goes_on(interrupted, whole):
+    assert load_trajectory(interrupted).summary["status"] == "interrupted"
+    trajectory = springbeam.resume(interrupted)
+    assert results(interrupted) == results(whole)
+    assert trajectory.summary["status"] == "done"
+    assert np.array_equal(trajectory.e_total, springbeam.simulate(SCENE).e_total)
+    assert not (interrupted / "run.checkpoint").exists()
+
+
+def test_wall_time_counts_all_parts(interrupted):
+    before = Checkpoint.read(interrupted / "run.checkpoint").wall_time
+    assert springbeam.resume(interrupted).summary["wall_time"] > before > 0.0
+
+
+def test_a_run_that_stopped_stops_again_at_the_same_place(tmp_path):
+    scene = with_changes(
+        SCENE, contact={"law": "compliance", "exponent": 1.5}, coupling={"scheme": "gauss_seidel", "macro_step": 1e-3}
+    )
+
+    def ended(run) -> tuple[object, ...]:
+        with pytest.raises(springbeam.RunStopped, match="has changed the energy by") as stopped:
+            run()
+        return stopped.value.time, results(tmp_path), load_trajectory(tmp_path).summary["status"]
+
+    def begin() -> None:
+        with FileRecorder(scene, RunDirectory.create(tmp_path)) as recorder:
+            runner.run(scene, recorder, seconds=0.01)
+
+    first = ended(begin)
+    assert first[0] > 0.1
+    assert first[2] == "stopped"
+    assert ended(lambda: springbeam.resume(tmp_path)) == first
+
+
+# -- the command, as a process --------------------------------------------------------------------------------------
+
+
+def process(*arguments: object, **options):
+    return subprocess.Popen(
+        [sys.executable, "-m", "springbeam", *map(str, arguments)], stderr=subprocess.PIPE, text=True, **options
+    )
+
+
+LONG = ["run", "soft", *CHANGES, "--set", "time.t_end=8", "--no-plots", "-q"]
+
+
+@pytest.fixture(scope="module")
+def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("long") / "run"
+    assert process(*LONG, "--out", directory).wait(120) == 0
+    return directory
+
+
+def started(directory: Path) -> subprocess.Popen[str]:
+    """The command, once it has taken a checkpoint."""
+    run = process(*LONG, "--out", directory, "--checkpoint", 0.05)
+    deadline = time.monotonic() + 60.0
+    while not (directory / "run.checkpoint").exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return run
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_command_with_3_and_it_goes_on(tmp_path, long, number):
+    run = started(tmp_path / "run")
+    run.send_signal(number)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == 3
+    assert "interrupted (reached t = " in errors
+    assert "Traceback" not in errors
+    assert load_trajectory(tmp_path / "run").summary["status"] == "interrupted"
+    assert process("resume", tmp_path / "run", "--no-plots", "-q").wait(120) == 0
+    assert results(tmp_path / "run") == results(long)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of another process")
+def test_a_run_without_room_ends_with_3_and_goes_on_where_there_is(tmp_path, long):
+    """The limit of a file's size stands for the disk's: no root needed."""
+    import resource
+
+    run = started(tmp_path / "run")
+    limit = (tmp_path / "run" / "trajectory.csv").stat().st_size + 50_000
+    resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (limit, limit))
+    _, errors = run.communicate(timeout=120)
+    assert run.returncode == 3
+    assert "the run stopped early: " in errors
+    assert "File too large" in errors
+    assert "Traceback" not in errors
+    trajectory = load_trajectory(tmp_path / "run")
+    assert trajectory.summary["status"] == "stopped"
+    assert "File too large" in trajectory.summary["cause"]
+    cut = (tmp_path / "run" / "trajectory.csv").read_bytes()
+    assert len(cut) == limit
+    assert (long / "trajectory.csv").read_bytes().startswith(cut)
+    assert process("resume", tmp_path / "run", "--no-plots", "-q").wait(120) == 0
+    assert results(tmp_path / "run") == results(long)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no locks")
+def test_a_run_that_still_runs_is_left_alone(interrupted):
+    checkpoint = runner.last_checkpoint(interrupted)
+    with FileRecorder(SCENE, RunDirectory(interrupted)) as running:
+        running.restore(checkpoint.results)
+        before = files(interrupted)
+        result = command("resume", interrupted)
+        assert result.exit_code == 2
+        assert "another process is writing to it" in result.stderr
+        result = command("run", "soft", "--out", interrupted, "--force")
+        assert result.exit_code == 2
+        assert "another process is writing to it" in result.stderr
+        assert files(interrupted) == before
+
+
+def test_forced_runs_keep_the_old_results_until_they_can_begin(whole, tmp_path, monkeypatch):
+    shutil.copytree(whole, tmp_path / "run")
+    before = files(tmp_path / "run")
+    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path / "nowhere"))
+    result = command("run", "soft", "--out", tmp_path / "run", "--force")
+    assert result.exit_code == 2
+    assert "nowhere" in result.stderr
+    assert files(tmp_path / "run") == before
+
+
+@pytest.mark.parametrize("seconds", ["-1", "nan", "soon"])
+def test_bad_intervals_are_bad_input(tmp_path, seconds):
+    result = command("run", "soft", "--out", tmp_path / "run", "--checkpoint", seconds)
+    assert result.exit_code == 2
+    assert "--checkpoint" in result.stderr
+    assert not (tmp_path / "run").exists()
