@@ -64,7 +64,7 @@ class Tie(Memory):
         #: By the size of the step: B, and by kind of partner the inverse of B − S.
         self._responses: dict[float, tuple[Matrix, dict[str, Matrix]]] = {}
         self._last_size = 0.0
-        self._reach = 0.0  #: largest displacement of an end so far [m]
+        self._reach = 0.0  #: largest displacement of an end under a force found [m]
         self.iterations = 0  #: Newton updates since the start
 
     def solve(self, beam: Body, partner: Body, time: float, size: float, guess: Force, start: Motion) -> Force:
@@ -126,6 +126,8 @@ class Tie(Memory):
         else:
             raise NotConverged(norm, _MAX_ITERATIONS)
         self._last_size = size
+        # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
+        self._reach = max(self._reach, abs(beam.motion().displacement), abs(partner.motion().displacement))
         inverses[kind] = inverse
         return force.derivatives(a, size)
 
@@ -160,9 +162,9 @@ class Tie(Memory):
     def _absolute_tolerance(self, start: Motion, beam: Motion, partner: Motion, size: float, by_force: Vector) -> float:
         speed = max(abs(start.velocity), abs(beam.velocity), abs(partner.velocity))
         change = max(size * speed, abs(beam.displacement - start.displacement))
-        self._reach = max(self._reach, abs(start.displacement), abs(beam.displacement), abs(partner.displacement))
+        reach = max(self._reach, abs(start.displacement), abs(beam.displacement), abs(partner.displacement))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
-        rounding = 16.0 * _EPS * max(self._reach, *map(abs, by_force))
+        rounding = 16.0 * _EPS * max(reach, *map(abs, by_force))
         return max(self._tolerance * change, rounding)
 
 
