@@ -6,7 +6,8 @@ The bound of a quantity at time t is
 
 what halving the macro step changes is an upper estimate of the discretisation error for any order ≥ 1 (twice the
 difference at order 1), doubled again because events mix orders; the second term is the tolerance of the spring's
-integrator in every step and the rounding of the beam's modes, grown as fast as the reference grows a perturbation.
+integrator in every step and the rounding of the beam's modes, grown as fast as the reference grows a perturbation; so
+is what a one-way coupling neglects, since the reference is two-way.
 Nothing in it knows the reference, so a wrong sign, mass or law, which converges to something else, fails.
 
 Nonsmooth trajectories separate: comparable is what comes before the first change of contact that the macro step, or a
@@ -102,6 +103,8 @@ def crosscheck(scene: Scene) -> Report:
         return _crosscheck_paper(scene)
     if scene.contact.impact == "rest" and scene.contact.law == "transmission" and scene.beam and scene.spring:
         raise SceneError("contact.impact = 'rest': a rigid tie has no reference there; take 'inelastic' or 'tip'")
+    if scene.contact.law == "compliance" and scene.beam and scene.beam.fidelity == "quasi_static":
+        raise SceneError("beam.fidelity = 'quasi_static': has no reference with law 'compliance'; take 'dynamic'")
     asked, note, failure = scene, "", None
     for _ in range(_MAX_REFINEMENTS):
         start, size = scene.contact_time or 0.0, scene.coupling.macro_step
@@ -274,7 +277,7 @@ def _compare_quantity(
     growth = np.maximum(1.0, np.maximum.accumulate(grown))
     report.growth = max(report.growth, float(growth[-1]))
     steps = (times - coarse.time[0]) / size + 1.0
-    floor = _IDA_TOLERANCE * steps + _SAFETY * _rounding(report.scene)
+    floor = _IDA_TOLERANCE * steps + _SAFETY * (_rounding(report.scene) + coarse.summary.get("neglected_share", 0.0))
     bound = _SAFETY * np.maximum.accumulate(np.abs(q - q_fine)) + floor * growth * scale
     report.rows.append(_row(name, times, np.abs(q - q_reference), bound))
 

@@ -442,7 +442,7 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[FmuBeam | QuasiStaticB
             assert scene.initial_tip is not None
             tip, velocity = scene.initial_tip + start_time * rate * scene.beam.length, rate * scene.beam.length
             beam = QuasiStaticBeam(scene.beam, scene.coupling.degree, tip, velocity)
-            if scene.beam.approach == "elastic":
+            if scene.beam.approach == "elastic" or scene.contact.law == "compliance":
                 beam.release()
         else:
             beam = FmuBeam(scene.beam, start_time, scene.beam.initial_deflection_slope + start_time * rate)

@@ -129,6 +129,10 @@ class Coupling(_Table):
     degree: Annotated[int, Field(ge=0, le=2)] = 0  #: of the contact force over a step
     macro_step: Positive = 0.004  #: H [s]
     tolerance: Annotated[float, Field(gt=0.0, le=1e-3)] = 1.0e-12
+    #: One-way: the driving body does not feel the contact force (law "compliance").
+    feedback: Literal["two_way", "beam_drives", "spring_drives"] = "two_way"
+    #: Motion of the driving end that one-way coupling may neglect, over the largest penetration.
+    feedback_tolerance: Annotated[float, Field(gt=0.0, le=0.1)] = 1.0e-6
 
     @model_validator(mode="after")
     def _degree_of_scheme(self) -> Coupling:
@@ -161,6 +165,15 @@ class Scene(_Table):
         """Names of the FMUs that the scene is made of; a beam without inertia is none."""
         beam = self.beam is not None and self.beam.fidelity == "dynamic"
         return ("beam",) * beam + ("spring",) * (self.spring is not None)
+
+    @property
+    def driver_stiffness(self) -> float | None:
+        """Static force per displacement [N/m] of the end that drives a one-way coupling; ``None`` without one."""
+        if self.coupling.feedback == "beam_drives" and self.beam is not None:
+            return 1.0 / tip_compliance(self.beam)
+        if self.coupling.feedback == "spring_drives" and self.spring is not None:
+            return self.spring.linear_stiffness
+        return None
 
     @property
     def tip_target(self) -> tuple[str, float] | None:
@@ -268,6 +281,34 @@ def _law_applies(scene: Scene) -> Iterator[str]:
         )
 
 
+def _feedback_negligible(scene: Scene) -> Iterator[str]:
+    beam, spring, contact, coupling = scene.beam, scene.spring, scene.contact, scene.coupling
+    if coupling.feedback == "two_way":
+        return
+    name = f'[coupling] feedback = "{coupling.feedback}"'
+    if beam is None or spring is None:
+        yield f'{name}: there is one body only; use "two_way"'
+        return
+    if contact.law != "compliance" or coupling.scheme != "energy":
+        yield (
+            f'{name}: needs [contact] law = "compliance" and [coupling] scheme = "energy"; a tie is felt by both ends. '
+            'Use "two_way"'
+        )
+    if coupling.feedback == "spring_drives" and (spring.cubic_stiffness != 0.0 or spring.linear_stiffness <= 0.0):
+        yield (
+            f"{name}: what it neglects is bounded for a linear spring only; linear_stiffness must be greater than 0 "
+            'and cubic_stiffness 0.0, or use "two_way"'
+        )
+        return
+    # A contact of depth p has V = 2 λ p, whatever p.
+    share = 4.0 * contact.stiffness / (scene.driver_stiffness or math.inf)
+    if contact.exponent == 1.0 and share > coupling.feedback_tolerance:
+        yield (
+            f"{name}: neglects up to 4·stiffness/(stiffness of the driving end) = {share:.2g} of the penetration; "
+            f'allowed is feedback_tolerance = {coupling.feedback_tolerance:g}. Use "two_way", or allow more'
+        )
+
+
 def _inertia_needed(scene: Scene) -> Iterator[str]:
     beam, contact, scheme = scene.beam, scene.contact, scene.coupling.scheme
     if beam is None or beam.fidelity == "dynamic":
@@ -275,10 +316,11 @@ def _inertia_needed(scene: Scene) -> Iterator[str]:
     name = '[beam] fidelity = "quasi_static"'
     if scene.spring is None:
         yield f'{name}: a beam without inertia moves with a [spring] or not at all; use fidelity = "dynamic"'
-    if contact.law == "compliance":
+    if contact.law == "compliance" and scene.coupling.feedback != "beam_drives":
         yield (
             f'{name}: is in series with the compliance of [contact] law = "compliance", and what lies between them has '
-            'no inertia; use law = "transmission", or fidelity = "dynamic"'
+            'no inertia; use law = "transmission", fidelity = "dynamic", or neglect the force on the beam: '
+            '[coupling] feedback = "beam_drives"'
         )
     if contact.law == "paper":
         yield f'{name}: [contact] law = "paper" integrates the beam by (62); use fidelity = "dynamic"'
@@ -323,7 +365,15 @@ def _coupling_resolves(scene: Scene) -> Iterator[str]:
 
 
 #: What cannot be run although each value is allowed; each yields ``[table] key = value: reason and remedy``.
-_CHECKS = (_bodies, _spring_holds, _tip_arrives, _law_applies, _inertia_needed, _coupling_resolves)
+_CHECKS = (
+    _bodies,
+    _spring_holds,
+    _tip_arrives,
+    _law_applies,
+    _inertia_needed,
+    _feedback_negligible,
+    _coupling_resolves,
+)
 
 _TABLES: dict[str, type[_Table]] = {
     "time": Time,
@@ -358,7 +408,7 @@ def suspicions(scene: Scene) -> list[str]:
         )
     if beam is not None and beam.fidelity == "quasi_static" and scene.spring is not None:
         share = tip_inertia(beam) / scene.spring.mass
-        if share > 0.05:
+        if share > 0.05 and scene.contact.law == "transmission":
             found.append(
                 f'[beam] fidelity = "quasi_static": leaves out an inertia that at the tip is {share:.2g} of the '
                 f"spring's mass; the joined motion is about {math.sqrt(1.0 + share) - 1.0:.0%} too fast"

@@ -127,6 +127,7 @@ class Simulation(Memory):
             if step.size > 0.0:
                 whole = event is None and abs(step.size - size) <= 1e-9 * self._H
                 state.accept(step, target if whole else state.time + step.size)
+                self._pair.accept(step)
                 self._macro_steps += 1
                 if self._pair.compliant:
                     self._note_contact(step)
@@ -228,6 +229,14 @@ class Simulation(Memory):
             raise RunStopped(str(error), self._state.time) from error
         if (self._ledger.gain if self._numerically_damped else self._ledger.relative) > _ENERGY_STOPS:
             raise RunStopped(self._energy_cause(), self._state.time)
+        one_way, allowed = self._pair.one_way, self._scene.coupling.feedback_tolerance
+        if one_way is not None and one_way.share > allowed:
+            raise RunStopped(
+                f"coupling.feedback = {self._scene.coupling.feedback!r} may by now neglect {one_way.neglected:.3g} m "
+                f"of the driving end's motion, {one_way.share:.2g} of the largest penetration; allowed is "
+                f"coupling.feedback_tolerance = {allowed:g}. Take 'two_way', or allow more",
+                self._state.time,
+            )
 
     @property
     def _numerically_damped(self) -> bool:
@@ -263,7 +272,10 @@ class Simulation(Memory):
                 f"{rows.largest_speed:.3g} m/s; velocities and forces alternate from step to step. A smaller "
                 f"coupling.macro_step (now {self._H:g} s) or fewer beam.n_modes resolves the motion"
             )
+        one_way = self._pair.one_way
+        neglected = {} if one_way is None else {"neglected_motion": one_way.neglected, "neglected_share": one_way.share}
         return {
+            **neglected,
             "time": self._state.time,
             "macro_steps": self._macro_steps,
             "events": self._events,

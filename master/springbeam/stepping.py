@@ -9,6 +9,7 @@ from .contact import Joint, Phase, spring_force
 from .coupling import conditions, force
 from .coupling.compliance import Compliance, compliance_energy
 from .coupling.exchange import Exchange
+from .coupling.one_way import OneWay
 from .coupling.tie import Tie
 from .memory import Memory
 from .quasi_static import QuasiStaticBeam
@@ -82,7 +83,7 @@ class Pair(Memory):
         The bodies; ``None`` where the scene has none.
     """
 
-    REMEMBERED = ("beam", "spring", "_held", "_tie", "_compliance")
+    REMEMBERED = ("beam", "spring", "_held", "_tie", "_compliance", "one_way")
 
     def __init__(self, scene: Scene, beam: BeamBody | None, spring: Body | None) -> None:
         self._scene = scene
@@ -100,6 +101,11 @@ class Pair(Memory):
         scheme = "energy" if self._exchange is not None else coupling.scheme
         self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance)
         self._compliance = Compliance(*law, coupling.tolerance, coupling.macro_step)
+        self.one_way: OneWay | None = None
+        if coupling.feedback != "two_way":
+            stiffness = scene.driver_stiffness
+            assert stiffness is not None
+            self.one_way = OneWay(self._compliance, *law, coupling.feedback == "beam_drives", stiffness)
         #: Of the contact force over a step.
         self.degree = 0 if self.compliant else coupling.degree
         #: Whether the coupling may create energy, so that its residual is watched.
@@ -133,8 +139,9 @@ class Pair(Memory):
             if self._exchange is not None:
                 contact = self._exchange.solve(upper, partner, state.time, size, start)
             else:
+                solver = self._compliance if self.one_way is None else self.one_way
                 penetration = start[1].displacement - start[0].displacement
-                contact = self._compliance.solve(upper, partner, state.time, size, state.contact, penetration)
+                contact = solver.solve(upper, partner, state.time, size, state.contact, penetration)
         elif phase.joint is Joint.FREE:
             if upper is not None:
                 upper.rewind()
@@ -154,6 +161,13 @@ class Pair(Memory):
                 spring.rewind()
                 spring.advance(state.time, size, contact, foundation)
         return Step(state.time, size, contact, foundation, start, self.ends())
+
+    def accept(self, step: Step) -> None:
+        """``step`` is made; of a one-way coupling, what it neglects counts from now on."""
+        if self.one_way is not None:
+            driver = 0 if self.one_way.beam_drives else 1
+            moved = step.end[driver].displacement - step.start[driver].displacement
+            self.one_way.accept(step.contact[0], moved, step.end[1].displacement - step.end[0].displacement)
 
     def settled(self, state: State, step: Step) -> Step:
         """Leave the bodies at the end of ``step`` (a look inside it may have moved them)."""
@@ -186,17 +200,20 @@ class Pair(Memory):
         )
 
     def energies(self) -> tuple[Energies, Energies, float]:
-        """Of the beam, of the spring, and of the contact law [J]."""
+        """Of the beam, of the spring, and of the contact law [J].
+
+        The work on an end that drives without feeling it counts as a load's on that body.
+        """
         contact = 0.0
+        beam = _NOTHING if self.beam is None else self.beam.energies()
+        spring = _NOTHING if self.spring is None else self.spring.energies()
         if self.compliant:
             tip, low = self.ends()
             law = self._scene.contact
             contact = compliance_energy(low.displacement - tip.displacement, law.stiffness, law.exponent)
-        return (
-            _NOTHING if self.beam is None else self.beam.energies(),
-            _NOTHING if self.spring is None else self.spring.energies(),
-            contact,
-        )
+        if self.one_way is not None:
+            beam = beam._replace(load_potential=beam.load_potential + self.one_way.work)
+        return beam, spring, contact
 
     def end_force(self, state: State, step: Step) -> float:
         """C at the end of the step as well as the degree tells [N]."""

@@ -6,8 +6,9 @@ the gap g = u_tip − y over that step. A *scheme* is the choice of these condit
 * `energy`  — g(t+H) = 0 and vanishing moments of g: the contact force does no net work, at any H;
 * `hermite` — g(t+H) = ġ(t+H) = 0 and vanishing moments: displacements and velocities agree at every macro point.
 
-`tie` solves the conditions of either; `compliance` is the discrete gradient of the normal-compliance law; `exchange`
-is what ordinary masters do with that law; `force` holds the polynomials. ``docs/coupling.md`` derives all of it.
+`tie` solves the conditions of either; `compliance` is the discrete gradient of the normal-compliance law, `one_way`
+the same with one body that does not feel it, `exchange` what ordinary masters do; `force` holds the polynomials.
+``docs/coupling.md`` derives all of it.
 """
 
 from __future__ import annotations

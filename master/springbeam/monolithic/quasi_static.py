@@ -46,7 +46,13 @@ def simulate(
     ------
     ReferenceFailure
         If an integration or the event logic cannot go on.
+    ValueError
+        If the law is another.
     """
+    if scene.contact.law != "transmission":
+        raise ValueError(
+            f"contact.law = {scene.contact.law!r}: with a quasi-static beam, this reference knows a tie only"
+        )
     return _Run(scene, rtol, atol, velocity_perturbation, t_end).execute(sample_times)
 
 

@@ -1,0 +1,163 @@
+"""One-way coupling: what it neglects stays below the bound, one body steps once, the ledger closes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from bodies import modal_beam, simulate
+
+from springbeam import statics
+from springbeam.coupling.compliance import Compliance, discrete_gradient
+from springbeam.coupling.one_way import OneWay
+from springbeam.scene import Beam, Scene, SceneError, load_scene, with_changes
+from springbeam.simulation import RunStopped
+from springbeam.subsystem import Held
+
+LAW = (100.0, 1.0)
+
+
+def scene(**tables: dict[str, Any]) -> Scene:
+    """`soft` with normal compliance on a beam some 1e4 times stiffer than the contact."""
+    base: dict[str, dict[str, Any]] = {
+        "time": {"t_end": 0.04},
+        "contact": {"law": "compliance", "stiffness": LAW[0], "exponent": LAW[1]},
+        "beam": {"young_modulus": 1e6, "shear_modulus": 1e6, "n_elements": 8},
+        "coupling": {"macro_step": 2e-4, "feedback_tolerance": 0.1},
+    }
+    return with_changes(load_scene("soft"), **{t: {**base.get(t, {}), **tables.get(t, {})} for t in {**base, **tables}})
+
+
+HEAVY = {"mass": 100.0, "linear_stiffness": 1e6, "cubic_stiffness": 0.0, "initial_velocity": 0.5}
+CASES: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {
+    "rings": ("beam_drives", {}),
+    "damped": ("beam_drives", {"beam": {"alpha_b": 1e-3}}),
+    "Hertz": ("beam_drives", {"contact": {"exponent": 1.5, "stiffness": 1e3}}),
+    "lossy foundation": (
+        "beam_drives",
+        {"stop": {"position": -0.002, "restitution": 0.3}, "spring": {"external_force": -0.5}},
+    ),
+    "heavy spring": ("spring_drives", {"beam": {"young_modulus": 100.0, "shear_modulus": 100.0}, "spring": HEAVY}),
+}
+
+
+@pytest.mark.parametrize("what", CASES)
+def test_what_is_neglected_is_below_the_bound(what: str) -> None:
+    """|Δu| ≤ 2V/k at the driving end, and not far below: the contact rings at the beam's own frequencies."""
+    feedback, changes = CASES[what]
+    two_way = simulate(scene(**changes))
+    one_way = simulate(scene(**{**changes, "coupling": {"feedback": feedback}}))
+    assert one_way.summary["stopped"] is None
+    driver, driven = ("u_tip", "y") if feedback == "beam_drives" else ("y", "u_tip")
+    _, mine, theirs = np.intersect1d(one_way.time, two_way.time, return_indices=True)
+    assert len(mine) > 180
+    difference = {name: np.abs(one_way[name][mine] - two_way[name][theirs]).max() for name in (driver, driven)}
+    bound = one_way.summary["neglected_motion"]
+    assert 0.02 * bound < difference[driver] < bound
+    assert difference[driven] < bound
+    assert one_way.summary["max_energy_residual"] < 1e-13
+
+
+def test_the_driving_body_steps_once_a_macro_step() -> None:
+    for feedback, driver, changes in (
+        ("beam_drives", "beam", {}),
+        ("spring_drives", "spring", CASES["heavy spring"][1]),
+    ):
+        two_way = simulate(scene(**changes))
+        one_way = simulate(scene(**{**changes, "coupling": {"feedback": feedback}}))
+        assert one_way.summary["work"][driver] == one_way.summary["macro_steps"] == 200
+        assert two_way.summary["work"][driver] > 1.2 * 200
+
+
+def test_the_driving_body_moves_as_if_alone() -> None:
+    alone = simulate(scene(time={"t_end": 0.02}, contact={"stiffness": 1e-300}))
+    driving = simulate(scene(time={"t_end": 0.02}, coupling={"feedback": "beam_drives"}))
+    assert np.array_equal(alone.u_tip, driving.u_tip)
+    assert driving.contact_force.max() > 0.0
+
+
+def test_a_resonant_force_keeps_to_the_bound() -> None:
+    """The worst case: a force that reverses in step with the first mode adds 2 φ²C/ω² each half period."""
+    beam = Beam(n_elements=5, young_modulus=100.0, shear_modulus=100.0)
+    stiffness = 1.0 / statics.tip_compliance(beam)
+    body = modal_beam(5, slope=0.0)
+    half = np.pi / body.omega[0]
+    variation = previous = largest = 0.0
+    for step in range(40):
+        force = 1.0 if step % 2 else -1.0
+        variation, previous = variation + abs(force - previous), force
+        for _ in range(8):
+            body.mark()
+            body.advance(0.0, half / 8, (force, 0.0, 0.0))
+            largest = max(largest, abs(body.motion().displacement))
+        assert largest < 2.0 * variation / stiffness
+    # The first mode carries most of the static compliance, and it is driven as hard as can be.
+    assert largest > 0.5 * 2.0 * variation / stiffness * (body.b[0] / body.omega[0]) ** 2 * stiffness
+
+
+def test_both_ends_known_leave_nothing_to_solve() -> None:
+    """The beam drives and the spring is seated: C is the discrete gradient of where the tip has gone."""
+    beam, start = modal_beam(6), 1e-3
+    beam.mark()
+    one_way = OneWay(Compliance(*LAW, 1e-12, 0.01), *LAW, beam_drives=True, driver_stiffness=1e6)
+    force = one_way.solve(beam, Held(0.0), 0.0, 0.01, (5.0, 0.0, 0.0), start)
+    assert force == (discrete_gradient(start, -beam.motion().displacement, *LAW), 0.0, 0.0)
+    assert beam.steps == 1
+
+
+def test_the_accounts_are_those_of_the_docstring() -> None:
+    one_way = OneWay(Compliance(*LAW, 1e-12, 0.01), *LAW, beam_drives=True, driver_stiffness=50.0)
+    assert (one_way.neglected, one_way.share) == (0.0, 0.0)
+    for force, moved, depth in ((2.0, -0.1, 0.02), (5.0, 0.2, 0.05), (1.0, 0.3, 0.01), (0.0, 0.0, -0.2)):
+        one_way.accept(force, moved, depth)
+    assert one_way.neglected == pytest.approx(2.0 * (2.0 + 3.0 + 4.0 + 1.0) / 50.0)
+    assert one_way.share == pytest.approx(one_way.neglected / 0.05)
+    assert one_way.work == pytest.approx(2.0 * -0.1 + 5.0 * 0.2 + 1.0 * 0.3)
+
+
+def test_a_run_stops_when_the_bound_passes_the_tolerance() -> None:
+    allowed = 2e-4
+    run = simulate(
+        scene(
+            contact={"exponent": 1.5, "stiffness": 1e3},
+            coupling={"feedback": "beam_drives", "feedback_tolerance": allowed},
+        )
+    )
+    stopped = run.summary["stopped"]
+    assert isinstance(stopped, RunStopped)
+    for words in ("'beam_drives'", "feedback_tolerance = 0.0002", "'two_way'"):
+        assert words in str(stopped)
+    assert 0.0 < run.time[-1] < 0.04
+    assert allowed < run.summary["neglected_share"] < 1.1 * allowed
+
+
+REFUSED: dict[str, tuple[dict[str, dict[str, Any]], list[str]]] = {
+    "tie": ({"contact": {"law": "transmission"}}, ['law = "compliance"', '"two_way"']),
+    "ordinary scheme": ({"coupling": {"scheme": "jacobi"}}, ['scheme = "energy"']),
+    "ratio": ({"coupling": {"feedback_tolerance": 1e-4}}, ["0.00053", "0.0001", '"two_way"']),
+    "cubic spring": ({"coupling": {"feedback": "spring_drives"}}, ["linear spring", "cubic_stiffness"]),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_refused_with_the_reason(what: str) -> None:
+    changes, words = REFUSED[what]
+    coupling = {"feedback": "beam_drives", **changes.get("coupling", {})}
+    with pytest.raises(SceneError) as refused:
+        scene(**{**changes, "coupling": coupling})
+    for word in words:
+        assert word in str(refused.value)
+
+
+def test_one_body_has_nothing_to_feed_back() -> None:
+    with pytest.raises(SceneError, match="one body only"):
+        with_changes(scene(), spring=None, coupling={"feedback": "beam_drives"})
+
+
+def test_the_papers_ratio() -> None:
+    """Figure 2: tangent stiffness of the compliance at the depth of the foundation over the beam's, 2.5e-10."""
+    paper = load_scene("paper-fig2")
+    law, depth = paper.contact, paper.spring.equilibrium - paper.stop.position
+    tangent = law.stiffness * law.exponent * depth ** (law.exponent - 1.0)
+    assert tangent * statics.tip_compliance(paper.beam) == pytest.approx(2.5e-10, rel=1e-12)

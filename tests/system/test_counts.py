@@ -1,0 +1,165 @@
+"""What a scene lacks costs nothing: no FMU, no call into one, no event function. Counts, not times."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from springbeam import fmu, load_scene, simulate, with_changes
+from springbeam.contact import Joint, Phase
+from springbeam.events import EventFunctions
+from springbeam.scene import Scene, shipped_scenes
+from springbeam.trajectory import Trajectory
+
+SET_SLOPES = "fmi2SetRealInputDerivatives"
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> Callable[[Scene], tuple[Trajectory, Counter[tuple[str, str]]]]:
+    """Runs a scene and counts ``(FMU, FMI function)``; ``(FMU, "instance")`` for those loaded."""
+    calls: Counter[tuple[str, str]] = Counter()
+    load, prepared = fmu.Fmu.__init__, fmu.Fmu.prepared
+
+    def counted_load(self: fmu.Fmu, name: str, *rest: Any) -> None:
+        calls[name, "instance"] += 1
+        load(self, name, *rest)
+
+    def counted_function(self: fmu.Fmu, name: str, *arguments: Any) -> Callable[[], int]:
+        function = prepared(self, name, *arguments)
+
+        def call() -> int:
+            calls[self._name, name] += 1
+            return function()
+
+        return call
+
+    monkeypatch.setattr(fmu.Fmu, "__init__", counted_load)
+    monkeypatch.setattr(fmu.Fmu, "prepared", counted_function)
+
+    def run(scene: Scene) -> tuple[Trajectory, Counter[tuple[str, str]]]:
+        calls.clear()
+        return simulate(scene), calls
+
+    return run
+
+
+@pytest.mark.parametrize("name", sorted(shipped_scenes()))
+def test_each_fmu_of_a_scene_is_loaded_once_and_no_other(counted, name):
+    scene = load_scene(name)
+    end = (scene.contact_time or 0.0) + 5.0 * scene.coupling.macro_step
+    _, calls = counted(with_changes(scene, time={"t_end": end}))
+    loaded = {body: number for (body, function), number in calls.items() if function == "instance"}
+    assert loaded == dict.fromkeys(scene.fmus, 1)
+    assert set(scene.fmus) == {body for body in ("beam", "spring") if getattr(scene, body) is not None}
+
+
+@pytest.mark.parametrize("coupling", [{}, {"degree": 2}, {"scheme": "hermite", "degree": 1}])
+def test_flight_before_contact_costs_one_step_of_each_body(counted, coupling):
+    """The elastic approach: nothing is iterated, nothing taken back, no slope of a force is set."""
+    approach = {"approach": "elastic", "initial_deflection_slope": 0.5, "n_elements": 10}
+    run, calls = counted(
+        with_changes(load_scene("soft"), beam=approach, time={"t_end": 0.05}, coupling={"macro_step": 1e-3, **coupling})
+    )
+    assert set(run.phase) == {"free"}
+    assert run.summary["macro_steps"] == 50
+    assert run.summary["iterations"] == 0
+    for body in ("beam", "spring"):
+        assert calls[body, "fmi2DoStep"] == 50
+        assert calls[body, "fmi2SetReal"] == 50  # the force; no load, no impulse
+        assert calls[body, SET_SLOPES] == 0
+        assert calls[body, "fmi2GetFMUstate"] == 50
+        assert calls[body, "fmi2SetFMUstate"] == 0
+
+
+def test_a_compliant_pair_apart_costs_one_step_of_each_body(counted):
+    apart = {"approach": "elastic", "initial_deflection_slope": 0.5, "n_elements": 10}
+    law = {"law": "compliance"}
+    run, calls = counted(with_changes(load_scene("soft"), beam=apart, contact=law, time={"t_end": 0.05}))
+    assert run.summary["iterations"] == 0
+    assert calls["beam", "fmi2DoStep"] == calls["spring", "fmi2DoStep"] == run.summary["macro_steps"] == 200
+
+
+def test_nothing_is_stepped_before_the_undeformed_tip_arrives(counted):
+    """Contact at 0.5 s, after 500 macro steps that are not made; then 10 that are."""
+    beam = {"initial_deflection_slope": 0.5, "n_elements": 10}
+    scene = with_changes(load_scene("soft"), beam=beam, time={"t_end": 0.51}, coupling={"macro_step": 1e-3})
+    run, calls = counted(scene)
+    assert run.time[0] == 0.5
+    assert run.summary["macro_steps"] == 10
+    assert calls["beam", "fmi2GetFMUstate"] == calls["spring", "fmi2GetFMUstate"] == 11  # the impact's, and each step's
+
+
+@pytest.mark.parametrize("name", ["duffing", "beam-on-stop"])
+def test_a_body_alone_takes_one_step_a_macro_step_but_for_events(counted, name):
+    scene = load_scene(name)
+    flight = with_changes(scene, time={"t_end": 20.0 * scene.coupling.macro_step}, stop=None)
+    run, calls = counted(flight)
+    (body,) = scene.fmus
+    assert calls[body, "fmi2DoStep"] == run.summary["macro_steps"] == 20
+    assert calls[body, "fmi2SetFMUstate"] == 0
+    assert calls[body, SET_SLOPES] == 0
+    assert run.summary["iterations"] == 0
+
+
+def test_a_constant_force_sets_no_slopes_and_one_that_varies_does(counted):
+    scene = with_changes(
+        load_scene("soft"), beam={"n_elements": 10}, time={"t_end": 0.02}, coupling={"macro_step": 1e-3}
+    )
+    for degree in (0, 1):
+        _, calls = counted(with_changes(scene, coupling={"degree": degree}))
+        assert (calls["beam", SET_SLOPES] > 0) == (degree > 0)
+
+
+PHASES = [Phase(joint, seated) for joint in Joint for seated in (False, True)]
+PAIR_EVENTS = {"impact", "release", "retie"}
+EVENTS: dict[str, tuple[dict[str, Any], set[str]]] = {
+    "all": ({}, {*PAIR_EVENTS, "stop_impact"}),
+    "no stop": ({"stop": None}, PAIR_EVENTS),
+    "no spring": ({"spring": None}, {"stop_impact"}),
+    "no beam": ({"beam": None}, {"stop_impact"}),
+    "spring alone": ({"beam": None, "stop": None}, set()),
+    "beam alone": ({"spring": None, "stop": None}, set()),
+    "compliance": ({"contact": {"law": "compliance"}}, {"stop_impact"}),
+    "compliance, no stop": ({"contact": {"law": "compliance"}, "stop": None}, set()),
+}
+
+
+@pytest.mark.parametrize("what", EVENTS)
+def test_event_functions_are_those_of_the_bodies_that_are_there(what):
+    changes, expected = EVENTS[what]
+    functions = EventFunctions(with_changes(load_scene("soft"), **changes))
+    assert {kind for phase in PHASES for kind, _ in functions.of(phase)} == expected
+    # Of each phase only what can end it, and on the foundation only what can leave it.
+    assert all(len(functions.of(phase)) <= 2 for phase in PHASES)
+    assert all(kind != "stop_impact" for phase in PHASES if phase.seated for kind, _ in functions.of(phase))
+
+
+def test_one_way_coupling_steps_the_driving_fmu_once(counted):
+    stiff = {"young_modulus": 1e6, "shear_modulus": 1e6, "n_elements": 10}
+    law = {"law": "compliance", "stiffness": 100.0, "exponent": 1.0}
+    scene = with_changes(load_scene("soft"), beam=stiff, contact=law, time={"t_end": 0.05})
+    both, calls = counted(scene)
+    beam_steps = calls["beam", "fmi2DoStep"]
+    one_way = with_changes(scene, coupling={"feedback": "beam_drives", "feedback_tolerance": 0.1})
+    run, calls = counted(one_way)
+    assert calls["beam", "fmi2DoStep"] == run.summary["macro_steps"] == both.summary["macro_steps"] == 200
+    assert beam_steps > 250
+    assert calls["beam", "fmi2SetFMUstate"] == 0
+
+
+def test_a_quasi_static_beam_that_drives_leaves_one_fmu_and_no_iteration_while_apart(counted):
+    beam = {"fidelity": "quasi_static", "approach": "elastic", "initial_velocity_slope": 0.0}
+    scene = with_changes(
+        load_scene("soft"),
+        beam=beam,
+        spring={"equilibrium": -0.01, "initial_velocity": -0.001},
+        contact={"law": "compliance"},
+        coupling={"feedback": "beam_drives"},
+        time={"t_end": 0.01},
+    )
+    run, calls = counted(scene)
+    assert {body for body, _ in calls} == {"spring"}
+    assert calls["spring", "fmi2DoStep"] == run.summary["macro_steps"] == 40
