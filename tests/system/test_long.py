@@ -1,0 +1,90 @@
+"""Long runs: memory stays flat, the energy is kept, the time does not drift.
+
+SPRINGBEAM_STEPS=1000000 .venv/bin/python -m pytest tests/system/test_long.py -s     makes them long (minutes each).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from springbeam.recording import load_events
+from springbeam.scene import load_scene, with_changes
+
+pytestmark = pytest.mark.usefixtures("fmu_folder")
+
+STEPS = int(os.environ.get("SPRINGBEAM_STEPS", "20000"))
+H = 2e-3
+
+SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": H}, time={"t_end": STEPS * H})
+SCENES = {
+    # Meets, bounces, is released and hits the foundation for ever; everything takes a little energy.
+    "lossy": with_changes(
+        SOFT, beam={"alpha_b": 1e-6}, spring={"damping": 1e-3}, stop={"restitution": 0.999}
+    ),
+    # A load keeps the tip on the spring, which it crosses Ψ with from time to time; nothing takes energy.
+    "conservative": with_changes(SOFT, beam={"distributed_load": -4.0, "initial_velocity_slope": 0.0}, stop=None),
+}  # fmt: skip
+
+#: Runs a scene into a directory; prints, for every tenth of the steps, memory in use [bytes] and the clock [s].
+RUN = """
+import json, os, sys
+from time import perf_counter
+from springbeam.recording import FileRecorder, RunDirectory
+from springbeam.runner import run
+from springbeam.scene import scene_from_dict
+
+scene, steps = scene_from_dict(json.loads(sys.argv[1])), int(sys.argv[3])
+marks, due = [], steps // 10
+
+def progress(time, phase, macro_steps):
+    global due
+    if macro_steps >= due:
+        due += steps // 10
+        with open("/proc/self/statm") as memory:
+            resident = int(memory.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        marks.append((resident, perf_counter()))
+
+with FileRecorder(scene, RunDirectory.create(sys.argv[2])) as recorder:
+    summary = run(scene, recorder, progress)
+print(json.dumps([marks, summary]))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory in use is read from /proc")
+@pytest.mark.parametrize("name", SCENES)
+def test_a_long_run(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, directory = SCENES[name], tmp_path / "run"
+    arguments = [json.dumps(scene.model_dump(exclude_none=True)), str(directory), str(STEPS)]
+    output = subprocess.run([sys.executable, "-c", RUN, *arguments], stdout=subprocess.PIPE, text=True, check=True)
+    marks, summary = json.loads(output.stdout)
+    resident, clock = np.array(marks).T
+    per_step = np.diff(clock) / (STEPS // 10)
+
+    time = np.loadtxt(directory / "trajectory.csv", delimiter=",", skiprows=1, usecols=0)
+    events = list(load_events(directory))
+    (directory / "trajectory.csv").unlink()  # 0.3 GB a million steps, which pytest would keep
+
+    with capsys.disabled():
+        print(
+            f"\n{name}: {summary['macro_steps']} steps, {len(events)} events, energy residual "
+            f"{summary['max_energy_residual']:.1e}; memory {resident[0] / 1e6:.1f} to {resident[-1] / 1e6:.1f} MB; "
+            f"per step {1e6 * per_step[0]:.0f} µs in the second tenth, {1e6 * per_step[-1]:.0f} µs in the last"
+        )
+    assert summary["status"] == "done"
+    assert len(events) > STEPS // 1000
+
+    # A tenth of the steps in, everything is allocated. Rows kept in memory would be 168 bytes each as doubles.
+    assert resident[-1] - resident[0] < 1e6
+    assert summary["max_energy_residual"] <= 1e-8
+    # Macro steps end on t₀ + k H, not on a sum of H; only events and the rest of their step are in between.
+    grid = H * np.arange(STEPS + 1)
+    assert time[-1] == scene.time.t_end == grid[-1]
+    assert np.count_nonzero(~np.isin(time, grid)) <= 2 * len(events)
+    assert np.count_nonzero(~np.isin(grid, time)) <= len(events)
