@@ -18,7 +18,7 @@ import numpy as np
 
 from .crosscheck import contact_changes
 from .runner import simulate
-from .scene import Scene, SceneError, with_changes
+from .scene import Scene, SceneError, scene_from_dict, with_changes
 from .trajectory import Trajectory
 
 #: Macro steps of the first run, and the largest number tried.
@@ -36,7 +36,8 @@ _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-4, 1e-12, 1e-8
 class Picked:
     """A scene that keeps the accuracy, and what is known about it."""
 
-    scene: Scene
+    asked: float
+    scene: Scene  #: asks for no accuracy: it says how it is run
     displacement_error: float  #: estimate, relative to the largest change of the tip (or spring top)
     event_error: float  #: estimate of the largest error of a change of contact, relative to the time that is run
     events: int  #: changes of contact that this is about, those longer than four macro steps
@@ -54,7 +55,7 @@ class Picked:
         if spring is not None:
             picked["ida_relative_tolerance"] = spring.relative_tolerance
         return {
-            "asked": self.scene.accuracy,
+            "asked": self.asked,
             "picked": picked,
             "estimated_displacement_error": self.displacement_error,
             "estimated_event_error": self.event_error,
@@ -83,7 +84,8 @@ def pick(scene: Scene) -> Picked:
 
 class _Search:
     def __init__(self, scene: Scene, accuracy: float) -> None:
-        self._scene, self._accuracy = scene, accuracy
+        data = scene.model_dump(exclude={"accuracy"}, exclude_none=True)
+        self._scene, self._accuracy = scene_from_dict(data), accuracy
         self._span = scene.time.t_end - (scene.contact_time or 0.0)
         self._order = _EXPECTED["compliance" if scene.contact.law == "compliance" else "transmission"]
         degree = 0 if scene.contact.law == "compliance" or scene.beam is None else 2
@@ -97,10 +99,12 @@ class _Search:
         while True:
             steps = math.ceil(growth * steps)
             if steps > _MOST:
-                found = "the events still change from run to run" if worst >= 1.0 else f"runs still differ by {worst:.1e}"
+                found = (
+                    "the events still change from run to run" if worst >= 1.0 else f"runs still differ by {worst:.1e}"
+                )
                 raise SceneError(
-                    f"accuracy = {self._accuracy:g}: not reached with {len(coarse) - 1} steps, {found}; ask for less, or "
-                    "shorten [time] t_end"
+                    f"accuracy = {self._accuracy:g}: not reached with {len(coarse) - 1} steps, {found}; ask for "
+                    "less, or shorten [time] t_end"
                 )
             spent += float(coarse.summary["wall_time"])
             fine, runs = self._with(steps), runs + 1
@@ -109,7 +113,7 @@ class _Search:
             share = 1.0 / (ratio**_TRUSTED - 1.0)
             worst = max(error, event_error)
             if share * worst <= self._accuracy / _SAFETY:
-                return Picked(fine.scene, share * error, share * event_error, events, runs - 1, spent)
+                return Picked(self._accuracy, fine.scene, share * error, share * event_error, events, runs - 1, spent)
             # What the expected order makes of the difference; other events tell nothing about it.
             expected = worst / (ratio**self._order - 1.0)
             growth = 1.2 * (_SAFETY * expected / self._accuracy) ** (1.0 / self._order) if worst < 1.0 else 2.0

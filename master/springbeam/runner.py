@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
@@ -13,7 +14,7 @@ from .memory import Memory
 from .paper_law import PaperLaw
 from .quasi_static import QuasiStaticBeam
 from .recording import FileRecorder, MemoryRecorder, Recorder, RunDirectory, load_summary, load_trajectory
-from .scene import Scene, scene_from_dict, suspicions, with_changes
+from .scene import Scene, SceneError, scene_from_dict, suspicions, with_changes
 from .simulation import Progress, RunStopped, Simulation
 from .trajectory import Trajectory
 
@@ -27,6 +28,7 @@ def run(
     *,
     seconds: float | None = None,
     start: Checkpoint | None = None,
+    further: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Co-simulate ``scene`` into ``recorder`` and return the summary.
 
@@ -43,6 +45,8 @@ def run(
         whenever so much time of the clock has passed [s].
     start
         Go on from here, `last_checkpoint` of the directory of ``recorder``, instead of from the start.
+    further
+        Added to the summary.
 
     Raises
     ------
@@ -53,6 +57,8 @@ def run(
     ResultsUnreadable, ResultsInUse
         If the results do not belong to ``start``, or another process is writing them.
     """
+    if scene.accuracy is not None:
+        raise SceneError("accuracy: not yet picked for; springbeam.accuracy.pick gives the scene that keeps it")
     began = perf_counter()
     before = 0.0 if start is None else start.wall_time
     after_step = progress
@@ -96,6 +102,7 @@ def run(
             summary = {
                 **status,
                 "version": version("springbeam"),
+                **(further or {}),
                 **simulation.summary(),
                 **_calls(beam=beam, spring=spring),
                 "setup_time": loaded - began,
@@ -166,9 +173,15 @@ def resume(directory: str | Path, progress: Progress | None = None) -> Trajector
 
 
 def simulate(scene: Scene, progress: Progress | None = None) -> Trajectory:
-    """Co-simulate ``scene`` and return the trajectory. Raises as `run` does."""
+    """Co-simulate ``scene`` and return the trajectory. Raises as `run` does, and as `springbeam.accuracy.pick` does."""
+    further = {}
+    if scene.accuracy is not None:
+        from .accuracy import pick
+
+        picked = pick(scene)
+        scene, further = picked.scene, {"accuracy": picked.summary()}
     recorder = MemoryRecorder(scene)
-    run(scene, recorder, progress)
+    run(scene, recorder, progress, further=further)
     return recorder.trajectory()
 
 

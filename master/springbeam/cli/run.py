@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Mapping
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from time import monotonic
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -18,7 +19,7 @@ from rich.text import Text
 from ..checkpoint import Checkpoint
 from ..fmu import FmuError
 from ..recording import FileRecorder, NonFiniteValue, RunDirectory, load_events, load_summary, load_trajectory
-from ..scene import Scene, load_scene
+from ..scene import Scene, load_scene, scene_from_dict
 from ..trajectory import Event
 from .common import STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail, interruptible
 
@@ -45,6 +46,14 @@ def run(
         ),
     ] = None,
     settings: SettingsOption = None,
+    accuracy: Annotated[
+        float | None,
+        typer.Option(
+            "--accuracy",
+            metavar="RELATIVE",
+            help="Pick scheme, macro step and tolerances so that tip displacement and event times are within it.",
+        ),
+    ] = None,
     checkpoint: Annotated[
         float | None,
         typer.Option(
@@ -65,8 +74,25 @@ def run(
     with interruptible():
         with bad_input_reported():
             what = load_scene(scene, settings or ())
+            if accuracy is not None:
+                what = scene_from_dict({**what.model_dump(exclude_none=True), "accuracy": accuracy}, source=scene)
+            what, picked = _picked(what)
             directory = _run_directory(scene, out, force)
-        carry_out(what, directory, seconds=checkpoint, no_plots=no_plots, quiet=quiet)
+        carry_out(what, directory, seconds=checkpoint, no_plots=no_plots, quiet=quiet, further=picked)
+
+
+def _picked(scene: Scene) -> tuple[Scene, dict[str, Any]]:
+    """The scene that keeps the accuracy asked for, if any, and what the summary says of it."""
+    if scene.accuracy is None:
+        return scene, {}
+    from ..accuracy import pick
+    from ..runner import RunStopped
+
+    try:
+        picked = pick(scene)
+    except RunStopped as stopped:
+        fail(STOPPED, f"a pilot run for accuracy = {scene.accuracy:g} {stopped}")
+    return picked.scene, {"accuracy": picked.summary()}
 
 
 def carry_out(
@@ -77,13 +103,14 @@ def carry_out(
     start: Checkpoint | None = None,
     no_plots: bool,
     quiet: bool,
+    further: Mapping[str, Any] | None = None,
 ) -> None:
     """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.runner.run`."""
     console = Console(quiet=quiet, highlight=False)
     recorder = FileRecorder(scene, directory)
     try:
         with bad_input_reported():
-            error = _run_into(recorder, seconds, start, quiet=quiet)
+            error = _run_into(recorder, seconds, start, further, quiet=quiet)
     finally:
         if not recorder.begun:
             directory.discard()
@@ -118,7 +145,14 @@ def _run_directory(scene: str, out: Path | None, force: bool) -> RunDirectory:
     return RunDirectory.create(out or default, replace=force)
 
 
-def _run_into(recorder: FileRecorder, seconds: float | None, start: Checkpoint | None, *, quiet: bool) -> str | None:
+def _run_into(
+    recorder: FileRecorder,
+    seconds: float | None,
+    start: Checkpoint | None,
+    further: Mapping[str, Any] | None,
+    *,
+    quiet: bool,
+) -> str | None:
     """Returns why the run stopped early, or ``None``; the results are closed and can be loaded either way.
 
     What keeps it from recording anything is raised.
@@ -129,7 +163,7 @@ def _run_into(recorder: FileRecorder, seconds: float | None, start: Checkpoint |
     t_end = recorder.scene.time.t_end
     with recorder, _ProgressBar(t_end, quiet=quiet) as progress:
         try:
-            run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start)
+            run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start, further=further)
             return None
         except RunStopped as stopped:
             status, cause = "stopped", str(stopped)
@@ -210,6 +244,13 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         console.print(f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s")
     if "max_energy_residual" in summary:
         console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}")
+    if "accuracy" in summary:
+        found, picked = summary["accuracy"], summary["accuracy"]["picked"]
+        console.print(
+            f"accuracy  {found['asked']:g} asked; {picked['scheme']} {picked['degree']}, H = {picked['macro_step']:.3g} s; "
+            f"errors {found['estimated_displacement_error']:.1e} (displacement), {found['estimated_event_error']:.1e} "
+            f"(times of {found['events_compared']} events)"
+        )
     for warning in summary.get("warnings", ()):
         console.print(Text(f"warning   {warning}"))
     console.print(Text(f"results   {directory.path}"), soft_wrap=True)

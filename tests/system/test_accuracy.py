@@ -1,0 +1,96 @@
+"""An accuracy asked for is kept: judged by the monolithic reference, on scenes that are not shipped."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from springbeam.cli import app
+from springbeam.monolithic import event_driven
+from springbeam.recording import MemoryRecorder
+from springbeam.runner import run, simulate
+from springbeam.scene import SceneError, scene_from_dict
+
+STIFF_ON_SOFT = {
+    "time": {"t_end": 0.25},
+    "beam": {"young_modulus": 400.0, "shear_modulus": 150.0, "n_elements": 12, "initial_velocity_slope": -0.6},
+    "spring": {"mass": 0.4, "linear_stiffness": 40.0, "cubic_stiffness": 10.0, "damping": 0.2},
+}
+WITH_STOP = {
+    "time": {"t_end": 0.2},
+    "beam": {
+        "young_modulus": 60.0,
+        "shear_modulus": 80.0,
+        "n_elements": 8,
+        "alpha_b": 1e-3,
+        "initial_velocity_slope": -1.5,
+    },
+    "spring": {"mass": 0.7, "linear_stiffness": 5.0, "cubic_stiffness": -0.3},
+    "stop": {"position": -0.04, "restitution": 0.6},
+}
+SPRING_ALONE = {
+    "time": {"t_end": 5.0},
+    "spring": {"equilibrium": 0.4, "linear_stiffness": 4.0, "cubic_stiffness": -1.0},
+}
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("tables", [STIFF_ON_SOFT, WITH_STOP, SPRING_ALONE], ids=["beam-spring", "with-stop", "spring"])
+def test_the_promise_is_kept(tables, accuracy):
+    found = simulate(scene_from_dict({**tables, "accuracy": accuracy}))
+    reference = event_driven.simulate(scene_from_dict(tables), sample_times=np.unique(found.time))
+    name = "u_tip" if "beam" in tables else "y"
+    exact = reference[name]
+    error = np.abs(found[name] - exact[np.searchsorted(reference.time, found.time)]).max()
+    assert error <= accuracy * np.abs(exact - exact[0]).max()
+    picked = found.summary["accuracy"]
+    assert max(picked["estimated_displacement_error"], picked["estimated_event_error"]) <= accuracy
+    strikes = [[e.time for e in t.events if e.kind == "stop_impact"] for t in (found, reference)]
+    if strikes[1]:
+        assert abs(strikes[0][0] - strikes[1][0]) <= accuracy * tables["time"]["t_end"]
+
+
+def test_more_accuracy_costs_more_steps():
+    steps = [simulate(scene_from_dict({**WITH_STOP, "accuracy": a})).summary["macro_steps"] for a in (1e-2, 1e-4, 1e-6)]
+    assert steps == sorted(steps)
+    assert steps[0] < steps[2]
+
+
+def test_the_scene_as_run_says_how_it_is_run():
+    found = simulate(scene_from_dict({**STIFF_ON_SOFT, "accuracy": 1e-3}))
+    assert found.scene.accuracy is None
+    again = simulate(found.scene)
+    np.testing.assert_array_equal(again.u_tip, found.u_tip)
+
+
+def test_the_papers_law_has_no_accuracy():
+    scene = {**WITH_STOP, "contact": {"law": "paper"}, "accuracy": 1e-3}
+    with pytest.raises(SceneError, match='law = "paper"'):
+        simulate(scene_from_dict(scene))
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, -1e-3])
+def test_an_impossible_accuracy_is_refused(value):
+    with pytest.raises(SceneError, match="accuracy"):
+        scene_from_dict({**WITH_STOP, "accuracy": value})
+
+
+def test_a_run_wants_it_picked():
+    scene = scene_from_dict({**WITH_STOP, "accuracy": 1e-3})
+    with pytest.raises(SceneError, match="not yet picked"):
+        run(scene, MemoryRecorder(scene))
+
+
+def test_command(tmp_path):
+    out = tmp_path / "out"
+    arguments = ["run", "soft", "--set", "beam.n_elements=6", "--set", "time.t_end=0.06", "--accuracy", "1e-4"]
+    result = CliRunner().invoke(app, [*arguments, "--no-plots", "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    assert "1e-04 asked" in result.stdout or "0.0001 asked" in result.stdout
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["accuracy"]["asked"] == 1e-4
+    assert summary["scene"]["coupling"]["macro_step"] == summary["accuracy"]["picked"]["macro_step"]
+    assert CliRunner().invoke(app, [*arguments[:-1], "2", "--out", str(tmp_path / "no")]).exit_code == 2
