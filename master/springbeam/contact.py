@@ -75,6 +75,11 @@ def foundation_impact(z: float | None, mass: float, v: float | None, tip_mass: f
     return Impact(on_beam, on_spring, on_spring + on_beam, loss_spring + loss_beam)
 
 
+def common_velocity(v: float, z: float, tip_mass: float, mass: float) -> float:
+    """With which joined ends of velocities v and z [m/s] go on: that of their momentum, whatever force joins them."""
+    return (tip_mass * v + mass * z) / (tip_mass + mass)
+
+
 def spring_force(spring: Spring, y: float) -> float:
     """k1 y + k2 y³ − f_s [N]: what the seated spring hands to the foundation besides C (Ahn & Tate, (6))."""
     return spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
@@ -147,7 +152,8 @@ class Transitions(Memory):
         speed = max(abs(w) for w in (z, v) if w is not None)
         self._fastest_impact = max(self._fastest_impact, speed)
         # It strikes while rising if the rebound would be over in no time.
-        rising = (low if self._mass is not None else tip).velocity > 0.0
+        tip_mass = 0.0 if v is None else self._tip_mass or 0.0
+        rising = common_velocity(v or 0.0, z or 0.0, tip_mass, self._mass or 0.0) > 0.0
         dies_out = rising or e * speed <= _SEATING_SPEED * self._fastest_impact
         if (dies_out and e < 1.0) or speed == 0.0:
             joint = phase.joint if self._mass is not None else Joint.TIED

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 
-from .contact import Joint, Phase
+from .contact import Joint, Phase, common_velocity
 from .coupling import force
 from .events import (
     EventFunction,
@@ -42,7 +42,12 @@ class Detector:
 
     def __init__(self, scene: Scene, pair: Pair) -> None:
         self._pair, self._H = pair, scene.coupling.macro_step
-        self._functions = EventFunctions(scene)
+        tip_share = 0.0
+        if pair.joinable:
+            assert pair.beam is not None
+            assert pair.spring is not None
+            tip_share = common_velocity(1.0, 0.0, pair.beam.mass, pair.spring.mass)
+        self._functions = EventFunctions(scene, tip_share)
 
     def tolerance(self, ends: Ends) -> float:
         """What positions can be told apart to [m]."""
@@ -59,17 +64,34 @@ class Detector:
 
     def first(self, state: State, step: Step) -> tuple[Step, str | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it."""
+        step, found = self._first_by_position(state, step)
+        if step.size == 0.0:
+            return step, found
+        if self._pair.compliant:
+            step = self._touched_inside(state, step)
+        unilateral = self._unilateral(state, step)
+        if unilateral is None:
+            return self._pair.settled(state, step), found
+        cut, kind = unilateral
+        if 0.0 < cut.size < step.size:
+            # Under the force of the shorter step the ends move differently: they may strike something before.
+            cut, found = self._first_by_position(state, cut)
+            if found is not None:
+                return cut if cut.size == 0.0 else self._pair.settled(state, cut), found
+        return self._pair.settled(state, cut) if cut.size > 0.0 else cut, kind
+
+    def _first_by_position(self, state: State, step: Step) -> tuple[Step, str | None]:
+        """The step, cut to the first event that positions tell of, and its kind; of size 0 if it is at the start."""
         found: str | None = None
         functions = self._functions.of(state.phase)
         for _ in range(2 * len(functions) + 1):
             candidates, tolerance = [], self.tolerance(step.end)
             for kind, function in functions:
-                if kind == found:
-                    continue
                 bracket = self._bracket(state, function, step, tolerance)
-                if bracket is not None:
-                    crossing = cubic_crossing(function(step.start), function(bracket.end), bracket.size)
-                    candidates.append((crossing, kind, function, bracket))
+                if bracket is None or (kind == found and bracket is step):
+                    continue
+                crossing = cubic_crossing(function(step.start), function(bracket.end), bracket.size)
+                candidates.append((crossing, kind, function, bracket))
             if not candidates:
                 break
             _, found, function, bracket = min(candidates, key=lambda c: c[0])
@@ -77,10 +99,7 @@ class Detector:
             if step.size < _NO_TIME * self._H:
                 # Too short for a contact force: velocities that differ would be turned round by an infinite one.
                 return self._no_step(step), found
-        if self._pair.compliant:
-            step = self._touched_inside(state, step)
-        unilateral = self._unilateral(state, step)
-        return unilateral if unilateral is not None else (self._pair.settled(state, step), found)
+        return step, found
 
     def _no_step(self, step: Step) -> Step:
         """No step at all: the bodies back at the mark."""

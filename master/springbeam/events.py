@@ -30,19 +30,35 @@ def gap(ends: tuple[Motion, Motion]) -> Sample:
     return tip.displacement - low.displacement, tip.velocity - low.velocity
 
 
-def _above(end: int, level: float) -> EventFunction:
-    return lambda ends: (ends[end].displacement - level, ends[end].velocity)
+def _above(end: int, level: float, share: float) -> EventFunction:
+    """Height of an end; its rate is the tip's velocity by ``share``, the lower end's by the rest."""
+
+    def height(ends: tuple[Motion, Motion]) -> Sample:
+        tip, low = ends
+        return ends[end].displacement - level, low.velocity + share * (tip.velocity - low.velocity)
+
+    return height
 
 
-def _below(end: int, level: float) -> EventFunction:
-    return lambda ends: (level - ends[end].displacement, -ends[end].velocity)
+def _below(end: int, level: float, share: float) -> EventFunction:
+    above = _above(end, level, share)
+
+    def depth(ends: tuple[Motion, Motion]) -> Sample:
+        value, rate = above(ends)
+        return -value, -rate
+
+    return depth
 
 
 class EventFunctions:
-    """Which event functions each phase of a scene has, by the kind of their event."""
+    """Which event functions each phase of a scene has, by the kind of their event.
 
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
+    ``tip_share`` is the tip's part in the velocity with which joined ends go on, `contact.common_velocity`: they differ
+    from each other by what the energy schemes leave open, and one of them may even go the other way.
+    """
+
+    def __init__(self, scene: Scene, tip_share: float) -> None:
+        self._scene, self._tip_share = scene, tip_share
         self._ties = scene.beam is not None and scene.spring is not None and scene.contact.law != "compliance"
         self._phase: Phase | None = None
         self._functions: list[tuple[str, EventFunction]] = []
@@ -56,16 +72,18 @@ class EventFunctions:
         tip, low = 0, 1
         spring, stop = self._scene.spring, self._scene.stop
         functions: list[tuple[str, EventFunction]] = []
+        share = self._tip_share if self._ties and phase.joint is not Joint.FREE else 0.0
         if self._ties:
             assert spring is not None
             if phase.joint is Joint.FREE:
                 functions.append(("impact", gap))
             if phase.joint is Joint.TIED and not phase.seated:
-                functions.append(("release", _below(low, spring.equilibrium)))
+                functions.append(("release", _below(low, spring.equilibrium, share)))
             if phase.joint is Joint.TOUCH:
-                functions.append(("retie", _above(low, spring.equilibrium)))
+                functions.append(("retie", _above(low, spring.equilibrium, share)))
         if stop is not None and not phase.seated:
-            functions.append(("stop_impact", _above(tip if spring is None else low, stop.position)))
+            end, share = (tip, 1.0) if spring is None else (low, share)
+            functions.append(("stop_impact", _above(end, stop.position, share)))
         return functions
 
 

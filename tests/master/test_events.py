@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
+from springbeam.contact import Joint, Phase, common_velocity
 from springbeam.events import (
+    EventFunctions,
     Sample,
     cubic_crossing,
     cubic_value,
@@ -17,6 +19,7 @@ from springbeam.events import (
     lowest_inside,
     stays_above,
 )
+from springbeam.scene import load_scene
 from springbeam.subsystem import Motion
 
 SIZE = 0.02
@@ -150,3 +153,16 @@ def test_locate_gives_up_where_time_itself_is_rounded():
     h = locate(f, f(0.0), f(3.0), 3.0, 0.0, 1e6)
     assert abs(h - math.acos(0.3)) <= 4.0 * np.finfo(float).eps * 1e6
     assert len(f.sizes) - 2 <= 35  # 3/(4 ulp of 1e6) = 2^31.6
+
+
+@pytest.mark.parametrize(("v", "z", "rate"), [(-0.4, 0.1, -0.3), (-0.1, 0.4, -0.0), (0.4, -0.1, 0.3)])
+def test_joined_ends_go_on_with_their_common_velocity(v, z, rate):
+    """A tip of 4 kg and a top of 1 kg: a release needs both to rise, whichever way the top alone would go."""
+    scene = load_scene("soft")
+    functions = EventFunctions(scene, tip_share=common_velocity(1.0, 0.0, 4.0, 1.0))
+    motions = (Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0))
+    joined = dict(functions.of(Phase(Joint.TIED)))
+    assert joined["stop_impact"](motions) == pytest.approx((-scene.stop.position, rate))
+    assert joined["release"](motions) == pytest.approx((0.0, -rate))
+    assert dict(functions.of(Phase(Joint.TOUCH)))["retie"](motions) == pytest.approx((0.0, rate))
+    assert dict(functions.of(Phase()))["stop_impact"](motions)[1] == z
