@@ -1,6 +1,8 @@
 // Lets an FMU that was linked on a new system load on an old one. What libstdc++.a, libgcc_eh.a and libm of the build
-// machine would ask of a new glibc is defined here, hidden, with what every glibc since 2.14 has.
-// Only for x86-64; the test tests/contract/test_package.py states the version that is left.
+// machine would ask of a new glibc is defined here, hidden, with what every glibc since 2.14 has: each block names the
+// version that brought the symbol. Names that old programs use too keep their old version in a new glibc, so on a yet
+// newer one only new names can be missing here; then tests/contract/test_package.py, which states the version that is
+// left, fails with the name. Only for x86-64.
 // NOLINTBEGIN(bugprone-reserved-identifier,performance-no-int-to-ptr)
 #include <features.h>
 
@@ -87,6 +89,11 @@ HIDDEN int _dl_find_object(void* pc, dl_find_object* found) noexcept {
   Search search{reinterpret_cast<unsigned long>(pc), found};
   return dl_iterate_phdr(visit, &search) ? 0 : -1;
 }
+#endif
+
+#if __GLIBC_PREREQ(2, 17)
+// GCC 13 and later: sizes of the pool for exceptions out of memory, from the environment. The defaults stay.
+HIDDEN char* secure_getenv(const char*) noexcept { return nullptr; }
 #endif
 
 #if __GLIBC_PREREQ(2, 38)
