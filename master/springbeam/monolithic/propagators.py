@@ -43,17 +43,22 @@ class Propagator(ABC):
 class _RungeKuttaSegment(Segment):
     owner: RungeKuttaPropagator
     start: np.ndarray
+    begin: float  #: as `RungeKuttaPropagator.elapsed` [s]
     size: float
     nodes: np.ndarray
     states: np.ndarray
+    dense: Any
 
     def state(self, tau: float) -> np.ndarray:
         if tau <= 0.0:
             return np.array(self.start)
-        # Again from the start, because the dense output is a power of the step less accurate.
         owner = self.owner
+        if owner.method == "LSODA":
+            # Of the order of the step; and before scipy 1.17 no second LSODA may run while the first goes on.
+            return owner.system.synchronise(owner.phase, self.dense(self.begin + tau))
+        # Again from the start, because the dense output is a power of the step less accurate.
         solution = solve_ivp(owner.rhs, (0.0, tau), self.start, method=owner.method, first_step=tau, **owner.options)
-        return self.owner.system.synchronise(self.owner.phase, solution.y[:, -1].copy())
+        return owner.system.synchronise(owner.phase, solution.y[:, -1].copy())
 
 
 class RungeKuttaPropagator(Propagator):
@@ -89,6 +94,8 @@ class RungeKuttaPropagator(Propagator):
         self.elapsed = solver.t
         size = solver.t - begin
         nodes = np.linspace(0.0, size, self._nodes)
-        states = np.array([start, solver.y]) if self._nodes == 2 else solver.dense_output()(begin + nodes).T
+        # DOP853's takes evaluations of its own.
+        dense: Any = solver.dense_output() if self._nodes != 2 or self.method == "LSODA" else None
+        states = np.array([start, solver.y]) if self._nodes == 2 else dense(begin + nodes).T
         states[0], states[-1] = start, solver.y
-        return _RungeKuttaSegment(self, start, size, nodes, self.system.synchronise(self.phase, states))
+        return _RungeKuttaSegment(self, start, begin, size, nodes, self.system.synchronise(self.phase, states), dense)
