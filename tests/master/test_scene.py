@@ -506,7 +506,8 @@ def test_whatever_is_in_a_table_is_a_scene_or_a_scene_error(table, key, value):
 def test_any_value_of_a_beam_key_is_allowed_or_explained(key, value):
     result = outcome(changed(beam={key: value}))
     if isinstance(result, Scene):
-        assert getattr(result.beam, key) == value
+        kept = getattr(result.beam, key)
+        assert kept == type(kept)(value)  # integers beyond 2^53 are rounded
     else:
         # Another key is named where the two do not go together.
         assert any(f"[beam] {name}" in result for name in (key, "n_modes", "initial_velocity_slope"))
