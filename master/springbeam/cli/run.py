@@ -245,9 +245,10 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
     if "max_energy_residual" in summary:
         console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}")
     if "accuracy" in summary:
-        found, picked = summary["accuracy"], summary["accuracy"]["picked"]
+        found = summary["accuracy"]
+        how = "{scheme} {degree}, H = {macro_step:.3g} s".format(**found["picked"])
         console.print(
-            f"accuracy  {found['asked']:g} asked; {picked['scheme']} {picked['degree']}, H = {picked['macro_step']:.3g} s; "
+            f"accuracy  {found['asked']:g} asked; {how}; "
             f"errors {found['estimated_displacement_error']:.1e} (displacement), {found['estimated_event_error']:.1e} "
             f"(times of {found['events_compared']} events)"
         )

@@ -1,0 +1,42 @@
+"""Writes docs/fmu_variables.md from the model descriptions of the built FMUs: python docs/fmu_variables.py"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fmpy import read_model_description
+
+ROOT = Path(__file__).parents[1]
+TARGET = ROOT / "docs" / "fmu_variables.md"
+HEAD = """# Variables of the FMUs
+
+Made from the FMUs by `python docs/fmu_variables.py`. Everything is SI, up is positive; what the symbols mean is in
+[model.md](model.md). A polynomial input is continued over a step by its FMI input derivatives of order 1 and 2.
+"""
+
+
+def table(name: str) -> str:
+    description = read_model_description(str(ROOT / "fmus" / f"{name}.fmu"))
+    lines = [f"\n## {name}\n", "| variable | kind | unit | start | |", "|---|---|---|---|---|"]
+    shown: set[str] = set()
+    for variable in description.modelVariables:
+        stem = variable.name.split("[")[0]
+        if variable.causality not in ("input", "output", "parameter") or stem in shown:
+            continue
+        label = variable.name
+        if stem != variable.name:
+            shown.add(stem)
+            label = f"{stem}[1..{sum(v.name.startswith(stem + '[') for v in description.modelVariables)}]"
+        start = "" if variable.start is None else str(variable.start)
+        unit = variable.unit or ("–" if variable.type == "Real" else variable.type)
+        text = (variable.description or "").replace("|", "\\|")
+        lines.append(f"| `{label}` | {variable.causality} | {unit} | {start} | {text} |")
+    return "\n".join(lines) + "\n"
+
+
+def page() -> str:
+    return HEAD + table("beam") + table("spring")
+
+
+if __name__ == "__main__":
+    TARGET.write_text(page(), encoding="utf-8")
