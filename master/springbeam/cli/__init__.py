@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from . import checks, doctor, report, resume, run, scenes, sweep, tradeoff
+from . import checks, doctor, report, resume, run, scenes, stability, sweep, tradeoff
 
 app = typer.Typer(
     help="A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs.",
@@ -49,5 +49,5 @@ def _common(
     pass
 
 
-for module in (run, resume, scenes, checks, tradeoff, report, sweep, doctor):
+for module in (run, resume, scenes, checks, tradeoff, report, sweep, doctor, stability):
     module.register(app)

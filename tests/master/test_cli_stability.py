@@ -1,0 +1,38 @@
+"""``springbeam predict`` as a user meets it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from springbeam.cli import app
+from springbeam.scene import load_scene, with_changes
+from springbeam.stability.predict import predict
+
+COARSE = ["--set", "beam.n_elements=10"]
+
+
+@pytest.mark.parametrize("scene", ["soft", "steel-bumper", "duffing"])
+def test_prediction_fits_80_columns(scene):
+    arguments = COARSE if scene == "soft" else []
+    result = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["predict", scene, *arguments])
+    assert result.exit_code == 0
+    assert max(map(len, result.stdout.splitlines())) <= 80
+    assert ("critical H" in result.stdout) == (scene != "duffing")
+
+
+def test_json_is_the_prediction():
+    result = CliRunner().invoke(app, ["predict", "soft", *COARSE, "--json"])
+    printed = json.loads(result.stdout)
+    expected = predict(with_changes(load_scene("soft"), beam={"n_elements": 10}))
+    assert printed["omega_max"] == expected.omega_max
+    assert printed["schemes"][3]["critical_step"] == expected.schemes[3].critical_step
+    assert printed["advised"] == ["hermite", 2]
+
+
+def test_a_scene_that_cannot_be_read_is_bad_input():
+    result = CliRunner().invoke(app, ["predict", "sotf"])
+    assert result.exit_code == 2
+    assert "did you mean soft?" in result.stderr

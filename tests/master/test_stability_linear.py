@@ -1,0 +1,239 @@
+"""Amplification matrices: exact propagators, the schemes against their solvers, known constants."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from bodies import DuffingBody, ModalBody, modal_beam
+from scipy.linalg import expm
+
+from springbeam.coupling import conditions
+from springbeam.coupling.compliance import Compliance
+from springbeam.coupling.exchange import Exchange
+from springbeam.coupling.tie import Tie
+from springbeam.scene import load_scene, with_changes
+from springbeam.stability.critical import Preloaded
+from springbeam.stability.linear import LinearBody, LinearPair, Step, amplification, impulse_integrals, spectral_radius
+from springbeam.stability.predict import THRESHOLD, critical_step, predict
+from springbeam.subsystem import NO_FORCE
+
+TIES = [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
+EXCHANGES = [("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
+
+
+@lru_cache(maxsize=8)
+def pair(n: int = 4, mass: float = 1.0, stiffness: float = 0.0, k: float = 3.0) -> LinearPair:
+    """An undamped unit beam, EI = KAG = 100, and a linear spring."""
+    beam = modal_beam(n)
+    modes = LinearBody(beam.omega**2, np.zeros_like(beam.omega), beam.b)
+    return LinearPair(modes, LinearBody(np.array([k / mass]), np.zeros(1), np.array([mass**-0.5])), stiffness)
+
+
+def omega_max(p: LinearPair) -> float:
+    return float(np.sqrt(p.beam.omega2.max()))
+
+
+# -- propagators ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("omega", "c", "h", "bound"),
+    [
+        (3.0, 0.0, 0.1, 1e-14),
+        (3.0, 0.0, 5.0, 1e-12),
+        (3.0, 1.0, 0.2, 1e-14),
+        (3.0, 6.0, 0.5, 1e-8),  # critical: the roots are moved apart by 1e-6
+        (3.0, 100.0, 0.5, 1e-13),
+        (0.0, 0.0, 0.3, 1e-14),
+        (0.0, 2.0, 0.3, 1e-13),
+        (1e4, 1e6, 0.01, 1e-11),
+    ],
+)
+def test_integrals_of_the_impulse_response(omega, c, h, bound):
+    """Against the exponential of (ξ, ξ̇, F, Ḟ, F̈, ∫ξ, ∫∫ξ), whose own rounding is |A|h ulp."""
+    A = np.zeros((7, 7))
+    A[0, 1], A[1, 0], A[1, 1] = 1.0, -(omega**2), -c
+    A[1, 2] = A[2, 3] = A[3, 4] = A[5, 0] = A[6, 5] = 1.0
+    E = expm(A * h)
+    exact = [E[1, 1], E[0, 1], E[0, 2], E[0, 3], E[0, 4], E[5, 4], E[6, 4]]
+    ours = impulse_integrals(np.array([omega**2]), np.array([c]), h)[:, 0]
+    assert ours == pytest.approx(exact, rel=bound, abs=bound * abs(exact[0]))
+
+
+def test_a_spring_that_pushes_away_grows_as_cosh():
+    S = impulse_integrals(np.array([-4.0]), np.zeros(1), 0.7)[:, 0]
+    assert S[:3] == pytest.approx([np.cosh(1.4), np.sinh(1.4) / 2.0, (np.cosh(1.4) - 1.0) / 4.0], rel=1e-14)
+
+
+# -- schemes --------------------------------------------------------------------------------------------------------
+
+
+def solved(p: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
+    """The amplification matrix column by column, by the solvers of a run on bodies exact to rounding.
+
+    A preload of 1e4 m of penetration keeps the one-sided contact closed under motions of 1 m.
+    """
+    r, mass, depth = len(p.beam.b), p.spring.mass, 1e4
+    columns = []
+    for unit in np.eye(2 * r + 2):
+        beam = ModalBody(np.sqrt(p.beam.omega2), p.beam.b, unit[:r], unit[r : 2 * r])
+        spring = DuffingBody(mass, float(p.spring.omega2[0]) * mass, 0.0, *(unit[2 * r :] * mass**-0.5))
+        ends = (beam, spring)
+        if p.stiffness > 0.0:
+            preload = p.stiffness * depth
+            ends = (Preloaded(beam, -0.5 * depth, preload), Preloaded(spring, 0.5 * depth, preload))
+        for body in ends:
+            body.mark()
+        motions = (ends[0].motion(), ends[1].motion())
+        if p.stiffness == 0.0:
+            Tie(conditions(scheme, degree), degree, 1e-13).solve(*ends, 0.0, h, NO_FORCE, motions[0])
+        elif scheme == "energy":
+            gap = motions[1].displacement - motions[0].displacement
+            Compliance(p.stiffness, 1.0, 1e-14, h).solve(*ends, 0.0, h, NO_FORCE, gap)
+        else:
+            Exchange(scheme == "gauss_seidel", degree, p.stiffness, 1.0).solve(*ends, 0.0, h, motions)
+        columns.append(np.concatenate([beam.a, beam.v, np.array([spring.y, spring.z]) * mass**0.5]))
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize(
+    ("scheme", "degree", "stiffness"),
+    [*((s, d, 0.0) for s, d in TIES), *((s, d, 1e4) for s, d in EXCHANGES), ("energy", 0, 1e4)],
+)
+@pytest.mark.parametrize("mass", [0.01, 100.0])
+def test_the_matrix_is_that_of_the_solvers(scheme, degree, stiffness, mass):
+    """Column by column; the solvers' tolerances are 1e-13 of a motion, 1e-9 where it is counted from 1e4 m."""
+    p = pair(2, mass, stiffness)
+    h = 3.0 / omega_max(p)
+    ours, theirs = amplification(p, scheme, degree, h), solved(p, scheme, degree, h)
+    assert np.abs(ours - theirs).max() < (1e-8 if stiffness else 1e-9) * np.abs(ours).max()
+    assert np.abs(ours).max() > 0.5
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("mass", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize("frequency", [0.5, 3.3, 50.0, 1000.0])
+def test_energy_has_spectral_radius_one(degree, mass, frequency):
+    """An isometry of the states with g = 0: one to the rounding of an eigenvalue problem of size 42."""
+    p = pair(10, mass)
+    assert spectral_radius(p, "energy", degree, frequency / omega_max(p)) == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("stiffness", [1e2, 1e8])
+@pytest.mark.parametrize("frequency", [0.5, 1000.0])
+def test_the_discrete_gradient_has_spectral_radius_one(stiffness, frequency):
+    p = pair(10, 1.0, stiffness)
+    assert spectral_radius(p, "energy", 0, frequency / omega_max(p)) == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_hermite_is_stable_where_the_search_for_its_bound_begins(degree):
+    """The search starts at 2.5/ω: random masses, spring stiffnesses and meshes are stable below."""
+    random = np.random.default_rng(5)
+    for _ in range(30):
+        p = pair(int(random.integers(2, 9)), 10.0 ** random.uniform(-4, 4), 0.0, 10.0 ** random.uniform(-2, 4))
+        highest = max(omega_max(p), float(np.sqrt(p.spring.omega2[0])))
+        for frequency in random.uniform(0.05, 2.5, 6):
+            assert spectral_radius(p, "hermite", degree, frequency / highest) < 1.0 + 1e-8
+
+
+@pytest.mark.parametrize(("scheme", "degree"), EXCHANGES)
+def test_critical_step_is_where_the_spectral_radius_passes_the_threshold(scheme, degree):
+    """To 1e-3 of itself; from there on the growth has its order, 2 or 4 in H (degree 0 or 1), within 15 %."""
+    p = pair(10, 1.0, 1e6)
+    H = critical_step(p, scheme, degree)
+    assert spectral_radius(p, scheme, degree, H) > 1.0 + THRESHOLD > spectral_radius(p, scheme, degree, 0.998 * H)
+    half = critical_step(p, scheme, degree, THRESHOLD / 16.0)
+    assert H / half == pytest.approx(4.0 if degree == 0 else 2.0, rel=0.15)
+
+
+# -- the two-mass oscillator ----------------------------------------------------------------------------------------
+
+#: Masses 1 and 1, springs 4π², 16π², 4π², zero-order hold: ρ ≈ 1 + cπ²H². What is exchanged, and when.
+CONSTANTS = {
+    "force-displacement jacobi": 6.0,
+    "force-displacement jacobi, one step late": 10.0,
+    "force-displacement gauss-seidel": 2.0,
+    "displacement-displacement jacobi": 4.0,
+    "displacement-displacement gauss-seidel": 0.0,
+}
+
+
+def two_mass_radius(kind: str, H: float) -> float:
+    k, coupling = 4.0 * np.pi**2, 16.0 * np.pi**2
+    free, joined = (Step(LinearBody(np.array([s]), np.zeros(1), np.ones(1)), H) for s in (k, k + coupling))
+    X = np.eye(5)
+    one, two, before = X[:2], X[2:4], X[4]
+    if kind.startswith("force"):
+        known = before if kind.endswith("late") else one[0]
+        one_end = free(one, [coupling * (two[0] - known)])[0]
+        two_end = joined(two, [coupling * (one_end if kind.endswith("seidel") else one)[0]])[0]
+    else:
+        one_end = joined(one, [coupling * two[0]])[0]
+        two_end = joined(two, [coupling * (one_end if kind.endswith("seidel") else one)[0]])[0]
+    return float(np.abs(np.linalg.eigvals(np.vstack([one_end, two_end, one[:1]]))).max())
+
+
+@pytest.mark.parametrize("kind", CONSTANTS)
+def test_two_mass_oscillator(kind):
+    """The next terms are of relative size O(H): below 0.5 % at H = 1e-3."""
+    c = (two_mass_radius(kind, 1e-3) - 1.0) / (np.pi**2 * 1e-6)
+    assert c == pytest.approx(CONSTANTS[kind], rel=5e-3, abs=1e-6)
+
+
+# -- scenes ---------------------------------------------------------------------------------------------------------
+
+
+def test_soft_is_predicted():
+    """m_tip = h√3/6 ρA for a long mesh, Z = √(KAG ρA) = 10, ω₁ = 1.27396492 √100 but for the mesh, 2m/(ZH)."""
+    p = predict(with_changes(load_scene("soft"), beam={"n_elements": 20}))
+    assert p.tip_mass == pytest.approx(3**0.5 / 6.0 / 20.0, rel=1e-6)
+    assert p.impedance == pytest.approx(10.0)
+    assert p.omega_1 == pytest.approx(12.7396492, rel=3e-4)
+    assert p.displacement_gain == pytest.approx(2.0 / (10.0 * 2.5e-4))
+    assert p.spring_frequency == pytest.approx(3.0**0.5)
+    assert p.resolved_modes == p.modes == 40
+    assert [(s.scheme, s.degree) for s in p.schemes] == TIES
+    assert all(s.spectral_radius == pytest.approx(1.0, abs=1e-11) for s in p.schemes)
+    assert p.advised == ("hermite", 2)
+
+
+def test_advice_beyond_the_bound_of_hermite_and_beyond_the_lowest_mode():
+    soft = with_changes(load_scene("soft"), beam={"n_elements": 10})
+    critical = predict(soft).schemes[-1].critical_step
+    coarse = predict(with_changes(soft, coupling={"macro_step": 1.05 * critical}))
+    assert coarse.advised == ("energy", 2)
+    aliased = predict(with_changes(soft, coupling={"macro_step": 0.1}))
+    assert aliased.advised == ("energy", 0)
+    assert aliased.resolved_modes == 0
+    assert any("not resolved" in note for note in aliased.notes)
+
+
+def test_compliance_is_predicted_where_it_is_stiffest():
+    """p = 1: λ itself; p = 3 at the depth that takes the energy E = 1/6 J: λ δ⁴/4 = E, stiffness 3 λ δ²."""
+    soft = with_changes(load_scene("soft"), beam={"n_elements": 5}, contact={"law": "compliance", "exponent": 1.0})
+    inverse = 1.0 / predict(soft).tip_mass + 1.0
+    assert predict(soft).contact_frequency == pytest.approx((1e4 * inverse) ** 0.5)
+    cubic = predict(with_changes(soft, contact={"exponent": 3.0}))
+    depth2 = (4.0 / 6.0 / 1e4) ** 0.5
+    assert cubic.contact_frequency == pytest.approx((3e4 * depth2 * inverse) ** 0.5)
+    assert [(s.scheme, s.degree) for s in cubic.schemes] == [("energy", 0), *EXCHANGES]
+    assert cubic.advised == ("energy", 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("duffing", {}),
+        ("beam-on-stop", {"beam": {"n_elements": 5}}),
+        ("soft", {"beam": {"n_elements": 5, "integrator": "generalized_alpha"}}),
+    ],
+)
+def test_what_a_scene_lacks_is_left_out(name, changes):
+    p = predict(with_changes(load_scene(name), **changes))
+    assert (p.omega_1 is None) == (name == "duffing")
+    assert (p.displacement_gain is None) == (name != "soft")
+    assert (p.advised is None) == (name == "duffing")
+    assert bool(p.notes) == (name != "beam-on-stop")
