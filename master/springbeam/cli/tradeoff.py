@@ -96,9 +96,11 @@ def tradeoff(
 
 
 def _table(found: Study) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold", title="cheapest for an error", title_justify="left")
-    for name in ("error", "co-simulation", "solve [ms]", "scipy", "solve [ms]", "ratio"):
-        table.add_column(Text(name), justify="left" if name in ("co-simulation", "scipy") else "right")
+    table = Table(
+        box=None, pad_edge=False, header_style="bold", title="cheapest for an error (solve time)", title_justify="left"
+    )
+    for name in ("error", "co-simulation", "[ms]", "scipy", "[ms]", "ratio"):
+        table.add_column(Text(name), justify="left" if name in ("co-simulation", "scipy") else "right", no_wrap=True)
     for choice in found.choices():
         ratio = f"{choice.ratio:.1f}" if choice.ours and choice.scipy else ""
         table.add_row(f"{choice.target:.0e}", *_cells(choice.ours), *_cells(choice.scipy), ratio)

@@ -81,7 +81,7 @@ def _macro_steps(scene: Scene) -> Iterator[Configuration]:
         for H in _sizes(scene):
             coupling = {"scheme": scheme, "degree": degree, "macro_step": H}
             for changed in _changed(scene, coupling=coupling):
-                yield Configuration(f"{scheme} {degree}", f"H = {H:.3g} s", changed)
+                yield Configuration(f"{scheme} {degree}", f"H = {H:.3g}", changed)
 
 
 def _adaptive(scene: Scene) -> Iterator[Configuration]:
@@ -132,9 +132,9 @@ def _models(scene: Scene) -> Iterator[Configuration]:
 def _rivals(scene: Scene) -> Iterator[Configuration]:
     for method, tolerances in SCIPY_TOLERANCES.items():
         for rtol in tolerances:
-            yield Configuration(method, f"rtol = {rtol:.0e}", scene, method, rtol)
+            yield Configuration(method, f"rtol {rtol:.0e}", scene, method, rtol)
     if scene.beam is not None and scene.spring is not None and scene.stop is not None:
         for H in _sizes(scene):
             paper = {"contact": {"law": "paper"}, "coupling": {"scheme": "energy", "degree": 0, "macro_step": H}}
             for changed in _changed(scene, beam={"n_modes": 0}, **paper):
-                yield Configuration(ALGORITHM_1, f"H = {H:.3g} s", changed, ALGORITHM_1)
+                yield Configuration(ALGORITHM_1, f"H = {H:.3g}", changed, ALGORITHM_1)
