@@ -50,7 +50,7 @@ class Picked:
         picked: dict[str, Any] = {
             "scheme": coupling.scheme,
             "degree": coupling.degree,
-            "macro_step": coupling.macro_step,
+            "macro_step": coupling.H,
         }
         if spring is not None:
             picked["ida_relative_tolerance"] = spring.relative_tolerance
@@ -108,7 +108,7 @@ class _Search:
                 )
             spent += float(coarse.summary["wall_time"])
             fine, runs = self._with(steps), runs + 1
-            ratio = coarse.scene.coupling.macro_step / fine.scene.coupling.macro_step
+            ratio = coarse.scene.coupling.H / fine.scene.coupling.H
             error, event_error, events = self._difference(coarse, fine)
             share = 1.0 / (ratio**_TRUSTED - 1.0)
             worst = max(error, event_error)
@@ -137,7 +137,7 @@ class _Search:
         values = fine[name]
         scale = float(np.abs(values - values[0]).max()) or 1.0
         displacement = float(np.abs(coarse[name][at] - values[rows]).max(initial=0.0)) / scale
-        window = 2.0 * coarse.scene.coupling.macro_step
+        window = 2.0 * coarse.scene.coupling.H
         ours, theirs = contact_changes(fine.events, window), contact_changes(coarse.events, window)
         if [kind for kind, _ in ours] != [kind for kind, _ in theirs]:
             return displacement, 1.0, 0

@@ -107,7 +107,7 @@ def crosscheck(scene: Scene) -> Report:
         raise SceneError("beam.fidelity = 'quasi_static': has no reference with law 'compliance'; take 'dynamic'")
     asked, note, failure = scene, "", None
     for _ in range(_MAX_REFINEMENTS):
-        start, size = scene.contact_time or 0.0, scene.coupling.macro_step
+        start, size = scene.contact_time or 0.0, scene.coupling.H
         try:
             coarse, fine, own_horizon = _pair(scene)
             if own_horizon - start >= min(_ENOUGH_STEPS * size, 0.5 * (scene.time.t_end - start)):
@@ -118,7 +118,7 @@ def crosscheck(scene: Scene) -> Report:
         t_end = min(asked.time.t_end, start + _WINDOW_STEPS * size)
         scene = with_changes(scene, time={"t_end": t_end}, coupling={"macro_step": size})
         note = (
-            f"At the scene's own macro step, {asked.coupling.macro_step:g} s, the motion is not resolved: halving it "
+            f"At the scene's own macro step, {asked.coupling.H:g} s, the motion is not resolved: halving it "
             f"changes the motion from the first contact on. Compared instead: {size:.3g} s, up to {t_end:.9g} s."
         )
     else:
@@ -135,7 +135,7 @@ def _pair(scene: Scene) -> tuple[Trajectory, Trajectory, float]:
     That is the same events, a run that does not call itself unresolved, and displacements and velocities, away from
     events, that halving hardly changes.
     """
-    size = scene.coupling.macro_step
+    size = scene.coupling.H
     coarse, fine = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
     changes = [contact_changes(run.events, _SHORT * size) for run in (coarse, fine)]
     horizon = _agree_until(changes[0], changes[1], float(coarse.time[0]), float(coarse.time[-1]))
@@ -155,7 +155,7 @@ def _pair(scene: Scene) -> tuple[Trajectory, Trajectory, float]:
 
 
 def _compare(scene: Scene, coarse: Trajectory, fine: Trajectory, own_horizon: float) -> Report:
-    size = scene.coupling.macro_step
+    size = scene.coupling.H
     times = _grid(coarse, scene)
     reference = event_driven.simulate(scene, sample_times=times)
     velocity = _PERTURBATION * _initial_speed(scene)
@@ -193,7 +193,7 @@ def _rounding(scene: Scene) -> float:
 
 def _grid(trajectory: Trajectory, scene: Scene) -> np.ndarray:
     """Macro points of the run that lie on its grid [s]."""
-    size, start = scene.coupling.macro_step, trajectory.time[0]
+    size, start = scene.coupling.H, trajectory.time[0]
     index = (trajectory.time - start) / size
     times = trajectory.time[np.abs(index - np.round(index)) < 1e-6]
     return np.unique(times)
@@ -237,7 +237,7 @@ def _quantities(scene: Scene) -> Iterable[tuple[str, Sample]]:
 
 def _force(trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
     """Contact force at macro points: of a tie the mean of its two limits there, which stands in the row after."""
-    size = trajectory.scene.coupling.macro_step
+    size = trajectory.scene.coupling.H
     if trajectory.scene.contact.law != "transmission" or "reference" in trajectory.summary:
         return _at(trajectory, times, "contact_force")
     steps = np.diff(trajectory.time, prepend=np.nan)
@@ -257,7 +257,7 @@ def _compare_quantity(
     report: Report, name: str, sample: Sample, runs: tuple[Trajectory, ...], breaks: list[float]
 ) -> None:
     coarse, _, _, _ = runs
-    size = report.scene.coupling.macro_step
+    size = report.scene.coupling.H
     times = _grid(coarse, report.scene)
     times = times[times <= report.horizon]
     if name not in _DISPLACEMENTS:
@@ -346,7 +346,7 @@ def _compare_events(
     fine: list[tuple[str, float]],
     reference: list[tuple[str, float]],
 ) -> None:
-    size = report.scene.coupling.macro_step
+    size = report.scene.coupling.H
     moved, start = 0.0, report.trajectory.time[0]
     expected = [change for change in reference if change[1] <= report.horizon]
     for i, (kind, time) in enumerate(expected):
@@ -375,7 +375,7 @@ def _crosscheck_paper(scene: Scene) -> Report:
     step by y a/6 and h z a/12, at least as much, and running Algorithm 1 with it shows what IDA may change.
     """
     assert scene.spring is not None
-    h, spring = scene.coupling.macro_step, scene.spring
+    h, spring = scene.coupling.H, scene.spring
     reference = algorithm1.simulate(scene)
     ours = simulate(scene)
     factor = 4.0 / 3.0
@@ -416,7 +416,7 @@ def orders(scene: Scene, halvings: int = 3) -> list[OrderRow]:
     Errors are in the max norm against the event-driven reference, at the macro points that all runs share and two
     macro steps away from the events.
     """
-    size = scene.coupling.macro_step
+    size = scene.coupling.H
     if scene.contact.law == "paper":
         raise SceneError("contact.law = 'paper': Algorithm 1 has no order to observe; --orders takes the other laws")
     runs = [simulate(with_changes(scene, coupling={"macro_step": size / 2**k})) for k in range(halvings + 1)]

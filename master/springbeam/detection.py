@@ -22,6 +22,7 @@ from .events import (
     position_tolerance,
     stays_above,
 )
+from .macro_steps import AdaptiveSteps, MacroGrid
 from .scene import Scene
 from .stepping import Ends, Pair, State, Step
 from .subsystem import Force
@@ -40,8 +41,8 @@ def _rest(ends: Ends) -> float:
 class Detector:
     """Finds the event that ends a step; the bodies are left where the returned step ends."""
 
-    def __init__(self, scene: Scene, pair: Pair) -> None:
-        self._pair, self._H = pair, scene.coupling.macro_step
+    def __init__(self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
+        self._pair, self._steps = pair, steps
         tip_share = 0.0
         if pair.joinable:
             assert pair.beam is not None
@@ -51,7 +52,7 @@ class Detector:
 
     def tolerance(self, ends: Ends) -> float:
         """What positions can be told apart to [m]."""
-        return position_tolerance(ends, self._pair.stop or 0.0, self._H)
+        return position_tolerance(ends, self._pair.stop or 0.0, self._steps.size)
 
     def at_start(self, state: State, start: Ends) -> str | None:
         """The event that is due before any step: its function is 0 and falling."""
@@ -96,7 +97,7 @@ class Detector:
                 break
             _, found, function, bracket = min(candidates, key=lambda c: c[0])
             step = self._located(state, function, bracket)
-            if step.size < _NO_TIME * self._H:
+            if step.size < _NO_TIME * self._steps.size:
                 # Too short for a contact force: velocities that differ would be turned round by an infinite one.
                 return self._no_step(step), found
         return step, found
@@ -183,7 +184,7 @@ class Detector:
             g = pick(last)
             value, slope = force.end_value(g, size), g[1] + size * g[2]
             change = -value / slope if slope < 0.0 else 0.0
-            if not 0.0 < size + change < step.size or abs(change) <= 1e-12 * self._H:
+            if not 0.0 < size + change < step.size or abs(change) <= 1e-12 * self._steps.size:
                 break
             size += change
         return last, kind
@@ -213,7 +214,7 @@ class Detector:
                 return None
         else:
             return None
-        if at <= _NO_TIME * self._H:
+        if at <= _NO_TIME * self._steps.size:
             return self._no_step(step), kind
         if at >= step.size:
             return self._pair.settled(state, step), kind

@@ -64,7 +64,7 @@ class PaperLaw(Memory):
         self._beam, self._spring, self._progress = beam, spring, progress
         self._parameters = scene.spring
         self._phi = -np.inf if scene.stop is None else scene.stop.position
-        self.h = scene.coupling.macro_step
+        self.h = scene.coupling.H
         self.time = self._start_time = start_time
         self._begun = self._touched = False
         self._stiffness = 0.0  #: λ_nc as lines 12 and 15 have left it

@@ -120,6 +120,8 @@ class Contact(_Table):
     exponent: Annotated[float, Field(ge=1.0)] = 3.0  #: p
 
 
+#: How long macro steps are: one key, or the others.
+_STEP, _TOLERANCES = "macro_step", ("relative_tolerance", "absolute_tolerance")
 #: Schemes that exchange once per macro step, as ordinary masters do.
 ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
 
@@ -127,12 +129,43 @@ ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
 class Coupling(_Table):
     scheme: Literal["energy", "hermite", "gauss_seidel", "jacobi"] = "energy"
     degree: Annotated[int, Field(ge=0, le=2)] = 0  #: of the contact force over a step
-    macro_step: Positive = 0.004  #: H [s]
+    macro_step: Annotated[float | None, Field(gt=0.0)] = None  #: H [s]; 0.004 where no tolerance is given
+    #: Instead of ``macro_step``: of a step's error, relative to the motion so far, and absolute [m].
+    relative_tolerance: Annotated[float | None, Field(gt=0.0, le=0.1)] = None
+    absolute_tolerance: Annotated[float | None, Field(gt=0.0)] = None
     tolerance: Annotated[float, Field(gt=0.0, le=1e-3)] = 1.0e-12
     #: One-way: the driving body does not feel the contact force (law "compliance").
     feedback: Literal["two_way", "beam_drives", "spring_drives"] = "two_way"
     #: Motion of the driving end that one-way coupling may neglect, over the largest penetration.
     feedback_tolerance: Annotated[float, Field(gt=0.0, le=0.1)] = 1.0e-6
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_step(cls, data: Any) -> Any:
+        if isinstance(data, dict) and all(data.get(key) is None for key in (_STEP, *_TOLERANCES)):
+            return {**data, _STEP: 0.004}
+        return data
+
+    @model_validator(mode="after")
+    def _step_or_tolerance(self) -> Coupling:
+        if self.macro_step is not None and self.adaptive:
+            raise ValueError(
+                f"macro_step = {self.macro_step}: with relative_tolerance or absolute_tolerance the master chooses its "
+                "steps; give either macro_step or tolerances"
+            )
+        return self
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether the steps follow from tolerances."""
+        return self.relative_tolerance is not None or self.absolute_tolerance is not None
+
+    @property
+    def H(self) -> float:
+        """The macro step [s]. Raises SceneError if tolerances are given instead."""
+        if self.macro_step is None:
+            raise SceneError("[coupling] macro_step: needed here; this scene gives tolerances instead")
+        return self.macro_step
 
     @model_validator(mode="after")
     def _degree_of_scheme(self) -> Coupling:
@@ -351,9 +384,15 @@ def _inertia_needed(scene: Scene) -> Iterator[str]:
 
 def _coupling_resolves(scene: Scene) -> Iterator[str]:
     beam, coupling, t_end = scene.beam, scene.coupling, scene.time.t_end
-    if coupling.macro_step > t_end:
+    if coupling.macro_step is None:
+        key = next(key for key in _TOLERANCES if getattr(coupling, key) is not None)
+        if scene.contact.law == "paper":
+            yield f'[coupling] {key}: [contact] law = "paper" is Algorithm 1, which has one macro_step'
+        if coupling.scheme in ORDINARY_SCHEMES:
+            yield f'[coupling] {key}: scheme = "{coupling.scheme}" never repeats a step; give macro_step instead'
+    elif coupling.macro_step > t_end:
         yield f"[coupling] macro_step = {coupling.macro_step}: must be at most [time] t_end = {t_end}"
-    if t_end / coupling.macro_step > MOST_MACRO_STEPS:
+    elif t_end / coupling.macro_step > MOST_MACRO_STEPS:
         yield (
             f"[coupling] macro_step = {coupling.macro_step}: [time] t_end = {t_end} would take "
             f"{t_end / coupling.macro_step:.1e} macro steps; at most {MOST_MACRO_STEPS:.0e} are allowed"
@@ -473,7 +512,12 @@ def with_changes(scene: Scene, **tables: Mapping[str, Any] | None) -> Scene:
     """
     data = scene.model_dump(exclude_none=True)
     for table, changes in tables.items():
-        data[table] = None if changes is None else {**data.get(table, {}), **changes}
+        if changes is None:
+            data[table] = None
+            continue
+        content = data.setdefault(table, {})
+        for key, value in changes.items():
+            _change(content, key, value)
     return scene_from_dict({table: content for table, content in data.items() if content is not None})
 
 
@@ -507,7 +551,14 @@ def _override(data: dict[str, Any], override: str) -> None:
     content = data.setdefault(table, {})
     if not isinstance(content, dict):
         raise SceneError(f"--set {override}: {table} is not a table; tables: {', '.join(_TABLES)}")
-    content[key] = parse_value(text.strip())
+    _change(content, key, parse_value(text.strip()))
+
+
+def _change(content: dict[str, Any], key: str, value: Any) -> None:
+    """Set a key of a table; a macro step takes the place of tolerances, and the other way round."""
+    for other in _TOLERANCES if key == _STEP else (_STEP,) if key in _TOLERANCES else ():
+        content.pop(other, None)
+    content[key] = value
 
 
 def parse_value(text: str) -> Any:

@@ -16,7 +16,8 @@ from .coupling.tie import NotConverged
 from .detection import Detector
 from .events import interpolated
 from .ledger import Ledger
-from .macro_grid import MacroGrid
+from .local_error import LocalError
+from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .memory import Memory
 from .recording import NonFiniteValue, Recorder
 from .rows import Rows
@@ -68,7 +69,8 @@ class Simulation(Memory):
     REMEMBERED = (
         "_pair",
         "_state",
-        "_grid",
+        "_steps",
+        "_error",
         "_transitions",
         "_ledger",
         "_rows",
@@ -90,11 +92,15 @@ class Simulation(Memory):
         progress: Progress | None = None,
     ) -> None:
         self._scene, self._recorder, self._progress = scene, recorder, progress
-        self._H = scene.coupling.macro_step
         self._pair = Pair(scene, beam, spring)
         self._state = State(start_time)
-        self._grid = MacroGrid(start_time, scene.time.t_end, self._H)
-        self._detector = Detector(scene, self._pair)
+        self._steps: MacroGrid | AdaptiveSteps
+        if scene.coupling.adaptive:
+            self._steps = AdaptiveSteps(start_time, scene.time.t_end)
+        else:
+            self._steps = MacroGrid(start_time, scene.time.t_end, scene.coupling.H)
+        self._error = LocalError(scene, self._pair) if scene.coupling.adaptive else None
+        self._detector = Detector(scene, self._pair, self._steps)
         self._transitions = Transitions(
             scene, None if beam is None else beam.mass, None if spring is None else spring.mass
         )
@@ -110,28 +116,30 @@ class Simulation(Memory):
 
         Raises RunStopped; what was computed is with the recorder.
         """
-        state, grid, t_end = self._state, self._grid, self._scene.time.t_end
+        state, steps, t_end = self._state, self._steps, self._scene.time.t_end
         if not self._begun:
             self._settle_start()
             self._record()
             self._begun = True
         while state.time < t_end:
-            target, size = grid.next(state.time)
+            target, size = steps.next(state.time)
             step, event = self._advance(size)
             at_once, since = self._at_once
-            if state.time + step.size - since > _AT_ONCE * self._H:
+            if state.time + step.size - since > _AT_ONCE * self._steps.size:
                 at_once, since = 0, state.time + step.size
             self._at_once = (at_once + 1, since)
             if at_once >= _MAX_EVENTS_AT_ONCE:
                 raise RunStopped(f"the contact chatters: {at_once + 1} events at once", state.time)
             if step.size > 0.0:
-                whole = event is None and abs(step.size - size) <= 1e-9 * self._H
+                if self._error is not None:
+                    self._error.accept(step)
+                whole = event is None and abs(step.size - size) <= 1e-9 * self._steps.size
                 state.accept(step, target if whole else state.time + step.size)
                 self._pair.accept(step)
                 self._macro_steps += 1
                 if self._pair.compliant:
                     self._note_contact(step)
-            grid.reached(state.time)
+            steps.reached(state.time)
             if event is not None:
                 self._act(event, step)
             self._record()
@@ -143,20 +151,35 @@ class Simulation(Memory):
         state, pair = self._state, self._pair
         pair.mark()
         start = pair.ends()
-        for halving in range(_MAX_HALVINGS + 1):
+        halvings = 0
+        while True:
             try:
                 at_start = self._detector.at_start(state, start)
                 if at_start is not None:
                     return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
-                return self._detector.first(state, pair.attempt(state, size, start))
+                step = pair.attempt(state, size, start)
+                if self._holds(step):
+                    return self._detector.first(state, step)
+                pair.rewind()
+                size = self._steps.size
             except StepRefused as refused:
                 pair.rewind()
-                if halving == _MAX_HALVINGS:
+                if halvings == _MAX_HALVINGS:
                     residual = refused.residual if isinstance(refused, NotConverged) else None
                     raise RunStopped(str(refused), state.time, residual) from refused
+                halvings += 1
                 self._halvings += 1
                 size *= 0.5
-        raise AssertionError("unreachable")
+
+    def _holds(self, step: Step) -> bool:
+        """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set."""
+        if self._error is None or isinstance(self._steps, MacroGrid):
+            return True
+        error, order = self._error.of(self._state, step, self._ledger.scale)
+        try:
+            return self._steps.judge(step.size, error, order)
+        except StepTooShort as too_short:
+            raise RunStopped(f"{too_short}, where it is {error:.3g} of it", step.time) from too_short
 
     # -- events -----------------------------------------------------------------------------------------------------
 
@@ -181,7 +204,7 @@ class Simulation(Memory):
         if kind in ("separation", "release"):
             self._last_opening = state.time
         if kind == "impact":
-            state.reclosed = state.time - self._last_opening <= _AT_ONCE * self._H
+            state.reclosed = state.time - self._last_opening <= _AT_ONCE * self._steps.size
         ends = pair.ends()
         kind, phase, impact = self._transitions.happens(
             kind, state.phase, ends, pair.end_force(state, step), self._detector.tolerance(ends)
@@ -249,7 +272,8 @@ class Simulation(Memory):
         if self._pair.lossy:
             causes.append(f"{coupling.scheme} of degree {coupling.degree}")
             remedies.append(
-                f"the macro step {self._H:g} s is too large for it; take a smaller one, or coupling.scheme = 'energy'"
+                f"the macro step {self._steps.size:g} s is too large for it; take a smaller one, or "
+                "coupling.scheme = 'energy'"
             )
         if self._numerically_damped:
             assert beam is not None
@@ -270,7 +294,7 @@ class Simulation(Memory):
             warnings.append(
                 f"not resolved: the joined ends' velocities differ by up to {rows.largest_mismatch:.3g} m/s of "
                 f"{rows.largest_speed:.3g} m/s; velocities and forces alternate from step to step. A smaller "
-                f"coupling.macro_step (now {self._H:g} s) or fewer beam.n_modes resolves the motion"
+                f"coupling.macro_step (now {self._steps.size:g} s) or fewer beam.n_modes resolves the motion"
             )
         one_way = self._pair.one_way
         neglected = {} if one_way is None else {"neglected_motion": one_way.neglected, "neglected_share": one_way.share}
@@ -280,6 +304,7 @@ class Simulation(Memory):
             "macro_steps": self._macro_steps,
             "events": self._events,
             "halved_steps": self._halvings,
+            **({"rejected_steps": self._steps.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
             "iterations": self._pair.iterations,
             "max_energy_residual": self._ledger.relative,
             "max_energy_residual_joule": self._ledger.largest_residual,

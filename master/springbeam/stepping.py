@@ -100,7 +100,7 @@ class Pair(Memory):
             self._exchange = Exchange(coupling.scheme == "gauss_seidel", coupling.degree, *law)
         scheme = "energy" if self._exchange is not None else coupling.scheme
         self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance)
-        self._compliance = Compliance(*law, coupling.tolerance, coupling.macro_step)
+        self._compliance = Compliance(*law, coupling.tolerance)
         self.one_way: OneWay | None = None
         if coupling.feedback != "two_way":
             stiffness = scene.driver_stiffness

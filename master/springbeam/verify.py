@@ -412,7 +412,7 @@ def _bar_on_mesh(n: int) -> list[Check]:
     x = sqrt(12.0) * n  # ω_c t at contact
     ripples = sqrt(2.0 / pi) * x**-1.5 * (1.0 + 2.0 / x)
     front = {t: (t * h * h / 8.0) ** (1.0 / 3.0) for t in (2.0, 3.0)}
-    duration = front[2.0] + scene.coupling.macro_step + ripples
+    duration = front[2.0] + scene.coupling.H + ripples
     energy_of_tip = 0.5 * h / (2.0 * sqrt(3.0)) * (0.5 * _airy_overshoot()) ** 2
 
     returning = "P1 spreads the returning front to the Airy width (t h²/8)^⅓, t = 2, seen to H"

@@ -52,7 +52,7 @@ def test_symmetric_and_the_mean_of_the_force_along_the_path():
 def couple(stiffness: float, q: float, size: float, steps: int, n: int = 4):
     """Beam falling on a Duffing spring. Returns (t, u, v, y, z, C) rows and the total energy of each row [J]."""
     beam, spring = modal_beam(n), DuffingBody(k1=3.0, k2=-0.2)
-    law = Compliance(stiffness, q, 1e-13, size)
+    law = Compliance(stiffness, q, 1e-13)
     rows, energies, guess = [], [], NO_FORCE
     for i in range(steps):
         for body in (beam, spring):
@@ -111,6 +111,6 @@ class Affine:
 def test_forces_are_found_however_far_they_move_the_ends(depth, response):
     """λ = 1e12 N/m, q = 1, contact from the start of the step: C = λ p⁺/2 with p⁺ = depth − 2·response·C. The force at
     C = 0 is up to 1e16 times the one that is looked for."""
-    law = Compliance(1e12, 1.0, 1e-12, 1e-3)
+    law = Compliance(1e12, 1.0, 1e-12)
     c = law.solve(Affine(-depth, response, 1e-3), Affine(0.0, -response, 1e-3), 0.0, 1e-3, NO_FORCE, 0.0)[0]
     assert c == pytest.approx(1e12 * depth / (2.0 + 2e12 * response), rel=1e-11)

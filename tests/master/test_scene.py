@@ -49,6 +49,11 @@ def changed(**tables):
     return data
 
 
+def adaptive(**coupling):
+    """The pair with tolerances instead of a macro step."""
+    return {**changed(), "coupling": coupling}
+
+
 def load_pair():
     return {
         "time": {"t_end": 0.6},
@@ -185,6 +190,21 @@ BAD = {
     "stop at spring": (changed(stop={"position": 0.0}), ["[stop] position = 0.0", "below", "equilibrium = 0.0"]),
     "step longer than run": (changed(coupling={"macro_step": 1.0}), ["macro_step = 1.0", "t_end = 0.6"]),
     "endless run": (changed(coupling={"macro_step": 1e-15}), ["macro_step = 1e-15", "6.0e+14 macro steps"]),
+    "step and tolerance": (
+        changed(coupling={"relative_tolerance": 1e-4}),
+        ["[coupling] macro_step = 0.001", "relative_tolerance or absolute_tolerance", "give either"],
+    ),
+    "relative tolerance 0": (adaptive(relative_tolerance=0.0), ["relative_tolerance = 0.0", "greater than 0"]),
+    "relative tolerance large": (adaptive(relative_tolerance=0.5), ["relative_tolerance = 0.5", "at most 0.1"]),
+    "absolute tolerance 0": (adaptive(absolute_tolerance=0.0), ["absolute_tolerance = 0.0", "greater than 0"]),
+    "adaptive paper": (
+        {**adaptive(relative_tolerance=1e-4), "contact": {"law": "paper"}},
+        ["[coupling] relative_tolerance", 'law = "paper"', "one macro_step"],
+    ),
+    "adaptive jacobi": (
+        {**adaptive(scheme="jacobi", absolute_tolerance=1e-4), "contact": {"law": "compliance"}},
+        ["[coupling] absolute_tolerance", '"jacobi" never repeats a step', "macro_step"],
+    ),
     # the spring lets go
     "softening only": (
         changed(spring={"linear_stiffness": 0.0}),
@@ -278,6 +298,8 @@ GOOD = {
     "hermite": changed(coupling={"scheme": "hermite", "degree": 2}),
     "no compliance part": changed(contact={"stiffness": 0.0}),
     "one step": changed(coupling={"macro_step": 0.6}),
+    "adaptive": adaptive(relative_tolerance=1e-4, absolute_tolerance=1e-9),
+    "adaptive, absolute": adaptive(absolute_tolerance=1e-9),
 }
 
 
@@ -430,6 +452,25 @@ def test_overrides(override, table, key, value):
 
 def test_the_last_override_of_a_key_counts():
     assert load_scene("soft", ["time.t_end=1", "time.t_end=2"]).time.t_end == 2.0
+
+
+def test_a_tolerance_takes_the_place_of_the_macro_step_and_back():
+    """A file has one or the other; who changes a scene means what was said last."""
+    tolerant = load_scene("soft", ["coupling.relative_tolerance=1e-5"])
+    assert (tolerant.coupling.macro_step, tolerant.coupling.relative_tolerance) == (None, 1e-5)
+    assert with_changes(tolerant, coupling={"absolute_tolerance": 1e-9}).coupling.relative_tolerance == 1e-5
+    fixed = with_changes(tolerant, coupling={"macro_step": 1e-3})
+    assert (fixed.coupling.macro_step, fixed.coupling.relative_tolerance) == (1e-3, None)
+    assert not fixed.coupling.adaptive
+
+
+def test_without_step_and_tolerance_there_is_a_step():
+    assert scene_from_dict({**load_pair(), "coupling": {}}).coupling.H == 0.004
+
+
+def test_what_needs_a_macro_step_says_so():
+    with pytest.raises(SceneError, match=r"\[coupling\] macro_step: needed here"):
+        _ = load_scene("soft", ["coupling.relative_tolerance=1e-5"]).coupling.H
 
 
 @pytest.mark.parametrize(

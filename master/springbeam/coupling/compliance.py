@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from ..memory import Memory
 from ..subsystem import Body, Force, Motion
-from .tie import NotConverged
+from .tie import SIZES_REMEMBERED, NotConverged
 
 _MAX_ITERATIONS = 30
 _EPS = float(np.finfo(float).eps)
@@ -42,6 +42,14 @@ def discrete_gradient(p0: float, p1: float, stiffness: float, exponent: float) -
     return stiffness * float(_WEIGHTS @ (p0 + change * _NODES) ** exponent)
 
 
+def force_change(start: tuple[Motion, Motion], end: tuple[Motion, Motion], stiffness: float, exponent: float) -> float:
+    """By how much the law's force differs between the ends of a step (tip, lower end) [N]; it was held on the step."""
+    before, after = (
+        compliance_force(low.displacement - tip.displacement, stiffness, exponent) for tip, low in (start, end)
+    )
+    return abs(after - before)
+
+
 class Compliance(Memory):
     """Solver for the step's force; the response of p⁺ to C is remembered between steps.
 
@@ -53,13 +61,12 @@ class Compliance(Memory):
         Relative tolerance of the force.
     """
 
-    REMEMBERED = ("_regular_response", "iterations", "_scale")
+    REMEMBERED = ("_responses", "iterations", "_scale")
 
-    def __init__(self, stiffness: float, exponent: float, tolerance: float, regular_size: float) -> None:
+    def __init__(self, stiffness: float, exponent: float, tolerance: float) -> None:
         self._law = (stiffness, exponent)
         self._tolerance = tolerance
-        self._regular_size = regular_size
-        self._regular_response: float | None = None
+        self._responses: dict[float, float] = {}  #: of p⁺ to C [m/N], by the size of the step
         self.iterations = 0
         self._scale = 0.0
 
@@ -71,7 +78,7 @@ class Compliance(Memory):
         """
         c = guess[0]
         p = self._penetration(beam, partner, time, size, c)
-        response = self._regular_response if size == self._regular_size else None
+        response = self._responses.pop(size, None)
         if response is None:
             # Response of two free masses; the secant below corrects it.
             response = 0.5 * size * size * (1.0 / beam.mass + 1.0 / partner.mass)
@@ -94,8 +101,9 @@ class Compliance(Memory):
             c, p = new, p_new
         else:
             raise NotConverged(residual, _MAX_ITERATIONS)
-        if size == self._regular_size:
-            self._regular_response = response
+        self._responses[size] = response  # the last one used comes last
+        if len(self._responses) > SIZES_REMEMBERED:
+            del self._responses[next(iter(self._responses))]
         return (c, 0.0, 0.0)
 
     def _penetration(self, beam: Body, partner: Body, time: float, size: float, c: float) -> float:

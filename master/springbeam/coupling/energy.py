@@ -27,3 +27,14 @@ def _degree_2(m: Motion, size: float) -> tuple[float, ...]:
 
 
 CONDITIONS = {0: _degree_0, 1: _degree_1, 2: _degree_2}
+
+#: Order in the step's size of the velocity mismatch that one step creates.
+ORDER_CREATED = {0: 2, 1: 3, 2: 4}
+
+
+def created_mismatch(start: Motion, end: Motion, degree: int) -> float:
+    """The velocity mismatch that a step creates [m/s], of the gap at its ends.
+
+    Where the ends answer a force as free masses do, the one it starts with turns into w⁺ = −(−1)^d w.
+    """
+    return abs(end.velocity - start.velocity if degree == 1 else end.velocity + start.velocity)

@@ -36,6 +36,11 @@ def mean(force: Force, size: float) -> float:
     return force[0] + size * (force[1] / 2.0 + size * force[2] / 6.0)
 
 
+def work(force: Force, gap: Motion, size: float) -> float:
+    """∫ C ġ dτ [J] over a step that starts and ends with the gap closed: −∫ Ċ g dτ, ``gap`` at its end."""
+    return -force[1] * gap.integral - force[2] * (size * gap.integral - gap.integral_2)
+
+
 def sign_changes(force: Force, size: float) -> list[float]:
     """Where C passes through zero inside the step, ascending."""
     c, b, a = force[0], force[1], 0.5 * force[2]

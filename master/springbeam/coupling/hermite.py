@@ -19,3 +19,12 @@ def _degree_2(m: Motion, size: float) -> tuple[float, ...]:
 
 
 CONDITIONS = {1: _degree_1, 2: _degree_2}
+
+#: Order in the step's size of `gap_inside`.
+ORDER_INSIDE = {1: 4, 2: 5}
+
+
+def gap_inside(end: Motion, size: float, degree: int) -> float:
+    """The first moment of the gap that is not among the conditions [m]: ∫ g dτ/H, or ∫ s g dτ/H with s = 2τ/H − 1."""
+    moment = end.integral if degree == 1 else end.integral - 2.0 * end.integral_2 / size
+    return abs(moment) / size

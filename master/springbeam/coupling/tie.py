@@ -26,7 +26,7 @@ _REACH_OF_GUESS = 4.0
 
 
 #: Step sizes whose responses are remembered: the macro step's, and some of steps cut by events.
-_SIZES_REMEMBERED = 64
+SIZES_REMEMBERED = 64
 
 Vector = list[float]
 Matrix = list[list[float]]
@@ -84,7 +84,7 @@ class Tie(Memory):
             at_beam = None
             known = self._measure(beam, time, size, a, r_beam, beam_end, 1.0), {}
         B, inverses = self._responses[size] = known  # the last one used comes last
-        if len(self._responses) > _SIZES_REMEMBERED:
+        if len(self._responses) > SIZES_REMEMBERED:
             del self._responses[next(iter(self._responses))]
         kind = type(partner).__name__
         inverse = inverses.get(kind) or _inverse(B, self._free_response(partner, size))

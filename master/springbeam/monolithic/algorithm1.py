@@ -108,7 +108,7 @@ class _Algorithm:
         assert scene.spring is not None
         self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
         self.start_velocity, self.y_temp, self.tolerance = start_velocity, y_temp, tolerance
-        self.h = scene.coupling.macro_step
+        self.h = scene.coupling.H
         self.discrete: SemiDiscreteBeam = assemble(scene.beam)
         d, h, alpha = self.discrete, self.h, scene.beam.alpha_b
         self.load = scene.beam.distributed_load * d.uniform_load + scene.beam.tip_load_coefficient * d.hat_load

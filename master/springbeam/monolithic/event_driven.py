@@ -42,6 +42,8 @@ __all__ = ["ReferenceFailure", "simulate"]
 
 #: More events than this at one time are a fault, not physics.
 _AT_ONCE = 20
+#: Rows of a scene that gives tolerances instead of a macro step.
+_SAMPLES = 1000
 
 
 def simulate(
@@ -68,8 +70,8 @@ def simulate(
     nodes
         Points of a scipy step at which events are looked for; 2, its ends, is what `scipy.integrate.solve_ivp` does.
     sample_times
-        Times of the rows [s]. Default: multiples of ``coupling.macro_step`` from the start, and a row before and
-        after each event.
+        Times of the rows [s]. Default: multiples of ``coupling.macro_step`` from the start (1000 of them where
+        the scene gives tolerances instead), and a row before and after each event.
     velocity_perturbation
         Added to ``initial_velocity_slope`` [1/s], or to the spring's initial velocity [m/s] without a beam: two runs
         that differ by it show how long a trajectory can be compared at all.
@@ -204,7 +206,7 @@ class _Run:
         began = clock.perf_counter()
         every_event = sample_times is None
         if sample_times is None:
-            H = self.scene.coupling.macro_step
+            H = self.scene.coupling.macro_step or (self.t_end - self.time) / _SAMPLES
             count = int(np.floor((self.t_end - self.time) / H * (1.0 + 1e-12)))
             grid = self.time + H * np.arange(count + 1)
             samples = np.append(grid, self.t_end) if self.t_end - grid[-1] > 1e-9 * H else grid

@@ -153,7 +153,7 @@ class _Run:
         began = clock.perf_counter()
         every_event = sample_times is None
         if sample_times is None:
-            H = self.scene.coupling.macro_step
+            H = self.scene.coupling.H
             samples = np.append(np.arange(self.time, self.t_end - 1e-9 * H, H), self.t_end)
         else:
             samples = np.asarray(sample_times, dtype=float)

@@ -69,7 +69,7 @@ def growth(scene: Scene) -> float:
     the second half of the steps up to `_GROWN`.
     """
     coupling, contact = scene.coupling, scene.contact
-    H, compliant = coupling.macro_step, contact.law == "compliance"
+    H, compliant = coupling.H, contact.law == "compliance"
     spring = {"cubic_stiffness": 0.0, "equilibrium": 0.0, "external_force": 0.0, "initial_velocity": 0.0}
     at_rest = {"distributed_load": 0.0, "initial_deflection_slope": 0.0, "initial_velocity_slope": 0.0}
     linear = with_changes(scene, stop=None, spring=spring, beam={**at_rest, "approach": "elastic"})
@@ -106,14 +106,14 @@ def _energy(pair: tuple[Body, Body]) -> float:
 def _stepper(scene: Scene, pair: tuple[Body, Body]) -> Callable[[float], None]:
     """``step(time)`` advances both bodies by the scene's coupling."""
     coupling, contact = scene.coupling, scene.contact
-    H, (beam, top) = coupling.macro_step, pair
+    H, (beam, top) = coupling.H, pair
     if contact.law == "compliance" and coupling.scheme != "energy":
         sequential = coupling.scheme == "gauss_seidel"
         exchange = Exchange(sequential, coupling.degree, contact.stiffness, contact.exponent)
         return lambda time: _discard(exchange.solve(beam, top, time, H, (beam.motion(), top.motion())))
     guess = NO_FORCE
     tie = Tie(conditions(coupling.scheme, coupling.degree), coupling.degree, coupling.tolerance)
-    law = Compliance(contact.stiffness, contact.exponent, coupling.tolerance, H)
+    law = Compliance(contact.stiffness, contact.exponent, coupling.tolerance)
 
     def step(time: float) -> None:
         nonlocal guess

@@ -65,7 +65,7 @@ class Prediction:
 
 def predict(scene: Scene) -> Prediction:
     """Predict the coupling of ``scene`` (no FMU is loaded)."""
-    H = scene.coupling.macro_step
+    H = scene.coupling.H
     notes = []
     modal = None
     if scene.beam is not None and scene.beam.fidelity == "quasi_static":

@@ -278,7 +278,7 @@ def _point(
     if isinstance(run, str):
         return Point(configuration, None, run, solve, spread, setup)
     summary = run.summary
-    found = errors(run, references[configuration.refined], configuration.scene.coupling.macro_step)
+    found = errors(run, references[configuration.refined], configuration.scene.coupling.H)
     return Point(
         configuration, found, "", solve, spread, setup,
         macro_steps=int(summary.get("macro_steps", 0)),

@@ -72,7 +72,7 @@ def _schemes(scene: Scene) -> list[tuple[str, int]]:
 
 def _sizes(scene: Scene) -> list[float]:
     span = scene.time.t_end - (scene.contact_time or 0.0)
-    sizes = [scene.coupling.macro_step * 2.0**k for k in range(_COARSEST, _FINEST - 1, -1)]
+    sizes = [scene.coupling.H * 2.0**k for k in range(_COARSEST, _FINEST - 1, -1)]
     return [H for H in sizes if _FEWEST_STEPS <= span / H <= _MOST_STEPS]
 
 

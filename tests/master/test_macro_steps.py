@@ -1,0 +1,153 @@
+"""Where macro steps end, by themselves: the adaptive sizes, and what they are chosen by."""
+
+from __future__ import annotations
+
+from math import log2
+
+import numpy as np
+import pytest
+from bodies import DuffingBody
+
+from springbeam.coupling import conditions, force
+from springbeam.coupling.energy import created_mismatch
+from springbeam.coupling.hermite import gap_inside
+from springbeam.coupling.tie import Tie
+from springbeam.local_error import _beside_cubic
+from springbeam.macro_steps import AdaptiveSteps, StepTooShort
+from springbeam.subsystem import NO_FORCE, Motion
+
+LENGTH = 3.0
+
+
+def rung(size: float) -> float:
+    return -4.0 * log2(size / LENGTH)
+
+
+def after(steps: AdaptiveSteps, *judgements: tuple[float, int]) -> float:
+    for error, order in judgements:
+        assert steps.judge(steps.size, error, order) == (error <= 1.0)
+    return steps.size
+
+
+def test_sizes_are_few_and_change_by_bounded_factors():
+    """A quarter of an octave apart; at most doubled, at least an eighth, a fourth of the run at most."""
+    steps, sizes = AdaptiveSteps(1.0, 1.0 + LENGTH), []
+    rng = np.random.default_rng(3)
+    for error in np.exp(rng.normal(0.0, 4.0, 400)):
+        if rung(steps.size) > 120:
+            steps = AdaptiveSteps(1.0, 1.0 + LENGTH)
+        sizes.append((steps.size, after(steps, (float(error), 4))))
+    assert all(rung(size) == pytest.approx(round(rung(size)), abs=1e-9) for size, _ in sizes)
+    factors = [b / a for a, b in sizes]
+    assert max(factors) == pytest.approx(2.0, rel=1e-12)
+    assert min(factors) == pytest.approx(0.125, rel=1e-12)
+    assert max(size for size, _ in sizes) <= 0.25 * LENGTH
+
+
+@pytest.mark.parametrize("order", [2, 5])
+def test_the_next_size_has_the_error_of_the_tolerance(order):
+    """error = (size/s)^order with s = 0.9⁻¹ times a size there is: from either side the steps settle on that size."""
+    steps = AdaptiveSteps(0.0, LENGTH)
+    fitting = LENGTH * 2.0 ** (-37 / 4)
+    for _ in range(40):
+        after(steps, ((0.9 * 1.001 * steps.size / fitting) ** order, order))
+    low = steps.size
+    assert 2.0**-0.25 <= low / fitting <= 1.0
+    while steps.size < 8.0 * fitting:
+        after(steps, (0.0, order))
+    for _ in range(20):
+        after(steps, ((0.9 * 1.001 * steps.size / fitting) ** order, order))
+    assert steps.size == low
+
+
+def test_a_step_after_a_rejected_one_does_not_grow():
+    steps = AdaptiveSteps(0.0, LENGTH)
+    rejected = after(steps, (1.1, 4))
+    assert rejected < LENGTH * 2.0**-14
+    assert after(steps, (1e-9, 4)) == rejected
+    assert after(steps, (1e-9, 4)) == 2.0 * rejected
+    assert steps.rejections == 1
+
+
+def test_the_last_step_ends_the_run():
+    """A remainder of up to a quarter more is taken at once, and none is ever shorter than a quarter of the size."""
+    steps = AdaptiveSteps(0.0, LENGTH)
+    size = steps.size
+    assert steps.next(LENGTH - 1.2 * size) == (LENGTH, pytest.approx(1.2 * size, rel=1e-9))
+    assert steps.next(LENGTH - 1.3 * size) == (pytest.approx(LENGTH - 0.3 * size), size)
+
+
+def test_an_error_that_no_step_is_short_enough_for_ends():
+    steps = AdaptiveSteps(0.0, LENGTH)
+    for _ in range(8):  # 26 octaves from the first size, 3 at a time
+        assert not steps.judge(steps.size, 50.0, 1)
+    with pytest.raises(StepTooShort, match="above the tolerance"):
+        steps.judge(steps.size, 50.0, 1)
+    assert steps.size < 1e-11 * LENGTH
+
+
+# -- estimates ------------------------------------------------------------------------------------------------------
+
+
+def of_polynomial(coefficients: tuple[float, ...], size: float) -> tuple[Motion, Motion]:
+    w = np.polynomial.Polynomial(coefficients)
+    first, second = w.integ(), w.integ().integ()
+    v = w.deriv()
+    return (
+        Motion(w(0.0), v(0.0), 0.0, 0.0),
+        Motion(w(size), v(size), first(size), second(size)),
+    )
+
+
+def test_a_cubic_is_not_beside_itself():
+    assert _beside_cubic(*of_polynomial((0.3, -1.0, 2.0, 7.0), 0.1), 0.1) < 1e-16
+
+
+def test_a_quartic_is_beside_the_cubic_through_its_ends():
+    """τ⁴ lies τ²(H − τ)² above it: H⁴/30 in the mean, and H⁴/30 as twice the moment ∫(1 − x) x²(1 − x)² dx = 1/60."""
+    assert _beside_cubic(*of_polynomial((0.0, 0.0, 0.0, 0.0, 1.0), 0.1), 0.1) == pytest.approx(1e-4 / 30.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_the_moment_inside_is_that_of_the_gap(degree):
+    """g = τ²(H − τ) (1 + τ): ∫g/H, and ∫(2τ/H − 1) g/H, by Gauss points."""
+    H = 0.2
+    g = np.polynomial.Polynomial((0.0, 0.0, H, -1.0)) * np.polynomial.Polynomial((1.0, 1.0))
+    x, weights = np.polynomial.legendre.leggauss(8)
+    expected = 0.5 * float(weights @ (g(0.5 * H * (x + 1.0)) * x ** (degree - 1)))
+    assert gap_inside(of_polynomial(g.coef, H)[1], H, degree) == pytest.approx(abs(expected), rel=1e-12)
+
+
+def test_work_is_that_of_the_force_on_the_gap():
+    H = 0.2
+    g = (
+        np.polynomial.Polynomial((0.0, 1.0))
+        * np.polynomial.Polynomial((H, -1.0))
+        * np.polynomial.Polynomial((2.0, 3.0))
+    )
+    c = (5.0, -7.0, 11.0)
+    x, weights = np.polynomial.legendre.leggauss(8)
+    tau = 0.5 * H * (x + 1.0)
+    expected = 0.5 * H * float(weights @ ([force.value(c, t) for t in tau] * g.deriv()(tau)))
+    assert force.work(c, of_polynomial(g.coef, H)[1], H) == pytest.approx(expected, rel=1e-12)
+
+
+class Upper(DuffingBody):
+    """Takes +C, as a beam does."""
+
+    def advance(self, time, size, contact, foundation=NO_FORCE):
+        super().advance(time, size, tuple(-c for c in contact), foundation)
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_free_masses_create_no_mismatch(degree):
+    """w⁺ = −(−1)^d w exactly: what they start with is not the step's error."""
+    size = 0.1
+    upper, b = Upper(mass=2.0, k1=0.0, k2=0.0, z=-0.7), DuffingBody(mass=3.0, k1=0.0, k2=0.0, z=0.4)
+    for body in (upper, b):
+        body.mark()
+    start = (upper.motion(), b.motion())
+    Tie(conditions("energy", degree), degree, 1e-12).solve(upper, b, 0.0, size, NO_FORCE, start[0])
+    gaps = [Motion(*np.subtract(*ends)) for ends in (start, (upper.motion(), b.motion()))]
+    assert gaps[1].velocity == pytest.approx(-((-1) ** degree) * gaps[0].velocity, rel=1e-9)
+    assert created_mismatch(*gaps, degree) < 1e-9 * abs(gaps[0].velocity)

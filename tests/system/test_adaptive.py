@@ -1,0 +1,119 @@
+"""Adaptive macro steps with the FMUs: the errors of a run follow its tolerance, and the rest of what they promise."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springbeam import RunStopped, load_scene, simulate, with_changes
+from springbeam.monolithic import event_driven
+from springbeam.scene import Scene
+from springbeam.trajectory import Trajectory
+
+
+def soft(tolerance: float, scheme: str = "energy", degree: int = 0, t_end: float = 0.28, **tables: Any) -> Scene:
+    coupling = {"scheme": scheme, "degree": degree, "relative_tolerance": tolerance}
+    return with_changes(load_scene("soft"), time={"t_end": t_end}, coupling=coupling, **tables)
+
+
+@lru_cache(maxsize=1)
+def exact_events() -> list[float]:
+    """Foundation, release, second meeting."""
+    return [event.time for event in event_driven.simulate(soft(1e-3)).events[1:4]]
+
+
+def errors(run: Trajectory) -> tuple[float, float]:
+    """Of y up to the foundation relative to the way there, and of the times of the three events, relative."""
+    rows = (run.time > 0.0) & (run.time < 0.0712)
+    reference = event_driven.simulate(run.scene, sample_times=run.time[rows], t_end=0.0713)
+    y = np.abs(run.y[rows] - reference.y[: rows.sum()]).max() / 0.015
+    assert [e.kind for e in run.events[:4]] == ["impact", "stop_impact", "release", "impact"]
+    late = [abs(e.time - t) / t for e, t in zip(run.events[1:4], exact_events(), strict=True)]
+    return float(y), max(late)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "degree", "tolerances", "least", "orders"),
+    [
+        ("hermite", 1, (1e-3, 1e-5, 1e-7, 1e-9), 1e-3, (0.8, 1.3)),
+        ("hermite", 2, (1e-3, 1e-5, 1e-7, 1e-9), 1e-4, (0.8, 1.3)),
+        # Their velocities follow the tolerance; y is of twice their order.
+        ("energy", 0, (1e-3, 1e-4, 1e-5), 1e-6, (1.0, 2.0)),
+        ("energy", 1, (1e-3, 1e-5, 1e-7), 1e-6, (1.0, 2.0)),
+        ("energy", 2, (1e-3, 1e-4, 1e-5), 1e-6, (1.0, 2.0)),
+    ],
+)
+def test_the_error_follows_the_tolerance(scheme, degree, tolerances, least, orders):
+    """y and the event times are within the tolerance, and not by orders of magnitude for nothing; y falls with it."""
+    found = []
+    for tolerance in tolerances:
+        y, late = errors(simulate(soft(tolerance, scheme, degree)))
+        assert least * tolerance < y < tolerance
+        assert late < tolerance
+        found.append(y)
+    slope = np.log(found[0] / found[-1]) / np.log(tolerances[0] / tolerances[-1])
+    assert orders[0] < slope < orders[1]
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_energy_is_conserved_at_any_sizes(degree):
+    run = simulate(soft(1e-4, "energy", degree, t_end=0.6))
+    sizes = np.diff(run.time)[np.diff(run.time) > 1e-9]
+    assert sizes.max() > 20.0 * sizes.min()
+    assert run.summary["max_energy_residual"] < 1e-11
+    assert run.summary["rejected_steps"] > 10
+
+
+def test_a_run_repeats_to_the_last_bit():
+    first, second = simulate(soft(1e-5, "hermite", 2)), simulate(soft(1e-5, "hermite", 2))
+    assert all(np.array_equal(first[name], second[name]) for name in first.columns)
+    assert first.events == second.events
+
+
+def test_the_compliance_law_follows_the_tolerance():
+    """y before the foundation, against the reference: the discrete gradient is of order 2, like its estimate."""
+    contact = {"law": "compliance", "stiffness": 1e4, "exponent": 1.0}
+    found = []
+    for tolerance in (1e-2, 1e-3, 1e-4):
+        run = simulate(soft(tolerance, t_end=0.07, contact=contact))
+        reference = event_driven.simulate(run.scene, sample_times=run.time)
+        found.append(np.abs(run.y - reference.y).max() / np.ptp(run.y))
+        assert 1e-3 * tolerance < found[-1] < tolerance
+        assert run.summary["max_energy_residual"] < 1e-11
+    assert 0.7 < np.log10(found[0] / found[2]) / 2.0 < 1.3
+
+
+def test_absolute_tolerance_is_of_the_displacement():
+    """In metres: 1.5e-8 m of the 15 mm to the foundation is 1e-6 of them."""
+    absolute = with_changes(soft(1.0e-6, "hermite", 1), coupling={"absolute_tolerance": 1.5e-8})
+    absolute = with_changes(absolute, coupling={"relative_tolerance": None})
+    (y, late), (relative, _) = errors(simulate(absolute)), errors(simulate(soft(1e-6, "hermite", 1)))
+    assert 1e-3 < y / 1e-6 < 1.0
+    assert 0.2 < y / relative < 50.0
+    assert late < 1e-6
+
+
+def test_without_coupling_the_rows_describe_the_motion():
+    """A lone spring: exact at any step; rows are as dense as the cubic through them needs to be."""
+    densities = []
+    for tolerance in (1e-3, 1e-6):
+        scene = with_changes(load_scene("duffing"), coupling={"relative_tolerance": tolerance})
+        run = simulate(scene)
+        middles = 0.5 * (run.time[1:] + run.time[:-1])
+        sizes = np.diff(run.time)
+        cubic = 0.5 * (run.y[1:] + run.y[:-1]) + sizes * (run.z[:-1] - run.z[1:]) / 8.0
+        reference = event_driven.simulate(scene, sample_times=middles)
+        error = np.abs(cubic - reference.y).max() / np.ptp(run.y)
+        # In the middle the cubic is H⁴/384 off, in the mean H⁴/720.
+        assert 0.05 * tolerance < error < 720.0 / 384.0 * 1.1 * tolerance
+        densities.append(len(run))
+    # Order 4: 1000 times the accuracy takes 1000^(1/4) = 5.6 times the rows.
+    assert densities[1] / densities[0] == pytest.approx(5.6, rel=0.25)
+
+
+def test_a_tolerance_below_rounding_stops_by_name():
+    with pytest.raises(RunStopped, match=r"above the tolerance, down to a macro step of .* where it is"):
+        simulate(soft(1e-17, "hermite", 2))
