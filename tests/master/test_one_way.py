@@ -100,14 +100,14 @@ def test_both_ends_known_leave_nothing_to_solve() -> None:
     """The beam drives and the spring is seated: C is the discrete gradient of where the tip has gone."""
     beam, start = modal_beam(6), 1e-3
     beam.mark()
-    one_way = OneWay(Compliance(*LAW, 1e-12, 0.01), *LAW, beam_drives=True, driver_stiffness=1e6)
+    one_way = OneWay(Compliance(*LAW, 1e-12), *LAW, beam_drives=True, driver_stiffness=1e6)
     force = one_way.solve(beam, Held(0.0), 0.0, 0.01, (5.0, 0.0, 0.0), start)
     assert force == (discrete_gradient(start, -beam.motion().displacement, *LAW), 0.0, 0.0)
     assert beam.steps == 1
 
 
 def test_the_accounts_are_those_of_the_docstring() -> None:
-    one_way = OneWay(Compliance(*LAW, 1e-12, 0.01), *LAW, beam_drives=True, driver_stiffness=50.0)
+    one_way = OneWay(Compliance(*LAW, 1e-12), *LAW, beam_drives=True, driver_stiffness=50.0)
     assert (one_way.neglected, one_way.share) == (0.0, 0.0)
     for force, moved, depth in ((2.0, -0.1, 0.02), (5.0, 0.2, 0.05), (1.0, 0.3, 0.01), (0.0, 0.0, -0.2)):
         one_way.accept(force, moved, depth)

@@ -91,7 +91,7 @@ def solved(p: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
             Tie(conditions(scheme, degree), degree, 1e-13).solve(*ends, 0.0, h, NO_FORCE, motions[0])
         elif scheme == "energy":
             gap = motions[1].displacement - motions[0].displacement
-            Compliance(p.stiffness, 1.0, 1e-14, h).solve(*ends, 0.0, h, NO_FORCE, gap)
+            Compliance(p.stiffness, 1.0, 1e-14).solve(*ends, 0.0, h, NO_FORCE, gap)
         else:
             Exchange(scheme == "gauss_seidel", degree, p.stiffness, 1.0).solve(*ends, 0.0, h, motions)
         columns.append(np.concatenate([beam.a, beam.v, np.array([spring.y, spring.z]) * mass**0.5]))
