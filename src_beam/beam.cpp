@@ -1,5 +1,7 @@
 #include "beam.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -18,6 +20,19 @@ void throw_not_finite(double size, const TipForce& c, double distributed_load) {
           << c[1] << " N/s, " << c[2] << " N/s2 and the load " << distributed_load
           << " N/m; the state is unchanged, use a smaller step or smaller inputs";
   throw std::domain_error(message.str());
+}
+
+bool outputs_finite(const BeamIntegrator& beam) {
+  std::array<double, shape_points> u{}, theta{};
+  beam.deflection(u);
+  beam.rotation(theta);
+  const auto finite = [](double value) { return std::isfinite(value); };
+  const std::array<double, 10> scalars{
+      beam.tip_displacement(),          beam.tip_velocity(),   beam.tip_acceleration(), beam.tip_displacement_integral(),
+      beam.tip_displacement_integral_2(), beam.kinetic_energy(), beam.strain_energy(),    beam.dissipated_energy(),
+      beam.load_potential(),            beam.tip_rotation()};
+  return std::all_of(u.begin(), u.end(), finite) && std::all_of(theta.begin(), theta.end(), finite) &&
+         std::all_of(scalars.begin(), scalars.end(), finite);
 }
 
 struct Beam::Impl {

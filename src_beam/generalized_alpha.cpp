@@ -59,6 +59,12 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
         w_(mesh_.size()),
         work_(mesh_.size()),
         work2_(mesh_.size()) {
+    const auto largest = [](const auto& values) { return values.cwiseAbs().maxCoeff(); };
+    ordinary_ = true;
+    for (const double value : {largest(K_.coeffs()), largest(uniform_load_), largest(hat_load_), largest(tip_response_),
+                               mu_, 1.0 / mu_, alpha_, 1.0 / mesh_.radius_of_gyration()}) {
+      ordinary_ = ordinary_ && value < ordinary;
+    }
     set_distributed_load(0.0);
   }
 
@@ -73,14 +79,14 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
 
   void apply_tip_impulse(double impulse) override {
     w_ = v_ + impulse * tip_response_;
-    if (!w_.allFinite()) throw_not_finite(0.0, {impulse, 0.0, 0.0}, distributed_load_);
+    if (!w_.allFinite()) throw_not_finite(0.0, {impulse, 0.0, 0.0}, now_.distributed_load);
     v_.swap(w_);
-    if (!midpoint_) pending_impulse_ += impulse;
+    if (!midpoint_) now_.pending_impulse += impulse;
   }
 
   void set_distributed_load(double distributed_load) override {
-    if (!midpoint_ && started_) pending_load_ += distributed_load - distributed_load_;
-    distributed_load_ = distributed_load;
+    if (!midpoint_ && now_.started) now_.pending_load += distributed_load - now_.distributed_load;
+    now_.distributed_load = distributed_load;
     load_ = distributed_load * uniform_load_ + hat_load_;
   }
 
@@ -88,11 +94,11 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   double tip_velocity() const override { return v_[mesh_.tip_index()]; }
   double tip_acceleration() const override { return mu_ * tip_response_.dot(residual_force()); }
   double tip_rotation() const override { return q_[mesh_.tip_rotation_index()] / mesh_.radius_of_gyration(); }
-  double tip_displacement_integral() const override { return integral_; }
-  double tip_displacement_integral_2() const override { return integral_2_; }
+  double tip_displacement_integral() const override { return now_.integral; }
+  double tip_displacement_integral_2() const override { return now_.integral_2; }
   double kinetic_energy() const override { return 0.5 * mu_ * mesh_.mass_norm2(v_); }
   double strain_energy() const override { return 0.5 * mu_ * mesh_.stiffness_norm2(q_); }
-  double dissipated_energy() const override { return dissipated_; }
+  double dissipated_energy() const override { return now_.dissipated; }
   double load_potential() const override { return -mu_ * load_.dot(q_); }
   double tip_mass() const override { return 1.0 / tip_response_[mesh_.tip_index()]; }
   double static_tip_compliance() const override { return compliance_; }
@@ -107,8 +113,9 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     state.clear();
     state.reserve(static_cast<std::size_t>(q_.size() + v_.size() + a_.size()) + 8);
     for (const VectorXd* x : {&q_, &v_, &a_}) state.insert(state.end(), x->data(), x->data() + x->size());
-    for (const double value : {integral_, integral_2_, dissipated_, end_force_, distributed_load_, pending_impulse_,
-                               pending_load_, started_ ? 1.0 : 0.0}) {
+    for (const double value :
+         {now_.integral, now_.integral_2, now_.dissipated, now_.end_force, now_.distributed_load, now_.pending_impulse,
+          now_.pending_load, now_.started ? 1.0 : 0.0}) {
       state.push_back(value);
     }
   }
@@ -121,13 +128,13 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     }
     const double distributed_load = from[4];
     set_distributed_load(distributed_load);
-    integral_ = from[0];
-    integral_2_ = from[1];
-    dissipated_ = from[2];
-    end_force_ = from[3];
-    pending_impulse_ = from[5];
-    pending_load_ = from[6];
-    started_ = from[7] != 0.0;
+    now_.integral = from[0];
+    now_.integral_2 = from[1];
+    now_.dissipated = from[2];
+    now_.end_force = from[3];
+    now_.pending_impulse = from[5];
+    now_.pending_load = from[6];
+    now_.started = from[7] != 0.0;
   }
 
  private:
@@ -187,17 +194,17 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
 
   /// rhs_ = the force that a_ does not know of yet; false if there is none.
   bool add_missing_force(double tip_force, double distributed_load) {
-    if (!started_) {
+    if (!now_.started) {
       rhs_ = hat_load_ - mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
       rhs_ += distributed_load * uniform_load_;
       rhs_[mesh_.tip_index()] += tip_force / mu_;
       return true;
     }
-    const double load = distributed_load - distributed_load_ + pending_load_, force = tip_force - end_force_;
-    if (load == 0.0 && force == 0.0 && pending_impulse_ == 0.0) return false;
+    const double load = distributed_load - now_.distributed_load + now_.pending_load, force = tip_force - now_.end_force;
+    if (load == 0.0 && force == 0.0 && now_.pending_impulse == 0.0) return false;
     rhs_ = load * uniform_load_;
     rhs_[mesh_.tip_index()] += force / mu_;
-    if (pending_impulse_ != 0.0) rhs_ -= (alpha_ * pending_impulse_) * mesh_.stiffness_times(tip_response_);
+    if (now_.pending_impulse != 0.0) rhs_ -= (alpha_ * now_.pending_impulse) * mesh_.stiffness_times(tip_response_);
     return true;
   }
 
@@ -213,22 +220,28 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   // Accepts work_ and work2_ as the new q and v, or throws.
   void finish(double h, const TipForce& c, double distributed_load, double loss, VectorXd* a1) {
     const double u0 = q_[mesh_.tip_index()], u1 = work_[mesh_.tip_index()];
-    const double integral = 0.5 * h * (u0 + u1), integral_2 = h * h * (2.0 * u0 + u1) / 6.0;
-    if (!work_.allFinite() || !work2_.allFinite() || (a1 != nullptr && !a1->allFinite()) ||
-        !std::isfinite(dissipated_ + loss) || !std::isfinite(integral) || !std::isfinite(integral_2)) {
-      throw_not_finite(h, c, distributed_load);
-    }
+    const Scalars before = now_;
     q_.swap(work_);
     v_.swap(work2_);
     if (a1 != nullptr) a_.swap(*a1);
-    integral_ = integral;
-    integral_2_ = integral_2;
-    dissipated_ += loss;
-    end_force_ = force_at(c, h);
-    if (distributed_load != distributed_load_) set_distributed_load(distributed_load);
-    pending_impulse_ = 0.0;
-    pending_load_ = 0.0;
-    started_ = true;
+    now_.integral = 0.5 * h * (u0 + u1);
+    now_.integral_2 = h * h * (2.0 * u0 + u1) / 6.0;
+    now_.dissipated += loss;
+    now_.end_force = force_at(c, h);
+    if (distributed_load != before.distributed_load) set_distributed_load(distributed_load);
+    now_.pending_impulse = 0.0;
+    now_.pending_load = 0.0;
+    now_.started = true;
+    const double energies = mesh_.mass_norm2(v_) + mesh_.stiffness_norm2(q_);
+    const bool harmless = ordinary_ && energies < ordinary && ordinary_inputs(h, c, distributed_load);
+    if (!harmless && !(outputs_finite(*this) && a_.allFinite())) {
+      q_.swap(work_);
+      v_.swap(work2_);
+      if (a1 != nullptr) a_.swap(*a1);
+      set_distributed_load(before.distributed_load);
+      now_ = before;
+      throw_not_finite(h, c, distributed_load);
+    }
   }
 
   void add_load(double factor, double tip_force, double distributed_load) {
@@ -239,7 +252,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   /// (F − K q − α_b K v)/ρA under the loads of the last step's end.
   VectorXd residual_force() const {
     VectorXd force = load_ - mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
-    force[mesh_.tip_index()] += end_force_ / mu_;
+    force[mesh_.tip_index()] += now_.end_force / mu_;
     return force;
   }
 
@@ -262,6 +275,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   double mu_;     // ρA [kg/m]: all below is per ρA
   double alpha_;  // α_b [s]
   bool midpoint_;
+  bool ordinary_;  // no coefficient is so large that an output could overflow, see integrator.hpp
   double alpha_m_, alpha_f_, beta_, gamma_;
   Eigen::SparseMatrix<double> K_, M_;  // with the same pattern
   VectorXd uniform_load_, hat_load_;
@@ -270,13 +284,15 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
 
   VectorXd q_, v_, a_;  // state [m, m/s, m/s²]; a only for ρ∞ < 1
   VectorXd load_;
-  double distributed_load_ = 0.0;
-  double end_force_ = 0.0;
-  double integral_ = 0.0, integral_2_ = 0.0;
-  double dissipated_ = 0.0;
-  // What a_ does not know of yet, besides the jump of C [N·s, N/m]; all of it before the first step.
-  double pending_impulse_ = 0.0, pending_load_ = 0.0;
-  bool started_ = false;
+  struct Scalars {
+    double distributed_load = 0.0, end_force = 0.0;
+    double integral = 0.0, integral_2 = 0.0;
+    double dissipated = 0.0;
+    // What a_ does not know of yet, besides the jump of C [N·s, N/m]; all of it before the first step.
+    double pending_impulse = 0.0, pending_load = 0.0;
+    bool started = false;
+  };
+  Scalars now_;
 
   FreeStep free_;
   VectorXd response_;  // w of a unit tip force, for steps of response_size_

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <memory>
 #include <vector>
@@ -46,6 +47,16 @@ class BeamIntegrator {
   /// @pre state has the length that save() gives, all of it finite
   virtual void restore(const std::vector<double>& state) = 0;
 };
+
+/// While parameters, loads and energies stay below `ordinary` and step sizes below `ordinary_size`, no output can
+/// overflow. A step beyond asks outputs_finite().
+inline constexpr double ordinary = 1e40, ordinary_size = 1e10;
+
+bool outputs_finite(const BeamIntegrator& beam);
+
+inline bool ordinary_inputs(double size, const TipForce& c, double distributed_load) {
+  return size < ordinary_size && std::abs(c[0]) + std::abs(c[1]) + std::abs(c[2]) + std::abs(distributed_load) < ordinary;
+}
 
 /// @throws std::domain_error that names the step and what to do about it
 [[noreturn]] void throw_not_finite(double size, const TipForce& tip_force, double distributed_load);

@@ -49,6 +49,15 @@ class ModalBeam final : public BeamIntegrator {
         v_next_(eta_.size()),
         force_(eta_.size()),
         r_(eta_.size()) {
+    ordinary_ = modes_.omega.minCoeff() > 1.0 / ordinary;
+    const auto bound = [this](double largest) { ordinary_ = ordinary_ && largest < ordinary; };
+    for (const Eigen::VectorXd* values : {&modes_.tip, &modes_.tip_rotation, &modes_.uniform_load})
+      bound(values->lpNorm<Eigen::Infinity>());
+    bound(modes_.deflection.lpNorm<Eigen::Infinity>());
+    bound(modes_.rotation.lpNorm<Eigen::Infinity>());
+    bound(omega2_.maxCoeff());
+    bound(damping_.maxCoeff());
+    bound(hat_load_.abs().maxCoeff());
     set_distributed_load(0.0);
     update_tip();
   }
@@ -84,21 +93,21 @@ class ModalBeam final : public BeamIntegrator {
       integral_2 += k.integral2_input[i] * input[i];
     }
 
-    const double displacement = (tip_ * eta_next_).sum();
-    const double velocity = (tip_ * v_next_).sum();
-    if (!std::isfinite(displacement) || !std::isfinite(velocity) || !std::isfinite(integral) ||
-        !std::isfinite(integral_2)) {
+    const Scalars before = now_;
+    eta_.swap(eta_next_);
+    v_.swap(v_next_);
+    now_ = {(tip_ * eta_).sum(), (tip_ * v_).sum(), integral, integral_2, before.dissipated, force_at(c, size)};
+    if (damped_) loss_step_ = {size, c[1], c[2]};
+    const double energies = (v_.square() + omega2_ * eta_.square()).sum();
+    const bool harmless = ordinary_ && energies < ordinary && ordinary_inputs(size, c, distributed_load);
+    if (!harmless && !outputs_finite(*this)) {
+      loss_step_.size = 0.0;
+      eta_.swap(eta_next_);
+      v_.swap(v_next_);
+      now_ = before;
       set_distributed_load(previous_load);
       throw_not_finite(size, c, distributed_load);
     }
-    eta_.swap(eta_next_);
-    v_.swap(v_next_);
-    displacement_ = displacement;
-    velocity_ = velocity;
-    integral_ = integral;
-    integral_2_ = integral_2;
-    end_force_ = force_at(c, size);
-    if (damped_) loss_step_ = {size, c[1], c[2]};
   }
 
   void apply_tip_impulse(double impulse) override {
@@ -107,7 +116,7 @@ class ModalBeam final : public BeamIntegrator {
     const double velocity = (tip_ * v_next_).sum();
     if (!std::isfinite(velocity)) throw_not_finite(0.0, {impulse, 0.0, 0.0}, distributed_load_);
     v_.swap(v_next_);
-    velocity_ = velocity;
+    now_.velocity = velocity;
   }
 
   void set_distributed_load(double distributed_load) override {
@@ -115,19 +124,19 @@ class ModalBeam final : public BeamIntegrator {
     load_ = distributed_load * modes_.uniform_load.array() + hat_load_;
   }
 
-  double tip_displacement() const override { return displacement_; }
-  double tip_velocity() const override { return velocity_; }
+  double tip_displacement() const override { return now_.displacement; }
+  double tip_velocity() const override { return now_.velocity; }
   double tip_acceleration() const override {
-    return (tip_ * (end_force_ * tip_ + load_ - omega2_ * eta_ - damping_ * v_)).sum();
+    return (tip_ * (now_.end_force * tip_ + load_ - omega2_ * eta_ - damping_ * v_)).sum();
   }
   double tip_rotation() const override { return modes_.tip_rotation.dot(eta_.matrix()); }
-  double tip_displacement_integral() const override { return integral_; }
-  double tip_displacement_integral_2() const override { return integral_2_; }
+  double tip_displacement_integral() const override { return now_.integral; }
+  double tip_displacement_integral_2() const override { return now_.integral_2; }
   double kinetic_energy() const override { return 0.5 * v_.square().sum(); }
   double strain_energy() const override { return 0.5 * (modes_.omega.array() * eta_).square().sum(); }
   double dissipated_energy() const override {
     add_loss();
-    return dissipated_;
+    return now_.dissipated;
   }
   double load_potential() const override { return -(load_ * eta_).sum(); }
   double tip_mass() const override { return 1.0 / inverse_tip_mass_; }
@@ -151,10 +160,10 @@ class ModalBeam final : public BeamIntegrator {
     Eigen::Map<ArrayXd>(state.data(), eta_.size()) = eta_;
     Eigen::Map<ArrayXd>(state.data() + m, eta_.size()) = v_;
     double* rest = state.data() + 2 * m;
-    rest[0] = integral_;
-    rest[1] = integral_2_;
-    rest[2] = dissipated_;
-    rest[3] = end_force_;
+    rest[0] = now_.integral;
+    rest[1] = now_.integral_2;
+    rest[2] = now_.dissipated;
+    rest[3] = now_.end_force;
     rest[4] = distributed_load_;
   }
 
@@ -164,10 +173,10 @@ class ModalBeam final : public BeamIntegrator {
     eta_ = Eigen::Map<const ArrayXd>(state.data(), eta_.size());
     v_ = Eigen::Map<const ArrayXd>(state.data() + m, eta_.size());
     const double* rest = state.data() + 2 * m;
-    integral_ = rest[0];
-    integral_2_ = rest[1];
-    dissipated_ = rest[2];
-    end_force_ = rest[3];
+    now_.integral = rest[0];
+    now_.integral_2 = rest[1];
+    now_.dissipated = rest[2];
+    now_.end_force = rest[3];
     set_distributed_load(rest[4]);
     update_tip();
   }
@@ -248,15 +257,15 @@ class ModalBeam final : public BeamIntegrator {
         dissipation_.get(loss_step_.size, [this](double h, Dissipation& value) { make_dissipation(h, value); });
     const ArrayXd& v = v_next_;  // before the step
     const double c1 = loss_step_.c1, c2 = loss_step_.c2;
-    dissipated_ +=
+    now_.dissipated +=
         (v * (k.vv * v + k.vr * r_ + c1 * k.v1 + c2 * k.v2) + r_ * (k.rr * r_ + c1 * k.r1 + c2 * k.r2)).sum() +
         (c1 * (c1 * k.input[0] + c2 * k.input[1]) + c2 * c2 * k.input[2]);
     loss_step_.size = 0.0;
   }
 
   void update_tip() {
-    displacement_ = (tip_ * eta_).sum();
-    velocity_ = (tip_ * v_).sum();
+    now_.displacement = (tip_ * eta_).sum();
+    now_.velocity = (tip_ * v_).sum();
   }
 
   Modes modes_;
@@ -264,6 +273,7 @@ class ModalBeam final : public BeamIntegrator {
   ArrayXd omega2_;   // ω² [1/s²]
   ArrayXd damping_;  // α_b ω² [1/s]
   bool damped_;
+  bool ordinary_;  // no coefficient is so large that an output could overflow, see integrator.hpp
   ArrayXd hat_load_;  // modal force of the hat load [N/√kg]
   double hat_coefficient_;
   double inverse_tip_mass_;
@@ -272,16 +282,18 @@ class ModalBeam final : public BeamIntegrator {
   ArrayXd eta_, v_;  // state: modal displacement [m √kg] and velocity
   ArrayXd load_;     // modal force of f_b and the hat load [N/√kg]
   double distributed_load_ = 0.0;
-  double end_force_ = 0.0;  // C at the end of the last step
-  double displacement_ = 0.0, velocity_ = 0.0;
-  double integral_ = 0.0, integral_2_ = 0.0;
-  mutable double dissipated_ = 0.0;
+  struct Scalars {
+    double displacement, velocity, integral, integral_2;
+    mutable double dissipated;
+    double end_force;  // C at the end of the last step
+  };
+  Scalars now_{};
 
   ArrayXd eta_next_, v_next_, force_, r_;  // work space; after a step v_next_ and r_ are those of its start
   struct LossStep {
     double size, c1, c2;
   };
-  mutable LossStep loss_step_ = {0.0, 0.0, 0.0};  // the step whose loss is not in dissipated_ yet; size 0: none
+  mutable LossStep loss_step_ = {0.0, 0.0, 0.0};  // the step whose loss is not in `dissipated` yet; size 0: none
   StepCache<Coefficients> coefficients_;
   mutable StepCache<Dissipation> dissipation_;
 };

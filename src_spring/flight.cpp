@@ -106,8 +106,9 @@ void Flight::prepare(const FlightStart& start) {
     limit(tolerance_z / std::abs(d[3]), 0.5);
     if (order == 0) limit(tolerance_y / std::abs(d[2]), 0.5);
   }
-  int halvings =
-      static_cast<int>(std::clamp(std::ceil(std::log2(H / h)), double{least_halvings}, double{most_halvings}));
+  const double levels = std::ceil(std::log2(H / h));
+  if (std::isnan(levels)) throw IdaError("the forces leave the range of floating-point numbers");
+  int halvings = static_cast<int>(std::clamp(levels, double{least_halvings}, double{most_halvings}));
   if (touching_ && order < Taylor::max_order) {
     // The power law has no second derivative or outgrows its rates at the start: the velocity from its growth instead.
     const auto growth = [&](double t) {
@@ -129,7 +130,7 @@ void Flight::prepare(const FlightStart& start) {
 
 Flight::Event Flight::run(const FlightStart& start) {
   prepare(start);
-  solver_.start(*this, relative_, h0_);
+  solver_.start(*this, relative_, h0_, start.most_steps);
   const int first = std::isfinite(laws_.hilltop) ? 1 : 0;
   const int stop = first, contact = first + (laws_.stop ? 2 : 0);
   Event event = Event::none;

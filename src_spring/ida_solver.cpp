@@ -1,6 +1,7 @@
 #include "ida_solver.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 
@@ -16,7 +17,6 @@ constexpr int max_order = 5;
 // costs more steps than it saves iterations).
 constexpr double newton_share = 0.01;
 constexpr int max_error_failures = 40;  ///< in one internal step: a first step that is far too long recovers
-constexpr long max_steps = 10'000'000;  ///< per start(); a step that needs more is refused
 
 struct ContextDeleter {
   void operator()(SUNContext context) const { SUNContext_Free(&context); }
@@ -59,6 +59,8 @@ int jacobian(sunrealtype s, sunrealtype c, N_Vector Y, N_Vector Yp, N_Vector, SU
 int events(sunrealtype s, N_Vector Y, N_Vector, sunrealtype* g, void* user_data) {
   const auto& problem = *static_cast<const Problem*>(user_data);
   problem.system->events(s, data(Y), g);
+  for (std::size_t i = 0; i < problem.crossings.size(); ++i)
+    if (!std::isfinite(g[i])) return 1;  // IDA would search for its root without end
   // An exact zero counts as not yet crossed: IDA would switch the event function off, and keep it off after IDAReInit.
   // Not the smallest double: IDA multiplies values to compare signs.
   for (std::size_t i = 0; i < problem.crossings.size(); ++i)
@@ -81,6 +83,7 @@ struct IdaSolver::Impl {
   std::vector<int> occurred;
   std::vector<double> event_values;
   double s = 0.0;
+  long most_steps = 0;
 
   [[noreturn]] void fail(const char* what, int code) const {
     std::unique_ptr<char, decltype(&std::free)> name(IDAGetReturnFlagName(code), &std::free);
@@ -125,7 +128,6 @@ IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings) : imp
   d.check(IDASetMaxOrd(ida, max_order), "IDASetMaxOrd");
   d.check(IDASetMaxErrTestFails(ida, max_error_failures), "IDASetMaxErrTestFails");
   d.check(IDASetNonlinConvCoef(ida, newton_share), "IDASetNonlinConvCoef");
-  d.check(IDASetMaxNumSteps(ida, max_steps), "IDASetMaxNumSteps");
   if (!crossings.empty()) {
     d.check(IDARootInit(ida, static_cast<int>(crossings.size()), events), "IDARootInit");
     std::vector<int> directions(crossings.size());
@@ -142,9 +144,10 @@ double* IdaSolver::initial_value() { return data(impl_->Y0.get()); }
 double* IdaSolver::initial_derivative() { return data(impl_->Yp0.get()); }
 double* IdaSolver::absolute_tolerance() { return data(impl_->tolerance.get()); }
 
-void IdaSolver::start(const ImplicitSystem& system, double relative_tolerance, double first_step) {
+void IdaSolver::start(const ImplicitSystem& system, double relative_tolerance, double first_step, long most_steps) {
   Impl& d = *impl_;
   void* ida = d.ida.get();
+  d.most_steps = most_steps;
   d.problem.system = &system;
   d.message.clear();
   d.s = 0.0;
@@ -156,7 +159,12 @@ void IdaSolver::start(const ImplicitSystem& system, double relative_tolerance, d
 
 IdaSolver::Outcome IdaSolver::advance() {
   Impl& d = *impl_;
+  // IDA counts from event to event.
+  const long left = d.most_steps - steps();
+  if (left <= 0) throw TooMuchWork();
+  d.check(IDASetMaxNumSteps(d.ida.get(), left), "IDASetMaxNumSteps");
   const int code = IDASolve(d.ida.get(), 1.0, &d.s, d.Y.get(), d.Yp.get(), IDA_NORMAL);
+  if (code == IDA_TOO_MUCH_WORK) throw TooMuchWork();
   if (code < 0) d.fail("IDASolve", code);
   if (code != IDA_ROOT_RETURN) return Outcome::finished;
   d.check(IDAGetRootInfo(d.ida.get(), d.occurred.data()), "IDAGetRootInfo");

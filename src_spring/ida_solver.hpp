@@ -26,6 +26,12 @@ class IdaError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The steps allowed did not suffice.
+class TooMuchWork : public IdaError {
+ public:
+  TooMuchWork() : IdaError("too many internal steps") {}
+};
+
 /// Which sign changes of an event function count.
 enum class Crossing { falling = -1, rising = 1 };
 
@@ -42,8 +48,8 @@ class IdaSolver {
   double* initial_derivative();
   double* absolute_tolerance();
 
-  /// Start afresh at s = 0. `system` must stay alive until the last advance().
-  void start(const ImplicitSystem& system, double relative_tolerance, double first_step);
+  /// Start afresh at s = 0, for at most `most_steps` internal steps. `system` must stay alive until the last advance().
+  void start(const ImplicitSystem& system, double relative_tolerance, double first_step, long most_steps);
 
   enum class Outcome { finished, event };
   /// Go on to s = 1 or to the next event, whichever comes first. @throws IdaError

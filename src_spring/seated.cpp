@@ -85,7 +85,7 @@ void Seated::prepare(const SeatedStart& start) {
 
 Seated::Event Seated::run(const SeatedStart& start) {
   prepare(start);
-  solver_.start(*this, relative_, h0_);
+  solver_.start(*this, relative_, h0_, start.most_steps);
   Event event = Event::none;
   while (event == Event::none && solver_.advance() == IdaSolver::Outcome::event) {
     if (solver_.fell(0, 1))

@@ -15,6 +15,7 @@ struct SeatedStart {
   Loads loads;
   double size;   ///< H [s]
   double depth;  ///< φ − u_tip, exactly 0 after a contact event
+  long most_steps;  ///< of IDA
 };
 
 class Seated final : public ImplicitSystem {

@@ -14,7 +14,9 @@ namespace spring {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr long most_segments = 1'000'000;  ///< in one step; more events than this are refused
+/// IDA's in one step: several hundred periods of the spring at the tightest tolerance. A step that needs more is refused,
+/// so that no call lasts longer than a second or two.
+constexpr long most_internal_steps = 1'000'000;
 constexpr long most_stalled = 100;         ///< events without progress
 
 /// Everything that a step changes. All members are doubles, so that the flat vector is this struct.
@@ -82,12 +84,12 @@ class Step {
     state_.integral = state_.integral_2 = state_.stop_force = state_.stop_impulse = 0.0;
     double held = 0.0;   // ∫N while seated
     double last = -1.0;  // event's time
-    for (long segments = 0, stalled = 0; remaining() > 0.0; ++segments) {
+    for (long stalled = 0; remaining() > 0.0; ++segments_) {
       stalled = t_ > last ? 0 : stalled + 1;
       last = t_;
-      if (segments == most_segments || stalled == most_stalled)
-        throw StepFailure("spring: too many contact events (" + std::to_string(segments) + ") in one step of " +
-                              number(size_) + " s, " + number(t_) + " s after its start",
+      if (stalled == most_stalled)
+        throw StepFailure("spring: " + std::to_string(most_stalled) + " contact events at once, " + number(t_) +
+                              " s after the step's start",
                           t_);
       now_ = loads_.shifted(t_);
       depth_ = !laws_.compliance ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip.c[0];
@@ -141,7 +143,7 @@ class Step {
 
   void fly() {
     const double gap = laws_.stop ? state_.y - laws_.stop_position : 1.0;
-    const FlightStart start{state_.y, state_.z, now_, remaining(), gap, depth_, released_};
+    const FlightStart start{state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_internal_steps - work_};
     const auto event = attempt(flight_, start);
     released_ = false;
     state_.integral_2 += state_.integral * flight_.elapsed() + flight_.integral_2();
@@ -163,7 +165,7 @@ class Step {
 
   /// @return ∫N
   double sit(Seated& seat) {
-    const auto event = attempt(seat, SeatedStart{now_, remaining(), depth_});
+    const auto event = attempt(seat, SeatedStart{now_, remaining(), depth_, most_internal_steps - work_});
     const double t = seat.elapsed();
     state_.integral_2 += state_.integral * t + state_.y * t * t / 2;
     state_.integral += state_.y * t;
@@ -179,8 +181,16 @@ class Step {
   typename Phase::Event attempt(Phase& phase, const Start& start) {
     try {
       const auto event = phase.run(start);
-      state_.steps += static_cast<double>(phase.solver().steps());
+      const long steps = phase.solver().steps();
+      state_.steps += static_cast<double>(steps);
+      work_ += std::max(steps, 1L);
       return event;
+    } catch (const TooMuchWork&) {
+      const double reached = t_ + phase.solver().s() * start.size;
+      throw StepFailure("spring: a step of " + number(size_) + " s needs more than " +
+                            std::to_string(most_internal_steps) + " internal steps (" + std::to_string(segments_) +
+                            " contact events up to " + number(reached) + " s after its start); use a smaller step size",
+                        reached);
     } catch (const IdaError& error) {
       const double reached = t_ + phase.solver().s() * start.size;
       throw StepFailure(std::string("spring: ") + error.what() + ", " + number(reached) + " s after the step's start",
@@ -197,6 +207,7 @@ class Step {
   const double size_;
   const Loads loads_;
   double t_ = 0.0;         ///< since the step's start
+  long segments_ = 0, work_ = 0;  ///< done, and their internal steps
   Loads now_;              ///< loads_ from t_ on
   double depth_ = -1.0;    ///< y − u_tip at t_
   bool meeting_ = false;   ///< tip and top are at a contact event: y = u_tip
@@ -223,7 +234,21 @@ void Spring::step(double size, const Inputs& inputs) {
   if (!(size > 0.0) || !std::isfinite(size))
     throw std::invalid_argument("spring: step size = " + number(size) + ": must be > 0 and finite");
   check(inputs);
+  const State before = impl_->state;
   impl_->state = impl_->advanced(size, inputs);
+  if (!finite()) {
+    impl_->state = before;
+    throw StepFailure("spring: the motion leaves the range of floating-point numbers in a step of " + number(size) +
+                          " s; use a smaller step size or smaller inputs",
+                      0.0);
+  }
+}
+
+bool Spring::finite() const {
+  bool all = std::isfinite(acceleration()) && std::isfinite(reaction()) && std::isfinite(kinetic_energy()) &&
+             std::isfinite(potential_energy()) && std::isfinite(contact_energy());
+  for_each(impl_->state, [&all](double value) { all = all && std::isfinite(value); });
+  return all;
 }
 
 void Spring::observe(const Inputs& inputs) {

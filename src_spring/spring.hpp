@@ -64,7 +64,7 @@ class Spring {
   Spring(Spring&&) noexcept;
   Spring& operator=(Spring&&) noexcept;
 
-  /// Advance by `size` [s] > 0.
+  /// Advance by `size` [s] > 0. The work is bounded: a step that spans too much of the motion is refused.
   /// @throws StepFailure, Escape (state unchanged)
   void step(double size, const Inputs& inputs);
 
@@ -97,6 +97,8 @@ class Spring {
   void restore(const std::vector<double>& state);
 
  private:
+  bool finite() const;
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

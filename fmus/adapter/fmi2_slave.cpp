@@ -18,6 +18,7 @@ namespace {
 
 using fmi::Phase;
 using fmi::Snapshot;
+using fmi::Unavailable;
 
 constexpr unsigned any_phase =
     fmi::instantiated | fmi::initialization | fmi::step_complete | fmi::step_failed | fmi::terminated | fmi::error;
@@ -61,11 +62,6 @@ struct Component {
     states[key] = std::move(owned);
     return key;
   }
-};
-
-/// Not provided, or not known: fmi2Discard without any change of phase.
-struct Unavailable : std::runtime_error {
-  using std::runtime_error::runtime_error;
 };
 
 template <class Body>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "description.hpp"
@@ -19,6 +20,33 @@ const char* name(Type type) {
       return "Boolean";
   }
   return "?";
+}
+
+double finite(const Variable& v, double value) {
+  if (!std::isfinite(value)) {
+    throw Unavailable("'" + v.name + "' = " + text(value) + " is not finite: the inputs are too large");
+  }
+  return value;
+}
+
+void require_allowed(const Variable& v, double value) {
+  if (!std::isfinite(value)) throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not finite");
+  if (value < v.min || value > v.max) {
+    throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not in [" + text(v.min) + ", " +
+                                text(v.max) + "]");
+  }
+}
+
+/// Of a saved state, which may have been tampered with.
+void require_allowed(const Variable& v, const Polynomial& p) {
+  require_allowed(v, p[0]);
+  const bool whole = p[0] == std::floor(p[0]) && std::abs(p[0]) <= std::numeric_limits<int>::max();
+  if ((v.type == Type::integer && !whole) || (v.type == Type::boolean && p[0] != 0.0 && p[0] != 1.0)) {
+    throw std::invalid_argument("'" + v.name + "' = " + text(p[0]) + " is not of its type, " + name(v.type));
+  }
+  if (!std::isfinite(p[1]) || !std::isfinite(p[2]) || (!v.interpolated && (p[1] != 0.0 || p[2] != 0.0))) {
+    throw std::invalid_argument("'" + v.name + "' has impossible derivatives");
+  }
 }
 
 bool is_setting(const Variable& v) { return v.causality == Causality::parameter || v.exact; }
@@ -54,6 +82,13 @@ void Instance::enter_initialization() { phase = initialization; }
 
 void Instance::exit_initialization() {
   ensure_built();
+  for (const Variable& v : table_.variables) {
+    const double value = v.get ? v.get(*model_) : 0.0;
+    if (!std::isfinite(value)) {
+      throw std::invalid_argument("the parameters leave the range of floating-point numbers: '" + v.name +
+                                  "' would be " + text(value));
+    }
+  }
   phase = step_complete;
 }
 
@@ -97,7 +132,7 @@ double Instance::get(unsigned reference, Type type) {
   }
   if (phase == instantiated) return settings_[reference][0];
   ensure_built();
-  return v.get(*model_);
+  return finite(v, v.get(*model_));
 }
 
 void Instance::set(unsigned reference, Type type, double value) {
@@ -108,11 +143,7 @@ void Instance::set(unsigned reference, Type type, double value) {
   if (is_setting(v) && (phase & ~(instantiated | initialization)) != 0) {
     throw std::invalid_argument("'" + v.name + "' can only be set before fmi2ExitInitializationMode");
   }
-  if (!std::isfinite(value)) throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not finite");
-  if (value < v.min || value > v.max) {
-    throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not in [" + text(v.min) + ", " +
-                                text(v.max) + "]");
-  }
+  require_allowed(v, value);
   settings_[reference][0] = value;
   if (is_setting(v)) {
     built_ = false;
@@ -142,7 +173,7 @@ double Instance::output_derivative(unsigned reference, int order) {
                                 "' is not available");
   }
   ensure_built();
-  return v.derivative(*model_);
+  return finite(v, v.derivative(*model_));
 }
 
 void Instance::step(double time, double size) {
@@ -183,6 +214,7 @@ Snapshot Instance::save() const {
 }
 
 void Instance::restore(const Snapshot& s) {
+  for (std::size_t i = 0; i < settings_.size(); ++i) require_allowed(table_.variables[i], s.settings[i]);
   bool same = tolerance_ == s.tolerance;
   for (std::size_t i = 0; i < settings_.size(); ++i) {
     if (is_setting(table_.variables[i])) same = same && settings_[i][0] == s.settings[i][0];

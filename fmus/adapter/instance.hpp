@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,12 @@
 #include "table.hpp"
 
 namespace fmi {
+
+/// Asked for what there is not: becomes fmi2Discard without any change of phase.
+class Unavailable : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// The states of section 4.2.4 that a slave which completes every step at once can be in, as bits.
 enum Phase : unsigned {
@@ -34,6 +41,7 @@ class Instance {
   void terminate();
   void reset();
 
+  /// @throws Unavailable if an output has no finite value under the inputs that were set since the last step
   double get(unsigned reference, Type type);
   void set(unsigned reference, Type type, double value);
   void set_derivative(unsigned reference, int order, double value);

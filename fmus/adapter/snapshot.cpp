@@ -1,7 +1,10 @@
 #include "snapshot.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 #include <stdexcept>
 
 namespace fmi {
@@ -82,6 +85,14 @@ Snapshot deserialize(const char* bytes, std::size_t size, const std::string& gui
   const std::size_t settings_end = fixed_count + 3 * n_settings;
   if (values.size() < settings_end || static_cast<double>(values.size() - settings_end) != values[6]) {
     refuse("its parts do not add up");
+  }
+  // A checksum is no signature: what the numbers mean is checked too, here and in Instance::restore.
+  const auto known = [&values](std::size_t i, std::initializer_list<double> allowed) {
+    return std::find(allowed.begin(), allowed.end(), values[i]) != allowed.end();
+  };
+  if (!known(0, {1, 2, 4, 8, 16, 32}) || !known(1, {0, 1, 2, 3}) || !known(5, {0, 1}) || !std::isfinite(values[2]) ||
+      std::isnan(values[3]) || !(values[4] >= 0.0 && values[4] < 1.0)) {
+    refuse("it says what no instance says of itself");
   }
   Snapshot s;
   s.phase = static_cast<int>(values[0]);

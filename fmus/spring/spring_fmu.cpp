@@ -67,7 +67,7 @@ struct SpringModel final : fmi::Model {
       if (impulse != 0.0) spring->apply_impulse(impulse);
       spring->step(size, acting);
     } catch (const spring::StepFailure& e) {
-      discard(std::string(e.what()) + " (" + fmi::text(e.reached) + " s after the start of the step)");
+      discard(e.what());
     } catch (const std::domain_error& e) {
       discard(e.what());
     }
