@@ -13,6 +13,7 @@ usage() {
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
 ./build.sh browser                 install playwright and Chromium and look at the report in it
 ./build.sh wheel                   build a source archive, and from that a wheel, into dist/, and test the wheel
+./build.sh fuzz [SEED]             a million random calls of each FMU under sanitizers (about 10 minutes)
 ./build.sh lint                    formatters, linters and type checker
 
 Set-up makes .venv here and installs Python packages into it; as root it also installs the system packages that are
@@ -183,6 +184,26 @@ case $command in
     build fmus
     ls -l fmus/*.fmu fmus/*.ssp
     ;;
+  fuzz)
+    build fuzz_beam fuzz_spring
+    seed=${1:-$(date +%s)}
+    failed=
+    sanitized() { # NAME SANITIZERS: the fuzzers in build/NAME
+      $venv/bin/cmake -S . -B build/$1 -G Ninja -DCMAKE_MAKE_PROGRAM="$PWD/$venv/bin/ninja" \
+        -DPython3_EXECUTABLE="$PWD/$python" -DSPRINGBEAM_SANITIZE="$2" >/dev/null || die "CMake stopped, see above"
+      $venv/bin/ninja -C build/$1 ${JOBS:+-j "$JOBS"} --quiet fuzz_beam fuzz_spring >&2 || die "the build stopped, see above"
+    }
+    say "building with sanitizers"
+    sanitized memory address,undefined,float-cast-overflow
+    sanitized thread thread
+    for body in beam spring; do
+      say "$body: 8 threads (seed $seed)"
+      build/thread/tests/fuzz/fuzz_$body threads "$seed" || failed=1
+      say "$body: a million calls (seed $seed)"
+      build/memory/tests/fuzz/fuzz_$body calls "$seed" 1000000 || failed=1
+    done
+    [ -z "$failed" ] || die "a promise is broken, see above; the same again: ./build.sh fuzz $seed"
+    ;;
   lint)
     set_up_python lint
     build beam spring
@@ -191,7 +212,7 @@ case $command in
     run $venv/bin/ruff check .
     run $venv/bin/ruff format --check .
     run $venv/bin/mypy
-    mapfile -t sources < <(find src_beam src_spring fmus tests/cpp -name '*.cpp' -o -name '*.hpp')
+    mapfile -t sources < <(find src_beam src_spring fmus tests/cpp tests/fuzz -name '*.cpp' -o -name '*.hpp')
     run $venv/bin/clang-format --dry-run -Werror "${sources[@]}"
     mapfile -t units < <(find src_beam src_spring fmus -name '*.cpp')
     run $venv/bin/clang-tidy --quiet -p build "${units[@]}"

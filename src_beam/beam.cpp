@@ -27,10 +27,16 @@ bool outputs_finite(const BeamIntegrator& beam) {
   beam.deflection(u);
   beam.rotation(theta);
   const auto finite = [](double value) { return std::isfinite(value); };
-  const std::array<double, 10> scalars{
-      beam.tip_displacement(),          beam.tip_velocity(),   beam.tip_acceleration(), beam.tip_displacement_integral(),
-      beam.tip_displacement_integral_2(), beam.kinetic_energy(), beam.strain_energy(),    beam.dissipated_energy(),
-      beam.load_potential(),            beam.tip_rotation()};
+  const std::array<double, 10> scalars{beam.tip_displacement(),
+                                       beam.tip_velocity(),
+                                       beam.tip_acceleration(),
+                                       beam.tip_displacement_integral(),
+                                       beam.tip_displacement_integral_2(),
+                                       beam.kinetic_energy(),
+                                       beam.strain_energy(),
+                                       beam.dissipated_energy(),
+                                       beam.load_potential(),
+                                       beam.tip_rotation()};
   return std::all_of(u.begin(), u.end(), finite) && std::all_of(theta.begin(), theta.end(), finite) &&
          std::all_of(scalars.begin(), scalars.end(), finite);
 }

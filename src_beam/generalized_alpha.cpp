@@ -113,9 +113,8 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     state.clear();
     state.reserve(static_cast<std::size_t>(q_.size() + v_.size() + a_.size()) + 8);
     for (const VectorXd* x : {&q_, &v_, &a_}) state.insert(state.end(), x->data(), x->data() + x->size());
-    for (const double value :
-         {now_.integral, now_.integral_2, now_.dissipated, now_.end_force, now_.distributed_load, now_.pending_impulse,
-          now_.pending_load, now_.started ? 1.0 : 0.0}) {
+    for (const double value : {now_.integral, now_.integral_2, now_.dissipated, now_.end_force, now_.distributed_load,
+                               now_.pending_impulse, now_.pending_load, now_.started ? 1.0 : 0.0}) {
       state.push_back(value);
     }
   }
@@ -200,7 +199,8 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
       rhs_[mesh_.tip_index()] += tip_force / mu_;
       return true;
     }
-    const double load = distributed_load - now_.distributed_load + now_.pending_load, force = tip_force - now_.end_force;
+    const double load = distributed_load - now_.distributed_load + now_.pending_load,
+                 force = tip_force - now_.end_force;
     if (load == 0.0 && force == 0.0 && now_.pending_impulse == 0.0) return false;
     rhs_ = load * uniform_load_;
     rhs_[mesh_.tip_index()] += force / mu_;

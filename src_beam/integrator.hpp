@@ -55,7 +55,8 @@ inline constexpr double ordinary = 1e40, ordinary_size = 1e10;
 bool outputs_finite(const BeamIntegrator& beam);
 
 inline bool ordinary_inputs(double size, const TipForce& c, double distributed_load) {
-  return size < ordinary_size && std::abs(c[0]) + std::abs(c[1]) + std::abs(c[2]) + std::abs(distributed_load) < ordinary;
+  return size < ordinary_size &&
+         std::abs(c[0]) + std::abs(c[1]) + std::abs(c[2]) + std::abs(distributed_load) < ordinary;
 }
 
 /// @throws std::domain_error that names the step and what to do about it

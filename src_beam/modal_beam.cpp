@@ -273,7 +273,7 @@ class ModalBeam final : public BeamIntegrator {
   ArrayXd omega2_;   // ω² [1/s²]
   ArrayXd damping_;  // α_b ω² [1/s]
   bool damped_;
-  bool ordinary_;  // no coefficient is so large that an output could overflow, see integrator.hpp
+  bool ordinary_;     // no coefficient is so large that an output could overflow, see integrator.hpp
   ArrayXd hat_load_;  // modal force of the hat load [N/√kg]
   double hat_coefficient_;
   double inverse_tip_mass_;

@@ -132,18 +132,27 @@ MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
   return solver.eigenvectors();
 }
 
+/// Singular values and right vectors. @throws std::runtime_error where Eigen would leave them uninitialised
+Eigen::BDCSVD<MatrixXd> singular_values(const MatrixXd& X) {
+  if (!X.allFinite()) throw std::runtime_error("beam: the parameters leave the range of floating-point numbers");
+  const Eigen::BDCSVD<MatrixXd> svd(X, Eigen::ComputeThinV);
+  if (svd.info() != Eigen::Success) throw std::runtime_error("beam: the modes cannot be computed");
+  return svd;
+}
+
 /// Lowest modes from the singular values of G C⁻¹, where K = GᵀG and M = CᵀC: a dense decomposition, but its error
 /// relative to ω₁ is ε ω_max/ω₁, where that of the eigenproblem of K would be the square of the ratio.
 MatrixXd dense_modes(const Timoshenko& mesh, Index count) {
   const Index size = mesh.size();
   const Timoshenko::MassFactor M(mesh.mass());
+  require_factor(M);
   MatrixXd X = M.matrixU().solve(MatrixXd::Identity(size, size));
   VectorXd strains(size);
   for (Index j = 0; j < size; ++j) {
     mesh.weighted_strains(X.col(j).data(), strains.data());
     X.col(j) = strains;
   }
-  const Eigen::BDCSVD<MatrixXd> svd(X, Eigen::ComputeThinV);
+  const Eigen::BDCSVD<MatrixXd> svd = singular_values(X);
   MatrixXd modes = svd.matrixV().rightCols(count).rowwise().reverse();
   return M.matrixU().solve(modes);
 }
@@ -184,7 +193,7 @@ VectorXd rayleigh_ritz(const Timoshenko& mesh, const MatrixXd& Z, MatrixXd& W) {
   MatrixXd X = stiffness_factor.matrixU();
   X *= scale.asDiagonal();
   mass_factor.matrixU().solveInPlace<Eigen::OnTheRight>(X);
-  const Eigen::BDCSVD<MatrixXd> svd(X, Eigen::ComputeThinV);
+  const Eigen::BDCSVD<MatrixXd> svd = singular_values(X);
   W = svd.matrixV().rowwise().reverse();
   mass_factor.matrixU().solveInPlace(W);
   return svd.singularValues().reverse();

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <stdexcept>
 #include <vector>
 
 #include "validate.hpp"
@@ -32,6 +33,13 @@ Timoshenko::Timoshenko(const Parameters& p)
       b_top_(b_),
       s_(p.shear_modulus * p.shear_coefficient / p.density) {
   if (!p.reduced_integration) b_top_ += s_ * (h_ / r_) * (h_ / r_) / (4.0 * static_cast<double>(4 * p_ * p_ - 1));
+  for (const double value : {h_, mu_, r_, b_, b_top_, s_}) {
+    if (!std::isnormal(value)) {
+      throw std::invalid_argument(
+          "beam: the parameters leave the range of floating-point numbers (length, density, "
+          "area, moduli or their ratios)");
+    }
+  }
 }
 
 // q is the element's part of the unknowns, its bubbles and its right node; θ̃₀ and u₀ are those of its left node.
@@ -214,7 +222,15 @@ Eigen::VectorXd Timoshenko::flexibility_times(const Eigen::VectorXd& x) const {
   return y;
 }
 
-Eigen::VectorXd Timoshenko::mass_solve(const Eigen::VectorXd& x) const { return MassFactor(mass()).solve(x); }
+Eigen::VectorXd Timoshenko::mass_solve(const Eigen::VectorXd& x) const {
+  const MassFactor factor(mass());
+  require_factor(factor);
+  return factor.solve(x);
+}
+
+void require_factor(const Timoshenko::MassFactor& factor) {
+  if (factor.info() != Eigen::Success) throw std::runtime_error("beam: the mass matrix cannot be factorised");
+}
 
 double Timoshenko::mass_norm2(const Eigen::VectorXd& x) const {
   double linear = 0.0, rest = 0.0, theta0 = 0.0, u0 = 0.0;

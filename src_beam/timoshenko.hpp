@@ -40,6 +40,7 @@ class Timoshenko {
   using MassFactor = Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
 
   /// @pre validate(parameters) passed
+  /// @throws std::invalid_argument if what follows from the parameters overflows or vanishes
   explicit Timoshenko(const Parameters& parameters);
 
   Eigen::Index size() const { return 2 * p_ * n_; }               ///< number of unknowns
@@ -96,5 +97,8 @@ class Timoshenko {
   double b_top_;  // b_{p−1}
   double s_;      // shear stiffness per ρA [m²/s²]
 };
+
+/// @throws std::runtime_error if the factor is not to be used
+void require_factor(const Timoshenko::MassFactor& factor);
 
 }  // namespace beam

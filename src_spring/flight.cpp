@@ -107,7 +107,7 @@ void Flight::prepare(const FlightStart& start) {
     if (order == 0) limit(tolerance_y / std::abs(d[2]), 0.5);
   }
   const double levels = std::ceil(std::log2(H / h));
-  if (std::isnan(levels)) throw IdaError("the forces leave the range of floating-point numbers");
+  if (std::isnan(levels)) throw IdaError("values leave the range of floating-point numbers");
   int halvings = static_cast<int>(std::clamp(levels, double{least_halvings}, double{most_halvings}));
   if (touching_ && order < Taylor::max_order) {
     // The power law has no second derivative or outgrows its rates at the start: the velocity from its growth instead.

@@ -33,10 +33,10 @@ struct Laws {
 struct FlightStart {
   double y, z;
   Loads loads;
-  double size;    ///< H [s]
-  double gap;     ///< y − φ, exactly 0 after a stop event
-  double depth;   ///< y − u_tip, exactly 0 after a contact event
-  bool released;  ///< from the stop, N = 0: ÿ = 0 by definition
+  double size;      ///< H [s]
+  double gap;       ///< y − φ, exactly 0 after a stop event
+  double depth;     ///< y − u_tip, exactly 0 after a contact event
+  bool released;    ///< from the stop, N = 0: ÿ = 0 by definition
   long most_steps;  ///< of IDA
 };
 

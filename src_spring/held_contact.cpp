@@ -34,6 +34,7 @@ void HeldContact::choose(double y, double z, double acceleration, bool held) {
   double low = 0.0, high = mean(0.0);
   while (high - low > 4.0 * std::numeric_limits<double>::epsilon() * high) {
     const double middle = (low + high) / 2;
+    if (middle <= low || middle >= high) break;  // neighbouring denormal numbers
     (mean(middle) > middle ? low : high) = middle;
   }
   force_ = high;

@@ -59,8 +59,11 @@ int jacobian(sunrealtype s, sunrealtype c, N_Vector Y, N_Vector Yp, N_Vector, SU
 int events(sunrealtype s, N_Vector Y, N_Vector, sunrealtype* g, void* user_data) {
   const auto& problem = *static_cast<const Problem*>(user_data);
   problem.system->events(s, data(Y), g);
-  for (std::size_t i = 0; i < problem.crossings.size(); ++i)
-    if (!std::isfinite(g[i])) return 1;  // IDA would search for its root without end
+  for (std::size_t i = 0; i < problem.crossings.size(); ++i) {
+    if (std::isnan(g[i])) return 1;  // IDA would search for its root without end
+    // A rate of the power law may be infinite at a start; only its sign matters.
+    if (std::isinf(g[i])) g[i] = std::copysign(1e100, g[i]);
+  }
   // An exact zero counts as not yet crossed: IDA would switch the event function off, and keep it off after IDAReInit.
   // Not the smallest double: IDA multiplies values to compare signs.
   for (std::size_t i = 0; i < problem.crossings.size(); ++i)
@@ -165,6 +168,8 @@ IdaSolver::Outcome IdaSolver::advance() {
   d.check(IDASetMaxNumSteps(d.ida.get(), left), "IDASetMaxNumSteps");
   const int code = IDASolve(d.ida.get(), 1.0, &d.s, d.Y.get(), d.Yp.get(), IDA_NORMAL);
   if (code == IDA_TOO_MUCH_WORK) throw TooMuchWork();
+  if (code == IDA_REP_RES_ERR || code == IDA_FIRST_RES_FAIL || code == IDA_RTFUNC_FAIL)
+    d.message = "values leave the range of floating-point numbers";
   if (code < 0) d.fail("IDASolve", code);
   if (code != IDA_ROOT_RETURN) return Outcome::finished;
   d.check(IDAGetRootInfo(d.ida.get(), d.occurred.data()), "IDAGetRootInfo");

@@ -13,8 +13,8 @@ namespace spring {
 /// Where a segment starts.
 struct SeatedStart {
   Loads loads;
-  double size;   ///< H [s]
-  double depth;  ///< φ − u_tip, exactly 0 after a contact event
+  double size;      ///< H [s]
+  double depth;     ///< φ − u_tip, exactly 0 after a contact event
   long most_steps;  ///< of IDA
 };
 

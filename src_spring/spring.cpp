@@ -14,10 +14,10 @@ namespace spring {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-/// IDA's in one step: several hundred periods of the spring at the tightest tolerance. A step that needs more is refused,
-/// so that no call lasts longer than a second or two.
-constexpr long most_internal_steps = 1'000'000;
-constexpr long most_stalled = 100;         ///< events without progress
+/// In one step, counted in internal steps of IDA: thousands of periods of the spring. A step that needs more is
+/// refused, so that no call lasts longer than a second or two. To start a segment costs as much as some steps.
+constexpr long most_work = 1'000'000, work_of_start = 20;
+constexpr long most_stalled = 100;  ///< events without progress
 
 /// Everything that a step changes. All members are doubles, so that the flat vector is this struct.
 struct State {
@@ -143,7 +143,7 @@ class Step {
 
   void fly() {
     const double gap = laws_.stop ? state_.y - laws_.stop_position : 1.0;
-    const FlightStart start{state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_internal_steps - work_};
+    const FlightStart start{state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_};
     const auto event = attempt(flight_, start);
     released_ = false;
     state_.integral_2 += state_.integral * flight_.elapsed() + flight_.integral_2();
@@ -165,7 +165,7 @@ class Step {
 
   /// @return ∫N
   double sit(Seated& seat) {
-    const auto event = attempt(seat, SeatedStart{now_, remaining(), depth_, most_internal_steps - work_});
+    const auto event = attempt(seat, SeatedStart{now_, remaining(), depth_, most_work - work_});
     const double t = seat.elapsed();
     state_.integral_2 += state_.integral * t + state_.y * t * t / 2;
     state_.integral += state_.y * t;
@@ -183,13 +183,14 @@ class Step {
       const auto event = phase.run(start);
       const long steps = phase.solver().steps();
       state_.steps += static_cast<double>(steps);
-      work_ += std::max(steps, 1L);
+      work_ += steps + work_of_start;
       return event;
     } catch (const TooMuchWork&) {
       const double reached = t_ + phase.solver().s() * start.size;
-      throw StepFailure("spring: a step of " + number(size_) + " s needs more than " +
-                            std::to_string(most_internal_steps) + " internal steps (" + std::to_string(segments_) +
-                            " contact events up to " + number(reached) + " s after its start); use a smaller step size",
+      throw StepFailure("spring: a step of " + number(size_) + " s spans too much of the motion: " +
+                            std::to_string(most_work - work_of_start * segments_) + " internal steps with " +
+                            std::to_string(segments_) + " contact events reach " + number(reached) +
+                            " s after its start; use a smaller step size",
                         reached);
     } catch (const IdaError& error) {
       const double reached = t_ + phase.solver().s() * start.size;
@@ -206,12 +207,12 @@ class Step {
   State state_;
   const double size_;
   const Loads loads_;
-  double t_ = 0.0;         ///< since the step's start
+  double t_ = 0.0;                ///< since the step's start
   long segments_ = 0, work_ = 0;  ///< done, and their internal steps
-  Loads now_;              ///< loads_ from t_ on
-  double depth_ = -1.0;    ///< y − u_tip at t_
-  bool meeting_ = false;   ///< tip and top are at a contact event: y = u_tip
-  bool released_ = false;  ///< has just left the foundation, N = 0
+  Loads now_;                     ///< loads_ from t_ on
+  double depth_ = -1.0;           ///< y − u_tip at t_
+  bool meeting_ = false;          ///< tip and top are at a contact event: y = u_tip
+  bool released_ = false;         ///< has just left the foundation, N = 0
 };
 
 }  // namespace

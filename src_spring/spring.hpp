@@ -36,7 +36,7 @@ struct Parameters {
 
 /// Held or polynomial over one step; τ from its start.
 struct Inputs {
-  std::array<double, 3> contact_force{};     ///< C, Ċ, C̈ : C(τ) = c₀ + c₁τ + c₂τ²/2; positive presses the spring down
+  std::array<double, 3> contact_force{};  ///< C, Ċ, C̈ : C(τ) = c₀ + c₁τ + c₂τ²/2; positive presses the spring down
   std::array<double, 3> foundation_force{};  ///< N, Ṅ, N̈ ≥ 0, upward; used when the stop inside is not enabled
   double external_force = 0.0;               ///< f_s [N]
   std::array<double, 3> tip_displacement{};  ///< u_tip and its derivatives; read by normal_compliance only

@@ -119,6 +119,12 @@ fmi2Status guard(fmi2Component c, const char* function, unsigned legal, Body bod
   }
 }
 
+/// Made once: it hashes the whole description.
+const std::string& guid() {
+  static const std::string text = fmi::guid(fmi::table());
+  return text;
+}
+
 void require(const void* pointer, const char* what) {
   if (!pointer) throw std::invalid_argument(std::string(what) + " is NULL");
 }
@@ -167,8 +173,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (!instanceName || !*instanceName) return refuse("instanceName is empty");
     if (fmuType != fmi2CoSimulation) return refuse("only co-simulation is provided");
     if (!fmuGUID) return refuse("fmuGUID is NULL");
-    const std::string guid = fmi::guid(fmi::table());
-    if (guid != fmuGUID) return refuse("fmuGUID = " + std::string(fmuGUID) + " is not that of this FMU, " + guid);
+    if (guid() != fmuGUID) return refuse("fmuGUID = " + std::string(fmuGUID) + " is not that of this FMU, " + guid());
     auto component = std::make_unique<Component>();
     component->name = instanceName;
     if (functions) component->callbacks = *functions;
@@ -316,7 +321,7 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byt
     if (size < needed) {
       throw std::invalid_argument("size = " + std::to_string(size) + ", needed are " + std::to_string(needed));
     }
-    fmi::serialize(snapshot, fmi::guid(fmi::table()), serializedState);
+    fmi::serialize(snapshot, guid(), serializedState);
   });
 }
 
@@ -326,8 +331,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
     require(serializedState, "serializedState");
     require(FMUstate, "FMUstate");
     // Purely an output, unlike fmi2GetFMUstate's: importers leave anything in it.
-    *FMUstate =
-        k.keep(fmi::deserialize(serializedState, size, fmi::guid(fmi::table()), fmi::table().variables.size()));
+    *FMUstate = k.keep(fmi::deserialize(serializedState, size, guid(), fmi::table().variables.size()));
   });
 }
 

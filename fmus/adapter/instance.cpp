@@ -82,13 +82,6 @@ void Instance::enter_initialization() { phase = initialization; }
 
 void Instance::exit_initialization() {
   ensure_built();
-  for (const Variable& v : table_.variables) {
-    const double value = v.get ? v.get(*model_) : 0.0;
-    if (!std::isfinite(value)) {
-      throw std::invalid_argument("the parameters leave the range of floating-point numbers: '" + v.name +
-                                  "' would be " + text(value));
-    }
-  }
   phase = step_complete;
 }
 
@@ -100,6 +93,13 @@ void Instance::ensure_built() {
     if (is_setting(table_.variables[i])) table_.variables[i].set(*model_, settings_[i]);
   }
   model_->build(tolerance_);
+  for (const Variable& v : table_.variables) {
+    const double value = v.get ? v.get(*model_) : 0.0;
+    if (!std::isfinite(value)) {
+      throw std::invalid_argument("the parameters leave the range of floating-point numbers: '" + v.name +
+                                  "' would be " + text(value));
+    }
+  }
   built_ = true;
   push_inputs();
   model_->observe();

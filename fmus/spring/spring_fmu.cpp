@@ -1,5 +1,6 @@
 // The spring FMU: its table of variables, bound to spring::Spring.
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -56,13 +57,16 @@ struct SpringModel final : fmi::Model {
 
   void step(double size) override {
     std::vector<double> before;
-    if (impulse != 0.0) spring->save(before);
+    if (impulse != 0.0 || held) save(before);
     const auto discard = [&](const std::string& why) {
-      if (!before.empty()) spring->restore(before);
+      if (!before.empty()) restore(before);
       throw fmi::StepDiscarded(why);
     };
     spring::Inputs acting = inputs;
-    if (held) acting.contact_force = {held->force(), 0.0, 0.0};
+    if (held) {
+      if (!std::isfinite(held->force())) discard(no_force);
+      acting.contact_force = {held->force(), 0.0, 0.0};
+    }
     try {
       if (impulse != 0.0) spring->apply_impulse(impulse);
       spring->step(size, acting);
@@ -75,6 +79,7 @@ struct SpringModel final : fmi::Model {
     if (held) {
       held->advance(size);
       choose();
+      if (!std::isfinite(held->force())) discard(no_force);
     }
   }
 
@@ -100,13 +105,17 @@ struct SpringModel final : fmi::Model {
   }
 
  private:
+  static constexpr const char* no_force =
+      "spring: the contact force leaves the range of floating-point numbers; the tip is too far or too fast";
+
   void choose() {
     spring::Inputs acting = inputs;
     acting.contact_force = {};
     spring->observe(acting);
     held->choose(spring->displacement(), spring->velocity(), spring->acceleration(), spring->seated());
     acting.contact_force[0] = held->force();
-    spring->observe(acting);
+    // Without a finite force `reaction` has no value, and the next step is refused.
+    if (std::isfinite(held->force())) spring->observe(acting);
   }
 };
 

@@ -142,6 +142,9 @@ TEST(BeamState, AResultThatIsNotFiniteLeavesTheStateUnchanged) {
     EXPECT_EQ(outputs(b), before);
     EXPECT_THROW(b.apply_tip_impulse(1.7e308), std::domain_error);
     EXPECT_EQ(outputs(b), before);
+    // The tip's motion is finite, the energies are not.
+    EXPECT_THROW(b.step(1e-3, {1e200, 0.0, 0.0}, 0.1), std::domain_error);
+    EXPECT_EQ(outputs(b), before);
     Beam same(p);
     same.step(0.01, {0.3, 0.0, 0.0}, 0.1);
     same.step(0.01, {0.2, 0.0, 0.0}, 0.1);

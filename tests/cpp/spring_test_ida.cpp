@@ -46,7 +46,7 @@ void start_cosine(IdaSolver& solver, const Cosine& system, double omega) {
   solver.initial_derivative()[1] = -omega * omega;
   solver.absolute_tolerance()[0] = 1e-13;
   solver.absolute_tolerance()[1] = 1e-13 * omega;
-  solver.start(system, 1e-13, 1e-7);
+  solver.start(system, 1e-13, 1e-7, 100000);
 }
 
 const std::vector<Crossing> distance_and_rate{Crossing::falling, Crossing::rising};
@@ -138,10 +138,28 @@ TEST(IdaSolver, ExactZerosDoNotSwitchEventsOff) {
   ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
   EXPECT_LT(solver.s(), 1e-6);
   const Cosine system(3.0, 0.5);
-  solver.start(system, 1e-13, 1e-7);
+  solver.start(system, 1e-13, 1e-7, 100000);
   ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
   EXPECT_TRUE(solver.fell(0, 1));
   EXPECT_NEAR(solver.s(), 3.14159265358979323846 / 9.0, 1e-11);
+}
+
+// The steps allowed are those since start(), also where events interrupt them.
+TEST(IdaSolver, StepsAreCountedFromTheStart) {
+  const Cosine system(60.0, -2.0);  // its rate rises through 0 some ten times, the level is never reached
+  IdaSolver solver(2, distance_and_rate);
+  start_cosine(solver, system, 60.0);
+  const auto finish = [&solver] {
+    long events = 0;
+    while (solver.advance() == IdaSolver::Outcome::event) ++events;
+    return events;
+  };
+  EXPECT_GE(finish(), 9);
+  const long needed = solver.steps();
+  solver.start(system, 1e-13, 1e-7, needed);
+  EXPECT_NO_THROW(finish());
+  solver.start(system, 1e-13, 1e-7, needed - 1);
+  EXPECT_THROW(finish(), TooMuchWork);
 }
 
 TEST(IdaSolver, FailureCarriesIdasMessage) {
@@ -152,7 +170,7 @@ TEST(IdaSolver, FailureCarriesIdasMessage) {
   };
   const Nowhere system;
   IdaSolver solver(1, {});
-  solver.start(system, 1e-6, 1e-3);
+  solver.start(system, 1e-6, 1e-3, 100000);
   try {
     solver.advance();
     FAIL() << "no error";
@@ -171,7 +189,7 @@ TEST(Flight, JacobianMatchesDifferences) {
   const double H = 0.02, y = 0.15, z = 0.5;
   // Touching, δ = 0.1; unresolved steps have another reference polynomial.
   for (const double size : {H, 40 * H}) {
-    const FlightStart start{y, z, loads, size, y + 0.2, y - 0.05, false};
+    const FlightStart start{y, z, loads, size, y + 0.2, y - 0.05, false, 100000};
     flight.run(start);
     const double d = 1e-5;
     expect_jacobian<5>(flight, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2, 0.3}, {d, d * size, d, d, d}, 1e-7);
@@ -185,7 +203,7 @@ TEST(Seated, JacobianMatchesDifferences) {
   Loads loads;
   loads.force.c = {-20.0, 1.0, 3.0};
   loads.tip.c = {-0.3, 0.4, -1.0};
-  EXPECT_EQ(seated.run({loads, 0.02, 0.1}), Seated::Event::none);
+  EXPECT_EQ(seated.run({loads, 0.02, 0.1, 100000}), Seated::Event::none);
   const double d = 1e-5;
   expect_jacobian<4>(seated, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2}, {d, d, d, d}, 1e-7);
 }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <functional>
+#include <initializer_list>
 #include <limits>
 #include <string>
 #include <vector>
@@ -38,6 +39,10 @@ std::string refusal(const std::function<void(Parameters&)>& change) {
   return refusal(std::function<void()>([&p] { Spring s(p); }));
 }
 
+void expect(const std::string& message, std::initializer_list<const char*> parts) {
+  for (const char* part : parts) EXPECT_NE(message.find(part), std::string::npos) << message;
+}
+
 Parameters softening() {
   Parameters p;
   p.linear_stiffness = 3.0;
@@ -63,12 +68,21 @@ Parameters everything() {
   return p;
 }
 
+/// What a step says that cannot be completed; the state must be as before.
+std::string failure(Spring& spring, double size, const Inputs& inputs = {}) {
+  const auto before = saved(spring);
+  try {
+    spring.step(size, inputs);
+  } catch (const spring::StepFailure& error) {
+    EXPECT_EQ(saved(spring), before);
+    return error.what();
+  }
+  return "the step was completed";
+}
+
 }  // namespace
 
 TEST(SpringParameters, RefusalsNameParameterValueAndWhatIsAllowed) {
-  const auto expect = [](const std::string& message, std::initializer_list<const char*> parts) {
-    for (const char* part : parts) EXPECT_NE(message.find(part), std::string::npos) << message;
-  };
   expect(refusal([](Parameters& p) { p.mass = 0.0; }), {"mass = 0", "> 0"});
   expect(refusal([](Parameters& p) { p.mass = not_a_number; }), {"mass = nan", "> 0"});
   expect(refusal([](Parameters& p) { p.damping = -0.5; }), {"damping = -0.5", ">= 0"});
@@ -268,4 +282,45 @@ TEST(SpringEscape, AForceCanPushItOver) {
   p.cubic_stiffness = 0.2;
   Spring hardening(p);
   EXPECT_NO_THROW(hardening.step(1.0, inputs));
+}
+
+// ω = 1e6 rad/s over 1000 s is 1.6e8 periods, hours of internal steps; over 0.1 ms it is 16.
+TEST(SpringStep, WorkIsBounded) {
+  Parameters p;
+  p.linear_stiffness = 1e12;
+  p.displacement = 1e-3;
+  Spring s(p);
+  expect(failure(s, 1e3),
+         {"1000 s spans too much", "1000000 internal steps with 0 contact events", "smaller step size"});
+  s.step(1e-4, {});
+  EXPECT_NEAR(s.displacement(), 1e-3 * std::cos(100.0), 1e-12);
+  // Also where events, not the motion, are what is many: a bounce lasts 4 us.
+  Parameters bouncing;
+  bouncing.linear_stiffness = 0.0;
+  bouncing.displacement = 1e-5;
+  bouncing.stop_enabled = true;
+  bouncing.stop_position = 0.0;
+  Inputs pressed;
+  pressed.external_force = -5e6;
+  Spring b(bouncing);
+  expect(failure(b, 1.0, pressed), {"1 s spans too much", "internal steps with ", "smaller step size"});
+}
+
+// Finite numbers whose results are not: the motion, its energy, the force of the law inside.
+TEST(SpringStep, ResultsThatAreNotFiniteAreRefused) {
+  Inputs force;
+  force.external_force = 1e300;
+  Parameters p;
+  p.cubic_stiffness = 1.0;
+  Spring hardening(p);
+  expect(failure(hardening, 1.0, force), {"range of floating-point numbers"});
+  Parameters heavy;
+  heavy.mass = 1e300;
+  heavy.velocity = 1e10;
+  Spring planet(heavy);
+  expect(failure(planet, 1e-3), {"range of floating-point numbers", "smaller inputs"});  // ½ m z²
+  Spring pressed(everything());
+  Inputs tip;
+  tip.tip_displacement = {-1e300, 0.0, 0.0};
+  expect(failure(pressed, 1e-3, tip), {"range of floating-point numbers"});  // λ δ^p
 }
