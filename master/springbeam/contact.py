@@ -10,6 +10,7 @@ from enum import Enum
 
 from .memory import Memory
 from .scene import Scene, Spring
+from .statics import tip_compliance, tip_load_deflection
 from .subsystem import Motion
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only).
@@ -138,8 +139,19 @@ class Transitions(Memory):
         impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
         at_equilibrium = abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
-        tied = common <= 0.0 if at_equilibrium else low.displacement < psi
+        if at_equilibrium:
+            tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
+        else:
+            tied = low.displacement < psi
         return Phase(Joint.TIED if tied else Joint.TOUCH), impact
+
+    def _rises_from_rest(self) -> bool:
+        """Whether a massless tip and the spring, at rest together at Ψ, are pushed up."""
+        beam, spring = self._scene.beam, self._scene.spring
+        if self._tip_mass != 0.0 or beam is None or spring is None:
+            return False
+        psi = spring.equilibrium
+        return spring_force(spring, psi) + (psi - tip_load_deflection(beam)) / tip_compliance(beam) < 0.0
 
     def _strike(self, phase: Phase, tip: Motion, low: Motion) -> tuple[str, Phase, Impact]:
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""

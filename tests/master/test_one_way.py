@@ -32,7 +32,7 @@ def scene(**tables: dict[str, Any]) -> Scene:
 HEAVY = {"mass": 100.0, "linear_stiffness": 1e6, "cubic_stiffness": 0.0, "initial_velocity": 0.5}
 CASES: dict[str, tuple[str, dict[str, dict[str, Any]]]] = {
     "rings": ("beam_drives", {}),
-    "damped": ("beam_drives", {"beam": {"alpha_b": 1e-3}}),
+    "damped": ("beam_drives", {"beam": {"alpha_b": 1e-3, "n_elements": 2}}),
     "Hertz": ("beam_drives", {"contact": {"exponent": 1.5, "stiffness": 1e3}}),
     "lossy foundation": (
         "beam_drives",

@@ -205,6 +205,14 @@ LIFE = {
         },
     },
     "load upward": {"beam": {"distributed_load": 3.0}, "stop": {"position": -0.2}},
+    "from rest at Ψ, upward": {
+        "spring": {"initial_velocity": 0.0, "external_force": 1.0},
+        "beam": {"distributed_load": 0.0},
+    },
+    "from rest at Ψ, downward": {
+        "spring": {"initial_velocity": 0.0, "external_force": -1.0},
+        "beam": {"distributed_load": 0.0},
+    },
     "hardening, pressed": {
         "spring": {"external_force": -3.0, "cubic_stiffness": 4.0},
         "stop": {"position": -0.2, "restitution": 0.3},

@@ -249,6 +249,8 @@ class _Run:
         X = self.X
         X[2] = X[0] - self.rest
         height, rate = X[0] - self.psi, float(X[1])
+        if rate == 0.0:
+            rate = float(self._spring_force(X) - self._contact(Phase("tied"), X))
         below = height < -_NOISE * abs(self.psi) or (abs(height) <= _NOISE * abs(self.psi) and rate <= 0.0)
         self.phase = Phase("tied" if below else "touch", self.phase.seated)
         self._emit("impact")
