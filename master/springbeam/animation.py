@@ -27,12 +27,12 @@ from .drawing import (
     VERMILLION,
     Unit,
     decimated,
+    mark,
     much_smaller,
     near_levels,
     phase_intervals,
     present,
     readable_unit,
-    unresolved,
 )
 from .motion import COIL_ACROSS, COIL_WIDTH, STOP_WIDTH, Motion, motion_of
 from .plots import LINES, STYLE
@@ -125,8 +125,7 @@ class _Picture:
         self._cursor = below.axvline(0.0, color=BLACK, lw=1.0, ls=":")
         self.figure.suptitle(trajectory.scene.title, fontsize=10.0, x=0.01, ha="left")
         self._words = self.figure.text(0.99, 0.985, "", fontsize=9.0, ha="right", va="top", family="monospace")
-        if unresolved(trajectory) or any("not resolved" in str(w) for w in trajectory.summary.get("warnings", ())):
-            words = "not resolved: velocities or forces alternate from step to step"
+        if words := mark(trajectory):
             above.set_title(words, fontsize=9.0, loc="right", color=VERMILLION, y=1.0)
         self._freeze()
 

@@ -23,8 +23,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .monolithic import algorithm1, event_driven
+from .resolution import mesh_frequency
 from .runner import RunStopped, simulate
 from .scene import Scene, SceneError, with_changes
+from .statics import tip_compliance
 from .trajectory import Event, Trajectory
 
 _SAFETY = 4.0
@@ -139,7 +141,7 @@ def _pair(scene: Scene) -> tuple[Trajectory, Trajectory, float]:
     coarse, fine = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
     changes = [contact_changes(run.events, _SHORT * size) for run in (coarse, fine)]
     horizon = _agree_until(changes[0], changes[1], float(coarse.time[0]), float(coarse.time[-1]))
-    if any(warning.startswith("not resolved") for warning in coarse.summary["warnings"]):
+    if not coarse.summary["resolved"]:
         return coarse, fine, float(coarse.time[0])
     times = _grid(coarse, scene)
     for name in (*_DISPLACEMENTS, *_VELOCITIES):
@@ -176,16 +178,8 @@ def _rounding(scene: Scene) -> float:
     beam = scene.beam
     if beam is None:
         return 0.0
-    bending = beam.young_modulus * beam.second_moment_of_area
-    shear = beam.shear_coefficient * beam.shear_modulus * beam.area
-    line_mass, line_inertia = beam.density * beam.area, beam.density * beam.second_moment_of_area
-    h, p = beam.length / beam.n_elements, beam.element_degree
-    # Of ∫v'²/∫v² over polynomials: 12/h² for p = 1, 60/h² for p = 2, then a little more than the exact value.
-    gradient = p * (p + 1) * (p + 2) * (p + 3) / (2.0 * h**2)
-    fastest = gradient * max(bending / line_inertia, shear / line_mass) + shear / line_inertia
-    compliance = beam.length**3 / (3.0 * bending) + beam.length / shear
-    slowest = 4.0 / (line_mass * beam.length * compliance)
-    return float(np.finfo(float).eps * np.sqrt(max(1.0, fastest / slowest)))
+    slowest = 2.0 / np.sqrt(beam.density * beam.area * beam.length * tip_compliance(beam))
+    return float(np.finfo(float).eps * max(1.0, mesh_frequency(beam) / slowest))
 
 
 # -- times ----------------------------------------------------------------------------------------------------------

@@ -114,7 +114,16 @@ def alternates(values: np.ndarray) -> bool:
     return bool(reversals > 0.6 and np.mean(np.abs(jumps)) > 0.15 * usual_range)
 
 
-def unresolved(trajectory: Trajectory) -> list[str]:
+#: The mark of pictures whose run says of itself that it is `springbeam.resolution.not_resolved`.
+NOT_RESOLVED = "NOT RESOLVED by the macro step: see the warnings"
+
+
+def mark(trajectory: Trajectory) -> str:
+    """`NOT_RESOLVED`, or nothing if the run has resolved its motion."""
+    return "" if trajectory.summary.get("resolved", True) else NOT_RESOLVED
+
+
+def alternating(trajectory: Trajectory) -> list[str]:
     """Words for the quantities that alternate from step to step."""
     looks = POSITIONS | VELOCITIES | FORCES
     return [looks[name].words for name in present(trajectory, looks) if alternates(trajectory[name])]

@@ -16,6 +16,7 @@ from .coupling.compliance import compliance_force
 from .ledger import Ledger
 from .memory import Memory
 from .recording import NonFiniteValue, Recorder
+from .resolution import not_resolved
 from .scene import Scene
 from .simulation import Progress, RunStopped
 from .subsystem import NO_FORCE, BeamBody, Body, StepRefused
@@ -241,6 +242,10 @@ class PaperLaw(Memory):
 
     def summary(self) -> dict[str, Any]:
         """As of `springbeam.simulation.Simulation`, with what the algorithm injected [J]."""
+        warnings = ["contact.law = 'paper' overwrites the tip's position: the energy residual is what that injects"]
+        unresolved = not_resolved(self.scene, 0.0, 0.0)
+        if unresolved is not None:
+            warnings.append(unresolved)
         return {
             "time": self.time,
             "macro_steps": self._steps,
@@ -252,7 +257,6 @@ class PaperLaw(Memory):
             "max_energy_residual_joule": self._ledger.largest_residual,
             "injected_into_beam": self._injected["beam"],
             "injected_into_spring": self._injected["spring"],
-            "warnings": [
-                "contact.law = 'paper' overwrites the tip's position: the energy residual is what that injects"
-            ],
+            "resolved": unresolved is None,
+            "warnings": warnings,
         }

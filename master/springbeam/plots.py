@@ -48,6 +48,7 @@ from .drawing import (
     energy_scale,
     first_contact,
     levels,
+    mark,
     much_smaller,
     phase_intervals,
     present,
@@ -217,7 +218,7 @@ class _Timeline:
         t, v = self.unit.factor * self.trajectory["time"][rows], unit.factor * values[rows]
         if alternates(values):
             style = {**style, "linewidth": 0.25, "marker": ".", "markersize": 1.6, "markeredgewidth": 0.0}
-            _note(ax, "alternates from step\nto step: not resolved")
+            _note(ax, "alternates from step\nto step")
         ax.plot(t, v, **style)
 
     def _shade(self) -> list[Patch]:
@@ -268,6 +269,7 @@ def _figure(trajectory: Trajectory, title: str, height: float) -> Figure:
     FigureCanvasAgg(figure)
     scene = trajectory.scene.title
     figure.suptitle(f"{title}\n{scene}" if scene else title, fontsize=10.0, x=0.01, ha="left")
+    figure.text(0.99, 0.985, mark(trajectory), fontsize=8.0, weight="bold", color=VERMILLION, ha="right", va="top")
     return figure
 
 
@@ -344,7 +346,7 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
     _levels(left, trajectory, readable_unit([shapes[some]], "m"))
     _map(figure, right, trajectory, times, shapes)
     if jumpy:
-        left.set_title("pairs of successive shapes: they alternate,\nthe motion is not resolved", **_REMARK)
+        left.set_title("pairs of successive shapes: they alternate\nfrom step to step", **_REMARK)
     return figure
 
 

@@ -426,7 +426,7 @@ _TABLES: dict[str, type[_Table]] = {
 }
 
 
-def _locking(beam: Beam) -> float:
+def locking(beam: Beam) -> float:
     """Static tip stiffness of the mesh over that of the beam, with full integration (model.md, "Locking")."""
     if beam.fidelity == "quasi_static" or beam.reduced_integration or beam.element_degree > 2:
         return 1.0
@@ -442,7 +442,7 @@ def suspicions(scene: Scene) -> list[str]:
     """What can be run but may not be meant; for a run's warnings."""
     found = []
     beam = scene.beam
-    if beam is not None and (factor := _locking(beam)) > 1.05:
+    if beam is not None and (factor := locking(beam)) > 1.05:
         found.append(
             f"[beam] n_elements = {beam.n_elements}: full integration locks, the beam is {factor:.3g} times too "
             "stiff; use reduced_integration = true, element_degree = 3, or more elements"

@@ -20,6 +20,7 @@ from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .memory import Memory
 from .recording import NonFiniteValue, Recorder
+from .resolution import not_resolved
 from .rows import Rows
 from .scene import Scene
 from .stepping import Pair, State, Step
@@ -36,8 +37,6 @@ _MAX_HALVINGS = 20
 _AT_ONCE, _MAX_EVENTS_AT_ONCE = 1e-6, 500
 #: Relative energy residual at which a run says so, and at which it stops (but for what numerical damping takes).
 _ENERGY_WARNS, _ENERGY_STOPS = 1e-3, 0.1
-#: Velocity mismatch of tip and spring top, relative to their speed, above which the motion is called unresolved.
-_UNRESOLVED = 0.2
 
 
 class RunStopped(RuntimeError):
@@ -290,12 +289,9 @@ class Simulation(Memory):
         warnings, rows = [], self._rows
         if self._ledger.relative > _ENERGY_WARNS:
             warnings.append(self._energy_cause())
-        if rows.largest_mismatch > _UNRESOLVED * rows.largest_speed:
-            warnings.append(
-                f"not resolved: the joined ends' velocities differ by up to {rows.largest_mismatch:.3g} m/s of "
-                f"{rows.largest_speed:.3g} m/s; velocities and forces alternate from step to step. A smaller "
-                f"coupling.macro_step (now {self._steps.size:g} s) or fewer beam.n_modes resolves the motion"
-            )
+        unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed)
+        if unresolved is not None:
+            warnings.append(unresolved)
         one_way = self._pair.one_way
         neglected = {} if one_way is None else {"neglected_motion": one_way.neglected, "neglected_share": one_way.share}
         return {
@@ -309,5 +305,6 @@ class Simulation(Memory):
             "max_energy_residual": self._ledger.relative,
             "max_energy_residual_joule": self._ledger.largest_residual,
             "max_velocity_mismatch": rows.largest_mismatch,
+            "resolved": unresolved is None,
             "warnings": warnings,
         }

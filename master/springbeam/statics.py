@@ -1,4 +1,4 @@
-"""Exact statics of the clamped Timoshenko beam: no mesh, closed under quadrature.
+"""Statics of the clamped Timoshenko beam, exact, and its lowest frequency: no mesh, closed under quadrature.
 
 With t = L − x the distance from the tip, a tip force of 1 N has the shear force 1 and the moment t; the loads of a
 scene, p(t) = f_b + c (1 − t/h)₊ [N/m] (c the ``tip_load_coefficient``, h the last element's length), have
@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.linalg
 
 if TYPE_CHECKING:
     from .scene import Beam
@@ -23,6 +24,7 @@ Virtual = Callable[[np.ndarray], np.ndarray]
 
 #: Gauss–Legendre on [0, 1], exact to degree 7: M² has degree 6.
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
+_RITZ_DEGREE = 6
 
 
 def bending_stiffness(beam: Beam) -> float:
@@ -53,6 +55,22 @@ def tip_inertia(beam: Beam) -> float:
     shape, inertia = tip_force_shape(beam, _NODES), beam.second_moment_of_area / beam.area
     density = beam.density * beam.area * (shape**2 + inertia * turn**2)
     return beam.length * float(_WEIGHTS @ density) / tip_compliance(beam) ** 2
+
+
+def lowest_frequency(beam: Beam) -> float:
+    """Lowest frequency, clamped and free [rad/s], by Ritz's method: u and θ polynomials of degree 6 over the length."""
+    nodes, weights = np.polynomial.legendre.leggauss(_RITZ_DEGREE + 1)  # exact for their products
+    x = 0.5 * (nodes + 1.0)
+    powers = np.arange(1, _RITZ_DEGREE + 1)
+    w = x[:, None] ** powers
+    slope, zero = powers * x[:, None] ** (powers - 1) / beam.length, np.zeros_like(w)
+    area, inertia = beam.density * beam.area, beam.density * beam.second_moment_of_area
+    rows = (
+        ((area, np.hstack([w, zero])), (inertia, np.hstack([zero, w]))),
+        ((shear_stiffness(beam), np.hstack([slope, -w])), (bending_stiffness(beam), np.hstack([zero, slope]))),
+    )
+    mass, stiffness = (sum(c * (B.T * weights) @ B for c, B in energy) for energy in rows)
+    return float(np.sqrt(scipy.linalg.eigh(stiffness, mass, eigvals_only=True, subset_by_index=(0, 0))[0]))
 
 
 def load_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:

@@ -14,7 +14,15 @@ from matplotlib.image import imread
 from runs import EVERY_EVENT, PAIR, a_trajectory
 
 from springbeam import plots
-from springbeam.drawing import EVENT_LOOKS, PIXEL_COLUMNS, alternates, decimated, phase_intervals, readable_unit
+from springbeam.drawing import (
+    EVENT_LOOKS,
+    NOT_RESOLVED,
+    PIXEL_COLUMNS,
+    alternates,
+    decimated,
+    phase_intervals,
+    readable_unit,
+)
 from springbeam.plots import plot_run
 from springbeam.recording import PICTURES, columns_of
 from springbeam.scene import with_changes
@@ -174,17 +182,26 @@ def test_many_events_become_ticks_in_rows():
     assert len({line.get_ydata()[0] for line in marks}) == 2
 
 
-def test_what_alternates_is_said_to_be_unresolved():
+def test_what_alternates_is_said_to_do_so():
     flips = np.where(np.arange(400) % 2, 1.0, -1.0)
-    remark = "alternates from step\nto step: not resolved"
+    remark = "alternates from step\nto step"
     assert remark in texts(plots._positions(a_trajectory(v_tip=flips)))
     assert remark not in texts(plots._positions(a_trajectory()))
     unresolved = a_trajectory()
     unresolved.shapes[1][:] = np.outer(flips, SHAPE_POINTS)
     figure = plots._shapes_later(unresolved)
-    assert any("not resolved" in text for text in texts(figure))
+    assert any("they alternate" in text for text in texts(figure))
     tips = [curve[-1, 1] for curve in figure.axes[0].collections[0].get_segments()]
     assert {-1.0, 1.0} == set(tips)
+
+
+def test_every_picture_of_a_run_that_is_not_resolved_carries_the_mark():
+    drawings = (plots._shapes_after_contact, plots._shapes_later, plots._positions, plots._velocities_and_forces,
+                plots._gap_and_energy)  # fmt: skip
+    for resolved in (True, False):
+        run = dataclasses.replace(a_trajectory(), summary={"resolved": resolved})
+        for draw in drawings:
+            assert (NOT_RESOLVED in texts(draw(run))) is not resolved
 
 
 def test_small_forces_are_named_rather_than_drawn_on_the_axis():

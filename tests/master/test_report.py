@@ -15,7 +15,7 @@ from runs import EVERY_EVENT, PAIR, a_trajectory
 from typer.testing import CliRunner
 
 from springbeam import cli
-from springbeam.drawing import EVENT_LOOKS, PIXEL_COLUMNS, readable_unit
+from springbeam.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS, readable_unit
 from springbeam.motion import COIL_HEIGHTS, MOST_FRAMES, motion_of
 from springbeam.recording import REPORT, FileRecorder, RunDirectory
 from springbeam.report import page, shipped_command
@@ -268,9 +268,16 @@ def test_warnings_come_first():
     found = Page(page(dataclasses.replace(run, summary={"status": "done", "warnings": ["take care"]})))
     assert found.ids[0] == "warnings"
     assert "take care" in found.texts["warnings"]
-    assert "tip v(t, L): alternates from step to step: not resolved" in " ".join(found.texts["warnings"].split())
-    assert "alternates from step to step: not resolved" in found.texts["over-time"]
+    assert "tip v(t, L): alternates from step to step" in " ".join(found.texts["warnings"].split())
+    assert "alternates from step to step" in found.texts["over-time"]
     assert "warnings" not in Page(page(a_trajectory())).ids
+
+
+def test_every_chart_of_a_run_that_is_not_resolved_carries_the_mark():
+    marked = page(dataclasses.replace(a_trajectory(), summary={"resolved": False}))
+    charts = Page(marked).data["charts"]
+    assert marked.count(NOT_RESOLVED) == len(charts) > 4
+    assert NOT_RESOLVED not in page(dataclasses.replace(a_trajectory(), summary={"resolved": True}))
 
 
 @pytest.mark.parametrize(

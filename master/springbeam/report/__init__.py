@@ -14,12 +14,12 @@ import numpy as np
 import tomli_w
 from plotly.offline import get_plotlyjs
 
-from ..drawing import EVENT_LOOKS, FORCES, IMPULSES, POSITIONS, present, readable_unit, unresolved
+from ..drawing import EVENT_LOOKS, FORCES, IMPULSES, POSITIONS, alternating, mark, present, readable_unit
 from ..motion import Motion, motion_of
 from ..scene import Scene, load_scene, shipped_scenes
 from ..trajectory import Trajectory
 from .figures import (
-    NOT_RESOLVED,
+    ALTERNATES,
     Chart,
     backdrop,
     charts,
@@ -59,6 +59,7 @@ def page(trajectory: Trajectory) -> str:
         title=scene.title or "(untitled scene)",
         version=trajectory.summary.get("version", ""),
         warnings=_warnings(trajectory),
+        mark=mark(trajectory),
         moving=moving,
         frames=0 if motion is None else len(motion.time),
         charts=over_time,
@@ -113,8 +114,8 @@ def _warnings(trajectory: Trajectory) -> list[str]:
         when = f" at t = {summary['time']:.9g} s" if isinstance(summary.get("time"), float) else ""
         found.append(f"The run was {status}{when}: {summary.get('cause', 'cause unknown')}")
     found += [str(warning) for warning in summary.get("warnings", ())]
-    if len(trajectory) and (words := unresolved(trajectory)):
-        found.append(f"{', '.join(words)}: {NOT_RESOLVED}. Single values and frames mean little there.")
+    if len(trajectory) and (words := alternating(trajectory)):
+        found.append(f"{', '.join(words)}: {ALTERNATES}. Single values and frames mean little there.")
     return found
 
 

@@ -42,7 +42,7 @@ from ..drawing import (
 from ..motion import COIL_ACROSS, COIL_HEIGHTS, COIL_WIDTH, STOP_WIDTH, Motion
 from ..trajectory import SHAPE_POINTS, Trajectory
 
-NOT_RESOLVED = "alternates from step to step: not resolved"
+ALTERNATES = "alternates from step to step"
 #: More events than this are not drawn through the charts.
 _MANY_EVENTS = 60
 #: What tells lines apart besides their colour.
@@ -236,7 +236,7 @@ def _curve(chart: Chart, trajectory: Trajectory, name: str, look: Look, unit: Un
             "line": {"color": look.colour, "width": 0.4},
             "marker": {"size": 2.5, "color": look.colour},
         }
-        remark = f"{look.words} {NOT_RESOLVED}"
+        remark = f"{look.words} {ALTERNATES}"
         chart.remarks += [remark] if remark not in chart.remarks else []
     chart.figure.add_scatter(
         x=time_unit(trajectory).factor * trajectory["time"][rows],

@@ -1,0 +1,98 @@
+"""Whether a macro step resolves the motion: frequencies beside the mesh's, and the criterion from both sides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from springbeam import load_scene, simulate, with_changes
+from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.resolution import MISMATCH, fastest_frequency, modes_below, not_resolved, slowest_frequency
+from springbeam.scene import scene_from_dict, shipped_scenes
+
+BEAMS = [name for name in shipped_scenes() if load_scene(name).beam is not None]
+PAIR = load_scene("soft")
+
+
+@pytest.mark.parametrize("name", BEAMS)
+def test_the_slowest_frequency_is_that_of_the_mesh(name):
+    beam = load_scene(name).beam
+    assert slowest_frequency(beam) == pytest.approx(modal_beam(beam).omega[0], rel=2e-3)
+
+
+@pytest.mark.parametrize("name", BEAMS)
+def test_modes_are_counted_to_within_one(name):
+    beam = load_scene(name).beam
+    omega = modal_beam(beam).omega
+    for k in (1, 2, 3, 5, 8, 12, 16):
+        if k <= (beam.n_modes or 16):
+            assert abs(modes_below(beam, 1.001 * omega[k - 1]) - k) <= 1
+
+
+def test_the_fastest_frequency_is_the_meshs_or_that_of_the_last_mode_kept():
+    beam = PAIR.beam
+    assert fastest_frequency(beam) == pytest.approx(modal_beam(beam).omega[-1], rel=1e-3)
+    fewer = beam.model_copy(update={"n_modes": 10})
+    omega = modal_beam(beam).omega
+    assert omega[8] < fastest_frequency(fewer) < omega[10]
+
+
+@pytest.mark.parametrize(("turn", "resolved"), [(0.98, True), (1.02, False)])
+def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
+    scene = with_changes(PAIR, coupling={"macro_step": turn / slowest_frequency(PAIR.beam)})
+    assert (not_resolved(scene, 0.0, 1.0) is None) is resolved
+    lone = {
+        "time": {"t_end": 9.0},
+        "spring": {"mass": 4.0, "linear_stiffness": 1.0},
+        "coupling": {"macro_step": 2.0 * turn},
+    }
+    assert (not_resolved(scene_from_dict(lone), 0.0, 1.0) is None) is resolved
+
+
+@pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
+def test_a_fifth_of_the_speed_is_the_limit_of_the_mismatch(share, resolved):
+    assert (not_resolved(PAIR, 3.0 * share * MISMATCH, 3.0) is None) is resolved
+
+
+def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
+    coarse = with_changes(PAIR, coupling={"macro_step": 0.2})
+    assert "slowest oscillation of the beam" in not_resolved(coarse, 0.0, 1.0)
+    assert not_resolved(with_changes(coarse, beam={"alpha_b": 1.0}), 0.0, 1.0) is None
+    assert not_resolved(with_changes(coarse, beam={"fidelity": "quasi_static"}), 0.0, 1.0) is None
+    tolerances = with_changes(PAIR, coupling={"relative_tolerance": 1e-3})
+    assert not_resolved(tolerances, 0.0, 1.0) is None
+
+
+def test_the_step_that_is_named_resolves_the_motion():
+    """`soft`, energy 0: at 2 ms the tie is left with 60 % of the speed; the warning's H and mode count cure it."""
+    coarse = simulate(with_changes(PAIR, coupling={"macro_step": 2e-3}))
+    assert coarse.summary["resolved"] is False
+    (warning,) = coarse.summary["warnings"]
+    named = float(warning.split("macro_step <= ")[1].split()[0])
+    modes = int(warning.split("n_modes = ")[1].split()[0])
+    assert named == pytest.approx(1.0 / modal_beam(PAIR.beam).omega[-1], rel=0.1)
+    for changes in (
+        {"coupling": {"macro_step": named}},
+        {"coupling": {"macro_step": 2e-3}, "beam": {"n_modes": modes}},
+    ):
+        cured = simulate(with_changes(PAIR, **changes))
+        assert cured.summary["resolved"] is True, changes
+        assert cured.summary["warnings"] == []
+
+
+@pytest.mark.parametrize(
+    ("scene", "law", "resolved"),
+    [("soft", "transmission", True), ("paper-fig2", "transmission", False), ("paper-fig2", "paper", False)],
+)
+def test_shipped_scenes_both_ways(scene, law, resolved):
+    """ω₁H = 0.0032 and 967."""
+    mesh = {"n_elements": 50, "n_modes": 0}
+    start = load_scene(scene).contact_time
+    run = simulate(with_changes(load_scene(scene), time={"t_end": start + 0.1}, beam=mesh, contact={"law": law}))
+    assert run.summary["resolved"] is resolved
+    told = [warning for warning in run.summary["warnings"] if warning.startswith("not resolved")]
+    assert len(told) == (not resolved)
+    if told:
+        assert "turns 967 rad" in told[0]
+        assert "macro_step <= 3.9e-06 s" in told[0]
+    assert np.isfinite(run.u_tip).all()
