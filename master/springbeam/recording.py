@@ -537,7 +537,7 @@ class FileRecorder(_Checks):
         self._summary_part.write_bytes(b" " * _SUMMARY_ROOM)
 
     def _write_summary(self, summary: Mapping[str, Any]) -> None:
-        text = json.dumps(_json_ready(_with_scene(summary, self.scene)), indent=2, allow_nan=False, ensure_ascii=False)
+        text = json.dumps(json_ready(_with_scene(summary, self.scene)), indent=2, allow_nan=False, ensure_ascii=False)
         # A reader, or a run killed at this moment, finds the old summary or the new one, never half of it.
         with self._summary_part.open("r+b" if self._summary_part.exists() else "wb") as file:
             file.write(text.encode() + b"\n")
@@ -661,7 +661,7 @@ _PLAIN: tuple[tuple[type, Callable[[Any], Any]], ...] = (
 )
 
 
-def _json_ready(value: Any) -> Any:
+def json_ready(value: Any) -> Any:
     """Plain JSON types; a number that is not finite becomes its name: JSON has none, a stopped run may."""
     for kind, plain in _PLAIN:
         if isinstance(value, kind):
@@ -669,7 +669,7 @@ def _json_ready(value: Any) -> Any:
     if isinstance(value, float) and not isfinite(value):
         return repr(value)
     if isinstance(value, Mapping):
-        return {str(key): _json_ready(item) for key, item in value.items()}
+        return {str(key): json_ready(item) for key, item in value.items()}
     if isinstance(value, (list, tuple, set, frozenset)):
-        return [_json_ready(item) for item in value]
+        return [json_ready(item) for item in value]
     return value

@@ -10,11 +10,13 @@ from __future__ import annotations
 import difflib
 import json
 import math
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args, get_origin
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
@@ -486,14 +488,40 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = ()) -> Scene
     """
     path = _scene_file(path_or_name)
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
+        data = tomllib.loads(text)
     except OSError as error:
         raise SceneError(f"{path}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise SceneError(f"{path}: not TOML: {error}") from error
-    for override in overrides:
-        _override(data, override)
-    return scene_from_dict(data, source=str(path))
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path}: not TOML: {error}{_line_of(error, text)}") from error
+    changes = {_override(data, override): override for override in overrides}
+    try:
+        return scene_from_dict(data, source=str(path))
+    except SceneError as error:
+        raise SceneError(_blamed(str(error), str(path), changes)) from None
+
+
+def _line_of(error: Exception, text: str) -> str:
+    """The line that a TOML error is about, for its message."""
+    found = re.search(r"at line (\d+)", str(error))
+    lines = text.splitlines()
+    return f": {lines[int(found[1]) - 1].strip()[:60]}" if found and int(found[1]) <= len(lines) else ""
+
+
+def _blamed(message: str, path: str, changes: Mapping[tuple[str, str], str]) -> str:
+    """The message with ``--set`` named instead of the file where it is about a value given there."""
+    lines = []
+    for line in message.splitlines():
+        said = line.removeprefix(f"{path}: ")
+        found = re.match(r"\[(\w+)\](?: (\w+))?", said)
+        given = [
+            text for (table, key), text in changes.items() if found and found[1] == table and found[2] in (key, None)
+        ]
+        source = f"--set {given[-1]}" if given else f"{path} with --set" if changes else path
+        lines.append(f"{source}: {said}")
+    return "\n".join(lines)
 
 
 def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
@@ -521,13 +549,23 @@ def with_changes(scene: Scene, **tables: Mapping[str, Any] | None) -> Scene:
     return scene_from_dict({table: content for table, content in data.items() if content is not None})
 
 
-def key_is_whole(table: str, key: str) -> bool:
-    """Whether ``[table] key`` takes whole numbers. Raises SceneError if there is no such key."""
+def scene_keys() -> list[str]:
+    """All keys as ``table.key``."""
+    return [f"{table}.{key}" for table, model in _TABLES.items() for key in model.model_fields]
+
+
+def key_kind(table: str, key: str) -> type:
+    """What ``[table] key`` takes, of int, float, bool and str. Raises SceneError if there is no such key."""
     if table not in _TABLES:
         raise SceneError(_explain_top("extra_forbidden", {}, table))
     if key not in _TABLES[table].model_fields:
         raise SceneError(f"[{table}] {key}: unknown key; {_nearest_key(table, key)}")
-    return _TABLES[table].model_fields[key].annotation is int
+    kinds = {get_origin(part) or part for part in _alternatives(_TABLES[table].model_fields[key].annotation)}
+    return next((kind for kind in (int, bool, float) if kind in kinds), str)
+
+
+def _alternatives(annotation: Any) -> tuple[Any, ...]:
+    return get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
 
 
 def _scene_file(path_or_name: str | Path) -> Path:
@@ -543,7 +581,8 @@ def _scene_file(path_or_name: str | Path) -> Path:
     raise SceneError(f"{path_or_name}: {what}; {_nearest(path.stem, shipped)}shipped scenes: {', '.join(shipped)}")
 
 
-def _override(data: dict[str, Any], override: str) -> None:
+def _override(data: dict[str, Any], override: str) -> tuple[str, str]:
+    """Returns the table and the key that it has set."""
     target, separator, text = override.partition("=")
     table, dot, key = (part.strip() for part in target.partition("."))
     if not (separator and dot and table and key):
@@ -552,6 +591,7 @@ def _override(data: dict[str, Any], override: str) -> None:
     if not isinstance(content, dict):
         raise SceneError(f"--set {override}: {table} is not a table; tables: {', '.join(_TABLES)}")
     _change(content, key, parse_value(text.strip()))
+    return table, key
 
 
 def _change(content: dict[str, Any], key: str, value: Any) -> None:

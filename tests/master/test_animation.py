@@ -160,7 +160,7 @@ def test_the_command_writes_a_gif_into_the_directory_and_says_where(directory):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["nowhere"], "is not a run directory"),
+        (["nowhere"], "nowhere: no such directory"),
         (["run", "--out", "run.avi"], "an animation is a .gif or a .mp4 file"),
         (["run", "--out", "no/such/run.gif"], "No such file"),
         (["run", "--fps", "0"], "--fps"),

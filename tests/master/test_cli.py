@@ -164,35 +164,7 @@ def test_scenes_without_a_body(here, name):
     assert "impact" in result.stdout
 
 
-# -- bad input: exit code 2, nothing written ----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("arguments", "fragments"),
-    [
-        (["run", "sotf"], ["sotf: no such file", "did you mean soft?"]),
-        (["run", "broken.toml"], ["broken.toml", "not TOML"]),
-        (["run", "soft", "--set", "beam.densty=1"], ["[beam] densty", "did you mean density?"]),
-        (["run", "soft", "--set", "time.t_end=-1"], ["[time] t_end = -1", "greater than 0"]),
-        (["run", "soft", "--set", "t_end"], ["TABLE.KEY=VALUE"]),
-        (["run", "soft", "--out", "used"], ["used already holds results (summary.json)", "--force", "--out"]),
-        (["run", "soft", "--out", "broken.toml"], ["broken.toml", "exists"]),
-        (["run"], ["Missing argument", "SCENE"]),
-        (["run", "soft", "--sett", "a.b=1"], ["No such option", "--set"]),
-        (["rum", "soft"], ["No such command"]),
-    ],
-)
-def test_bad_input(here, arguments, fragments):
-    (here / "broken.toml").write_text("[time")
-    (here / "used").mkdir()
-    (here / "used" / "summary.json").write_text("precious")
-    result = springbeam_command(*arguments)
-    assert result.exit_code == 2
-    for fragment in fragments:
-        assert fragment in result.stderr
-    assert "Traceback" not in result.output
-    assert not (here / "results").exists()
-    assert (here / "used" / "summary.json").read_text() == "precious"
+# -- bad input: exit code 2, nothing written (mistakes in the command line: tests/system/test_command_line.py) ------
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="nothing is forbidden to root")

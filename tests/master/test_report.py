@@ -406,7 +406,7 @@ def test_a_new_run_in_the_directory_removes_the_report_of_the_old_one(directory)
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (lambda d: (d / "summary.json").unlink(), "summary.json: missing"),
+        (lambda d: (d / "summary.json").unlink(), "holds no run"),
         (lambda d: (d / "trajectory.csv").unlink(), "trajectory.csv"),
         (lambda d: (d / "trajectory.csv").write_text("time,u_tip\n0.0,nonsense\n"), "trajectory.csv: after the header"),
         (lambda d: (d / "summary.json").write_text('{"scene": {}}'), "[time]: missing table"),
@@ -425,7 +425,7 @@ def test_a_damaged_directory_is_one_clear_error(directory, damage, message):
 def test_no_directory_is_one_clear_error(tmp_path):
     result = command("report", tmp_path / "nowhere")
     assert result.exit_code == 2
-    assert "is not a run directory" in result.stderr
+    assert "nowhere: no such directory" in result.stderr
 
 
 def test_a_place_that_cannot_be_written_is_one_clear_error(directory):

@@ -6,16 +6,28 @@ Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the run stopped early (what
 
 from __future__ import annotations
 
+import textwrap
 from importlib import metadata
 from typing import Annotated
 
 import typer
 
 from . import checks, doctor, report, resume, run, scenes, stability, sweep, tradeoff
+from .common import Command, Group
+
+_WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."
+_START = """\
+springbeam scenes                 which scenes there are
+springbeam run soft               run one; what comes of it is in results/soft
+springbeam report results/soft    look at it: one HTML page with a time slider
+springbeam crosscheck soft        is it right? beside an independent reference
+springbeam doctor                 is this installation sound?"""
 
 app = typer.Typer(
-    help="A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs.",
-    no_args_is_help=True,
+    cls=Group,
+    help=_WHAT,
+    epilog="springbeam COMMAND --help shows options and an example; springbeam alone shows how to start.",
+    invoke_without_command=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -42,12 +54,21 @@ def version() -> str:
 
 @app.callback()
 def _common(
+    ctx: typer.Context,
     show_version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
-    pass
+    if ctx.invoked_subcommand is None:
+        typer.echo(f"{_WHAT}\n\nTo start:\n\n{textwrap.indent(_START, '  ')}\n")
+        typer.echo("springbeam --help lists all commands, springbeam COMMAND --help their options.")
 
 
-for module in (run, resume, scenes, checks, tradeoff, report, sweep, doctor, stability):
-    module.register(app)
+for title, commands in {
+    "Run": (scenes.scenes, run.run, resume.resume, sweep.sweep),
+    "Look": (report.report, report.animate),
+    "Choose scheme and accuracy": (stability.predict, tradeoff.tradeoff),
+    "Check": (checks.crosscheck, checks.verify, doctor.doctor),
+}.items():
+    for command in commands:
+        app.command(cls=Command, rich_help_panel=title)(command)

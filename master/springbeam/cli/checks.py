@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from ..fmu import FmuError
 from ..scene import load_scene
-from .common import BAD_INPUT, DISAGREES, STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail
+from .common import (
+    BAD_INPUT,
+    DISAGREES,
+    STOPPED,
+    JsonOption,
+    SceneArgument,
+    SettingsOption,
+    bad_input_reported,
+    console_for,
+    fail,
+    print_json,
+)
 
 if TYPE_CHECKING:
     from ..crosscheck import OrderRow, Report
-
-
-def register(app: typer.Typer) -> None:
-    app.command()(crosscheck)
-    app.command()(verify)
 
 
 def crosscheck(
@@ -32,6 +38,7 @@ def crosscheck(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", metavar="PNG", help="Draw both, and errors below bounds, here.")
     ] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Compare the co-simulation with the monolithic reference of its law. Exit code 1 if they disagree.
 
@@ -43,12 +50,15 @@ def crosscheck(
     from ..plots import plot_crosscheck
     from ..runner import RunStopped
 
-    console = Console(highlight=False)
+    console = console_for(silent=as_json)
     with bad_input_reported():
         what = load_scene(scene, settings or ())
         try:
             if with_orders:
-                console.print(_orders_table(orders(what)))
+                found = orders(what)
+                if as_json:
+                    print_json({"orders": [asdict(row) for row in found]})
+                console.print(_orders_table(found))
                 return
             report = compare(what)
         except FmuError as error:
@@ -57,6 +67,8 @@ def crosscheck(
             fail(STOPPED, str(error))
         if out is not None:
             plot_crosscheck(report, out)
+    if as_json:
+        print_json(_as_json(report))
     for note in report.notes:
         console.print(Text(note))
     console.print(_error_table(report))
@@ -71,16 +83,44 @@ def crosscheck(
         raise typer.Exit(DISAGREES)
 
 
-def verify() -> None:
-    """Check the FMUs against exact solutions. Exit code 1 if one is missed."""
-    from ..verify import report
+def verify(as_json: JsonOption = False) -> None:
+    """Check the FMUs against exact solutions. Exit code 1 if one is missed.
+
+    Example: springbeam verify
+    """
+    from .. import verify as checks
 
     try:
-        passed = report(Console(highlight=False))
+        if as_json:
+            sections = list(checks.verify())
+            passed = all(check.passed is not False for _, section in sections for check in section)
+            described = [
+                {"title": title, "checks": [{**asdict(c), "error": c.error, "passed": c.passed} for c in section]}
+                for title, section in sections
+            ]
+            print_json({"passed": passed, "sections": described})
+        else:
+            passed = checks.report(console_for(silent=False))
     except FmuError as error:
         fail(BAD_INPUT, str(error))
     if not passed:
         raise typer.Exit(DISAGREES)
+
+
+def _as_json(report: Report) -> dict[str, Any]:
+    rows = [
+        {"quantity": r.quantity, "error": r.error, "at": r.at, "l2": r.l2, "bound": r.bound, "passed": r.passed}
+        for r in report.rows
+    ]
+    return {
+        "passed": report.passed,
+        "horizon": report.horizon,
+        "growth": report.growth,
+        "quantities": rows,
+        "events": [asdict(event) for event in report.events],
+        "notes": report.notes,
+        "scene": report.scene.model_dump(exclude_none=True),
+    }
 
 
 def _error_table(report: Report) -> Table:

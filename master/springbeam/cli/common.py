@@ -1,22 +1,28 @@
 """What the commands share: arguments, exit codes, errors.
 
-Results go to stdout, progress and errors to stderr.
+Results go to stdout, progress and errors to stderr. ``--json`` puts one JSON document on stdout and nothing else,
+``--quiet`` only where the results are. Colours are for terminals, and NO_COLOR turns them off (rich sees to both).
 """
 
 from __future__ import annotations
 
+import json
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
+from rich.console import Console
+from rich.progress import Progress, ProgressColumn
+from typer.core import TyperCommand, TyperGroup
 
 from ..checkpoint import CheckpointRefused
 from ..fmu import FmuError
-from ..recording import ResultsExist, ResultsInUse, ResultsUnreadable
-from ..scene import SceneError, shipped_scenes
+from ..recording import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory, json_ready
+from ..scene import SceneError, scene_keys, shipped_scenes
 
 DISAGREES = 1
 BAD_INPUT = 2
@@ -24,7 +30,13 @@ STOPPED = 3
 
 
 def complete_scene(incomplete: str) -> list[str]:
+    """Shipped scenes; where there is none the shell goes on with files."""
     return [name for name in shipped_scenes() if name.startswith(incomplete)]
+
+
+def complete_key(incomplete: str) -> list[str]:
+    """``table.key=`` of a scene."""
+    return [f"{name}=" for name in scene_keys() if name.startswith(incomplete)]
 
 
 SceneArgument = Annotated[
@@ -37,8 +49,90 @@ SceneArgument = Annotated[
 ]
 SettingsOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="TABLE.KEY=VALUE", help="Change a value of the scene; may be repeated."),
+    typer.Option(
+        "--set",
+        metavar="TABLE.KEY=VALUE",
+        help="Change a value of the scene; may be repeated.",
+        autocompletion=complete_key,
+    ),
 ]
+RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Where springbeam run has left its results.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document, and nothing else, on stdout.")]
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="No progress bar and no tables; print only where the results are.")
+]
+NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no pictures.")]
+
+
+class _TellingParameters:
+    """Flags are shown without a type: a reader would try ``--force true``."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        parameters: list[Any] = super().get_params(ctx)  # type: ignore[misc]
+        for parameter in parameters:
+            if getattr(parameter, "is_flag", False):
+                parameter.metavar = ""
+        return parameters
+
+
+class Command(_TellingParameters, TyperCommand):
+    """A command that can be interrupted, and says what to do with an argument too many."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        ctx.allow_extra_args = True
+        rest: list[str] = super().parse_args(ctx, args)
+        if rest and not ctx.resilient_parsing:
+            setting = next((text for text in rest if "=" in text and "." in text.partition("=")[0]), None)
+            hint = f". Did you mean --set {setting}?" if setting and "--set" in self._options(ctx) else ""
+            ctx.fail(f"Unexpected argument {' '.join(rest)}{hint}")
+        return rest
+
+    def _options(self, ctx: Any) -> set[str]:
+        return {option for parameter in self.get_params(ctx) for option in parameter.opts}
+
+    def invoke(self, ctx: Any) -> Any:
+        with interruptible():
+            return super().invoke(ctx)
+
+
+class Group(_TellingParameters, TyperGroup):
+    """Says what to do with a scene in the place of a command."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args[0] not in self.commands and (args[0] in shipped_scenes() or args[0].endswith(".toml")):
+            ctx.fail(f"{args[0]} is a scene, not a command. Did you mean {ctx.command_path} run {args[0]}?")
+        return super().resolve_command(ctx, args)
+
+
+def console_for(*, silent: bool) -> Console:
+    """For results, on stdout; silent if there is only a path or JSON to print."""
+    return Console(highlight=False, quiet=silent)
+
+
+def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
+    """On stderr, if that is a terminal."""
+    console = Console(stderr=True)
+    return Progress(
+        *columns, console=console, transient=True, redirect_stdout=False, disable=quiet or not console.is_terminal
+    )
+
+
+def print_json(document: Any) -> None:
+    """JSON has no NaN: what is not finite, as in the summary of a run that stopped, goes by its name."""
+    typer.echo(json.dumps(json_ready(document), indent=2, allow_nan=False, ensure_ascii=False))
+
+
+def results_directory(path: Path) -> Path:
+    """``path`` if it holds a run; otherwise the command ends, and says which do."""
+    if not RunDirectory(path).summary.exists():
+        what = "holds no run" if path.is_dir() else "is no directory" if path.exists() else "no such directory"
+        there = sorted(file.parent for file in Path("results").glob("*/summary.json"))
+        meant = [found for found in there if found.name == path.name]
+        remedy = "springbeam run SCENE --out DIR makes one"
+        if there:
+            remedy = f"did you mean {meant[0]}?" if meant else f"runs here: {', '.join(map(str, there[:8]))}"
+        fail(BAD_INPUT, f"{path}: {what}; {remedy}")
+    return path
 
 
 @contextmanager
@@ -49,6 +143,8 @@ def bad_input_reported() -> Iterator[None]:
         fail(BAD_INPUT, f"{error}; --force replaces them, --out DIR puts the new ones elsewhere")
     except (SceneError, FmuError, CheckpointRefused, ResultsInUse, ResultsUnreadable) as error:
         fail(BAD_INPUT, str(error))
+    except FileExistsError as error:
+        fail(BAD_INPUT, f"{error.filename}: is a file; --out DIR names a directory, new or without results")
     except OSError as error:
         fail(BAD_INPUT, f"{error.filename or 'results'}: {error.strerror or error}")
 

@@ -3,50 +3,94 @@
 from __future__ import annotations
 
 import platform
+import shutil
 import sys
+import textwrap
 import zipfile
 from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import typer
-from rich.console import Console
 from rich.text import Text
 
 from ..fmu import FmuBeam, FmuError, FmuSpring, fmu_directory
 from ..scene import Beam, Spring
-from .common import DISAGREES
+from .common import DISAGREES, JsonOption, console_for, print_json
 
 _REQUIRED = ("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly")
 _FOR_SWEEPS = ("distributed", "pyarrow")
 
 
-def register(app: typer.Typer) -> None:
-    app.command()(doctor)
+def doctor(as_json: JsonOption = False) -> None:
+    """Show versions, and whether the FMUs are found and can be loaded here. Exit code 1 if they cannot.
+
+    Example: springbeam doctor
+    """
+    found = _found()
+    if as_json:
+        print_json(found)
+    console = console_for(silent=as_json)
+
+    def line(name: str, text: str) -> None:
+        console.print(Text(f"{name:<12}{text}"), soft_wrap=True)
+
+    line("springbeam", f"{found['version']} in {found['path']}")
+    line("Python", f"{found['python']['version']} ({found['python']['executable']})")
+    line("system", f"{found['system']}, {found['machine']}")
+    for name, remedy in (
+        ("packages", "pip install --upgrade springbeam"),
+        ("sweep", "pip install 'springbeam[sweep]'"),
+    ):
+        versions = found[name]
+        absent = [package for package, number in versions.items() if number is None]
+        there = [f"{package} {number}" for package, number in versions.items()]
+        lines = [f"not available: {', '.join(absent)} missing; {remedy}"] if absent else _wrapped(there)
+        for k, text in enumerate(lines):
+            line("" if k else name, text)
+    line("ffmpeg", found["ffmpeg"] or "not found: springbeam animate then writes GIFs only, no MP4")
+    for name, fmu in found["fmus"].items():
+        state = f"loads; binaries for {', '.join(fmu['platforms'])}" if fmu["error"] is None else "FAILED"
+        line(f"{name}.fmu", f"{state}\n{'':<12}{fmu['error'] or fmu['path']}")
+    if any(fmu["error"] is not None for fmu in found["fmus"].values()):
+        raise typer.Exit(DISAGREES)
 
 
-def doctor() -> None:
-    """Show versions, and whether the FMUs are found and can be loaded here. Exit code 1 if they cannot."""
-    console = Console(highlight=False)
-    console.print(Text(f"springbeam  {metadata.version('springbeam')} in {Path(__file__).parents[1]}"), soft_wrap=True)
-    console.print(Text(f"Python      {platform.python_version()} ({sys.executable})"), soft_wrap=True)
-    console.print(Text(f"system      {platform.platform()}, {platform.machine()}"), soft_wrap=True)
-    console.print(Text("packages    " + ", ".join(f"{name} {metadata.version(name)}" for name in _REQUIRED)))
-    if absent := [name for name in _FOR_SWEEPS if find_spec(name) is None]:
-        console.print(Text(f"sweep       not available: {', '.join(absent)} missing; pip install 'springbeam[sweep]'"))
-    else:
-        console.print(Text("sweep       " + ", ".join(f"{name} {metadata.version(name)}" for name in _FOR_SWEEPS)))
-    healthy = True
+def _found() -> dict[str, Any]:
+    """Everything that `doctor` says."""
+    fmus = {}
     for name in ("beam", "spring"):
         path = fmu_directory() / f"{name}.fmu"
+        platforms: list[str] = []
+        error = None
         try:
             (FmuBeam(Beam(), 0.0, 0.0) if name == "beam" else FmuSpring(Spring(), 0.0)).close()
-            said = f"loads; binaries for {', '.join(_platforms(path))}"
-        except FmuError as error:
-            healthy, said = False, f"FAILED: {error}"
-        console.print(Text(f"{name + '.fmu':<12}{path}: {said}"), soft_wrap=True)
-    if not healthy:
-        raise typer.Exit(DISAGREES)
+            platforms = _platforms(path)
+        except FmuError as failure:
+            error = str(failure)
+        fmus[name] = {"path": path, "platforms": platforms, "error": error}
+    return {
+        "version": metadata.version("springbeam"),
+        "path": Path(__file__).parents[1],
+        "python": {"version": platform.python_version(), "executable": sys.executable},
+        "system": platform.platform(),
+        "machine": platform.machine(),
+        "packages": {name: _version(name) for name in _REQUIRED},
+        "sweep": {name: _version(name) for name in _FOR_SWEEPS},
+        "ffmpeg": shutil.which("ffmpeg"),
+        "fmus": fmus,
+    }
+
+
+def _version(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _wrapped(words: list[str]) -> list[str]:
+    return textwrap.wrap(", ".join(words), width=66, break_on_hyphens=False)
 
 
 def _platforms(path: Path) -> list[str]:

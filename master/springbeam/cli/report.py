@@ -7,19 +7,12 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import track
+from rich.progress import BarColumn, MofNCompleteColumn
 
 from ..recording import ANIMATIONS, REPORT, load_trajectory
-from .common import BAD_INPUT, bad_input_reported, fail
+from .common import BAD_INPUT, QuietOption, RunArgument, bad_input_reported, fail, progress_bar, results_directory
 
-RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Where springbeam run has left its results.")]
 ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace a file that is already there.")]
-
-
-def register(app: typer.Typer) -> None:
-    app.command()(report)
-    app.command()(animate)
 
 
 def report(
@@ -34,7 +27,7 @@ def report(
     Example: springbeam report results/soft
     """
     with bad_input_reported():
-        trajectory = load_trajectory(directory)
+        trajectory = load_trajectory(results_directory(directory))
         target = _free(out or directory / REPORT, force)
         from ..report import page  # plotly takes a second to load
 
@@ -53,21 +46,21 @@ def animate(
     seconds: Annotated[float, typer.Option(min=0.1, max=600.0, help="How long it plays.")] = 10.0,
     fps: Annotated[int, typer.Option(min=1, max=50, help="Frames per second.")] = 20,
     force: ForceOption = False,
+    quiet: QuietOption = False,
 ) -> None:
     """Write a run as an animation: beam and spring above their positions over time.
 
     Example: springbeam animate results/soft --out soft.mp4
     """
     with bad_input_reported():
-        trajectory = load_trajectory(directory)
+        trajectory = load_trajectory(results_directory(directory))
         target = _free(out or directory / ANIMATIONS[0], force)
         from ..animation import AnimationError
         from ..animation import animate as write
 
-        console = Console(stderr=True)
-
         def progress(times: Sequence[float]) -> Iterable[float]:
-            return track(times, "drawing", console=console, transient=True, disable=not console.is_terminal)
+            with progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), quiet=quiet) as bar:
+                yield from bar.track(times)
 
         try:
             write(trajectory, target, seconds=seconds, fps=fps, progress=progress)

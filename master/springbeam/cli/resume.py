@@ -8,18 +8,15 @@ from typing import Annotated
 import typer
 
 from ..recording import RunDirectory
-from .common import bad_input_reported, interruptible
-from .run import NoPlotsOption, QuietOption, carry_out
-
-
-def register(app: typer.Typer) -> None:
-    app.command()(resume)
+from .common import JsonOption, NoPlotsOption, QuietOption, bad_input_reported, results_directory
+from .run import carry_out
 
 
 def resume(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="The directory of the run.", show_default=False)],
     no_plots: NoPlotsOption = False,
     quiet: QuietOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Go on with a run that was killed or stopped, from its last checkpoint.
 
@@ -29,8 +26,7 @@ def resume(
     """
     from ..runner import last_checkpoint
 
-    with interruptible():
-        with bad_input_reported():
-            start = last_checkpoint(directory)
-        results = RunDirectory(directory)
-        carry_out(start.scene, results, seconds=start.seconds, start=start, no_plots=no_plots, quiet=quiet)
+    with bad_input_reported():
+        start = last_checkpoint(results_directory(directory))
+    results = RunDirectory(directory)
+    carry_out(start.scene, results, seconds=start.seconds, start=start, no_plots=no_plots, quiet=quiet, as_json=as_json)

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
@@ -21,20 +21,23 @@ from ..fmu import FmuError
 from ..recording import FileRecorder, NonFiniteValue, RunDirectory, load_events, load_summary, load_trajectory
 from ..scene import Scene, load_scene, scene_from_dict
 from ..trajectory import Event
-from .common import STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail, interruptible
+from .common import (
+    BAD_INPUT,
+    STOPPED,
+    JsonOption,
+    NoPlotsOption,
+    QuietOption,
+    SceneArgument,
+    SettingsOption,
+    bad_input_reported,
+    console_for,
+    fail,
+    print_json,
+    progress_bar,
+)
 
 _FIRST_EVENTS, _LAST_EVENTS = 10, 3
 _REFRESH_SECONDS = 0.1
-
-
-NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Do not draw pictures.")]
-QuietOption = Annotated[
-    bool, typer.Option("--quiet", "-q", help="No progress bar and no report; print only where the results are.")
-]
-
-
-def register(app: typer.Typer) -> None:
-    app.command()(run)
 
 
 def run(
@@ -66,19 +69,21 @@ def run(
     no_plots: NoPlotsOption = False,
     force: Annotated[bool, typer.Option("--force", "-f", help="Replace results that are already there.")] = False,
     quiet: QuietOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Run a scene; write its results, events and pictures into a directory.
 
     Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
     """
-    with interruptible():
-        with bad_input_reported():
-            what = load_scene(scene, settings or ())
-            if accuracy is not None:
-                what = scene_from_dict({**what.model_dump(exclude_none=True), "accuracy": accuracy}, source=scene)
-            what, picked = _picked(what)
-            directory = _run_directory(scene, out, force)
-        carry_out(what, directory, seconds=checkpoint, no_plots=no_plots, quiet=quiet, further=picked)
+    with bad_input_reported():
+        what = load_scene(scene, settings or ())
+        if accuracy is not None:
+            if not 0.0 < accuracy < 1.0:
+                fail(BAD_INPUT, f"--accuracy {accuracy:g}: must be between 0 and 1, as in --accuracy 1e-4")
+            what = scene_from_dict({**what.model_dump(exclude_none=True), "accuracy": accuracy}, source=scene)
+        what, picked = _picked(what)
+        directory = _run_directory(scene, out, force)
+    carry_out(what, directory, seconds=checkpoint, no_plots=no_plots, quiet=quiet, as_json=as_json, further=picked)
 
 
 def _picked(scene: Scene) -> tuple[Scene, dict[str, Any]]:
@@ -103,10 +108,11 @@ def carry_out(
     start: Checkpoint | None = None,
     no_plots: bool,
     quiet: bool,
+    as_json: bool,
     further: Mapping[str, Any] | None = None,
 ) -> None:
     """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.runner.run`."""
-    console = Console(quiet=quiet, highlight=False)
+    console = console_for(silent=quiet or as_json)
     recorder = FileRecorder(scene, directory)
     try:
         with bad_input_reported():
@@ -117,7 +123,9 @@ def carry_out(
     _report(console, directory, scene)
     if not no_plots:
         error = _draw(console, directory) or error
-    if quiet:
+    if as_json:
+        print_json({"directory": directory.path, **load_summary(directory.path)})
+    elif quiet:
         typer.echo(directory.path)
     if error is not None:
         fail(STOPPED, f"{error}\nwhat was computed is in {directory.path}")
@@ -194,16 +202,12 @@ class _ProgressBar:
     """Simulated time, phase and speed on stderr, when that is a terminal."""
 
     def __init__(self, t_end: float, *, quiet: bool) -> None:
-        console = Console(stderr=True)
-        self._bar = Progress(
+        self._bar = progress_bar(
             BarColumn(bar_width=20),
             TaskProgressColumn(),
             TextColumn("{task.fields[state]}"),
             TimeRemainingColumn(),
-            console=console,
-            transient=True,
-            redirect_stdout=False,
-            disable=quiet or not console.is_terminal,
+            quiet=quiet,
         )
         self._t_end = t_end
         self._task = self._bar.add_task("", total=t_end, state="starting")

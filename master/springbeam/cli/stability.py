@@ -2,30 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from ..scene import load_scene
-from .common import SceneArgument, SettingsOption, bad_input_reported
+from .common import JsonOption, SceneArgument, SettingsOption, bad_input_reported, console_for, print_json
 
 if TYPE_CHECKING:
     from ..stability.predict import Prediction
 
 
-def register(app: typer.Typer) -> None:
-    app.command()(predict)
-
-
 def predict(
     scene: SceneArgument,
     settings: SettingsOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Say before a scene runs where its coupling is stable, whether the motion is resolved, which scheme fits.
 
@@ -37,9 +30,8 @@ def predict(
         what = load_scene(scene, settings or ())
     prediction = prediction_of(what)
     if as_json:
-        typer.echo(json.dumps(asdict(prediction), indent=2))
-        return
-    console = Console(highlight=False)
+        print_json(asdict(prediction))
+    console = console_for(silent=as_json)
     console.print(Text(what.title or "(untitled scene)", style="bold"))
     for name, text in _lines(prediction):
         console.print(Text(f"{name:<10}{text}"))

@@ -7,16 +7,25 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
 from ..scene import SceneError, load_scene
-from .common import BAD_INPUT, STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail
-
-
-def register(app: typer.Typer) -> None:
-    app.command()(sweep)
+from .common import (
+    BAD_INPUT,
+    STOPPED,
+    JsonOption,
+    NoPlotsOption,
+    QuietOption,
+    SceneArgument,
+    SettingsOption,
+    bad_input_reported,
+    complete_key,
+    console_for,
+    fail,
+    print_json,
+    progress_bar,
+)
 
 
 def sweep(
@@ -27,6 +36,7 @@ def sweep(
             "--vary",
             metavar="TABLE.KEY=VALUES",
             help="A list 1,2,5, a grid LOW:HIGH:COUNT, or LOW:HIGH for --samples; with :log even in the logarithm.",
+            autocompletion=complete_key,
         ),
     ] = None,
     settings: SettingsOption = None,
@@ -51,8 +61,9 @@ def sweep(
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Where rows go; a sweep that was begun there goes on."),
     ] = None,
-    no_plots: Annotated[bool, typer.Option("--no-plots", help="Do not draw the picture.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar; print only DIR.")] = False,
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Run a scene over many values of its keys, on all cores or a Dask cluster; one row per run.
 
@@ -65,10 +76,8 @@ def sweep(
     from ..sweep.picture import draw
 
     directory = out or Path("results") / f"{Path(scene).stem}-sweep"
-    bar = Progress(
-        BarColumn(bar_width=20), MofNCompleteColumn(), TextColumn("{task.fields[state]}"), TimeRemainingColumn(),
-        console=Console(stderr=True), transient=True, disable=quiet or not Console(stderr=True).is_terminal,
-    )  # fmt: skip
+    state, left = TextColumn("{task.fields[state]}"), TimeRemainingColumn()
+    bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), state, left, quiet=quiet)
     with bad_input_reported():
         metrics = tuple(metric or sweeps.METRICS)
         if unknown := [name for name in metrics if name not in sweeps.METRICS]:
@@ -88,12 +97,17 @@ def sweep(
             fail(BAD_INPUT, str(error))
         except KeyboardInterrupt:
             fail(STOPPED, f"interrupted; the same command goes on with what is in {directory}")
-        drawn = not no_plots and draw(sweeps.rows(directory), axes, metrics, directory / "sweep.png")
-    if quiet:
+        columns = sweeps.rows(directory)
+        drawn = not no_plots and draw(columns, axes, metrics, directory / sweeps.PICTURE)
+    if as_json:
+        picture = directory / sweeps.PICTURE if drawn else None
+        print_json({"directory": directory, "rows": directory / sweeps.TABLE, "picture": picture, "runs": counts})
+    elif quiet:
         typer.echo(directory)
-        return
-    console = Console(highlight=False)
+    console = console_for(silent=quiet or as_json)
     console.print(f"runs      {', '.join(f'{number} {status}' for status, number in counts.items() if number)}")
+    if first := next(filter(None, columns["error"]), None):
+        console.print(Text(f"error     {first}, the first of them"))
     console.print(Text(f"rows      {directory / sweeps.TABLE}"), soft_wrap=True)
     if drawn:
         console.print(Text(f"picture   {directory / 'sweep.png'}"), soft_wrap=True)

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
 
 from ..fmu import FmuError
 from ..recording import RunDirectory
 from ..scene import load_scene
-from .common import BAD_INPUT, STOPPED, SceneArgument, SettingsOption, bad_input_reported, fail
+from .common import (
+    BAD_INPUT,
+    STOPPED,
+    JsonOption,
+    QuietOption,
+    SceneArgument,
+    SettingsOption,
+    bad_input_reported,
+    console_for,
+    fail,
+    print_json,
+    progress_bar,
+)
 
 if TYPE_CHECKING:
     from ..tradeoff import Choice, Point, Study
-
-
-def register(app: typer.Typer) -> None:
-    app.command()(tradeoff)
 
 
 def tradeoff(
@@ -40,7 +46,8 @@ def tradeoff(
         typer.Option("--out", "-o", metavar="DIR", help="Where tradeoff.csv and tradeoff.png go. Default: results/…"),
     ] = None,
     force: Annotated[bool, typer.Option("--force", "-f", help="Replace what is already there.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the table as JSON.")] = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Measure error against cost over schemes, macro steps, modes, meshes and tolerances, beside scipy's solvers.
 
@@ -50,7 +57,6 @@ def tradeoff(
     from ..tradeoff import study, write_csv
     from ..tradeoff.picture import draw
 
-    console = Console(highlight=False, quiet=as_json)
     with bad_input_reported():
         what = load_scene(scene, settings or ())
         default = Path("results") / f"{Path(scene).stem}-tradeoff"
@@ -59,10 +65,8 @@ def tradeoff(
             if out is None and not force
             else RunDirectory.create(out or default, replace=force)
         )
-        bar = Progress(
-            BarColumn(bar_width=20), MofNCompleteColumn(), TextColumn("{task.fields[name]}"),
-            console=Console(stderr=True), transient=True, disable=not Console(stderr=True).is_terminal or as_json,
-        )  # fmt: skip
+        name = TextColumn("{task.fields[name]}")
+        bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), name, quiet=quiet)
         try:
             with bar:
                 task = bar.add_task("", total=None, name="")
@@ -84,7 +88,10 @@ def tradeoff(
         write_csv(found, directory.path / "tradeoff.csv")
         draw(found, directory.path / "tradeoff.png")
     if as_json:
-        typer.echo(json.dumps(_as_json(found), indent=1))
+        print_json({"directory": directory.path, **_as_json(found)})
+    elif quiet:
+        typer.echo(directory.path)
+    console = console_for(silent=quiet or as_json)
     console.print(
         Text(f"{found.scene.title}: up to t = {found.scene.time.t_end:.6g} s, {len(found.points)} configurations")
     )

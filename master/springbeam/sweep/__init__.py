@@ -34,7 +34,7 @@ __all__ = ["METRICS", "Sweep", "SweepError", "cluster", "rows", "run"]
 _WRITE_SECONDS = 5.0
 #: Runs handed to the scheduler ahead of what has finished, per worker.
 _AHEAD = 8
-TABLE, DESCRIPTION, PARTS = "sweep.parquet", "sweep.json", "parts"
+TABLE, DESCRIPTION, PARTS, PICTURE = "sweep.parquet", "sweep.json", "parts", "sweep.png"
 
 
 class SweepError(RuntimeError):
@@ -194,7 +194,10 @@ def _check_workers(client: Client) -> None:
 
 
 def _task(scene: dict[str, Any], axes: Sequence[Axis], values: Sequence[Any], metrics: Sequence[str]) -> dict[str, Any]:
-    return row(scene_from_dict(scene), axes, values, metrics)
+    try:
+        return row(scene_from_dict(scene), axes, values, metrics)
+    except FmuError as error:  # an exception would be in the worker's log with its traceback
+        return {"status": "no FMU", "error": str(error)}
 
 
 def _results(sweep: Sweep, todo: Sequence[int], client: Client) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -213,11 +216,12 @@ def _results(sweep: Sweep, todo: Sequence[int], client: Client) -> Iterator[tupl
     for future in queue:
         index = future.key[1]
         try:
-            yield index, future.result()
-        except FmuError as error:
-            raise SweepError(str(error)) from error
+            result = future.result()
         except KilledWorker as error:
-            yield index, {"status": "lost", "error": f"its workers died: {error}", "warnings": ""}
+            result = {"status": "lost", "error": f"its workers died: {error}", "warnings": ""}
+        if result["status"] == "no FMU":
+            raise SweepError(result["error"])
+        yield index, result
         future.release()
         following = next(upcoming, None)
         if following is not None:

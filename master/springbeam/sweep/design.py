@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.stats import qmc
 
-from ..scene import Scene, SceneError, key_is_whole, parse_value, with_changes
+from ..scene import Scene, SceneError, key_kind, parse_value, with_changes
 
 Sampling = Literal["random", "latin_hypercube"]
 #: A mistyped count, not a sweep.
@@ -62,12 +62,15 @@ def parse_axis(text: str) -> Axis:
     if not (separator and dot and table and key and values.strip()):
         raise _wrong(text, "must be TABLE.KEY=VALUES, as in spring.mass=0.5:2:16")
     try:
-        whole = key_is_whole(table, key)
+        kind = key_kind(table, key)
     except SceneError as error:
         raise _wrong(text, str(error)) from None
     parts = [part.strip() for part in values.split(":")]
     if len(parts) == 1:
-        return Axis(table, key, tuple(parse_value(value.strip()) for value in values.split(",")))
+        listed = tuple(parse_value(value.strip()) for value in values.split(","))
+        if kind is not str and (words := [value for value in listed if isinstance(value, str)]):
+            raise _wrong(text, f"{words[0]!r} is no value of {key}; a list is 1,2,5, a range LOW:HIGH:COUNT")
+        return Axis(table, key, listed)
     log = parts[-1] == "log"
     parts = parts[:-1] if log else parts
     try:
@@ -81,7 +84,7 @@ def parse_axis(text: str) -> Axis:
         raise _wrong(text, "a logarithmic range needs LOW and HIGH greater than 0")
     if count > MOST_RUNS:
         raise _wrong(text, f"at most {MOST_RUNS} values are allowed")
-    axis = Axis(table, key, (), low, high, log, whole)
+    axis = Axis(table, key, (), low, high, log, kind is int)
     return replace(axis, values=tuple(axis.at(k / (count - 1)) for k in range(count)))
 
 

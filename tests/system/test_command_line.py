@@ -1,0 +1,360 @@
+"""The command as people and programs meet it: widths, JSON, colours, completion, help, and the likeliest mistakes."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from importlib import util
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from springbeam.cli import app
+from springbeam.fmu import fmu_directory
+from springbeam.recording import load_summary
+from springbeam.scene import load_scene, shipped_scenes
+
+COMMAND = typer.main.get_command(app)
+#: Arguments of each command that make it print its tables within a second or two. `verify` is in test_verify.py.
+TABLES = {
+    "scenes": "",
+    "run": "soft --no-plots",
+    "resume": "cut --no-plots",
+    "sweep": "duffing --vary spring.mass=0.5,1 --set time.t_end=1 --workers 1 --out varied",
+    "report": "done --out page.html",
+    "animate": "done --seconds 0.2 --fps 10 --out moving.gif",
+    "predict": "soft --set beam.n_elements=10",
+    "tradeoff": "duffing --until 0.5 --repeats 1 --out traded",
+    "crosscheck": "soft --set time.t_end=0.1",
+    "doctor": "",
+}
+
+
+def springbeam(*arguments, **environment):
+    environment = {"COLUMNS": "80", "FORCE_COLOR": None, "PY_COLORS": None, "GITHUB_ACTIONS": None} | environment
+    return CliRunner(env=environment).invoke(app, [str(argument) for argument in arguments], prog_name="springbeam")
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with a run that is done, and one that was cut short after its first checkpoint."""
+    folder = tmp_path_factory.mktemp("place")
+    script = """
+import os, sys
+from springbeam import checkpoint, cli
+save = checkpoint.Checkpoints.take_when_due
+taken = []
+def take(self, simulation):
+    save(self, simulation)
+    taken.append(0)
+    if len(taken) == 40:
+        os._exit(9)
+checkpoint.Checkpoints.take_when_due = take
+sys.argv[1:] = "run soft --checkpoint 1000 --no-plots --out cut".split()
+cli.main()
+"""
+    subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, timeout=60)
+    assert load_summary(folder / "cut")["status"] == "running"
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        assert springbeam("run", "soft", "--no-plots", "--out", "done").exit_code == 0
+        yield folder
+    finally:
+        os.chdir(before)
+
+
+def lines_without_paths(text):
+    """Lines, absolute paths left out: they cannot be broken."""
+    return [re.sub(r"/\S{20,}", "", line) for line in text.splitlines()]
+
+
+# -- tables and help ------------------------------------------------------------------------------------------------
+
+
+def test_every_command_is_looked_at():
+    assert set(TABLES) | {"verify"} == set(COMMAND.commands)
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_what_a_command_prints_fits_80_columns(place, name):
+    result = springbeam(name, *TABLES[name].split(), COLUMNS="80")
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    assert max(map(len, lines_without_paths(result.stdout))) <= 80
+    assert "…" not in result.stdout  # nothing cut off
+
+
+def test_observed_orders_fit_80_columns(place):
+    result = springbeam("crosscheck", "soft", "--orders", "--set", "time.t_end=0.05")
+    assert result.exit_code == 0
+    assert max(map(len, result.stdout.splitlines())) <= 80
+    assert "…" not in result.stdout.split("\n", 1)[1]
+
+
+@pytest.mark.parametrize("name", [None, *COMMAND.commands])
+def test_help_fits_80_columns(name):
+    result = springbeam(*([] if name is None else [name]), "--help")
+    assert result.exit_code == 0
+    assert max(map(len, result.stdout.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("name", COMMAND.commands)
+def test_the_help_of_a_command_has_an_example_that_it_understands(name):
+    command = COMMAND.commands[name]
+    example = re.search(r"Example: (springbeam .*)", command.help)[1]
+    assert example in " ".join(springbeam(name, "--help").stdout.split())
+    program, first, *arguments = shlex.split(example)
+    assert (program, first) == ("springbeam", name)
+    command.make_context(name, arguments)  # raises if an option or a value is wrong
+
+
+def test_flags_are_shown_without_a_type():
+    assert "bool" not in "".join(springbeam(name, "--help").stdout for name in COMMAND.commands)
+
+
+def test_the_command_alone_shows_how_to_start():
+    result = springbeam()
+    assert result.exit_code == 0
+    assert max(map(len, result.stdout.splitlines())) <= 80 + len("ulation of two FMUs.") * ("FMUs" in result.stdout)
+    shown = re.findall(r"^  springbeam (\w+)(.*?)   ", result.stdout, re.M)
+    assert [name for name, _ in shown] == ["scenes", "run", "report", "crosscheck", "doctor"]
+    for name, arguments in shown:
+        COMMAND.commands[name].make_context(name, arguments.split())
+
+
+# -- JSON, quiet, colours -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [name for name in TABLES if name not in ("report", "animate", "resume")])
+def test_json_is_one_document_and_all_of_stdout(place, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    result = springbeam(name, *TABLES[name].split(), "--json")
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    document = json.loads(result.stdout)
+    if name == "run":
+        directory = Path(document.pop("directory"))
+        assert document == load_summary(directory)
+    elif name == "sweep":
+        assert document["runs"] == {"done": 2, "stopped": 0, "refused": 0, "lost": 0}
+        assert Path(document["rows"]).exists()
+    elif name == "crosscheck":
+        assert document["passed"] is True
+        assert all(row["error"] <= row["bound"] for row in document["quantities"])
+        assert [event["kind"] for event in document["events"]] == ["closes", "strikes"]
+    elif name == "scenes":
+        assert [scene["name"] for scene in document] == list(shipped_scenes())
+    elif name == "doctor":
+        assert [fmu["error"] for fmu in document["fmus"].values()] == [None, None]
+    elif name == "predict":
+        assert document["macro_step"] == load_scene("soft").coupling.macro_step
+    else:
+        assert Path(document["directory"], "tradeoff.csv").exists()
+
+
+def test_json_of_a_run_that_stops_early_is_its_summary_and_the_error_is_on_stderr(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    unstable = ["contact.law=compliance", "coupling.scheme=jacobi", "contact.stiffness=1e9", "coupling.macro_step=1e-2"]
+    result = springbeam("run", "soft", "--no-plots", "--json", *[word for text in unstable for word in ("--set", text)])
+    assert result.exit_code == 3
+    assert json.loads(result.stdout)["status"] == "stopped"
+    assert result.stderr.startswith("error: the run stopped early: ")
+
+
+def test_json_of_bad_input_is_nothing():
+    result = springbeam("run", "sotf", "--json")
+    assert (result.exit_code, result.stdout) == (2, "")
+
+
+@pytest.mark.parametrize(
+    ("name", "printed"),
+    [("run", "results/soft"), ("sweep", "varied"), ("tradeoff", "traded"), ("report", "page.html")],
+)
+def test_quiet_prints_only_where_the_results_are(place, tmp_path, monkeypatch, name, printed):
+    (tmp_path / "done").symlink_to(place / "done")
+    monkeypatch.chdir(tmp_path)
+    result = springbeam(name, *TABLES[name].split(), *(() if name == "report" else ("--quiet",)))
+    assert (result.exit_code, result.stdout, result.stderr) == (0, f"{printed}\n", "")
+    assert Path(printed).exists()
+
+
+FORCING = ("NO_COLOR", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS")
+COLOUR = re.compile(r"\x1b\[(?:\d+;)*(?:3[0-8]|9[0-7])(?:;\d+)*m")
+
+
+def on_a_terminal(*arguments, **environment):
+    ours, theirs = os.openpty()
+    own = {key: value for key, value in os.environ.items() if key not in FORCING}
+    environment = {**own, "TERM": "xterm-256color", "COLUMNS": "80"} | environment
+    command = [sys.executable, "-m", "springbeam", *arguments]
+    process = subprocess.Popen(command, stdout=theirs, stderr=theirs, stdin=theirs, env=environment)
+    os.close(theirs)
+    seen = b""
+    try:
+        while chunk := os.read(ours, 10_000):
+            seen += chunk
+    except OSError:  # Linux: the other end was closed
+        pass
+    process.wait(60)
+    os.close(ours)
+    return seen.decode()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals")
+def test_colours_are_for_terminals_and_can_be_turned_off():
+    assert COLOUR.search(on_a_terminal("--help"))
+    assert not COLOUR.search(on_a_terminal("--help", NO_COLOR="1"))
+    environment = {key: value for key, value in os.environ.items() if key not in FORCING}
+    for arguments in (["--help"], ["scenes"], ["run", "sotf"], ["rnu"]):
+        command = [sys.executable, "-m", "springbeam", *arguments]
+        ran = subprocess.run(command, capture_output=True, env=environment, text=True, timeout=60)
+        assert ran.stdout + ran.stderr
+        assert "\x1b" not in ran.stdout + ran.stderr
+
+
+# -- completion -----------------------------------------------------------------------------------------------------
+
+
+def completed(line, shell="bash"):
+    words = line.split(" ")
+    environment = {**os.environ, "_SPRINGBEAM_COMPLETE": f"complete_{shell}"}
+    if shell == "bash":
+        environment |= {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    else:
+        environment |= {"_TYPER_COMPLETE_ARGS": line}
+    # Typer names the variable after the program.
+    script = "import sys; sys.argv[0] = 'springbeam'; from springbeam.cli import main; main()"
+    ran = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, timeout=60)
+    return ran.stdout.split()
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
+def test_there_is_a_completion_script_for(shell):
+    script = "import sys; sys.argv[0] = 'springbeam'; from springbeam.cli import main; main()"
+    environment = {**os.environ, "_SPRINGBEAM_COMPLETE": f"source_{shell}"}
+    ran = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, timeout=60)
+    assert "_SPRINGBEAM_COMPLETE" in ran.stdout
+    assert f"complete_{shell}" in ran.stdout
+    if shell == "bash":
+        assert subprocess.run(["bash", "-n"], input=ran.stdout, text=True).returncode == 0
+
+
+def test_commands_scenes_and_keys_are_completed():
+    assert completed("springbeam cr") == ["crosscheck"]
+    assert completed("springbeam run so") == ["soft"]
+    assert completed("springbeam run soft --set coupling.sch") == ["coupling.scheme="]
+    assert completed("springbeam sweep soft --vary stop.") == ["stop.position=", "stop.restitution="]
+    assert completed("springbeam run my_scene") == []  # the shell goes on with files
+
+
+# -- the likeliest mistakes: one error with place and remedy, exit code 2, nothing done --------------------------------
+
+TOML = "[time]\nt_end = 0.6\n\n[spring]\nmass = 1,0\n"
+MISTAKES = {
+    "scene misspelt": ("run sotf", ["sotf: no such file", "did you mean soft?", "steel-bumper"]),
+    "scene's file is not there": ("run my_scene.toml", ["my_scene.toml: no such file", "shipped scenes: bar-impact"]),
+    "a folder for a scene": ("run empty", ["empty: is a directory", "shipped scenes: bar-impact"]),
+    "command misspelt": ("rnu soft", ["No such command 'rnu'", "Did you mean 'run'?"]),
+    "command forgotten": ("soft", ["soft is a scene, not a command", "Did you mean springbeam run soft?"]),
+    "scene forgotten": ("run", ["Missing argument 'SCENE'", "Try 'springbeam run -h' for help"]),
+    "option misspelt": ("run soft --no-plot", ["No such option: --no-plot", "--no-plots"]),
+    "key misspelt": (
+        "run soft --set beam.densty=2",
+        ["--set beam.densty=2: [beam] densty: unknown key", "did you mean density?", "young_modulus"],
+    ),
+    "table misspelt": ("run soft --set beem.density=2", ["--set beem.density=2: [beem]", "did you mean beam?"]),
+    "table forgotten": ("run soft --set density=2", ["--set density=2: must be TABLE.KEY=VALUE, as in"]),
+    "value forgotten": ("run soft --set beam.density", ["--set beam.density: must be TABLE.KEY=VALUE, as in"]),
+    "--set forgotten": ("run soft beam.density=2", ["Unexpected argument", "Did you mean --set beam.density=2?"]),
+    "decimal comma": (
+        "run soft --set beam.density=1,5",
+        ["--set beam.density=1,5:", "must be a finite number greater than 0"],
+    ),
+    "unit in the value": ("run soft --set time.t_end=600ms", ["--set time.t_end=600ms:", '"600ms": must be a finite']),
+    "no stiffness": (
+        "run soft --set beam.young_modulus=0",
+        ["--set beam.young_modulus=0: [beam] young_modulus = 0: must be a finite number greater than 0"],
+    ),
+    "negative stiffness": ("run soft --set beam.young_modulus=-100", ["= -100: must be", "greater than 0"]),
+    "H longer than the run": (
+        "run soft --set coupling.macro_step=5",
+        ["--set coupling.macro_step=5:", "must be at most [time] t_end = 0.6"],
+    ),
+    "run shorter than H": (
+        "run soft --set time.t_end=1e-4",
+        ["soft.toml with --set: [coupling] macro_step", "must be at most [time] t_end = 0.0001"],
+    ),
+    "not TOML": ("run comma.toml", ["comma.toml: not TOML", "at line 5, column 9", "mass = 1,0"]),
+    "accuracy in per cent": ("run soft --accuracy 5", ["--accuracy 5: must be between 0 and 1, as in"]),
+    "results are there": ("run soft --out done", ["done already holds results", "--force replaces", "--out DIR"]),
+    "a file for a directory": ("run soft --out comma.toml", ["comma.toml: is a file; --out DIR names a directory"]),
+    "report of a scene": ("report soft", ["soft: no such directory; did you mean results/soft?"]),
+    "report of an empty folder": ("report empty", ["empty: holds no run; runs here: results/soft"]),
+    "animation of a file": ("animate comma.toml", ["comma.toml: is no directory; runs here: results/soft"]),
+    "animation of another kind": ("animate done --out a.webm", ["a.webm: an animation is a .gif or a .mp4 file"]),
+    "resume of a run that is done": ("resume done", ["done: the run is done, nothing to resume"]),
+    "resume of what is no run": ("resume empty", ["empty: holds no run"]),
+    "sweep of nothing": ("sweep soft", ["--vary: nothing varies", "TABLE.KEY=VALUES"]),
+    "sweep of a range": ("sweep soft --vary spring.mass=1:2", ["--vary spring.mass: a range", "--samples, or a count"]),
+    "sweep with dots": ("sweep soft --vary spring.mass=1..2", ["--vary spring.mass=1..2:", "LOW:HIGH:COUNT"]),
+    "sweep of words": ("sweep soft --vary spring.mass=1,heavy", ["'heavy' is no value of mass"]),
+    "sweep's key misspelt": ("sweep soft --vary spring.mas=1,2", ["--vary spring.mas=1,2:", "did you mean mass?"]),
+    "crosscheck without a reference": ("crosscheck soft --set contact.impact=rest", ["'rest'", "'inelastic' or 'tip'"]),
+}
+
+
+@pytest.fixture
+def desk(place, tmp_path, monkeypatch):
+    (tmp_path / "comma.toml").write_text(TOML)
+    (tmp_path / "empty").mkdir()
+    for name in ("done", "results/soft"):
+        (tmp_path / name).mkdir(parents=True)
+        for file in (place / "done").iterdir():
+            (tmp_path / name / file.name).write_bytes(file.read_bytes())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def contents(folder):
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_error_with_place_and_remedy(desk, mistake):
+    line, fragments = MISTAKES[mistake]
+    before = contents(desk)
+    result = springbeam(*line.split())
+    assert result.exit_code == 2, result.output
+    said = " ".join(re.sub("[│╭╮╰╯─]", " ", result.stderr).split())
+    for fragment in fragments:
+        assert fragment in said
+    assert len(re.findall(r"\berror\b", said, re.I)) == 1
+    assert "Traceback" not in result.output
+    assert result.stdout == ""
+    assert contents(desk) == before
+
+
+@pytest.mark.parametrize("line", ["run soft", "verify", "crosscheck soft", "sweep soft --vary spring.mass=1,2"])
+def test_without_fmus_the_error_says_what_builds_them(desk, monkeypatch, line):
+    monkeypatch.setenv("SPRINGBEAM_FMUS", str(desk / "empty"))
+    result = springbeam(*line.split(), "--workers", "1") if line.startswith("sweep") else springbeam(*line.split())
+    assert result.exit_code == 2
+    assert str(desk / "empty" / "beam.fmu") in result.stderr
+    assert "./build.sh fmus builds it" in result.stderr
+    assert len(re.findall(r"\berror:", result.stderr)) == 1
+    assert fmu_directory() == desk / "empty"
+
+
+def test_a_sweep_without_its_packages_says_how_to_get_them(desk, monkeypatch):
+    find = util.find_spec
+    monkeypatch.setattr("springbeam.cli.sweep.find_spec", lambda name: None if name == "distributed" else find(name))
+    result = springbeam("sweep", "soft", "--vary", "spring.mass=1,2")
+    assert result.exit_code == 2
+    assert result.stderr == "error: sweep needs the packages distributed: pip install 'springbeam[sweep]'\n"
