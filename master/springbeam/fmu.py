@@ -7,7 +7,8 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import lru_cache, partial
 from math import isfinite
@@ -30,16 +31,16 @@ from fmpy.model_description import ModelDescription, read_model_description
 from .memory import Memory
 from .quasi_static import QuasiStaticBeam
 from .scene import Beam, Scene, Spring
-from .subsystem import NO_FORCE, Energies, Force, Motion, StepRefused
+from .subsystem import NO_FORCE, BodyFailed, Energies, Force, Motion, StepRefused
 from .trajectory import SHAPE_POINTS
 
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
-_WARNING, _DISCARD, _ERROR = 1, 2, 3
+_WARNING, _DISCARD, _ERROR, _FATAL = 1, 2, 3, 4
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
 
-class FmuError(RuntimeError):
-    """An FMU cannot be found, loaded or initialised; the message names the file and the cause."""
+class FmuError(BodyFailed):
+    """An FMU cannot be found, loaded or initialised, or a call has failed; the message names file and cause."""
 
 
 def fmu_directory() -> Path:
@@ -112,6 +113,7 @@ class Fmu(Memory):
         self._messages: list[str] = []
         self._slave = self._load()
         self._state = fmi2FMUstate()
+        self._worst = 0  #: status of the calls that have failed for good
         #: Whether anything happened since the state was marked.
         self.moved = False
         #: doStep calls, and how often the state was set back.
@@ -120,7 +122,14 @@ class Fmu(Memory):
         self._do_step = self.prepared("fmi2DoStep", self._time, self._size, c_int(0))
         self._get_state = self.prepared("fmi2GetFMUstate", byref(self._state))
         self._set_state = self.prepared("fmi2SetFMUstate", self._state)
-        self.initialise(start_time, parameters)
+        self._free_state = self.prepared("fmi2FreeFMUstate", byref(self._state))
+        self._reached = c_double()
+        self._get_reached = self.prepared("fmi2GetRealStatus", c_int(fmi2LastSuccessfulTime), byref(self._reached))
+        try:
+            self.initialise(start_time, parameters)
+        except BaseException:
+            self.close()
+            raise
 
     def _load(self) -> FMU2Slave:
         if not self.path.is_file():
@@ -163,23 +172,25 @@ class Fmu(Memory):
         for name, value in parameters.items():
             variable = self._variable(name)
             of_kind[variable.type][variable.valueReference] = setters[variable.type][1](value)
-        try:
+        with self._calling("cannot be initialised"):
             slave.setupExperiment(startTime=time)
             for kind, values in of_kind.items():
                 if values:
                     setters[kind][0](list(values), list(values.values()))
             slave.enterInitializationMode()
             slave.exitInitializationMode()
-        except FMICallException as error:
-            cause = self._cause(error)
-            self.close()
-            raise FmuError(f"{self.path}: cannot be initialised: {cause}") from error
 
     def reset(self, time: float, parameters: dict[str, float | int | bool]) -> None:
         """Start again at ``time`` with the given parameters."""
-        self._slave.reset()
+        with self._calling("cannot be reset"):
+            self._slave.reset()
         self.initialise(time, parameters)
         self.moved = True
+
+    @property
+    def usable(self) -> bool:
+        """Whether no call has failed for good."""
+        return self._slave is not None and self._worst <= _WARNING
 
     def prepared(self, name: str, *arguments: Any) -> Callable[[], int]:
         """An FMI function of this instance with its arguments, which are converted to C once; returns its status.
@@ -223,45 +234,57 @@ class Fmu(Memory):
             return
         if status not in (_DISCARD, _ERROR):
             raise self.failed(status, f"cannot step at t = {time:.9g} s")
+        cause = self._cause(f"fmi2DoStep returned {_STATUS[status]}")
         reached = ""
         if status == _DISCARD:
-            reached = f" (reached t = {self._slave.getRealStatus(fmi2LastSuccessfulTime):.9g} s)"
-        raise StepRefused(f"{self._name}: {self._cause(f'fmi2DoStep returned {_STATUS[status]}')}{reached}")
+            if (known := self._get_reached()) >= _ERROR:
+                raise self.failed(known, f"{cause}, and does not say how far it came")
+            reached = f" (reached t = {self._reached.value:.9g} s)" if known <= _WARNING else ""
+        # Also after fmi2Error a saved state may be restored and the step tried again (FMI 2.0.4, section 2.1.3).
+        raise StepRefused(f"{self._name}: {cause}{reached}")
 
     def failed(self, status: int, what: str) -> FmuError:
         """The error of a call that returned ``status``, with what the FMU has logged."""
+        self._worst = max(self._worst, status)
         return FmuError(f"{self.path}: {what}: {self._cause(f'it returned {_STATUS[status]}')}")
+
+    @contextmanager
+    def _calling(self, what: str) -> Iterator[None]:
+        try:
+            yield
+        except FMICallException as error:
+            raise self.failed(error.status, what) from error
 
     def _check(self, status: int, what: str) -> None:
         if status > _WARNING:
             raise self.failed(status, what)
 
     def save(self) -> dict[str, Any]:
-        try:
+        with self._calling("cannot save the state"):
             state = self._slave.getFMUstate()
             serialized = self._slave.serializeFMUstate(state)
             self._slave.freeFMUstate(state)
-        except FMICallException as error:
-            raise self.failed(error.status, "cannot save the state") from error
         return {**super().save(), "state": serialized}
 
     def restore(self, saved: dict[str, Any]) -> None:
         counts = dict(saved)
-        try:
+        with self._calling("cannot restore the state"):
             state = self._slave.deSerializeFMUstate(counts.pop("state", b""), fmi2FMUstate())
             self._slave.setFMUstate(state)
             self._slave.freeFMUstate(state)
-        except FMICallException as error:
-            raise self.failed(error.status, "cannot restore the state") from error
         super().restore(counts)
 
     def close(self) -> None:
-        slave, self._slave = getattr(self, "_slave", None), None
+        """Free the instance, unless it has returned fmi2Fatal: then none of its library may be called again."""
+        slave, self._slave = self._slave, None
         if slave is None:
             return
-        if self._state:
-            slave.fmi2FreeFMUstate(slave.component, byref(self._state))
-        slave.freeInstance()
+        if self._state and self._worst < _FATAL:
+            self._worst = self._free_state()
+        if self._worst == _FATAL:
+            _unpacked.cache_clear()  # the next instance takes a copy of the library of its own
+        else:
+            slave.freeInstance()
 
     def _log(self, environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
         if status > 0:
@@ -281,9 +304,18 @@ class _FmuBody(Memory):
     _ENERGIES: tuple[str, ...]
     _IMPULSE: str
     _FORCES: tuple[str, ...]
+    _current: Motion
+    _marked_motion: Motion
 
     def __init__(self, fmu: Fmu) -> None:
         self.fmu = fmu
+        try:
+            self._prepare(fmu)
+        except BaseException:
+            fmu.close()
+            raise
+
+    def _prepare(self, fmu: Fmu) -> None:
         self._motion, self._energies = Reals(fmu, *self._MOTION), Reals(fmu, *self._ENERGIES)
         self._forces, self._impulse = Reals(fmu, *self._FORCES), Reals(fmu, self._IMPULSE)
         names = [name for name in self._FORCES for _ in (1, 2)]
@@ -295,7 +327,9 @@ class _FmuBody(Memory):
         )
         self._pending = self._marked_pending = 0.0
         self.mass = self._mass()
-        self._current = self._marked_motion = self._read_motion()
+        if not isfinite(self.mass):
+            raise FmuError(f"{fmu.path}: the mass of its end is {self.mass}")
+        self._begin()
 
     def _mass(self) -> float:
         raise NotImplementedError
@@ -329,6 +363,8 @@ class _FmuBody(Memory):
 
     def _advance(self, time: float, size: float, values: list[float], slopes: list[float]) -> None:
         """``values`` of the forces and their ``slopes`` (Ḟ, F̈ of each) at the start of the step."""
+        if not isfinite(sum(values) + sum(slopes)):
+            raise StepRefused(f"{self.fmu.path.name}: the force it should step under is not finite: {values}")
         self._forces.set(values)
         if any(slopes):
             self._slopes[:] = slopes
@@ -338,10 +374,17 @@ class _FmuBody(Memory):
         self._pending = 0.0
         self._current = self._read_motion()
 
+    def _begin(self) -> None:
+        """Read the motion that the FMU was initialised to."""
+        try:
+            self._current = self._marked_motion = self._read_motion()
+        except StepRefused as refused:
+            raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
+
     def _read_motion(self) -> Motion:
         motion = Motion(*self._motion.get())
         if not isfinite(sum(motion)):
-            raise StepRefused(f"{self.fmu.path.name}: not finite: {motion}")
+            raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
         return motion
 
     def _stored(self) -> list[float]:
@@ -374,9 +417,11 @@ class FmuBeam(_FmuBody):
         parameters: dict[str, float | int | bool] = beam.model_dump(exclude={"approach", "fidelity"})
         parameters["integrator"] = _INTEGRATORS[beam.integrator]
         parameters["initial_deflection_slope"] = deflection_slope
-        fmu = Fmu("beam", fmu_directory() / "beam.fmu", parameters, start_time)
+        super().__init__(Fmu("beam", fmu_directory() / "beam.fmu", parameters, start_time))
+
+    def _prepare(self, fmu: Fmu) -> None:
+        super()._prepare(fmu)
         self._shape = Reals(fmu, *[f"deflection[{i}]" for i in range(1, len(SHAPE_POINTS) + 1)])
-        super().__init__(fmu)
 
     def _mass(self) -> float:
         return Reals(self.fmu, "tip_mass").get()[0]
@@ -418,16 +463,28 @@ class FmuSpring(_FmuBody):
         kinetic, potential, dissipated = self._stored()
         return Energies(kinetic, potential, dissipated, -self._spring.external_force * self._current.displacement)
 
+    def _prepare(self, fmu: Fmu) -> None:
+        super()._prepare(fmu)
+        self._internal_steps = Reals(fmu, "internal_steps")
+
     @property
     def internal_steps(self) -> int:
-        """Steps that IDA took on the way here; those of steps that were taken back are not among them."""
-        return round(Reals(self.fmu, "internal_steps").get()[0])
+        """Steps that IDA took on the way here; those of steps that were taken back are not among them.
+
+        Raises FmuError if the FMU has failed, or fails to tell.
+        """
+        if not self.fmu.usable:
+            raise FmuError(f"{self.fmu.path}: has failed")
+        steps = self._internal_steps.get()[0]
+        if not isfinite(steps):
+            raise FmuError(f"{self.fmu.path}: internal_steps = {steps}")
+        return round(steps)
 
     def restart(self, time: float, displacement: float, velocity: float) -> None:
         """Start again at ``time`` [s] from y [m] and z [m/s], by the exact start values of the FMU."""
         self.fmu.reset(time, {**self._parameters, "displacement": displacement, "velocity": velocity})
         self._pending = 0.0
-        self._current = self._read_motion()
+        self._begin()
 
 
 def load_bodies(scene: Scene, start_time: float) -> tuple[FmuBeam | QuasiStaticBeam | None, FmuSpring | None]:

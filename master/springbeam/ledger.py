@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import NamedTuple
 
 from .memory import Memory
@@ -34,7 +35,10 @@ class Ledger(Memory):
     gain: float = 0.0  #: the same of the residuals that are positive
 
     def book(self, beam: Energies, spring: Energies, contact: float) -> Booked:
-        """The next row; ``contact`` is the energy of the contact law [J]."""
+        """The next row; ``contact`` is the energy of the contact law [J].
+
+        One that is not finite changes nothing: it is no row of the results.
+        """
         e_beam = beam.kinetic + beam.potential
         e_spring = spring.kinetic + spring.potential
         dissipated = beam.dissipated + spring.dissipated
@@ -43,6 +47,8 @@ class Ledger(Memory):
         if self.initial is None:
             self.initial = total
         residual = total - self.initial
+        if not isfinite(residual):
+            return Booked(e_beam, e_spring, contact, dissipated, self.impact_loss, load, total, residual)
         self.scale = max(self.scale, abs(self.initial), e_beam + abs(e_spring) + contact)
         self.largest_residual = max(self.largest_residual, abs(residual))
         if self.scale > 0.0:

@@ -18,8 +18,8 @@ from .memory import Memory
 from .recording import NonFiniteValue, Recorder
 from .resolution import not_resolved
 from .scene import Scene
-from .simulation import Progress, RunStopped
-from .subsystem import NO_FORCE, BeamBody, Body, StepRefused
+from .simulation import OVERFLOW, Progress, RunStopped
+from .subsystem import NO_FORCE, BeamBody, Body, BodyFailed, StepRefused
 from .trajectory import Event
 
 _MAX_ITERATIONS = 50
@@ -95,8 +95,10 @@ class PaperLaw(Memory):
                 self._record(phase, contact, inside, foundation)
                 if self._progress is not None:
                     self._progress(self.time, phase, self._steps)
-        except (StepRefused, NonFiniteValue) as error:
+        except (StepRefused, BodyFailed, NonFiniteValue) as error:
             raise RunStopped(str(error), self.time) from error
+        except OverflowError as error:
+            raise RunStopped(OVERFLOW, self.time) from error
 
     def _begin(self) -> None:
         self._touched = self._beam.motion().displacement <= self._parameters.equilibrium

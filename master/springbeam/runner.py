@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from .checkpoint import Checkpoint, CheckpointRefused, Checkpoints
-from .fmu import FmuBeam, FmuSpring, fingerprints, load_bodies
+from .fmu import FmuBeam, FmuError, FmuSpring, fingerprints, load_bodies
 from .memory import Memory
 from .paper_law import PaperLaw
 from .quasi_static import QuasiStaticBeam
@@ -51,7 +53,11 @@ def run(
     Raises
     ------
     RunStopped
-        If the run ends early; what was computed has been recorded and the summary written.
+        If the run ends early, for whatever reason but those below; what was computed has been recorded and the
+        summary written. If the reason was not foreseen, it is the error's ``__cause__`` and the summary has its
+        ``traceback``.
+    OSError
+        If the results cannot be written.
     FmuError
         If an FMU cannot be found or loaded.
     ResultsUnreadable, ResultsInUse
@@ -92,9 +98,13 @@ def run(
         except RunStopped as stopped:
             status = {"status": "stopped", "cause": stopped.cause, "residual": stopped.residual}
             raise
-        except Exception as error:
+        except OSError as error:
             status = {"status": "stopped", "cause": f"{type(error).__name__}: {error}"}
             raise
+        except Exception as error:
+            cause = f"{type(error).__name__}: {error}"
+            status = {"status": "stopped", "cause": cause, "residual": None, "traceback": traceback.format_exc()}
+            raise RunStopped(cause, simulation.time) from error
         except BaseException as error:
             status = {"status": "interrupted", "cause": type(error).__name__}
             raise
@@ -197,5 +207,6 @@ def _calls(**bodies: FmuBeam | FmuSpring | QuasiStaticBeam | None) -> dict[str, 
             counts[f"{name}_steps"] = body.steps
             counts[f"{name}_rollbacks"] = body.rewinds
         if isinstance(body, FmuSpring):
-            counts["spring_internal_steps"] = body.internal_steps
+            with suppress(FmuError):  # why it fails to tell is the cause that the run stopped for
+                counts["spring_internal_steps"] = body.internal_steps
     return counts

@@ -9,6 +9,7 @@ goes on from there. Every row closes the ledger (`springbeam.rows`, `springbeam.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 from typing import Any
 
 from .contact import Joint, Phase, Transitions
@@ -24,7 +25,7 @@ from .resolution import not_resolved
 from .rows import Rows
 from .scene import Scene
 from .stepping import Pair, State, Step
-from .subsystem import NO_FORCE, BeamBody, Body, StepRefused
+from .subsystem import NO_FORCE, BeamBody, Body, BodyFailed, StepRefused
 from .trajectory import Event
 
 #: ``progress(time, phase, macro_steps)``, called once per accepted step.
@@ -37,12 +38,19 @@ _MAX_HALVINGS = 20
 _AT_ONCE, _MAX_EVENTS_AT_ONCE = 1e-6, 500
 #: Relative energy residual at which a run says so, and at which it stops (but for what numerical damping takes).
 _ENERGY_WARNS, _ENERGY_STOPS = 1e-3, 0.1
+#: Cause of a run that ends so.
+OVERFLOW = "a force, an energy or a position is larger than a double holds"
 
 
 class RunStopped(RuntimeError):
-    """The run ended before t_end; everything up to ``time`` has been recorded."""
+    """The run ended before t_end; everything up to ``time`` [s] has been recorded.
+
+    ``residual`` [m] is that of the conditions that could not be met, ``None`` where the cause is another.
+    """
 
     def __init__(self, cause: str, time: float, residual: float | None = None) -> None:
+        if residual is not None and not isfinite(residual):
+            residual = None
         at = "" if residual is None else f", residual {residual:.3g} m"
         super().__init__(f"stopped at t = {time:.9g} s: {cause}{at}")
         self.cause, self.time, self.residual = cause, time, residual
@@ -115,6 +123,19 @@ class Simulation(Memory):
 
         Raises RunStopped; what was computed is with the recorder.
         """
+        try:
+            self._run()
+        except (BodyFailed, NonFiniteValue) as failed:
+            raise RunStopped(str(failed), self.time) from failed
+        except OverflowError as error:
+            raise RunStopped(OVERFLOW, self.time) from error
+
+    @property
+    def time(self) -> float:
+        """Reached so far [s]."""
+        return self._state.time
+
+    def _run(self) -> None:
         state, steps, t_end = self._state, self._steps, self._scene.time.t_end
         if not self._begun:
             self._settle_start()
@@ -161,11 +182,12 @@ class Simulation(Memory):
                     return self._detector.first(state, step)
                 pair.rewind()
                 size = self._steps.size
-            except StepRefused as refused:
+            except (StepRefused, OverflowError) as refused:
                 pair.rewind()
                 if halvings == _MAX_HALVINGS:
                     residual = refused.residual if isinstance(refused, NotConverged) else None
-                    raise RunStopped(str(refused), state.time, residual) from refused
+                    cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
+                    raise RunStopped(cause, state.time, residual) from refused
                 halvings += 1
                 self._halvings += 1
                 size *= 0.5
@@ -245,10 +267,7 @@ class Simulation(Memory):
     # -- what is reported -------------------------------------------------------------------------------------------
 
     def _record(self) -> None:
-        try:
-            self._rows.write(self._state)
-        except NonFiniteValue as error:
-            raise RunStopped(str(error), self._state.time) from error
+        self._rows.write(self._state)
         if (self._ledger.gain if self._numerically_damped else self._ledger.relative) > _ENERGY_STOPS:
             raise RunStopped(self._energy_cause(), self._state.time)
         one_way, allowed = self._pair.one_way, self._scene.coupling.feedback_tolerance

@@ -18,6 +18,10 @@ class StepRefused(RuntimeError):
     """A body could not complete a step (fmi2Discard, a numerical failure, a non-finite result)."""
 
 
+class BodyFailed(RuntimeError):
+    """A body cannot go on, whatever the step (fmi2Error of any other call, fmi2Fatal)."""
+
+
 class Motion(NamedTuple):
     """The interface end of a body at the end of its last step."""
 
@@ -53,7 +57,10 @@ class Body(Protocol):
         """Return to the marked state. Costs nothing if nothing happened since."""
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
-        """Advance from ``time`` by ``size`` [s]. Raises StepRefused; ``rewind`` then recovers."""
+        """Advance from ``time`` by ``size`` [s]. Raises StepRefused; ``rewind`` then recovers.
+
+        This and every other method but ``close`` may raise BodyFailed.
+        """
 
     def motion(self) -> Motion: ...
 

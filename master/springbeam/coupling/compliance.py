@@ -22,12 +22,12 @@ _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(6)[0] + 1) / 2, np.polynomia
 
 
 def compliance_force(p: float, stiffness: float, exponent: float) -> float:
-    """λ p₊^q [N] for a penetration ``p`` [m]."""
+    """λ p₊^q [N] for a penetration ``p`` [m]. Raises OverflowError where no double holds it."""
     return stiffness * p**exponent if p > 0.0 else 0.0
 
 
 def compliance_energy(p: float, stiffness: float, exponent: float) -> float:
-    """Φ(p) = λ p₊^{q+1}/(q+1) [J]."""
+    """Φ(p) = λ p₊^{q+1}/(q+1) [J]. Raises OverflowError where no double holds it."""
     return stiffness * p ** (exponent + 1.0) / (exponent + 1.0) if p > 0.0 else 0.0
 
 

@@ -1,0 +1,255 @@
+"""FMUs that fail in every phase: the run goes on as designed or stops by name, and nothing computed is lost."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+from faulty import NAMES, Fault, Script, installed
+from typer.testing import CliRunner
+
+from springbeam import cli
+from springbeam.recording import load_trajectory
+
+pytestmark = pytest.mark.usefixtures("fmu_folder")
+
+#: Every phase and every kind of event within 0.6 s.
+SCENE: dict[str, dict[str, Any]] = {
+    "time": {"t_end": 0.6},
+    "beam": {
+        "n_elements": 8,
+        "young_modulus": 29.0,
+        "shear_modulus": 29.0,
+        "distributed_load": -2.0,
+        "initial_velocity_slope": -0.86,
+        "initial_deflection_slope": 0.1,
+        "approach": "elastic",
+    },
+    "spring": {
+        "mass": 0.15,
+        "linear_stiffness": 8.6,
+        "cubic_stiffness": 5.0,
+        "damping": 0.36,
+        "external_force": 0.3,
+    },
+    "stop": {"position": -0.043, "restitution": 0.3},
+    "coupling": {"macro_step": 2e-3},
+}
+COMPLIANCE = {"law": "compliance", "stiffness": 1e3, "exponent": 1.5}
+#: Tables that differ, and where the master comes by.
+LAWS: dict[str, tuple[dict[str, dict[str, Any]], tuple[str, ...]]] = {
+    "energy": ({}, ("free", "tied", "touch", "seated", "location")),
+    "hermite": (
+        {"coupling": {"scheme": "hermite", "degree": 2}},
+        ("free", "tied", "touch", "seated", "location"),
+    ),
+    "compliance": ({"contact": COMPLIANCE}, ("free", "touch", "seated", "location")),
+    "jacobi": ({"contact": COMPLIANCE, "coupling": {"scheme": "jacobi"}}, ("free", "touch", "seated")),
+    "paper": ({"contact": {"law": "paper"}, "beam": {"approach": "undeformed"}}, ("paper",)),
+}
+#: What halving one step changes at the end [m]: its error at H against that at H/2, of order 2 and 6 and none.
+HALVED = {"energy": 1e-5, "hermite": 1e-10, "compliance": 1e-5, "jacobi": 1e-4}
+FILES = ("trajectory.csv", "events.csv", "shapes.csv")
+Run = Callable[..., tuple[int, Path, Script]]
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    def started(law: str, *faults: Fault, name: str = "faulty") -> tuple[int, Path, Script]:
+        changes, _ = LAWS[law]
+        scene = {table: {**SCENE.get(table, {}), **changes.get(table, {})} for table in {**SCENE, **changes}}
+        (tmp_path / "scene.toml").write_text(tomli_w.dumps(scene))
+        with monkeypatch.context() as patch:
+            script = installed(patch, *faults)
+            result = CliRunner().invoke(
+                cli.app, ["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / name), "--no-plots", "-q"]
+            )
+        assert "Traceback" not in result.output
+        assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+        return result.exit_code, tmp_path / name, script
+
+    return started
+
+
+_WHOLE: dict[str, dict[str, bytes]] = {}
+
+
+def whole(run: Run, law: str) -> dict[str, bytes]:
+    """The files of a run without a fault."""
+    if law not in _WHOLE:
+        code, directory, script = run(law, name="whole")
+        assert code == 0
+        script.check()
+        trajectory = load_trajectory(directory)
+        assert {where for where in LAWS[law][1] if where not in ("location", "paper")} <= set(trajectory.phase)
+        _WHOLE[law] = {name: (directory / name).read_bytes() for name in FILES}
+    return _WHOLE[law]
+
+
+def check_stopped(code: int, directory: Path, expected: dict[str, bytes], cause: str) -> None:
+    """Exit code 3; the summary says why and when; the rows are the first ones of the run without a fault."""
+    assert code == 3
+    summary = json.loads((directory / "summary.json").read_text())
+    assert summary["status"] == "stopped"
+    assert cause in summary["cause"]
+    assert summary["residual"] is None or np.isfinite(summary["residual"])
+    for name in FILES:
+        content = (directory / name).read_bytes()
+        assert expected[name].startswith(content), name
+    trajectory = load_trajectory(directory)
+    assert trajectory.summary["time"] >= (trajectory.time[-1] if len(trajectory) else 0.0)
+    assert np.isfinite(trajectory.summary["max_energy_residual"])
+
+
+EVERYWHERE = [(law, where) for law, (_, places) in LAWS.items() for where in places]
+
+
+LASTING = [
+    *(
+        (law, where, *fault)
+        for law, where in EVERYWHERE
+        for fault in (
+            ("fmi2DoStep", "Discard", "fmi2DoStep returned discard"),
+            ("fmi2GetReal", "nan", "not finite: Motion(displacement="),
+            ("fmi2SetReal", "Error", "cannot set "),
+        )
+    ),
+    *(
+        (law, where, *fault)
+        for law, where in EVERYWHERE
+        if law in ("energy", "paper")
+        for fault in (
+            ("fmi2DoStep", "Error", "fmi2DoStep returned error"),
+            ("fmi2DoStep", "Fatal", "cannot step at t = "),
+            ("fmi2DoStep", "raise", "ZeroDivisionError: nobody expected this"),
+            ("fmi2GetReal", "Fatal", "cannot read "),
+        )
+    ),
+]
+
+
+@pytest.mark.parametrize("fmu", ["beam", "spring"])
+@pytest.mark.parametrize(("law", "where", "function", "kind", "cause"), LASTING)
+def test_a_lasting_fault_stops_the_run(
+    run: Run, fmu: str, law: str, where: str, function: str, kind: str, cause: str
+) -> None:
+    expected = whole(run, law)
+    fault = Fault(fmu, function, where, kind)
+    code, directory, script = run(law, fault)
+    assert fault.happened
+    script.check()
+    check_stopped(code, directory, expected, cause)
+
+
+@pytest.mark.parametrize("fmu", ["beam", "spring"])
+@pytest.mark.parametrize(
+    ("law", "where", "function", "kind", "cause"),
+    [
+        ("energy", "tied", "fmi2SetFMUstate", "Discard", "cannot restore the state"),
+        ("hermite", "touch", "fmi2SetFMUstate", "raise", "ZeroDivisionError"),
+        ("energy", "location", "fmi2SetFMUstate", "Error", "cannot restore the state"),
+        ("compliance", "touch", "fmi2SetFMUstate", "Fatal", "cannot restore the state"),
+        ("paper", "paper", "fmi2SetFMUstate", "Error", "cannot restore the state"),
+        ("energy", "start", "fmi2GetFMUstate", "Discard", "cannot save the state"),
+        ("energy", "start", "fmi2GetFMUstate", "Fatal", "cannot save the state"),
+        ("jacobi", "start", "fmi2GetFMUstate", "Error", "cannot save the state"),
+        ("paper", "paper", "fmi2GetFMUstate", "Error", "cannot save the state"),
+        ("hermite", "tied", "fmi2SetRealInputDerivatives", "Discard", "cannot set input derivatives"),
+        ("hermite", "touch", "fmi2SetRealInputDerivatives", "Error", "cannot set input derivatives"),
+        ("hermite", "location", "fmi2SetRealInputDerivatives", "Fatal", "cannot set input derivatives"),
+        ("energy", "event", "fmi2SetReal", "Error", "impulse"),
+        ("hermite", "event", "fmi2SetReal", "Fatal", "impulse"),
+        ("energy", "row", "fmi2GetReal", "Error", "cannot read "),
+        ("energy", "row", "fmi2GetReal", "Fatal", "cannot read "),
+        ("energy", "row", "fmi2GetReal", "nan", "not a finite number"),
+        ("compliance", "row", "fmi2GetReal", "inf", "not a finite number"),
+        ("energy", "tied", "fmi2GetReal", "inf", "not finite: Motion(displacement="),
+    ],
+)
+def test_whatever_fails_is_named(
+    run: Run, fmu: str, law: str, where: str, function: str, kind: str, cause: str
+) -> None:
+    expected = whole(run, law)
+    fault = Fault(fmu, function, where, kind)
+    code, directory, script = run(law, fault)
+    assert fault.happened
+    script.check()
+    check_stopped(code, directory, expected, cause)
+
+
+@pytest.mark.parametrize("fmu", ["beam", "spring"])
+@pytest.mark.parametrize(("law", "where"), [case for case in EVERYWHERE if case[0] != "paper"])
+@pytest.mark.parametrize(("function", "kind"), [("fmi2DoStep", "Discard"), ("fmi2GetReal", "nan")])
+def test_a_fault_that_passes_is_stepped_over(
+    run: Run, fmu: str, law: str, where: str, function: str, kind: str
+) -> None:
+    fault = Fault(fmu, function, where, kind, once=True)
+    code, directory, script = run(law, fault)
+    assert fault.happened == 1
+    script.check()
+    assert code == 0
+    trajectory, undisturbed = load_trajectory(directory), whole(run, law)
+    assert trajectory.summary["halved_steps"] == 1
+    assert trajectory.time[-1] == SCENE["time"]["t_end"]
+    last = undisturbed["trajectory.csv"].split()[-1].split(b",")
+    u, y = float(last[1]), float(last[3])
+    deviation = max(abs(trajectory.u_tip[-1] - u), abs(trajectory.y[-1] - y))
+    assert deviation < HALVED[law]
+    if law != "jacobi":
+        assert trajectory.summary["max_energy_residual"] < 1e-10
+
+
+@pytest.mark.parametrize("fmu", ["beam", "spring"])
+@pytest.mark.parametrize("law", ["energy", "hermite", "compliance", "jacobi"])
+@pytest.mark.parametrize("kind", [*NAMES, "raise"])
+def test_a_rollback_that_fails_stops_the_run(run: Run, fmu: str, law: str, kind: str) -> None:
+    expected = whole(run, law)
+    discard = Fault(fmu, "fmi2DoStep", "touch", "Discard", once=True)
+    code, directory, script = run(law, discard, Fault(fmu, "fmi2SetFMUstate", "rollback", kind, skip=0))
+    script.check()
+    check_stopped(code, directory, expected, "nobody expected" if kind == "raise" else "cannot restore the state")
+
+
+@pytest.mark.parametrize("fmu", ["beam", "spring"])
+@pytest.mark.parametrize("law", ["energy", "hermite", "compliance", "jacobi"])
+def test_wild_numbers_stop_the_run(run: Run, fmu: str, law: str) -> None:
+    """1e300 m is a finite number: it is recorded, as it came, and the energy tells."""
+    code, directory, script = run(law, Fault(fmu, "fmi2GetReal", "touch", "1e300", skip=2))
+    script.check()
+    assert code == 3
+    trajectory = load_trajectory(directory)
+    assert trajectory.summary["status"] == "stopped"
+    assert "has changed the energy" in trajectory.summary["cause"]
+
+
+@pytest.mark.parametrize("fmu", ["beam", "spring"])
+@pytest.mark.parametrize("kind", list(NAMES))
+@pytest.mark.parametrize("function", ["fmi2SetupExperiment", "fmi2GetReal"])
+def test_an_fmu_that_does_not_start_is_refused(run: Run, fmu: str, kind: str, function: str) -> None:
+    code, directory, script = run("energy", Fault(fmu, function, "start", kind, skip=0))
+    script.check()
+    assert code == 2
+    assert not directory.exists()
+
+
+@pytest.mark.parametrize("fmu", ["beam", "spring"])
+def test_a_start_that_is_not_finite_is_refused(run: Run, fmu: str) -> None:
+    code, directory, script = run("energy", Fault(fmu, "fmi2GetReal", "start", "nan", skip=0))
+    script.check()
+    assert code == 2
+    assert not directory.exists()
+
+
+def test_after_fmi2_fatal_the_next_run_is_as_ever(run: Run) -> None:
+    expected = whole(run, "energy")
+    code, *_ = run("energy", Fault("spring", "fmi2DoStep", "tied", "Fatal"))
+    assert code == 3
+    code, directory, script = run("energy", name="next")
+    assert code == 0
+    script.check()
+    assert {name: (directory / name).read_bytes() for name in FILES} == expected
