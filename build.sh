@@ -11,6 +11,7 @@ usage() {
 ./build.sh sources                 also get the source of SUNDIALS: spring.fmu can then be compiled from its own sources/
 ./build.sh win64                   also cross-compile for 64-bit Windows; the FMUs then carry both
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
+./build.sh bench [GROUP]…          measure the speed and write the tables of docs/performance.md (minutes)
 ./build.sh browser                 install playwright and Chromium and look at the report in it
 ./build.sh wheel                   build a source archive, and from that a wheel, into dist/, and test the wheel
 ./build.sh fuzz [SEED]             a million random calls of each FMU under sanitizers (about 10 minutes)
@@ -166,6 +167,10 @@ case $command in
     cache=${SPRINGBEAM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/springbeam}
     tests/interop/install.sh "$cache" "$python"
     SPRINGBEAM_CACHE=$cache exec $python -m pytest tests/interop "$@"
+    ;;
+  bench)
+    build fmus beam_bench spring_bench
+    exec $python tests/bench "$@"
     ;;
   browser)
     build fmus

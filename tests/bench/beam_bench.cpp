@@ -1,0 +1,188 @@
+// The beam beside what its step cannot do without: one banded solve and one banded product of the mesh's unknowns, or
+// as many 2×2 products as there are modes. beam_bench [--quick]
+#include <malloc.h>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+#include "../../fmus/adapter/instance.hpp"
+#include "../../src_beam/beam.hpp"
+#include "../../src_beam/timoshenko.hpp"
+#include "paired.hpp"
+
+namespace {
+
+using Eigen::VectorXd;
+
+/// The beam of paper-fig2.
+beam::Parameters paper(int n_elements, int n_modes) {
+  beam::Parameters p;
+  p.young_modulus = p.shear_modulus = 3.6e10;
+  p.n_elements = n_elements;
+  p.n_modes = n_modes;
+  p.integrator = n_modes == 0 ? beam::Integrator::generalized_alpha : beam::Integrator::modal;
+  p.initial_velocity_slope = -1.0;
+  return p;
+}
+
+constexpr double h = 0.004;
+
+/// What a step of (62) needs at the least.
+class Bare {
+ public:
+  explicit Bare(const beam::Parameters& p) : mesh_(p), K_(mesh_.stiffness()), b_(mesh_.linear_shape()) {
+    Eigen::SparseMatrix<double> S = mesh_.mass();
+    S.coeffs() += 0.25 * h * h * K_.coeffs();
+    factor_.compute(S);
+    if (factor_.info() != Eigen::Success) throw std::runtime_error("not factorised");
+  }
+  void solve_and_multiply() {
+    x_ = factor_.solve(b_);
+    y_.noalias() = K_.selfadjointView<Eigen::Lower>() * x_;
+    bench::keep(y_[0]);
+  }
+
+ private:
+  beam::Timoshenko mesh_;
+  Eigen::SparseMatrix<double> K_;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor_;
+  VectorXd b_, x_, y_;
+};
+
+/// η⁺ = A η + B v + b C, v⁺ likewise, and the tip's displacement: exact modes and nothing else.
+class BareModes {
+ public:
+  explicit BareModes(Eigen::Index m) : a_(7, m), eta_(m), v_(m), next_(m) {
+    for (Eigen::Index i = 0; i < m; ++i) {
+      const double x = 0.3 * static_cast<double>(i + 1);
+      a_.col(i) << std::cos(x), std::sin(x), -std::sin(x), std::cos(x), 1e-3, 1e-3, 1.0;
+    }
+    eta_.setZero();
+    v_.setOnes();
+    rows_ = a_.transpose();
+  }
+  void step(double force) {
+    next_ = rows_.col(0) * eta_ + rows_.col(1) * v_ + rows_.col(4) * force;
+    v_ = rows_.col(2) * eta_ + rows_.col(3) * v_ + rows_.col(5) * force;
+    eta_.swap(next_);
+    bench::keep((rows_.col(6) * eta_).sum());
+  }
+
+ private:
+  Eigen::ArrayXXd a_, rows_;
+  Eigen::ArrayXd eta_, v_, next_;
+};
+
+/// beam.fmu without the library around it, called as an importer written in C would.
+class Fmu {
+ public:
+  explicit Fmu(const beam::Parameters& p) {
+    set("young_modulus", fmi::Type::real, p.young_modulus);
+    set("shear_modulus", fmi::Type::real, p.shear_modulus);
+    set("n_elements", fmi::Type::integer, p.n_elements);
+    set("n_modes", fmi::Type::integer, p.n_modes);
+    set("integrator", fmi::Type::integer, static_cast<int>(p.integrator));
+    set("initial_velocity_slope", fmi::Type::real, p.initial_velocity_slope);
+    instance_.enter_initialization();
+    instance_.exit_initialization();
+  }
+  void step(double force) {
+    set("tip_force", fmi::Type::real, force);
+    instance_.step(instance_.time(), h);
+  }
+  void step() { instance_.step(instance_.time(), h); }
+
+ private:
+  void set(const char* name, fmi::Type type, double value) {
+    instance_.set(static_cast<unsigned>(fmi::table().index(name)), type, value);
+  }
+  fmi::Instance instance_;
+};
+
+/// A line of /proc/self/status [bytes].
+double status(const std::string& key) {
+  std::ifstream file("/proc/self/status");
+  for (std::string word; file >> word;) {
+    if (word != key) continue;
+    double kilobytes = 0.0;
+    file >> kilobytes;
+    return 1024.0 * kilobytes;
+  }
+  throw std::runtime_error("no " + key + " in /proc/self/status");
+}
+
+/// Memory in use now; from here on the largest is VmHWM.
+double begin_peak() {
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << "5";
+  return status("VmRSS:");
+}
+
+/// Time per step, memory at its most and time to initialise against the number of elements.
+void scaling(const bench::Options& o) {
+  for (const int modes : {0, 64}) {
+    std::vector<double> elements, step, memory, initialisation;
+    for (int n = 100; n <= (o.quick ? 1000 : 100000); n *= 10) {
+      const double before = begin_peak(), began = bench::now();
+      beam::Beam one(paper(n, modes));
+      initialisation.push_back(bench::now() - began);
+      const auto work = [&one] { one.step(h, {1.0, 0.0, 0.0}, 0.0); };
+      const std::size_t calls = bench::calls_for(work, o.seconds);
+      memory.push_back(status("VmHWM:") - before);
+      std::vector<double> times;
+      for (int round = 0; round < o.rounds; ++round) times.push_back(bench::timed(work, calls));
+      std::sort(times.begin(), times.end());
+      elements.push_back(n);
+      step.push_back(times[times.size() / 2]);
+    }
+    std::printf("{\"name\": \"scaling\", \"modes\": %d, ", modes);
+    bench::print("elements", elements);
+    std::printf(", ");
+    bench::print("step", step);
+    std::printf(", ");
+    bench::print("memory", memory);
+    std::printf(", ");
+    bench::print("initialisation", initialisation);
+    std::printf("}\n");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const bench::Options o = bench::options(argc, argv);
+  {
+    beam::Beam direct(paper(1000, 0));
+    Fmu fmu(paper(1000, 0));
+    Bare bare(paper(1000, 0));
+    double force = 1.0;
+    bench::compare(
+        "generalized_alpha", o, [&] { direct.step(h, {force += 1e-3, 0.0, 0.0}, 0.0); },
+        [&] { bare.solve_and_multiply(); });
+    bench::compare("generalized_alpha fmu", o, [&] { fmu.step(); }, [&] { bare.solve_and_multiply(); });
+    std::vector<double> state;
+    direct.save(state);
+    bench::compare(
+        "generalized_alpha repeated", o,
+        [&] {
+          direct.restore(state);
+          direct.step(h, {force += 1e-3, 0.0, 0.0}, 0.0);
+        },
+        [&] { bare.solve_and_multiply(); });
+  }
+  {
+    beam::Beam direct(paper(1000, 64));
+    Fmu fmu(paper(1000, 64));
+    BareModes bare(64);
+    double force = 1.0;
+    bench::compare("modal", o, [&] { direct.step(h, {force += 1e-3, 0.0, 0.0}, 0.0); }, [&] { bare.step(force); });
+    bench::compare("modal fmu", o, [&] { fmu.step(); }, [&] { bare.step(force); });
+  }
+  scaling(o);
+  return 0;
+}

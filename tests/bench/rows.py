@@ -1,0 +1,438 @@
+"""What is measured, and the goals: one function per group of rows of docs/performance.md."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from ctypes import c_size_t
+from dataclasses import dataclass
+from functools import partial
+from math import log10
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import scipy.sparse.linalg as spla
+from measure import Times, compare, median_and_spread, timed
+
+from springbeam import fmu, load_scene, simulate, with_changes
+from springbeam.monolithic import algorithm1, event_driven
+from springbeam.monolithic.semi_discrete import assemble
+from springbeam.scene import Scene
+
+HERE = Path(__file__).parent
+PROGRAMS = HERE.parents[1] / "build" / "tests" / "bench"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the table."""
+
+    group: str
+    what: str
+    goal: str
+    measured: str
+    met: bool | None = None  #: ``None``: measured without a goal
+    against: str = ""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured."""
+
+    rounds: int = 11
+    #: Macro steps of the long run.
+    long_run: int = 1_000_000
+    #: Only see that everything runs.
+    quick: bool = False
+
+
+def ratio_row(group: str, what: str, times: Times, limit: float, against: str, *, faster: bool = False) -> Row:
+    """``limit`` bounds ours/rival from above, or with ``faster`` rival/ours from below."""
+    ratios = [1.0 / r for r in times.ratios] if faster else times.ratios
+    median = statistics.median(ratios)
+    seconds = f"{_time(statistics.median(times.ours))} against {_time(statistics.median(times.rival))}"
+    return Row(
+        group,
+        what,
+        f"≥ {limit:g} × faster" if faster else f"≤ {limit:g} ×",
+        f"{median_and_spread(ratios)} × {'faster' if faster else ''}".rstrip() + f"; {seconds}",
+        median >= limit if faster else median <= limit,
+        against,
+    )
+
+
+def _time(seconds: float) -> str:
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
+
+
+def program(name: str, effort: Effort) -> dict[str, Any]:
+    """What ``build/tests/bench/NAME`` prints, by the names of its lines."""
+    arguments = ["--quick"] if effort.quick else []
+    output = subprocess.run([str(PROGRAMS / name), *arguments], stdout=subprocess.PIPE, text=True, check=True).stdout
+    lines = [json.loads(line) for line in output.splitlines()]
+    return {line["name"] + (f" {line['modes']}" if "modes" in line else ""): line for line in lines}
+
+
+def _of(line: dict[str, Any]) -> Times:
+    return Times(line["ours"], line["rival"])
+
+
+# -- 1, 2: the beam ---------------------------------------------------------------------------------------------------
+
+
+def beam(effort: Effort) -> Iterator[Row]:
+    found = program("beam_bench", effort)
+    bare = "one solve with the factors, one product, by Eigen (SimplicialLDLT, natural order)"
+    yield ratio_row("1", "beam step, generalized-α, 1000 elements", _of(found["generalized_alpha"]), 1.5, bare)
+    yield ratio_row(
+        "1", "the same from the same state under another force", _of(found["generalized_alpha repeated"]), 1.5, bare
+    )
+    modal = _of(found["modal fmu"])
+    microseconds = [1e6 * s for s in modal.ours]
+    yield Row(
+        "1",
+        "beam step of the FMU, 64 modes, called from C",
+        "≤ 1 µs",
+        f"{median_and_spread(microseconds)} µs",
+        statistics.median(microseconds) <= 1.0,
+        f"64 products of 2 × 2 matrices: {_time(statistics.median(modal.rival))}",
+    )
+    yield from _initialisation(effort, found)
+    for modes, name in ((0, "generalized-α"), (64, "64 modes")):
+        line = found[f"scaling {modes}"]
+        for key, what, first, shown in (
+            ("step", "time of a step", 0, _time),
+            ("memory", "memory at its most", 1, _size),
+        ):
+            # A hundred elements are less than the system gives out at once.
+            n, values = line["elements"][first:], line[key][first:]
+            exponents = _exponents(n, values)
+            yield Row(
+                "2",
+                f"{what}, {name}, {n[0]:.0e} to {n[-1]:.0e} elements",
+                "exponent ≤ 1.1",
+                ", ".join(f"{e:.2f}" for e in exponents) + " a decade",
+                max(exponents, default=0.0) <= 1.1,
+                "; ".join(shown(value) for value in values),
+            )
+
+
+def _exponents(n: list[float], values: list[float]) -> list[float]:
+    return [log10(b / a) / log10(m / k) for a, b, k, m in zip(values, values[1:], n, n[1:], strict=False)]
+
+
+def _size(size: float) -> str:
+    return f"{size / 1e6:.2g} MB"
+
+
+def _initialisation(effort: Effort, found: dict[str, Any]) -> Iterator[Row]:
+    """Beside ARPACK's shift-invert Lanczos of scipy for as many modes of the same matrices."""
+    paper = load_scene("paper-fig2").beam
+    assert paper is not None
+    for n, goal, unit, rounds in ((1000, 100.0, "ms", min(effort.rounds, 5)), (100_000, 10.0, "s", 1)):
+        if effort.quick and n > 1000:
+            continue
+        one = paper.model_copy(update={"n_elements": n, "n_modes": 64})
+
+        def ours(one: Any = one) -> float:
+            made: list[fmu.FmuBeam] = []
+            seconds = timed(lambda: made.append(fmu.FmuBeam(one, 0.0, 0.0)))
+            made[0].close()
+            return seconds
+
+        def arpack(one: Any = one) -> float:
+            d = assemble(one)
+            return timed(lambda: spla.eigsh(d.K.tocsc(), 64, d.M.tocsc(), sigma=0.0))
+
+        times = compare(ours, arpack, rounds) if n == 1000 else Times([ours()], [arpack()])
+        scaled = [seconds * {"ms": 1e3, "s": 1.0}[unit] for seconds in times.ours]
+        yield Row(
+            "2",
+            f"initialisation of beam.fmu, {n} elements, 64 modes",
+            f"≤ {goal:g} {unit}",
+            f"{median_and_spread(scaled)} {unit}",
+            statistics.median(scaled) <= goal,
+            f"scipy's eigsh (ARPACK) for the same modes: {_time(statistics.median(times.rival))}",
+        )
+    if not effort.quick:
+        line = found["scaling 64"]
+        yield Row(
+            "2",
+            "initialisation, 64 modes, by elements",
+            "",
+            "; ".join(f"{n:.0e}: {_time(s)}" for n, s in zip(line["elements"], line["initialisation"], strict=True)),
+        )
+
+
+# -- 3: the spring ----------------------------------------------------------------------------------------------------
+
+
+def spring(effort: Effort) -> Iterator[Row]:
+    found = program("spring_bench", effort)
+    bare = "IDA restarted on (y, z, ∫y, ∫∫y), same tolerances"
+    for name, what in (
+        ("soft 1e-12", "`soft`, H = 4e-3, tolerance 1e-12"),
+        ("soft 1e-10", "`soft`, H = 4e-3, tolerance 1e-10"),
+        ("soft 1e-12 H=2.5e-4", "`soft`, H = 2.5e-4, tolerance 1e-12"),
+        ("fig4 1e-12", "`paper-fig4`, H = 4e-3, tolerance 1e-12"),
+    ):
+        counts, errors = found[f"{name} counts"], found[f"{name} errors"]
+        row = ratio_row("3", f"spring step, {what}", _of(found[name]), 1.2, "")
+        yield Row(
+            row.group,
+            row.what,
+            row.goal,
+            row.measured,
+            row.met,
+            f"{bare}: {counts['rival'][0]} internal steps, ours {counts['ours'][0]}; error "
+            f"{errors['rival'][0]:.0e} m, ours {errors['ours'][0]:.0e} m",
+        )
+    yield ratio_row("3", "the same of the FMU, state restored before", _of(found["fmu"]), 1.2, bare)
+
+
+# -- 4: the master ----------------------------------------------------------------------------------------------------
+
+
+class Inside:
+    """Time spent in FMI calls while it is in force; what ctypes needs for a call is not part of it."""
+
+    def __init__(self) -> None:
+        self.seconds, self.calls = 0.0, 0
+        self._prepared = fmu.Fmu.prepared
+
+    def __enter__(self) -> Inside:
+        inside, prepared = self, self._prepared
+
+        def timed_call(self: fmu.Fmu, name: str, *arguments: Any) -> Callable[[], int]:
+            function = prepared(self, name, *arguments)
+
+            def call() -> int:
+                began = perf_counter()
+                status = function()
+                inside.seconds += perf_counter() - began
+                inside.calls += 1
+                return status
+
+            return call
+
+        fmu.Fmu.prepared = timed_call  # type: ignore[method-assign]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        fmu.Fmu.prepared = self._prepared  # type: ignore[method-assign]
+
+
+def nothing(times: int = 20_000) -> float:
+    """Seconds that `Inside` sees of a call that does nothing."""
+    with Inside() as inside:
+        body = fmu.FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
+        call = body.fmu.prepared("fmi2GetReal", None, c_size_t(0), None)
+        inside.seconds, inside.calls = 0.0, 0
+        for _ in range(times):
+            call()
+        body.close()
+    return inside.seconds / times
+
+
+def tied_phase(scene: Scene) -> tuple[float, int]:
+    """Seconds and macro steps of the first tied phase of `soft`, up to the foundation, in a run of the whole scene."""
+    clock: list[float] = []
+
+    def progress(time: float, phase: str, macro_steps: int) -> None:
+        if time < UNTIL:
+            clock.append(perf_counter())
+
+    simulate(scene, progress)
+    return clock[-1] - clock[0], len(clock) - 1
+
+
+def master(effort: Effort) -> Iterator[Row]:
+    empty = nothing()
+    for H, scheme, degree in ((2.5e-4, "energy", 0), (1e-3, "energy", 0), (1e-3, "energy", 2), (1e-3, "hermite", 2)):
+        coupling = {"macro_step": H, "scheme": scheme, "degree": degree}
+        scene = with_changes(load_scene("soft"), coupling=coupling)
+        only_tied = with_changes(scene, time={"t_end": UNTIL - 1e-4})
+        outside, within = [], []
+        for _ in range(effort.rounds):
+            seconds, steps = tied_phase(scene)
+            with Inside() as inside:
+                summary = simulate(only_tied).summary
+            of_fmus = (inside.seconds - inside.calls * empty) / summary["macro_steps"]
+            within.append(1e6 * of_fmus)
+            outside.append(1e6 * (seconds / steps - of_fmus))
+        name = f"`soft` tied, {scheme} {degree}, H = {H:g}"
+        for body, goal in (("beam", 2), ("spring", 3)):
+            # A first step measures what is remembered from then on.
+            per_step = (summary[f"{body}_steps"] - degree - 1) / summary["macro_steps"]
+            yield Row("4", f"{name}: {body} doSteps per macro step", f"≤ {goal}", f"{per_step:.3f}", per_step <= goal)
+        yield Row(
+            "4",
+            f"{name}: time outside the FMUs per macro step",
+            "≤ 40 µs",
+            f"{median_and_spread(outside)} µs",
+            statistics.median(outside) <= 40.0,
+            f"inside {median_and_spread(within)} µs",
+        )
+        if effort.quick:
+            return
+
+
+# -- 5, 6: the paper's scene ------------------------------------------------------------------------------------------
+
+
+def paper(effort: Effort) -> Iterator[Row]:
+    scene = with_changes(load_scene("paper-fig2"), contact={"law": "paper", "impact": "rest"})
+    if effort.quick:
+        scene = with_changes(scene, time={"t_end": 0.54})
+    steps = 0
+
+    def ours() -> float:
+        nonlocal steps
+        summary = simulate(scene).summary
+        steps = int(summary["macro_steps"])
+        return float(summary["wall_time"])
+
+    def scipy() -> float:
+        run = algorithm1.simulate(scene)
+        return float(run.summary["newton"]["time_per_step"]) * (len(run) - 1)
+
+    times = compare(ours, scipy, min(effort.rounds, 5))
+    yield ratio_row(
+        "5",
+        f"`paper-fig2`, law `paper`, {steps} steps, 1000 elements",
+        times,
+        10.0,
+        "Algorithm 1 in scipy.sparse (SuperLU)",
+        faster=True,
+    )
+    bare = statistics.median(program("beam_bench", effort)["generalized_alpha"]["rival"])
+    of_solves = Times(times.ours, [bare * steps] * len(times.ours))
+    yield ratio_row("5", "the same", of_solves, 5.0, f"{steps} bare solves and products")
+    resolved = with_changes(
+        load_scene("paper-fig2"),
+        beam={"n_modes": 64},
+        coupling={"macro_step": 4e-6},
+        time={"t_end": 0.5 + 4e-6 * (100 if effort.quick else 5000)},
+    )
+    per_step = []
+    for _ in range(min(effort.rounds, 5)):
+        summary = simulate(resolved).summary
+        per_step.append(float(summary["wall_time"]) / summary["macro_steps"])
+    median, needed = statistics.median(per_step), 3.5 / 4e-6
+    theirs = statistics.median(times.rival) / steps
+    yield Row(
+        "6",
+        "`paper-fig2` resolved: H = 4e-6 ≤ 1/ω₁, 64 modes",
+        "",
+        f"{median_and_spread([1.0 / s for s in per_step])} macro steps a second; up to T = 4: {needed:.3g} steps, "
+        f"{_time(median * needed)}",
+        None,
+        f"Algorithm 1 in scipy.sparse, {_time(theirs)} a step: {_time(theirs * needed)}",
+    )
+
+
+# -- 7: a long run ----------------------------------------------------------------------------------------------------
+
+
+def long_run(effort: Effort) -> Iterator[Row]:
+    steps = 2000 if effort.quick else effort.long_run
+    output = subprocess.run(
+        [sys.executable, str(HERE / "long_run.py"), str(steps)], stdout=subprocess.PIPE, text=True, check=True
+    ).stdout
+    marks = np.array(json.loads(output))
+    resident, clock = marks.T
+    per_step = np.diff(clock) / (steps // 10)
+    growth = float(resident[-1] - resident[0]) / 1e6
+    change = float(per_step[-1] / per_step[0])
+    yield Row(
+        "7",
+        f"`soft` with losses, {steps:.0e} macro steps into files: memory",
+        "constant",
+        f"{growth:+.2f} MB from the first tenth to the end, of {resident[0] / 1e6:.0f} MB",
+        growth < 1.0,
+    )
+    yield Row(
+        "7",
+        "the same: time per step, last tenth over second tenth",
+        "constant",
+        f"{change:.2f} ({min(per_step) * 1e6:.0f} – {max(per_step) * 1e6:.0f} µs)",
+        0.8 < change < 1.2,
+    )
+
+
+# -- 8: what an accuracy costs ----------------------------------------------------------------------------------------
+
+#: Ours: scheme, degree, H [s].
+CANDIDATES = [(s, 2, H) for s in ("energy", "hermite") for H in (4e-3, 3e-3, 2.5e-3, 2e-3, 1.5e-3, 1e-3)]
+RIVALS = {"DOP853": (1e-2, 1e-3, 1e-4), "LSODA": (1e-2, 1e-3), "Radau": (1e-2,)}
+#: A method so many times dearer than the cheapest is not tried on the finer mesh.
+_HOPELESS = 10.0
+#: Relative error of y, and just after the first impact on the foundation of `soft` [s].
+TARGET, UNTIL = 1e-6, 0.0712
+
+
+def accuracy(effort: Effort) -> Iterator[Row]:
+    methods = list(RIVALS)[:1] if effort.quick else list(RIVALS)
+    for n in (50,) if effort.quick else (50, 200):
+        soft = with_changes(load_scene("soft"), beam={"n_elements": n}, time={"t_end": UNTIL})
+        grid = np.linspace(0.0, UNTIL, 401)
+        exact = event_driven.simulate(soft, sample_times=grid)
+        scale = float(np.abs(exact.y).max())
+        ours = []
+        for scheme, degree, H in CANDIDATES[4:5] if effort.quick else CANDIDATES:
+            scene = with_changes(soft, coupling={"scheme": scheme, "degree": degree, "macro_step": H})
+            run = simulate(scene)
+            reference = event_driven.simulate(soft, sample_times=run.time)
+            rows = np.searchsorted(reference.time, run.time)
+            error = float(np.abs(run.y - reference.y[rows]).max()) / scale
+            if error <= TARGET:
+                ours.append((_ours(scene), f"{scheme} {degree}, H = {H:g}", scene))
+        theirs: list[tuple[float, str, float]] = []
+        for method in methods:
+            for rtol in RIVALS[method]:
+                run = _scipy(soft, method, rtol, scale, grid)
+                if float(np.abs(run.y - exact.y).max()) / scale <= TARGET:
+                    theirs.append((_seconds(soft, method, rtol, scale), method, rtol))
+        _, name, scene = min(ours, key=lambda o: o[0])
+        best, method, rtol = min(theirs)
+        methods = list(dict.fromkeys(m for seconds, m, _ in theirs if seconds <= _HOPELESS * best))
+        times = compare(partial(_ours, scene), partial(_seconds, soft, method, rtol, scale), effort.rounds)
+        yield ratio_row(
+            "8",
+            f"`soft`, {n} elements, y within 1e-6 up to the foundation: {name}",
+            times,
+            10.0,
+            f"the cheapest of scipy's: {method}, rtol {rtol:.0e}",
+            faster=True,
+        )
+
+
+def _ours(scene: Scene) -> float:
+    return float(simulate(scene).summary["wall_time"])
+
+
+def _seconds(scene: Scene, method: str, rtol: float, scale: float) -> float:
+    """What scipy takes without rows; the matrices are made before the clock runs."""
+    return float(_scipy(scene, method, rtol, scale, np.array([scene.time.t_end])).summary["wall_time"])
+
+
+def _scipy(scene: Scene, method: str, rtol: float, scale: float, times: np.ndarray) -> Any:
+    return event_driven.simulate(scene, method=method, rtol=rtol, atol=1e-3 * rtol * scale, nodes=2, sample_times=times)
+
+
+GROUPS: dict[str, Callable[[Effort], Iterator[Row]]] = {
+    "beam": beam,
+    "spring": spring,
+    "master": master,
+    "paper": paper,
+    "long": long_run,
+    "accuracy": accuracy,
+}
