@@ -11,9 +11,15 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 from typer.testing import CliRunner
 
 from springbeam.cli import app
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 ROOT = Path(__file__).parents[2]
 
@@ -60,3 +66,36 @@ print(springbeam.__file__, len(springbeam.simulate(springbeam.load_scene("duffin
         capture_output=True, text=True, check=True, timeout=100,
     )  # fmt: skip
     assert run.stdout.split() == [str(tmp_path / "site/springbeam/__init__.py"), "2001"]
+
+
+def test_every_dependency_has_a_lowest_and_a_tested_version():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    groups = [project["dependencies"], *(project["optional-dependencies"][name] for name in ("sweep", "dev"))]
+    all_of_them = [requirement for group in groups for requirement in map(Requirement, group)]
+    on = {"python_version": "3.11"}  # as constraints.txt says
+    wanted = {r.name: r.specifier for r in all_of_them if r.marker is None or r.marker.evaluate(on)}
+    del wanted["springbeam"]  # itself, with an extra
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    tested = {r.name: r.specifier for r in map(Requirement, (line for line in lines if not line.startswith("#")))}
+    assert tested.keys() == wanted.keys()
+    for name, specifier in wanted.items():
+        assert [s.operator for s in specifier] == [">="], name
+        (pin,) = tested[name]
+        assert pin.operator == "=="
+        assert specifier.contains(pin.version), name
+
+
+def test_a_run_uses_no_network(tmp_path):
+    script = """
+import sys
+sockets = []
+sys.addaudithook(lambda event, arguments: sockets.append(event) if event.startswith("socket.") else None)
+from springbeam import cli
+try:
+    cli.app(["run", "soft", "--set", "time.t_end=0.05", "--out", sys.argv[1], "-q"])
+except SystemExit as end:
+    print(end.code, sockets)
+"""
+    command = [sys.executable, "-c", script, str(tmp_path / "out")]
+    run = subprocess.run(command, capture_output=True, text=True, check=True, timeout=100)
+    assert run.stdout.splitlines()[-1] == "0 []", run.stdout
