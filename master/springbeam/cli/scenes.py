@@ -31,4 +31,6 @@ def scenes(as_json: JsonOption = False) -> None:
             })  # fmt: skip
     if as_json:
         print_json(listed)
-    console_for(silent=as_json).print(table)
+    console = console_for(silent=as_json)
+    console.print(table)
+    console.print(Text(f"\nfiles: {path.parent}"), soft_wrap=True)

@@ -119,11 +119,11 @@ def run(
     return counts
 
 
-def rows(directory: Path) -> dict[str, list[Any]]:
+def rows(directory: str | Path) -> dict[str, list[Any]]:
     """Columns of a finished sweep: ``index``, the varied keys, ``status``, ``error``, ``warnings``, the metrics."""
     import pyarrow.parquet as pq
 
-    columns: dict[str, list[Any]] = pq.read_table(directory / TABLE).to_pydict()
+    columns: dict[str, list[Any]] = pq.read_table(Path(directory) / TABLE).to_pydict()
     return columns
 
 

@@ -14,21 +14,27 @@ from matplotlib.figure import Figure
 
 from ..drawing import BLUE, VERMILLION
 from .design import Axis
+from .metrics import UNITS
+
+#: A metric that varies less, relative to its largest value, is constant.
+_ROUNDING = 1e-12
+#: So many values of a key are named on its axis.
+_FEW = 8
 
 
 def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], metrics: Sequence[str], path: Path) -> bool:
-    """Draw the metrics of a sweep of one or two keys to ``path``; ``False`` where there is nothing to draw."""
+    """Draw to ``path`` what the one or two keys of a sweep change; ``False`` where there is nothing to draw."""
     numbers = {name: np.array([np.nan if v is None else v for v in columns[name]], dtype=float) for name in metrics}
-    shown = [name for name in metrics if np.isfinite(numbers[name]).any()]
+    shown = [name for name in metrics if _varies(numbers[name])]
     if len(axes) not in (1, 2) or not shown:
         return False
     wide = min(3, len(shown))
     high = -(-len(shown) // wide)
-    figure, panels = plt.subplots(high, wide, figsize=(4.6 * wide, 3.6 * high), squeeze=False, layout="constrained")
+    figure, panels = plt.subplots(high, wide, figsize=(4.0 * wide, 3.0 * high), squeeze=False, layout="constrained")
     for ax in panels.flat[len(shown) :]:
-        ax.set_visible(False)
+        ax.remove()
     for ax, name in zip(panels.flat, shown, strict=False):
-        ax.set_title(name, fontsize="medium")
+        ax.set_title(f"{name} [{UNITS[name]}]" if name in UNITS else name, fontsize="medium")
         if len(axes) == 1:
             _curve(ax, columns[axes[0].name], numbers[name], axes[0])
         else:
@@ -36,6 +42,11 @@ def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], metrics: Sequence[
     figure.savefig(path, dpi=100)
     plt.close(figure)
     return True
+
+
+def _varies(values: np.ndarray) -> bool:
+    found = values[np.isfinite(values)]
+    return found.size > 1 and bool(np.ptp(found) > _ROUNDING * np.abs(found).max())
 
 
 def _curve(ax: Axes, at: list[Any], values: np.ndarray, axis: Axis) -> None:
@@ -46,8 +57,9 @@ def _curve(ax: Axes, at: list[Any], values: np.ndarray, axis: Axis) -> None:
         position = np.array(at, dtype=float)
         order = np.argsort(position, kind="stable")
         ax.plot(position[order], values[order], ".-", color=BLUE, linewidth=1.0)
-        low = ax.get_ylim()[0]
-        ax.plot(position[failed], np.full(failed.sum(), low), "x", color=VERMILLION, clip_on=False)
+        if failed.any():
+            low = ax.get_ylim()[0]
+            ax.plot(position[failed], np.full(failed.sum(), low), "x", color=VERMILLION, clip_on=False)
         if axis.log:
             ax.set_xscale("log")
     ax.set_xlabel(axis.name)
@@ -76,5 +88,7 @@ def _map(figure: Figure, ax: Axes, columns: dict[str, list[Any]], values: np.nda
             set_ticks(range(len(level)), [str(v) for v in level])
         elif axis.log:
             set_scale("log")
+        elif grid and len(level) <= _FEW:
+            set_ticks(level)
     ax.set(xlabel=axes[0].name, ylabel=axes[1].name)
     figure.colorbar(picture, ax=ax)
