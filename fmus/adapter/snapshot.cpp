@@ -80,12 +80,11 @@ Snapshot deserialize(const char* bytes, std::size_t size, const std::string& gui
   }
   if (checksum(bytes + sizeof header, payload) != header.checksum) refuse("the checksum is wrong");
 
+  const std::size_t settings_end = fixed_count + 3 * n_settings;
+  if (header.count < settings_end) refuse("its parts do not add up");
   std::vector<double> values(header.count);
   std::memcpy(values.data(), bytes + sizeof header, payload);
-  const std::size_t settings_end = fixed_count + 3 * n_settings;
-  if (values.size() < settings_end || static_cast<double>(values.size() - settings_end) != values[6]) {
-    refuse("its parts do not add up");
-  }
+  if (static_cast<double>(values.size() - settings_end) != values[6]) refuse("its parts do not add up");
   // A checksum is no signature: what the numbers mean is checked too, here and in Instance::restore.
   const auto known = [&values](std::size_t i, std::initializer_list<double> allowed) {
     return std::find(allowed.begin(), allowed.end(), values[i]) != allowed.end();

@@ -1102,9 +1102,13 @@ void too_long(int) {
 
 }  // namespace
 
-// A report ends in abort(), where the last calls are printed.
+// Hooks of the sanitizers: options, and the last calls after a report.
+#pragma GCC visibility push(default)
 extern "C" const char* __asan_default_options() { return "abort_on_error=1:detect_stack_use_after_return=1"; }
 extern "C" const char* __ubsan_default_options() { return "abort_on_error=1:print_stacktrace=1"; }
+extern "C" void __ubsan_on_report() { trace.print(); }
+extern "C" void __sanitizer_set_death_callback(void (*)()) __attribute__((weak));  // not there without sanitizers
+#pragma GCC visibility pop
 
 int main(int argc, char** argv) {
   const std::string mode = argc > 1 ? argv[1] : "";
@@ -1118,7 +1122,8 @@ int main(int argc, char** argv) {
   const bool one = argc > 4;
   trace.episode = one ? std::strtoul(argv[4], nullptr, 10) : 0;
   std::signal(SIGVTALRM, too_long);
-  std::signal(SIGABRT, [](int) { trace.print(); });
+  std::signal(SIGABRT, [](int) { trace.print(); });  // a sanitizer ends past this
+  if (__sanitizer_set_death_callback) __sanitizer_set_death_callback([] { trace.print(); });
   std::signal(SIGSEGV, [](int) { fail("a call crashed"); });
   do {
     std::seed_seq mix{trace.seed, trace.episode};
