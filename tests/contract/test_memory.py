@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ctypes as ct
-import resource
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pytest
+
+pytestmark = pytest.mark.skipif(not hasattr(ct.CDLL(None), "mallinfo2"), reason="mallinfo2 came with glibc 2.33")
 
 OK, ERROR, CO_SIMULATION = 0, 3, 1
 CYCLES = 10_000
@@ -21,18 +21,41 @@ PARAMETERS: dict[str, dict[str, float]] = {
 }
 
 
-def growth(cycle: Callable[[int], None], cycles: int) -> int:
-    """Of the memory in use by this process [bytes], over `cycles` after those that fill caches."""
+class MallocInfo(ct.Structure):
+    """glibc's struct mallinfo2."""
 
-    def resident() -> int:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    _fields_ = [
+        (name, ct.c_size_t)
+        for name in [
+            "arena",
+            "ordblks",
+            "smblks",
+            "hblks",
+            "hblkhd",
+            "usmblks",
+            "fsmblks",
+            "uordblks",
+            "fordblks",
+            "keepcost",
+        ]
+    ]
+
+
+def growth(cycle: Callable[[int], None], cycles: int) -> int:
+    """Of what malloc has given out and not got back [bytes], over `cycles` after those that fill caches."""
+    information = ct.CDLL(None).mallinfo2
+    information.restype = MallocInfo
+
+    def in_use() -> int:
+        found = information()
+        return int(found.uordblks + found.hblkhd)
 
     for i in range(1000):
         cycle(i)
-    before = resident()
+    before = in_use()
     for i in range(cycles):
         cycle(i)
-    return resident() - before
+    return in_use() - before
 
 
 def run(instance: Any, parameters: dict[str, float], i: int) -> None:
