@@ -47,6 +47,8 @@ EVENT_COLUMNS = (
 EVENT_KINDS = ("impact", "stop_impact", "release", "retie", "separation", "seated", "unseated")
 #: Where the beam's shape is sampled, as fractions of its length.
 SHAPE_POINTS = np.linspace(0.0, 1.0, 21)
+#: The share of a table's largest value that is a zero, rounded.
+_NOISE = 1e-13
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,11 @@ class Event:
     impulse_contact: float = 0.0  #: on the beam's tip, upward [N·s]
     impulse_foundation: float = 0.0  #: of the foundation, upward [N·s]
     energy_loss: float = 0.0  #: [J]
+
+
+def rounded(value: float, scale: float) -> str:
+    """``value`` in four digits; "0" for what rounding leaves of a zero, beside the largest of its kind, ``scale``."""
+    return "0" if abs(value) <= _NOISE * scale else f"{value:.4g}"
 
 
 @dataclass

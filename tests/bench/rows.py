@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg as spla
+import sweeps
 from measure import Times, compare, median_and_spread, timed
 
 from springbeam import fmu, load_scene, simulate, with_changes
@@ -428,6 +429,28 @@ def _scipy(scene: Scene, method: str, rtol: float, scale: float, times: np.ndarr
     return event_driven.simulate(scene, method=method, rtol=rtol, atol=1e-3 * rtol * scale, nodes=2, sample_times=times)
 
 
+def sweep(effort: Effort) -> Iterator[Row]:
+    """Throughput of a sweep, cluster and pool warm."""
+    for workers in (1, 2):
+        with sweeps.both(workers) as (client, pool):
+            for t_end, runs in sweeps.SIZES:
+                todo = sweeps.plan(t_end, 4 if effort.quick else runs)
+                times = compare(
+                    partial(sweeps.on_dask, todo, client),
+                    partial(sweeps.in_a_pool, todo, pool),
+                    min(effort.rounds, 5),
+                )
+                each = statistics.median(times.rival) * workers / len(todo.values)
+                yield ratio_row(
+                    "9",
+                    f"throughput of a sweep on {workers} worker{'s' * (workers > 1)}, runs of {_time(each)}",
+                    times,
+                    0.85,
+                    "a pool of as many processes, handed the same runs one by one",
+                    faster=True,
+                )
+
+
 GROUPS: dict[str, Callable[[Effort], Iterator[Row]]] = {
     "beam": beam,
     "spring": spring,
@@ -435,4 +458,5 @@ GROUPS: dict[str, Callable[[Effort], Iterator[Row]]] = {
     "paper": paper,
     "long": long_run,
     "accuracy": accuracy,
+    "sweep": sweep,
 }

@@ -90,6 +90,16 @@ def test_a_run_leaves_results_and_pictures_and_says_where(here):
     assert event.split() == ["impact", "0.10000000", "0.5", "-1", "0.25", "0.125"]
 
 
+def test_what_rounding_leaves_of_a_zero_is_shown_as_0(here, monkeypatch):
+    def released(scene, recorder, progress=None, **checkpoints):
+        recorder.event(Event(0.2, "release", -1.355e-20, 0.25, 0.0, 0.25))
+        fake_run(scene, recorder)
+
+    monkeypatch.setattr(springbeam.runner, "run", released)
+    (event,) = [line for line in springbeam_command("run", "soft").stdout.splitlines() if line.startswith("release")]
+    assert event.split() == ["release", "0.20000000", "0", "0.25"]
+
+
 def test_no_plots(here):
     result = springbeam_command("run", "soft", "--no-plots")
     assert result.exit_code == 0
@@ -330,7 +340,8 @@ def test_no_progress_in_a_file(here):
 def test_scenes_lists_what_is_shipped_within_80_columns(here):
     result = springbeam_command("scenes")
     assert result.exit_code == 0
-    lines = result.stdout.splitlines()
+    *lines, where = result.stdout.splitlines()
+    assert where == f"files: {shipped_scenes()['soft'].parent}"
     assert max(map(len, lines)) <= 80
     assert lines[0].split() == ["scene", "contains", "t_end", "[s]", "title"]
     first_words = [line.split()[0] for line in lines if line and not line.startswith(" ")]

@@ -20,7 +20,7 @@ from ..checkpoint import Checkpoint
 from ..fmu import FmuError
 from ..recording import FileRecorder, NonFiniteValue, RunDirectory, load_events, load_summary, load_trajectory
 from ..scene import Scene, load_scene, scene_from_dict
-from ..trajectory import Event
+from ..trajectory import Event, rounded
 from .common import (
     BAD_INPUT,
     STOPPED,
@@ -268,14 +268,16 @@ def _event_table(first: list[Event], last: list[Event], between: int, scene: Sce
     units = {"t": "s", position: "m", speed: "m/s", "J_contact": "N·s", "J_stop": "N·s", "loss": "J"}
     for name, unit in units.items():
         table.add_column(Text(f"{name}\n[{unit}]"), justify="right", no_wrap=True)
-    for event in [*first, *last]:
+    shown = [*first, *last]
+    scales = {name: max(abs(getattr(event, name) or 0.0) for event in shown) for name in (position, speed)}
+    for event in shown:
         if between and last and event is last[0]:
             table.add_row("⋮", Text(f"{between} more"))
         impulses = (event.impulse_contact, event.impulse_foundation)
         table.add_row(
             event.kind,
             f"{event.time:.8f}",
-            *("" if value is None else f"{value:.4g}" for value in (getattr(event, position), getattr(event, speed))),
+            *("" if getattr(event, name) is None else rounded(getattr(event, name), scales[name]) for name in scales),
             *(f"{value:.3g}" if value else "" for value in (*impulses, event.energy_loss)),
         )
     return table

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterator
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ from plotly.offline import get_plotlyjs
 from ..drawing import EVENT_LOOKS, FORCES, IMPULSES, POSITIONS, alternating, mark, present, readable_unit
 from ..motion import Motion, motion_of
 from ..scene import Scene, load_scene, shipped_scenes
-from ..trajectory import Trajectory
+from ..trajectory import Trajectory, rounded
 from .figures import (
     ALTERNATES,
     Chart,
@@ -55,6 +54,8 @@ def page(trajectory: Trajectory) -> str:
         lstrip_blocks=True,
     )  # fmt: skip
     scene = trajectory.scene
+    events = trajectory.events[:_EVENTS_SHOWN]
+    values = {name: unit for name, unit in _EVENT_UNITS.items() if name in trajectory.columns}
     return environment.get_template("page.html").render(
         title=scene.title or "(untitled scene)",
         version=trajectory.summary.get("version", ""),
@@ -66,8 +67,10 @@ def page(trajectory: Trajectory) -> str:
         phases=phase_key(trajectory) if drawable else [],
         event_key=event_key(trajectory),
         numbers=list(_numbers(trajectory)),
-        events=list(islice(trajectory.events, _EVENTS_SHOWN)),
-        event_values={name: unit for name, unit in _EVENT_UNITS.items() if name in trajectory.columns},
+        events=events,
+        event_values=values,
+        event_scales={name: max((abs(getattr(e, name) or 0.0) for e in events), default=0.0) for name in values},
+        rounded=rounded,
         event_words={kind: look.words for kind, look in EVENT_LOOKS.items()},
         more_events=max(0, len(trajectory.events) - _EVENTS_SHOWN),
         rows=len(time),

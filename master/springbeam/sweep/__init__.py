@@ -13,9 +13,8 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
-from time import monotonic
+from time import monotonic, perf_counter
 from typing import TYPE_CHECKING, Any
 
 from ..fmu import FmuError
@@ -32,8 +31,10 @@ __all__ = ["METRICS", "Sweep", "SweepError", "cluster", "rows", "run"]
 
 #: Rows are written at least this often [s].
 _WRITE_SECONDS = 5.0
-#: Runs handed to the scheduler ahead of what has finished, per worker.
-_AHEAD = 8
+#: Tasks handed to the scheduler ahead of what has finished, per worker.
+_AHEAD = 4
+#: Runs that take less together are handed out as one task [s]: Dask takes some 6 ms for each.
+_TASK_SECONDS = 1.0
 TABLE, DESCRIPTION, PARTS, PICTURE = "sweep.parquet", "sweep.json", "parts", "sweep.png"
 
 
@@ -193,39 +194,57 @@ def _check_workers(client: Client) -> None:
             raise SweepError(f"the worker {address} has springbeam {version}, this is {own}; install the same version")
 
 
-def _task(scene: dict[str, Any], axes: Sequence[Axis], values: Sequence[Any], metrics: Sequence[str]) -> dict[str, Any]:
+def _task(
+    scene: dict[str, Any], axes: Sequence[Axis], several: Sequence[Sequence[Any]], metrics: Sequence[str]
+) -> tuple[list[dict[str, Any]], float]:
+    """The rows of several runs, and the seconds that they took."""
+    began = perf_counter()
     try:
-        return row(scene_from_dict(scene), axes, values, metrics)
+        found = [row(scene_from_dict(scene), axes, values, metrics) for values in several]
     except FmuError as error:  # an exception would be in the worker's log with its traceback
-        return {"status": "no FMU", "error": str(error)}
+        found = [{"status": "no FMU", "error": str(error)}]
+    return found, perf_counter() - began
 
 
 def _results(sweep: Sweep, todo: Sequence[int], client: Client) -> Iterator[tuple[int, dict[str, Any]]]:
     from distributed import KilledWorker, as_completed
 
     shared = sweep.scene.model_dump(exclude_none=True)
-    upcoming = iter(todo)
+    workers = max(1, len(client.scheduler_info()["workers"]))
+    left, seconds, runs = list(reversed(todo)), 0.0, 0
+    queue = as_completed()
 
-    def submit(index: int) -> Any:
-        return client.submit(
-            _task, shared, sweep.axes, sweep.values[index], sweep.metrics, key=("springbeam", index), pure=False
-        )
+    def submit(indices: Sequence[int]) -> None:
+        values = [sweep.values[index] for index in indices]
+        key = ("springbeam", *indices)
+        queue.add(client.submit(_task, shared, sweep.axes, values, sweep.metrics, key=key, pure=False))
 
-    ahead = _AHEAD * max(1, len(client.scheduler_info()["workers"]))
-    queue = as_completed([submit(index) for index in islice(upcoming, ahead)])
+    def submit_next() -> None:
+        if left:
+            # Long enough for Dask, yet small shares of what is left, so that all workers end together.
+            wanted = int(_TASK_SECONDS * runs / seconds) if seconds > 0.0 else 1
+            share = len(left) // (_AHEAD * workers)
+            submit([left.pop() for _ in range(max(1, min(wanted, share)))])
+
+    for _ in range(_AHEAD * workers):
+        submit_next()
     for future in queue:
-        index = future.key[1]
+        indices = future.key[1:]
         try:
-            result = future.result()
+            found, took = future.result()
+            seconds, runs = seconds + took, runs + len(found)
         except KilledWorker as error:
-            result = {"status": "lost", "error": f"its workers died: {error}", "warnings": ""}
-        if result["status"] == "no FMU":
-            raise SweepError(result["error"])
-        yield index, result
+            if len(indices) > 1:  # which of them it was shows alone
+                for index in indices:
+                    submit([index])
+                continue
+            found = [{"status": "lost", "error": f"its workers died: {error}", "warnings": ""}]
         future.release()
-        following = next(upcoming, None)
-        if following is not None:
-            queue.add(submit(following))
+        submit_next()
+        for index, result in zip(indices, found, strict=False):
+            if result["status"] == "no FMU":
+                raise SweepError(result["error"])
+            yield index, result
 
 
 class _Parts:
