@@ -443,11 +443,10 @@ def sweep(effort: Effort) -> Iterator[Row]:
                 each = statistics.median(times.rival) * workers / len(todo.values)
                 yield ratio_row(
                     "9",
-                    f"throughput of a sweep on {workers} worker{'s' * (workers > 1)}, runs of {_time(each)}",
+                    f"a sweep on {workers} worker{'s' * (workers > 1)}, runs of {_time(each)}",
                     times,
-                    0.85,
+                    1.18,  # 85 % of the throughput
                     "a pool of as many processes, handed the same runs one by one",
-                    faster=True,
                 )
 
 
