@@ -13,8 +13,9 @@ from .scene import Scene, Spring
 from .statics import tip_compliance, tip_load_deflection
 from .subsystem import Motion
 
-#: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only).
-_SEATING_SPEED = 1e-8
+#: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
+#: second, if it would also rise no higher than positions can be told apart.
+_SEATING_SPEED, _SEATING_SPEED_UNSEEN = 1e-8, 1e-4
 
 
 class Joint(Enum):
@@ -115,7 +116,7 @@ class Transitions(Memory):
         if kind == "impact":
             return kind, *self._meet(phase, tip, low, tolerance)
         if kind == "stop_impact":
-            return self._strike(phase, tip, low)
+            return self._strike(phase, tip, low, end_force, tolerance)
         if kind == "release":
             if end_force > 0.0:
                 return kind, Phase(Joint.TOUCH), Impact()
@@ -153,7 +154,9 @@ class Transitions(Memory):
         psi = spring.equilibrium
         return spring_force(spring, psi) + (psi - tip_load_deflection(beam)) / tip_compliance(beam) < 0.0
 
-    def _strike(self, phase: Phase, tip: Motion, low: Motion) -> tuple[str, Phase, Impact]:
+    def _strike(
+        self, phase: Phase, tip: Motion, low: Motion, end_force: float, tolerance: float
+    ) -> tuple[str, Phase, Impact]:
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
         assert self._scene.stop is not None
         e = self._scene.stop.restitution
@@ -166,7 +169,13 @@ class Transitions(Memory):
         # It strikes while rising if the rebound would be over in no time.
         tip_mass = 0.0 if v is None else self._tip_mass or 0.0
         rising = common_velocity(v or 0.0, z or 0.0, tip_mass, self._mass or 0.0) > 0.0
-        dies_out = rising or e * speed <= _SEATING_SPEED * self._fastest_impact
+        back = e * speed
+        dies_out = rising or back <= _SEATING_SPEED * self._fastest_impact
+        if self._scene.spring is not None and back <= _SEATING_SPEED_UNSEEN * self._fastest_impact:
+            contact = 0.0 if phase.joint is Joint.FREE else end_force
+            pressing = contact + spring_force(self._scene.spring, self._scene.stop.position)
+            # It rises by m (e z)²/2F; each impact is found to no better than the tolerance, which brings it as much.
+            dies_out |= 0.5 * self._scene.spring.mass * back * back <= tolerance * pressing
         if (dies_out and e < 1.0) or speed == 0.0:
             joint = phase.joint if self._mass is not None else Joint.TIED
             return "seated", Phase(joint, seated=True), foundation_impact(*ends, restitution=0.0)

@@ -66,10 +66,13 @@ class Detector:
     def first(self, state: State, step: Step) -> tuple[Step, str | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it."""
         step, found = self._first_by_position(state, step)
+        if self._pair.compliant and step.size > 0.0:
+            touched = self._touched_inside(state, step)
+            if touched is not step:
+                # The contact force changes where the ends go: what was found may not happen, something else may.
+                step, found = self._first_by_position(state, touched)
         if step.size == 0.0:
             return step, found
-        if self._pair.compliant:
-            step = self._touched_inside(state, step)
         unilateral = self._unilateral(state, step)
         if unilateral is None:
             return self._pair.settled(state, step), found
@@ -156,7 +159,7 @@ class Detector:
         """The event that ends the phase where a force that can only push would pull, and that force."""
         if phase.seated:
             return "unseated" if self._pair.spring is not None else "separation", lambda step: step.foundation
-        if phase.joint is Joint.TOUCH and not self._pair.compliant:
+        if phase.joint is Joint.TOUCH and not self._pair.compliant and not self._pair.massless:
             return "separation", lambda step: step.contact
         return None
 

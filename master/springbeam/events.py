@@ -10,8 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .contact import Joint, Phase
-from .scene import Scene
+from .contact import Joint, Phase, spring_force
+from .scene import Beam, Scene, Spring
+from .statics import tip_compliance, tip_load_deflection
 from .subsystem import Motion
 
 _EPS = float(np.finfo(float).eps)
@@ -50,6 +51,23 @@ def _below(end: int, level: float, share: float) -> EventFunction:
     return depth
 
 
+def _holding(beam: Beam, spring: Spring) -> EventFunction:
+    """C/k of a massless tip on the spring top, y − u_F + α_b z [m]: known from where they are, not from a step's force.
+
+    ż of its rate is that of the spring with the tip on it, off the foundation.
+    """
+    rest, stiffness, alpha = tip_load_deflection(beam), 1.0 / tip_compliance(beam), beam.alpha_b
+
+    def pressed(ends: tuple[Motion, Motion]) -> Sample:
+        _, low = ends
+        y, z = low.displacement, low.velocity
+        value = y - rest + alpha * z
+        acceleration = -(stiffness * value + spring.damping * z + spring_force(spring, y)) / spring.mass
+        return value, z + alpha * acceleration
+
+    return pressed
+
+
 class EventFunctions:
     """Which event functions each phase of a scene has, by the kind of their event.
 
@@ -81,6 +99,9 @@ class EventFunctions:
                 functions.append(("release", _below(low, spring.equilibrium, share)))
             if phase.joint is Joint.TOUCH:
                 functions.append(("retie", _above(low, spring.equilibrium, share)))
+                beam = self._scene.beam
+                if beam is not None and beam.fidelity == "quasi_static" and not phase.seated:
+                    functions.append(("separation", _holding(beam, spring)))
         if stop is not None and not phase.seated:
             end, share = (tip, 1.0) if spring is None else (low, share)
             functions.append(("stop_impact", _above(end, stop.position, share)))

@@ -7,7 +7,25 @@ from math import isfinite
 from typing import NamedTuple
 
 from .memory import Memory
+from .scene import ORDINARY_SCHEMES, Scene
 from .subsystem import Energies
+
+#: Relative energy residual up to which a coupling that creates no energy is exact: rounding and solvers' tolerances.
+EXACT = 1e-8
+#: The same where a scheme, an integrator or Algorithm 1 changes the energy itself.
+APPROXIMATE = 1e-3
+#: A solver's tolerance counts so often: 1e-12 is `EXACT`.
+_TOLERANCES = EXACT / 1e-12
+
+
+def bounds(scene: Scene) -> tuple[float, float]:
+    """Relative energy residuals above which a run warns, and above which it stops."""
+    coupling, beam = scene.coupling, scene.beam
+    changes = coupling.scheme == "hermite" or coupling.scheme in ORDINARY_SCHEMES or scene.contact.law == "paper"
+    if changes or (beam is not None and beam.damped_numerically):
+        return APPROXIMATE, 0.1
+    tolerance = max(coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)
+    return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
 
 
 class Booked(NamedTuple):

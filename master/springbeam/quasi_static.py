@@ -130,6 +130,10 @@ class QuasiStaticBeam(Memory):
     def apply_impulse(self, impulse: float) -> None:
         raise AssertionError("a massless tip takes no impulse")
 
+    def holding_force(self, displacement: float, velocity: float) -> float:
+        """C that holds the tip at ``displacement`` [m], moving at ``velocity`` [m/s]."""
+        return self._stiffness * (displacement - self._rest + self._alpha * velocity)
+
     def join(self, velocity: float) -> None:
         """The tip is held together with an end that moves at ``velocity`` [m/s]."""
         self._velocity = velocity

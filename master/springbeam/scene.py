@@ -76,6 +76,11 @@ class Beam(_Table):
     #: "quasi_static": without inertia, a tip compliance; mesh, modes, integrator and density then play no part.
     fidelity: Literal["dynamic", "quasi_static"] = "dynamic"
 
+    @property
+    def damped_numerically(self) -> bool:
+        """Whether the integrator takes energy that nothing books."""
+        return self.fidelity == "dynamic" and self.integrator == "generalized_alpha" and self.rho_inf < 1.0
+
     @model_validator(mode="after")
     def _modes_exist(self) -> Beam:
         unknowns, degree = 2 * self.n_elements * self.element_degree, self.element_degree

@@ -16,7 +16,7 @@ from .contact import Joint, Phase, Transitions
 from .coupling.tie import NotConverged
 from .detection import Detector
 from .events import interpolated
-from .ledger import Ledger
+from .ledger import Ledger, bounds
 from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .memory import Memory
@@ -36,8 +36,6 @@ _MAX_HALVINGS = 20
 #: Events closer than this fraction of H are at once; so many of them and the contact is said to chatter. Impacts that
 #: die out are up to 370 (e = 0.997) between this and `_NO_TIME` of `springbeam.detection`, where they are seated.
 _AT_ONCE, _MAX_EVENTS_AT_ONCE = 1e-6, 500
-#: Relative energy residual at which a run says so, and at which it stops (but for what numerical damping takes).
-_ENERGY_WARNS, _ENERGY_STOPS = 1e-3, 0.1
 #: Cause of a run that ends so.
 OVERFLOW = "a force, an energy or a position is larger than a double holds"
 
@@ -112,6 +110,7 @@ class Simulation(Memory):
             scene, None if beam is None else beam.mass, None if spring is None else spring.mass
         )
         self._ledger = Ledger()
+        self._energy_warns, self._energy_stops = bounds(scene)
         self._rows = Rows(scene, self._pair, self._ledger, recorder, start_time)
         self._begun = False
         self._last_opening = -float("inf")
@@ -268,7 +267,8 @@ class Simulation(Memory):
 
     def _record(self) -> None:
         self._rows.write(self._state)
-        if (self._ledger.gain if self._numerically_damped else self._ledger.relative) > _ENERGY_STOPS:
+        # What numerical damping takes is not an error; what it brings is.
+        if (self._ledger.gain if self._numerically_damped else self._ledger.relative) > self._energy_stops:
             raise RunStopped(self._energy_cause(), self._state.time)
         one_way, allowed = self._pair.one_way, self._scene.coupling.feedback_tolerance
         if one_way is not None and one_way.share > allowed:
@@ -282,7 +282,7 @@ class Simulation(Memory):
     @property
     def _numerically_damped(self) -> bool:
         beam = self._scene.beam
-        return beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf < 1.0
+        return beam is not None and beam.damped_numerically
 
     def _energy_cause(self) -> str:
         coupling, beam = self._scene.coupling, self._scene.beam
@@ -306,7 +306,7 @@ class Simulation(Memory):
     def summary(self) -> dict[str, Any]:
         """Counts, residuals and warnings, as they go into ``summary.json``."""
         warnings, rows = [], self._rows
-        if self._ledger.relative > _ENERGY_WARNS:
+        if self._ledger.relative > self._energy_warns:
             warnings.append(self._energy_cause())
         unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed)
         if unresolved is not None:

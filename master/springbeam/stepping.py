@@ -106,6 +106,8 @@ class Pair(Memory):
             stiffness = scene.driver_stiffness
             assert stiffness is not None
             self.one_way = OneWay(self._compliance, *law, coupling.feedback == "beam_drives", stiffness)
+        #: A tip without inertia: C follows from where it is held.
+        self.massless = isinstance(beam, QuasiStaticBeam)
         #: Of the contact force over a step.
         self.degree = 0 if self.compliant else coupling.degree
         #: Whether the coupling may create energy, so that its residual is watched.
@@ -159,7 +161,8 @@ class Pair(Memory):
                 static = spring_force(self._scene.spring, self.stop)  # type: ignore[arg-type]
                 foundation = (contact[0] + static, contact[1], contact[2])
                 spring.rewind()
-                spring.advance(state.time, size, contact, foundation)
+                # C and the part of N that bears it cancel: together, rounding of a large C would move a light top.
+                spring.advance(state.time, size, NO_FORCE, (static, 0.0, 0.0))
         return Step(state.time, size, contact, foundation, start, self.ends())
 
     def accept(self, step: Step) -> None:
@@ -216,5 +219,7 @@ class Pair(Memory):
         return beam, spring, contact
 
     def end_force(self, state: State, step: Step) -> float:
-        """C at the end of the step as well as the degree tells [N]."""
+        """C at the end of the step as well as the degree tells; exactly, where the tip has no mass [N]."""
+        if isinstance(self.beam, QuasiStaticBeam):
+            return self.beam.holding_force(*self.ends()[1][:2])
         return force.end_value(step.contact, step.size) if self.degree > 0 else state.smoothed

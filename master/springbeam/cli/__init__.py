@@ -68,7 +68,7 @@ for title, commands in {
     "Run": (scenes.scenes, run.run, resume.resume, sweep.sweep),
     "Look": (report.report, report.animate),
     "Choose scheme and accuracy": (stability.predict, tradeoff.tradeoff),
-    "Check": (checks.crosscheck, checks.verify, doctor.doctor),
+    "Check": (checks.crosscheck, checks.verify, stability.stability, doctor.doctor),
 }.items():
     for command in commands:
         app.command(cls=Command, rich_help_panel=title)(command)

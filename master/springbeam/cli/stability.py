@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
+import os
+import re
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
+from ..fmu import fmu_directory
 from ..scene import load_scene
-from .common import JsonOption, SceneArgument, SettingsOption, bad_input_reported, console_for, print_json
+from .common import (
+    BAD_INPUT,
+    DISAGREES,
+    STOPPED,
+    JsonOption,
+    QuietOption,
+    SceneArgument,
+    SettingsOption,
+    bad_input_reported,
+    console_for,
+    fail,
+    print_json,
+    progress_bar,
+)
 
 if TYPE_CHECKING:
+    from ..stability.grid import Outcome
     from ..stability.predict import Prediction
+
+#: Reasons that the summary lists, the most frequent ones.
+_REASONS = 12
 
 
 def predict(
@@ -78,3 +103,116 @@ def _schemes_table(p: Prediction) -> Table:
             "unstable" if excess > p.threshold else "",
         )
     return table
+
+
+def stability(
+    samples: Annotated[int, typer.Option("--samples", min=0, help="Cells of the hypercube over all parameters.")] = 400,
+    resolution: Annotated[
+        int, typer.Option("--resolution", min=0, help="Values of each parameter of a slice; 0: no slices.")
+    ] = 7,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the hypercube.")] = 1,
+    workers: Annotated[int | None, typer.Option("--workers", min=1, help="Processes. Default: one per core.")] = None,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="DIR", help="Where the table and the pictures go.")
+    ] = Path("results/stability"),
+    force: Annotated[bool, typer.Option("--force", "-f", help="Replace what is already there.")] = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Run extreme scenes and say how each ends: energy kept, refused, stopped, or silent garbage (exit code 1).
+
+    Example: springbeam stability --samples 100 --resolution 0
+    """
+    from concurrent.futures.process import BrokenProcessPool
+
+    from ..stability.cells import sampled_cells, slice_cells
+    from ..stability.grid import run_cells, write_csv, write_scene
+    from ..stability.picture import draw
+
+    cells = [*sampled_cells(samples, seed), *slice_cells(resolution)]
+    table = out / "stability.csv"
+    if not cells:
+        fail(BAD_INPUT, "no cells: --samples and --resolution are both 0")
+    if table.exists() and not force:
+        fail(BAD_INPUT, f"{table}: already there; --force replaces it, --out DIR names another directory")
+    for name in ("beam.fmu", "spring.fmu"):
+        if not (fmu_directory() / name).is_file():
+            fail(BAD_INPUT, f"{fmu_directory() / name}: not found; ./build.sh fmus builds it")
+    with bad_input_reported():
+        out.mkdir(parents=True, exist_ok=True)
+    garbage = 0
+
+    def count(outcome: Outcome) -> None:
+        nonlocal garbage
+        garbage += outcome.kind == "garbage"
+        bar.update(task, advance=1, garbage=garbage)
+
+    state = TextColumn("{task.fields[garbage]} garbage")
+    bar = progress_bar(
+        BarColumn(bar_width=20), MofNCompleteColumn(), state, TimeRemainingColumn(), quiet=quiet or as_json
+    )
+    with bar:
+        task = bar.add_task("", total=len(cells), garbage=0)
+        try:
+            outcomes = run_cells(cells, workers or os.cpu_count() or 1, count)
+        except BrokenProcessPool:
+            fail(STOPPED, "a worker process died: an FMU has crashed, or memory ran out")
+    write_csv(cells, outcomes, table)
+    pictures = draw(cells, outcomes, out)
+    for stale in out.glob("garbage-*.toml"):
+        stale.unlink()
+    bad = {number: outcome.reason for number, outcome in enumerate(outcomes) if outcome.kind == "garbage"}
+    for number in bad:
+        write_scene(cells[number], out / f"garbage-{number}.toml")
+    if as_json:
+        print_json({"cells": len(cells), "classes": Counter(o.kind for o in outcomes), "garbage": bad})
+    elif quiet:
+        typer.echo(out)
+    console = console_for(silent=quiet or as_json)
+    console.print(_outcome_table(cells, outcomes))
+    console.print(_reason_table(outcomes))
+    for number, reason in bad.items():
+        console.print(Text(f"garbage   {out / f'garbage-{number}.toml'}: {reason}"))
+    console.print(Text(f"cells     {table}"), soft_wrap=True)
+    console.print(Text(f"pictures  {', '.join(map(str, pictures))}"), soft_wrap=True)
+    if garbage:
+        raise typer.Exit(DISAGREES)
+
+
+def _outcome_table(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome]) -> Table:
+    """A row per coupling, with the largest residual of those that were done."""
+    from ..stability.cells import COUPLINGS
+    from ..stability.grid import CLASSES
+
+    table = Table(box=None, pad_edge=False, header_style="bold", title=f"{len(cells)} cells", title_justify="left")
+    table.add_column("coupling", no_wrap=True)
+    for name in (*(f"{kind[:4]}." for kind in CLASSES), "residual"):
+        table.add_column(Text(name), justify="right", no_wrap=True)
+    ends = [(cell["coupling"], outcome) for cell, outcome in zip(cells, outcomes, strict=True)]
+    for row in (*COUPLINGS, None):
+        mine = [outcome for coupling, outcome in ends if row in (coupling, None)]
+        counts = Counter(outcome.kind for outcome in mine)
+        done = [o.residual for o in mine if o.kind in ("conserved", "dissipative", "approximate", "garbage")]
+        done = [residual for residual in done if residual == residual]
+        name = "all" if row is None else " ".join(map(str, row)).removeprefix("transmission ")
+        numbers = [str(counts[kind]) if counts[kind] else "" for kind in CLASSES]
+        table.add_row(name, *numbers, f"{max(done):.0e}" if done else "")
+    return table
+
+
+def _reason_table(outcomes: Sequence[Outcome]) -> Table:
+    """Why cells were refused or stopped, numbers left out, the most frequent reasons first."""
+    counts = Counter((o.kind, _without_numbers(o.reason)) for o in outcomes if o.kind in ("refused", "stopped"))
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column(justify="right", no_wrap=True)
+    table.add_column(no_wrap=True, overflow="ellipsis")
+    for (kind, reason), number in counts.most_common(_REASONS):
+        table.add_row(kind, str(number), Text(reason))
+    if len(counts) > _REASONS:
+        table.add_row("", "", f"and {len(counts) - _REASONS} further reasons, see the table")
+    return table
+
+
+def _without_numbers(reason: str) -> str:
+    return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", " ".join(reason.removeprefix("cell: ").split()))

@@ -1,0 +1,256 @@
+"""The extreme scenes of the grid: a Latin hypercube over all parameters at once, and slices through two of them.
+
+The hypercube is seeded, stratified and in log space. A slice takes two parameters over their whole ranges, the others
+at rest. Every cell is a scene of its own; the same seed gives the same cells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+#: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
+_MOST_PHASE_PER_STEP, _MOST_PHASE = 100.0, 3000.0
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A parameter of a cell and how a number in [0, 1) becomes its value.
+
+    ``zero`` is the share of cells where it is 0, the rest is spread over ``low`` … ``high``, logarithmically unless
+    ``linear``. ``choices`` takes the place of a range.
+    """
+
+    name: str
+    low: float = 0.0
+    high: float = 1.0
+    zero: float = 0.0
+    linear: bool = False
+    choices: tuple[Any, ...] = ()
+
+    def value(self, x: float) -> Any:
+        if self.choices:
+            return self.choices[min(int(x * len(self.choices)), len(self.choices) - 1)]
+        if x < self.zero:
+            return 0.0
+        x = (x - self.zero) / (1.0 - self.zero)
+        if self.linear:
+            return self.low + (self.high - self.low) * x
+        return float(self.low * (self.high / self.low) ** x)
+
+
+#: law, scheme, degree: every pair that a scene may ask for.
+COUPLINGS = (
+    *(("transmission", scheme, degree)
+      for scheme, degree in (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2))),
+    *(("compliance", scheme, degree)
+      for scheme, degree in (("energy", 0), ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1))),
+    ("paper", "energy", 0),
+)  # fmt: skip
+
+AXES = (
+    Axis("coupling", choices=COUPLINGS),
+    Axis("stiffness", 1.0, 3.6e10),  # √(EI·KAG)
+    Axis("shear_ratio", 1e-6, 1e6),  # KAG/EI
+    Axis("macro_step", 1e-6, 0.1),
+    Axis("mass", 1e-6, 1e6),
+    Axis("k1", 1e-2, 1e6),
+    Axis("k2_kind", choices=("hardening", "hardening", "softening", "linear")),
+    Axis("k2", 1e-2, 1e8),
+    Axis("escape", 0.3, 30.0),  # hilltop of the softening spring / the deflection that takes the beam's energy
+    Axis("contact_stiffness", 1.0, 1e12),
+    Axis("exponent", 1.0, 5.0, linear=True),
+    Axis("alpha_b", 1e-9, 1.0, zero=0.4),
+    Axis("alpha_s", 1e-3, 1e3, zero=0.4),
+    Axis("speed", 1e-6, 1e3),
+    Axis("restitution", 0.0, 1.0, linear=True),
+    Axis("elasticity", choices=("given", "plastic", "elastic")),
+    Axis("stop_depth", 1e-12, 0.1, zero=0.2),  # Ψ − φ; 0: no stop
+    Axis("equilibrium", -0.1, 0.1, linear=True),
+    Axis("clearance", 1e-9, 0.1, zero=0.6),  # tip above the spring at the start
+    Axis("approach", choices=("undeformed", "elastic")),
+    Axis("impact", choices=("inelastic", "inelastic", "rest", "tip")),
+    Axis("bodies", choices=("both", "both", "both", "both", "both", "both", "beam", "spring")),
+    Axis("fidelity", choices=("dynamic", "dynamic", "dynamic", "dynamic", "quasi_static")),
+    Axis("n_elements", choices=(1, 2, 5, 10, 20, 50)),
+    Axis("element_degree", choices=(1, 1, 1, 2, 5, 12)),
+    Axis("n_modes", choices=(0, 0, 1, 4)),
+    Axis("integrator", choices=("modal", "modal", "modal", "midpoint", "damped")),
+    Axis("reduced_integration", choices=(False, True)),
+    Axis("distributed_load", 1e-3, 1e3, zero=0.6),
+    Axis("external_force", 1e-3, 1e3, zero=0.6),
+    Axis("steps", 300, 1000),
+)
+
+#: The cell that slices vary: the scene ``soft``, coarser.
+BASE: dict[str, Any] = {
+    "coupling": ("transmission", "energy", 0),
+    "stiffness": 100.0,
+    "shear_ratio": 1.0,
+    "macro_step": 1e-3,
+    "mass": 1.0,
+    "k1": 3.0,
+    "k2_kind": "softening",
+    "k2": 1.0,
+    "escape": 6.7,
+    "contact_stiffness": 1e4,
+    "exponent": 1.5,
+    "alpha_b": 0.0,
+    "alpha_s": 0.0,
+    "speed": 1.0,
+    "restitution": 1.0,
+    "elasticity": "given",
+    "stop_depth": 0.015,
+    "equilibrium": 0.0,
+    "clearance": 0.0,
+    "approach": "undeformed",
+    "impact": "inelastic",
+    "bodies": "both",
+    "fidelity": "dynamic",
+    "n_elements": 20,
+    "element_degree": 1,
+    "n_modes": 0,
+    "integrator": "modal",
+    "reduced_integration": False,
+    "distributed_load": 0.0,
+    "external_force": 0.0,
+    "steps": 400,
+}
+
+
+@dataclass(frozen=True)
+class Slice:
+    """Two axes over their ranges, everything else as in `BASE` but for ``fixed``."""
+
+    name: str
+    x: str
+    y: str
+    fixed: dict[str, Any] = field(default_factory=dict)
+
+
+SLICES = (
+    Slice("energy 0", "macro_step", "stiffness"),
+    Slice("energy 2", "macro_step", "stiffness", {"coupling": ("transmission", "energy", 2)}),
+    Slice("hermite 2", "macro_step", "mass", {"coupling": ("transmission", "hermite", 2)}),
+    Slice("jacobi 0", "macro_step", "contact_stiffness", {"coupling": ("compliance", "jacobi", 0)}),
+    Slice("compliance energy", "macro_step", "contact_stiffness", {"coupling": ("compliance", "energy", 0)}),
+    Slice("compliance exponents", "exponent", "contact_stiffness", {"coupling": ("compliance", "energy", 0)}),
+    Slice("hardening", "speed", "k2", {"k2_kind": "hardening", "coupling": ("transmission", "energy", 1)}),
+    Slice("shear", "shear_ratio", "alpha_b", {"coupling": ("transmission", "energy", 1)}),
+    Slice("stop", "stop_depth", "restitution", {"coupling": ("transmission", "energy", 2), "alpha_s": 0.1}),
+    Slice("quasi-static", "macro_step", "stiffness", {"fidelity": "quasi_static"}),
+)
+
+
+def sampled_cells(count: int, seed: int) -> list[dict[str, Any]]:
+    """A Latin hypercube of ``count`` cells over all `AXES`."""
+    points = qmc.LatinHypercube(len(AXES), seed=seed).random(count)
+    return [
+        {"slice": "", **{axis.name: axis.value(x) for axis, x in zip(AXES, point, strict=True)}} for point in points
+    ]
+
+
+def slice_cells(resolution: int) -> list[dict[str, Any]]:
+    """``resolution``² cells of each of `SLICES`, both ends of the ranges included."""
+    axes = {axis.name: axis for axis in AXES}
+    ends = np.linspace(0.0, 1.0, resolution)
+    return [
+        {"slice": s.name, **BASE, **s.fixed, s.x: _spread(axes[s.x], i), s.y: _spread(axes[s.y], j)}
+        for s in SLICES
+        for i in ends
+        for j in ends
+    ]
+
+
+def _spread(axis: Axis, x: float) -> Any:
+    """Over the range without the share of zeros, but 0 itself first."""
+    if axis.zero > 0.0 and x == 0.0:
+        return 0.0
+    return axis.value(axis.zero + (1.0 - axis.zero) * x)
+
+
+def _spring_frequency(cell: dict[str, Any], k1: float, k2: float) -> float:
+    """An upper estimate [rad/s], at the deflection that takes all the energy and bears the loads."""
+    if cell["bodies"] == "spring":
+        energy = 0.5 * cell["mass"] * cell["speed"] ** 2
+    else:
+        energy = cell["speed"] ** 2 / 6.0
+        if cell["approach"] == "elastic":  # from u = s x, θ = 0
+            slope = cell["equilibrium"] + cell["clearance"]
+            energy += 0.5 * cell["stiffness"] * np.sqrt(cell["shear_ratio"]) * slope**2
+    load = cell["external_force"] + cell["distributed_load"]
+    y = abs(cell["equilibrium"]) + min(np.sqrt(2.0 * energy / k1) + 2.0 * load / k1,
+                                       (4.0 * energy / k2) ** 0.25 + 2.0 * (load / k2) ** (1.0 / 3.0))  # fmt: skip
+    return float(np.sqrt((k1 + 3.0 * k2 * y * y) / cell["mass"]))
+
+
+def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
+    """The scene of a cell, as `springbeam.scene.scene_from_dict` takes it."""
+    law, scheme, degree = cell["coupling"]
+    H, speed, psi = cell["macro_step"], cell["speed"], cell["equilibrium"]
+    steps = int(cell["steps"])
+    k1 = cell["k1"]
+    k2 = cell["k2"] if cell["k2_kind"] == "hardening" else 1e-30
+    if cell["bodies"] != "beam":
+        while (phase := _spring_frequency(cell, k1, k2) * H) > _MOST_PHASE_PER_STEP:
+            k1, k2 = 0.5 * k1, 0.5 * k2
+        steps = max(10, min(steps, int(_MOST_PHASE / phase)))
+    restitution = {"given": cell["restitution"], "plastic": 0.0, "elastic": 1.0}[cell["elasticity"]]
+    # generalized_alpha goes with degree 0 only, and with ρ∞ = 1 in the paper.
+    integrator = cell["integrator"] if degree == 0 else "modal"
+    if law == "paper" and integrator == "damped":
+        integrator = "midpoint"
+    elastic = cell["approach"] == "elastic"
+    clearance = cell["clearance"]
+    if elastic:
+        clearance = min(clearance, 0.1 * speed * steps * H)  # else most would never meet
+    # What takes the beam's kinetic energy v²/6.
+    reach = abs(psi) + speed / np.sqrt(3.0 * k1)
+    k2 = {"hardening": k2, "softening": -k1 / (cell["escape"] * reach) ** 2, "linear": 0.0}[cell["k2_kind"]]
+    scene: dict[str, Any] = {
+        "contact": {
+            "law": law,
+            "impact": cell["impact"],
+            "stiffness": cell["contact_stiffness"],
+            "exponent": cell["exponent"],
+        },
+        "coupling": {"scheme": scheme, "degree": degree, "macro_step": H},
+        "time": {"t_end": steps * H + (0.0 if elastic or cell["bodies"] == "spring" else clearance / speed)},
+    }
+    if cell["bodies"] != "spring":
+        root = float(np.sqrt(cell["shear_ratio"]))
+        degree_of_elements = cell["element_degree"]
+        n = max(1, cell["n_elements"] // degree_of_elements)
+        scene["beam"] = {
+            "young_modulus": cell["stiffness"] / root,
+            "shear_modulus": cell["stiffness"] * root,
+            "alpha_b": cell["alpha_b"],
+            "n_elements": n,
+            "element_degree": degree_of_elements,
+            "n_modes": min(cell["n_modes"], 2 * n * degree_of_elements),
+            "reduced_integration": cell["reduced_integration"],
+            "integrator": "modal" if integrator == "modal" else "generalized_alpha",
+            "rho_inf": 0.5 if integrator == "damped" else 1.0,
+            "distributed_load": -cell["distributed_load"],
+            "initial_deflection_slope": psi + clearance,
+            "initial_velocity_slope": -speed,
+            "approach": cell["approach"],
+            "fidelity": cell["fidelity"],
+        }
+    if cell["bodies"] != "beam":
+        scene["spring"] = {
+            "mass": cell["mass"],
+            "damping": cell["alpha_s"],
+            "linear_stiffness": k1,
+            "cubic_stiffness": k2,
+            "equilibrium": psi,
+            "external_force": cell["external_force"],
+            "initial_velocity": -speed if cell["bodies"] == "spring" else 0.0,
+        }
+    if cell["stop_depth"] > 0.0:
+        height = psi if cell["bodies"] == "beam" else psi - cell["stop_depth"]
+        scene["stop"] = {"position": height, "restitution": restitution}
+    return scene

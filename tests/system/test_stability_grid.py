@@ -1,0 +1,216 @@
+"""The grid of extremes: what its classes mean, that its cells cover the ranges, and a small part of it."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from springbeam import load_scene, simulate, with_changes
+from springbeam.cli import app
+from springbeam.ledger import APPROXIMATE, EXACT, bounds
+from springbeam.stability import grid
+from springbeam.stability.cells import AXES, SLICES, sampled_cells, scene_dict, slice_cells
+from springbeam.stability.grid import CLASSES, Outcome, judged, run_cell, run_cells, write_csv
+from springbeam.trajectory import Trajectory
+
+SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro_step": 2e-3}}
+
+
+@lru_cache
+def done(scheme: str = "energy", degree: int = 0, **beam: float) -> Trajectory:
+    changes = {**SMALL, "beam": {**SMALL["beam"], **beam}}
+    changes["coupling"] = {"macro_step": 2e-3, "scheme": scheme, "degree": degree}
+    return simulate(with_changes(load_scene("soft"), **changes))
+
+
+def changed(run: Trajectory, warnings: tuple[str, ...] | None = None, **columns: np.ndarray) -> Trajectory:
+    summary = run.summary if warnings is None else {**run.summary, "warnings": list(warnings)}
+    return replace(run, columns={**run.columns, **columns}, summary=summary)
+
+
+def residual(run: Trajectory, share: float) -> np.ndarray:
+    """A residual that ends at ``share`` of the energy."""
+    return np.linspace(0.0, share, len(run.time)) * run.e_total[0]
+
+
+# -- classes --------------------------------------------------------------------------------------------------------
+
+
+def test_energy_kept_is_conserved_or_dissipative_by_what_was_lost():
+    run = done()
+    assert judged(run).kind == "dissipative"  # the impact takes 4e-2 of it
+    assert judged(changed(run, e_impact_loss=0.0 * run.time)).kind == "conserved"
+    assert judged(run).residual < EXACT
+
+
+@pytest.mark.parametrize("scheme", ["energy", "hermite"])
+def test_energy_that_changes_is_approximate_if_said_and_garbage_if_not(scheme):
+    """The bound is 1e-8 for a coupling that creates none, 1e-3 for one that does."""
+    run = done(scheme, 1)
+    bound, _ = bounds(run.scene)
+    assert bound == (EXACT if scheme == "energy" else APPROXIMATE)
+    for share, warnings, kind in (
+        (0.9 * bound, (), "approximate" if bound > EXACT else "dissipative"),
+        (1.1 * bound, (), "garbage"),
+        (1.1 * bound, ("not resolved",), "garbage"),
+        (1.1 * bound, ("something has changed the energy",), "approximate"),
+    ):
+        outcome = judged(changed(run, warnings, energy_residual=residual(run, share)))
+        assert outcome.kind == kind
+        assert outcome.residual == pytest.approx(share, rel=1e-6)
+
+
+def test_numerical_damping_may_take_energy_but_not_bring_it():
+    run = done(integrator="generalized_alpha", rho_inf=0.5)
+    assert judged(changed(run, (), energy_residual=residual(run, -0.5))).kind == "dissipative"
+    assert judged(changed(run, (), energy_residual=residual(run, 0.5))).kind == "garbage"
+
+
+@pytest.mark.parametrize(
+    ("column", "reason"),
+    [
+        ("z", "z is not finite"),
+        ("gap", "overlap or part by 2.0e-09"),
+        ("e_dissipated", "damping gives energy back"),
+        ("e_impact_loss", "impacts give energy back"),
+        ("time", "time runs backwards"),
+    ],
+)
+def test_what_must_not_be_is_garbage_whatever_the_energy(column, reason):
+    run = done()
+    values = run[column].copy()
+    motion = np.abs(run.shapes[1]).max() + 2e-3 * max(np.abs(run.v_tip).max(), np.abs(run.z).max())
+    values[-1] = {"z": np.nan, "gap": 2e-9 * motion, "time": 0.0}.get(column, values[-1] - 1e-6)
+    outcome = judged(changed(run, **{column: values}))
+    assert outcome.kind == "garbage"
+    assert reason in outcome.reason
+
+
+def test_a_run_that_ends_early_is_stopped_for_its_cause():
+    outcome = judged(done(), "the contact chatters")
+    assert (outcome.kind, outcome.reason) == ("stopped", "the contact chatters")
+
+
+def test_what_cannot_be_run_is_refused_and_a_crash_is_garbage(monkeypatch):
+    outcome = run_cell({**slice_cells(2)[0], "coupling": ("paper", "energy", 0), "fidelity": "quasi_static"})
+    assert outcome.kind == "refused"
+    assert 'law = "paper" integrates the beam by (62)' in outcome.reason
+
+    def crash(*_: object) -> None:
+        raise ZeroDivisionError("nothing there")
+
+    monkeypatch.setattr(grid, "run", crash)
+    outcome = run_cell(slice_cells(2)[0])
+    assert (outcome.kind, outcome.reason) == ("garbage", "crashed: ZeroDivisionError: nothing there")
+
+
+# -- cells ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_grid_covers_the_ranges():
+    """Each stratum of the hypercube holds one cell, so the ranges are covered to 1/400 of their length."""
+    cells = sampled_cells(400, 1)
+    assert len(cells) + len(slice_cells(7)) >= 600
+    for axis in AXES:
+        if axis.choices:
+            assert {cell[axis.name] for cell in cells} == set(axis.choices)
+            continue
+        values = sorted(cell[axis.name] for cell in cells if cell[axis.name] != 0.0)
+        if axis.linear:
+            tolerance = 0.01 * (axis.high - axis.low)
+            assert values[0] == pytest.approx(axis.low, abs=tolerance)
+            assert values[-1] == pytest.approx(axis.high, abs=tolerance)
+        else:
+            ratio = (axis.high / axis.low) ** 0.01
+            assert axis.low <= values[0] <= axis.low * ratio
+            assert axis.high / ratio <= values[-1] <= axis.high
+    assert sampled_cells(400, 1) == cells != sampled_cells(400, 2)
+
+
+@pytest.mark.parametrize("s", SLICES, ids=[s.name for s in SLICES])
+def test_slices_reach_both_ends(s):
+    axes = {axis.name: axis for axis in AXES}
+    mine = [cell for cell in slice_cells(3) if cell["slice"] == s.name]
+    assert len(mine) == 9
+    for name in (s.x, s.y):
+        values = {cell[name] for cell in mine}
+        assert len(values) == 3
+        assert max(values) == pytest.approx(axes[name].high)
+        assert min(values) == pytest.approx(0.0 if axes[name].zero else axes[name].low)
+
+
+# -- a part of it ---------------------------------------------------------------------------------------------------
+
+
+def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else(tmp_path):
+    """12 cells of the hypercube and corners of the slices; the same bytes from one process and from two."""
+    cells = [*sampled_cells(12, 3), *slice_cells(2)[::3]]
+    one, two = [run_cell(cell) for cell in cells], run_cells(cells, 2)
+    assert [(o.kind, o.reason) for o in one if o.kind == "garbage"] == []
+    assert {o.kind for o in one} >= {"conserved", "dissipative", "approximate", "stopped"}
+    for outcomes, name in ((one, "one"), (two, "two")):
+        write_csv(cells, outcomes, tmp_path / name)
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
+    with (tmp_path / "one").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["class"] for row in rows] == [o.kind for o in one]
+    for row, outcome in zip(rows, one, strict=True):
+        if outcome.kind in ("conserved", "dissipative") and row["integrator"] != "damped":
+            assert float(row["residual"]) <= EXACT
+        if outcome.kind in ("refused", "stopped"):
+            assert row["reason"]
+
+
+# -- the command ----------------------------------------------------------------------------------------------------
+
+
+def outcomes_of(kinds: tuple[str, ...]):
+    def run_cells(cells, processes, report):
+        found = [Outcome(kinds[i % len(kinds)], "y = 1.5 m", 1e-9, 0.0, 3, 1) for i in range(len(cells))]
+        for outcome in found:
+            report(outcome)
+        return found
+
+    return run_cells
+
+
+@pytest.mark.parametrize(("kinds", "code"), [(CLASSES[:-1], 0), (CLASSES, 1)])
+def test_command(tmp_path, monkeypatch, kinds, code):
+    monkeypatch.setattr(grid, "run_cells", outcomes_of(kinds))
+    out = tmp_path / "grid"
+    arguments = ["stability", "--samples", "30", "--resolution", "3", "--out", str(out)]
+    result = CliRunner(env={"COLUMNS": "80"}).invoke(app, arguments)
+    assert result.exit_code == code, result.output
+    assert "garb." in result.stdout
+    table = (
+        result.stdout[: result.stdout.index("garbage  ")] if code else result.stdout[: result.stdout.index("cells  ")]
+    )
+    assert max(map(len, table.splitlines())) <= 80
+    assert len((out / "stability.csv").read_text().splitlines()) == 1 + 30 + 9 * len(SLICES)
+    assert all((out / name).stat().st_size > 10_000 for name in ("classes.png", "residuals.png"))
+    scenes = sorted(out.glob("garbage-*.toml"))
+    assert len(scenes) == (0 if code == 0 else (30 + 9 * len(SLICES)) // len(CLASSES))
+    for path in scenes[:3]:
+        assert load_scene(path).time.t_end > 0.0
+    again = CliRunner().invoke(app, arguments)
+    assert again.exit_code == 2
+    assert "--force" in again.stderr
+
+
+def test_command_without_cells_is_refused():
+    result = CliRunner().invoke(app, ["stability", "--samples", "0", "--resolution", "0"])
+    assert result.exit_code == 2
+
+
+def test_a_scene_of_a_cell_is_that_cell():
+    cell = slice_cells(2)[0]
+    scene = scene_dict(cell)
+    assert scene["coupling"]["macro_step"] == cell["macro_step"]
+    beam = scene["beam"]
+    assert np.sqrt(beam["young_modulus"] * beam["shear_modulus"]) == pytest.approx(cell["stiffness"])
+    assert beam["shear_modulus"] / beam["young_modulus"] == pytest.approx(cell["shear_ratio"])
