@@ -113,9 +113,9 @@ def test_what_cannot_be_run_is_refused_and_a_crash_is_garbage(monkeypatch):
 
 
 def test_the_grid_covers_the_ranges():
-    """Each stratum of the hypercube holds one cell, so the ranges are covered to 1/400 of their length."""
-    cells = sampled_cells(400, 1)
-    assert len(cells) + len(slice_cells(7)) >= 600
+    """Each stratum of the hypercube holds one cell, so the ranges are covered to 1/300 of their length."""
+    cells = sampled_cells(300, 1)
+    assert len(cells) + len(slice_cells(6)) >= 600
     for axis in AXES:
         if axis.choices:
             assert {cell[axis.name] for cell in cells} == set(axis.choices)
@@ -129,7 +129,7 @@ def test_the_grid_covers_the_ranges():
             ratio = (axis.high / axis.low) ** 0.01
             assert axis.low <= values[0] <= axis.low * ratio
             assert axis.high / ratio <= values[-1] <= axis.high
-    assert sampled_cells(400, 1) == cells != sampled_cells(400, 2)
+    assert sampled_cells(300, 1) == cells != sampled_cells(300, 2)
 
 
 @pytest.mark.parametrize("s", SLICES, ids=[s.name for s in SLICES])
@@ -148,8 +148,8 @@ def test_slices_reach_both_ends(s):
 
 
 def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else(tmp_path):
-    """12 cells of the hypercube and corners of the slices; the same bytes from one process and from two."""
-    cells = [*sampled_cells(12, 3), *slice_cells(2)[::3]]
+    """Cells of the hypercube and corners of the slices; the same bytes from one process and from two."""
+    cells = [*sampled_cells(20, 3)[:16], *slice_cells(2)[::3]]
     one, two = [run_cell(cell) for cell in cells], run_cells(cells, 2)
     assert [(o.kind, o.reason) for o in one if o.kind == "garbage"] == []
     assert {o.kind for o in one} >= {"conserved", "dissipative", "approximate", "stopped"}

@@ -106,10 +106,10 @@ def _schemes_table(p: Prediction) -> Table:
 
 
 def stability(
-    samples: Annotated[int, typer.Option("--samples", min=0, help="Cells of the hypercube over all parameters.")] = 400,
+    samples: Annotated[int, typer.Option("--samples", min=0, help="Cells of the hypercube over all parameters.")] = 300,
     resolution: Annotated[
         int, typer.Option("--resolution", min=0, help="Values of each parameter of a slice; 0: no slices.")
-    ] = 7,
+    ] = 6,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the hypercube.")] = 1,
     workers: Annotated[int | None, typer.Option("--workers", min=1, help="Processes. Default: one per core.")] = None,
     out: Annotated[

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import qmc
 
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
-_MOST_PHASE_PER_STEP, _MOST_PHASE = 100.0, 3000.0
+_MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ AXES = (
     Axis("reduced_integration", choices=(False, True)),
     Axis("distributed_load", 1e-3, 1e3, zero=0.6),
     Axis("external_force", 1e-3, 1e3, zero=0.6),
-    Axis("steps", 300, 1000),
+    Axis("steps", 100, 400),
 )
 
 #: The cell that slices vary: the scene ``soft``, coarser.
@@ -117,7 +117,7 @@ BASE: dict[str, Any] = {
     "reduced_integration": False,
     "distributed_load": 0.0,
     "external_force": 0.0,
-    "steps": 400,
+    "steps": 200,
 }
 
 

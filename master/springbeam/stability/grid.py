@@ -39,7 +39,7 @@ from .cells import AXES, scene_dict
 #: In the order in which pictures and tables show them; the last must stay empty.
 CLASSES = ("conserved", "dissipative", "approximate", "refused", "stopped", "garbage")
 #: A run is cut after this many accepted steps: a contact that opens and closes in every macro step.
-_MOST_STEPS = 1500
+_MOST_STEPS = 600
 #: Bodies may overlap or, joined, part by so much of their motion.
 _OVERLAP = 1e-9
 #: Rounding of a sum of energies, of the largest so far.
