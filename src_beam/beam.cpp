@@ -41,6 +41,23 @@ bool outputs_finite(const BeamIntegrator& beam) {
          std::all_of(scalars.begin(), scalars.end(), finite);
 }
 
+namespace {
+
+/// Puts the state back.
+class Trial {
+ public:
+  explicit Trial(BeamIntegrator& beam) : beam_(beam) { beam_.save(state_); }
+  Trial(const Trial&) = delete;
+  Trial& operator=(const Trial&) = delete;
+  ~Trial() { beam_.restore(state_); }
+
+ private:
+  BeamIntegrator& beam_;
+  std::vector<double> state_;
+};
+
+}  // namespace
+
 struct Beam::Impl {
   std::unique_ptr<BeamIntegrator> integrator;
   std::size_t state_size;
@@ -90,6 +107,28 @@ double Beam::tip_mass() const { return impl_->integrator->tip_mass(); }
 double Beam::static_tip_compliance() const { return impl_->integrator->static_tip_compliance(); }
 void Beam::deflection(std::array<double, shape_points>& u) const { impl_->integrator->deflection(u); }
 void Beam::rotation(std::array<double, shape_points>& theta) const { impl_->integrator->rotation(theta); }
+
+Beam::Forecast Beam::forecast(double size, double distributed_load) {
+  const Trial trial(*impl_->integrator);
+  const double u = tip_displacement(), v = tip_velocity();
+  for (int i = 0; i < 2; ++i) step(size, {}, distributed_load);
+  return {(tip_displacement() - u) / (2.0 * size), (tip_velocity() - v) / (2.0 * size)};
+}
+
+std::array<double, 2> Beam::tip_response(double size) {
+  const Trial trial(*impl_->integrator);
+  const std::vector<double> rest(impl_->state_size, 0.0);
+  std::array<double, 2> response{};
+  for (const double force : {1.0, 0.0}) {  // the difference: other loads act in both
+    impl_->integrator->restore(rest);
+    for (std::size_t i = 0; i < 2; ++i) {
+      step(size, {i == 0 ? force : 0.0, 0.0, 0.0}, 0.0);
+      response[i] = force == 0.0 ? response[i] - tip_displacement() : tip_displacement();
+    }
+  }
+  return response;
+}
+
 std::vector<double> Beam::frequencies() const { return impl_->integrator->frequencies(); }
 
 void Beam::save(std::vector<double>& state) const { impl_->integrator->save(state); }

@@ -74,6 +74,22 @@ class Beam {
   void deflection(std::array<double, shape_points>& u) const;    ///< [m]
   void rotation(std::array<double, shape_points>& theta) const;  ///< [rad]
 
+  /// How the tip goes on over two steps of `size` [s] without a tip force.
+  struct Forecast {
+    double velocity;      ///< w = [u(t + 2·size) − u(t)]/(2·size) [m/s]
+    double acceleration;  ///< its rate, [u_t(t + 2·size) − u_t(t)]/(2·size) [m/s²]
+  };
+  /// By two trial steps, which leave no trace.
+  /// @throws std::invalid_argument as step() does
+  /// @throws std::domain_error (state unchanged) if the result is not finite
+  Forecast forecast(double size, double distributed_load);
+
+  /// What 1 N held over a step of `size` [s] adds to u(L) at that step's end, and at the end of another step without a
+  /// force [m/N]. As the beam is linear, forces C₁, C₂ over the next two steps lead to
+  ///     u(t + 2·size) = u(t) + 2·size·w + C₁ r[1] + C₂ r[0].
+  /// @throws as forecast()
+  std::array<double, 2> tip_response(double size);
+
   /// Natural frequencies of what is integrated, ascending [rad/s]; empty for generalized_alpha.
   std::vector<double> frequencies() const;
 

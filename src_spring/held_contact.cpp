@@ -3,54 +3,92 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "parameters.hpp"
 
 namespace spring {
 
-void HeldContact::see(double displacement, double velocity) {
-  u_ = displacement;
-  v_ = velocity;
-  if (size_ > 0.0) free_ = (v_ - v_before_) / size_ - force_before_ / tip_mass_;
-}
-
-void HeldContact::choose(double y, double z, double acceleration, bool held) {
-  const double h = size_;
-  const double depth = y - u_;
-  if (h == 0.0) {
-    force_ = law_.force(depth);
-    return;
-  }
-  const double spring = held ? 0.0 : h * z + h * h / 2 * acceleration;
-  const double change = spring - h * v_ - h * h / 2 * free_;
-  const double yielding = h * h / 2 * (1.0 / tip_mass_ + (held ? 0.0 : 1.0 / mass_));
-  const auto mean = [&](double force) {
-    const double after = depth + change - yielding * force;
-    // Where the difference quotient is rounding, the middle is as good.
-    if (std::abs(after - depth) <= 1e-6 * (std::abs(after) + std::abs(depth))) {
-      return law_.force((after + depth) / 2);
-    }
-    return (law_.energy(after) - law_.energy(depth)) / (after - depth);
+HeldContact::HeldContact(const Compliance& law, double mass, double size, const std::array<double, 2>& response)
+    : law_(law), yielding_(size * size / 2 / mass), size_(size), response_(response) {
+  const auto require = [](bool allowed, const char* name, double value, const char* what) {
+    if (!allowed) throw std::invalid_argument(std::string("spring: ") + name + " = " + number(value) + what);
   };
-  // `mean` falls with the force: one root, between 0 and what no yielding would give.
-  double low = 0.0, high = mean(0.0);
-  while (high - low > 4.0 * std::numeric_limits<double>::epsilon() * high) {
-    const double middle = (low + high) / 2;
-    if (middle <= low || middle >= high) break;  // neighbouring denormal numbers
-    (mean(middle) > middle ? low : high) = middle;
-  }
-  force_ = high;
+  require(std::isfinite(size) && size > 0.0, "communication_step", size, ": must be > 0 and finite");
+  require(std::isfinite(response[0]) && response[0] > 0.0, "tip_response", response[0],
+          ": must be > 0 and finite where communication_step > 0; it is an output of the beam with the same one");
+  require(std::isfinite(response[1]), "tip_response_2", response[1], ": must be finite");
 }
 
-void HeldContact::advance(double size) {
-  v_before_ = v_;
-  force_before_ = force_;
-  size_ = size;
-  const double acceleration = free_ + force_ / tip_mass_;
-  u_ += size * v_ + size * size / 2 * acceleration;
-  v_ += size * acceleration;
+void HeldContact::begin(const TipMessage& seen, double y, const Top& top) {
+  const bool nothing = seen.displacement == 0.0 && seen.velocity == 0.0;
+  const bool held_back = nothing && (first_.displacement != 0.0 || first_.velocity != 0.0);
+  if (!held_back) first_ = seen;
+  tip_ = first_.displacement;
+  const double free = tip_ + size_ * first_.velocity;
+  if (held_back) {
+    force_ = 0.0;
+    next_ = free;
+  } else {
+    choose(y, free, top);
+  }
+}
+
+void HeldContact::advance(const TipMessage& seen, double y, const Top& top) {
+  const TipMessage& from = started_ ? seen : first_;
+  started_ = true;
+  tip_ = next_;
+  choose(y, from.displacement + 2.0 * size_ * from.velocity + force_ * response_[1], top);
+}
+
+void HeldContact::choose(double y, double free, const Top& top) {
+  const double start = y - tip_, yielding = response_[0] + yielding_;
+  double low = 0.0, high = std::numeric_limits<double>::infinity(), force = force_;
+  // The top answers almost like a free mass, then two or three trials do; an impact on the foundation takes more.
+  for (int trial = 0; trial < 60; ++trial) {
+    const double at_rest = top(force) + yielding_ * force - free;
+    const double wanted = mean(start, at_rest - yielding * force);
+    if (std::abs(wanted - force) <= 1e-13 * force || !std::isfinite(wanted)) break;
+    (wanted > force ? low : high) = force;
+    double next = root(start, at_rest, yielding);
+    if (!(low < next && next < high) && std::isfinite(high)) next = low + (high - low) / 2;
+    if (next == force) break;
+    force = next;
+    if (!std::isfinite(force)) break;
+  }
+  force_ = force;
+  next_ = free + response_[0] * force_;
+}
+
+/// C with C = mean(start, free − yielding·C). The mean falls with C: there is one, between 0 and what no yielding
+/// gives.
+double HeldContact::root(double start, double free, double yielding) const {
+  double low = 0.0, high = mean(start, free);
+  while (high - low > 4.0 * std::numeric_limits<double>::epsilon() * high) {
+    const double middle = low + (high - low) / 2;
+    if (middle <= low || middle >= high) break;  // neighbouring denormal numbers, or not finite
+    (mean(start, free - yielding * middle) > middle ? low : high) = middle;
+  }
+  return high;
+}
+
+double HeldContact::mean(double start, double end) const {
+  // Where the difference quotient is rounding, the middle is as good.
+  if (std::abs(end - start) <= 1e-6 * (std::abs(end) + std::abs(start))) return law_.force((start + end) / 2);
+  return (law_.energy(end) - law_.energy(start)) / (end - start);
+}
+
+std::array<double, HeldContact::state_length> HeldContact::state() const {
+  return {tip_, next_, force_, first_.displacement, first_.velocity, started_ ? 1.0 : 0.0};
 }
 
 void HeldContact::restore(const double* state) {
-  for (double* member : {&u_, &v_, &free_, &force_, &size_, &v_before_, &force_before_}) *member = *state++;
+  if (!std::all_of(state, state + state_length, [](double x) { return std::isfinite(x); })) {
+    throw std::invalid_argument("spring: a saved state has numbers that are not finite");
+  }
+  for (double* member : {&tip_, &next_, &force_, &first_.displacement, &first_.velocity}) *member = *state++;
+  started_ = *state != 0.0;
 }
 
 }  // namespace spring

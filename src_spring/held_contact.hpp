@@ -1,53 +1,66 @@
-// Normal compliance for tools that exchange values only between steps. Over a step the contact force is held constant,
-// for both bodies alike (action = reaction), and it is chosen so that it does the work of the law:
+// Normal compliance for tools that exchange values only between steps. Over a step of size H the contact force is held
+// constant, for both bodies alike (action = reaction), at the value that does the work of the law:
 //     C = [Φ(δ⁺) − Φ(δ)]/(δ⁺ − δ),   δ = y − u_tip,   Φ(δ) = λ δ₊^{p+1}/(p+1)          (design.md section 4, d = 0).
-// δ⁺ is predicted: the spring by its acceleration, the tip as a mass m_tip under C and the acceleration that the rest
-// of the beam gave it over the step before.
+// It is sent off at the step's start, before the tip is seen there; what is known is what was seen a step earlier. That
+// is enough, because the beam is linear: it says how its tip would go on without a force, u + 2H w two steps ahead, and
+//     u_tip⁺ = u + 2H w + C₋ r₂ + C r₁,
+// C₋ the force meanwhile, r₁ and r₂ what 1 N held over a step adds to u_tip at its end and a step later.
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <functional>
 
 #include "compliance.hpp"
 
 namespace spring {
 
+/// What the beam says of its tip: displacement u now [m], mean velocity w over the next two steps without a force
+/// [m/s].
+struct TipMessage {
+  double displacement = 0.0, velocity = 0.0;
+};
+
 class HeldContact {
  public:
-  /// `mass` of the spring, `tip_mass` [kg] > 0 of the beam; `late`: the other side reads the force before this one
-  /// learns where the tip is, so that the force is chosen from the predicted tip.
-  HeldContact(const Compliance& law, double mass, double tip_mass, bool late)
-      : law_(law), mass_(mass), tip_mass_(tip_mass), late_(late) {}
+  /// `mass` of the spring [kg] > 0, step `size` H [s] > 0, `response` r₁ ≥ 0, r₂ [m/N].
+  /// @throws std::invalid_argument naming the value and what is allowed
+  HeldContact(const Compliance& law, double mass, double size, const std::array<double, 2>& response);
 
-  /// Where the tip is now [m, m/s].
-  void see(double displacement, double velocity);
+  /// Where the top would be [m] after a step of H under a force [N] held over it.
+  using Top = std::function<double(double)>;
 
-  /// Choose the force for the next step, taken to be as long as the last. `acceleration`: the spring's without C;
-  /// `held`: seated on the foundation.
-  void choose(double y, double z, double acceleration, bool held);
+  /// Before the first step, whenever `seen` changes: choose its force, the top being at y. w then stands for the first
+  /// step's mean velocity, too. Zeros after other values are no message: the tool has nothing to pass on yet, and as
+  /// it does not pass the force on either, that is 0 over the first step.
+  void begin(const TipMessage& seen, double y, const Top& top);
 
-  /// Whether choose() is due once the tip was seen.
-  bool follows_the_tip() const { return !late_ || size_ == 0.0; }
+  /// A step was made under force(), at whose start the tip was `seen`, and the top is at y: choose the next force.
+  void advance(const TipMessage& seen, double y, const Top& top);
 
-  /// A step of `size` [s] was made under force().
-  void advance(double size);
+  double force() const { return force_; }                          ///< C over the next step [N]
+  double energy(double y) const { return law_.energy(y - tip_); }  ///< Φ [J]
+  double tip() const { return tip_; }                              ///< u_tip now [m], as foreseen
+  double size() const { return size_; }                            ///< H [s]
+  bool started() const { return started_; }                        ///< a step was made
 
-  double force() const { return force_; }                                         ///< C [N]
-  double energy(double y) const { return law_.energy(y - u_); }                   ///< Φ [J]
-
-  static constexpr std::size_t state_length = 7;
-  std::array<double, state_length> state() const { return {u_, v_, free_, force_, size_, v_before_, force_before_}; }
+  static constexpr std::size_t state_length = 6;
+  std::array<double, state_length> state() const;
+  /// @throws std::invalid_argument (state unchanged) if a number is not finite
   void restore(const double* state);
 
  private:
+  void choose(double y, double free, const Top& top);
+  double root(double start, double free, double yielding) const;
+  double mean(double start, double end) const;
+
   Compliance law_;
-  double mass_, tip_mass_;
-  bool late_;
-  double u_ = 0.0, v_ = 0.0;  ///< the tip now, seen or predicted
-  double free_ = 0.0;         ///< its acceleration without C
+  double yielding_, size_;
+  std::array<double, 2> response_;
+  double tip_ = 0.0, next_ = 0.0;  ///< u_tip now and after the coming step [m]
   double force_ = 0.0;
-  double size_ = 0.0;                           ///< of the last step, 0 if there was none
-  double v_before_ = 0.0, force_before_ = 0.0;  ///< at its start, over it
+  TipMessage first_;  ///< seen before the first step
+  bool started_ = false;
 };
 
 }  // namespace spring

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import springbeam
+from springbeam.monolithic import event_driven
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -17,3 +21,29 @@ def fmu_folder() -> Path:
     if missing:
         pytest.fail(f"{', '.join(missing)} not in {folder}: run ./build.sh fmus")
     return folder
+
+
+#: `soft` with the compliance law: what the pair of FMUs runs where only ports are connected.
+COMPLIANCE = springbeam.with_changes(
+    springbeam.load_scene("soft"),
+    time={"t_end": 0.4},
+    contact={"law": "compliance", "stiffness": 1e6, "exponent": 1.5},
+)
+
+
+@pytest.fixture(scope="session")
+def reference() -> np.ndarray:
+    """y at 1, 2, … 400 ms of that scene by the event-driven solver."""
+    times = np.arange(1, 401) * 1e-3
+    solution = event_driven.simulate(COMPLIANCE, sample_times=times)
+    return np.interp(times, solution.time, solution.y)
+
+
+@pytest.fixture(scope="session")
+def master_run() -> dict[float, np.ndarray]:
+    """y at 1, 2, … 400 ms of that scene by `springbeam run`, per macro step."""
+    runs = {}
+    for size in (1e-3, 5e-4):
+        run = springbeam.simulate(springbeam.with_changes(COMPLIANCE, coupling={"macro_step": size}))
+        runs[size] = np.interp(np.arange(1, 401) * 1e-3, run.time, run.y)
+    return runs

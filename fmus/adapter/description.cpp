@@ -35,6 +35,7 @@ constexpr Unit units[] = {
     {"Pa", "Pressure", 1, -1, -2, 0},
     {"N", "Force", 1, 1, -2, 0},
     {"N/m", "Stiffness", 1, 0, -2, 0},
+    {"m/N", "Compliance", -1, 0, 2, 0},
     {"N/m3", "CubicStiffness", 1, -2, -2, 0},
     {"N.s", "Impulse", 1, 1, -1, 0},
     {"N.s/m", "Damping", 1, 0, -1, 0},

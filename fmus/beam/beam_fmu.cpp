@@ -1,4 +1,6 @@
 // The beam FMU: its table of variables, bound to beam::Beam.
+#include <array>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -12,24 +14,42 @@ namespace {
 using beam::Beam;
 using beam::Parameters;
 
+/// The beam's parameters and what exchange between steps adds to them.
+struct FmuParameters : Parameters {
+  double communication_step = 0.0;
+};
+
 struct BeamModel final : fmi::Model {
-  Parameters parameters;
+  FmuParameters parameters;
   fmi::Polynomial tip_force{};
   double tip_impulse = 0.0;
   double distributed_load = 0.0;
   std::optional<Beam> beam;
+  std::optional<Beam::Forecast> forecast;  ///< with communication_step > 0; not finite if it leaves the range
+  std::array<double, 2> tip_response{};
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
-  void build(double) override { beam.emplace(parameters); }
+  void build(double) override {
+    beam.emplace(parameters);
+    forecast.reset();
+    tip_response = {};
+    if (parameters.communication_step == 0.0) return;
+    tip_response = beam->tip_response(parameters.communication_step);
+    look_ahead();
+  }
 
-  void observe() override { beam->set_distributed_load(distributed_load); }
+  void observe() override {
+    if (forecast && distributed_load != foreseen_load_) look_ahead();
+    beam->set_distributed_load(distributed_load);
+  }
 
   void step(double size) override {
     std::vector<double> before;
-    if (tip_impulse != 0.0) beam->save(before);
+    if (tip_impulse != 0.0 || forecast) beam->save(before);
     try {
       if (tip_impulse != 0.0) beam->apply_tip_impulse(tip_impulse);
       beam->step(size, tip_force, distributed_load);
+      if (forecast) foresee();
     } catch (const std::domain_error& e) {
       if (!before.empty()) beam->restore(before);
       throw fmi::StepDiscarded(e.what());
@@ -37,7 +57,32 @@ struct BeamModel final : fmi::Model {
   }
 
   void save(std::vector<double>& state) const override { beam->save(state); }
-  void restore(const std::vector<double>& state) override { beam->restore(state); }
+
+  void restore(const std::vector<double>& state) override {
+    beam->restore(state);
+    if (forecast) look_ahead();
+  }
+
+  double tip_velocity() const { return forecast ? forecast->velocity : beam->tip_velocity(); }
+  double tip_acceleration() const { return forecast ? forecast->acceleration : beam->tip_acceleration(); }
+
+ private:
+  double foreseen_load_ = 0.0;
+
+  /// @throws std::domain_error
+  void foresee() {
+    foreseen_load_ = distributed_load;
+    forecast = beam->forecast(parameters.communication_step, distributed_load);
+  }
+
+  void look_ahead() {
+    try {
+      foresee();
+    } catch (const std::domain_error&) {
+      constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+      forecast = {unknown, unknown};
+    }
+  }
 };
 
 template <class Value>
@@ -100,6 +145,12 @@ fmi::Table make_table() {
             "s in the initial velocity u_t = s*x");
   parameter("tip_load_coefficient", "N/m", &Parameters::tip_load_coefficient,
             "coefficient of the last hat function in the distributed load");
+  parameter(
+      "communication_step", "s", &FmuParameters::communication_step,
+      "size H of the communication steps, for a partner that foresees the tip (communication_step of the spring). "
+      "If > 0, tip_velocity looks ahead and tip_response is known")
+      .at_least(0)
+      .scale(1e-3);
 
   add.polynomial("tip_force", "N",
                  "contact force C on the tip, positive upward; its derivatives of order 1 and 2 hold for the next "
@@ -111,7 +162,6 @@ fmi::Table make_table() {
             [](BeamModel& m) -> double& { return m.distributed_load; });
 
   const std::vector<std::string> start_u{"initial_deflection_slope", "length"};
-  const std::vector<std::string> start_v{"initial_velocity_slope", "length"};
   // What the modal basis depends on: the start is projected onto the modes that are kept.
   const std::vector<std::string> basis{"density",        "area",    "second_moment_of_area", "young_modulus",
                                        "shear_modulus",  "length",  "shear_coefficient",     "n_elements",
@@ -121,8 +171,18 @@ fmi::Table make_table() {
   add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),
              of(&Beam::tip_velocity))
       .from(start_u);
-  add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
-      .from(start_v);
+  // What the steps ahead depend on besides.
+  std::vector<std::string> motion = basis;
+  motion.insert(motion.end(), {"alpha_b", "rho_inf", "communication_step"});
+  std::vector<std::string> free_motion = motion;
+  free_motion.insert(free_motion.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient",
+                                         "distributed_load"});
+  add.output(
+         "tip_velocity", "m/s",
+         "velocity of the tip; if communication_step = H > 0 its mean over the next 2H were there no tip_force",
+         [](const BeamModel& m) { return m.tip_velocity(); }, [](const BeamModel& m) { return m.tip_acceleration(); })
+      .from(free_motion)
+      .follows({"distributed_load"});
   add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation))
       .from(start_shape);
   add.output("tip_displacement_integral", "m.s", "integral of tip_displacement over the last step",
@@ -139,6 +199,13 @@ fmi::Table make_table() {
       .follows({"distributed_load"});
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
       .from(basis);
+  add.output("tip_response", "m/N",
+             "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
+             [](const BeamModel& m) { return m.tip_response[0]; })
+      .from(motion);
+  add.output("tip_response_2", "m/N", "the same at the end of the step after, without a force meanwhile",
+             [](const BeamModel& m) { return m.tip_response[1]; })
+      .from(motion);
   for (int i = 0; i < beam::shape_points; ++i) {
     const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
     add.output("deflection[" + std::to_string(i + 1) + "]", "m", "deflection" + x, point(i, &Beam::deflection))

@@ -1,9 +1,11 @@
 // The spring FMU: its table of variables, bound to spring::Spring.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../../src_spring/compliance.hpp"
@@ -19,8 +21,7 @@ using spring::Spring;
 
 /// The spring's parameters and what exchange between steps adds to them.
 struct FmuParameters : Parameters {
-  double tip_mass = 0.0;
-  bool late_exchange = false;
+  double communication_step = 0.0, tip_response = 0.0, tip_response_2 = 0.0;
 };
 
 struct SpringModel final : fmi::Model {
@@ -36,26 +37,32 @@ struct SpringModel final : fmi::Model {
     Parameters p = parameters;
     if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
     held.reset();
-    if (p.contact_law == spring::ContactLaw::normal_compliance && parameters.tip_mass > 0.0) {
-      held.emplace(spring::Compliance(p.compliance_stiffness, p.compliance_exponent), p.mass, parameters.tip_mass,
-                   parameters.late_exchange);
+    if (p.contact_law == spring::ContactLaw::normal_compliance && parameters.communication_step > 0.0) {
       p.contact_law = spring::ContactLaw::external;
+      spring.emplace(p);  // checks the parameters
+      held.emplace(spring::Compliance(p.compliance_stiffness, p.compliance_exponent), p.mass,
+                   parameters.communication_step,
+                   std::array<double, 2>{parameters.tip_response, parameters.tip_response_2});
+    } else {
+      spring.emplace(p);
     }
-    spring.emplace(p);
     tip_is_current = true;
   }
 
   void observe() override {
     if (held) {
-      if (!tip_is_current) return;
-      held->see(inputs.tip_displacement[0], inputs.tip_velocity);
-      if (held->follows_the_tip()) choose();
+      if (!held->started()) held->begin(message(), spring->displacement(), trial());
+      show_force();
     } else if (parameters.contact_law == spring::ContactLaw::external || tip_is_current) {
       spring->observe(inputs);
     }
   }
 
   void step(double size) override {
+    if (held && std::abs(size - held->size()) > 1e-6 * held->size()) {
+      throw std::invalid_argument("a step of " + fmi::text(size) + " s, but communication_step = " +
+                                  fmi::text(held->size()) + " s: steps must have that size, or the parameter be 0");
+    }
     std::vector<double> before;
     if (impulse != 0.0 || held) save(before);
     const auto discard = [&](const std::string& why) {
@@ -77,9 +84,9 @@ struct SpringModel final : fmi::Model {
     }
     tip_is_current = false;
     if (held) {
-      held->advance(size);
-      choose();
+      held->advance(message(), spring->displacement(), trial());
       if (!std::isfinite(held->force())) discard(no_force);
+      show_force();
     }
   }
 
@@ -99,22 +106,44 @@ struct SpringModel final : fmi::Model {
     const std::size_t own = 1 + (held ? spring::HeldContact::state_length : 0);
     if (state.size() < own) throw std::invalid_argument("spring: a saved state is too short");
     const auto mine = state.end() - static_cast<std::ptrdiff_t>(own);
+    std::optional<spring::HeldContact> restored = held;
+    if (restored) restored->restore(&mine[1]);
     spring->restore({state.begin(), mine});
+    held = std::move(restored);
     tip_is_current = mine[0] != 0.0;
-    if (held) held->restore(&mine[1]);
   }
 
  private:
   static constexpr const char* no_force =
       "spring: the contact force leaves the range of floating-point numbers; the tip is too far or too fast";
 
-  void choose() {
+  spring::TipMessage message() const { return {inputs.tip_displacement[0], inputs.tip_velocity}; }
+
+  /// Where the top would be after the next step, other inputs staying as they are; the spring is left as it was.
+  spring::HeldContact::Top trial() {
+    std::vector<double> present;
+    spring->save(present);
     spring::Inputs acting = inputs;
-    acting.contact_force = {};
-    spring->observe(acting);
-    held->choose(spring->displacement(), spring->velocity(), spring->acceleration(), spring->seated());
-    acting.contact_force[0] = held->force();
-    // Without a finite force `reaction` has no value, and the next step is refused.
+    for (auto* input : {&acting.contact_force, &acting.foundation_force}) (*input)[1] = (*input)[2] = 0.0;
+    return [this, present, acting](double force) mutable {
+      acting.contact_force[0] = force;
+      const double size = held->size(), y = spring->displacement();
+      try {
+        spring->step(size, acting);
+      } catch (const spring::StepFailure&) {
+        // The step itself will tell, if it fails too.
+        return y + size * (spring->velocity() - size * force / (2.0 * parameters.mass));
+      }
+      const double reached = spring->displacement();
+      spring->restore(present);
+      return reached;
+    };
+  }
+
+  /// To the acceleration. Without a finite force `reaction` has no value, and the next step is refused.
+  void show_force() {
+    spring::Inputs acting = inputs;
+    acting.contact_force = {held->force(), 0.0, 0.0};
     if (std::isfinite(held->force())) spring->observe(acting);
   }
 };
@@ -155,14 +184,17 @@ fmi::Table make_table() {
       .at_least(0)
       .scale(1e4);
   parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").at_least(1);
-  parameter("tip_mass", "kg", &FmuParameters::tip_mass,
-            "for contact_law = 2: what the other body's tip opposes to a force within one step (tip_mass of the beam). "
-            "If > 0, the contact force is held over each step at the value that does the law's work for the predicted "
-            "tip; stable where the step does not resolve the contact. 0: the law under the extrapolated tip")
+  parameter(
+      "communication_step", "s", &FmuParameters::communication_step,
+      "for contact_law = 2 beside a beam with the same communication_step: size of all communication steps. If > 0, "
+      "reaction is held over each step at the value that does the law's work, the tip being foreseen: no energy is "
+      "gained at any step size. 0: the law under the extrapolated tip")
+      .at_least(0)
+      .scale(1e-3);
+  parameter("tip_response", "m/N", &FmuParameters::tip_response, "for communication_step > 0: tip_response of the beam")
       .at_least(0);
-  parameter("late_exchange", "", &FmuParameters::late_exchange,
-            "for tip_mass > 0: true if reaction is read and passed on before tip_displacement and tip_velocity are "
-            "set, as tools do that read all outputs first");
+  parameter("tip_response_2", "m/N", &FmuParameters::tip_response_2,
+            "for communication_step > 0: tip_response_2 of the beam");
   parameter("stop_enabled", "", &Parameters::stop_enabled, "foundation inside, with impacts");
   parameter("stop_position", "m", &Parameters::stop_position, "position phi of the foundation");
   parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation").range(0, 1);
@@ -196,7 +228,9 @@ fmi::Table make_table() {
                    m.tip_is_current = true;
                    return m.inputs.tip_displacement;
                  });
-  input("tip_velocity", "m/s", &Inputs::tip_velocity, "velocity of the beam's tip, read by contact_law = 2");
+  input(
+      "tip_velocity", "m/s", &Inputs::tip_velocity,
+      "velocity of the beam's tip, read by contact_law = 2; looks ahead if communication_step > 0, as the beam's does");
 
   add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
   add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
@@ -209,7 +243,10 @@ fmi::Table make_table() {
   add.output("reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
              [](const SpringModel& m) { return m.reaction(); })
       .follows({"tip_displacement"})
-      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
+      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement",
+             // with communication_step > 0, of which the first is foreseen:
+             "communication_step", "tip_response", "tip_velocity", "velocity", "mass", "damping", "linear_stiffness",
+             "cubic_stiffness", "external_force", "foundation_force", "stop_enabled", "stop_position", "restitution"});
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});

@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from typing import Any
 
+AHEAD = {"contact_law": 2, "communication_step": 1e-3}
 # Base points: between them every declared dependency shows.
 BASES: dict[str, list[dict[str, float]]] = {
     "beam": [
@@ -12,12 +13,15 @@ BASES: dict[str, list[dict[str, float]]] = {
         {"n_modes": 3},
         {"integrator": 2},
         {"integrator": 2, "reduced_integration": True},
+        {"communication_step": 1e-3},
+        {"communication_step": 0.1, "integrator": 2, "alpha_b": 1e-3},
     ],
     "spring": [
         {},
         {"contact_law": 2},
-        {"contact_law": 2, "tip_mass": 0.1},
-        {"contact_law": 2, "tip_mass": 0.1, "late_exchange": True},
+        AHEAD,
+        {**AHEAD, "stop_enabled": False},
+        {**AHEAD, "stop_position": 0.2995},  # met within the step
     ],
 }
 COMMON: dict[str, dict[str, float]] = {
@@ -42,6 +46,7 @@ COMMON: dict[str, dict[str, float]] = {
         "tip_velocity": 0.2,
         "contact_force": 0.3,
         "stop_enabled": True,
+        "tip_response": 1e-4,
     },
 }
 # Values that are not a factor of the base's.
@@ -52,10 +57,10 @@ CHANGES: dict[str, list[float]] = {
     "reduced_integration": [True, False],
     "integrator": [1, 2],
     "contact_law": [1, 2],
-    "late_exchange": [True, False],
     "stop_enabled": [True, False],
     "rho_inf": [0.5],
     "restitution": [0.5],
+    "stop_position": [-0.5],
     "relative_tolerance": [1e-8],
     "absolute_tolerance": [1e-9],
 }

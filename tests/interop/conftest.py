@@ -7,4 +7,4 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from test_importers import ours  # noqa: F401
+from test_importers import judge, ours  # noqa: F401

@@ -1,0 +1,218 @@
+// The contact force that is held over a step, between bodies that exchange values only between steps.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "compliance.hpp"
+#include "held_contact.hpp"
+#include "spring.hpp"
+
+using spring::Compliance;
+using spring::HeldContact;
+using spring::TipMessage;
+
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+constexpr double m_tip = 0.3, m_top = 1.1;  // [kg]
+constexpr double v = -0.8;                  // of the tip, which arrives [m/s]
+
+struct FreeMass {
+  double mass, x, v;
+  void step(double H, double force) {
+    x += H * (v + H * force / (2.0 * mass));
+    v += H * force / mass;
+  }
+};
+
+/// What a free mass answers to 1 N held over H: at the end of that step, and a step later.
+std::array<double, 2> response(double mass, double H) { return {H * H / (2 * mass), 3 * H * H / (2 * mass)}; }
+
+/// Two free masses, stepped as a tool does that reads all outputs before it sets inputs.
+struct Collision {
+  FreeMass tip, top;
+  double H;
+  HeldContact contact;
+  TipMessage seen;
+
+  Collision(const Compliance& law, double gap, double H)
+      : tip{m_tip, gap, v}, top{m_top, 0.0, 0.0}, H(H), contact(law, m_top, H, response(m_tip, H)) {
+    seen = {tip.x, tip.v};
+    contact.begin(seen, top.x, foresee());
+  }
+  HeldContact::Top foresee() const {
+    return [top = top, H = H](double force) mutable {
+      FreeMass trial = top;
+      trial.step(H, -force);
+      return trial.x;
+    };
+  }
+  void step() {
+    const double force = contact.force();
+    tip.step(H, force);
+    top.step(H, -force);
+    contact.advance(seen, top.x, foresee());
+    seen = {tip.x, tip.v};  // a free mass has the velocity ahead that it has now
+  }
+  double energy() const {
+    return 0.5 * tip.mass * tip.v * tip.v + 0.5 * top.mass * top.v * top.v + contact.energy(top.x);
+  }
+};
+
+}  // namespace
+
+class HeldContactRebound : public testing::TestWithParam<std::tuple<double, double>> {};
+
+// Momentum and energy leave one way to part: with the velocities of an elastic collision, whatever the step.
+TEST_P(HeldContactRebound, IsElasticAtAnyStep) {
+  const auto [exponent, omegaH] = GetParam();
+  const Compliance law(1e6, exponent);
+  const double mu = m_tip * m_top / (m_tip + m_top);
+  const double depth = std::pow((exponent + 1) * mu * v * v / 2 / 1e6, 1 / (exponent + 1));
+  const double H = omegaH * depth / -v;  // depth/|v|: about 1/ω
+  Collision c(law, 0.37 * H * -v, H);
+  const double before = c.energy();
+  int touching = 0, steps = 0;
+  for (; steps < 10 || c.contact.force() > 0.0; ++steps) {
+    ASSERT_LT(steps, 1000);
+    touching += c.contact.force() > 0.0;
+    c.step();
+    EXPECT_NEAR(c.contact.tip(), c.tip.x, 1e-14 * (1 + std::abs(c.tip.x)));
+    EXPECT_NEAR(c.energy(), before, 1e-11 * before) << steps;
+  }
+  EXPECT_GT(touching, 0);
+  EXPECT_NEAR(c.tip.v, v * (m_tip - m_top) / (m_tip + m_top), 1e-11);
+  EXPECT_NEAR(c.top.v, v * 2 * m_tip / (m_tip + m_top), 1e-11);
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, HeldContactRebound,
+                         testing::Combine(testing::Values(1.0, 1.5, 3.0), testing::Values(0.1, 1.0, 10.0, 1000.0)));
+
+// p = 1: δ = |v|/ω sin ωt, ω² = λ/μ. The force held at the discrete gradient is the midpoint rule: second order.
+TEST(HeldContact, IsOfSecondOrderWhereTheStepResolvesTheContact) {
+  const double lambda = 1e4, omega = std::sqrt(lambda * (1 / m_tip + 1 / m_top));
+  std::array<double, 2> errors{};
+  for (const int k : {0, 1}) {
+    const int steps = 50 << k;
+    Collision c(Compliance(lambda, 1.0), 0.0, 0.8 * pi / omega / steps);
+    for (int i = 1; i <= steps; ++i) {
+      c.step();
+      const double exact = -v / omega * std::sin(omega * c.H * i);
+      errors[k] = std::max(errors[k], std::abs(c.top.x - c.tip.x - exact));
+    }
+  }
+  EXPECT_NEAR(errors[0] / errors[1], 4.0, 0.1);
+  EXPECT_LT(errors[0], 1e-3 * -v / omega);
+}
+
+// A tool with nothing to pass on before its first step sends zeros, and no force to the beam either.
+TEST(HeldContact, ZerosBeforeTheFirstStepAreNoMessage) {
+  const double H = 1e-3;
+  Collision told(Compliance(1e6, 1.5), 0.0, H);
+  EXPECT_GT(told.contact.force(), 0.0);
+  Collision untold = told;
+  untold.contact.begin({0.0, 0.0}, 0.0, untold.foresee());
+  untold.seen = {0.0, 0.0};
+  EXPECT_EQ(untold.contact.force(), 0.0);
+  untold.step();
+  EXPECT_EQ(untold.top.v, 0.0);
+  EXPECT_NEAR(untold.contact.tip(), H * v, 1e-18);
+  // From then on energy is conserved: what came in is the work that the force of the first step did not do.
+  const double after = untold.energy();
+  EXPECT_NEAR(after, 0.5 * m_tip * v * v + Compliance(1e6, 1.5).energy(-H * v), 1e-14);
+  for (int i = 0; i < 10; ++i) {
+    untold.step();
+    EXPECT_NEAR(untold.energy(), after, 1e-12 * after);
+  }
+}
+
+// With impacts on the foundation inside a step the top's place at its end is no longer smooth in the force.
+TEST(HeldContact, EnergyIsConservedThroughImpactsOfTheTop) {
+  const double H = 2e-3;
+  spring::Parameters p;
+  p.mass = 0.2;
+  p.linear_stiffness = 30.0;
+  p.stop_enabled = true;
+  p.stop_position = -2e-4;
+  spring::Spring top(p);
+  FreeMass tip{m_tip, 0.0, v};
+  const auto foresee = [&] {
+    std::vector<double> state;
+    top.save(state);
+    return [&top, state, H](double force) {
+      spring::Inputs inputs;
+      inputs.contact_force[0] = force;
+      top.step(H, inputs);
+      const double y = top.displacement();
+      top.restore(state);
+      return y;
+    };
+  };
+  HeldContact contact(Compliance(1e7, 1.5), p.mass, H, response(m_tip, H));
+  const double g = 5.0;  // presses the tip down: it comes again and again
+  const auto ahead = [&] { return TipMessage{tip.x, tip.v - g * H}; };  // u(t+2H) = u + 2H (v − gH)
+  TipMessage seen = ahead();
+  contact.begin(seen, 0.0, foresee());
+  double before = 0.0, impulses = 0.0;
+  for (int i = 0; i < 100; ++i) {
+    spring::Inputs inputs;
+    inputs.contact_force[0] = contact.force();
+    tip.step(H, contact.force());
+    tip.v -= g * H;
+    tip.x -= g * H * H / 2;
+    top.step(H, inputs);
+    impulses += top.stop_impulse();
+    contact.advance(seen, top.displacement(), foresee());
+    seen = ahead();
+    const double energy = 0.5 * tip.mass * tip.v * tip.v + tip.mass * g * tip.x + top.kinetic_energy() +
+                          top.potential_energy() + contact.energy(top.displacement());
+    if (i == 1) before = energy;  // the first step is foreseen by the mean velocity over two
+    if (i > 1) {
+      EXPECT_NEAR(energy, before, 1e-11 * 0.5 * m_tip * v * v) << i;
+    }
+  }
+  EXPECT_GT(impulses, 0.0);
+}
+
+TEST(HeldContact, ARestoredStateGoesOnBitByBit) {
+  Collision c(Compliance(1e6, 1.5), 1e-4, 1e-3);
+  for (int i = 0; i < 2; ++i) c.step();
+  const auto state = c.contact.state();
+  Collision other(Compliance(1e6, 1.5), 0.3, 1e-3);
+  other.contact.restore(state.data());
+  other.tip = c.tip;
+  other.top = c.top;
+  other.seen = c.seen;
+  for (int i = 0; i < 5; ++i) {
+    c.step();
+    other.step();
+    EXPECT_EQ(c.contact.state(), other.contact.state());
+  }
+  EXPECT_GT(c.tip.v, 0.0);  // the collision was among these steps
+  auto forged = state;
+  forged[2] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(other.contact.restore(forged.data()), std::invalid_argument);
+  EXPECT_EQ(c.contact.state(), other.contact.state());
+}
+
+TEST(HeldContact, ImpossibleParametersAreNamed) {
+  const auto message = [](double size, double r1, double r2) -> std::string {
+    try {
+      HeldContact(Compliance(1e6, 1.5), 1.0, size, {r1, r2});
+    } catch (const std::invalid_argument& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message(1e-3, 1e-4, -1e-4), "");
+  EXPECT_NE(message(0.0, 1e-4, 1e-4).find("communication_step = 0"), std::string::npos);
+  EXPECT_NE(message(1e-3, 0.0, 1e-4).find("tip_response = 0: must be > 0"), std::string::npos);
+  EXPECT_NE(message(1e-3, 1e-4, INFINITY).find("tip_response_2 = inf"), std::string::npos);
+}
