@@ -7,6 +7,7 @@ the FMU parameters; units are SI.
 
 from __future__ import annotations
 
+import datetime
 import difflib
 import json
 import math
@@ -30,10 +31,18 @@ else:
 
 #: Up to this many unknowns all modes may be kept; the full eigenproblem grows with the cube.
 ALL_MODES_UP_TO = 1000
+#: Most modes of a mesh with more.
+MOST_MODES = 1000
+#: Most modes times unknowns: 40 bytes each while the modes are found, so 1 GB.
+MOST_MODE_VALUES = 25_000_000
 #: Most elements times their degree.
 MOST_ELEMENTS = 1_000_000
 #: Two weeks at a microsecond a step: a mistyped macro step, not a run.
 MOST_MACRO_STEPS = 1e12
+#: For those who meet TOML here first.
+_TOML_IS = "a line is a [table] or key = value, with numbers like 0.5 or 1e-3 and texts in quotes"
+#: Bytes of a scene file.
+LONGEST_FILE = 1_000_000
 
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -90,12 +99,23 @@ class Beam(_Table):
                 f"n_elements = {self.n_elements}: times element_degree = {degree} it must be at most {MOST_ELEMENTS}"
             )
         if self.n_modes > unknowns:
-            raise ValueError(f"n_modes = {self.n_modes}: {mesh} has only {unknowns} modes")
+            raise ValueError(f"n_modes = {self.n_modes}: {mesh} has only {unknowns} modes; use 0 for all of them")
         if self.integrator == "modal" and self.n_modes == 0 and unknowns > ALL_MODES_UP_TO:
             raise ValueError(
                 f"n_modes = 0: {mesh} has {unknowns} modes, too many to keep them all (allowed up to "
                 f'{ALL_MODES_UP_TO}); use n_modes = 64, or integrator = "generalized_alpha"'
             )
+        if self.integrator == "modal" and unknowns > ALL_MODES_UP_TO:
+            most = min(MOST_MODES, unknowns // 2)
+            if self.n_modes > most:
+                raise ValueError(
+                    f"n_modes = {self.n_modes}: at most {most} of the {unknowns} modes of {mesh} are found"
+                )
+            if self.n_modes * unknowns > MOST_MODE_VALUES:
+                raise ValueError(
+                    f"n_modes = {self.n_modes}: with {mesh} they take {40 * self.n_modes * unknowns / 1e9:.3g} GB; "
+                    f"use n_modes = {MOST_MODE_VALUES // unknowns} or less, or fewer n_elements"
+                )
         return self
 
 
@@ -124,7 +144,7 @@ class Contact(_Table):
     law: Literal["transmission", "compliance", "paper"] = "transmission"
     impact: Literal["inelastic", "rest", "tip"] = "inelastic"
     stiffness: NonNegative = 1.0e4  #: λ_nc [N/m^p]
-    exponent: Annotated[float, Field(ge=1.0)] = 3.0  #: p
+    exponent: Annotated[float, Field(ge=1.0, le=100.0)] = 3.0  #: p
 
 
 #: How long macro steps are: one key, or the others.
@@ -188,7 +208,7 @@ class Scene(_Table):
 
     title: str = ""
     #: Picks mesh, modes, scheme, macro step and IDA's tolerance instead of those given: `springbeam.accuracy`.
-    accuracy: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    accuracy: Annotated[float | None, Field(gt=0.0, lt=1.0)] = None
     time: Time
     beam: Beam | None = None
     spring: Spring | None = None
@@ -198,7 +218,11 @@ class Scene(_Table):
 
     @model_validator(mode="after")
     def _possible(self) -> Scene:
-        if impossible := [message for check in _CHECKS for message in check(self)]:
+        try:
+            impossible = [message for check in _CHECKS for message in check(self)] or _uncomputable(self)
+        except ArithmeticError:
+            impossible = ["no double holds what follows from these values; check their units: " + _extreme(self)]
+        if impossible:
             raise ValueError("\n".join(impossible))
         return self
 
@@ -256,6 +280,35 @@ class Scene(_Table):
         return -clearance / velocity if clearance > 0.0 > velocity else math.inf
 
 
+def _extreme(scene: Scene) -> str:
+    """The value furthest from 1, by its place."""
+    places = {
+        f"[{table}] {key}": float(value)
+        for table in ("time", "beam", "spring", "stop", "contact", "coupling")
+        for key, value in (getattr(scene, table) or ())
+        if isinstance(value, (int, float)) and value != 0.0
+    }
+    place = max(places, key=lambda name: abs(math.log10(abs(places[name]))))
+    return f"{place} = {places[place]!r}"
+
+
+def _uncomputable(scene: Scene) -> list[str]:
+    """What is certain to overflow once the scene runs."""
+    suspicions(scene)
+    beam = scene.beam
+    if beam is not None and not 0.0 < min(quantities := _beam_quantities(beam)) <= max(quantities) < math.inf:
+        raise OverflowError
+    return []
+
+
+def _beam_quantities(beam: Beam) -> tuple[float, ...]:
+    """What the equations are made of: ρA, ρI, EI, KAG, their wave speeds squared, and 1/k of the tip."""
+    stiffness = (bending_stiffness(beam), shear_stiffness(beam))
+    inertia = (beam.density * beam.area, beam.density * beam.second_moment_of_area)
+    speeds = tuple(k / m if m > 0.0 else math.inf for k, m in zip(stiffness, reversed(inertia), strict=True))
+    return (*stiffness, *inertia, *speeds, tip_compliance(beam))
+
+
 def _bodies(scene: Scene) -> Iterator[str]:
     if scene.beam is None and scene.spring is None:
         yield "no body: a scene needs [beam], [spring] or both"
@@ -280,6 +333,58 @@ def _spring_holds(scene: Scene) -> Iterator[str]:
             f"[spring] equilibrium = {spring.equilibrium}: the softening spring escapes from beyond "
             f"|y| = √(linear_stiffness/|cubic_stiffness|) = {hilltop:.6g} m; it must start inside"
         )
+    elif k2 < 0.0:
+        free = scene.beam is None and (spring.external_force > 0.0 or scene.stop is None)
+        if free and abs(spring.external_force) >= (largest := _largest_load(spring)):
+            yield (
+                f"[spring] external_force = {spring.external_force}: the softening spring can hold less than "
+                f"2/3 linear_stiffness √(linear_stiffness/3|cubic_stiffness|) = {largest:.6g} N"
+            )
+            return
+        # Nothing takes energy away or pushes back: what is above the rim of the well runs over it.
+        lossless = (
+            scene.beam is None and spring.damping == 0.0 and (scene.stop is None or scene.stop.restitution == 1.0)
+        )
+        energy, depth = _spring_energy(spring), _well_depth(scene)
+        if lossless and energy > depth:
+            yield (
+                f"[spring] cubic_stiffness = {k2}: the softening spring starts with {energy:.6g} J and escapes from a "
+                f"well {depth:.6g} J deep; use a smaller initial_velocity or external_force, an equilibrium nearer to "
+                "0, or a larger linear_stiffness"
+            )
+
+
+def _potential(spring: Spring, y: float) -> float:
+    """Of the spring and its load [J]."""
+    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    return y * (y * (0.5 * k1 + 0.25 * k2 * y * y) - spring.external_force)
+
+
+def _spring_energy(spring: Spring) -> float:
+    """At the start, with the load's potential [J]."""
+    return 0.5 * spring.mass * spring.initial_velocity**2 + _potential(spring, spring.equilibrium)
+
+
+def _largest_load(spring: Spring) -> float:
+    """Of which a softening spring has an equilibrium, 2/3 k1 √(k1/3|k2|) [N]."""
+    return 2.0 / 3.0 * spring.linear_stiffness * math.sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
+
+
+def _well_depth(scene: Scene) -> float:
+    """Potential [J] at the lower rim of a softening spring's well, of those that the foundation does not bar.
+
+    −∞ where the load leaves no well. The rims are the outer roots of k1 y + k2 y³ = f_s: y = 2a cos θ with
+    a² = k1/3|k2| and cos 3θ = −f_s/(2|k2|a³) (Viète).
+    """
+    spring = scene.spring
+    assert spring is not None
+    a = math.sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
+    if not abs(spring.external_force) < _largest_load(spring):
+        return -math.inf
+    theta = math.acos(-spring.external_force / _largest_load(spring)) / 3.0
+    low, high = 2.0 * a * math.cos(theta + 2.0 / 3.0 * math.pi), 2.0 * a * math.cos(theta)
+    barred = scene.stop is not None and scene.stop.position > low
+    return min(_potential(spring, y) for y in ((high,) if barred else (low, high)))
 
 
 def _tip_arrives(scene: Scene) -> Iterator[str]:
@@ -310,7 +415,10 @@ def _law_applies(scene: Scene) -> Iterator[str]:
             yield f'[beam] rho_inf = {beam.rho_inf}: [contact] law = "paper" is the midpoint rule, rho_inf = 1'
     if contact.law == "compliance":
         if contact.stiffness == 0.0:
-            yield '[contact] stiffness = 0.0: with law = "compliance" nothing would hold the bodies apart'
+            yield (
+                '[contact] stiffness = 0.0: with law = "compliance" nothing would hold the bodies apart; it must be '
+                "greater than 0"
+            )
         if coupling.scheme not in ORDINARY_SCHEMES and (coupling.scheme != "energy" or coupling.degree != 0):
             yield (
                 f'[coupling] scheme = "{coupling.scheme}", degree = {coupling.degree}: [contact] law = "compliance" '
@@ -445,10 +553,29 @@ def locking(beam: Beam) -> float:
     return compliance / (compliance - missing)
 
 
+def _beam_energy(scene: Scene) -> float:
+    """Kinetic, and of the shear of a straight slope, as the beam arrives [J]; without the work of its loads."""
+    if (beam := scene.beam) is None or beam.fidelity == "quasi_static":
+        return 0.0
+    target, slope = scene.tip_target, beam.initial_deflection_slope
+    if beam.approach == "undeformed" and target is not None:
+        slope = target[1] / beam.length
+    kinetic = beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
+    return kinetic + 0.5 * shear_stiffness(beam) * beam.length * slope**2
+
+
 def suspicions(scene: Scene) -> list[str]:
     """What can be run but may not be meant; for a run's warnings."""
     found = []
-    beam = scene.beam
+    beam, spring = scene.beam, scene.spring
+    if spring is not None and spring.cubic_stiffness < 0.0:
+        energy, depth = _spring_energy(spring) + _beam_energy(scene), _well_depth(scene)
+        if energy > depth:
+            deep = f"well is {depth:.3g} J deep" if depth > -math.inf else "well is gone under external_force"
+            found.append(
+                f"[spring] cubic_stiffness = {spring.cubic_stiffness}: the motion starts with {energy:.3g} J, the "
+                f"softening spring's {deep}; the run stops should it escape"
+            )
     if beam is not None and (factor := locking(beam)) > 1.05:
         found.append(
             f"[beam] n_elements = {beam.n_elements}: full integration locks, the beam is {factor:.3g} times too "
@@ -492,15 +619,21 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = ()) -> Scene
         If the file cannot be read or the scene cannot be run.
     """
     path = _scene_file(path_or_name)
+    if (size := path.stat().st_size) > LONGEST_FILE:
+        raise SceneError(f"{path}: {size} bytes, more than a scene has; at most {LONGEST_FILE} are read")
     try:
         text = path.read_text(encoding="utf-8-sig")
         data = tomllib.loads(text)
     except OSError as error:
         raise SceneError(f"{path}: {error.strerror}") from error
     except UnicodeDecodeError as error:
-        raise SceneError(f"{path}: not TOML: {error}") from error
+        raise SceneError(f"{path}: not TOML, which is text in UTF-8: {error.reason} at byte {error.start}") from error
     except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{path}: not TOML: {error}{_line_of(error, text)}") from error
+        raise SceneError(f"{path}: not TOML: {error}{_line_of(error, text)}; {_TOML_IS}") from error
+    except ValueError as error:  # Python's own limit on the digits of an integer
+        raise SceneError(f"{path}: a number in it has more digits than can be read") from error
+    except RecursionError as error:
+        raise SceneError(f"{path}: nested too deeply; a scene has tables with plain values in them") from error
     changes = {_override(data, override): override for override in overrides}
     try:
         return scene_from_dict(data, source=str(path))
@@ -512,7 +645,7 @@ def _line_of(error: Exception, text: str) -> str:
     """The line that a TOML error is about, for its message."""
     found = re.search(r"at line (\d+)", str(error))
     lines = text.splitlines()
-    return f": {lines[int(found[1]) - 1].strip()[:60]}" if found and int(found[1]) <= len(lines) else ""
+    return f": {_one_line(lines[int(found[1]) - 1].strip())}" if found and int(found[1]) <= len(lines) else ""
 
 
 def _blamed(message: str, path: str, changes: Mapping[tuple[str, str], str]) -> str:
@@ -578,9 +711,12 @@ def _scene_file(path_or_name: str | Path) -> Path:
     if str(path_or_name) in shipped:
         return shipped[str(path_or_name)]
     path = Path(path_or_name)
-    if path.is_file():
-        return path
-    what = "is a directory" if path.is_dir() else "no such file"
+    try:
+        if path.is_file():
+            return path
+        what = "is a directory" if path.is_dir() else "not a file" if path.exists() else "no such file"
+    except OSError as error:  # a name too long
+        raise SceneError(f"{_one_line(str(path))}: {error.strerror}") from error
     if path.suffix != ".toml":
         what += ", and not a shipped scene"
     raise SceneError(f"{path_or_name}: {what}; {_nearest(path.stem, shipped)}shipped scenes: {', '.join(shipped)}")
@@ -610,7 +746,7 @@ def parse_value(text: str) -> Any:
     """A value in TOML syntax; what is none is a bare word, taken as a string."""
     try:
         parsed = tomllib.loads(f"value = {text}")
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         parsed = {}
     if parsed.keys() == {"value"}:
         return parsed["value"]
@@ -628,7 +764,7 @@ def _explain(error: Any) -> list[str]:
         return [prefix + line for line in error["msg"].removeprefix("Value error, ").splitlines()]
     if len(loc) == 1:
         return [_explain_top(kind, value, loc[0])]
-    table, key = loc[0], ".".join(loc[1:])
+    table, key = loc[0], ".".join(map(_bare, loc[1:]))
     if kind == "extra_forbidden":
         return [f"[{table}] {key}: unknown key; {_nearest_key(table, key)}"]
     if kind == "missing":
@@ -640,10 +776,11 @@ def _explain_top(kind: str, value: Any, name: str) -> str:
     if kind == "missing":
         return f"[{name}]: missing table; it must have {', '.join(_TABLES[name].model_fields)}"
     if kind == "extra_forbidden" and isinstance(value, dict):
-        return f"[{name}]: unknown table; {_nearest(name, _TABLES)}allowed: {', '.join(_TABLES)}"
+        return f"[{_bare(name)}]: unknown table; {_nearest(name, _TABLES)}allowed: {', '.join(_TABLES)}"
     if kind == "extra_forbidden":
-        return f"{name} = {_toml(value)}: unknown key outside a table; {_nearest_key('', name)}"
-    return f"{name} = {_toml(value)}: must be {'a table' if name in _TABLES else _allowed(Scene.model_fields[name])}"
+        return f"{_bare(name)} = {_toml(value)}: unknown key outside a table; {_nearest_key('', name)}"
+    allowed = _allowed(Scene.model_fields[name]) if name not in _TABLES else f"a table, written as [{name}]"
+    return f"{name} = {_toml(value)}: must be {allowed}"
 
 
 def _nearest(name: str, candidates: Iterable[str]) -> str:
@@ -667,15 +804,34 @@ def _allowed(field: FieldInfo) -> str:
     bounds = {
         name: value
         for m in field.metadata
-        for name in ("gt", "ge", "le")
+        for name in ("gt", "ge", "le", "lt")
         if (value := getattr(m, name, None)) is not None
     }
-    words = {"gt": "greater than", "ge": "at least", "le": "at most"}
+    words = {"gt": "greater than", "ge": "at least", "le": "at most", "lt": "less than"}
     return " ".join([noun, " and ".join(f"{words[name]} {value:.15g}" for name, value in bounds.items())]).strip()
 
 
 def _toml(value: Any) -> str:
+    """A value as it may stand in a file, in one line of at most 60 characters."""
     if isinstance(value, dict):
         return "{…}"
-    text = json.dumps(value, ensure_ascii=False) if isinstance(value, (bool, str)) else repr(value)
-    return text if len(text) <= 60 else text[:59] + "…"
+    if isinstance(value, (bool, str)):
+        return _one_line(json.dumps(value, ensure_ascii=False))
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
+    if isinstance(value, list):
+        shown = [_toml(item) if not isinstance(item, list) else "[…]" for item in value[:8]]
+        return _one_line(f"[{', '.join(shown)}{', …' if len(value) > 8 else ''}]")
+    if isinstance(value, int) and value.bit_length() > 1000:  # more digits than Python may convert
+        return _one_line(hex(value)[:50] + "…")
+    return _one_line(repr(value))
+
+
+def _bare(key: str) -> str:
+    """A key as it may stand in a file."""
+    return _one_line(key if re.fullmatch("[A-Za-z0-9_.-]+", key) else json.dumps(key, ensure_ascii=False))
+
+
+def _one_line(text: str, longest: int = 60) -> str:
+    text = "".join(c if c.isprintable() else "�" for c in text)
+    return text if len(text) <= longest else text[: longest - 1] + "…"

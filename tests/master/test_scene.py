@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -552,3 +553,30 @@ def test_any_value_of_a_beam_key_is_allowed_or_explained(key, value):
     else:
         # Another key is named where the two do not go together.
         assert any(f"[beam] {name}" in result for name in (key, "n_modes", "initial_velocity_slope"))
+
+
+@pytest.mark.parametrize("load", [0.0, 2.0, -2.0])
+@pytest.mark.parametrize("stop", [None, -1.0])
+def test_a_softening_spring_may_start_with_the_energy_of_its_lower_rim(load, stop):
+    """Rims from a general root finder; a foundation inside the well bars the one below."""
+    k1, k2 = 3.0, -0.2
+    low, _, high = sorted(np.roots([k2, 0.0, k1, -load]).real)
+    rims = (high,) if stop is not None else (low, high)
+    depth = min(0.5 * k1 * y**2 + 0.25 * k2 * y**4 - load * y for y in rims)
+    for factor in (1.0 - 1e-9, 1.0 + 1e-9):
+        spring = {"external_force": load, "initial_velocity": factor * math.sqrt(2.0 * depth)}
+        scene = changed(beam=None, stop=stop and {"position": stop}, spring=spring)
+        if factor < 1.0:
+            assert suspicions(scene_from_dict(scene)) == []
+            continue
+        with pytest.raises(SceneError, match=r"escapes from a well .* J deep"):
+            scene_from_dict(scene)
+        scene["spring"]["damping"] = 0.1
+        assert "J deep; the run stops should it escape" in suspicions(scene_from_dict(scene))[0]
+
+
+def test_the_beams_energy_counts_for_the_well():
+    """ρAL³s²/6 = 11.25 J, the depth k1²/4|k2|, at s = 8.2158."""
+    slow, fast = (scene_from_dict(changed(beam={"initial_velocity_slope": -s})) for s in (8.21, 8.22))
+    assert suspicions(slow) == []
+    assert "starts with 11.3 J" in suspicions(fast)[0]

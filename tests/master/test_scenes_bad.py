@@ -1,0 +1,114 @@
+"""Scene files that cannot be run: each is refused by what its first lines say, and leaves nothing behind.
+
+``tests/scenes_bad/*.toml`` begin with the message expected, a comment per line of it; "…" stands for anything.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from springbeam import cli
+from springbeam.scene import LONGEST_FILE, load_scene
+
+FOLDER = Path(__file__).parents[1] / "scenes_bad"
+SCENES = sorted(FOLDER.glob("*.toml"))
+
+
+def check(path: Path | str, expected: list[str], here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(here)
+    before = sorted(here.rglob("*"))
+    result = CliRunner().invoke(cli.app, ["run", str(path)])
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    lines = result.stderr.splitlines()
+    lines[0] = lines[0].removeprefix("error: ")
+    assert len(lines) == len(expected), result.stderr
+    for line, wanted in zip(lines, expected, strict=True):
+        pattern = ".*".join(map(re.escape, f"{path}: {wanted}".split("…")))
+        assert re.fullmatch(pattern, line), result.stderr
+    assert sorted(here.rglob("*")) == before
+
+
+def test_there_are_many() -> None:
+    assert len(SCENES) >= 200
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_refused_as_its_first_lines_say(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = []
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("# "):
+            break
+        expected.append(line.removeprefix("# "))
+    check(path, expected, tmp_path, monkeypatch)
+
+
+NO_TIME = "[time]: missing table; it must have t_end"
+GOOD = "[time]\nt_end = 1.0\n[spring]\nlinear_stiffness = 3.0\n"
+NOT_UTF8 = "not TOML, which is text in UTF-8: … at byte "
+BYTES: dict[str, tuple[bytes, str]] = {
+    "empty": (b"", NO_TIME),
+    "blank": (b" \n\t\n", NO_TIME),
+    "byte order mark": (b"\xef\xbb\xbf", NO_TIME),
+    "UTF-16": (GOOD.encode("utf-16"), NOT_UTF8 + "0"),
+    "UTF-16 without a mark": (GOOD.encode("utf-16-be"), "not TOML: … (at line 1, column 1)…"),
+    "Latin-1": ('title = "Stoß"\n'.encode("latin-1"), NOT_UTF8 + "12"),
+    "a picture": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", NOT_UTF8 + "0"),
+    "an archive": (b"PK\x03\x04\x14\0\0\0\x08\0", "not TOML: …"),
+    "a program": (b"\x7fELF\x02\x01\x01" + bytes(9), "not TOML: … (at line 1, column 1)…"),
+    "zeros": (bytes(100), "not TOML: … (at line 1, column 1)…"),
+    "a zero in a text": (b'title = "a\0b"\n', "not TOML: …"),
+    "escape sequences": (b"\x1b[31mred\x1b[0m\n", "not TOML: …"),
+    "surrogate": (b'title = "\xed\xa0\x80"\n', NOT_UTF8 + "9"),
+    "escaped surrogate": (b'title = "\\ud800"\n', "not TOML: …"),
+    "nested lists": (b"a = " + b"[" * 100_000, "nested too deeply; …"),
+    "nested tables": (b"a = " + b"{a = " * 50_000, "nested too deeply; …"),
+    "a value nested deeply": (
+        GOOD.encode() + b"mass = " + b"[" * 150 + b"]" * 150,
+        "[spring] mass = [[…]]: must be a finite number greater than 0",
+    ),
+    "a dotted key of many parts": (GOOD.encode() + b".".join([b"a"] * 2000) + b" = 1", "[spring] a: unknown key; …"),
+    "a long key": (GOOD.encode() + b"k" * 5000 + b" = 1", f"[spring] {'k' * 59}…: unknown key; allowed: …"),
+    "a long line": (GOOD.encode() + b"mass = " + b"x" * 5000, "not TOML: … (at line 5, column 8): mass = …"),
+    "too long": (GOOD.encode() + b"#" * LONGEST_FILE, f"{LONGEST_FILE + len(GOOD)} bytes, more than a scene has; …"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BYTES)
+def test_whatever_bytes_are_in_it(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    content, expected = BYTES[name]
+    path = tmp_path / "scene.toml"
+    path.write_bytes(content)
+    check(path, [expected], tmp_path, monkeypatch)
+
+
+def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
+    (tmp_path / "marked.toml").write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
+    (tmp_path / "plain.toml").write_text(GOOD)
+    assert load_scene(tmp_path / "marked.toml") == load_scene(tmp_path / "plain.toml")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX files")
+def test_what_is_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "folder.toml").mkdir()
+    (tmp_path / "circle.toml").symlink_to("circle.toml")
+    (tmp_path / "nowhere.toml").symlink_to("missing.toml")
+    for name, what in {
+        "pipe.toml": "not a file",
+        "folder.toml": "is a directory",
+        "circle.toml": "no such file",
+        "nowhere.toml": "no such file",
+        "missing.toml": "no such file",
+        "sotf": "no such file, and not a shipped scene; did you mean soft? shipped scenes: …",
+        "/dev/zero": "not a file, and not a shipped scene",
+    }.items():
+        check(name, [f"{what}; shipped scenes: …" if "shipped scenes:" not in what else what], tmp_path, monkeypatch)
+    long = "x" * 300 + ".toml"
+    result = CliRunner().invoke(cli.app, ["run", long])
+    assert (result.exit_code, result.stderr) == (2, f"error: {'x' * 59}…: File name too long\n")
