@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .automatic import decided
 from .monolithic import algorithm1, event_driven
 from .resolution import mesh_frequency
 from .runner import RunStopped, simulate
@@ -353,7 +354,7 @@ def _compare_events(
         steps = (time - start) / size + 1.0
         # The unit of time in which the state changes as a whole is what the events so far have taken.
         bound = _SAFETY * moved + _IDA_TOLERANCE * steps * report.growth * max(time - start, size)
-        if kind == "opens" and report.scene.coupling.degree == 0:
+        if kind == "opens" and decided(report.scene)[0].coupling.degree == 0:
             bound += 0.5 * size  # a force known by its means tells no better when it vanishes
         report.events.append(EventRow(kind, ours, time, bound, abs(ours - time) <= bound))
 

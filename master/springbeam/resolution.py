@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
-from .scene import Beam, Scene, Spring, locking
+from .linearised import spring_frequency
+from .scene import Beam, Scene, locking
 from .statics import bending_stiffness, lowest_frequency, shear_stiffness
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
@@ -59,9 +60,9 @@ def _slowest(scene: Scene) -> list[tuple[str, float, str]]:
             static = spring is not None and scene.contact.law == "transmission"
             found.append(("beam", omega, ', beam.fidelity = "quasi_static" leaves it out' if static else ""))
     if spring is not None:
-        stiffness = _stiffness_at_rest(spring)
-        if spring.damping**2 < 4.0 * stiffness * spring.mass:
-            found.append(("spring", sqrt(stiffness / spring.mass), ""))
+        omega = spring_frequency(scene)
+        if spring.damping < 2.0 * spring.mass * omega:
+            found.append(("spring", omega, ""))
     return found
 
 
@@ -129,7 +130,3 @@ def modes_below(beam: Beam, omega: float) -> int:
     apart = omega * sqrt((0.5 * omega * (a - b)) ** 2 + mass / bending)
     number = beam.length / pi * (sqrt(middle + apart) + sqrt(max(middle - apart, 0.0)))
     return int(number + 0.5)
-
-
-def _stiffness_at_rest(spring: Spring) -> float:
-    return max(spring.linear_stiffness + 3.0 * spring.cubic_stiffness * spring.equilibrium**2, 0.0)

@@ -151,10 +151,13 @@ class Contact(_Table):
 _STEP, _TOLERANCES = "macro_step", ("relative_tolerance", "absolute_tolerance")
 #: Schemes that exchange once per macro step, as ordinary masters do.
 ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
+#: Schemes that iterate over an exchange of the tip's displacement against the spring's force.
+DISPLACEMENT_DRIVEN = ("fixed_point", "aitken")
 
 
 class Coupling(_Table):
-    scheme: Literal["energy", "hermite", "gauss_seidel", "jacobi"] = "energy"
+    #: "auto" picks scheme and degree: `springbeam.automatic`.
+    scheme: Literal["energy", "hermite", "auto", "gauss_seidel", "jacobi", "fixed_point", "aitken"] = "energy"
     degree: Annotated[int, Field(ge=0, le=2)] = 0  #: of the contact force over a step
     macro_step: Annotated[float | None, Field(gt=0.0)] = None  #: H [s]; 0.004 where no tolerance is given
     #: Instead of ``macro_step``: of a step's error, relative to the motion so far, and absolute [m].
@@ -198,6 +201,10 @@ class Coupling(_Table):
     def _degree_of_scheme(self) -> Coupling:
         if self.scheme == "hermite" and self.degree == 0:
             raise ValueError('degree = 0: scheme = "hermite" needs degree 1 or 2')
+        if self.scheme == "auto" and self.degree > 0:
+            raise ValueError(f'degree = {self.degree}: scheme = "auto" picks the degree; leave it out')
+        if self.scheme in DISPLACEMENT_DRIVEN and self.degree > 0:
+            raise ValueError(f'degree = {self.degree}: scheme = "{self.scheme}" exchanges one force a step, degree 0')
         if self.scheme in ORDINARY_SCHEMES and self.degree > 1:
             raise ValueError(f'degree = {self.degree}: scheme = "{self.scheme}" extrapolates with degree 0 or 1')
         return self
@@ -419,7 +426,9 @@ def _law_applies(scene: Scene) -> Iterator[str]:
                 '[contact] stiffness = 0.0: with law = "compliance" nothing would hold the bodies apart; it must be '
                 "greater than 0"
             )
-        if coupling.scheme not in ORDINARY_SCHEMES and (coupling.scheme != "energy" or coupling.degree != 0):
+        if coupling.scheme not in ORDINARY_SCHEMES and (
+            coupling.scheme in ("hermite", *DISPLACEMENT_DRIVEN) or coupling.degree != 0
+        ):
             yield (
                 f'[coupling] scheme = "{coupling.scheme}", degree = {coupling.degree}: [contact] law = "compliance" '
                 'needs scheme = "energy" and degree = 0 (its discrete gradient), "gauss_seidel" or "jacobi"'
@@ -428,6 +437,11 @@ def _law_applies(scene: Scene) -> Iterator[str]:
         yield (
             f'[coupling] scheme = "{coupling.scheme}": exchanges the force of [contact] law = "compliance"; '
             f'law = "{contact.law}" needs "energy" or "hermite"'
+        )
+    elif coupling.scheme in DISPLACEMENT_DRIVEN and (beam is None or scene.spring is None):
+        yield (
+            f'[coupling] scheme = "{coupling.scheme}": moves the spring to where the tip went; needs a [beam] and a '
+            "[spring]"
         )
 
 
@@ -439,7 +453,7 @@ def _feedback_negligible(scene: Scene) -> Iterator[str]:
     if beam is None or spring is None:
         yield f'{name}: there is one body only; use "two_way"'
         return
-    if contact.law != "compliance" or coupling.scheme != "energy":
+    if contact.law != "compliance" or coupling.scheme not in ("energy", "auto"):
         yield (
             f'{name}: needs [contact] law = "compliance" and [coupling] scheme = "energy"; a tie is felt by both ends. '
             'Use "two_way"'

@@ -12,7 +12,9 @@ from collections.abc import Callable
 from math import isfinite
 from typing import Any
 
+from .automatic import decided
 from .contact import Joint, Phase, Transitions
+from .coupling.fixed_point import Diverged
 from .coupling.tie import NotConverged
 from .detection import Detector
 from .events import interpolated
@@ -96,6 +98,7 @@ class Simulation(Memory):
         recorder: Recorder,
         progress: Progress | None = None,
     ) -> None:
+        scene, self._choice = decided(scene)
         self._scene, self._recorder, self._progress = scene, recorder, progress
         self._pair = Pair(scene, beam, spring)
         self._state = State(start_time)
@@ -183,7 +186,7 @@ class Simulation(Memory):
                 size = self._steps.size
             except (StepRefused, OverflowError) as refused:
                 pair.rewind()
-                if halvings == _MAX_HALVINGS:
+                if halvings == _MAX_HALVINGS or isinstance(refused, Diverged):
                     residual = refused.residual if isinstance(refused, NotConverged) else None
                     cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
                     raise RunStopped(cause, state.time, residual) from refused
@@ -313,8 +316,10 @@ class Simulation(Memory):
             warnings.append(unresolved)
         one_way = self._pair.one_way
         neglected = {} if one_way is None else {"neglected_motion": one_way.neglected, "neglected_share": one_way.share}
+        coupling = {} if self._choice is None else {"coupling": self._choice._asdict()}
         return {
             **neglected,
+            **coupling,
             "time": self._state.time,
             "macro_steps": self._macro_steps,
             "events": self._events,

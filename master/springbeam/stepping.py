@@ -9,11 +9,12 @@ from .contact import Joint, Phase, spring_force
 from .coupling import conditions, force
 from .coupling.compliance import Compliance, compliance_energy
 from .coupling.exchange import Exchange
+from .coupling.fixed_point import FixedPoint
 from .coupling.one_way import OneWay
 from .coupling.tie import Tie
 from .memory import Memory
 from .quasi_static import QuasiStaticBeam
-from .scene import ORDINARY_SCHEMES, Scene
+from .scene import DISPLACEMENT_DRIVEN, ORDINARY_SCHEMES, Scene
 from .subsystem import NO_FORCE, BeamBody, Body, Energies, Force, Held, Motion
 
 #: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
@@ -83,7 +84,7 @@ class Pair(Memory):
         The bodies; ``None`` where the scene has none.
     """
 
-    REMEMBERED = ("beam", "spring", "_held", "_tie", "_compliance", "one_way")
+    REMEMBERED = ("beam", "spring", "_held", "_tie", "_fixed_point", "_compliance", "one_way")
 
     def __init__(self, scene: Scene, beam: BeamBody | None, spring: Body | None) -> None:
         self._scene = scene
@@ -98,7 +99,9 @@ class Pair(Memory):
         self._exchange: Exchange | None = None
         if coupling.scheme in ORDINARY_SCHEMES:
             self._exchange = Exchange(coupling.scheme == "gauss_seidel", coupling.degree, *law)
-        scheme = "energy" if self._exchange is not None else coupling.scheme
+        driven = coupling.scheme in DISPLACEMENT_DRIVEN
+        scheme = "energy" if self._exchange is not None or driven else coupling.scheme
+        self._fixed_point = FixedPoint(coupling.scheme == "aitken", coupling.tolerance) if driven else None
         self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance)
         self._compliance = Compliance(*law, coupling.tolerance)
         self.one_way: OneWay | None = None
@@ -115,7 +118,8 @@ class Pair(Memory):
 
     @property
     def iterations(self) -> int:
-        return self._tie.iterations + self._compliance.iterations
+        rounds = 0 if self._fixed_point is None else self._fixed_point.iterations
+        return self._tie.iterations + self._compliance.iterations + rounds
 
     def mark(self) -> None:
         """Remember the bodies' states as those that steps start from."""
@@ -154,7 +158,8 @@ class Pair(Memory):
         else:
             assert upper is not None
             assert partner is not None
-            contact = self._tie.solve(upper, partner, state.time, size, state.contact, start[0])
+            tie = self._tie if self._fixed_point is None or partner is self._held else self._fixed_point
+            contact = tie.solve(upper, partner, state.time, size, state.contact, start[0])
         if phase.seated:
             foundation = contact
             if spring is not None:

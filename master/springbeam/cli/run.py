@@ -246,6 +246,8 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         console.print(f"events    {counts}")
     if "macro_steps" in summary and "wall_time" in summary:
         console.print(f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s")
+    if "coupling" in summary:
+        console.print(Text("coupling  {scheme} {degree}: {because}".format(**summary["coupling"])))
     if "max_energy_residual" in summary:
         console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}")
     if "accuracy" in summary:

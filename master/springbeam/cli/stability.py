@@ -67,6 +67,9 @@ def predict(
     if prediction.advised is not None:
         scheme, degree = prediction.advised
         console.print(Text(f"advised   coupling.scheme = {scheme!r}, degree = {degree}"))
+    if prediction.auto is not None:
+        scheme, degree, because = prediction.auto
+        console.print(Text(f"auto      takes {scheme} {degree}: {because}"))
 
 
 def _lines(p: Prediction) -> list[tuple[str, str]]:

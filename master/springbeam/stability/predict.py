@@ -11,8 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..automatic import Choice, choice
+from ..linearised import contact_energy, spring_frequency, spring_stiffness
 from ..monolithic.semi_discrete import ModalBeam, modal_beam
 from ..scene import Beam, Scene
+from ..statics import shear_stiffness
 from .linear import LinearBody, LinearPair, spectral_radius
 
 #: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.
@@ -60,6 +63,7 @@ class Prediction:
     modes: int | None
     schemes: tuple[SchemePrediction, ...]
     advised: tuple[str, int] | None  #: scheme and degree
+    auto: Choice | None  #: what ``scheme = "auto"`` takes, where there is something to couple
     notes: tuple[str, ...]
 
 
@@ -91,7 +95,7 @@ def predict(scene: Scene) -> Prediction:
             for scheme, degree in SCHEMES[law]
             if scene.beam is None or scene.beam.integrator == "modal" or degree == 0
         )  # fmt: skip
-    Z = None if scene.beam is None else math.sqrt(_shear_stiffness(scene.beam) * scene.beam.density * scene.beam.area)
+    Z = None if scene.beam is None else math.sqrt(shear_stiffness(scene.beam) * scene.beam.density * scene.beam.area)
     mass = None if scene.spring is None else scene.spring.mass
     resolved = None if modal is None else int(np.sum(modal.omega * H <= RESOLVED))
     if modal is not None and resolved == 0:
@@ -107,7 +111,7 @@ def predict(scene: Scene) -> Prediction:
         threshold=THRESHOLD,
         omega_1=None if modal is None else float(modal.omega[0]),
         omega_max=None if modal is None else float(modal.omega[-1]),
-        spring_frequency=None if scene.spring is None else _frequency(spring_body(scene)),
+        spring_frequency=None if scene.spring is None else spring_frequency(scene),
         contact_frequency=contact,
         tip_mass=None if modal is None else 1.0 / modal.inverse_tip_mass,
         impedance=Z,
@@ -116,6 +120,7 @@ def predict(scene: Scene) -> Prediction:
         modes=None if modal is None else len(modal.omega),
         schemes=schemes,
         advised=_advised(schemes, H, resolved),
+        auto=choice(scene) if schemes else None,
         notes=tuple(notes),
     )
 
@@ -165,43 +170,8 @@ def spring_body(scene: Scene) -> LinearBody:
     """The spring with k1 + 3 k2 y² at its stiffest."""
     spring = scene.spring
     assert spring is not None
-    k = spring.linear_stiffness + 3.0 * spring.cubic_stiffness * _deflection(scene) ** 2
     m = spring.mass
-    return LinearBody(np.array([k / m]), np.array([spring.damping / m]), np.array([m**-0.5]))
-
-
-def _frequency(body: LinearBody) -> float:
-    return math.sqrt(max(float(body.omega2[0]), 0.0))
-
-
-def _shear_stiffness(beam: Beam) -> float:
-    return beam.shear_coefficient * beam.shear_modulus * beam.area
-
-
-def _energy(scene: Scene) -> float:
-    """At first contact [J]: of u̇ = s₁x, of u = s₀x with θ = 0 where that is strained, and of the spring."""
-    energy = 0.0
-    if (spring := scene.spring) is not None:
-        y, z = spring.equilibrium, spring.initial_velocity
-        energy += 0.5 * (spring.mass * z * z + spring.linear_stiffness * y * y) + 0.25 * spring.cubic_stiffness * y**4
-    if (beam := scene.beam) is not None:
-        energy += beam.density * beam.area * beam.initial_velocity_slope**2 * beam.length**3 / 6.0
-        slope = beam.initial_deflection_slope + (scene.contact_time or 0.0) * beam.initial_velocity_slope
-        energy += 0.5 * _shear_stiffness(beam) * beam.length * slope**2
-    return max(energy, 0.0)
-
-
-def _deflection(scene: Scene) -> float:
-    """Of the spring at its stiffest [m]: 0 if it softens, else on the foundation or where it takes all the energy."""
-    spring = scene.spring
-    assert spring is not None
-    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
-    if k2 <= 0.0:
-        return 0.0
-    if scene.stop is not None:
-        return max(abs(scene.stop.position), abs(spring.equilibrium))
-    # ½ k1 y² + ¼ k2 y⁴ = E
-    return math.sqrt((math.sqrt(k1 * k1 + 4.0 * k2 * _energy(scene)) - k1) / k2)
+    return LinearBody(np.array([spring_stiffness(scene) / m]), np.array([spring.damping / m]), np.array([m**-0.5]))
 
 
 def _contact_stiffness(scene: Scene) -> float:
@@ -209,7 +179,7 @@ def _contact_stiffness(scene: Scene) -> float:
     stiffness, p = scene.contact.stiffness, scene.contact.exponent
     if p == 1.0:
         return stiffness
-    depth = ((p + 1.0) * _energy(scene) / stiffness) ** (1.0 / (p + 1.0))
+    depth = ((p + 1.0) * contact_energy(scene) / stiffness) ** (1.0 / (p + 1.0))
     return float(stiffness * p * depth ** (p - 1.0))
 
 

@@ -33,6 +33,8 @@ TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
 _BUDGET = 10.0
 #: Runs longer than this are timed once [s].
 _TIMED_ONCE = 3.0
+#: Rows of a run of adaptive steps that are compared, about.
+_ADAPTIVE_ROWS = 60
 #: Relative change of the initial velocity that shows how long two solutions stay together, and how far it may grow.
 _PERTURBATION, _GROWTH = 1e-7, 1e4
 
@@ -231,7 +233,7 @@ def _judged(
     began = perf_counter()
     for refined in (False, True):
         model = finer(scene) if refined else scene
-        times = [r.time for c, r in results.items() if c.refined == refined and not _scipy(c)]
+        times = [_compared(c, r) for c, r in results.items() if c.refined == refined and not _scipy(c)]
         if model is not None and (times or not refined):
             references[refined] = event_driven.simulate(model, sample_times=np.unique(np.concatenate([grid, *times])))
     elapsed = perf_counter() - began
@@ -249,6 +251,12 @@ def _judged(
         [f"not run, the looser tolerance already took more than {_BUDGET:g} s: {', '.join(skipped)}"] if skipped else []
     )
     return Study(scene, points, elapsed, notes)
+
+
+def _compared(configuration: Configuration, run: Trajectory) -> np.ndarray:
+    """Times of the rows that are judged: of steps of any size some, since every other size costs the reference more."""
+    every = len(run) // _ADAPTIVE_ROWS + 1 if configuration.scene.coupling.adaptive else 1
+    return np.asarray(run.time[::every])
 
 
 def _scipy(configuration: Configuration) -> bool:
@@ -278,7 +286,10 @@ def _point(
     if isinstance(run, str):
         return Point(configuration, None, run, solve, spread, setup)
     summary = run.summary
-    found = errors(run, references[configuration.refined], configuration.scene.coupling.H)
+    size = configuration.scene.coupling.macro_step
+    if size is None:
+        size = float(run.time[-1] - run.time[0]) / max(1, int(summary["macro_steps"]))
+    found = errors(run, references[configuration.refined], size)
     return Point(
         configuration, found, "", solve, spread, setup,
         macro_steps=int(summary.get("macro_steps", 0)),

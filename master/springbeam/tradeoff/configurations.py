@@ -6,12 +6,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from ..scene import ALL_MODES_UP_TO, Scene, SceneError, with_changes
+from ..resolution import slowest_frequency
+from ..scene import ALL_MODES_UP_TO, DISPLACEMENT_DRIVEN, Scene, SceneError, with_changes
 
 #: Macro steps are the scene's times powers of 2 between these, where a run has this many of them.
 _COARSEST, _FINEST = 6, -2
 _FEWEST_STEPS, _MOST_STEPS = 4, 20_000
 _ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+#: Steps that follow from tolerances resolve the motion: with more turns of the slowest mode [rad] that takes too many.
+_MOST_TURNS = 2000.0
 _IDA_TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 _MODES = (2, 4, 8, 16, 32, 64, 128)
 _MESHES = (0.25, 0.5, 1.0, 2.0)
@@ -54,7 +57,7 @@ class Configuration:
 
 def configurations(scene: Scene) -> list[Configuration]:
     """The sweep for a scene; settings that the scene cannot have are left out."""
-    return [*_macro_steps(scene), *_adaptive(scene), *_ida(scene), *_models(scene), *_rivals(scene)]
+    return [*_macro_steps(scene), *_automatic(scene), *_adaptive(scene), *_ida(scene), *_models(scene), *_rivals(scene)]
 
 
 def _changed(scene: Scene, **tables: Any) -> Iterator[Scene]:
@@ -67,7 +70,8 @@ def _changed(scene: Scene, **tables: Any) -> Iterator[Scene]:
 def _schemes(scene: Scene) -> list[tuple[str, int]]:
     if scene.contact.law == "compliance":
         return [("energy", 0), ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
-    return [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
+    exchanged = [(scheme, 0) for scheme in DISPLACEMENT_DRIVEN]
+    return [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2), *exchanged]
 
 
 def _sizes(scene: Scene) -> list[float]:
@@ -84,8 +88,22 @@ def _macro_steps(scene: Scene) -> Iterator[Configuration]:
                 yield Configuration(f"{scheme} {degree}", f"H = {H:.3g}", changed)
 
 
+def _automatic(scene: Scene) -> Iterator[Configuration]:
+    for H in _sizes(scene):
+        for changed in _changed(scene, coupling={"scheme": "auto", "degree": 0, "macro_step": H}):
+            yield Configuration("auto", f"H = {H:.3g}", changed)
+
+
 def _adaptive(scene: Scene) -> Iterator[Configuration]:
-    return iter(())
+    beam, span = scene.beam, scene.time.t_end - (scene.contact_time or 0.0)
+    if beam is not None and beam.fidelity == "dynamic" and slowest_frequency(beam) * span > _MOST_TURNS:
+        return
+    pairs = [("energy", 0)] if scene.contact.law == "compliance" else [("energy", 2), ("hermite", 2)]
+    for scheme, degree in pairs:
+        for tolerance in _ADAPTIVE_TOLERANCES:
+            coupling = {"scheme": scheme, "degree": degree, "relative_tolerance": tolerance}
+            for changed in _changed(scene, coupling=coupling):
+                yield Configuration(f"{scheme} {degree}, adaptive", f"tolerance {tolerance:.0e}", changed)
 
 
 def _ida(scene: Scene) -> Iterator[Configuration]:

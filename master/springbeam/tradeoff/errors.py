@@ -37,17 +37,19 @@ class Errors:
 
 
 def errors(run: Trajectory, reference: Trajectory, macro_step: float) -> Errors:
-    """Errors of ``run``; the times of its rows must be among the reference's rows.
+    """Errors of ``run`` at those of its rows whose times the reference has.
 
     ``macro_step`` [s] says which contacts are too short for the run to see.
     """
-    index = np.searchsorted(reference.time, run.time)
+    index = np.searchsorted(reference.time, run.time).clip(max=len(reference) - 1)
+    rows = np.flatnonzero(reference.time[index] == run.time)
+    index = index[rows]
     values: dict[str, float] = {}
     for name in ("u_tip", "y"):
         if name in run.columns and name in reference.columns:
             exact = reference[name]
             scale = float(np.abs(exact - exact[0]).max()) or 1.0
-            difference = (run[name] - exact[index]) / scale
+            difference = (run[name][rows] - exact[index]) / scale
             values[f"{name}_max"] = float(np.abs(difference).max())
             values[f"{name}_l2"] = float(np.sqrt(np.mean(difference**2)))
         else:

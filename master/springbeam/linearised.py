@@ -1,0 +1,46 @@
+"""The scene where it is stiffest, for what must be known of it before it runs.
+
+The hardening spring at the largest deflection that the energy at first contact allows; a softening one at rest.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from .scene import Scene
+from .statics import shear_stiffness
+
+
+def contact_energy(scene: Scene) -> float:
+    """At first contact [J]: of u̇ = s₁x, of u = s₀x with θ = 0 where that is strained, and of the spring."""
+    energy = 0.0
+    if (spring := scene.spring) is not None:
+        y, z = spring.equilibrium, spring.initial_velocity
+        energy += 0.5 * (spring.mass * z * z + spring.linear_stiffness * y * y) + 0.25 * spring.cubic_stiffness * y**4
+    if (beam := scene.beam) is not None:
+        energy += beam.density * beam.area * beam.initial_velocity_slope**2 * beam.length**3 / 6.0
+        slope = beam.initial_deflection_slope + (scene.contact_time or 0.0) * beam.initial_velocity_slope
+        energy += 0.5 * shear_stiffness(beam) * beam.length * slope**2
+    return max(energy, 0.0)
+
+
+def spring_stiffness(scene: Scene) -> float:
+    """k1 + 3 k2 y² of the spring at its stiffest [N/m]: at rest if it softens, else on the foundation or where it takes
+    all the energy."""
+    spring = scene.spring
+    assert spring is not None
+    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    if k2 <= 0.0:
+        y = 0.0
+    elif scene.stop is not None:
+        y = max(abs(scene.stop.position), abs(spring.equilibrium))
+    else:
+        # ½ k1 y² + ¼ k2 y⁴ = E
+        y = sqrt((sqrt(k1 * k1 + 4.0 * k2 * contact_energy(scene)) - k1) / k2)
+    return k1 + 3.0 * k2 * y**2
+
+
+def spring_frequency(scene: Scene) -> float:
+    """√(k/m) of the spring at its stiffest [rad/s], 0 where it does not oscillate."""
+    assert scene.spring is not None
+    return sqrt(max(spring_stiffness(scene), 0.0) / scene.spring.mass)

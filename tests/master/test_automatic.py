@@ -1,0 +1,111 @@
+"""``scheme = "auto"``: what it takes for which scene, and that what it takes is stable."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam.automatic import STABLE, choice, decided
+from springbeam.cli import app
+from springbeam.linearised import spring_frequency
+from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.resolution import mesh_frequency, slowest_frequency
+from springbeam.scene import Beam
+from springbeam.stability.linear import LinearBody, LinearPair, spectral_radius
+
+PAIR = load_scene("soft")
+
+
+def auto(scene=PAIR, **changes):
+    return with_changes(scene, coupling={"scheme": "auto", "degree": 0, **changes.pop("coupling", {})}, **changes)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("soft", ("hermite", 2)), ("beam-on-stop", ("hermite", 2)), ("steel-bumper", ("energy", 2)),
+     ("bar-impact", ("energy", 2)), ("paper-fig2", ("energy", 0)), ("duffing", ("energy", 0))],
+)  # fmt: skip
+def test_what_the_shipped_scenes_get(name, expected):
+    assert choice(load_scene(name))[:2] == expected
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.99, ("hermite", 2)), (1.01, ("energy", 2))])
+def test_the_bound_is_on_the_fastest_frequency(share, expected):
+    H = share * STABLE / mesh_frequency(PAIR.beam)
+    assert choice(auto(coupling={"macro_step": H}))[:2] == expected
+    stiff = {"spring": {"linear_stiffness": 1e8, "cubic_stiffness": 0.0}}
+    spring = with_changes(PAIR, **stiff)
+    assert spring_frequency(spring) == 1e4 > mesh_frequency(PAIR.beam)
+    assert choice(auto(spring, coupling={"macro_step": share * STABLE / 1e4}))[:2] == expected
+
+
+@pytest.mark.parametrize(("turn", "expected"), [(0.99, ("energy", 2)), (1.01, ("energy", 0))])
+def test_unresolved_motion_gets_degree_0(turn, expected):
+    assert choice(auto(coupling={"macro_step": turn / slowest_frequency(PAIR.beam)}))[:2] == expected
+
+
+def test_the_fastest_frequency_is_above_all_that_are_kept():
+    for degree, modes in ((1, 0), (1, 5), (2, 0), (4, 7)):
+        beam = PAIR.beam.model_copy(update={"n_elements": 7, "element_degree": degree, "n_modes": modes})
+        assert modal_beam(beam).omega[-1] <= 1.0001 * mesh_frequency(beam)
+
+
+def test_below_the_bound_no_pair_amplifies():
+    """Random linear pairs: beams slender and stocky, full and truncated, springs light and heavy, or none."""
+    rng = np.random.default_rng(5)
+    for _ in range(60):
+        n, degree = int(rng.integers(1, 9)), int(rng.choice([1, 2, 4]))
+        inertia = 10 ** rng.uniform(-4, 0)
+        beam = Beam(
+            young_modulus=10 ** rng.uniform(-2, 2) / inertia, second_moment_of_area=inertia,
+            shear_modulus=10 ** rng.uniform(-2, 3), n_elements=n, element_degree=degree,
+            n_modes=int(rng.choice([0, rng.integers(1, 2 * n * degree + 1)])),
+        )  # fmt: skip
+        modal, fastest = modal_beam(beam), mesh_frequency(beam)
+        omega2 = modal.omega**2
+        own = fastest * 10 ** rng.uniform(-6, 0)
+        spring = [np.array([own**2]), np.zeros(1), np.array([10 ** rng.uniform(-2, 3)])]
+        if rng.random() < 0.2:
+            spring = [np.zeros(0)] * 3
+        pair = LinearPair(LinearBody(omega2, np.zeros_like(omega2), modal.tip), LinearBody(*spring))
+        for x in (0.3, 0.6, 1.0):
+            assert spectral_radius(pair, "hermite", 2, x * STABLE / fastest) < 1.0 + 1e-6
+
+
+def test_where_hermite_is_not_defined_it_is_not_taken():
+    assert choice(with_changes(PAIR, contact={"law": "compliance"}))[:2] == ("energy", 0)
+    assert choice(with_changes(PAIR, beam={"integrator": "generalized_alpha"}))[:2] == ("energy", 0)
+    assert choice(with_changes(PAIR, beam={"fidelity": "quasi_static"}))[:2] == ("energy", 2)
+    for changes in ({"contact": {"law": "compliance"}}, {"beam": {"integrator": "generalized_alpha"}}):
+        assert decided(auto(**changes))[0].coupling.scheme == "energy"
+
+
+def test_steps_from_tolerances_are_hermites():
+    assert choice(with_changes(PAIR, coupling={"relative_tolerance": 1e-4}))[:2] == ("hermite", 2)
+
+
+def test_a_run_is_that_of_the_scheme_it_takes_and_says_so():
+    short = {"time": {"t_end": 0.1}}
+    found = simulate(auto(**short, coupling={"macro_step": 1e-3}))
+    named = simulate(with_changes(PAIR, **short, coupling={"scheme": "hermite", "degree": 2, "macro_step": 1e-3}))
+    np.testing.assert_array_equal(found.u_tip, named.u_tip)
+    assert found.summary["coupling"] == {"scheme": "hermite", "degree": 2, "because": "ω_max H = 1.73 <= 3"}
+    assert found.scene.coupling.scheme == "auto"
+    assert "coupling" not in named.summary
+
+
+def test_a_degree_beside_auto_is_refused():
+    with pytest.raises(SceneError, match=r'degree = 1: scheme = "auto" picks the degree'):
+        with_changes(PAIR, coupling={"scheme": "auto", "degree": 1})
+
+
+def test_the_command_says_what_it_took(tmp_path):
+    arguments = ["run", "soft", "--set", "time.t_end=0.02", "--set", "coupling.scheme=auto", "--no-plots"]
+    result = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "out")])
+    assert result.exit_code == 0
+    assert "coupling  hermite 2: ω_max H = 0.433 <= 3" in result.stdout
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["coupling"]["scheme"] == "hermite"
