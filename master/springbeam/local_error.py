@@ -18,6 +18,8 @@ from .subsystem import Motion
 
 #: Joined, the cubic through a step's ends is only looked at for events; it is within this fraction of the motion.
 _SEEN = 1e-2
+#: Displacements are rounded to so many ulp.
+_ULPS, _EPS = 16.0, 2.0**-52
 #: Order of the cubic.
 _CUBIC = 4
 
@@ -87,8 +89,19 @@ class LocalError(Memory):
         return max(self._fastest, *(abs(end.velocity) for ends in (step.start, step.end) for end in ends))
 
     def _curve(self, errors: list[float], ranges: list[float], relative: float) -> tuple[float, int]:
-        ratios = [e / (self._absolute + relative * r) for e, r in zip(errors, ranges, strict=True) if r > 0.0]
+        allowed = (self._absolute + relative * r for r in ranges)
+        told = zip(errors, ranges, allowed, self._told_apart(), strict=True)
+        ratios = [e / (a + least) for e, r, a, least in told if r > 0.0]
         return max(ratios, default=0.0), _CUBIC
+
+    def _told_apart(self) -> list[float]:
+        """Up to where displacements of the ends are rounding, and the spring's tolerance [m]: no step is too long for
+        that, though from rest the motion so far is shorter still."""
+        reach = [max(abs(low), abs(high)) for low, high in zip(self._lowest, self._highest, strict=True)]
+        tip, lower = (_ULPS * _EPS * r for r in reach)
+        if (spring := self._scene.spring) is not None:
+            lower += spring.relative_tolerance * reach[1] + spring.absolute_tolerance
+        return [tip, lower]
 
     def _reduced_mass(self) -> float:
         masses = [body.mass for body in (self._pair.beam, self._pair.lower) if body is not None]

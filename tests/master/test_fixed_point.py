@@ -79,7 +79,8 @@ def test_a_run_stops_at_once_and_names_the_gain():
     with pytest.raises(RunStopped, match=r"displacement-driven exchange diverges.*by 173") as stopped:
         simulate(scene)
     assert stopped.value.time == 0.0
-    assert predict(scene).displacement_gain == pytest.approx(200.0)
+    few = with_changes(scene, beam={"n_modes": 4})  # the gain is that of Z, whatever the modes
+    assert predict(few).displacement_gain == pytest.approx(200.0)
 
 
 def test_a_run_that_converges_is_that_of_the_energy_scheme():

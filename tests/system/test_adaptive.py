@@ -117,3 +117,13 @@ def test_without_coupling_the_rows_describe_the_motion():
 def test_a_tolerance_below_rounding_stops_by_name():
     with pytest.raises(RunStopped, match=r"above the tolerance, down to a macro step of .* where it is"):
         simulate(soft(1e-17, "hermite", 2))
+
+
+def test_from_rest_rounding_is_no_error():
+    """The motion so far, which the tolerance is relative to, is then shorter than what displacements are rounded to."""
+    duffing = load_scene("duffing")
+    run = simulate(with_changes(duffing, time={"t_end": 0.5}, coupling={"relative_tolerance": 1e-8}))
+    assert run.summary["rejected_steps"] <= 2
+    exact = event_driven.simulate(duffing, sample_times=run.time, t_end=0.5)
+    assert np.abs(run.y - exact.y).max() <= 1e-8 * np.abs(exact.y - 0.5).max()
+    assert run.summary["macro_steps"] < 100
