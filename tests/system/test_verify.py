@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
 import numpy as np
@@ -113,6 +114,21 @@ def test_a_failed_check_is_exit_code_1(monkeypatch: pytest.MonkeyPatch):
     result = CliRunner().invoke(app, ["verify"])
     assert result.exit_code == 1
     assert "FAIL" in result.output
+
+
+def test_json_is_the_checks(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(verify, "SECTIONS", (("Mesh", verify.mesh_convergence), ("Escape", verify.escape)))
+    result = CliRunner().invoke(app, ["verify", "--json"])
+    assert (result.exit_code, result.stderr) == (0, "")
+    document = json.loads(result.stdout)
+    assert document["passed"] is True
+    assert [section["title"] for section in document["sections"]] == ["Mesh", "Escape"]
+    for printed, check in zip(document["sections"][0]["checks"], verify.mesh_convergence(), strict=True):
+        assert (printed["exact"], printed["computed"], printed["passed"]) == (check.exact, check.computed, check.passed)
+    changed(FmuBeam, "density", 1.01)(monkeypatch)
+    result = CliRunner().invoke(app, ["verify", "--json"])
+    assert result.exit_code == 1
+    assert json.loads(result.stdout)["passed"] is False
 
 
 def test_missing_fmus_are_bad_input(tmp_path, monkeypatch: pytest.MonkeyPatch):

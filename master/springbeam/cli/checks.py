@@ -72,7 +72,8 @@ def crosscheck(
     for note in report.notes:
         console.print(Text(note))
     console.print(_error_table(report))
-    console.print(_event_errors_table(report))
+    if report.events:
+        console.print(_event_errors_table(report))
     begin, end = report.trajectory["time"][0], report.trajectory["time"][-1]
     console.print(Text(
         f"comparable from {begin:.9g} to {report.horizon:.9g} s of {end:.9g} s; there a perturbation of the reference "

@@ -6,6 +6,7 @@ Results go to stdout, progress and errors to stderr. ``--json`` puts one JSON do
 
 from __future__ import annotations
 
+import difflib
 import json
 import signal
 import threading
@@ -96,11 +97,15 @@ class Command(_TellingParameters, TyperCommand):
 
 
 class Group(_TellingParameters, TyperGroup):
-    """Says what to do with a scene in the place of a command."""
+    """Says what may have been meant by a word that is no command."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        if args[0] not in self.commands and (args[0] in shipped_scenes() or args[0].endswith(".toml")):
-            ctx.fail(f"{args[0]} is a scene, not a command. Did you mean {ctx.command_path} run {args[0]}?")
+        word = args[0]
+        if word not in self.commands and not word.startswith("-") and not ctx.resilient_parsing:
+            if word in shipped_scenes() or word.endswith(".toml"):
+                ctx.fail(f"{word} is a scene, not a command. Did you mean {ctx.command_path} run {word}?")
+            close = difflib.get_close_matches(word, self.commands, n=1)
+            ctx.fail(f"No such command '{word}'." + (f" Did you mean '{close[0]}'?" if close else ""))
         return super().resolve_command(ctx, args)
 
 

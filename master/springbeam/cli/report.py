@@ -43,8 +43,10 @@ def animate(
             "--out", "-o", metavar="FILE", help=f"A .gif, or an .mp4 (needs ffmpeg). Default: DIR/{ANIMATIONS[0]}"
         ),
     ] = None,
-    seconds: Annotated[float, typer.Option(min=0.1, max=600.0, help="How long it plays.")] = 10.0,
-    fps: Annotated[int, typer.Option(min=1, max=50, help="Frames per second.")] = 20,
+    seconds: Annotated[
+        float, typer.Option("--seconds", metavar="SECONDS", min=0.1, max=600.0, help="How long it plays.")
+    ] = 10.0,
+    fps: Annotated[int, typer.Option("--fps", metavar="N", min=1, max=50, help="Frames per second.")] = 20,
     force: ForceOption = False,
     quiet: QuietOption = False,
 ) -> None:

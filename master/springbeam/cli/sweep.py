@@ -41,21 +41,26 @@ def sweep(
     ] = None,
     settings: SettingsOption = None,
     samples: Annotated[
-        int, typer.Option("--samples", min=0, help="Sample the ranges so often, instead of a grid.")
+        int, typer.Option("--samples", metavar="N", min=0, help="Number of samples of the ranges, instead of a grid.")
     ] = 0,
     sampling: Annotated[
         Literal["latin_hypercube", "random"], typer.Option("--sampling", help="How --samples are placed.")
     ] = "latin_hypercube",
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the samples.")] = 0,
+    seed: Annotated[
+        int, typer.Option("--seed", metavar="N", min=0, help="Of the samples: the same seed, the same runs.")
+    ] = 0,
     metric: Annotated[
         list[str] | None,
-        typer.Option("--metric", metavar="NAME", help="Keep only this; may be repeated. Default: all."),
+        typer.Option(
+            "--metric", metavar="NAME", help="Keep only this number of each run; may be repeated. Default: all."
+        ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Local processes. Default: one per core.")
+        int | None, typer.Option("--workers", metavar="N", min=1, help="Local processes. Default: one per core.")
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option("--scheduler", metavar="ADDRESS", help="An existing Dask cluster instead.")
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster instead of local processes."),
     ] = None,
     out: Annotated[
         Path | None,
