@@ -109,12 +109,16 @@ def _schemes_table(p: Prediction) -> Table:
 
 
 def stability(
-    samples: Annotated[int, typer.Option("--samples", min=0, help="Cells of the hypercube over all parameters.")] = 300,
+    samples: Annotated[
+        int, typer.Option("--samples", metavar="N", min=0, help="Cells of the hypercube over all parameters.")
+    ] = 300,
     resolution: Annotated[
-        int, typer.Option("--resolution", min=0, help="Values of each parameter of a slice; 0: no slices.")
+        int, typer.Option("--resolution", metavar="N", min=0, help="Values of each parameter of a slice; 0: no slices.")
     ] = 6,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the hypercube.")] = 1,
-    workers: Annotated[int | None, typer.Option("--workers", min=1, help="Processes. Default: one per core.")] = None,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the hypercube.")] = 1,
+    workers: Annotated[
+        int | None, typer.Option("--workers", metavar="N", min=1, help="Processes. Default: one per core.")
+    ] = None,
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="Where the table and the pictures go.")
     ] = Path("results/stability"),
