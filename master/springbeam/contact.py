@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 from .memory import Memory
 from .scene import Scene, Spring
@@ -32,8 +33,13 @@ class Phase:
     #: The lower end is held by the foundation: the spring at y = φ or, without a spring, the tip itself.
     seated: bool = False
 
-    def __str__(self) -> str:
+    @cached_property
+    def name(self) -> str:
+        """As in the column ``phase``."""
         return "seated" if self.seated else self.joint.value
+
+    def __str__(self) -> str:
+        return self.name
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from contextlib import ExitStack, suppress
 from itertools import count
 from math import isfinite
 from pathlib import Path
+from struct import Struct
 from types import TracebackType
 from typing import Any, BinaryIO, Protocol
 from zlib import crc32
@@ -147,16 +148,17 @@ class _Checks:
         values = list(values)
         phase = ""
         if self._phase_at >= 0:
-            self._check_phase(phase := values.pop(self._phase_at))
+            phase = values.pop(self._phase_at)
+            if phase not in self._phases:
+                self._check_phase(phase)
         row = list(map(float, values))
-        if not all(map(isfinite, row)):
-            name, value = next((n, x) for n, x in zip(self._numbers, row, strict=True) if not isfinite(x))
-            raise NonFiniteValue(name, row[0], value)
+        if not isfinite(sum(row)):  # or the sum alone overflows
+            for name, value in zip(self._numbers, row, strict=True):
+                if not isfinite(value):
+                    raise NonFiniteValue(name, row[0], value)
         return row, phase
 
     def _check_phase(self, phase: str) -> None:
-        if phase in self._phases:
-            return
         if not phase.isprintable() or not 0 < len(phase) <= _PHASE_WIDTH or set(phase) & set(',"\\'):
             raise ValueError(f"phase {phase!r} cannot be written to a file")
         self._phases.add(phase)
@@ -185,21 +187,9 @@ class _Checks:
         return shape
 
 
-class _Rows:
-    """Rows of doubles in an array that doubles when full."""
-
-    def __init__(self, width: int) -> None:
-        self._data = np.empty((256, width))
-        self._used = 0
-
-    def append(self, row: Sequence[float] | np.ndarray) -> None:
-        if self._used == len(self._data):
-            self._data = np.concatenate([self._data, np.empty_like(self._data)])
-        self._data[self._used] = row
-        self._used += 1
-
-    def columns(self) -> list[np.ndarray]:
-        return [column.copy() for column in self._data[: self._used].T]
+def _columns(rows: bytearray, width: int) -> list[np.ndarray]:
+    """The columns of rows of doubles."""
+    return [column.copy() for column in np.frombuffer(rows).reshape(-1, width).T]
 
 
 class MemoryRecorder(_Checks):
@@ -215,15 +205,16 @@ class MemoryRecorder(_Checks):
 
     def __init__(self, scene: Scene, columns: Sequence[str] | None = None) -> None:
         super().__init__(scene, columns)
-        self._rows = _Rows(len(self._numbers))
+        self._rows = bytearray()
+        self._packed = Struct(f"{len(self._numbers)}d").pack
         self._phase_of_row: list[str] = []
         self._events: list[Event] = []
-        self._shapes = _Rows(len(_SHAPE_HEADER))
+        self._shapes = bytearray()
         self._summary: dict[str, Any] = {}
 
     def row(self, values: Mapping[str, Any] | Sequence[Any]) -> None:
         row, phase = self._checked_row(values)
-        self._rows.append(row)
+        self._rows += self._packed(*row)
         self._phase_of_row.append(phase)
 
     def event(self, event: Event) -> None:
@@ -231,19 +222,19 @@ class MemoryRecorder(_Checks):
 
     def shape(self, time: float, deflection: np.ndarray) -> None:
         shape = self._checked_shape(time, deflection)
-        self._shapes.append([time, *shape])
+        self._shapes += np.float64(time).tobytes() + shape.tobytes()
 
     def finish(self, summary: Mapping[str, Any]) -> None:
         self._summary = _with_scene(summary, self.scene)
 
     def trajectory(self) -> Trajectory:
         """Everything recorded so far."""
-        numbers = iter(self._rows.columns())
+        numbers = iter(_columns(self._rows, len(self._numbers)))
         phases = np.array(self._phase_of_row, dtype=str)
         columns = {name: phases if name == "phase" else next(numbers) for name in self.columns}
         shapes = None
         if self.scene.beam is not None:
-            time, *deflection = self._shapes.columns()
+            time, *deflection = _columns(self._shapes, len(_SHAPE_HEADER))
             shapes = (time, np.column_stack(deflection))
         return Trajectory(self.scene, columns, list(self._events), shapes, dict(self._summary))
 

@@ -11,6 +11,7 @@ from .memory import Memory
 from .recording import Recorder
 from .scene import Scene
 from .stepping import Pair, State
+from .subsystem import BeamBody
 from .trajectory import COLUMNS
 
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
@@ -23,10 +24,12 @@ class Rows(Memory):
     REMEMBERED = ("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed")
 
     def __init__(self, scene: Scene, pair: Pair, ledger: Ledger, recorder: Recorder, start_time: float) -> None:
-        self._scene, self._pair, self._ledger, self._recorder = scene, pair, ledger, recorder
+        self._pair, self._ledger, self._recorder = pair, ledger, recorder
         self._shapes_left = _SHAPES_AFTER_CONTACT
         self._next_shape = start_time
         self._equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
+        self._law = (scene.contact.stiffness, scene.contact.exponent)
+        self._shape_every = scene.time.t_end / _SHAPES_OVER_RUN
         #: The columns of the scene, out of all.
         self._present = itemgetter(*(COLUMNS.index(name) for name in recorder.columns))
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
@@ -34,36 +37,32 @@ class Rows(Memory):
 
     def write(self, state: State) -> None:
         """The row of the present state. Raises NonFiniteValue."""
-        pair, law = self._pair, self._scene.contact
-        tip, low = pair.ends()
-        (u, v), (y, z) = tip[:2], low[:2]
-        joined = state.phase.joint is not Joint.FREE
+        pair, time, phase = self._pair, state.time, state.phase
+        (u, v, _, _), (y, z, _, _) = pair.ends()
+        joined = phase.joint is not Joint.FREE
         contact = smoothed = state.contact[0]
         inside = mismatch = 0.0
         if pair.compliant:
-            contact = smoothed = inside = compliance_force(y - u, law.stiffness, law.exponent)
+            contact = smoothed = inside = compliance_force(y - u, *self._law)
         elif joined:
             smoothed = state.smoothed
         if pair.joinable and not pair.compliant:
-            inside = compliance_force(self._equilibrium - u, law.stiffness, law.exponent)
+            inside = compliance_force(self._equilibrium - u, *self._law)
         if joined:
             mismatch = v - z
             if not pair.compliant:
                 self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
         self.largest_speed = max(self.largest_speed, abs(v), abs(z))
         forces = (contact, smoothed, inside, contact - inside, state.foundation[0])
-        row = (state.time, u, v, y, z, *forces, u - y, mismatch, str(state.phase))
-        self._recorder.row(self._present((*row, *self._ledger.book(*pair.energies()))))
-        self._shape(state.time, joined)
+        row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *self._ledger.book(*pair.energies()))
+        self._recorder.row(self._present(row))
+        if pair.beam is not None:
+            early = joined and self._shapes_left > 0
+            if early or time >= self._next_shape:
+                self._shape(pair.beam, time, early)
 
-    def _shape(self, time: float, joined: bool) -> None:
-        if self._pair.beam is None:
-            return
-        early = joined and self._shapes_left > 0
-        if not early and time < self._next_shape:
-            return
+    def _shape(self, beam: BeamBody, time: float, early: bool) -> None:
         self._shapes_left -= early
-        span = self._scene.time.t_end / _SHAPES_OVER_RUN
         while self._next_shape <= time:
-            self._next_shape += span
-        self._recorder.shape(time, self._pair.beam.shape())
+            self._next_shape += self._shape_every
+        self._recorder.shape(time, beam.shape())

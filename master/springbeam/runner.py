@@ -109,6 +109,7 @@ def run(
             status = {"status": "interrupted", "cause": type(error).__name__}
             raise
         finally:
+            ended = perf_counter()
             summary = {
                 **status,
                 "version": version("springbeam"),
@@ -116,7 +117,7 @@ def run(
                 **simulation.summary(),
                 **_calls(beam=beam, spring=spring),
                 "setup_time": loaded - began,
-                "wall_time": before + perf_counter() - loaded,
+                "wall_time": before + ended - loaded,
             }
             summary["warnings"] = [*suspicions(scene), *summary["warnings"]]
             recorder.finish(summary)

@@ -166,7 +166,7 @@ class Simulation(Memory):
                 self._act(event, step)
             self._record()
             if self._progress is not None:
-                self._progress(state.time, str(state.phase), self._macro_steps)
+                self._progress(state.time, state.phase.name, self._macro_steps)
 
     def _advance(self, size: float) -> tuple[Step, str | None]:
         """The next step and the event it ends on, the bodies left at its end."""

@@ -8,7 +8,7 @@ beam steps and two spring steps.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from operator import add, mul, sub
 
 import numpy as np
@@ -76,7 +76,8 @@ class Tie(Memory):
         if size > _REACH_OF_GUESS * self._last_size:
             guess = (guess[0], 0.0, 0.0)
         a = force.legendre(guess, size, self._degree)
-        r_beam = self._advance(beam, time, size, a)
+        acting = force.derivatives(a, size)
+        r_beam = self._advance(beam, time, size, acting)
         beam_end = beam.motion()
         at_beam: Vector | None = a
         known = self._responses.pop(size, None)
@@ -88,7 +89,7 @@ class Tie(Memory):
             del self._responses[next(iter(self._responses))]
         kind = type(partner).__name__
         inverse = inverses.get(kind) or _inverse(B, self._free_response(partner, size))
-        r_partner = self._advance(partner, time, size, a)
+        r_partner = self._advance(partner, time, size, acting)
         tolerance = self._absolute_tolerance(start, beam_end, partner.motion(), size, _times(B, a))
         residual = list(map(sub, r_beam, r_partner))
         norm = max(map(abs, residual))
@@ -101,7 +102,7 @@ class Tie(Memory):
             if norm <= noise * tolerance:
                 if at_beam is a:
                     break
-                r_beam, at_beam = self._advance(beam, time, size, a), a  # in place of the affine prediction
+                r_beam, at_beam = self._advance(beam, time, size, acting), a  # in place of the affine prediction
                 # A bad guess moves the bodies far: what counts is the motion under the force found.
                 tolerance = self._absolute_tolerance(start, beam.motion(), partner.motion(), size, _times(B, a))
                 residual = list(map(sub, r_beam, r_partner))
@@ -110,8 +111,9 @@ class Tie(Memory):
                 self.iterations += 1
                 step = [-x for x in _times(inverse, residual)]
                 a = list(map(add, a, step))
+                acting = force.derivatives(a, size)
                 r_beam = list(map(add, r_beam, _times(B, step)))
-                r_partner = self._advance(partner, time, size, a)
+                r_partner = self._advance(partner, time, size, acting)
                 residual = list(map(sub, r_beam, r_partner))
                 norm = max(map(abs, residual))
                 if norm > noise * tolerance:  # below, the difference is rounding and would spoil what is known
@@ -119,7 +121,7 @@ class Tie(Memory):
             if norm > noise * tolerance and norm > 0.3 * previous:
                 if not measured:
                     S = self._measure(partner, time, size, a, r_partner, partner.motion(), 1e-4)
-                    self._advance(partner, time, size, a)
+                    self._advance(partner, time, size, acting)
                     inverse, measured = _inverse(B, S), True
                 elif norm <= _NOISE * tolerance:  # the bodies' own rounding: nothing left to gain
                     noise = _NOISE
@@ -129,12 +131,12 @@ class Tie(Memory):
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
         self._reach = max(self._reach, abs(beam.motion().displacement), abs(partner.motion().displacement))
         inverses[kind] = inverse
-        return force.derivatives(a, size)
+        return acting
 
-    def _advance(self, body: Body, time: float, size: float, a: Vector) -> Vector:
+    def _advance(self, body: Body, time: float, size: float, contact: Force) -> Sequence[float]:
         body.rewind()
-        body.advance(time, size, force.derivatives(a, size))
-        return list(self._conditions(body.motion(), size))
+        body.advance(time, size, contact)
+        return self._conditions(body.motion(), size)
 
     def _free_response(self, partner: Body, size: float) -> Matrix:
         if partner.mass == float("inf"):
@@ -143,7 +145,7 @@ class Tie(Memory):
         return _transposed([self._conditions(m, size) for m in unit])
 
     def _measure(
-        self, body: Body, time: float, size: float, a: Vector, r: Vector, end: Motion, fraction: float
+        self, body: Body, time: float, size: float, a: Vector, r: Sequence[float], end: Motion, fraction: float
     ) -> Matrix:
         """Columns ∂conditions/∂a_k by differences about ``a``, where they are ``r`` and the motion ends at ``end``.
 
@@ -156,7 +158,8 @@ class Tie(Memory):
         for k in range(len(a)):
             changed = a.copy()
             changed[k] += delta
-            columns.append([(x - y) / delta for x, y in zip(self._advance(body, time, size, changed), r, strict=True)])
+            r_changed = self._advance(body, time, size, force.derivatives(changed, size))
+            columns.append([(x - y) / delta for x, y in zip(r_changed, r, strict=True)])
         return _transposed(columns)
 
     def _absolute_tolerance(self, start: Motion, beam: Motion, partner: Motion, size: float, by_force: Vector) -> float:
