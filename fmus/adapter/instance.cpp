@@ -53,7 +53,13 @@ bool is_setting(const Variable& v) { return v.causality == Causality::parameter 
 
 }  // namespace
 
-Instance::Instance() : table_(table()) { reset(); }
+Instance::Instance() : table_(table()) {
+  for (std::size_t i = 0; i < table_.variables.size(); ++i) {
+    if (is_setting(table_.variables[i])) fixed_.push_back(i);
+    if (table_.variables[i].causality == Causality::input) inputs_.push_back(i);
+  }
+  reset();
+}
 
 void Instance::reset() {
   model_ = make_model();
@@ -89,9 +95,7 @@ void Instance::terminate() { phase = terminated; }
 
 void Instance::ensure_built() {
   if (built_) return;
-  for (std::size_t i = 0; i < settings_.size(); ++i) {
-    if (is_setting(table_.variables[i])) table_.variables[i].set(*model_, settings_[i]);
-  }
+  for (const std::size_t i : fixed_) table_.variables[i].set(*model_, settings_[i]);
   model_->build(tolerance_);
   for (const Variable& v : table_.variables) {
     const double value = v.get ? v.get(*model_) : 0.0;
@@ -106,9 +110,7 @@ void Instance::ensure_built() {
 }
 
 void Instance::push_inputs() {
-  for (std::size_t i = 0; i < settings_.size(); ++i) {
-    if (table_.variables[i].causality == Causality::input) table_.variables[i].set(*model_, settings_[i]);
-  }
+  for (const std::size_t i : inputs_) table_.variables[i].set(*model_, settings_[i]);
 }
 
 const Variable& Instance::variable(unsigned reference, Type type, const char* what) const {
@@ -193,15 +195,13 @@ void Instance::step(double time, double size) {
   ensure_built();
   push_inputs();
   model_->step(size);
-  for (std::size_t i = 0; i < settings_.size(); ++i) {
-    const Variable& v = table_.variables[i];
-    if (v.causality == Causality::input) settings_[i] = {v.consumed ? 0.0 : settings_[i][0], 0.0, 0.0};
+  for (const std::size_t i : inputs_) {
+    settings_[i] = {table_.variables[i].consumed ? 0.0 : settings_[i][0], 0.0, 0.0};
   }
   time_ = time + size;
 }
 
-Snapshot Instance::save() const {
-  Snapshot s;
+void Instance::save(Snapshot& s) const {
   s.phase = static_cast<int>(phase);
   s.last_status = last_status;
   s.time = time_;
@@ -209,16 +209,14 @@ Snapshot Instance::save() const {
   s.tolerance = tolerance_;
   s.settings = settings_;
   s.built = built_;
+  s.numerics.clear();
   if (built_) model_->save(s.numerics);
-  return s;
 }
 
 void Instance::restore(const Snapshot& s) {
   for (std::size_t i = 0; i < settings_.size(); ++i) require_allowed(table_.variables[i], s.settings[i]);
   bool same = tolerance_ == s.tolerance;
-  for (std::size_t i = 0; i < settings_.size(); ++i) {
-    if (is_setting(table_.variables[i])) same = same && settings_[i][0] == s.settings[i][0];
-  }
+  for (const std::size_t i : fixed_) same = same && settings_[i][0] == s.settings[i][0];
   settings_ = s.settings;
   tolerance_ = s.tolerance;
   built_ = built_ && same;

@@ -1,6 +1,7 @@
 // One instance of the FMU: the life cycle of FMI 2.0.4, section 4.2.4, over a Model and its table. No FMI types.
 #pragma once
 
+#include <cstddef>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -51,7 +52,8 @@ class Instance {
   void step(double time, double size);
   double time() const { return time_; }
 
-  Snapshot save() const;
+  /// Into a snapshot that may hold an earlier state: its memory is used again.
+  void save(Snapshot& snapshot) const;
   void restore(const Snapshot& snapshot);
 
  private:
@@ -61,7 +63,8 @@ class Instance {
 
   const Table& table_;
   std::unique_ptr<Model> model_;
-  std::vector<Polynomial> settings_;  ///< of every variable; unused for calculated outputs
+  std::vector<std::size_t> inputs_, fixed_;  ///< positions of inputs, and of what is set before the start
+  std::vector<Polynomial> settings_;         ///< of every variable; unused for calculated outputs
   bool built_ = false;
   double time_ = 0.0;
   double stop_time_ = std::numeric_limits<double>::infinity();

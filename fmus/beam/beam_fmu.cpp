@@ -31,6 +31,7 @@ struct BeamModel final : fmi::Model {
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
     beam.emplace(parameters);
+    moved();
     forecast.reset();
     tip_response = {};
     if (parameters.communication_step == 0.0) return;
@@ -44,6 +45,7 @@ struct BeamModel final : fmi::Model {
   }
 
   void step(double size) override {
+    moved();
     std::vector<double> before;
     if (tip_impulse != 0.0 || forecast) beam->save(before);
     try {
@@ -60,11 +62,16 @@ struct BeamModel final : fmi::Model {
 
   void restore(const std::vector<double>& state) override {
     beam->restore(state);
+    moved();
     if (forecast) look_ahead();
   }
 
   double tip_velocity() const { return forecast ? forecast->velocity : beam->tip_velocity(); }
   double tip_acceleration() const { return forecast ? forecast->acceleration : beam->tip_acceleration(); }
+
+  // At point `i` of the shape.
+  double deflection(std::size_t i) const { return at(i, deflection_, &Beam::deflection); }
+  double rotation(std::size_t i) const { return at(i, rotation_, &Beam::rotation); }
 
  private:
   double foreseen_load_ = 0.0;
@@ -83,20 +90,27 @@ struct BeamModel final : fmi::Model {
       forecast = {unknown, unknown};
     }
   }
+
+  using Points = std::array<double, beam::shape_points>;
+  /// A field of the shape, found for all points at once.
+  struct Field {
+    bool current = false;
+    Points values{};
+  };
+
+  double at(std::size_t i, Field& field, void (Beam::*fill)(Points&) const) const {
+    if (!field.current) ((*beam).*fill)(field.values);
+    field.current = true;
+    return field.values[i];
+  }
+  void moved() { deflection_.current = rotation_.current = false; }
+
+  mutable Field deflection_, rotation_;
 };
 
 template <class Value>
 auto of(Value (Beam::*value)() const) {
   return [value](const BeamModel& m) { return ((*m.beam).*value)(); };
-}
-
-template <class Fill>
-auto point(int i, Fill fill) {
-  return [i, fill](const BeamModel& m) {
-    std::array<double, beam::shape_points> values{};
-    ((*m.beam).*fill)(values);
-    return values[static_cast<std::size_t>(i)];
-  };
 }
 
 fmi::Table make_table() {
@@ -206,15 +220,16 @@ fmi::Table make_table() {
   add.output("tip_response_2", "m/N", "the same at the end of the step after, without a force meanwhile",
              [](const BeamModel& m) { return m.tip_response[1]; })
       .from(motion);
-  for (int i = 0; i < beam::shape_points; ++i) {
+  for (std::size_t i = 0; i < beam::shape_points; ++i) {
     const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
-    add.output("deflection[" + std::to_string(i + 1) + "]", "m", "deflection" + x, point(i, &Beam::deflection))
+    add.output("deflection[" + std::to_string(i + 1) + "]", "m", "deflection" + x,
+               [i](const BeamModel& m) { return m.deflection(i); })
         .from(i == 0 ? std::vector<std::string>{} : start_u);
   }
-  for (int i = 0; i < beam::shape_points; ++i) {
+  for (std::size_t i = 0; i < beam::shape_points; ++i) {
     const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
     add.output("rotation[" + std::to_string(i + 1) + "]", "rad", "rotation of the cross-section" + x,
-               point(i, &Beam::rotation))
+               [i](const BeamModel& m) { return m.rotation(i); })
         .from(i == 0 ? std::vector<std::string>{} : start_shape);
   }
   return t;

@@ -35,7 +35,8 @@ _MAX_FORCE_CUTS = 8
 
 def _rest(ends: Ends) -> float:
     """Speed below which ends do not move against each other [m/s]."""
-    return 1e-12 * max(abs(ends[0].velocity), abs(ends[1].velocity))
+    tip, low = ends
+    return 1e-12 * max(abs(tip.velocity), abs(low.velocity))
 
 
 class Detector:
@@ -56,10 +57,9 @@ class Detector:
 
     def at_start(self, state: State, start: Ends) -> str | None:
         """The event that is due before any step: its function is 0 and falling."""
-        rest = _rest(start)
         for kind, function in self._functions.of(state.phase):
             value, rate = function(start)
-            if rate < -rest and value <= self.tolerance(start):
+            if rate < 0.0 and value <= self.tolerance(start) and rate < -_rest(start):
                 return kind
         return None
 

@@ -110,10 +110,8 @@ class EventFunctions:
 
 def position_tolerance(ends: tuple[Motion, Motion], level: float, macro_step: float) -> float:
     """What positions can be told apart to [m]: rounding of the displacements, and of the foundation's ``level``."""
-    tip, low = ends
-    length = max(abs(tip.displacement), abs(low.displacement), abs(level))
-    speed = max(abs(tip.velocity), abs(low.velocity))
-    return 8.0 * _EPS * length + 1e-15 * speed * macro_step
+    (u, v, _, _), (y, z, _, _) = ends
+    return 8.0 * _EPS * max(abs(u), abs(y), abs(level)) + 1e-15 * max(abs(v), abs(z)) * macro_step
 
 
 def stays_above(start: Sample, end: Sample, size: float, level: float) -> bool:

@@ -7,12 +7,13 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import lru_cache, partial
 from math import isfinite
 from pathlib import Path
+from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -88,18 +89,18 @@ class Reals:
         self._names = ", ".join(names)
         self._fmu = fmu
         self._values: Any = (c_double * n)()
+        self._unpacked = partial(Struct(f"{n}d").unpack, self._values)
         references = (c_uint * n)(*[fmu.reference(name, "Real") for name in names])
         self._read = fmu.prepared("fmi2GetReal", references, c_size_t(n), self._values)
         self._write = fmu.prepared("fmi2SetReal", references, c_size_t(n), self._values)
         self.get()  # a wrong reference is found before the run
 
-    def get(self) -> list[float]:
+    def get(self) -> tuple[float, ...]:
         if (status := self._read()) > _WARNING:
             raise self._fmu.failed(status, f"cannot read {self._names}")
-        values: list[float] = self._values[:]
-        return values
+        return self._unpacked()
 
-    def set(self, values: list[float]) -> None:
+    def set(self, values: Sequence[float]) -> None:
         self._values[:] = values
         self._fmu.moved = True
         if (status := self._write()) > _WARNING:
@@ -352,8 +353,9 @@ class _FmuBody(Memory):
         self._marked_pending, self._marked_motion = self._pending, self._current
 
     def rewind(self) -> None:
-        self.fmu.rewind()
-        self._pending, self._current = self._marked_pending, self._marked_motion
+        if self.fmu.moved:
+            self.fmu.rewind()
+            self._pending, self._current = self._marked_pending, self._marked_motion
 
     def motion(self) -> Motion:
         return self._current
@@ -361,13 +363,13 @@ class _FmuBody(Memory):
     def apply_impulse(self, impulse: float) -> None:
         # The FMU applies it at the start of its next step; motion and energies already show it.
         self._pending += impulse
-        self._impulse.set([self._pending])
+        self._impulse.set((self._pending,))
         self._current = self._current._replace(velocity=self._current.velocity + impulse / self.mass)
 
-    def _advance(self, time: float, size: float, values: list[float], slopes: list[float]) -> None:
+    def _advance(self, time: float, size: float, values: Sequence[float], slopes: Sequence[float]) -> None:
         """``values`` of the forces and their ``slopes`` (Ḟ, F̈ of each) at the start of the step."""
         if not isfinite(sum(values) + sum(slopes)):
-            raise StepRefused(f"{self.fmu.path.name}: the force it should step under is not finite: {values}")
+            raise StepRefused(f"{self.fmu.path.name}: the force it should step under is not finite: {list(values)}")
         self._forces.set(values)
         if any(slopes):
             self._slopes[:] = slopes
@@ -385,17 +387,18 @@ class _FmuBody(Memory):
             raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
 
     def _read_motion(self) -> Motion:
-        motion = Motion(*self._motion.get())
-        if not isfinite(sum(motion)):
+        values = self._motion.get()
+        motion = Motion(*values)
+        if not isfinite(sum(values)):
             raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
         return motion
 
-    def _stored(self) -> list[float]:
+    def _stored(self) -> tuple[float, ...]:
         """The energies [J]; the kinetic one with the impulse that is still pending."""
         energies = self._energies.get()
         if self._pending != 0.0:
             before = self._current.velocity - self._pending / self.mass
-            energies[0] += 0.5 * self._pending * (before + self._current.velocity)
+            return (energies[0] + 0.5 * self._pending * (before + self._current.velocity), *energies[1:])
         return energies
 
     def close(self) -> None:
@@ -430,7 +433,7 @@ class FmuBeam(_FmuBody):
         return Reals(self.fmu, "tip_mass").get()[0]
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
-        self._advance(time, size, [contact[0]], [contact[1], contact[2]])
+        self._advance(time, size, contact[:1], contact[1:])
 
     def energies(self) -> Energies:
         return Energies(*self._stored())
@@ -460,7 +463,7 @@ class FmuSpring(_FmuBody):
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
         (c, dc, ddc), (n, dn, ddn) = contact, foundation
-        self._advance(time, size, [c, n], [dc, ddc, dn, ddn])
+        self._advance(time, size, (c, n), (dc, ddc, dn, ddn))
 
     def energies(self) -> Energies:
         kinetic, potential, dissipated = self._stored()

@@ -129,7 +129,7 @@ class Fmu {
     set("velocity", p.z);
     instance_.enter_initialization();
     instance_.exit_initialization();
-    start_ = instance_.save();
+    instance_.save(start_);
   }
   void step(double force, double H) {
     instance_.restore(start_);

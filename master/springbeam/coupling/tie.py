@@ -163,15 +163,17 @@ class Tie(Memory):
         return _transposed(columns)
 
     def _absolute_tolerance(self, start: Motion, beam: Motion, partner: Motion, size: float, by_force: Vector) -> float:
-        speed = max(abs(start.velocity), abs(beam.velocity), abs(partner.velocity))
-        change = max(size * speed, abs(beam.displacement - start.displacement))
-        reach = max(self._reach, abs(start.displacement), abs(beam.displacement), abs(partner.displacement))
+        (u0, v0, _, _), (u, v, _, _), (y, z, _, _) = start, beam, partner
+        change = max(size * max(abs(v0), abs(v), abs(z)), abs(u - u0))
+        reach = max(self._reach, abs(u0), abs(u), abs(y))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
         rounding = 16.0 * _EPS * max(reach, *map(abs, by_force))
         return max(self._tolerance * change, rounding)
 
 
 def _times(A: Matrix, x: Vector) -> Vector:
+    if len(x) == 1:
+        return [A[0][0] * x[0]]
     return [sum(map(mul, row, x)) for row in A]
 
 
