@@ -3,6 +3,7 @@
 #include <Eigen/SparseCholesky>
 
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -17,11 +18,64 @@ using Eigen::VectorXd;
 // Banded matrices stay banded in their natural order.
 using Factorisation = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
 
+/// LDLᵀ of linear elements, L stored by its three diagonals. The operations are those of Eigen's solver, in its order:
+/// the same bits, but no index is looked up and what the next unknown waits for stays in registers.
+class BandedFactors {
+ public:
+  void assign(const Factorisation& factorisation) {
+    const Factorisation::CholMatrixType& L = factorisation.matrixL().nestedExpression();
+    inverse_ = factorisation.vectorD().cwiseInverse();
+    diagonals_.setZero(3, L.cols());
+    for (Index j = 0; j < L.outerSize(); ++j) {
+      for (Factorisation::CholMatrixType::InnerIterator it(L, j); it; ++it) {
+        if (it.row() > j) diagonals_(it.row() - j - 1, j) = it.value();
+      }
+    }
+  }
+
+  /// x = (LDLᵀ)⁻¹ b
+  void solve(const VectorXd& b, VectorXd& x) const {
+    const Index n = b.size();
+    x.resize(n);
+    const auto at = [&b, n](Index i) { return i < n ? b[i] : 0.0; };
+    double y1 = at(0), y2 = at(1), y3 = at(2);
+    for (Index j = 0; j < n; ++j) {
+      const double* const L = diagonals_.data() + 3 * j;
+      const double y = y1;
+      y1 = y2 - y * L[0];
+      y2 = y3 - y * L[1];
+      y3 = at(j + 3) - y * L[2];
+      x[j] = y * inverse_[j];
+    }
+    double x1 = 0.0, x2 = 0.0, x3 = 0.0;
+    for (Index j = n - 1; j >= 0; --j) {
+      const double* const L = diagonals_.data() + 3 * j;
+      const double y = x[j] - L[0] * x1 - L[1] * x2 - L[2] * x3;
+      x3 = x2;
+      x2 = x1;
+      x1 = x[j] = y;
+    }
+  }
+
+ private:
+  Eigen::MatrixXd diagonals_;  // (k − 1, j): L(j + k, j)
+  VectorXd inverse_;           // of D
+};
+
 /// S = mass M + stiffness K of one step size, factorised.
 struct StepMatrix {
   double mass = 0.0, stiffness = 0.0;
   Eigen::SparseMatrix<double> matrix;
   Factorisation factorisation;
+  std::optional<BandedFactors> banded;  // of linear elements
+
+  void solve(const VectorXd& b, VectorXd& x) const {
+    if (banded) {
+      banded->solve(b, x);
+    } else {
+      x = factorisation.solve(b);
+    }
+  }
 };
 
 /// The midpoint rule's w without tip force. It is linear in that force: a coupling that repeats a step from one state
@@ -42,6 +96,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
         mu_(p.density * p.area),
         alpha_(p.alpha_b),
         midpoint_(p.rho_inf == 1.0),
+        linear_(p.element_degree == 1),
         alpha_m_((2.0 * p.rho_inf - 1.0) / (p.rho_inf + 1.0)),
         alpha_f_(p.rho_inf / (p.rho_inf + 1.0)),
         beta_(0.25 * (1.0 - alpha_m_ + alpha_f_) * (1.0 - alpha_m_ + alpha_f_)),
@@ -210,11 +265,12 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
 
   /// x = S⁻¹ rhs_ with one step of iterative refinement.
   void solve(const StepMatrix& S, VectorXd& x) {
-    x = S.factorisation.solve(rhs_);
+    S.solve(rhs_, x);
     mesh_.mass_times(x.data(), work_.data());
     mesh_.stiffness_times(x.data(), work2_.data());
     rhs_ -= S.mass * work_ + S.stiffness * work2_;
-    x += S.factorisation.solve(rhs_);
+    S.solve(rhs_, work_);
+    x += work_;
   }
 
   // Accepts work_ and work2_ as the new q and v, or throws.
@@ -269,12 +325,13 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     if (S.factorisation.info() != Eigen::Success) {
       throw std::domain_error("beam: the matrix of the time step cannot be factorised; use a smaller step size");
     }
+    if (linear_) S.banded.emplace().assign(S.factorisation);
   }
 
   Timoshenko mesh_;
   double mu_;     // ρA [kg/m]: all below is per ρA
   double alpha_;  // α_b [s]
-  bool midpoint_;
+  bool midpoint_, linear_;
   bool ordinary_;  // no coefficient is so large that an output could overflow, see integrator.hpp
   double alpha_m_, alpha_f_, beta_, gamma_;
   Eigen::SparseMatrix<double> K_, M_;  // with the same pattern

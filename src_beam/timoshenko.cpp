@@ -43,30 +43,32 @@ Timoshenko::Timoshenko(const Parameters& p)
 }
 
 // q is the element's part of the unknowns, its bubbles and its right node; θ̃₀ and u₀ are those of its left node.
-Timoshenko::Strains Timoshenko::strains(double theta0, double u0, const double* q) const {
-  const double half = 0.5 / r_, theta1 = q[2 * p_ - 2], u1 = q[2 * p_ - 1];
+template <typename Degree>
+Timoshenko::Strains Timoshenko::strains(Degree p, double theta0, double u0, const double* q) const {
+  const double half = 0.5 / r_, theta1 = q[2 * p - 2], u1 = q[2 * p - 1];
   Strains s;
   s.h_kappa[0] = theta1 - theta0;
   s.gamma[0] = (u1 - u0) / h_ - half * (theta0 + theta1);
-  for (Index k = 2; k <= p_; ++k) {
+  for (Index k = 2; k <= p; ++k) {
     s.h_kappa[k - 1] = 2.0 * q[2 * k - 4];
     s.gamma[k - 1] = 2.0 * q[2 * k - 3] / h_;
   }
-  if (p_ > 1) s.gamma[1] -= half * (theta1 - theta0);
-  for (Index k = 2; k <= p_; ++k) {
+  if (p > 1) s.gamma[1] -= half * (theta1 - theta0);
+  for (Index k = 2; k <= p; ++k) {
     const double slope = q[2 * k - 4] / (static_cast<double>(2 * k - 1) * r_);
     s.gamma[k - 2] += slope;
-    if (k < p_) s.gamma[k] -= slope;
+    if (k < p) s.gamma[k] -= slope;
   }
   return s;
 }
 
 // q points to the field's part of the element; its unknowns are every other one.
-Timoshenko::Field Timoshenko::field(double left, const double* q) const {
+template <typename Degree>
+Timoshenko::Field Timoshenko::field(Degree p, double left, const double* q) const {
   Field v;
   v.left = left;
-  v.right = q[2 * p_ - 2];
-  for (Index k = 2; k <= p_; ++k) {
+  v.right = q[2 * p - 2];
+  for (Index k = 2; k <= p; ++k) {
     const double part = q[2 * k - 4] / static_cast<double>(2 * k - 1);
     v.f[k] = part;
     if (k == 2) {
@@ -82,16 +84,17 @@ Timoshenko::Field Timoshenko::field(double left, const double* q) const {
   return v;
 }
 
-void Timoshenko::mass_times(const double* x, double* y) const {
+template <typename Degree>
+void Timoshenko::multiply_mass(Degree p, const double* x, double* y) const {
   const double m = h_ / 6.0;
-  const Index block = 2 * p_;
+  const Index block = 2 * p;
   for (Index f = 0; f < 2; ++f) {
     double node = 0.0;        // value at the left end; the clamp to begin with
     double l = 0.0, r = 0.0;  // linear part of the element to the left
     for (Index e = 0; e < n_; ++e) {
       const double* q = x + e * block + f;
       double* out = y + e * block + f;
-      const Field v = field(node, q);
+      const Field v = field(p, node, q);
       if (e > 0) *(out - 2) = m * (l + 2.0 * (r + v.left) + v.right);
       l = v.left;
       r = v.right;
@@ -100,7 +103,7 @@ void Timoshenko::mass_times(const double* x, double* y) const {
       std::array<double, max_element_degree + 1> moment;
       moment[0] = 3.0 * m * (l + r);
       moment[1] = m * (r - l);
-      for (Index k = 2; k <= p_; ++k) {
+      for (Index k = 2; k <= p; ++k) {
         moment[k] = h_ * v.f[k] / static_cast<double>(2 * k + 1);
         out[2 * k - 4] = (moment[k] - moment[k - 2]) / static_cast<double>(2 * k - 1);
       }
@@ -109,27 +112,28 @@ void Timoshenko::mass_times(const double* x, double* y) const {
   }
 }
 
-void Timoshenko::stiffness_times(const double* x, double* y) const {
+template <typename Degree>
+void Timoshenko::multiply_stiffness(Degree p, const double* x, double* y) const {
   const double lever = 0.5 * h_ / r_;
-  const Index block = 2 * p_;
+  const Index block = 2 * p;
   double theta0 = 0.0, u0 = 0.0;
   double moment = 0.0, shear = 0.0;  // of the element to the left
   for (Index e = 0; e < n_; ++e) {
     const double* q = x + e * block;
     double* out = y + e * block;
-    Strains s = strains(theta0, u0, q);
-    for (Index j = 0; j < p_; ++j) {  // strains become stresses
+    Strains s = strains(p, theta0, u0, q);
+    for (Index j = 0; j < p; ++j) {  // strains become stresses
       const double legendre = static_cast<double>(2 * j + 1);
-      s.h_kappa[j] *= bending_stiffness(j) / (h_ * legendre);
+      s.h_kappa[j] *= bending_stiffness(p, j) / (h_ * legendre);
       s.gamma[j] *= s_ / legendre;
     }
-    const double moment1 = p_ > 1 ? s.h_kappa[0] - lever * s.gamma[1] : s.h_kappa[0], shear1 = s.gamma[0];
+    const double moment1 = p > 1 ? s.h_kappa[0] - lever * s.gamma[1] : s.h_kappa[0], shear1 = s.gamma[0];
     if (e > 0) {
       *(out - 2) = (moment - moment1) - lever * (shear + shear1);
       *(out - 1) = shear - shear1;
     }
-    for (Index k = 2; k <= p_; ++k) {
-      const double jump = k < p_ ? s.gamma[k - 2] - s.gamma[k] : s.gamma[k - 2];
+    for (Index k = 2; k <= p; ++k) {
+      const double jump = k < p ? s.gamma[k - 2] - s.gamma[k] : s.gamma[k - 2];
       out[2 * k - 4] = 2.0 * s.h_kappa[k - 1] + 2.0 * lever / static_cast<double>(2 * k - 1) * jump;
       out[2 * k - 3] = 2.0 * s.gamma[k - 1];
     }
@@ -140,6 +144,14 @@ void Timoshenko::stiffness_times(const double* x, double* y) const {
   }
   y[tip_rotation_index()] = moment - lever * shear;
   y[tip_index()] = shear;
+}
+
+void Timoshenko::mass_times(const double* x, double* y) const {
+  p_ == 1 ? multiply_mass(Linear(), x, y) : multiply_mass(p_, x, y);
+}
+
+void Timoshenko::stiffness_times(const double* x, double* y) const {
+  p_ == 1 ? multiply_stiffness(Linear(), x, y) : multiply_stiffness(p_, x, y);
 }
 
 void Timoshenko::flexibility_times(const double* x, double* y) const {
@@ -164,7 +176,7 @@ void Timoshenko::flexibility_times(const double* x, double* y) const {
     if (p_ > 1) stress[block - 2] += lever * stress[1];
   }
   // Strains and displacements from the clamp.
-  const double bend = h_ / bending_stiffness(0), slide = h_ / s_;
+  const double bend = h_ / bending_stiffness(p_, 0), slide = h_ / s_;
   double theta0 = 0.0, u0 = 0.0;
   for (Index e = 0; e < n_; ++e) {
     double* q = y + e * block;
@@ -172,7 +184,7 @@ void Timoshenko::flexibility_times(const double* x, double* y) const {
     u0 += slide * q[block - 1] + lever * (theta0 + theta1);
     for (Index k = 2; k <= p_; ++k) {
       const double legendre = static_cast<double>(2 * k - 1);
-      q[2 * k - 4] *= 0.5 * h_ * legendre / bending_stiffness(k - 1);
+      q[2 * k - 4] *= 0.5 * h_ * legendre / bending_stiffness(p_, k - 1);
       q[2 * k - 3] *= 0.5 * slide * legendre;
     }
     if (p_ > 1) {
@@ -193,10 +205,10 @@ void Timoshenko::flexibility_times(const double* x, double* y) const {
 void Timoshenko::weighted_strains(const double* x, double* out) const {
   double theta0 = 0.0, u0 = 0.0;
   for (Index i = 0; i < size(); i += 2 * p_) {
-    const Strains s = strains(theta0, u0, x + i);
+    const Strains s = strains(p_, theta0, u0, x + i);
     for (Index j = 0; j < p_; ++j) {
       const double legendre = static_cast<double>(2 * j + 1);
-      out[i + 2 * j] = std::sqrt(bending_stiffness(j) / (h_ * legendre)) * s.h_kappa[j];
+      out[i + 2 * j] = std::sqrt(bending_stiffness(p_, j) / (h_ * legendre)) * s.h_kappa[j];
       out[i + 2 * j + 1] = std::sqrt(s_ * h_ / legendre) * s.gamma[j];
     }
     theta0 = x[i + 2 * p_ - 2];
@@ -236,7 +248,7 @@ double Timoshenko::mass_norm2(const Eigen::VectorXd& x) const {
   double linear = 0.0, rest = 0.0, theta0 = 0.0, u0 = 0.0;
   for (Index i = 0; i < size(); i += 2 * p_) {
     const double* q = x.data() + i;
-    const Field t = field(theta0, q), u = field(u0, q + 1);
+    const Field t = field(p_, theta0, q), u = field(p_, u0, q + 1);
     linear += (t.left * t.left + t.right * t.right + (t.left + t.right) * (t.left + t.right)) +
               (u.left * u.left + u.right * u.right + (u.left + u.right) * (u.left + u.right));
     for (Index j = 2; j <= p_; ++j) rest += (t.f[j] * t.f[j] + u.f[j] * u.f[j]) / static_cast<double>(2 * j + 1);
@@ -249,7 +261,7 @@ double Timoshenko::mass_norm2(const Eigen::VectorXd& x) const {
 double Timoshenko::stiffness_norm2(const Eigen::VectorXd& x) const {
   double bend = 0.0, top = 0.0, shear = 0.0, theta0 = 0.0, u0 = 0.0;
   for (Index i = 0; i < size(); i += 2 * p_) {
-    const Strains s = strains(theta0, u0, x.data() + i);
+    const Strains s = strains(p_, theta0, u0, x.data() + i);
     for (Index j = 0; j < p_; ++j) {
       const double kappa = s.h_kappa[j] / h_, legendre = static_cast<double>(2 * j + 1);
       (j + 1 < p_ ? bend : top) += kappa * kappa / legendre;
@@ -288,7 +300,7 @@ Eigen::SparseMatrix<double> Timoshenko::mass() const {
   for (Index j = 0; j <= p_; ++j) {
     Eigen::VectorXd unit = Eigen::VectorXd::Zero(2 * p_);
     if (j > 0) unit[2 * j - 2] = 1.0;
-    const Field v = field(j == 0 ? 1.0 : 0.0, unit.data());
+    const Field v = field(p_, j == 0 ? 1.0 : 0.0, unit.data());
     const double m = h_ / 6.0;
     element(0, j) = m * (2.0 * v.left + v.right);
     element(p_, j) = m * (v.left + 2.0 * v.right);
@@ -307,13 +319,13 @@ Eigen::SparseMatrix<double> Timoshenko::stiffness() const {
   for (Index i = 0; i < 2 * (p_ + 1); ++i) {
     Eigen::VectorXd unit = Eigen::VectorXd::Zero(2 * (p_ + 1));
     unit[i] = 1.0;
-    columns.push_back(strains(unit[0], unit[1], unit.data() + 2));
+    columns.push_back(strains(p_, unit[0], unit[1], unit.data() + 2));
   }
   return assemble([&](Index i, Index j) {
     const Strains &a = columns[i], &b = columns[j];
     double sum = 0.0;
     for (Index k = 0; k < p_; ++k) {
-      const double bend = bending_stiffness(k) * (a.h_kappa[k] / h_) * (b.h_kappa[k] / h_);
+      const double bend = bending_stiffness(p_, k) * (a.h_kappa[k] / h_) * (b.h_kappa[k] / h_);
       sum += h_ / static_cast<double>(2 * k + 1) * (bend + s_ * a.gamma[k] * b.gamma[k]);
     }
     return sum;

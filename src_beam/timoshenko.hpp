@@ -30,6 +30,8 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
+#include <type_traits>
+
 #include "beam.hpp"
 
 namespace beam {
@@ -82,9 +84,17 @@ class Timoshenko {
  private:
   struct Strains;
   struct Field;
-  Strains strains(double theta0, double u0, const double* q) const;
-  Field field(double left, const double* q) const;
-  double bending_stiffness(Eigen::Index j) const { return j + 1 < p_ ? b_ : b_top_; }
+  /// Known to the compiler, the degree of linear elements makes products three times as fast.
+  using Linear = std::integral_constant<Eigen::Index, 1>;
+  template <typename Degree>
+  Strains strains(Degree p, double theta0, double u0, const double* q) const;
+  template <typename Degree>
+  Field field(Degree p, double left, const double* q) const;
+  template <typename Degree>
+  void multiply_mass(Degree p, const double* x, double* y) const;
+  template <typename Degree>
+  void multiply_stiffness(Degree p, const double* x, double* y) const;
+  double bending_stiffness(Eigen::Index p, Eigen::Index j) const { return j + 1 < p ? b_ : b_top_; }
   template <typename Entry>
   Eigen::SparseMatrix<double> assemble(const Entry& entry) const;
   void sample(const double* q, int field, double* values) const;

@@ -116,8 +116,8 @@ def position_tolerance(ends: tuple[Motion, Motion], level: float, macro_step: fl
 
 def stays_above(start: Sample, end: Sample, size: float, level: float) -> bool:
     """Whether the cubic is bound to stay above ``level``: its Bézier points do, and it lies in their hull."""
-    third = size / 3.0
-    return min(start[0], start[0] + third * start[1], end[0] - third * end[1], end[0]) >= level
+    (f0, d0), (f1, d1), third = start, end, size / 3.0
+    return f0 >= level and f1 >= level and f0 + third * d0 >= level and f1 - third * d1 >= level
 
 
 def lowest_inside(start: Sample, end: Sample, size: float) -> float | None:
@@ -156,10 +156,13 @@ def interpolated(start: Motion, end: Motion, size: float, tau: float) -> Sample:
 
 def cubic_crossing(start: Sample, end: Sample, size: float) -> float:
     """τ where the cubic falls through zero, by bisection; f(size) < 0."""
+    d0, d1, rise = start[1] * size, end[1] * size, end[0] - start[0]
+    f0, b, a = start[0], 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise
     low, high = 0.0, size
     for _ in range(60):
         middle = 0.5 * (low + high)
-        value = cubic_value(start, end, size, middle)
+        x = middle / size
+        value = f0 + x * (d0 + x * (b + x * a))
         # Starting on zero and rising is still "before": only the side that ends below counts.
         if value > 0.0 or (value == 0.0 and middle < 0.5 * size):
             low = middle
