@@ -204,7 +204,9 @@ class Coupling(_Table):
         if self.scheme == "auto" and self.degree > 0:
             raise ValueError(f'degree = {self.degree}: scheme = "auto" picks the degree; leave it out')
         if self.scheme in DISPLACEMENT_DRIVEN and self.degree > 0:
-            raise ValueError(f'degree = {self.degree}: scheme = "{self.scheme}" exchanges one force a step, degree 0; leave it out')
+            raise ValueError(
+                f'degree = {self.degree}: scheme = "{self.scheme}" exchanges one force a step, degree 0; leave it out'
+            )
         if self.scheme in ORDINARY_SCHEMES and self.degree > 1:
             raise ValueError(f'degree = {self.degree}: scheme = "{self.scheme}" extrapolates with degree 0 or 1')
         return self
