@@ -5,17 +5,18 @@ The error is that of the coupling and the time integration, for the scene's own 
 
 Runs with more and more macro steps follow each other until two agree in the order of their events, and in their
 displacements and event times: if the finer one has ρ times the steps and its error is of order 2 in H or more, that
-error is at most the difference over ρ² − 1.
+error is at most the difference over ρ² − 1. Each takes the scheme that `springbeam.automatic` takes for its macro step.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from .automatic import choice
 from .crosscheck import contact_changes
 from .runner import simulate
 from .scene import Scene, SceneError, scene_from_dict, with_changes
@@ -37,12 +38,22 @@ class Picked:
     """A scene that keeps the accuracy, and what is known about it."""
 
     asked: float
-    scene: Scene  #: asks for no accuracy: it says how it is run
+    run: Trajectory  #: the last pilot run, which keeps it
     displacement_error: float  #: estimate, relative to the largest change of the tip (or spring top)
     event_error: float  #: estimate of the largest error of a change of contact, relative to the time that is run
     events: int  #: changes of contact that this is about, those longer than four macro steps
     pilot_runs: int
+    pilot_steps: int  #: doStep calls of the pilot runs before the last
     pilot_time: float  #: [s]
+
+    @property
+    def scene(self) -> Scene:
+        """Asks for no accuracy: it says how it is run."""
+        return self.run.scene
+
+    def trajectory(self) -> Trajectory:
+        """The run, what was picked and found in its summary."""
+        return replace(self.run, summary={**self.run.summary, "accuracy": self.summary()})
 
     def summary(self) -> dict[str, Any]:
         """As it goes into ``summary.json``."""
@@ -61,12 +72,13 @@ class Picked:
             "estimated_event_error": self.event_error,
             "events_compared": self.events,
             "pilot_runs": self.pilot_runs,
+            "pilot_steps": self.pilot_steps,
             "pilot_time": self.pilot_time,
         }
 
 
 def pick(scene: Scene) -> Picked:
-    """Settings with which ``scene`` keeps its ``accuracy``.
+    """Settings with which ``scene`` keeps its ``accuracy``, and the run with them.
 
     Raises
     ------
@@ -88,14 +100,10 @@ class _Search:
         self._scene, self._accuracy = scene_from_dict(data), accuracy
         self._span = scene.time.t_end - (scene.contact_time or 0.0)
         self._order = _EXPECTED["compliance" if scene.contact.law == "compliance" else "transmission"]
-        degree = 0 if scene.contact.law == "compliance" or scene.beam is None else 2
-        if scene.beam is not None and scene.beam.integrator == "generalized_alpha":
-            degree = 0  # it sees only the mean of the contact force
-        self._scheme = {"scheme": "energy", "degree": degree}
 
     def run(self) -> Picked:
         steps = _FEWEST
-        coarse, spent, runs, growth, worst = self._with(steps), 0.0, 1, 2.0, 1.0
+        coarse, spent, calls, runs, growth, worst = self._with(steps), 0.0, 0, 1, 2.0, 1.0
         while True:
             steps = math.ceil(growth * steps)
             if steps > _MOST:
@@ -107,13 +115,14 @@ class _Search:
                     "less, or shorten [time] t_end"
                 )
             spent += float(coarse.summary["wall_time"])
+            calls += _calls(coarse)
             fine, runs = self._with(steps), runs + 1
             ratio = coarse.scene.coupling.H / fine.scene.coupling.H
             error, event_error, events = self._difference(coarse, fine)
-            share = 1.0 / (ratio**_TRUSTED - 1.0)
             worst = max(error, event_error)
+            share = 1.0 / (ratio**_TRUSTED - 1.0)
             if share * worst <= self._accuracy / _SAFETY:
-                return Picked(self._accuracy, fine.scene, share * error, share * event_error, events, runs - 1, spent)
+                return Picked(self._accuracy, fine, share * error, share * event_error, events, runs - 1, calls, spent)
             # What the expected order makes of the difference; other events tell nothing about it.
             expected = worst / (ratio**self._order - 1.0)
             growth = 1.2 * (_SAFETY * expected / self._accuracy) ** (1.0 / self._order) if worst < 1.0 else 2.0
@@ -121,11 +130,15 @@ class _Search:
             coarse = fine
 
     def _with(self, steps: int) -> Trajectory:
-        tables: dict[str, dict[str, Any]] = {"coupling": {**self._scheme, "macro_step": self._span / steps}}
+        tables: dict[str, dict[str, Any]] = {"coupling": {**self._scheme(steps), "macro_step": self._span / steps}}
         if self._scene.spring is not None:
             tolerance = min(max(_IDA_SHARE * self._accuracy, _TIGHTEST), _LOOSEST)
             tables["spring"] = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
         return simulate(with_changes(self._scene, **tables))
+
+    def _scheme(self, steps: int) -> dict[str, Any]:
+        taken = choice(with_changes(self._scene, coupling={"macro_step": self._span / steps}))
+        return {"scheme": taken.scheme, "degree": taken.degree}
 
     def _difference(self, coarse: Trajectory, fine: Trajectory) -> tuple[float, float, int]:
         """Of displacement, relative to its change; of event times, relative to the span; the number of events.
@@ -143,6 +156,10 @@ class _Search:
             return displacement, 1.0, 0
         apart = [abs(a - b) for (_, a), (_, b) in zip(ours, theirs, strict=True)]
         return displacement, max(apart, default=0.0) / self._span, len(ours)
+
+
+def _calls(run: Trajectory) -> int:
+    return sum(int(run.summary.get(f"{body}_steps", 0)) for body in ("beam", "spring"))
 
 
 def _common(coarse: np.ndarray, fine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -239,6 +239,17 @@ class MemoryRecorder(_Checks):
         return Trajectory(self.scene, columns, list(self._events), shapes, dict(self._summary))
 
 
+def replay(trajectory: Trajectory, recorder: Recorder) -> None:
+    """Record a run that has been made, to its end, as if it were made now."""
+    for i in range(len(trajectory)):
+        recorder.row({name: values[i] for name, values in trajectory.columns.items()})
+    for event in trajectory.events:
+        recorder.event(event)
+    for time, deflection in zip(*(trajectory.shapes or ((), ())), strict=True):
+        recorder.shape(float(time), deflection)
+    recorder.finish({key: value for key, value in trajectory.summary.items() if key != "scene"})
+
+
 @dataclasses.dataclass(frozen=True)
 class RunDirectory:
     """The files of one run."""

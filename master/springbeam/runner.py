@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Mapping
 from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
@@ -30,7 +29,6 @@ def run(
     *,
     seconds: float | None = None,
     start: Checkpoint | None = None,
-    further: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Co-simulate ``scene`` into ``recorder`` and return the summary.
 
@@ -47,8 +45,6 @@ def run(
         whenever so much time of the clock has passed [s].
     start
         Go on from here, `last_checkpoint` of the directory of ``recorder``, instead of from the start.
-    further
-        Added to the summary.
 
     Raises
     ------
@@ -113,7 +109,6 @@ def run(
             summary = {
                 **status,
                 "version": version("springbeam"),
-                **(further or {}),
                 **simulation.summary(),
                 **_calls(beam=beam, spring=spring),
                 "setup_time": loaded - began,
@@ -185,14 +180,12 @@ def resume(directory: str | Path, progress: Progress | None = None) -> Trajector
 
 def simulate(scene: Scene, progress: Progress | None = None) -> Trajectory:
     """Co-simulate ``scene`` and return the trajectory. Raises as `run` does, and as `springbeam.accuracy.pick` does."""
-    further = {}
     if scene.accuracy is not None:
         from .accuracy import pick
 
-        picked = pick(scene)
-        scene, further = picked.scene, {"accuracy": picked.summary()}
+        return pick(scene).trajectory()
     recorder = MemoryRecorder(scene)
-    run(scene, recorder, progress, further=further)
+    run(scene, recorder, progress)
     return recorder.trajectory()
 
 

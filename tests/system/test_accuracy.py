@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from springbeam.cli import app
 from springbeam.monolithic import event_driven
-from springbeam.recording import MemoryRecorder
+from springbeam.recording import MemoryRecorder, load_trajectory
 from springbeam.runner import run, simulate
 from springbeam.scene import SceneError, scene_from_dict
 
@@ -93,4 +93,11 @@ def test_command(tmp_path):
     summary = json.loads((out / "summary.json").read_text())
     assert summary["accuracy"]["asked"] == 1e-4
     assert summary["scene"]["coupling"]["macro_step"] == summary["accuracy"]["picked"]["macro_step"]
+    assert summary["status"] == "done"
+    written = load_trajectory(out)
+    again = simulate(written.scene)  # the last pilot run is the result, and that of the scene which it was picked for
+    for name in written.columns:
+        np.testing.assert_array_equal(written[name], again[name])
+    assert written.events == again.events
+    np.testing.assert_array_equal(written.shapes[1], again.shapes[1])
     assert CliRunner().invoke(app, [*arguments[:-1], "2", "--out", str(tmp_path / "no")]).exit_code == 2

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Mapping
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -18,9 +17,9 @@ from rich.text import Text
 
 from ..checkpoint import Checkpoint
 from ..fmu import FmuError
-from ..recording import FileRecorder, NonFiniteValue, RunDirectory, load_events, load_summary, load_trajectory
+from ..recording import FileRecorder, NonFiniteValue, RunDirectory, load_events, load_summary, load_trajectory, replay
 from ..scene import Scene, load_scene, scene_from_dict
-from ..trajectory import Event, rounded
+from ..trajectory import Event, Trajectory, rounded
 from .common import (
     BAD_INPUT,
     STOPPED,
@@ -81,23 +80,23 @@ def run(
             if not 0.0 < accuracy < 1.0:
                 fail(BAD_INPUT, f"--accuracy {accuracy:g}: must be between 0 and 1, as in --accuracy 1e-4")
             what = scene_from_dict({**what.model_dump(exclude_none=True), "accuracy": accuracy}, source=scene)
-        what, picked = _picked(what)
+        made = _picked(what)
+        what = what if made is None else made.scene
         directory = _run_directory(scene, out, force)
-    carry_out(what, directory, seconds=checkpoint, no_plots=no_plots, quiet=quiet, as_json=as_json, further=picked)
+    carry_out(what, directory, seconds=checkpoint, no_plots=no_plots, quiet=quiet, as_json=as_json, made=made)
 
 
-def _picked(scene: Scene) -> tuple[Scene, dict[str, Any]]:
-    """The scene that keeps the accuracy asked for, if any, and what the summary says of it."""
+def _picked(scene: Scene) -> Trajectory | None:
+    """The run that keeps the accuracy asked for, if any is."""
     if scene.accuracy is None:
-        return scene, {}
+        return None
     from ..accuracy import pick
     from ..runner import RunStopped
 
     try:
-        picked = pick(scene)
+        return pick(scene).trajectory()
     except RunStopped as stopped:
         fail(STOPPED, f"a pilot run for accuracy = {scene.accuracy:g} {stopped}")
-    return picked.scene, {"accuracy": picked.summary()}
 
 
 def carry_out(
@@ -109,14 +108,17 @@ def carry_out(
     no_plots: bool,
     quiet: bool,
     as_json: bool,
-    further: Mapping[str, Any] | None = None,
+    made: Trajectory | None = None,
 ) -> None:
-    """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.runner.run`."""
+    """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.runner.run`.
+
+    A run that is already ``made`` is only written.
+    """
     console = console_for(silent=quiet or as_json)
     recorder = FileRecorder(scene, directory)
     try:
         with bad_input_reported():
-            error = _run_into(recorder, seconds, start, further, quiet=quiet)
+            error = _run_into(recorder, seconds, start, made, quiet=quiet)
     finally:
         if not recorder.begun:
             directory.discard()
@@ -157,7 +159,7 @@ def _run_into(
     recorder: FileRecorder,
     seconds: float | None,
     start: Checkpoint | None,
-    further: Mapping[str, Any] | None,
+    made: Trajectory | None,
     *,
     quiet: bool,
 ) -> str | None:
@@ -171,7 +173,10 @@ def _run_into(
     t_end = recorder.scene.time.t_end
     with recorder, _ProgressBar(t_end, quiet=quiet) as progress:
         try:
-            run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start, further=further)
+            if made is not None:
+                replay(made, recorder)
+            else:
+                run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start)
             return None
         except RunStopped as stopped:
             status, cause = "stopped", str(stopped)
