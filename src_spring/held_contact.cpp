@@ -44,12 +44,19 @@ void HeldContact::advance(const TipMessage& seen, double y, const Top& top) {
 
 void HeldContact::choose(double y, double free, const Top& top) {
   const double start = y - tip_, yielding = response_[0] + yielding_;
-  double low = 0.0, high = std::numeric_limits<double>::infinity(), force = force_;
+  double low = 0.0, high = std::numeric_limits<double>::infinity();
+  double force = std::isfinite(force_) ? force_ : 0.0;
   // The top answers almost like a free mass, then two or three trials do; an impact on the foundation takes more.
   for (int trial = 0; trial < 60; ++trial) {
-    const double at_rest = top(force) + yielding_ * force - free;
+    const double reached = top(force);
+    if (!std::isfinite(reached)) break;
+    const double at_rest = reached + yielding_ * force - free;
     const double wanted = mean(start, at_rest - yielding * force);
-    if (std::abs(wanted - force) <= 1e-13 * force || !std::isfinite(wanted)) break;
+    if (!std::isfinite(wanted)) {
+      force = wanted;
+      break;
+    }
+    if (std::abs(wanted - force) <= 1e-13 * force) break;
     (wanted > force ? low : high) = force;
     double next = root(start, at_rest, yielding);
     if (!(low < next && next < high) && std::isfinite(high)) next = low + (high - low) / 2;

@@ -27,7 +27,8 @@ class HeldContact {
   /// @throws std::invalid_argument naming the value and what is allowed
   HeldContact(const Compliance& law, double mass, double size, const std::array<double, 2>& response);
 
-  /// Where the top would be [m] after a step of H under a force [N] held over it.
+  /// Where the top would be [m] after a step of H under a force [N] held over it; NaN if that is not known or would
+  /// take too long: then the last force asked for stays.
   using Top = std::function<double(double)>;
 
   /// Before the first step, whenever `seen` changes: choose its force, the top being at y. w then stands for the first
@@ -38,7 +39,8 @@ class HeldContact {
   /// A step was made under force(), at whose start the tip was `seen`, and the top is at y: choose the next force.
   void advance(const TipMessage& seen, double y, const Top& top);
 
-  double force() const { return force_; }                          ///< C over the next step [N]
+  /// C over the next step [N]; not finite if the law leaves the range of floating-point numbers.
+  double force() const { return force_; }
   double energy(double y) const { return law_.energy(y - tip_); }  ///< Φ [J]
   double tip() const { return tip_; }                              ///< u_tip now [m], as foreseen
   double size() const { return size_; }                            ///< H [s]

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -60,8 +61,8 @@ struct SpringModel final : fmi::Model {
 
   void step(double size) override {
     if (held && std::abs(size - held->size()) > 1e-6 * held->size()) {
-      throw std::invalid_argument("a step of " + fmi::text(size) + " s, but communication_step = " +
-                                  fmi::text(held->size()) + " s: steps must have that size, or the parameter be 0");
+      throw fmi::StepDiscarded("a step of " + fmi::text(size) + " s, but communication_step = " +
+                               fmi::text(held->size()) + " s: steps must have that size, or the parameter be 0");
     }
     std::vector<double> before;
     if (impulse != 0.0 || held) save(before);
@@ -114,6 +115,7 @@ struct SpringModel final : fmi::Model {
   }
 
  private:
+  static constexpr long most_trial_work = 100'000;  ///< of IDA's steps for one force
   static constexpr const char* no_force =
       "spring: the contact force leaves the range of floating-point numbers; the tip is too far or too fast";
 
@@ -125,15 +127,17 @@ struct SpringModel final : fmi::Model {
     spring->save(present);
     spring::Inputs acting = inputs;
     for (auto* input : {&acting.contact_force, &acting.foundation_force}) (*input)[1] = (*input)[2] = 0.0;
-    return [this, present, acting](double force) mutable {
+    return [this, present, acting, work = 0L](double force) mutable {
+      constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+      if (work > most_trial_work) return unknown;
       acting.contact_force[0] = force;
-      const double size = held->size(), y = spring->displacement();
+      const long before = spring->ida_steps();
       try {
-        spring->step(size, acting);
+        spring->step(held->size(), acting);
       } catch (const spring::StepFailure&) {
-        // The step itself will tell, if it fails too.
-        return y + size * (spring->velocity() - size * force / (2.0 * parameters.mass));
+        return unknown;  // the step itself will tell
       }
+      work += spring->ida_steps() - before;
       const double reached = spring->displacement();
       spring->restore(present);
       return reached;

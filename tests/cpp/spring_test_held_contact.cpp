@@ -181,6 +181,23 @@ TEST(HeldContact, EnergyIsConservedThroughImpactsOfTheTop) {
   EXPECT_GT(impulses, 0.0);
 }
 
+TEST(HeldContact, WhereTheTopGoesMayBeUnknown) {
+  Collision c(Compliance(1e6, 1.5), 0.0, 1e-3);
+  const double force = c.contact.force();
+  EXPECT_GT(force, 0.0);
+  c.contact.advance(c.seen, c.top.x, [](double) { return std::numeric_limits<double>::quiet_NaN(); });
+  EXPECT_EQ(c.contact.force(), force);
+}
+
+TEST(HeldContact, AForceOutOfRangeIsNoForce) {
+  Collision c(Compliance(1e6, 1.5), 0.0, 1e-3);
+  const double force = c.contact.force();
+  c.contact.begin({-1e300, 0.0}, 0.0, c.foresee());
+  EXPECT_FALSE(std::isfinite(c.contact.force()));
+  c.contact.begin(c.seen, 0.0, c.foresee());
+  EXPECT_NEAR(c.contact.force(), force, 1e-12 * force);
+}
+
 TEST(HeldContact, ARestoredStateGoesOnBitByBit) {
   Collision c(Compliance(1e6, 1.5), 1e-4, 1e-3);
   for (int i = 0; i < 2; ++i) c.step();
