@@ -127,3 +127,14 @@ def test_command(tmp_path):
     assert {row["family"] for row in rows} >= {"energy 0", "DOP853"}
     assert all(row["u_tip_max"] == "" for row in rows)
     assert (tmp_path / "out" / "tradeoff.png").stat().st_size > 10_000
+
+
+def test_explicit_solvers_are_not_sent_after_a_mode_that_is_too_fast_for_them():
+    """3.5e6 rad/s for 3 s are a million steps of DOP853; on `soft` to its first impact they are 40."""
+
+    def left_out(name, until):
+        every = configurations(with_changes(load_scene(name), time={"t_end": until}))
+        return {c.method for c in every if tradeoff._hopeless(c)}
+
+    assert left_out("bar-impact", 3.0) == {"DOP853", "LSODA"}
+    assert left_out("soft", 0.0712) == set()
