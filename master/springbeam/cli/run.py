@@ -259,9 +259,9 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         found = summary["accuracy"]
         how = "{scheme} {degree}, H = {macro_step:.3g} s".format(**found["picked"])
         console.print(
-            f"accuracy  {found['asked']:g} asked; {how}; "
-            f"errors {found['estimated_displacement_error']:.1e} (displacement), {found['estimated_event_error']:.1e} "
-            f"(times of {found['events_compared']} events)"
+            f"accuracy  {found['asked']:g} asked: {how}\n"
+            f"          errors {found['estimated_displacement_error']:.1e} (displacement), "
+            f"{found['estimated_event_error']:.1e} (times of {found['events_compared']} events)"
         )
     for warning in summary.get("warnings", ()):
         console.print(Text(f"warning   {warning}"))
