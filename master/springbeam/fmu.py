@@ -14,7 +14,7 @@ from functools import lru_cache, partial
 from math import isfinite
 from pathlib import Path
 from struct import Struct
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from fmpy.fmi1 import FMICallException
@@ -302,7 +302,7 @@ class Fmu(Memory):
 class _FmuBody(Memory):
     """What both bodies do alike; a subclass names its variables."""
 
-    REMEMBERED = ("fmu", "_pending", "_current")
+    REMEMBERED: ClassVar[tuple[str, ...]] = ("fmu", "_pending", "_current")
 
     _MOTION: tuple[str, ...]
     _ENERGIES: tuple[str, ...]
@@ -446,6 +446,8 @@ class FmuBeam(_FmuBody):
 class FmuSpring(_FmuBody):
     """``spring.fmu`` as a body; contact law and foundation are the master's."""
 
+    REMEMBERED = (*_FmuBody.REMEMBERED, "_dissipated_before")
+
     _MOTION = ("displacement", "velocity", "displacement_integral", "displacement_integral_2")
     _ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy")
     _IMPULSE = "impulse"
@@ -456,6 +458,7 @@ class FmuSpring(_FmuBody):
         self._parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
         self._parameters["displacement"] = spring.equilibrium
         self._parameters["velocity"] = spring.initial_velocity
+        self._dissipated_before = 0.0  #: before the last `restart` [J]
         super().__init__(Fmu("spring", fmu_directory() / "spring.fmu", self._parameters, start_time))
 
     def _mass(self) -> float:
@@ -467,7 +470,8 @@ class FmuSpring(_FmuBody):
 
     def energies(self) -> Energies:
         kinetic, potential, dissipated = self._stored()
-        return Energies(kinetic, potential, dissipated, -self._spring.external_force * self._current.displacement)
+        load = -self._spring.external_force * self._current.displacement
+        return Energies(kinetic, potential, self._dissipated_before + dissipated, load)
 
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)
@@ -486,8 +490,12 @@ class FmuSpring(_FmuBody):
             raise FmuError(f"{self.fmu.path}: internal_steps = {steps}")
         return round(steps)
 
-    def restart(self, time: float, displacement: float, velocity: float) -> None:
-        """Start again at ``time`` [s] from y [m] and z [m/s], by the exact start values of the FMU."""
+    def restart(self, time: float, displacement: float, velocity: float, dissipated: float = 0.0) -> None:
+        """Start again at ``time`` [s] from y [m] and z [m/s], by the exact start values of the FMU.
+
+        ``dissipated`` is what damping has taken until then [J].
+        """
+        self._dissipated_before = dissipated
         self.fmu.reset(time, {**self._parameters, "displacement": displacement, "velocity": velocity})
         self._pending = 0.0
         self._begin()

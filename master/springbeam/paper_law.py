@@ -28,8 +28,8 @@ _TOLERANCE = 1e-12
 
 
 class RestartableBody(Body, Protocol):
-    def restart(self, time: float, displacement: float, velocity: float) -> None:
-        """Start again at ``time`` [s] from a displacement [m] and velocity [m/s]."""
+    def restart(self, time: float, displacement: float, velocity: float, dissipated: float = 0.0) -> None:
+        """Start again at ``time`` [s] from a displacement [m] and velocity [m/s], ``dissipated`` [J] until then."""
 
 
 class PaperLaw(Memory):
@@ -114,7 +114,7 @@ class PaperLaw(Memory):
         z = self._spring.motion().velocity
         if self.scene.contact.impact == "tip":
             z = self._beam.motion().velocity
-        self._spring.restart(self.time, self._parameters.equilibrium, z)
+        self._spring.restart(self.time, self._parameters.equilibrium, z, self._spring.energies().dissipated)
         self._event("impact")
 
     def _measure_beam(self) -> None:
@@ -145,7 +145,7 @@ class PaperLaw(Memory):
             spring.advance(self.time, self.h, NO_FORCE)
             return "free", 0.0, 0.0, 0.0
         u_new = self._predicted_tip(u_free, u)  # line 9
-        energy = self._spring_energy()
+        kinetic, potential, dissipated, _ = spring.energies()
         y_new, pressing = self._spring_end(y, y)  # line 10
         acting, phase, foundation = self._stiffness, "free", 0.0
         if psi < y_new < u_new:  # lines 11–13
@@ -153,17 +153,17 @@ class PaperLaw(Memory):
         elif u_new <= psi or u_new <= y_new:  # line 14
             phase = "tied"
             self._stiffness = acting = self.scene.contact.stiffness  # line 15
-            spring.restart(self.time, u_new, z)  # line 16
+            spring.restart(self.time, u_new, z, dissipated)  # line 16
             y_new, pressing = self._spring_end(u_new, u_new)  # line 17
             if y_new <= self._phi:  # lines 20–24
                 phase, y_new = "seated", self._phi
-                spring.restart(self.time, y, z)
+                spring.restart(self.time, y, z, dissipated)
                 pressing = 0.5 * (self._law(y_new) + self._law(y))
                 foundation = self._foundation_force(pressing)
             u_new = y_new  # lines 18, 21
             z_new = 2.0 * (y_new - y) / self.h - z  # line 29
             if phase == "seated":
-                spring.restart(self.time + self.h, y_new, z_new)
+                spring.restart(self.time + self.h, y_new, z_new, spring.energies().dissipated)
             else:  # the spring has come to y_new: only its velocity is another
                 spring.apply_impulse(spring.mass * (z_new - spring.motion().velocity))
         contact = (u_new - u_free) / self._beam_response  # lines 13, 19, 22
@@ -173,7 +173,7 @@ class PaperLaw(Memory):
         # What no force of the model does: the overwritten tip's work on the beam, the exchanged yˡ on the spring.
         self._injected["beam"] += (contact - inside) * (u_new - u)
         worked = (foundation - pressing + self._parameters.external_force) * (y_new - y)
-        self._injected["spring"] += self._spring_energy() - energy - worked
+        self._injected["spring"] += self._spring_energy() - kinetic - potential - worked
         return phase, contact, inside, foundation
 
     def _predicted_tip(self, u_free: float, u: float) -> float:

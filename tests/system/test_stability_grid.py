@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from springbeam import load_scene, simulate, with_changes
 from springbeam.cli import app
 from springbeam.ledger import APPROXIMATE, EXACT, bounds
+from springbeam.simulation import Simulation
 from springbeam.stability import grid
 from springbeam.stability.cells import AXES, SLICES, sampled_cells, scene_dict, slice_cells
 from springbeam.stability.grid import CLASSES, Outcome, judged, run_cell, run_cells, write_csv
@@ -104,7 +105,7 @@ def test_what_cannot_be_run_is_refused_and_a_crash_is_garbage(monkeypatch):
     def crash(*_: object) -> None:
         raise ZeroDivisionError("nothing there")
 
-    monkeypatch.setattr(grid, "run", crash)
+    monkeypatch.setattr(Simulation, "_advance", crash)
     outcome = run_cell(slice_cells(2)[0])
     assert (outcome.kind, outcome.reason) == ("garbage", "crashed: ZeroDivisionError: nothing there")
 

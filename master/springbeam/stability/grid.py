@@ -46,8 +46,8 @@ _OVERLAP = 1e-9
 _SLACK = 1e-10
 
 
-class _Enough(Exception):
-    """The cell has taken all the steps that it may."""
+class _Enough(BaseException):
+    """The cell has taken all the steps that it may; no error, which a run would turn into a stop."""
 
 
 @dataclass
@@ -86,9 +86,10 @@ def run_cell(cell: dict[str, Any]) -> Outcome:
         cause = stopped.cause
     except _Enough:
         pass
-    except Exception as error:  # noqa: BLE001 - a crash is what this grid is to find
-        return Outcome("garbage", f"crashed: {type(error).__name__}: {error}")
-    return judged(recorder.trajectory(), cause)
+    found = recorder.trajectory()
+    if "traceback" in found.summary:  # an error that nobody foresaw
+        return Outcome("garbage", f"crashed: {cause}")
+    return judged(found, cause)
 
 
 def judged(run: Trajectory, cause: str = "") -> Outcome:
