@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import textwrap
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -36,8 +37,8 @@ if TYPE_CHECKING:
     from ..stability.grid import Outcome
     from ..stability.predict import Prediction
 
-#: Reasons that the summary lists, the most frequent ones.
-_REASONS = 12
+#: Reasons that the summary lists, the most frequent ones, and characters of each.
+_REASONS, _REASON_WIDTH = 12, 66
 
 
 def predict(
@@ -109,6 +110,10 @@ def _schemes_table(p: Prediction) -> Table:
 
 
 def stability(
+    critical: Annotated[
+        bool,
+        typer.Option("--critical", help="Instead: critical macro steps of all schemes, predicted and measured."),
+    ] = False,
     samples: Annotated[
         int, typer.Option("--samples", metavar="N", min=0, help="Cells of the hypercube over all parameters.")
     ] = 300,
@@ -130,6 +135,9 @@ def stability(
 
     Example: springbeam stability --samples 100 --resolution 0
     """
+    if critical:
+        _critical(quiet=quiet, as_json=as_json)
+        return
     from concurrent.futures.process import BrokenProcessPool
 
     from ..stability.cells import sampled_cells, slice_cells
@@ -186,6 +194,60 @@ def stability(
         raise typer.Exit(DISAGREES)
 
 
+#: Predicted and measured critical macro steps agree so far, and constants of the two-mass oscillator.
+_AGREEMENT = 0.05
+
+
+def _critical(*, quiet: bool, as_json: bool) -> None:
+    """Critical macro steps and the constants of the two-mass oscillator; exit code 1 if they are not as predicted."""
+    from ..stability import two_mass
+    from ..stability.critical import LARGE_STEP, comparisons
+    from ..stability.predict import THRESHOLD
+
+    steps = Table(box=None, pad_edge=False, header_style="bold", title="critical macro steps", title_justify="left")
+    steps.add_column("coupling", no_wrap=True)
+    for name in ("λ [N/m]", "predicted [s]", "measured [s]", "differ by", f"at {LARGE_STEP:g} s"):
+        steps.add_column(Text(name), justify="right", no_wrap=True)
+    found, agree = [], True
+    with bad_input_reported():
+        for c in comparisons():
+            stable = c.growth <= 1.0 + THRESHOLD
+            cells = ("none", "", "")
+            if c.predicted is None:
+                agree &= stable
+            elif c.measured is None:
+                agree = False
+                cells = (f"{c.predicted:.4g}", "none", "")
+            else:
+                differ = c.measured / c.predicted - 1.0
+                agree &= abs(differ) <= _AGREEMENT
+                cells = (f"{c.predicted:.4g}", f"{c.measured:.4g}", f"{100.0 * differ:+.2f} %")
+            agree &= stable == (c.radius <= 1.0 + THRESHOLD)
+            found.append({**asdict(c), "stable": stable})
+            stiffness = f"{c.stiffness:g}" if c.law == "compliance" else "tie"
+            steps.add_row(f"{c.scheme} {c.degree}", stiffness, *cells, "stable" if stable else "unstable")
+    masses = Table(box=None, pad_edge=False, header_style="bold", title="two masses: growth 1 + cπ²H²",
+                   title_justify="left")  # fmt: skip
+    masses.add_column("exchange", no_wrap=True)
+    for name in ("c", "predicted", "measured"):
+        masses.add_column(name, justify="right", no_wrap=True)
+    constants = []
+    for exchange, constant in two_mass.CONSTANTS.items():
+        predicted, measured = two_mass.predicted(exchange, 1e-3), two_mass.measured(exchange, 1e-3)
+        agree &= max(abs(predicted - constant), abs(measured - constant)) <= _AGREEMENT * max(constant, 1.0)
+        constants.append({"exchange": exchange, "c": constant, "predicted": predicted, "measured": measured})
+        masses.add_row(exchange, f"{constant:g}", f"{predicted:.4f}", f"{measured:.4f}")
+    if as_json:
+        print_json({"agree": agree, "couplings": found, "two_mass": constants})
+    elif quiet:
+        typer.echo("agree" if agree else "disagree")
+    console = console_for(silent=quiet or as_json)
+    console.print(steps)
+    console.print(masses)
+    if not agree:
+        raise typer.Exit(DISAGREES)
+
+
 def _outcome_table(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome]) -> Table:
     """A row per coupling, with the largest residual of those that were done."""
     from ..stability.cells import COUPLINGS
@@ -211,11 +273,10 @@ def _reason_table(outcomes: Sequence[Outcome]) -> Table:
     """Why cells were refused or stopped, numbers left out, the most frequent reasons first."""
     counts = Counter((o.kind, _without_numbers(o.reason)) for o in outcomes if o.kind in ("refused", "stopped"))
     table = Table(box=None, pad_edge=False, show_header=False)
-    table.add_column(no_wrap=True)
-    table.add_column(justify="right", no_wrap=True)
-    table.add_column(no_wrap=True, overflow="ellipsis")
+    for _ in range(3):
+        table.add_column(no_wrap=True)
     for (kind, reason), number in counts.most_common(_REASONS):
-        table.add_row(kind, str(number), Text(reason))
+        table.add_row(kind, str(number), Text(textwrap.shorten(reason, _REASON_WIDTH, placeholder=" …")))
     if len(counts) > _REASONS:
         table.add_row("", "", f"and {len(counts) - _REASONS} further reasons, see the table")
     return table

@@ -141,7 +141,7 @@ SLICES = (
     Slice("hardening", "speed", "k2", {"k2_kind": "hardening", "coupling": ("transmission", "energy", 1)}),
     Slice("shear", "shear_ratio", "alpha_b", {"coupling": ("transmission", "energy", 1)}),
     Slice("stop", "stop_depth", "restitution", {"coupling": ("transmission", "energy", 2), "alpha_s": 0.1}),
-    Slice("quasi-static", "macro_step", "stiffness", {"fidelity": "quasi_static"}),
+    Slice("quasi-static", "macro_step", "stiffness", {"fidelity": "quasi_static", "external_force": 1.0}),
 )
 
 

@@ -195,16 +195,19 @@ def _frequencies(pair: LinearPair) -> tuple[float, float]:
     return highest, lowest
 
 
-def critical_step(pair: LinearPair, scheme: str, degree: int, threshold: float = THRESHOLD) -> float | None:
+def critical_step(
+    pair: LinearPair, scheme: str, degree: int, threshold: float = THRESHOLD, factor: float | None = None
+) -> float | None:
     """Smallest H [s] at which the spectral radius exceeds 1 + ``threshold``, to 1e-3 of itself; None if there is none.
 
     Searched upwards by factors of 1.03 (``hermite``, from 2.5/ω_max; narrower bands may be missed) or 2 (``jacobi``,
-    ``gauss_seidel``, from 1e-3/ω_max) until the slowest mode turns 10 rad in a step. Not for ``energy``, which changes
-    no energy at any H.
+    ``gauss_seidel``, from 1e-3/ω_max), or of ``factor``, until the slowest mode turns 10 rad in a step. Not for
+    ``energy``, which changes no energy at any H.
     """
     if scheme == "energy":
         return None
-    start, factor = _SEARCH[scheme]
+    start, usual = _SEARCH[scheme]
+    factor = usual if factor is None else factor
     fast, slow = _frequencies(pair)
     H = start / fast
     while H * slow <= 10.0:

@@ -1,0 +1,89 @@
+"""Critical macro steps: measured by the FMUs as predicted by the spectral radius."""
+
+from __future__ import annotations
+
+import json
+from itertools import islice
+
+import pytest
+from typer.testing import CliRunner
+
+from springbeam import load_scene, with_changes
+from springbeam.cli import app
+from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.stability import critical, two_mass
+from springbeam.stability.critical import LARGE_STEP, Comparison, comparison, comparisons, growth
+from springbeam.stability.predict import THRESHOLD, linear_pair
+
+
+def compared(law: str, stiffness: float, scheme: str, degree: int, n: int = 4) -> Comparison:
+    soft = with_changes(
+        load_scene("soft"),
+        stop=None,
+        beam={"n_elements": n},
+        spring={"cubic_stiffness": 0.0},
+        contact={"law": law, "stiffness": stiffness, "exponent": 1.0},
+        coupling={"scheme": scheme, "degree": degree, "macro_step": LARGE_STEP},
+    )
+    return comparison(soft, linear_pair(soft, modal_beam(soft.beam)))
+
+
+@pytest.mark.parametrize(
+    ("law", "stiffness", "scheme", "degree"),
+    [
+        ("compliance", 1e8, "jacobi", 0),
+        ("compliance", 1e8, "gauss_seidel", 0),
+        ("compliance", 1e4, "jacobi", 1),
+        ("compliance", 1e4, "gauss_seidel", 1),
+        ("transmission", 1.0, "hermite", 1),
+        ("transmission", 1.0, "hermite", 2),
+    ],
+)
+def test_measured_as_predicted(law, stiffness, scheme, degree):
+    """5 % are asked; growth over 4000 steps at the threshold is e⁴, told to some percent: 1 % of H."""
+    c = compared(law, stiffness, scheme, degree, 2)
+    assert c.measured == pytest.approx(c.predicted, rel=0.01)
+    if law == "compliance":
+        assert c.radius > 1.0 + THRESHOLD
+        assert c.growth > 1.0 + THRESHOLD
+
+
+@pytest.mark.parametrize(("law", "stiffness"), [("compliance", 1e8), ("transmission", 1.0)])
+def test_energy_is_stable_where_ordinary_exchanges_are_not(law, stiffness):
+    """λ = 1e8 N/m, H = 0.004 s, 4000 times the critical H of `jacobi`; rounding of the preload is 1e-6 per step."""
+    c = compared(law, stiffness, "energy", 0)
+    assert c.predicted is None
+    assert c.radius == pytest.approx(1.0, abs=1e-12)
+    assert c.growth == pytest.approx(1.0, abs=1e-6)
+
+
+def test_growth_is_the_spectral_radius():
+    """Above the threshold, where a power of ten is reached in some 400 steps."""
+    c = compared("compliance", 1e4, "jacobi", 0)
+    soft = with_changes(
+        load_scene("soft"),
+        beam={"n_elements": 4},
+        contact={"law": "compliance", "stiffness": 1e4, "exponent": 1.0},
+        coupling={"scheme": "jacobi", "macro_step": 3.0 * c.predicted},
+    )
+    pair = linear_pair(with_changes(soft, spring={"cubic_stiffness": 0.0}), modal_beam(soft.beam))
+    radius = critical.spectral_radius(pair, "jacobi", 0, soft.coupling.H)
+    assert radius > 1.005
+    assert growth(soft) - 1.0 == pytest.approx(radius - 1.0, rel=0.02)
+
+
+@pytest.mark.parametrize("agree", [True, False])
+def test_command(monkeypatch, agree):
+    some = [*islice(comparisons(2), 1), Comparison("transmission", "hermite", 1, 0.0, 1e-3, 1.01e-3, 1.0, 1.0)]
+    if not agree:
+        some.append(Comparison("compliance", "jacobi", 0, 1e4, 1e-4, 1.1e-4, 1.5, 1.5))
+    monkeypatch.setattr(critical, "comparisons", lambda: iter(some))
+    monkeypatch.setattr(two_mass, "measured", lambda exchange, H: two_mass.CONSTANTS[exchange])
+    for options in ([], ["--json"], ["--quiet"]):
+        result = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["stability", "--critical", *options])
+        assert result.exit_code == (0 if agree else 1)
+        assert options or max(map(len, result.stdout.splitlines())) <= 80
+    assert result.stdout.strip() == ("agree" if agree else "disagree")
+    document = json.loads(CliRunner().invoke(app, ["stability", "--critical", "--json"]).stdout)
+    assert document["agree"] == agree
+    assert [c["c"] for c in document["two_mass"]] == [6.0, 10.0, 2.0, 4.0, 0.0]
