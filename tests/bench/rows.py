@@ -431,9 +431,9 @@ def _scipy(scene: Scene, method: str, rtol: float, scale: float, times: np.ndarr
 
 def sweep(effort: Effort) -> Iterator[Row]:
     """Throughput of a sweep, cluster and pool warm."""
-    for workers in (1, 2):
+    for workers in (1,) if effort.quick else (1, 2):
         with sweeps.both(workers) as (client, pool):
-            for t_end, runs in sweeps.SIZES:
+            for t_end, runs in sweeps.SIZES[-1:] if effort.quick else sweeps.SIZES:
                 todo = sweeps.plan(t_end, 4 if effort.quick else runs)
                 times = compare(
                     partial(sweeps.on_dask, todo, client),
