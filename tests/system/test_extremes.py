@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springbeam import simulate
+from springbeam import RunStopped, simulate
 from springbeam.scene import scene_from_dict
 from springbeam.trajectory import Trajectory
 
@@ -176,3 +176,17 @@ def test_rebounds_that_cannot_be_seen_end_seated():
     kinds = [event.kind for event in run.events]
     assert kinds.count("stop_impact") <= 12
     assert kinds[-1] == "seated"
+
+
+def test_bouncing_without_end_stops_by_name(monkeypatch):
+    """A damped beam on a lossless stop: its rebounds shrink, but never by enough to be the last."""
+    monkeypatch.setattr("springbeam.simulation._MAX_EVENTS_IN_STEP", 300)
+    beam = {"density": 672.6, "area": 0.07, "shear_modulus": 53.6, "alpha_b": 1.0, "n_elements": 6}
+    tables = {
+        "time": {"t_end": 1.5},
+        "beam": {**beam, "initial_velocity_slope": -1.0},
+        "stop": {"position": 0.0},
+        "coupling": {"macro_step": 0.1},
+    }
+    with pytest.raises(RunStopped, match=r"chatters: 300 events within a macro step of 0\.1 s"):
+        simulate(scene_from_dict(tables))
