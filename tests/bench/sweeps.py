@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 from measure import timed
@@ -29,12 +30,12 @@ def plan(t_end: float, runs: int) -> sweep.Sweep:
 
 def on_dask(todo: sweep.Sweep, client: Any) -> float:
     with tempfile.TemporaryDirectory() as folder:
-        return timed(lambda: sweep.run(todo, Path(folder), client))
+        return timed(lambda: sweep.run(todo, Path(folder), client), perf_counter)
 
 
 def in_a_pool(todo: sweep.Sweep, pool: ProcessPoolExecutor) -> float:
     run = partial(sweep.row, todo.scene, todo.axes, metrics=todo.metrics)
-    return timed(lambda: list(pool.map(run, todo.values)))
+    return timed(lambda: list(pool.map(run, todo.values)), perf_counter)
 
 
 @contextmanager

@@ -12,7 +12,7 @@ HERE = Path(__file__).parent
 PAGE = HERE.parents[1] / "docs" / "performance.md"
 
 
-@pytest.mark.parametrize("group", ["beam", "spring", "master", "paper", "long", "accuracy", "sweep"])
+@pytest.mark.parametrize("group", ["beam", "spring", "master", "profile", "paper", "long", "accuracy", "sweep"])
 def test_every_group_runs(group: str, fmu_folder: Path) -> None:
     if group in ("beam", "spring", "paper") and not (HERE.parents[1] / "build/tests/bench/beam_bench").exists():
         pytest.skip("the C++ benchmarks are not built: ./build.sh bench")
