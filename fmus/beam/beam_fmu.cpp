@@ -34,6 +34,7 @@ struct BeamModel final : fmi::Model {
     moved();
     forecast.reset();
     tip_response = {};
+    distributed_load = 0.0;  // inputs are set after this
     if (parameters.communication_step == 0.0) return;
     tip_response = beam->tip_response(parameters.communication_step);
     look_ahead();

@@ -205,7 +205,7 @@ def test_a_run_without_checkpoints_says_how_to_take_them(interrupted):
 def test_a_folder_that_is_no_run(tmp_path):
     result = command("resume", tmp_path)
     assert result.exit_code == 2
-    assert "not a run directory" in result.stderr
+    assert "holds no run; springbeam run SCENE --out DIR makes one" in result.stderr
 
 
 def test_another_version_is_refused(interrupted, monkeypatch):

@@ -120,7 +120,7 @@ def _cells(point: Point | None) -> tuple[str, str]:
 
 def _front_table(found: Study) -> Table:
     table = Table(box=None, pad_edge=False, header_style="bold", title="Pareto front", title_justify="left")
-    table.add_column("configuration", no_wrap=True)
+    table.add_column("configuration", overflow="fold")
     for name in ("error", "event [s]", "solve [ms]", "set-up [ms]", "doSteps"):
         table.add_column(Text(name), justify="right", no_wrap=True)
     for point in found.front():

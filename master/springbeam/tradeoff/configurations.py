@@ -103,7 +103,7 @@ def _adaptive(scene: Scene) -> Iterator[Configuration]:
         for tolerance in _ADAPTIVE_TOLERANCES:
             coupling = {"scheme": scheme, "degree": degree, "relative_tolerance": tolerance}
             for changed in _changed(scene, coupling=coupling):
-                yield Configuration(f"{scheme} {degree}, adaptive", f"tolerance {tolerance:.0e}", changed)
+                yield Configuration(f"{scheme} {degree} adaptive", f"{tolerance:.0e}", changed)
 
 
 def _ida(scene: Scene) -> Iterator[Configuration]:
