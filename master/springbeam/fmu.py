@@ -14,6 +14,7 @@ from functools import lru_cache, partial
 from math import isfinite
 from pathlib import Path
 from struct import Struct
+from types import FrameType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -403,6 +404,37 @@ class _FmuBody(Memory):
 
     def close(self) -> None:
         self.fmu.close()
+
+
+#: What a method may be waiting for.
+_CALLED_BY = {
+    "_load": "fmi2Instantiate",
+    "initialise": "initialisation",
+    "step": "fmi2DoStep",
+    "get": "fmi2GetReal",
+    "set": "fmi2SetReal",
+    "_advance": "fmi2SetRealInputDerivatives",
+    "mark": "fmi2GetFMUstate",
+    "rewind": "fmi2SetFMUstate",
+    "close": "fmi2FreeInstance",
+}
+
+
+def call_under_way(frame: FrameType | None) -> str:
+    """Which FMU a thread is calling, and the time at which its last step began, in words; else the line it is in.
+
+    ``frame`` is the innermost one of the thread. Found there when it is asked for, the call costs a run nothing.
+    """
+    innermost = frame
+    while frame is not None:
+        owner = frame.f_locals.get("self")
+        fmu = owner._fmu if isinstance(owner, Reals) else owner.fmu if isinstance(owner, _FmuBody) else owner
+        if isinstance(fmu, Fmu):
+            function = _CALLED_BY.get(frame.f_code.co_name, frame.f_code.co_name)
+            time = getattr(fmu, "_time", None)  # none while it is being loaded
+            return f"{function} of {fmu.path.name}" + ("" if time is None else f" at t = {time.value:.9g} s")
+        frame = frame.f_back
+    return "the program" if innermost is None else f"{innermost.f_code.co_filename}, line {innermost.f_lineno},"
 
 
 class FmuBeam(_FmuBody):

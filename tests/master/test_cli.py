@@ -295,6 +295,20 @@ def test_a_killed_run_can_be_loaded(here):
     assert trajectory.scene.title
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
+@pytest.mark.parametrize("arguments", [["scenes"], ["--version"], ["run", "soft", "--no-plots"]])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_an_output_without_room_is_one_error(here, fmu_folder, arguments, unbuffered):
+    process = [sys.executable, "-m", "springbeam", *arguments]
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(process, cwd=here, env=environment, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 3
+    assert done.stderr == "error: standard output: No space left on device\n"
+    if arguments[0] == "run":
+        assert load_trajectory(here / "results" / "soft").summary["status"] == "done"
+
+
 # -- progress -----------------------------------------------------------------------------------------------------
 
 

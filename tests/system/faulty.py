@@ -6,6 +6,7 @@ seen: also what FMPy calls by itself.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -40,7 +41,7 @@ class Fault:
     fmu: str
     function: str
     where: str
-    kind: str  #: a name of `NAMES`, "raise", or what is put into the values: "nan", "inf", "1e300"
+    kind: str  #: a name of `NAMES`, "raise", "hang", or what is put into the values: "nan", "inf", "1e300"
     once: bool = False
     skip: int = 3
     happened: int = 0
@@ -103,6 +104,16 @@ class Script:
             assert alive == (allowed == set()), f"{fmu} was not freed"
 
 
+def hang() -> None:
+    """Call a C function that never returns, not even for a signal: the second lock of a mutex."""
+    print("hanging", flush=True)
+    library, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(256)
+    library.pthread_mutex_init(mutex, None)
+    library.pthread_mutex_lock(mutex)
+    library.pthread_mutex_lock(mutex)
+    raise AssertionError("returned")
+
+
 class Function:
     """A function of the library."""
 
@@ -122,6 +133,8 @@ class Function:
             result = self._function(*arguments)
         elif fault.kind == "raise":
             raise ZeroDivisionError("nobody expected this")
+        elif fault.kind == "hang":
+            hang()
         elif fault.kind in NAMES:
             result = NAMES[fault.kind]
         else:

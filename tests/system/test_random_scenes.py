@@ -86,7 +86,7 @@ def scenes(draw: st.DrawFn) -> Tables:
         tables["beam"]["initial_deflection_slope"] = (height + above) / tables["beam"]["length"]
     if "spring" in some or "pair" in some:
         mass = draw(decades(-4, 2))
-        stiffness = min(draw(decades(-1, 8)), mass * (100.0 / step) ** 2)  # some hundred radians a step
+        stiffness = min(draw(decades(-1, 8)), mass * (10.0 / step) ** 2)  # some ten radians a step
         tables["spring"] = {
             "mass": mass,
             "damping": draw(st.one_of(st.just(0.0), decades(-3, 1).map(lambda x: x * sqrt(mass * stiffness)))),

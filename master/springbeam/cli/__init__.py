@@ -6,6 +6,9 @@ Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the run stopped early (what
 
 from __future__ import annotations
 
+import errno
+import os
+import sys
 import textwrap
 from importlib import metadata
 from typing import Annotated
@@ -13,7 +16,7 @@ from typing import Annotated
 import typer
 
 from . import checks, doctor, report, resume, run, scenes, stability, sweep, tradeoff
-from .common import Command, Group
+from .common import STOPPED, Command, Group
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."
 _START = """\
@@ -22,6 +25,9 @@ springbeam run soft               run one; what comes of it is in results/soft
 springbeam report results/soft    look at it: one HTML page with a time slider
 springbeam crosscheck soft        is it right? beside an independent reference
 springbeam doctor                 is this installation sound?"""
+
+#: Where the output goes to a file.
+_NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 app = typer.Typer(
     cls=Group,
@@ -35,7 +41,15 @@ app = typer.Typer(
 
 def main() -> None:
     """Entry point of the console script."""
-    app()
+    try:
+        app()
+    except OSError as error:
+        if error.errno not in _NO_ROOM or error.filename is not None:
+            raise
+        # What Python still holds of the output would fail again at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        typer.echo(f"error: standard output: {error.strerror}", err=True)
+        sys.exit(STOPPED)
 
 
 def _show_version(wanted: bool) -> None:

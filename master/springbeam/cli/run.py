@@ -34,6 +34,7 @@ from .common import (
     print_json,
     progress_bar,
 )
+from .watchdog import watched
 
 _FIRST_EVENTS, _LAST_EVENTS = 10, 3
 _REFRESH_SECONDS = 0.1
@@ -94,7 +95,8 @@ def _picked(scene: Scene) -> Trajectory | None:
     from ..runner import RunStopped
 
     try:
-        return pick(scene).trajectory()
+        with watched(lambda cause: f"a pilot run for accuracy = {scene.accuracy:g}: {cause}"):
+            return pick(scene).trajectory()
     except RunStopped as stopped:
         fail(STOPPED, f"a pilot run for accuracy = {scene.accuracy:g} {stopped}")
 
@@ -171,7 +173,21 @@ def _run_into(
     from ..runner import run as run_scene
 
     t_end = recorder.scene.time.t_end
-    with recorder, _ProgressBar(t_end, quiet=quiet) as progress:
+
+    def last_words(cause: str) -> str:
+        progress.__exit__()
+        if not recorder.begun:
+            recorder.directory.discard()
+            return cause
+        reached = 0.0 if recorder.time is None else recorder.time
+        if not recorder.finished:
+            with suppress(OSError):
+                recorder.finish({"status": "interrupted", "cause": cause, "time": reached})
+        return (
+            f"{cause} (reached t = {reached:.9g} s of {t_end:g} s); what was computed is in {recorder.directory.path}"
+        )
+
+    with recorder, _ProgressBar(t_end, quiet=quiet) as progress, watched(last_words):
         try:
             if made is not None:
                 replay(made, recorder)

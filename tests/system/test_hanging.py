@@ -1,0 +1,120 @@
+"""An FMU call that never returns: Ctrl-C ends the command all the same, by name, and nothing computed is lost."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import tomli_w
+from test_faults import FILES, SCENE
+from typer.testing import CliRunner
+
+from springbeam import cli
+from springbeam.recording import load_trajectory
+
+pytestmark = [
+    pytest.mark.skipif(os.name == "nt", reason="POSIX signals"),
+    pytest.mark.usefixtures("fmu_folder"),
+]
+
+#: The command with a shorter wait, and the FMU, the function and the place that are its first arguments.
+HANGING = """
+import sys
+import pytest
+from faulty import Fault, installed
+from springbeam import cli
+from springbeam.cli import watchdog
+
+fmu, function, where, skip, *arguments = sys.argv[1:]
+watchdog.PATIENCE = 0.5
+installed(pytest.MonkeyPatch(), Fault(fmu, function, where, "hang", skip=int(skip)))
+sys.argv = ["springbeam", *arguments]
+cli.main()
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(tomli_w.dumps(SCENE))
+    return path
+
+
+def interrupted(number: signal.Signals, fmu: str, function: str, where: str, skip: int, *arguments: object) -> str:
+    """What the command says when it is sent a signal while the FMU hangs."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", HANGING, fmu, function, where, str(skip), *map(str, arguments), "--no-plots", "-q"],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "hanging\n"
+        with pytest.raises(subprocess.TimeoutExpired):  # it does hang
+            process.wait(0.2)
+        process.send_signal(number)
+        output, errors = process.communicate(timeout=20)
+    finally:
+        process.kill()
+    assert process.returncode == 3
+    assert output == ""
+    assert "Traceback" not in errors
+    return errors
+
+
+def contents(directory: Path) -> dict[str, bytes]:
+    return {name: (directory / name).read_bytes() for name in FILES}
+
+
+def check_interrupted(directory: Path, whole: dict[str, bytes], said: str, named: str) -> None:
+    """One line names the call and the time; the rows are the first ones of the run that did not hang."""
+    trajectory = load_trajectory(directory)
+    summary = trajectory.summary
+    assert summary["status"] == "interrupted"
+    assert summary["cause"].startswith(f"{named} at t = ")
+    assert summary["cause"].endswith(" s has not returned within 0.5 s")
+    assert summary["time"] == trajectory.time[-1]
+    begun = float(summary["cause"].split(" at t = ")[1].split()[0])
+    macro_step = SCENE["coupling"]["macro_step"]
+    assert summary["time"] - 1e-8 <= begun <= summary["time"] + macro_step
+    assert said == (
+        f"error: interrupted: {summary['cause']} (reached t = {summary['time']:.9g} s of 0.6 s); "
+        f"what was computed is in {directory}\n"
+    )
+    for name, content in contents(directory).items():
+        assert whole[name].startswith(content)
+    assert 10 < len(trajectory) < whole["trajectory.csv"].count(b"\n") - 1
+
+
+@pytest.mark.parametrize(
+    ("number", "fmu", "where"),
+    [(signal.SIGINT, "spring", "tied"), (signal.SIGTERM, "beam", "location")],
+    ids=["tied", "location"],
+)
+def test_a_call_that_never_returns_can_be_interrupted(
+    tmp_path: Path, scene: Path, number: signal.Signals, fmu: str, where: str
+) -> None:
+    def command(*arguments: object) -> None:
+        assert CliRunner().invoke(cli.app, [*map(str, arguments), "--no-plots", "-q"]).exit_code == 0
+
+    directory = tmp_path / "run"
+    command("run", scene, "--out", tmp_path / "whole")
+    whole = contents(tmp_path / "whole")
+    run = ("run", scene, "--out", directory, "--checkpoint", 0.02)
+    said = interrupted(number, fmu, "fmi2DoStep", where, 3, *run)
+    check_interrupted(directory, whole, said, f"fmi2DoStep of {fmu}.fmu")
+    said = interrupted(number, fmu, "fmi2GetReal", "row", 50, "resume", directory)
+    check_interrupted(directory, whole, said, f"fmi2GetReal of {fmu}.fmu")
+    command("resume", directory)
+    assert contents(directory) == whole
+
+
+def test_a_call_that_never_returns_before_the_first_row_leaves_nothing(tmp_path: Path, scene: Path) -> None:
+    run = ("run", scene, "--out", tmp_path / "run")
+    said = interrupted(signal.SIGINT, "beam", "fmi2ExitInitializationMode", "start", 0, *run)
+    assert said == "error: interrupted: initialisation of beam.fmu at t = 0 s has not returned within 0.5 s\n"
+    assert not (tmp_path / "run").exists()
