@@ -299,8 +299,12 @@ void Spring::restore(const std::vector<double>& state) {
   for (double value : state)
     if (!std::isfinite(value))
       throw std::invalid_argument("spring: a saved state holds " + number(value) + ": must be finite");
+  auto restored = impl_->state;
   std::size_t i = 0;
-  for_each(impl_->state, [&](double& value) { value = state[i++]; });
+  for_each(restored, [&](double& value) { value = state[i++]; });
+  if (!(restored.steps >= 0.0 && restored.steps < 0x1p53))
+    throw std::invalid_argument("spring: a saved state counts " + number(restored.steps) + " internal steps");
+  impl_->state = restored;
 }
 
 }  // namespace spring

@@ -93,7 +93,7 @@ class Spring {
 
   /// The whole dynamic state as a flat vector of fixed length.
   void save(std::vector<double>& state) const;
-  /// @throws std::invalid_argument if the length does not fit or a number is not finite; the state is then unchanged
+  /// @throws std::invalid_argument if the length does not fit or a number cannot be; the state is then unchanged
   void restore(const std::vector<double>& state);
 
  private:

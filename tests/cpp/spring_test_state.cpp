@@ -187,6 +187,20 @@ TEST(SpringState, AStateOfAnotherLengthIsRefused) {
   EXPECT_EQ(saved(s), before);
 }
 
+TEST(SpringState, AStateWithAnImpossibleNumberIsRefused) {
+  Spring s(softening());
+  const auto before = saved(s);
+  auto forged = before;
+  forged[0] = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(s.restore(forged), std::invalid_argument);
+  for (const double steps : {-1.0, 1e20}) {
+    forged = before;
+    forged.back() = steps;
+    EXPECT_THROW(s.restore(forged), std::invalid_argument);
+  }
+  EXPECT_EQ(saved(s), before);
+}
+
 TEST(SpringState, ImpulseChangesTheVelocityByJOverM) {
   Parameters p = softening();
   p.mass = 2.0;
