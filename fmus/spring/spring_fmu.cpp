@@ -6,7 +6,6 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "../../src_spring/compliance.hpp"
@@ -110,7 +109,7 @@ struct SpringModel final : fmi::Model {
     std::optional<spring::HeldContact> restored = held;
     if (restored) restored->restore(&mine[1]);
     spring->restore({state.begin(), mine});
-    held = std::move(restored);
+    held = restored;
     tip_is_current = mine[0] != 0.0;
   }
 
