@@ -1,30 +1,20 @@
-"""`soft` with losses for many macro steps into files: long_run.py STEPS prints, for every tenth of them, memory in use
-[bytes] and the clock [s]."""
+"""A scene for many macro steps into files: long_run.py SCENE_AS_JSON DIRECTORY STEPS prints, for every tenth of the
+steps, memory in use [bytes] and the clock [s]; then the summary."""
 
 from __future__ import annotations
 
 import json
 import os
 import sys
-import tempfile
 from time import perf_counter
 
-from springbeam import load_scene, with_changes
 from springbeam.recording import FileRecorder, RunDirectory
 from springbeam.runner import run
+from springbeam.scene import scene_from_dict
 
-H = 2e-3
 
-
-def main(steps: int) -> None:
-    scene = with_changes(
-        load_scene("soft"),
-        beam={"n_elements": 10, "alpha_b": 1e-6},
-        spring={"damping": 1e-3},
-        stop={"restitution": 0.999},
-        coupling={"macro_step": H},
-        time={"t_end": steps * H},
-    )
+def main(scene_as_json: str, directory: str, steps: int) -> None:
+    scene = scene_from_dict(json.loads(scene_as_json))
     marks: list[tuple[int, float]] = []
     due = steps // 10
 
@@ -36,10 +26,10 @@ def main(steps: int) -> None:
                 resident = int(memory.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
             marks.append((resident, perf_counter()))
 
-    with tempfile.TemporaryDirectory() as folder, FileRecorder(scene, RunDirectory.create(folder)) as recorder:
-        run(scene, recorder, progress)
-    print(json.dumps(marks))
+    with FileRecorder(scene, RunDirectory.create(directory)) as recorder:
+        summary = run(scene, recorder, progress)
+    print(json.dumps([marks, summary]))
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(sys.argv[1], sys.argv[2], int(sys.argv[3]))

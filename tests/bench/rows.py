@@ -6,6 +6,7 @@ import json
 import statistics
 import subprocess
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from ctypes import c_size_t
@@ -419,11 +420,20 @@ def paper(effort: Effort) -> Iterator[Row]:
 
 def long_run(effort: Effort) -> Iterator[Row]:
     steps = 2000 if effort.quick else effort.long_run
-    output = subprocess.run(
-        [sys.executable, str(HERE / "long_run.py"), str(steps)], stdout=subprocess.PIPE, text=True, check=True
-    ).stdout
-    marks = np.array(json.loads(output))
-    resident, clock = marks.T
+    scene = with_changes(
+        load_scene("soft"),
+        beam={"n_elements": 10, "alpha_b": 1e-6},
+        spring={"damping": 1e-3},
+        stop={"restitution": 0.999},
+        coupling={"macro_step": 2e-3},
+        time={"t_end": steps * 2e-3},
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        arguments = [json.dumps(scene.model_dump(exclude_none=True)), folder, str(steps)]
+        program = [sys.executable, str(HERE / "long_run.py"), *arguments]
+        output = subprocess.run(program, stdout=subprocess.PIPE, text=True, check=True).stdout
+    marks, _ = json.loads(output)
+    resident, clock = np.array(marks).T
     per_step = np.diff(clock) / (steps // 10)
     growth = float(resident[-1] - resident[0]) / 1e6
     change = float(per_step[-1] / per_step[0])

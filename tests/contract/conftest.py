@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes as ct
 import math
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -174,6 +175,15 @@ class Instance:
         token = ct.c_void_p()
         status = self.call("fmi2DeSerializeFMUstate", blob, ct.c_size_t(len(blob)), ct.byref(token))
         return status, token
+
+
+@pytest.fixture
+def folder(fmu_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Copies of the FMUs, to be spoilt; the master takes these."""
+    for name in ("beam", "spring"):
+        shutil.copy(fmu_folder / f"{name}.fmu", tmp_path)
+    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
+    return tmp_path
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import stat
 import zipfile
 from collections.abc import Callable
@@ -120,14 +119,6 @@ def test_our_own_are_unpacked_to_the_last_byte(fmu_folder: Path, tmp_path: Path,
     with ZipFile(fmu_folder / f"{name}.fmu") as file:
         files = {info.filename: file.read(info) for info in file.infolist() if not info.is_dir()}
     assert {str(p.relative_to(tmp_path)): p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == files
-
-
-@pytest.fixture
-def folder(fmu_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    for name in ("beam", "spring"):
-        shutil.copy(fmu_folder / f"{name}.fmu", tmp_path)
-    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
-    return tmp_path
 
 
 def refusal(folder: Path) -> str:

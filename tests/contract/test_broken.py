@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -63,14 +62,6 @@ BROKEN: dict[str, tuple[Callable[[Files], None], str]] = {
         "tip_impulse",
     ),
 }
-
-
-@pytest.fixture
-def folder(fmu_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    for name in ("beam", "spring"):
-        shutil.copy(fmu_folder / f"{name}.fmu", tmp_path)
-    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
-    return tmp_path
 
 
 def refusal(folder: Path) -> str:

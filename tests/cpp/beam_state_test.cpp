@@ -20,26 +20,8 @@ using testing::general_beam;
 using testing::mechanical_energy;
 using testing::outputs;
 using testing::unit_beam;
+using testing::variants;
 using testing::with_integrator;
-
-std::vector<Parameters> variants() {
-  std::vector<Parameters> all;
-  for (Parameters p : {general_beam(25), general_beam(3, 5)}) {
-    p.initial_velocity_slope = -1.0;
-    p.initial_deflection_slope = 0.05;
-    p.tip_load_coefficient = -0.2;
-    for (const double alpha_b : {0.0, 2e-3}) {
-      p.alpha_b = alpha_b;
-      p.n_modes = 0;
-      all.push_back(p);
-      p.n_modes = 4;
-      all.push_back(p);
-      for (const double rho_inf : {1.0, 0.7, 0.0})
-        all.push_back(with_integrator(p, Integrator::generalized_alpha, rho_inf));
-    }
-  }
-  return all;
-}
 
 TEST(BeamState, AnImpulseMovesTheTipMassOnly) {
   for (const Parameters& p : variants()) {

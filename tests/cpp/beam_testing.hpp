@@ -41,6 +41,26 @@ inline Parameters with_integrator(Parameters p, Integrator integrator, double rh
   return p;
 }
 
+/// Both integrators, degrees 1 and 5, with and without damping and truncation, in motion under a load.
+inline std::vector<Parameters> variants() {
+  std::vector<Parameters> all;
+  for (Parameters p : {general_beam(25), general_beam(3, 5)}) {
+    p.initial_velocity_slope = -1.0;
+    p.initial_deflection_slope = 0.05;
+    p.tip_load_coefficient = -0.2;
+    for (const double alpha_b : {0.0, 2e-3}) {
+      p.alpha_b = alpha_b;
+      for (const int n_modes : {0, 4}) {
+        p.n_modes = n_modes;
+        all.push_back(p);
+      }
+      for (const double rho_inf : {1.0, 0.7, 0.0})
+        all.push_back(with_integrator(p, Integrator::generalized_alpha, rho_inf));
+    }
+  }
+  return all;
+}
+
 /// Clamped–free, EI = KAG = ρA = ρI = L = 1: zeros of det [[X_MM, X_MQ], [X_QM, X_QQ]] of X = exp(A), A from
 /// θ' = M/EI, M' = −Q − ρIω²θ, u' = Q/KAG + θ, Q' = −ρAω²u.
 inline const std::vector<double>& clamped_free_frequencies() {

@@ -130,48 +130,31 @@ LASTING = [
             ("fmi2GetReal", "Fatal", "cannot read "),
         )
     ),
+    ("energy", "tied", "fmi2SetFMUstate", "Discard", "cannot restore the state"),
+    ("hermite", "touch", "fmi2SetFMUstate", "raise", "ZeroDivisionError"),
+    ("energy", "location", "fmi2SetFMUstate", "Error", "cannot restore the state"),
+    ("compliance", "touch", "fmi2SetFMUstate", "Fatal", "cannot restore the state"),
+    ("paper", "paper", "fmi2SetFMUstate", "Error", "cannot restore the state"),
+    ("energy", "start", "fmi2GetFMUstate", "Discard", "cannot save the state"),
+    ("energy", "start", "fmi2GetFMUstate", "Fatal", "cannot save the state"),
+    ("jacobi", "start", "fmi2GetFMUstate", "Error", "cannot save the state"),
+    ("paper", "paper", "fmi2GetFMUstate", "Error", "cannot save the state"),
+    ("hermite", "tied", "fmi2SetRealInputDerivatives", "Discard", "cannot set input derivatives"),
+    ("hermite", "touch", "fmi2SetRealInputDerivatives", "Error", "cannot set input derivatives"),
+    ("hermite", "location", "fmi2SetRealInputDerivatives", "Fatal", "cannot set input derivatives"),
+    ("energy", "event", "fmi2SetReal", "Error", "impulse"),
+    ("hermite", "event", "fmi2SetReal", "Fatal", "impulse"),
+    ("energy", "row", "fmi2GetReal", "Error", "cannot read "),
+    ("energy", "row", "fmi2GetReal", "Fatal", "cannot read "),
+    ("energy", "row", "fmi2GetReal", "nan", "not a finite number"),
+    ("compliance", "row", "fmi2GetReal", "inf", "not a finite number"),
+    ("energy", "tied", "fmi2GetReal", "inf", "not finite: Motion(displacement="),
 ]
 
 
 @pytest.mark.parametrize("fmu", ["beam", "spring"])
 @pytest.mark.parametrize(("law", "where", "function", "kind", "cause"), LASTING)
 def test_a_lasting_fault_stops_the_run(
-    run: Run, fmu: str, law: str, where: str, function: str, kind: str, cause: str
-) -> None:
-    expected = whole(run, law)
-    fault = Fault(fmu, function, where, kind)
-    code, directory, script = run(law, fault)
-    assert fault.happened
-    script.check()
-    check_stopped(code, directory, expected, cause)
-
-
-@pytest.mark.parametrize("fmu", ["beam", "spring"])
-@pytest.mark.parametrize(
-    ("law", "where", "function", "kind", "cause"),
-    [
-        ("energy", "tied", "fmi2SetFMUstate", "Discard", "cannot restore the state"),
-        ("hermite", "touch", "fmi2SetFMUstate", "raise", "ZeroDivisionError"),
-        ("energy", "location", "fmi2SetFMUstate", "Error", "cannot restore the state"),
-        ("compliance", "touch", "fmi2SetFMUstate", "Fatal", "cannot restore the state"),
-        ("paper", "paper", "fmi2SetFMUstate", "Error", "cannot restore the state"),
-        ("energy", "start", "fmi2GetFMUstate", "Discard", "cannot save the state"),
-        ("energy", "start", "fmi2GetFMUstate", "Fatal", "cannot save the state"),
-        ("jacobi", "start", "fmi2GetFMUstate", "Error", "cannot save the state"),
-        ("paper", "paper", "fmi2GetFMUstate", "Error", "cannot save the state"),
-        ("hermite", "tied", "fmi2SetRealInputDerivatives", "Discard", "cannot set input derivatives"),
-        ("hermite", "touch", "fmi2SetRealInputDerivatives", "Error", "cannot set input derivatives"),
-        ("hermite", "location", "fmi2SetRealInputDerivatives", "Fatal", "cannot set input derivatives"),
-        ("energy", "event", "fmi2SetReal", "Error", "impulse"),
-        ("hermite", "event", "fmi2SetReal", "Fatal", "impulse"),
-        ("energy", "row", "fmi2GetReal", "Error", "cannot read "),
-        ("energy", "row", "fmi2GetReal", "Fatal", "cannot read "),
-        ("energy", "row", "fmi2GetReal", "nan", "not a finite number"),
-        ("compliance", "row", "fmi2GetReal", "inf", "not a finite number"),
-        ("energy", "tied", "fmi2GetReal", "inf", "not finite: Motion(displacement="),
-    ],
-)
-def test_whatever_fails_is_named(
     run: Run, fmu: str, law: str, where: str, function: str, kind: str, cause: str
 ) -> None:
     expected = whole(run, law)

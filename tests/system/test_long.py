@@ -32,29 +32,8 @@ SCENES = {
     "conservative": with_changes(SOFT, beam={"distributed_load": -4.0, "initial_velocity_slope": 0.0}, stop=None),
 }  # fmt: skip
 
-#: Runs a scene into a directory; prints, for every tenth of the steps, memory in use [bytes] and the clock [s].
-RUN = """
-import json, os, sys
-from time import perf_counter
-from springbeam.recording import FileRecorder, RunDirectory
-from springbeam.runner import run
-from springbeam.scene import scene_from_dict
-
-scene, steps = scene_from_dict(json.loads(sys.argv[1])), int(sys.argv[3])
-marks, due = [], steps // 10
-
-def progress(time, phase, macro_steps):
-    global due
-    if macro_steps >= due:
-        due += steps // 10
-        with open("/proc/self/statm") as memory:
-            resident = int(memory.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-        marks.append((resident, perf_counter()))
-
-with FileRecorder(scene, RunDirectory.create(sys.argv[2])) as recorder:
-    summary = run(scene, recorder, progress)
-print(json.dumps([marks, summary]))
-"""
+#: Prints, for every tenth of the steps, memory in use [bytes] and the clock [s]; then the summary.
+RUN = Path(__file__).parents[1] / "bench" / "long_run.py"
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory in use is read from /proc")
@@ -62,7 +41,7 @@ print(json.dumps([marks, summary]))
 def test_a_long_run(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scene, directory = SCENES[name], tmp_path / "run"
     arguments = [json.dumps(scene.model_dump(exclude_none=True)), str(directory), str(STEPS)]
-    output = subprocess.run([sys.executable, "-c", RUN, *arguments], stdout=subprocess.PIPE, text=True, check=True)
+    output = subprocess.run([sys.executable, str(RUN), *arguments], stdout=subprocess.PIPE, text=True, check=True)
     marks, summary = json.loads(output.stdout)
     resident, clock = np.array(marks).T
     per_step = np.diff(clock) / (STEPS // 10)
