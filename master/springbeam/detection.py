@@ -57,10 +57,9 @@ class Detector:
 
     def at_start(self, state: State, start: Ends) -> str | None:
         """The event that is due before any step: its function is 0 and falling."""
-        for kind, function in self._functions.of(state.phase):
-            value, rate = function(start)
+        for index, (value, rate) in enumerate(self._functions.samples(state.phase, start)):
             if rate < 0.0 and value <= self.tolerance(start) and rate < -_rest(start):
-                return kind
+                return self._functions.of(state.phase)[index][0]
         return None
 
     def first(self, state: State, step: Step) -> tuple[Step, str | None]:
@@ -73,7 +72,8 @@ class Detector:
                 step, found = self._first_by_position(state, touched)
         if step.size == 0.0:
             return step, found
-        unilateral = self._unilateral(state, step)
+        pushing = self._pushing(state.phase)
+        unilateral = None if pushing is None else self._unilateral(state, step, *pushing)
         if unilateral is None:
             return self._pair.settled(state, step), found
         cut, kind = unilateral
@@ -90,11 +90,17 @@ class Detector:
         functions = self._functions.of(state.phase)
         for _ in range(2 * len(functions) + 1):
             candidates, tolerance = [], self.tolerance(step.end)
-            for kind, function in functions:
-                bracket = self._bracket(state, function, step, tolerance)
+            starts = self._functions.samples(state.phase, step.start)
+            ends = self._functions.samples(state.phase, step.end)
+            for (kind, function), start, end in zip(functions, starts, ends, strict=True):
+                # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
+                floor = min(start[0], 0.0) - tolerance
+                if stays_above(start, end, step.size, floor):
+                    continue
+                bracket = self._bracket(state, function, step, floor, start, end)
                 if bracket is None or (kind == found and bracket is step):
                     continue
-                crossing = cubic_crossing(function(step.start), function(bracket.end), bracket.size)
+                crossing = cubic_crossing(start, function(bracket.end), bracket.size)
                 candidates.append((crossing, kind, function, bracket))
             if not candidates:
                 break
@@ -112,13 +118,10 @@ class Detector:
 
     # -- events told by positions -----------------------------------------------------------------------------------
 
-    def _bracket(self, state: State, function: EventFunction, step: Step, tolerance: float) -> Step | None:
-        """The step itself if ``function`` ends below zero, a shorter one if it dips below zero inside, or None."""
-        start, end = function(step.start), function(step.end)
-        # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
-        floor = min(start[0], 0.0) - tolerance
-        if stays_above(start, end, step.size, floor):
-            return None
+    def _bracket(
+        self, state: State, function: EventFunction, step: Step, floor: float, start: Sample, end: Sample
+    ) -> Step | None:
+        """The step itself if ``function`` ends below ``floor``, a shorter one if it dips below it inside, or None."""
         if end[0] < floor:
             return step
         if abs(start[1]) <= _rest(step.start):
@@ -163,12 +166,10 @@ class Detector:
             return "separation", lambda step: step.contact
         return None
 
-    def _unilateral(self, state: State, step: Step) -> tuple[Step, str] | None:
+    def _unilateral(
+        self, state: State, step: Step, kind: str, pick: Callable[[Step], Force]
+    ) -> tuple[Step, str] | None:
         """The step cut where a force that can only push would pull, and the event there."""
-        pushing = self._pushing(state.phase)
-        if pushing is None:
-            return None
-        kind, pick = pushing
         f = pick(step)
         if self._pair.degree == 0:
             return self._unilateral_mean(state, step, kind, f[0])

@@ -80,11 +80,21 @@ class EventFunctions:
         self._ties = scene.beam is not None and scene.spring is not None and scene.contact.law != "compliance"
         self._phase: Phase | None = None
         self._functions: list[tuple[str, EventFunction]] = []
+        #: The ends last asked for, and the samples there: a step starts where the one before has ended.
+        self._ends: tuple[Motion, Motion] | None = None
+        self._samples: list[Sample] = []
 
     def of(self, phase: Phase) -> list[tuple[str, EventFunction]]:
         if phase is not self._phase:
-            self._phase, self._functions = phase, self._built(phase)
+            self._phase, self._functions, self._ends = phase, self._built(phase), None
         return self._functions
+
+    def samples(self, phase: Phase, ends: tuple[Motion, Motion]) -> list[Sample]:
+        """f, ḟ of each function of ``phase``."""
+        functions = self.of(phase)
+        if ends != self._ends:
+            self._ends, self._samples = ends, [function(ends) for _, function in functions]
+        return self._samples
 
     def _built(self, phase: Phase) -> list[tuple[str, EventFunction]]:
         tip, low = 0, 1

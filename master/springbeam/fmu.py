@@ -9,7 +9,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p, sizeof
 from functools import lru_cache, partial
 from math import isfinite
 from pathlib import Path
@@ -38,6 +38,8 @@ from .trajectory import SHAPE_POINTS
 
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
 _WARNING, _DISCARD, _ERROR, _FATAL = 1, 2, 3, 4
+#: ``Motion(*values)`` in a third of the time.
+_motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
 
@@ -221,18 +223,19 @@ class Fmu(Memory):
         return int(variable.valueReference)
 
     def mark(self) -> None:
-        self._check(self._get_state(), "cannot save the state")
+        if (status := self._get_state()) > _WARNING:
+            raise self.failed(status, "cannot save the state")
         self.moved = False
 
     def rewind(self) -> None:
-        if self.moved:
-            self._check(self._set_state(), "cannot restore the state")
-            self.moved = False
-            self.rewinds += 1
+        if (status := self._set_state()) > _WARNING:
+            raise self.failed(status, "cannot restore the state")
+        self.moved = False
+        self.rewinds += 1
 
     def step(self, time: float, size: float) -> None:
+        """fmi2DoStep, after its inputs have been set. Raises StepRefused."""
         self.steps += 1
-        self.moved = True
         self._time.value, self._size.value = time, size
         status = self._do_step()
         if status <= _WARNING:
@@ -259,10 +262,6 @@ class Fmu(Memory):
             yield
         except FMICallException as error:
             raise self.failed(error.status, what) from error
-
-    def _check(self, status: int, what: str) -> None:
-        if status > _WARNING:
-            raise self.failed(status, what)
 
     def save(self) -> dict[str, Any]:
         with self._calling("cannot save the state"):
@@ -322,13 +321,17 @@ class _FmuBody(Memory):
 
     def _prepare(self, fmu: Fmu) -> None:
         self._motion, self._energies = Reals(fmu, *self._MOTION), Reals(fmu, *self._ENERGIES)
-        self._forces, self._impulse = Reals(fmu, *self._FORCES), Reals(fmu, self._IMPULSE)
-        names = [name for name in self._FORCES for _ in (1, 2)]
-        references = (c_uint * len(names))(*[fmu.reference(name, "Real") for name in names])
-        orders = (c_int * len(names))(*[1, 2] * len(self._FORCES))
-        self._slopes: Any = (c_double * len(names))()
+        self._impulse = Reals(fmu, self._IMPULSE)
+        n = len(self._FORCES)
+        forces = [fmu.reference(name, "Real") for name in self._FORCES]
+        self._inputs: Any = (c_double * (3 * n))()  # the forces, then Ḟ and F̈ of each
+        self._set_forces = fmu.prepared("fmi2SetReal", (c_uint * n)(*forces), c_size_t(n), self._inputs)
         self._set_slopes = fmu.prepared(
-            "fmi2SetRealInputDerivatives", references, c_size_t(len(names)), orders, self._slopes
+            "fmi2SetRealInputDerivatives",
+            (c_uint * (2 * n))(*[reference for reference in forces for _ in (1, 2)]),
+            c_size_t(2 * n),
+            (c_int * (2 * n))(*[1, 2] * n),
+            byref(self._inputs, n * sizeof(c_double)),
         )
         self._pending = self._marked_pending = 0.0
         self.mass = self._mass()
@@ -367,18 +370,21 @@ class _FmuBody(Memory):
         self._impulse.set((self._pending,))
         self._current = self._current._replace(velocity=self._current.velocity + impulse / self.mass)
 
-    def _advance(self, time: float, size: float, values: Sequence[float], slopes: Sequence[float]) -> None:
-        """``values`` of the forces and their ``slopes`` (Ḟ, F̈ of each) at the start of the step."""
-        if not isfinite(sum(values) + sum(slopes)):
-            raise StepRefused(f"{self.fmu.path.name}: the force it should step under is not finite: {list(values)}")
-        self._forces.set(values)
-        if any(slopes):
-            self._slopes[:] = slopes
-            if (status := self._set_slopes()) > _WARNING:
-                raise self.fmu.failed(status, "cannot set input derivatives")
-        self.fmu.step(time, size)
+    def _advance(self, time: float, size: float, inputs: Sequence[float]) -> Motion:
+        """``inputs`` at the start of the step: the forces, then Ḟ and F̈ of each."""
+        fmu, n = self.fmu, len(self._FORCES)
+        if not isfinite(sum(inputs)):
+            raise StepRefused(f"{fmu.path.name}: the force it should step under is not finite: {list(inputs[:n])}")
+        self._inputs[:] = inputs
+        fmu.moved = True
+        if (status := self._set_forces()) > _WARNING:
+            raise fmu.failed(status, f"cannot set {', '.join(self._FORCES)}")
+        if any(inputs[n:]) and (status := self._set_slopes()) > _WARNING:
+            raise fmu.failed(status, "cannot set input derivatives")
+        fmu.step(time, size)
         self._pending = 0.0
-        self._current = self._read_motion()
+        self._current = motion = self._read_motion()
+        return motion
 
     def _begin(self) -> None:
         """Read the motion that the FMU was initialised to."""
@@ -388,9 +394,8 @@ class _FmuBody(Memory):
             raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
 
     def _read_motion(self) -> Motion:
-        values = self._motion.get()
-        motion = Motion(*values)
-        if not isfinite(sum(values)):
+        motion = _motion_of(Motion, self._motion.get())
+        if not isfinite(sum(motion)):
             raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
         return motion
 
@@ -413,7 +418,7 @@ _CALLED_BY = {
     "step": "fmi2DoStep",
     "get": "fmi2GetReal",
     "set": "fmi2SetReal",
-    "_advance": "fmi2SetRealInputDerivatives",
+    "_advance": "fmi2SetReal or fmi2SetRealInputDerivatives",
     "mark": "fmi2GetFMUstate",
     "rewind": "fmi2SetFMUstate",
     "close": "fmi2FreeInstance",
@@ -464,8 +469,8 @@ class FmuBeam(_FmuBody):
     def _mass(self) -> float:
         return Reals(self.fmu, "tip_mass").get()[0]
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
-        self._advance(time, size, contact[:1], contact[1:])
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        return self._advance(time, size, contact)
 
     def energies(self) -> Energies:
         return Energies(*self._stored())
@@ -496,9 +501,9 @@ class FmuSpring(_FmuBody):
     def _mass(self) -> float:
         return self._spring.mass
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         (c, dc, ddc), (n, dn, ddn) = contact, foundation
-        self._advance(time, size, (c, n), (dc, ddc, dn, ddn))
+        return self._advance(time, size, (c, n, dc, ddc, dn, ddn))
 
     def energies(self) -> Energies:
         kinetic, potential, dissipated = self._stored()

@@ -57,19 +57,17 @@ class Ledger(Memory):
 
         One that is not finite changes nothing: it is no row of the results.
         """
-        e_beam = beam.kinetic + beam.potential
-        e_spring = spring.kinetic + spring.potential
-        dissipated = beam.dissipated + spring.dissipated
-        load = beam.load_potential + spring.load_potential
-        total = e_beam + e_spring + contact + dissipated + self.impact_loss + load
-        if self.initial is None:
-            self.initial = total
-        residual = total - self.initial
-        if not isfinite(residual):
-            return Booked(e_beam, e_spring, contact, dissipated, self.impact_loss, load, total, residual)
-        self.scale = max(self.scale, abs(self.initial), e_beam + abs(e_spring) + contact)
-        self.largest_residual = max(self.largest_residual, abs(residual))
-        if self.scale > 0.0:
-            self.relative = max(self.relative, abs(residual) / self.scale)
-            self.gain = max(self.gain, residual / self.scale)
-        return Booked(e_beam, e_spring, contact, dissipated, self.impact_loss, load, total, residual)
+        (kinetic, potential, dissipated, load), (kinetic_2, potential_2, dissipated_2, load_2) = beam, spring
+        e_beam, e_spring = kinetic + potential, kinetic_2 + potential_2
+        dissipated, load, lost = dissipated + dissipated_2, load + load_2, self.impact_loss
+        total = e_beam + e_spring + contact + dissipated + lost + load
+        if (initial := self.initial) is None:
+            self.initial = initial = total
+        residual = total - initial
+        if isfinite(residual):
+            self.scale = scale = max(self.scale, abs(initial), e_beam + abs(e_spring) + contact)
+            self.largest_residual = max(self.largest_residual, abs(residual))
+            if scale > 0.0:
+                self.relative = max(self.relative, abs(residual) / scale)
+                self.gain = max(self.gain, residual / scale)
+        return Booked(e_beam, e_spring, contact, dissipated, lost, load, total, residual)

@@ -25,17 +25,13 @@ class MacroGrid(Memory):
     REMEMBERED = ("_index",)
 
     def __init__(self, start: float, end: float, macro_step: float) -> None:
-        self._start, self._end, self._H = start, end, macro_step
+        self._start, self._end = start, end
+        self.size = macro_step  #: H [s]
         self._index = 0
-
-    @property
-    def size(self) -> float:
-        """H [s]."""
-        return self._H
 
     def next(self, time: float) -> tuple[float, float]:
         """The time at which the step from ``time`` should end, and its size (exactly H where it is a whole one)."""
-        H = self._H
+        H = self.size
         target = self._start + (self._index + 1) * H
         size = target - time
         on_grid = abs(size - H) <= _SAME * H
@@ -49,7 +45,9 @@ class MacroGrid(Memory):
 
     def reached(self, time: float) -> None:
         """Grid points up to ``time`` are behind."""
-        while self._start + (self._index + 1) * self._H <= time + _SAME * self._H:
+        start, H = self._start, self.size
+        latest = time + _SAME * H
+        while start + (self._index + 1) * H <= latest:
             self._index += 1
 
 

@@ -68,12 +68,13 @@ class QuasiStaticBeam(Memory):
     def rewind(self) -> None:
         self._w, self._velocity, self._integrals, self._dissipated = self._marked
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         """By ``size`` [s] under the contact force C; under `NO_FORCE` itself with nothing at the tip."""
         if contact is NO_FORCE:
             self._relax(size)
         else:
             self._follow_force(size, contact)
+        return self.motion()
 
     def _relax(self, size: float) -> None:
         start, alpha = self._w, self._alpha

@@ -138,7 +138,7 @@ class _Checks:
 
     def _checked_row(self, values: Mapping[str, Any] | Sequence[Any]) -> tuple[list[float], str]:
         """The numbers of the row, and its phase."""
-        if isinstance(values, Mapping):
+        if not isinstance(values, tuple) and isinstance(values, Mapping):  # the first is the quicker to tell
             try:
                 values = [values[name] for name in self.columns]
             except KeyError as missing:

@@ -41,17 +41,15 @@ class Rows(Memory):
         (u, v, _, _), (y, z, _, _) = pair.ends()
         joined = phase.joint is not Joint.FREE
         contact = smoothed = state.contact[0]
-        inside = mismatch = 0.0
+        inside, mismatch = 0.0, v - z if joined else 0.0
         if pair.compliant:
             contact = smoothed = inside = compliance_force(y - u, *self._law)
-        elif joined:
-            smoothed = state.smoothed
-        if pair.joinable and not pair.compliant:
-            inside = compliance_force(self._equilibrium - u, *self._law)
-        if joined:
-            mismatch = v - z
-            if not pair.compliant:
+        else:
+            if joined:
+                smoothed = state.smoothed
                 self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
+            if pair.joinable:
+                inside = compliance_force(self._equilibrium - u, *self._law)
         self.largest_speed = max(self.largest_speed, abs(v), abs(z))
         forces = (contact, smoothed, inside, contact - inside, state.foundation[0])
         row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *self._ledger.book(*pair.energies()))

@@ -151,24 +151,13 @@ class Simulation(Memory):
         while state.time < t_end:
             target, size = steps.next(state.time)
             step, event = self._advance(size)
-            end, H = state.time + step.size, self._steps.size
-            at_once, since = self._at_once
-            self._at_once = (at_once + 1, since) if end - since <= _AT_ONCE * H else (1, end)
-            if at_once >= _MAX_EVENTS_AT_ONCE:
-                raise RunStopped(f"the contact chatters: {at_once} events at once", state.time)
-            in_step, since = self._in_step
-            self._in_step = (in_step + 1, since) if end - since <= H else (1, end)
-            if in_step >= _MAX_EVENTS_IN_STEP:
-                raise RunStopped(
-                    f"the contact chatters: {in_step} events within a macro step of {H:g} s; a restitution below 1 "
-                    "lets impacts die out",
-                    state.time,
-                )
+            whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
+            end = target if whole else state.time + step.size
+            self._count_events(end, step.size)
             if step.size > 0.0:
                 if self._error is not None:
                     self._error.accept(step)
-                whole = event is None and abs(step.size - size) <= 1e-9 * self._steps.size
-                state.accept(step, target if whole else state.time + step.size)
+                state.accept(step, end)
                 self._pair.accept(step)
                 self._macro_steps += 1
                 if self._pair.compliant:
@@ -192,7 +181,7 @@ class Simulation(Memory):
                 if at_start is not None:
                     return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
                 step = pair.attempt(state, size, start)
-                if self._holds(step):
+                if self._error is None or self._holds(step, self._error):
                     return self._detector.first(state, step)
                 pair.rewind()
                 size = self._steps.size
@@ -206,17 +195,35 @@ class Simulation(Memory):
                 self._halvings += 1
                 size *= 0.5
 
-    def _holds(self, step: Step) -> bool:
+    def _holds(self, step: Step, local_error: LocalError) -> bool:
         """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set."""
-        if self._error is None or isinstance(self._steps, MacroGrid):
-            return True
-        error, order = self._error.of(self._state, step, self._ledger.scale)
+        assert isinstance(self._steps, AdaptiveSteps)
+        error, order = local_error.of(self._state, step, self._ledger.scale)
         try:
             return self._steps.judge(step.size, error, order)
         except StepTooShort as too_short:
             raise RunStopped(f"{too_short}, where it is {error:.3g} of it", step.time) from too_short
 
     # -- events -----------------------------------------------------------------------------------------------------
+
+    def _count_events(self, end: float, size: float) -> None:
+        """Of a step that ends at ``end`` [s] after ``size`` [s], maybe on an event. Raises RunStopped."""
+        H = self._steps.size
+        if size >= H:
+            self._at_once = self._in_step = (1, end)
+            return
+        at_once, since = self._at_once
+        self._at_once = (at_once + 1, since) if end - since <= _AT_ONCE * H else (1, end)
+        if at_once >= _MAX_EVENTS_AT_ONCE:
+            raise RunStopped(f"the contact chatters: {at_once} events at once", self._state.time)
+        in_step, since = self._in_step
+        self._in_step = (in_step + 1, since) if end - since <= H else (1, end)
+        if in_step >= _MAX_EVENTS_IN_STEP:
+            raise RunStopped(
+                f"the contact chatters: {in_step} events within a macro step of {H:g} s; a restitution below 1 "
+                "lets impacts die out",
+                self._state.time,
+            )
 
     def _settle_start(self) -> None:
         """First contact at the start: the tip on the spring top (or the stop), moving down or at rest."""

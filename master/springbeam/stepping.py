@@ -24,6 +24,10 @@ _AT_REST = Motion(0.0, 0.0, 0.0, 0.0)
 _NOTHING = Energies(0.0, 0.0, 0.0, 0.0)
 
 
+def _at_rest() -> Motion:
+    return _AT_REST
+
+
 class Step(NamedTuple):
     """An attempted step and what the bodies' ends did on it."""
 
@@ -93,6 +97,9 @@ class Pair(Memory):
         self._held = None if self.stop is None else Held(self.stop)
         self.lower: Body | None = self._held if spring is None else spring
         self._bodies: list[Body] = [body for body in (beam, self.lower) if body is not None]
+        #: Where the ends are.
+        self._tip, self._low = (_at_rest if body is None else body.motion for body in (beam, self.lower))
+        self._last: Step | None = None  #: at whose end the bodies are
         self.joinable = beam is not None and spring is not None
         self.compliant = scene.contact.law == "compliance" and self.joinable
         coupling, law = scene.coupling, (scene.contact.stiffness, scene.contact.exponent)
@@ -127,6 +134,7 @@ class Pair(Memory):
             body.mark()
 
     def rewind(self) -> None:
+        self._last = None
         for body in self._bodies:
             body.rewind()
 
@@ -168,7 +176,8 @@ class Pair(Memory):
                 spring.rewind()
                 # C and the part of N that bears it cancel: together, rounding of a large C would move a light top.
                 spring.advance(state.time, size, NO_FORCE, (static, 0.0, 0.0))
-        return Step(state.time, size, contact, foundation, start, self.ends())
+        self._last = step = Step(state.time, size, contact, foundation, start, (self._tip(), self._low()))
+        return step
 
     def accept(self, step: Step) -> None:
         """``step`` is made; of a one-way coupling, what it neglects counts from now on."""
@@ -179,9 +188,7 @@ class Pair(Memory):
 
     def settled(self, state: State, step: Step) -> Step:
         """Leave the bodies at the end of ``step`` (a look inside it may have moved them)."""
-        if self.ends() == step.end:
-            return step
-        return self.attempt(state, step.size, step.start)
+        return step if step is self._last else self.attempt(state, step.size, step.start)
 
     def apply_impulses(self, on_beam: float, on_spring: float) -> None:
         """Upward impulses [N·s]."""
@@ -202,10 +209,7 @@ class Pair(Memory):
 
     def ends(self) -> Ends:
         """(tip, lower end); the one that is missing is at rest at 0."""
-        return (
-            _AT_REST if self.beam is None else self.beam.motion(),
-            _AT_REST if self.lower is None else self.lower.motion(),
-        )
+        return self._tip(), self._low()
 
     def energies(self) -> tuple[Energies, Energies, float]:
         """Of the beam, of the spring, and of the contact law [J].

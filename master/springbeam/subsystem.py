@@ -56,8 +56,8 @@ class Body(Protocol):
     def rewind(self) -> None:
         """Return to the marked state. Costs nothing if nothing happened since."""
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
-        """Advance from ``time`` by ``size`` [s]. Raises StepRefused; ``rewind`` then recovers.
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        """Advance from ``time`` by ``size`` [s]; returns `motion`. Raises StepRefused; ``rewind`` then recovers.
 
         This and every other method but ``close`` may raise BodyFailed.
         """
@@ -99,8 +99,9 @@ class Held(Memory):
 
     def rewind(self) -> None: ...
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self._size = size
+        return self.motion()
 
     def motion(self) -> Motion:
         w, h = self._position, self._size

@@ -83,7 +83,7 @@ class ModalBody:
             self.a, self.v, self._integrals, self._dissipated = self._marked
             self._moved = False
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE):
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self.steps += 1
         self._moved = True
         step = self._undamped if self.alpha == 0.0 else self._damped
@@ -91,6 +91,7 @@ class ModalBody:
         p[0] += self.f
         i1, i2 = step(size, p)
         self._integrals = (float(self.b @ i1), float(self.b @ i2))
+        return self.motion()
 
     def _undamped(self, h, p):
         if h not in self._maps:
@@ -220,7 +221,7 @@ class DuffingBody:
             self.y, self.z, self._integrals, self._dissipated = self._marked
             self._moved = False
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE):
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self.steps += 1
         self._moved = True
         f0, f1, f2 = (n - p for n, p in zip(foundation, contact, strict=True))
@@ -244,6 +245,7 @@ class DuffingBody:
             i1 = new1
             self.y, self.z = _sum(y, h), _sum([k * c for k, c in enumerate(y)][1:], h)
         self._integrals = (i1, i2)
+        return self.motion()
 
     def _series(self, *forcing: float) -> list[float]:
         y, z = [self.y, self.z], [self.z]

@@ -101,6 +101,7 @@ class Affine:
 
     def advance(self, time, size, contact):
         self.w = self.free + self.response * contact[0]
+        return self.motion()
 
     def motion(self):
         return Motion(self.w, 0.0, 0.0, 0.0)

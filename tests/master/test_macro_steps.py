@@ -136,7 +136,7 @@ class Upper(DuffingBody):
     """Takes +C, as a beam does."""
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
-        super().advance(time, size, tuple(-c for c in contact), foundation)
+        return super().advance(time, size, tuple(-c for c in contact), foundation)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])

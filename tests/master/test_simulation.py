@@ -178,7 +178,7 @@ def test_refused_steps_are_halved():
     def advance(own, time, size, *forces):
         if 0.02 <= time < 0.0249 and size > 3e-4:
             raise StepRefused("too long")
-        own(time, size, *forces)
+        return own(time, size, *forces)
 
     scene = soft(time={"t_end": 0.05})
     halved, exact = simulate(scene, wrapped(advance=advance)), reference(scene)
@@ -197,7 +197,7 @@ def test_a_step_that_is_always_refused_stops_the_run_with_cause_and_time():
     def advance(own, time, size, *forces):
         if time + size > 0.0205:
             raise StepRefused("the spring is broken")
-        own(time, size, *forces)
+        return own(time, size, *forces)
 
     scene = soft(time={"t_end": 0.05})
     stopped, whole = simulate(scene, wrapped(advance=advance)), simulate(scene)

@@ -144,7 +144,8 @@ def test_the_scenes_pass_every_phase_and_event():
 SET_ANEW = {
     *(f"{body}.{name}" for body in ("FmuBeam", "FmuSpring") for name in ("_marked_pending", "_marked_motion")),
     *(f"Fmu.{name}" for name in ("moved", "_time", "_size", "_messages")),
-    "EventFunctions._phase",
+    *(f"EventFunctions.{name}" for name in ("_phase", "_ends", "_samples")),
+    "Pair._last",
 }
 
 

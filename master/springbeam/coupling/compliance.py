@@ -110,8 +110,7 @@ class Compliance(Memory):
         ends: list[Motion] = []
         for body in (beam, partner):
             body.rewind()
-            body.advance(time, size, (c, 0.0, 0.0))
-            ends.append(body.motion())
+            ends.append(body.advance(time, size, (c, 0.0, 0.0)))
         self._scale = max(abs(ends[0].displacement), abs(ends[1].displacement))
         return ends[1].displacement - ends[0].displacement
 

@@ -42,11 +42,11 @@ class Exchange:
         p, rate = low.displacement - tip.displacement, low.velocity - tip.velocity
         force = (self._law(p), self._slope(p) * rate if self._degree else 0.0, 0.0)
         beam.rewind()
-        beam.advance(time, size, force)
+        tip = beam.advance(time, size, force)
         on_partner = force
         if self._sequential:
             moved = low.displacement + (size * low.velocity if self._degree else 0.0)
-            end = self._law(moved - beam.motion().displacement)
+            end = self._law(moved - tip.displacement)
             on_partner = (force[0], (end - force[0]) / size, 0.0) if self._degree else (end, 0.0, 0.0)
         partner.rewind()
         partner.advance(time, size, on_partner)

@@ -126,5 +126,4 @@ class FixedPoint(Memory):
 
 def _advanced(body: Body, time: float, size: float, c: float) -> Motion:
     body.rewind()
-    body.advance(time, size, (c, 0.0, 0.0))
-    return body.motion()
+    return body.advance(time, size, (c, 0.0, 0.0))

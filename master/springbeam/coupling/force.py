@@ -57,13 +57,16 @@ def sign_changes(force: Force, size: float) -> list[float]:
 
 def shifted(force: Force, tau: float) -> Force:
     """The same polynomial, seen from τ on."""
+    if force[1] == 0.0 == force[2]:
+        return force
     return (value(force, tau), force[1] + tau * force[2], force[2])
 
 
 def legendre(force: Force, size: float, degree: int) -> list[float]:
     """The degree + 1 Legendre coefficients of the polynomial (cut above ``degree``)."""
-    slope, bend = size * force[1], size * size * force[2]
-    return [force[0] + slope / 2.0 + bend / 6.0, slope / 2.0 + bend / 4.0, bend / 12.0][: degree + 1]
+    value, slope, bend = force[0], size * force[1], size * size * force[2]
+    mean = value + slope / 2.0 + bend / 6.0
+    return [mean] if degree == 0 else [mean, slope / 2.0 + bend / 4.0, bend / 12.0][: degree + 1]
 
 
 def free_mass_response(degree: int, size: float, mass: float) -> list[Motion]:

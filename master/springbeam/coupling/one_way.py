@@ -48,8 +48,7 @@ class OneWay(Memory):
         """Advance both bodies from their marks by ``size`` [s]; parameters and errors as of `Compliance.solve`."""
         driver, driven = (beam, partner) if self.beam_drives else (partner, beam)
         driver.rewind()
-        driver.advance(time, size, NO_FORCE)
-        end = Held(driver.motion().displacement)
+        end = Held(driver.advance(time, size, NO_FORCE).displacement)
         if driven.mass == float("inf"):
             depth = driven.motion().displacement - end.motion().displacement
             return (discrete_gradient(start, depth, *self._law), 0.0, 0.0)

@@ -9,6 +9,7 @@ beam steps and two spring steps.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from math import inf
 from operator import add, mul, sub
 
 import numpy as np
@@ -77,34 +78,43 @@ class Tie(Memory):
             guess = (guess[0], 0.0, 0.0)
         a = force.legendre(guess, size, self._degree)
         acting = force.derivatives(a, size)
-        r_beam = self._advance(beam, time, size, acting)
-        beam_end = beam.motion()
+        conditions = self._conditions
+        beam.rewind()
+        beam_end = beam.advance(time, size, acting)
+        r_beam: Sequence[float] = conditions(beam_end, size)
         at_beam: Vector | None = a
-        known = self._responses.pop(size, None)
+        known = self._responses.get(size)
         if known is None:
             at_beam = None
             known = self._measure(beam, time, size, a, r_beam, beam_end, 1.0), {}
-        B, inverses = self._responses[size] = known  # the last one used comes last
-        if len(self._responses) > SIZES_REMEMBERED:
-            del self._responses[next(iter(self._responses))]
+        if size != self._last_size:
+            self._responses.pop(size, None)
+            self._responses[size] = known  # the last one used comes last
+            if len(self._responses) > SIZES_REMEMBERED:
+                del self._responses[next(iter(self._responses))]
+        B, inverses = known
         kind = type(partner).__name__
         inverse = inverses.get(kind) or _inverse(B, self._free_response(partner, size))
-        r_partner = self._advance(partner, time, size, acting)
-        tolerance = self._absolute_tolerance(start, beam_end, partner.motion(), size, _times(B, a))
+        partner.rewind()
+        partner_end = partner.advance(time, size, acting)
+        r_partner = conditions(partner_end, size)
+        tolerance = self._absolute_tolerance(start, beam_end, partner_end, size, _times(B, a))
         residual = list(map(sub, r_beam, r_partner))
         norm = max(map(abs, residual))
         measured = False
         noise = 1.0
         for iteration in range(_MAX_ITERATIONS):
-            if not norm < float("inf"):
+            if not norm < inf:
                 raise NotConverged(norm, iteration)
             previous = norm
             if norm <= noise * tolerance:
                 if at_beam is a:
                     break
-                r_beam, at_beam = self._advance(beam, time, size, acting), a  # in place of the affine prediction
+                beam.rewind()
+                beam_end, at_beam = beam.advance(time, size, acting), a
+                r_beam = conditions(beam_end, size)  # in place of the affine prediction
                 # A bad guess moves the bodies far: what counts is the motion under the force found.
-                tolerance = self._absolute_tolerance(start, beam.motion(), partner.motion(), size, _times(B, a))
+                tolerance = self._absolute_tolerance(start, beam_end, partner_end, size, _times(B, a))
                 residual = list(map(sub, r_beam, r_partner))
                 norm = max(map(abs, residual))
             else:
@@ -113,15 +123,18 @@ class Tie(Memory):
                 a = list(map(add, a, step))
                 acting = force.derivatives(a, size)
                 r_beam = list(map(add, r_beam, _times(B, step)))
-                r_partner = self._advance(partner, time, size, acting)
+                partner.rewind()
+                partner_end = partner.advance(time, size, acting)
+                r_partner = conditions(partner_end, size)
                 residual = list(map(sub, r_beam, r_partner))
                 norm = max(map(abs, residual))
                 if norm > noise * tolerance:  # below, the difference is rounding and would spoil what is known
                     inverse = _broyden(inverse, step, residual)
             if norm > noise * tolerance and norm > 0.3 * previous:
                 if not measured:
-                    S = self._measure(partner, time, size, a, r_partner, partner.motion(), 1e-4)
-                    self._advance(partner, time, size, acting)
+                    S = self._measure(partner, time, size, a, r_partner, partner_end, 1e-4)
+                    partner.rewind()
+                    partner.advance(time, size, acting)
                     inverse, measured = _inverse(B, S), True
                 elif norm <= _NOISE * tolerance:  # the bodies' own rounding: nothing left to gain
                     noise = _NOISE
@@ -129,17 +142,12 @@ class Tie(Memory):
             raise NotConverged(norm, _MAX_ITERATIONS)
         self._last_size = size
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
-        self._reach = max(self._reach, abs(beam.motion().displacement), abs(partner.motion().displacement))
+        self._reach = max(self._reach, abs(beam_end.displacement), abs(partner_end.displacement))
         inverses[kind] = inverse
         return acting
 
-    def _advance(self, body: Body, time: float, size: float, contact: Force) -> Sequence[float]:
-        body.rewind()
-        body.advance(time, size, contact)
-        return self._conditions(body.motion(), size)
-
     def _free_response(self, partner: Body, size: float) -> Matrix:
-        if partner.mass == float("inf"):
+        if partner.mass == inf:
             return [[0.0] * (self._degree + 1)] * (self._degree + 1)
         unit = force.free_mass_response(self._degree, size, partner.mass)
         return _transposed([self._conditions(m, size) for m in unit])
@@ -158,16 +166,16 @@ class Tie(Memory):
         for k in range(len(a)):
             changed = a.copy()
             changed[k] += delta
-            r_changed = self._advance(body, time, size, force.derivatives(changed, size))
+            body.rewind()
+            r_changed = self._conditions(body.advance(time, size, force.derivatives(changed, size)), size)
             columns.append([(x - y) / delta for x, y in zip(r_changed, r, strict=True)])
         return _transposed(columns)
 
     def _absolute_tolerance(self, start: Motion, beam: Motion, partner: Motion, size: float, by_force: Vector) -> float:
         (u0, v0, _, _), (u, v, _, _), (y, z, _, _) = start, beam, partner
-        change = max(size * max(abs(v0), abs(v), abs(z)), abs(u - u0))
-        reach = max(self._reach, abs(u0), abs(u), abs(y))
+        change = max(size * max(map(abs, (v0, v, z))), abs(u - u0))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
-        rounding = 16.0 * _EPS * max(reach, *map(abs, by_force))
+        rounding = 16.0 * _EPS * max(self._reach, *map(abs, (u0, u, y, *by_force)))
         return max(self._tolerance * change, rounding)
 
 

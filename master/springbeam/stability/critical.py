@@ -42,8 +42,9 @@ class Preloaded:
     def rewind(self) -> None:
         self._body.rewind()
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> None:
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self._body.advance(time, size, (contact[0] - self._preload, contact[1], contact[2]), foundation)
+        return self.motion()
 
     def motion(self) -> Motion:
         w = self._body.motion()
