@@ -91,11 +91,11 @@ class Reals:
         n = len(names)
         self._names = ", ".join(names)
         self._fmu = fmu
-        self._values: Any = (c_double * n)()
-        self._unpacked = partial(Struct(f"{n}d").unpack, self._values)
+        self.values: Any = (c_double * n)()  #: as last read or written
+        self._unpacked = partial(Struct(f"{n}d").unpack, self.values)
         references = (c_uint * n)(*[fmu.reference(name, "Real") for name in names])
-        self._read = fmu.prepared("fmi2GetReal", references, c_size_t(n), self._values)
-        self._write = fmu.prepared("fmi2SetReal", references, c_size_t(n), self._values)
+        self._read = fmu.prepared("fmi2GetReal", references, c_size_t(n), self.values)
+        self._write = fmu.prepared("fmi2SetReal", references, c_size_t(n), self.values)
         self.get()  # a wrong reference is found before the run
 
     def get(self) -> tuple[float, ...]:
@@ -104,7 +104,7 @@ class Reals:
         return self._unpacked()
 
     def set(self, values: Sequence[float]) -> None:
-        self._values[:] = values
+        self.values[:] = values
         self._fmu.moved = True
         if (status := self._write()) > _WARNING:
             raise self._fmu.failed(status, f"cannot set {self._names}")
@@ -477,7 +477,8 @@ class FmuBeam(_FmuBody):
 
     def shape(self) -> np.ndarray:
         """Deflection [m] at `SHAPE_POINTS`, shape (21,)."""
-        return np.array(self._shape.get())
+        self._shape.get()
+        return np.array(np.frombuffer(self._shape.values))
 
 
 class FmuSpring(_FmuBody):

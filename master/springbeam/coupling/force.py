@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import mul
 
 import numpy as np
 
@@ -69,20 +70,17 @@ def legendre(force: Force, size: float, degree: int) -> list[float]:
     return [mean] if degree == 0 else [mean, slope / 2.0 + bend / 4.0, bend / 12.0][: degree + 1]
 
 
+def _unit_response(k: int) -> tuple[float, float, float, float]:
+    """∫ P_k(2x − 1) (1 − x)ⁿ/n! dx over [0, 1] for n = 1, 0, 2, 3: in the order of `Motion`."""
+    p = _WEIGHTS * np.polynomial.legendre.legval(2.0 * _NODES - 1.0, [0.0] * k + [1.0])
+    left = 1.0 - _NODES
+    return float(p @ left), float(p.sum()), float(p @ left**2) / 2.0, float(p @ left**3) / 6.0
+
+
+_UNIT_RESPONSES = [_unit_response(k) for k in range(3)]
+
+
 def free_mass_response(degree: int, size: float, mass: float) -> list[Motion]:
     """Motion of a free mass [kg] from rest under −P_k, k = 0 … degree: how a spring answers when H is small."""
-    tau = 1.0 - _NODES  # remaining time, in units of H
-    motions = []
-    for k in range(degree + 1):
-        unit = np.zeros(k + 1)
-        unit[k] = 1.0
-        p = -_WEIGHTS * np.polynomial.legendre.legval(2.0 * _NODES - 1.0, unit) / mass
-        motions.append(
-            Motion(
-                float(size**2 * (p @ tau)),
-                float(size * p.sum()),
-                float(size**3 * (p @ tau**2) / 2.0),
-                float(size**4 * (p @ tau**3) / 6.0),
-            )
-        )
-    return motions
+    scales = [-(size**n) / mass for n in (2, 1, 3, 4)]
+    return [Motion(*map(mul, unit, scales)) for unit in _UNIT_RESPONSES[: degree + 1]]
