@@ -51,7 +51,6 @@ _OF_PAIR = frozenset(
     {"contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction", "velocity_mismatch", "e_contact"}
 )
 _TRAJECTORY, _EVENTS, _SHAPES = "trajectory.csv", "events.csv", "shapes.csv"
-_ONES = np.ones(len(SHAPE_POINTS))
 _SHAPE_HEADER = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
 #: Of a summary; longer ones are written if the disk has room.
 _SUMMARY_ROOM = 16384
@@ -179,8 +178,9 @@ class _Checks:
         shape = np.asarray(deflection, dtype=float)
         if shape.shape != SHAPE_POINTS.shape:
             raise ValueError(f"shape of {shape.shape} values for {SHAPE_POINTS.shape} points")
-        if not isfinite(time + float(shape @ _ONES)):  # or the sum alone overflows
-            for name, value in zip(_SHAPE_HEADER, (time, *shape.tolist()), strict=True):
+        values = [time, *shape.tolist()]
+        if not isfinite(sum(values)):  # or the sum alone overflows
+            for name, value in zip(_SHAPE_HEADER, values, strict=True):
                 if not isfinite(value):
                     raise NonFiniteValue(name, time, value)
         return shape
