@@ -2,10 +2,11 @@
 
 #include <Eigen/SparseCholesky>
 
+#include <array>
 #include <cmath>
-#include <optional>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "timoshenko.hpp"
 
@@ -13,53 +14,101 @@ namespace beam {
 namespace {
 
 using Eigen::Index;
+using Eigen::Matrix2d;
+using Eigen::Vector2d;
 using Eigen::VectorXd;
 
 // Banded matrices stay banded in their natural order.
 using Factorisation = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
 
-/// LDLᵀ of linear elements, L stored by its three diagonals. The operations are those of Eigen's solver, in its order:
-/// the same bits, but no index is looked up and what the next unknown waits for stays in registers.
-class BandedFactors {
+/// LDLᵀ of a matrix of linear elements, eliminated node by node from both ends to a node in the middle ("burn at both
+/// ends": Dongarra, Bunch, Moler & Stewart, LINPACK Users' Guide, SIAM, 1979, chapter 7; twisted factorisation:
+/// Meurant, SIAM J. Matrix Anal. Appl. 13, 1992, 707–728). In a sweep each unknown waits for the one before; the two
+/// halves do not wait for each other.
+class TwistedFactors {
  public:
-  void assign(const Factorisation& factorisation) {
-    const Factorisation::CholMatrixType& L = factorisation.matrixL().nestedExpression();
-    inverse_ = factorisation.vectorD().cwiseInverse();
-    diagonals_.setZero(3, L.cols());
-    for (Index j = 0; j < L.outerSize(); ++j) {
-      for (Factorisation::CholMatrixType::InnerIterator it(L, j); it; ++it) {
-        if (it.row() > j) diagonals_(it.row() - j - 1, j) = it.value();
-      }
-    }
+  /// False if a pivot is not positive.
+  bool factorise(const Eigen::SparseMatrix<double>& S) {
+    nodes_.resize(static_cast<std::size_t>(S.rows() / 2));
+    middle_ = S.rows() / 4;
+    const auto block = [&S](Index row, Index column) { return Matrix2d(S.block(2 * row, 2 * column, 2, 2)); };
+    bool positive = true;
+    const auto factorise_pivot = [&](Index i, const Matrix2d& pivot) {  // of which the lower triangle is stored
+      Node& f = node(i);
+      f.within = pivot(1, 0) / pivot(0, 0);
+      const double second = pivot(1, 1) - f.within * pivot(1, 0);
+      positive = positive && pivot(0, 0) > 0.0 && second > 0.0;
+      f.inverse = {1.0 / pivot(0, 0), 1.0 / second};
+    };
+    const auto eliminate = [&](Index i, Index next, const Matrix2d& carried) -> Matrix2d {
+      factorise_pivot(i, block(i, i) - carried);
+      Node& f = node(i);
+      Matrix2d coupling = next > i ? block(next, i) : Matrix2d(block(i, next).transpose());
+      coupling.col(1) -= f.within * coupling.col(0);
+      f.next = coupling * f.inverse.asDiagonal();
+      return f.next * coupling.transpose();
+    };
+    Matrix2d left = Matrix2d::Zero(), right = left;
+    for (Index i = 0; i < middle_; ++i) left = eliminate(i, i + 1, left);
+    for (Index i = S.rows() / 2 - 1; i > middle_; --i) right = eliminate(i, i - 1, right);
+    factorise_pivot(middle_, block(middle_, middle_) - left - right);
+    return positive;
   }
 
   /// x = (LDLᵀ)⁻¹ b
   void solve(const VectorXd& b, VectorXd& x) const {
-    const Index n = b.size();
-    x.resize(n);
-    const auto at = [&b, n](Index i) { return i < n ? b[i] : 0.0; };
-    double y1 = at(0), y2 = at(1), y3 = at(2);
-    for (Index j = 0; j < n; ++j) {
-      const double* const L = diagonals_.data() + 3 * j;
-      const double y = y1;
-      y1 = y2 - y * L[0];
-      y2 = y3 - y * L[1];
-      y3 = at(j + 3) - y * L[2];
-      x[j] = y * inverse_[j];
+    x = b;
+    const Index last = x.size() / 2 - 1;
+    Values left = {x[0], x[1]}, right = {x[2 * last], x[2 * last + 1]};
+    for (Index i = 0, j = last; i < middle_; ++i, --j) {
+      left = eliminate(i, i + 1, left, x);
+      if (j > middle_) right = eliminate(j, j - 1, right, x);  // one less where the number of nodes is even
     }
-    double x1 = 0.0, x2 = 0.0, x3 = 0.0;
-    for (Index j = n - 1; j >= 0; --j) {
-      const double* const L = diagonals_.data() + 3 * j;
-      const double y = x[j] - L[0] * x1 - L[1] * x2 - L[2] * x3;
-      x3 = x2;
-      x2 = x1;
-      x1 = x[j] = y;
+    const Node& f = node(middle_);
+    double &x0 = x[2 * middle_], &x1 = x[2 * middle_ + 1];
+    x0 = left[0] + right[0] - x0;
+    x1 = f.inverse[1] * (left[1] + right[1] - x1 - f.within * x0);
+    x0 = f.inverse[0] * x0 - f.within * x1;
+    left = right = {x0, x1};
+    for (Index i = middle_ - 1, j = middle_ + 1; i >= 0; --i, ++j) {
+      left = substitute(i, left, x);
+      if (j <= last) right = substitute(j, right, x);
     }
   }
 
  private:
-  Eigen::MatrixXd diagonals_;  // (k − 1, j): L(j + k, j)
-  VectorXd inverse_;           // of D
+  struct Node {
+    double within;     // L in the rows of the node
+    Vector2d inverse;  // of D
+    Matrix2d next;     // L in the rows of the next node towards the middle
+  };
+  using Values = std::array<double, 2>;  // at a node
+
+  // y: right-hand side of node i less what was eliminated before; returns that of the next. Inlined, so that it stays
+  // in registers; what is waited for comes last in each sum.
+  EIGEN_ALWAYS_INLINE Values eliminate(Index i, Index next, const Values& y, VectorXd& x) const {
+    const Node& f = node(i);
+    const double y0 = y[0], y1 = y[1] - f.within * y0;
+    x[2 * i] = f.inverse[0] * y0;
+    x[2 * i + 1] = f.inverse[1] * y1;
+    return {x[2 * next] - f.next(0, 0) * y0 - f.next(0, 1) * y1,
+            x[2 * next + 1] - f.next(1, 0) * y0 - f.next(1, 1) * y1};
+  }
+
+  // z: the solution at the next node towards the middle; returns that at node i.
+  EIGEN_ALWAYS_INLINE Values substitute(Index i, const Values& z, VectorXd& x) const {
+    const Node& f = node(i);
+    double &x0 = x[2 * i], &x1 = x[2 * i + 1];
+    x1 = x1 - f.next(1, 1) * z[1] - f.next(0, 1) * z[0];
+    x0 = x0 - f.next(1, 0) * z[1] - f.next(0, 0) * z[0] - f.within * x1;
+    return {x0, x1};
+  }
+
+  Node& node(Index i) { return nodes_[static_cast<std::size_t>(i)]; }
+  const Node& node(Index i) const { return nodes_[static_cast<std::size_t>(i)]; }
+
+  std::vector<Node> nodes_;
+  Index middle_ = 0;
 };
 
 /// S = mass M + stiffness K of one step size, factorised.
@@ -67,15 +116,7 @@ struct StepMatrix {
   double mass = 0.0, stiffness = 0.0;
   Eigen::SparseMatrix<double> matrix;
   Factorisation factorisation;
-  std::optional<BandedFactors> banded;  // of linear elements
-
-  void solve(const VectorXd& b, VectorXd& x) const {
-    if (banded) {
-      banded->solve(b, x);
-    } else {
-      x = factorisation.solve(b);
-    }
-  }
+  TwistedFactors twisted;  // instead, of linear elements
 };
 
 /// The midpoint rule's w without tip force. It is linear in that force: a coupling that repeats a step from one state
@@ -120,7 +161,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
                                mu_, 1.0 / mu_, alpha_, 1.0 / mesh_.radius_of_gyration()}) {
       ordinary_ = ordinary_ && value < ordinary;
     }
-    set_distributed_load(0.0);
+    load_ = hat_load_;
   }
 
   void step(double size, const TipForce& c, double distributed_load) override {
@@ -140,6 +181,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   }
 
   void set_distributed_load(double distributed_load) override {
+    if (distributed_load == now_.distributed_load) return;
     if (!midpoint_ && now_.started) now_.pending_load += distributed_load - now_.distributed_load;
     now_.distributed_load = distributed_load;
     load_ = distributed_load * uniform_load_ + hat_load_;
@@ -263,13 +305,21 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     return true;
   }
 
+  void solve_once(const StepMatrix& S, VectorXd& x) {
+    if (linear_) {
+      S.twisted.solve(rhs_, x);
+    } else {
+      x = S.factorisation.solve(rhs_);
+    }
+  }
+
   /// x = S⁻¹ rhs_ with one step of iterative refinement.
   void solve(const StepMatrix& S, VectorXd& x) {
-    S.solve(rhs_, x);
+    solve_once(S, x);
     mesh_.mass_times(x.data(), work_.data());
     mesh_.stiffness_times(x.data(), work2_.data());
     rhs_ -= S.mass * work_ + S.stiffness * work2_;
-    S.solve(rhs_, work_);
+    solve_once(S, work_);
     x += work_;
   }
 
@@ -288,8 +338,8 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     now_.pending_impulse = 0.0;
     now_.pending_load = 0.0;
     now_.started = true;
-    const double energies = mesh_.mass_norm2(v_) + mesh_.stiffness_norm2(q_);
-    const bool harmless = ordinary_ && energies < ordinary && ordinary_inputs(h, c, distributed_load);
+    const bool harmless = ordinary_ && q_.squaredNorm() < ordinary && v_.squaredNorm() < ordinary &&
+                          ordinary_inputs(h, c, distributed_load);
     if (!harmless && !(outputs_finite(*this) && a_.allFinite())) {
       q_.swap(work_);
       v_.swap(work2_);
@@ -318,14 +368,19 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     S.stiffness = midpoint_ ? 0.25 * h * h + 0.5 * alpha_ * h : f * (alpha_ * gamma_ * h + beta_ * h * h);
     if (S.matrix.size() == 0) {
       S.matrix = K_;
-      S.factorisation.analyzePattern(K_);
+      if (!linear_) S.factorisation.analyzePattern(K_);
     }
     S.matrix.coeffs() = S.mass * M_.coeffs() + S.stiffness * K_.coeffs();
-    S.factorisation.factorize(S.matrix);
-    if (S.factorisation.info() != Eigen::Success) {
+    bool factorised = false;
+    if (linear_) {
+      factorised = S.twisted.factorise(S.matrix);
+    } else {
+      S.factorisation.factorize(S.matrix);
+      factorised = S.factorisation.info() == Eigen::Success;
+    }
+    if (!factorised) {
       throw std::domain_error("beam: the matrix of the time step cannot be factorised; use a smaller step size");
     }
-    if (linear_) S.banded.emplace().assign(S.factorisation);
   }
 
   Timoshenko mesh_;

@@ -48,8 +48,8 @@ class BeamIntegrator {
   virtual void restore(const std::vector<double>& state) = 0;
 };
 
-/// While parameters, loads and energies stay below `ordinary` and step sizes below `ordinary_size`, no output can
-/// overflow. A step beyond asks outputs_finite().
+/// While parameters, loads and energies (or the squared norms of q and v) stay below `ordinary` and step sizes below
+/// `ordinary_size`, no output can overflow. A step beyond asks outputs_finite().
 inline constexpr double ordinary = 1e40, ordinary_size = 1e10;
 
 bool outputs_finite(const BeamIntegrator& beam);

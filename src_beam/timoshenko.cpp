@@ -85,7 +85,7 @@ Timoshenko::Field Timoshenko::field(Degree p, double left, const double* q) cons
 }
 
 template <typename Degree>
-void Timoshenko::multiply_mass(Degree p, const double* x, double* y) const {
+void Timoshenko::multiply_mass(Degree p, const double* x, double* __restrict y) const {
   const double m = h_ / 6.0;
   const Index block = 2 * p;
   for (Index f = 0; f < 2; ++f) {
@@ -113,7 +113,7 @@ void Timoshenko::multiply_mass(Degree p, const double* x, double* y) const {
 }
 
 template <typename Degree>
-void Timoshenko::multiply_stiffness(Degree p, const double* x, double* y) const {
+void Timoshenko::multiply_stiffness(Degree p, const double* x, double* __restrict y) const {
   const double lever = 0.5 * h_ / r_;
   const Index block = 2 * p;
   double theta0 = 0.0, u0 = 0.0;
@@ -244,33 +244,43 @@ void require_factor(const Timoshenko::MassFactor& factor) {
   if (factor.info() != Eigen::Success) throw std::runtime_error("beam: the mass matrix cannot be factorised");
 }
 
-double Timoshenko::mass_norm2(const Eigen::VectorXd& x) const {
+template <typename Degree>
+double Timoshenko::sum_mass(Degree p, const double* x) const {
   double linear = 0.0, rest = 0.0, theta0 = 0.0, u0 = 0.0;
-  for (Index i = 0; i < size(); i += 2 * p_) {
-    const double* q = x.data() + i;
-    const Field t = field(p_, theta0, q), u = field(p_, u0, q + 1);
+  for (Index i = 0; i < size(); i += 2 * p) {
+    const double* q = x + i;
+    const Field t = field(p, theta0, q), u = field(p, u0, q + 1);
     linear += (t.left * t.left + t.right * t.right + (t.left + t.right) * (t.left + t.right)) +
               (u.left * u.left + u.right * u.right + (u.left + u.right) * (u.left + u.right));
-    for (Index j = 2; j <= p_; ++j) rest += (t.f[j] * t.f[j] + u.f[j] * u.f[j]) / static_cast<double>(2 * j + 1);
-    theta0 = q[2 * p_ - 2];
-    u0 = q[2 * p_ - 1];
+    for (Index j = 2; j <= p; ++j) rest += (t.f[j] * t.f[j] + u.f[j] * u.f[j]) / static_cast<double>(2 * j + 1);
+    theta0 = q[2 * p - 2];
+    u0 = q[2 * p - 1];
   }
   return linear * h_ / 6.0 + h_ * rest;
 }
 
-double Timoshenko::stiffness_norm2(const Eigen::VectorXd& x) const {
+template <typename Degree>
+double Timoshenko::sum_stiffness(Degree p, const double* x) const {
   double bend = 0.0, top = 0.0, shear = 0.0, theta0 = 0.0, u0 = 0.0;
-  for (Index i = 0; i < size(); i += 2 * p_) {
-    const Strains s = strains(p_, theta0, u0, x.data() + i);
-    for (Index j = 0; j < p_; ++j) {
+  for (Index i = 0; i < size(); i += 2 * p) {
+    const Strains s = strains(p, theta0, u0, x + i);
+    for (Index j = 0; j < p; ++j) {
       const double kappa = s.h_kappa[j] / h_, legendre = static_cast<double>(2 * j + 1);
-      (j + 1 < p_ ? bend : top) += kappa * kappa / legendre;
+      (j + 1 < p ? bend : top) += kappa * kappa / legendre;
       shear += s.gamma[j] * s.gamma[j] / legendre;
     }
-    theta0 = x[i + 2 * p_ - 2];
-    u0 = x[i + 2 * p_ - 1];
+    theta0 = x[i + 2 * p - 2];
+    u0 = x[i + 2 * p - 1];
   }
   return h_ * (b_ * bend + b_top_ * top + s_ * shear);
+}
+
+double Timoshenko::mass_norm2(const Eigen::VectorXd& x) const {
+  return p_ == 1 ? sum_mass(Linear(), x.data()) : sum_mass(p_, x.data());
+}
+
+double Timoshenko::stiffness_norm2(const Eigen::VectorXd& x) const {
+  return p_ == 1 ? sum_stiffness(Linear(), x.data()) : sum_stiffness(p_, x.data());
 }
 
 // All entries of every element, also where they are 0: M and K have one pattern.

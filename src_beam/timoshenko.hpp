@@ -94,6 +94,10 @@ class Timoshenko {
   void multiply_mass(Degree p, const double* x, double* y) const;
   template <typename Degree>
   void multiply_stiffness(Degree p, const double* x, double* y) const;
+  template <typename Degree>
+  double sum_mass(Degree p, const double* x) const;
+  template <typename Degree>
+  double sum_stiffness(Degree p, const double* x) const;
   double bending_stiffness(Eigen::Index p, Eigen::Index j) const { return j + 1 < p ? b_ : b_top_; }
   template <typename Entry>
   Eigen::SparseMatrix<double> assemble(const Entry& entry) const;

@@ -23,9 +23,7 @@ void require_positive(const char* name, double value) {
 
 }  // namespace
 
-void require_finite(const char* name, double value) {
-  if (!std::isfinite(value)) reject(name, value, "finite");
-}
+void reject_not_finite(const char* name, double value) { reject(name, value, "finite"); }
 
 void require_step_size(double size) { require_positive("step size [s]", size); }
 

@@ -1,6 +1,8 @@
 // Parameter checks: a message always names the parameter, its value and what is allowed.
 #pragma once
 
+#include <cmath>
+
 #include "beam.hpp"
 
 namespace beam {
@@ -18,8 +20,12 @@ inline constexpr int max_dense_unknowns = 1000;
 /// @throws std::invalid_argument for the first parameter that is not allowed
 void validate(const Parameters& parameters);
 
+[[noreturn]] void reject_not_finite(const char* name, double value);
+
 /// @throws std::invalid_argument unless `value` is finite
-void require_finite(const char* name, double value);
+inline void require_finite(const char* name, double value) {
+  if (!std::isfinite(value)) reject_not_finite(name, value);
+}
 
 /// @throws std::invalid_argument unless `size` is a finite, positive step size [s]
 void require_step_size(double size);

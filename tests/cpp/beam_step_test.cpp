@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "beam.hpp"
@@ -78,9 +79,9 @@ TEST(BeamStep, IntegralsAreThoseOfTheDisplacement) {
 // The paper's (59) and (62) with its own block ordering, for EI = KAG = ρA = ρI = L = 1. λ_nc(Ψ − u)₊^p is the contact
 // force there, at both ends of the step; constant here. f_b = 1 − 6ψ_n, all of it as a vector of coefficients.
 TEST(BeamStep, MidpointRuleIsThePapersEquation62) {
-  constexpr int n = 12;
-  const double hx = 1.0 / n;
-  for (const double alpha_b : {0.0, 0.03}) {
+  for (const auto& [n, alpha_b] :
+       {std::pair(1, 0.03), std::pair(2, 0.0), std::pair(11, 0.03), std::pair(12, 0.0), std::pair(12, 0.03)}) {
+    const double hx = 1.0 / n;
     for (const double ht : {1e-3, 0.1, 3.0}) {
       Eigen::MatrixXd M = Eigen::MatrixXd::Zero(n, n), K = M, S = M;
       for (int i = 0; i < n; ++i) {
