@@ -3,9 +3,11 @@
 The error is that of the coupling and the time integration, for the scene's own mesh and modes: these are the model.
 (Impacts on the foundation converge only slowly with the mesh, since what they meet is the mass of its tip.)
 
-Runs with more and more macro steps follow each other until two agree in the order of their events, and in their
-displacements and event times: if the finer one has ρ times the steps and its error is of order 2 in H or more, that
-error is at most the difference over ρ² − 1. Each takes the scheme that `springbeam.automatic` takes for its macro step.
+Two runs are compared: if the finer one has ρ times the steps and its error is of order p, that error is the
+difference over ρᵖ − 1. `hermite` tells p itself: its energy residual is an error of the same order, summed up over the
+run, so ρᵖ is the ratio of the two residuals. The first run has the macro step that the fastest waves at the tip ask
+for, the second what the residual of the first lets expect, a third what the difference of these two does; each agrees
+with the one before or gives way to a finer one (``docs/accuracy.md``).
 """
 
 from __future__ import annotations
@@ -15,20 +17,35 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from .automatic import choice
-from .crosscheck import contact_changes
-from .runner import simulate
+from .contact_times import apart, changes_of_contact
+from .linearised import spring_frequency
+from .recording import MemoryRecorder
+from .resolution import shear_frequency, slowest_frequency
+from .runner import RunStopped, run
 from .scene import Scene, SceneError, scene_from_dict, with_changes
-from .trajectory import Trajectory
+from .statics import tip_compliance
+from .trajectory import Event, Trajectory
 
-#: Macro steps of the first run, and the largest number tried.
-_FEWEST, _MOST = 16, 50_000
-#: Growth of the number of macro steps from run to run.
-_LEAST_GROWTH, _MOST_GROWTH = 1.5, 8.0
-_SAFETY = 1.5
-#: Order of the error that is relied on, and orders expected where contact opens and closes.
-_TRUSTED, _EXPECTED = 2.0, {"compliance": 2.0, "transmission": 4.0}
+#: Fewest macro steps, and the largest number tried; pilot runs in a row that may stop early.
+_FEWEST, _MOST, _MOST_STOPPED = 8, 50_000, 6
+#: Growth of the number of macro steps from run to run: at least, at most, and after a run that stopped.
+_LEAST_GROWTH, _MOST_GROWTH, _AFTER_STOP = 1.2, 4.0, 1.4
+#: An estimate of the displacement's error is to be so many times smaller than the accuracy.
+_SAFETY = 2.0
+#: Runs that differ by more are both unresolved, whatever their order [of the motion].
+_UNRESOLVED = 0.05
+#: Orders of the error of a displacement that are relied on, and of the time of an event, where `hermite` measures them.
+_LOWEST, _HIGHEST, _OF_EVENTS = 2.0, 6.0, 3.0
+#: What the first macro step turns the fastest wave by [rad], over accuracy^(1/6); a mode that dies out within this
+#: fraction of its retardation time needs no resolution; and what a macro step turns a body alone by [rad].
+_FIRST_TURN, _DIES_OUT, _ALONE = 28.0, 0.4, 2.0
+#: Displacement error over energy residual, of runs with so many changes of contact after the first.
+_AMPLIFIED = (1.0, 3.0, 60.0)
+#: Law "compliance": the first and the second tolerance of the adaptive steps over the accuracy, and the largest.
+_FIRST_TOLERANCE, _SECOND_TOLERANCE, _LARGEST_TOLERANCE = 8.0, 0.8, 0.1
 #: IDA's tolerance over the accuracy, and its bounds.
 _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-4, 1e-12, 1e-8
 
@@ -41,7 +58,7 @@ class Picked:
     run: Trajectory  #: the last pilot run, which keeps it
     displacement_error: float  #: estimate, relative to the largest change of the tip (or spring top)
     event_error: float  #: estimate of the largest error of a change of contact, relative to the time that is run
-    events: int  #: changes of contact that this is about, those longer than four macro steps
+    events: int  #: changes of contact that this is about, those further apart than four macro steps
     pilot_runs: int
     pilot_steps: int  #: doStep calls of the pilot runs before the last
     pilot_time: float  #: [s]
@@ -58,11 +75,11 @@ class Picked:
     def summary(self) -> dict[str, Any]:
         """As it goes into ``summary.json``."""
         coupling, spring = self.scene.coupling, self.scene.spring
-        picked: dict[str, Any] = {
-            "scheme": coupling.scheme,
-            "degree": coupling.degree,
-            "macro_step": coupling.H,
-        }
+        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree}
+        if coupling.adaptive:
+            picked["relative_tolerance"] = coupling.relative_tolerance
+        else:
+            picked["macro_step"] = coupling.H
         if spring is not None:
             picked["ida_relative_tolerance"] = spring.relative_tolerance
         return {
@@ -94,72 +111,189 @@ def pick(scene: Scene) -> Picked:
     return _Search(scene, scene.accuracy).run()
 
 
+@dataclass(frozen=True)
+class _Pilot:
+    """A run, and how fine it is: macro steps, or one over the tolerance of the adaptive ones."""
+
+    fineness: float
+    run: Trajectory
+
+    @property
+    def residual(self) -> float:
+        return float(self.run.summary["max_energy_residual"])
+
+
+@dataclass(frozen=True)
+class _Estimate:
+    """Of the finer one of two runs, relative to the largest change of the tip, and to the time that is run."""
+
+    displacement: float
+    event: float
+    events: int
+    apart: float  #: by how much the two differ in the larger of both
+
+
+class _Disturbed(Exception):
+    """There is more than the first event."""
+
+
+class _UndisturbedRecorder(MemoryRecorder):
+    """Of a run that has but one event. Raises _Disturbed."""
+
+    def event(self, event: Event) -> None:
+        if self.trajectory().events:
+            raise _Disturbed
+        super().event(event)
+
+
 class _Search:
     def __init__(self, scene: Scene, accuracy: float) -> None:
         data = scene.model_dump(exclude={"accuracy"}, exclude_none=True)
         self._scene, self._accuracy = scene_from_dict(data), accuracy
         self._span = scene.time.t_end - (scene.contact_time or 0.0)
-        self._order = _EXPECTED["compliance" if scene.contact.law == "compliance" else "transmission"]
+        fine = with_changes(self._scene, coupling={"macro_step": 1e-9 * self._span})
+        taken = choice(fine)  # of schemes, the one where everything is resolved
+        self._scheme = {"scheme": taken.scheme, "degree": taken.degree}
+        beam, compliant = scene.beam, scene.contact.law == "compliance" and scene.spring is not None
+        self._adaptive = compliant and beam is not None and beam.integrator == "modal"
+        self._runs, self._calls, self._spent, self._stopped = 0, 0, 0.0, 0
 
     def run(self) -> Picked:
-        steps = _FEWEST
-        coarse, spent, calls, runs, growth, worst = self._with(steps), 0.0, 0, 1, 2.0, 1.0
-        while True:
-            steps = math.ceil(growth * steps)
-            if steps > _MOST:
-                found = (
-                    "the events still change from run to run" if worst >= 1.0 else f"runs still differ by {worst:.1e}"
-                )
-                raise SceneError(
-                    f"accuracy = {self._accuracy:g}: not reached with {len(coarse) - 1} steps, {found}; ask for "
-                    "less, or shorten [time] t_end"
-                )
-            spent += float(coarse.summary["wall_time"])
-            calls += _calls(coarse)
-            fine, runs = self._with(steps), runs + 1
-            ratio = coarse.scene.coupling.H / fine.scene.coupling.H
-            error, event_error, events = self._difference(coarse, fine)
-            worst = max(error, event_error)
-            share = 1.0 / (ratio**_TRUSTED - 1.0)
-            if share * worst <= self._accuracy / _SAFETY:
-                return Picked(self._accuracy, fine, share * error, share * event_error, events, runs - 1, calls, spent)
-            # What the expected order makes of the difference; other events tell nothing about it.
-            expected = worst / (ratio**self._order - 1.0)
-            growth = 1.2 * (_SAFETY * expected / self._accuracy) ** (1.0 / self._order) if worst < 1.0 else 2.0
-            growth = min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
-            coarse = fine
+        fineness, coarse, estimate = self._first(), None, None
+        if self._scheme["scheme"] == "hermite" and fineness > 2.0 * _FEWEST:
+            coarse = self._pilot(_FEWEST, undisturbed=True)
+            if coarse is not None:
+                fineness = self._rung(_FEWEST * self._second(coarse))
+        while fineness <= (1.0 / _TIGHTEST if self._adaptive else _MOST):
+            calls, spent = self._calls, self._spent
+            fine = self._pilot(fineness)
+            if fine is None:
+                growth = _AFTER_STOP
+            elif coarse is None:
+                growth, coarse = self._second(fine), fine
+            else:
+                estimate = self._estimate(coarse, fine)
+                worst = max(_SAFETY * estimate.displacement, estimate.event) / self._accuracy
+                if worst <= 1.0 and estimate.apart <= _UNRESOLVED:
+                    return Picked(
+                        self._accuracy, fine.run, estimate.displacement, estimate.event, estimate.events,
+                        self._runs - 1, calls, spent,
+                    )  # fmt: skip
+                growth, coarse = self._growth(estimate), fine
+            fineness = self._rung(fineness * growth)
+        if coarse is None:
+            found = f"the fastest waves of its mesh take some {fineness:.1g}"
+        else:
+            found = "" if estimate is None else f"runs still differ by {estimate.apart:.1e}"
+        raise SceneError(
+            f"accuracy = {self._accuracy:g}: not reached with {_MOST} steps, {found}; ask for less, shorten [time] "
+            "t_end, or take a coarser mesh"
+        )
 
-    def _with(self, steps: int) -> Trajectory:
-        tables: dict[str, dict[str, Any]] = {"coupling": {**self._scheme(steps), "macro_step": self._span / steps}}
+    # -- how fine ---------------------------------------------------------------------------------------------------
+
+    def _first(self) -> float:
+        beam, spring = self._scene.beam, self._scene.spring
+        if self._adaptive:
+            return 1.0 / min(_FIRST_TOLERANCE * self._accuracy, _LARGEST_TOLERANCE)
+        of_spring = 0.0 if spring is None else spring_frequency(self._scene)
+        if beam is None:
+            return self._rung(of_spring * self._span / _ALONE)
+        if spring is None and self._scene.stop is None:
+            return self._rung(slowest_frequency(beam) * self._span / _ALONE)
+        if beam.fidelity == "quasi_static":
+            assert spring is not None
+            return self._rung(math.hypot(of_spring, 1.0 / math.sqrt(tip_compliance(beam) * spring.mass)) * self._span)
+        waves = shear_frequency(beam)
+        if beam.alpha_b > 0.0:
+            waves = min(waves, _DIES_OUT / beam.alpha_b)
+        return self._rung(max(waves, of_spring) * self._span / (_FIRST_TURN * self._accuracy ** (1.0 / 6.0)))
+
+    def _second(self, first: _Pilot) -> float:
+        if self._adaptive:
+            return 1.0 / (first.fineness * _SECOND_TOLERANCE * self._accuracy)
+        if self._scheme["scheme"] != "hermite":
+            return _LEAST_GROWTH
+        expected = _AMPLIFIED[min(changes_of_contact(first.run), len(_AMPLIFIED) - 1)] * first.residual
+        return min(max(math.pow(expected / self._accuracy, 1.0 / _HIGHEST), _LEAST_GROWTH), _MOST_GROWTH)
+
+    def _growth(self, estimate: _Estimate) -> float:
+        """What makes the next estimate hold, with a margin, by the orders of convergence expected."""
+        displacement = 1.5 * _SAFETY * estimate.displacement / self._accuracy
+        event = 1.5 * estimate.event / self._accuracy
+        of_displacement, of_event = (1.0, 1.0) if self._adaptive else (5.0, 3.5)
+        growth = max(math.pow(displacement, 1.0 / of_displacement), math.pow(event, 1.0 / of_event))
+        return min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
+
+    def _rung(self, steps: float) -> float:
+        """Macro steps, at least these: four sizes an octave, so that any two runs have many times in common."""
+        if self._adaptive:
+            return steps
+        steps = max(steps, _FEWEST)
+        unit = max(2.0 ** (math.floor(math.log2(steps)) - 2), 4.0)
+        return unit * math.ceil(steps / unit * (1.0 - 1e-9))
+
+    # -- runs -------------------------------------------------------------------------------------------------------
+
+    def _pilot(self, fineness: float, *, undisturbed: bool = False) -> _Pilot | None:
+        """``None`` if it stops early, which a finer one may not. Raises RunStopped if that goes on.
+
+        If it is to be ``undisturbed``, a second event stops it.
+        """
+        steps = {"relative_tolerance": 1.0 / fineness} if self._adaptive else {"macro_step": self._span / fineness}
+        tables: dict[str, dict[str, Any]] = {"coupling": {**self._scheme, **steps}}
         if self._scene.spring is not None:
             tolerance = min(max(_IDA_SHARE * self._accuracy, _TIGHTEST), _LOOSEST)
             tables["spring"] = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
-        return simulate(with_changes(self._scene, **tables))
+        scene = with_changes(self._scene, **tables)
+        recorder = _UndisturbedRecorder(scene) if undisturbed else MemoryRecorder(scene)
+        try:
+            run(scene, recorder)
+            self._stopped = 0
+        except RunStopped as stopped:
+            self._stopped += not isinstance(stopped.__cause__, _Disturbed)
+            if self._stopped == _MOST_STOPPED:
+                raise
+        made = recorder.trajectory()
+        self._runs += 1
+        self._calls += sum(int(made.summary.get(f"{body}_steps", 0)) for body in ("beam", "spring"))
+        self._spent += float(made.summary["wall_time"])
+        return None if made.summary["status"] != "done" else _Pilot(fineness, made)
 
-    def _scheme(self, steps: int) -> dict[str, Any]:
-        taken = choice(with_changes(self._scene, coupling={"macro_step": self._span / steps}))
-        return {"scheme": taken.scheme, "degree": taken.degree}
+    def _estimate(self, coarse: _Pilot, fine: _Pilot) -> _Estimate:
+        displacement = self._displacement(coarse.run, fine.run)
+        window = 2.0 * self._span / (len(coarse.run) if self._adaptive else coarse.fineness)
+        event, events = apart(coarse.run, fine.run, window)
+        event /= self._span
+        ratio = fine.fineness / coarse.fineness
+        if self._adaptive:
+            order = of_event = 1.0
+        else:
+            order = _LOWEST
+            if self._scheme["scheme"] == "hermite" and fine.residual > 0.0 < coarse.residual:
+                seen = math.log(coarse.residual / fine.residual) / math.log(ratio)
+                order = min(max(seen, _LOWEST), _HIGHEST)
+            of_event = min(order, _OF_EVENTS)
+        return _Estimate(
+            displacement / (ratio**order - 1.0), event / (ratio**of_event - 1.0), events, max(displacement, event)
+        )
 
-    def _difference(self, coarse: Trajectory, fine: Trajectory) -> tuple[float, float, int]:
-        """Of displacement, relative to its change; of event times, relative to the span; the number of events.
-
-        Where the events come in another order, that of their times is 1.
-        """
-        name = "u_tip" if "u_tip" in fine.columns else "y"
-        at, rows = _common(coarse.time, fine.time)
+    def _displacement(self, coarse: Trajectory, fine: Trajectory) -> float:
+        """The largest difference, relative to the largest change."""
+        name, velocity = ("u_tip", "v_tip") if "u_tip" in fine.columns else ("y", "z")
         values = fine[name]
         scale = float(np.abs(values - values[0]).max()) or 1.0
-        displacement = float(np.abs(coarse[name][at] - values[rows]).max(initial=0.0)) / scale
-        window = 2.0 * coarse.scene.coupling.H
-        ours, theirs = contact_changes(fine.events, window), contact_changes(coarse.events, window)
-        if [kind for kind, _ in ours] != [kind for kind, _ in theirs]:
-            return displacement, 1.0, 0
-        apart = [abs(a - b) for (_, a), (_, b) in zip(ours, theirs, strict=True)]
-        return displacement, max(apart, default=0.0) / self._span, len(ours)
-
-
-def _calls(run: Trajectory) -> int:
-    return sum(int(run.summary.get(f"{body}_steps", 0)) for body in ("beam", "spring"))
+        if self._adaptive:
+            # Nowhere the same times, but many rows. Before an event the row has the velocity after it.
+            rows = np.flatnonzero(np.diff(fine.time, append=np.inf) > 0.0)
+            at = np.clip(np.searchsorted(fine.time[rows], coarse.time), 1, len(rows) - 1)
+            smooth = ~np.isin(fine.time[rows][at], [event.time for event in fine.events])
+            curve = CubicHermiteSpline(fine.time[rows], values[rows], fine[velocity][rows])
+            difference = coarse[name][smooth] - curve(coarse.time[smooth])
+        else:
+            at, rows = _common(coarse.time, fine.time)
+            difference = coarse[name][at] - values[rows]
+        return float(np.abs(difference).max(initial=0.0)) / scale
 
 
 def _common(coarse: np.ndarray, fine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

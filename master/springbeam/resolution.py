@@ -111,10 +111,18 @@ def mesh_frequency(beam: Beam) -> float:
     """Highest frequency of the mesh [rad/s], about."""
     bending, shear = bending_stiffness(beam), shear_stiffness(beam)
     inertia, mass = beam.density * beam.second_moment_of_area, beam.density * beam.area
+    return sqrt(_gradient(beam) * max(bending / inertia, shear / mass) + shear / inertia)
+
+
+def shear_frequency(beam: Beam) -> float:
+    """Highest frequency of shear waves on the mesh [rad/s], about: those that an impact at the tip sets off."""
+    return sqrt(_gradient(beam) * shear_stiffness(beam) / (beam.density * beam.area))
+
+
+def _gradient(beam: Beam) -> float:
+    """Of ∫v'²/∫v² over polynomials on an element: 12/h² for p = 1, 60/h² for p = 2, then a little more [1/m²]."""
     h, p = beam.length / beam.n_elements, beam.element_degree
-    # Of ∫v'²/∫v² over polynomials: 12/h² for p = 1, 60/h² for p = 2, then a little more than the exact value.
-    gradient = p * (p + 1) * (p + 2) * (p + 3) / (2.0 * h**2)
-    return sqrt(gradient * max(bending / inertia, shear / mass) + shear / inertia)
+    return p * (p + 1) * (p + 2) * (p + 3) / (2.0 * h**2)
 
 
 def modes_below(beam: Beam, omega: float) -> int:

@@ -273,9 +273,14 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}")
     if "accuracy" in summary:
         found = summary["accuracy"]
-        how = "{scheme} {degree}, H = {macro_step:.3g} s".format(**found["picked"])
+        picked = found["picked"]
+        how = (
+            f"H = {picked['macro_step']:.3g} s"
+            if "macro_step" in picked
+            else f"tolerance {picked['relative_tolerance']:.3g}"
+        )
         console.print(
-            f"accuracy  {found['asked']:g} asked: {how}\n"
+            f"accuracy  {found['asked']:g} asked: {picked['scheme']} {picked['degree']}, {how}\n"
             f"          errors {found['estimated_displacement_error']:.1e} (displacement), "
             f"{found['estimated_event_error']:.1e} (times of {found['events_compared']} events)"
         )
