@@ -111,18 +111,25 @@ class Transitions(Memory):
         self._fastest_impact = 0.0
 
     def happens(
-        self, kind: str, phase: Phase, ends: tuple[Motion, Motion], end_force: float, tolerance: float
+        self,
+        kind: str,
+        phase: Phase,
+        start: tuple[Motion, Motion],
+        elapsed: float,
+        ends: tuple[Motion, Motion],
+        end_force: float,
+        tolerance: float,
     ) -> tuple[str, Phase, Impact]:
         """The event's kind (an impact on the foundation may end seated), the phase after it, and the impact.
 
-        ``ends`` are (tip, lower end) before it, ``end_force`` is C there [N], ``tolerance`` what positions can be told
-        apart to [m].
+        ``ends`` are (tip, lower end) before it, ``start`` the same ``elapsed`` [s] ago, where the step began that ends
+        with it, ``end_force`` is C [N], ``tolerance`` what positions can be told apart to [m].
         """
         tip, low = ends
         if kind == "impact":
             return kind, *self._meet(phase, tip, low, tolerance)
         if kind == "stop_impact":
-            return self._strike(phase, tip, low, end_force, tolerance)
+            return self._strike(phase, start, elapsed, ends, tolerance)
         if kind == "release":
             if end_force > 0.0:
                 return kind, Phase(Joint.TOUCH), Impact()
@@ -161,31 +168,40 @@ class Transitions(Memory):
         return spring_force(spring, psi) + (psi - tip_load_deflection(beam)) / tip_compliance(beam) < 0.0
 
     def _strike(
-        self, phase: Phase, tip: Motion, low: Motion, end_force: float, tolerance: float
+        self,
+        phase: Phase,
+        start: tuple[Motion, Motion],
+        elapsed: float,
+        ends: tuple[Motion, Motion],
+        tolerance: float,
     ) -> tuple[str, Phase, Impact]:
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
         assert self._scene.stop is not None
         e = self._scene.stop.restitution
+        tip, low = ends
         tied = self._tip_mass is not None and phase.joint is not Joint.FREE and self._scene.contact.law != "compliance"
         z = low.velocity if self._mass is not None else None
         v = tip.velocity if tied or self._mass is None else None
-        ends = (z, self._mass or 0.0, v, self._tip_mass or 0.0)
+        striking = (z, self._mass or 0.0, v, self._tip_mass or 0.0)
         speed = max(abs(w) for w in (z, v) if w is not None)
         self._fastest_impact = max(self._fastest_impact, speed)
         # It strikes while rising if the rebound would be over in no time.
         tip_mass = 0.0 if v is None else self._tip_mass or 0.0
-        rising = common_velocity(v or 0.0, z or 0.0, tip_mass, self._mass or 0.0) > 0.0
+        after = common_velocity(v or 0.0, z or 0.0, tip_mass, self._mass or 0.0)
         back = e * speed
-        dies_out = rising or back <= _SEATING_SPEED * self._fastest_impact
-        if self._scene.spring is not None and back <= _SEATING_SPEED_UNSEEN * self._fastest_impact:
-            contact = 0.0 if phase.joint is Joint.FREE else end_force
-            pressing = contact + spring_force(self._scene.spring, self._scene.stop.position)
-            # It rises by m (e z)²/2F; each impact is found to no better than the tolerance, which brings it as much.
-            dies_out |= 0.5 * self._scene.spring.mass * back * back <= tolerance * pressing
+        dies_out = after > 0.0 or back <= _SEATING_SPEED * self._fastest_impact
+        if z is not None and elapsed > 0.0 and back <= _SEATING_SPEED_UNSEEN * self._fastest_impact:
+            # What presses it down is told by the flight: C at its end may be off by what reverses a mismatch of
+            # velocities, (d + 1)(d + 2) times their quotient by the step. It rises by (e z)²/2a; each impact is found
+            # to no better than the tolerance, which brings it as much.
+            before = common_velocity(
+                0.0 if v is None else start[0].velocity, start[1].velocity, tip_mass, self._mass or 0.0
+            )
+            dies_out |= 0.5 * (e * after) ** 2 * elapsed <= tolerance * (before - after)
         if (dies_out and e < 1.0) or speed == 0.0:
             joint = phase.joint if self._mass is not None else Joint.TIED
-            return "seated", Phase(joint, seated=True), foundation_impact(*ends, restitution=0.0)
-        return "stop_impact", phase, foundation_impact(*ends, restitution=e)
+            return "seated", Phase(joint, seated=True), foundation_impact(*striking, restitution=0.0)
+        return "stop_impact", phase, foundation_impact(*striking, restitution=e)
 
     def _part(self, opened: Phase, tip: Motion, low: Motion) -> Impact:
         """A tie that opens while its ends still close (the energy scheme lets velocities differ): they meet first."""

@@ -29,21 +29,22 @@ from .subsystem import Force
 
 #: An event closer to the start of a step than this fraction of H happens at the start.
 _NO_TIME = 1e-9
+#: Of a velocity, relative to the largest so far.
+_VELOCITY_ROUNDING = 16.0 * 2.0**-52
 #: Repetitions to end a step where the contact force vanishes.
 _MAX_FORCE_CUTS = 8
 
 
-def _rest(ends: Ends) -> float:
-    """Speed below which ends do not move against each other [m/s]."""
-    tip, low = ends
-    return 1e-12 * max(abs(tip.velocity), abs(low.velocity))
-
-
 class Detector:
-    """Finds the event that ends a step; the bodies are left where the returned step ends."""
+    """Finds the event that ends a step; the bodies are left where the returned step ends.
 
-    def __init__(self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps) -> None:
-        self._pair, self._steps = pair, steps
+    ``fastest`` tells the largest speed of an end so far [m/s].
+    """
+
+    def __init__(
+        self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps, fastest: Callable[[], float]
+    ) -> None:
+        self._pair, self._steps, self._fastest = pair, steps, fastest
         tip_share = 0.0
         if pair.joinable:
             assert pair.beam is not None
@@ -55,10 +56,19 @@ class Detector:
         """What positions can be told apart to [m]."""
         return position_tolerance(ends, self._pair.stop or 0.0, self._steps.size)
 
+    def _rest(self, ends: Ends) -> float:
+        """Speed below which ends do not move against each other [m/s].
+
+        Velocities are sums of modes that have been as fast as the ends: one that is left of 0, as of a tip that is let
+        go, is rounding.
+        """
+        tip, low = ends
+        return max(1e-12 * max(abs(tip.velocity), abs(low.velocity)), _VELOCITY_ROUNDING * self._fastest())
+
     def at_start(self, state: State, start: Ends) -> str | None:
         """The event that is due before any step: its function is 0 and falling."""
         for index, (value, rate) in enumerate(self._functions.samples(state.phase, start)):
-            if rate < 0.0 and value <= self.tolerance(start) and rate < -_rest(start):
+            if rate < 0.0 and value <= self.tolerance(start) and rate < -self._rest(start):
                 return self._functions.of(state.phase)[index][0]
         return None
 
@@ -124,7 +134,7 @@ class Detector:
         """The step itself if ``function`` ends below ``floor``, a shorter one if it dips below it inside, or None."""
         if end[0] < floor:
             return step
-        if abs(start[1]) <= _rest(step.start):
+        if abs(start[1]) <= self._rest(step.start):
             # Ends that have just parted may close a little first, by the error of the time at which they were let go.
             return None
         inside = lowest_inside(start, end, step.size)

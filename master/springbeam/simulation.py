@@ -112,7 +112,7 @@ class Simulation(Memory):
         else:
             self._steps = MacroGrid(start_time, scene.time.t_end, scene.coupling.H)
         self._error = LocalError(scene, self._pair) if scene.coupling.adaptive else None
-        self._detector = Detector(scene, self._pair, self._steps)
+        self._detector = Detector(scene, self._pair, self._steps, lambda: self._rows.largest_speed)
         self._transitions = Transitions(
             scene, None if beam is None else beam.mass, None if spring is None else spring.mass
         )
@@ -249,7 +249,7 @@ class Simulation(Memory):
             state.reclosed = state.time - self._last_opening <= _AT_ONCE * self._steps.size
         ends = pair.ends()
         kind, phase, impact = self._transitions.happens(
-            kind, state.phase, ends, pair.end_force(state, step), self._detector.tolerance(ends)
+            kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), self._detector.tolerance(ends)
         )
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.massless_tip(phase)

@@ -17,6 +17,9 @@ from .quasi_static import QuasiStaticBeam
 from .scene import DISPLACEMENT_DRIVEN, ORDINARY_SCHEMES, Scene
 from .subsystem import NO_FORCE, BeamBody, Body, Energies, Force, Held, Motion
 
+#: The force of a step is continued over at most this many times its size; beyond, its end value is held.
+_REACH_OF_FORCE = 4.0
+
 #: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
 Ends = tuple[Motion, Motion]
 
@@ -46,6 +49,7 @@ class State(Memory):
     time: float
     phase: Phase = field(default_factory=Phase)
     contact: Force = NO_FORCE  #: C of the last step, continued
+    last_size: float = 0.0  #: of the last step [s]
     foundation: Force = NO_FORCE  #: N of the last step, continued
     smoothed: float = 0.0  #: mean of C's two limits at the start of the last step [N]
     steps_in_phase: int = 0
@@ -56,13 +60,17 @@ class State(Memory):
     def accept(self, step: Step, time: float) -> None:
         """The step that ends at ``time`` is made."""
         self.middles = [*self.middles[-1:], (self.time + 0.5 * step.size, step.contact[0], step.foundation[0])]
-        self.time = time
+        self.time, self.last_size = time, step.size
         first = self.steps_in_phase == 0
         # At the macro point between two steps both forces are wrong by nearly the same, one up, one down.
         self.smoothed = step.contact[0] if first else 0.5 * (step.contact[0] + self.contact[0])
         self.contact = force.shifted(step.contact, step.size)
         self.foundation = force.shifted(step.foundation, step.size)
         self.steps_in_phase += 1
+
+    def guess(self, size: float) -> Force:
+        """C over a step of ``size`` [s], as far as the last step tells."""
+        return self.contact if size <= _REACH_OF_FORCE * self.last_size else (self.contact[0], 0.0, 0.0)
 
     def enter(self, phase: Phase) -> None:
         """Another phase begins: what was known of the forces holds no longer."""
@@ -167,7 +175,7 @@ class Pair(Memory):
             assert upper is not None
             assert partner is not None
             tie = self._tie if self._fixed_point is None or partner is self._held else self._fixed_point
-            contact = tie.solve(upper, partner, state.time, size, state.contact, start[0])
+            contact = tie.solve(upper, partner, state.time, size, state.guess(size), start[0])
         if phase.seated:
             foundation = contact
             if spring is not None:

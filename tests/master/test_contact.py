@@ -105,6 +105,6 @@ def test_a_meeting_at_the_equilibrium_is_told_by_the_velocity(y, speed, joint):
     """Within rounding of Ψ: tied while rising it would be released at once, and meet again, for ever."""
     transitions = Transitions(load_scene("soft"), tip_mass=0.01, mass=1.0)
     end = Motion(y, speed, 0.0, 0.0)
-    _, phase, impact = transitions.happens("impact", Phase(), (end, end), 0.0, 1e-17)
+    _, phase, impact = transitions.happens("impact", Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
     assert phase.joint is joint
     assert impact.energy_loss == 0.0

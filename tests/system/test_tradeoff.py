@@ -138,3 +138,27 @@ def test_explicit_solvers_are_not_sent_after_a_mode_that_is_too_fast_for_them():
 
     assert left_out("bar-impact", 3.0) == {"DOP853", "LSODA"}
     assert left_out("soft", 0.0712) == set()
+
+
+def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
+    """With no time at all every run is given up: one of each family is begun, and none is judged."""
+    monkeypatch.setattr(tradeoff, "_LIMIT", 0.0)
+    monkeypatch.setattr(tradeoff, "_LIMIT_FINER", 0.0)
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 4})
+    late = tradeoff.study(scene, until=0.02, repeats=1)
+    same = [c for c in configurations(late.scene) if not c.refined and c.method != "Algorithm 1"]
+    families = {c.family for c in same}
+    points = [p for p in late.points if p.configuration in same]
+    assert sorted(p.configuration.family for p in points) == sorted(families)
+    assert all(p.errors is None for p in points)
+    assert all("takes more than 0 s" in p.cause or "diverges" in p.cause for p in points)
+    assert late.notes[0].startswith("given up after 0 s")
+    assert all(family in late.notes[0] for family in families)
+
+
+def test_models_are_left_out_if_their_reference_takes_too_long(monkeypatch):
+    monkeypatch.setattr(tradeoff, "_LIMIT_FINER", 0.0)
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 4})
+    late = tradeoff.study(scene, until=0.02, repeats=1)
+    assert not [p for p in late.points if p.configuration.refined]
+    assert "the reference takes more than 0 s" in late.notes[-1]

@@ -22,9 +22,6 @@ _MAX_ITERATIONS = 20
 _EPS = float(np.finfo(float).eps)
 #: Where the iteration stops to converge within this factor of the tolerance it has met the bodies' own rounding.
 _NOISE = 1e3
-#: A guess fitted over a step is extrapolated over at most this many times its size; beyond, its end value is held.
-_REACH_OF_GUESS = 4.0
-
 
 #: Step sizes whose responses are remembered: the macro step's, and some of steps cut by events.
 SIZES_REMEMBERED = 64
@@ -74,8 +71,6 @@ class Tie(Memory):
         ``guess`` is the contact force as far as known, ``start`` the beam's motion at the mark. Returns the contact
         force. Raises NotConverged (with the residual [m]) or StepRefused.
         """
-        if size > _REACH_OF_GUESS * self._last_size:
-            guess = (guess[0], 0.0, 0.0)
         a = force.legendre(guess, size, self._degree)
         acting = force.derivatives(a, size)
         conditions = self._conditions

@@ -58,6 +58,7 @@ def simulate(
     seat_height: float | None = None,
     max_events: int = 100_000,
     t_end: float | None = None,
+    time_limit: float | None = None,
 ) -> Trajectory:
     """Run a scene by events.
 
@@ -82,6 +83,8 @@ def simulate(
         bounces left out. At e = 1 bounces can be damped without end, ever smaller; then give a larger height.
     t_end
         Ends the run earlier than the scene does [s].
+    time_limit
+        Wall time after which it is given up [s]; not of a quasi-static beam.
 
     Returns
     -------
@@ -91,7 +94,7 @@ def simulate(
     Raises
     ------
     ReferenceFailure
-        If an integration or the event logic cannot go on.
+        If an integration or the event logic cannot go on, or ``time_limit`` is over.
     ValueError
         If the scene is outside what this reference defines.
     """
@@ -104,7 +107,7 @@ def simulate(
     if method not in ("exponential", *SCIPY_METHODS):
         raise ValueError(f"method = {method!r}: one of exponential, {', '.join(SCIPY_METHODS)}")
     run = _Run(scene, method, rtol, atol, nodes, velocity_perturbation, seat_height, max_events, t_end)
-    return run.execute(sample_times)
+    return run.execute(sample_times, time_limit)
 
 
 @dataclass
@@ -202,7 +205,7 @@ class _Run:
 
     # Main loop ------------------------------------------------------------------------------------------------------
 
-    def execute(self, sample_times: Sequence[float] | np.ndarray | None) -> Trajectory:
+    def execute(self, sample_times: Sequence[float] | np.ndarray | None, time_limit: float | None) -> Trajectory:
         began = clock.perf_counter()
         every_event = sample_times is None
         if sample_times is None:
@@ -223,6 +226,8 @@ class _Run:
         armed: set[str] = set()
         propagator, phase_start = self._propagator(), self.time
         while self.t_end - self.time > 1e-14 * self.t_end:
+            if time_limit is not None and clock.perf_counter() - began > time_limit:
+                raise ReferenceFailure(f"takes more than {time_limit:g} s; it is at t = {self.time:.6g} s")
             target = samples[upcoming] if upcoming < len(samples) else self.t_end
             segment = propagator.advance(max(target - self.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
             self.counts["steps"] += 1

@@ -30,8 +30,10 @@ __all__ = ["TARGETS", "Choice", "Point", "Study", "comparable_until", "study", "
 
 #: Relative errors for which the table names the cheapest configuration.
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
-#: A method whose looser tolerance took longer than this is not run at tighter ones [s].
-_BUDGET = 10.0
+#: A run that takes longer than this is given up, and finer ones of its family are not begun [s].
+_LIMIT = 10.0
+#: So long the reference on a finer mesh may take [s].
+_LIMIT_FINER = 60.0
 #: Runs longer than this are timed once [s].
 _TIMED_ONCE = 3.0
 #: Methods whose steps are stable up to a few radians of the fastest mode, and how many radians they are let go [rad].
@@ -140,23 +142,20 @@ def study(scene: Scene, until: float | None = None, repeats: int = 3, progress: 
         raise SceneError('[contact] impact = "rest": a rigid tie has no reference there; take "inelastic" or "tip"')
     window = comparable_until(scene) if until is None else min(until, scene.time.t_end)
     scene = with_changes(scene, time={"t_end": window})
-    todo = configurations(scene)
+    every = configurations(scene)
+    hopeless = [c for c in every if _hopeless(c)]
+    todo = [c for c in every if c not in hopeless]
     total, done = len(todo) * repeats, 0
     runs: dict[Configuration, Trajectory | str] = {}
     timings: dict[Configuration, list[tuple[float, float]]] = {}
-    spent: dict[str, float] = {}
+    given_up: dict[str, Configuration] = {}
     reach = _reach(scene)
     for repeat in range(repeats):
         for configuration in todo:
             done += 1
             if progress is not None:
                 progress(done, total, configuration.name)
-            family = configuration.family
-            if (
-                configuration.monolithic
-                and repeat == 0
-                and (spent.get(family, 0.0) > _BUDGET or _hopeless(configuration))
-            ):
+            if repeat == 0 and configuration.family in given_up:
                 continue
             if repeat > 0 and (
                 not isinstance(runs.get(configuration), Trajectory) or timings[configuration][0][0] > _TIMED_ONCE
@@ -165,9 +164,16 @@ def study(scene: Scene, until: float | None = None, repeats: int = 3, progress: 
             run, solve, setup = _run(configuration, window, reach)
             runs.setdefault(configuration, run)
             timings.setdefault(configuration, []).append((solve, setup))
-            if repeat == 0:
-                spent[family] = solve
-    return _judged(scene, todo, runs, timings)
+            if repeat == 0 and solve > _LIMIT:
+                given_up[configuration.family] = configuration
+    notes = []
+    if given_up:
+        names = "; ".join(c.name for c in given_up.values())
+        notes.append(f"given up after {_LIMIT:g} s, finer ones of their kind not run: {names}")
+    if hopeless:
+        names = ", ".join(dict.fromkeys(c.method for c in hopeless))
+        notes.append(f"not run, explicit steps would follow the mesh's fastest mode over {_MOST_TURNS:g} rad: {names}")
+    return _judged(scene, todo, runs, timings, reach, notes)
 
 
 def comparable_until(scene: Scene) -> float:
@@ -219,6 +225,11 @@ def _run(configuration: Configuration, window: float, reach: float) -> tuple[Tra
     """(result or why it stopped, solve time [s], setup time [s])."""
     scene = configuration.scene
     began = perf_counter()
+
+    def limited(time: float, phase: str, macro_steps: int) -> None:
+        if perf_counter() - began > _LIMIT:
+            raise RunStopped(f"takes more than {_LIMIT:g} s", time)
+
     try:
         if configuration.method == ALGORITHM_1:
             run = algorithm1.simulate(scene)
@@ -227,10 +238,11 @@ def _run(configuration: Configuration, window: float, reach: float) -> tuple[Tra
         if configuration.monolithic:
             rtol = configuration.rtol
             run = event_driven.simulate(
-                scene, method=configuration.method, rtol=rtol, atol=1e-3 * rtol * reach, nodes=2, sample_times=[window]
-            )
+                scene, method=configuration.method, rtol=rtol, atol=1e-3 * rtol * reach, nodes=2, sample_times=[window],
+                time_limit=_LIMIT,
+            )  # fmt: skip
             return run, float(run.summary["wall_time"]), perf_counter() - began - float(run.summary["wall_time"])
-        run = simulate(scene)
+        run = simulate(scene, limited)
         return run, float(run.summary["wall_time"]), float(run.summary["setup_time"])
     except (RunStopped, algorithm1.AlgorithmFailure, event_driven.ReferenceFailure) as stopped:
         return str(stopped), perf_counter() - began, 0.0
@@ -241,6 +253,8 @@ def _judged(
     todo: list[Configuration],
     runs: dict[Configuration, Trajectory | str],
     timings: dict[Configuration, list[tuple[float, float]]],
+    reach: float,
+    notes: list[str],
 ) -> Study:
     grid = np.linspace(scene.contact_time or 0.0, scene.time.t_end, 401)
     results = {c: r for c, r in runs.items() if isinstance(r, Trajectory)}
@@ -249,24 +263,27 @@ def _judged(
     for refined in (False, True):
         model = finer(scene) if refined else scene
         times = [_compared(c, r) for c, r in results.items() if c.refined == refined and not _scipy(c)]
-        if model is not None and (times or not refined):
-            references[refined] = event_driven.simulate(model, sample_times=np.unique(np.concatenate([grid, *times])))
+        if model is None or not (times or not refined):
+            continue
+        samples = np.unique(np.concatenate([grid, *times]))
+        try:
+            references[refined] = event_driven.simulate(
+                model, sample_times=samples, time_limit=_LIMIT_FINER if refined else None
+            )
+        except event_driven.ReferenceFailure as failed:
+            if not refined:
+                raise
+            notes.append(f"modes and elements not judged: on a finer mesh the reference {failed}")
     elapsed = perf_counter() - began
     points = []
     for configuration in todo:
         run = runs.get(configuration)
-        if run is None:
+        if run is None or configuration.refined not in references:
             continue
         if isinstance(run, Trajectory) and _scipy(configuration):
             # Timed without rows; its errors are those of the same steps, sampled.
-            run = _sampled(configuration, grid, _reach(scene))
+            run = _sampled(configuration, grid, reach)
         points.append(_point(configuration, run, references, timings[configuration]))
-    skipped = [c.name for c in todo if c not in runs]
-    notes = (
-        [f"not run, would take more than {_BUDGET:g} s, as their looser tolerance: {', '.join(skipped)}"]
-        if skipped
-        else []
-    )
     return Study(scene, points, elapsed, notes)
 
 
