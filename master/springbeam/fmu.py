@@ -133,7 +133,8 @@ class Fmu(Memory):
         self._reached = c_double()
         self._get_reached = self.prepared("fmi2GetRealStatus", c_int(fmi2LastSuccessfulTime), byref(self._reached))
         try:
-            self.initialise(start_time, parameters)
+            self._prepare_start(parameters)
+            self.initialise(start_time)
         except BaseException:
             self.close()
             raise
@@ -167,31 +168,43 @@ class Fmu(Memory):
             raise FmuError(f"{self.path}: cannot be instantiated: {self._cause(error)}") from error
         return slave
 
-    def initialise(self, time: float, parameters: dict[str, float | int | bool]) -> None:
-        """Set parameters and start values and leave initialization mode at ``time`` [s]."""
-        slave = self._slave
-        setters: dict[str, tuple[Any, type]] = {
-            "Real": (slave.setReal, float),
-            "Integer": (slave.setInteger, int),
-            "Boolean": (slave.setBoolean, bool),
-        }
-        of_kind: dict[str, dict[int, Any]] = {kind: {} for kind in setters}
-        for name, value in parameters.items():
-            variable = self._variable(name)
-            of_kind[variable.type][variable.valueReference] = setters[variable.type][1](value)
-        with self._calling("cannot be initialised"):
-            slave.setupExperiment(startTime=time)
-            for kind, values in of_kind.items():
-                if values:
-                    setters[kind][0](list(values), list(values.values()))
-            slave.enterInitializationMode()
-            slave.exitInitializationMode()
+    def _prepare_start(self, parameters: dict[str, float | int | bool]) -> None:
+        """Calls that initialise, with the parameters in their arguments."""
+        self._start_time = c_double()
+        no = c_int(0)
+        self._set_up = self.prepared("fmi2SetupExperiment", no, c_double(0.0), self._start_time, no, c_double(0.0))
+        self._enter = self.prepared("fmi2EnterInitializationMode")
+        self._exit = self.prepared("fmi2ExitInitializationMode")
+        self._reset = self.prepared("fmi2Reset")
+        #: Where the value of a parameter is.
+        self._parameters: dict[str, tuple[Any, int]] = {}
+        self._set_parameters = []
+        kinds: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int}
+        for kind, ctype in kinds.items():
+            names = [name for name in parameters if self._variable(name).type == kind]
+            if not names:
+                continue
+            n = len(names)
+            values: Any = (ctype * n)(*[parameters[name] for name in names])
+            references = (c_uint * n)(*[self.reference(name, kind) for name in names])
+            self._set_parameters.append(self.prepared(f"fmi2Set{kind}", references, c_size_t(n), values))
+            self._parameters.update((name, (values, i)) for i, name in enumerate(names))
 
-    def reset(self, time: float, parameters: dict[str, float | int | bool]) -> None:
-        """Start again at ``time`` with the given parameters."""
-        with self._calling("cannot be reset"):
-            self._slave.reset()
-        self.initialise(time, parameters)
+    def initialise(self, time: float) -> None:
+        """Set parameters and start values and leave initialization mode at ``time`` [s]."""
+        self._start_time.value = time
+        for call in (self._set_up, *self._set_parameters, self._enter, self._exit):
+            if (status := call()) > _WARNING:
+                raise self.failed(status, "cannot be initialised")
+
+    def reset(self, time: float, changed: dict[str, float]) -> None:
+        """Start again at ``time`` with some parameters changed."""
+        for name, value in changed.items():
+            values, i = self._parameters[name]
+            values[i] = value
+        if (status := self._reset()) > _WARNING:
+            raise self.failed(status, "cannot be reset")
+        self.initialise(time)
         self.moved = True
 
     @property
@@ -493,11 +506,11 @@ class FmuSpring(_FmuBody):
 
     def __init__(self, spring: Spring, start_time: float) -> None:
         self._spring = spring
-        self._parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
-        self._parameters["displacement"] = spring.equilibrium
-        self._parameters["velocity"] = spring.initial_velocity
+        parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
+        parameters["displacement"] = spring.equilibrium
+        parameters["velocity"] = spring.initial_velocity
         self._dissipated_before = 0.0  #: before the last `restart` [J]
-        super().__init__(Fmu("spring", fmu_directory() / "spring.fmu", self._parameters, start_time))
+        super().__init__(Fmu("spring", fmu_directory() / "spring.fmu", parameters, start_time))
 
     def _mass(self) -> float:
         return self._spring.mass
@@ -534,7 +547,7 @@ class FmuSpring(_FmuBody):
         ``dissipated`` is what damping has taken until then [J].
         """
         self._dissipated_before = dissipated
-        self.fmu.reset(time, {**self._parameters, "displacement": displacement, "velocity": velocity})
+        self.fmu.reset(time, {"displacement": displacement, "velocity": velocity})
         self._pending = 0.0
         self._begin()
 

@@ -8,6 +8,7 @@ and ``energy_residual`` shows it. Readings where the print leaves something open
 
 from __future__ import annotations
 
+from math import nan
 from typing import Any, Protocol
 
 import numpy as np
@@ -122,8 +123,7 @@ class PaperLaw(Memory):
         ends = []
         for force in (0.0, 1.0):
             self._beam.rewind()
-            self._beam.advance(self.time, self.h, (force, 0.0, 0.0))
-            ends.append(self._beam.motion().displacement)
+            ends.append(self._beam.advance(self.time, self.h, (force, 0.0, 0.0)).displacement)
         self._beam.rewind()
         self._beam_response = ends[1] - ends[0]
 
@@ -139,18 +139,21 @@ class PaperLaw(Memory):
         start = spring.motion()
         y, z = start.displacement, start.velocity
         beam.mark()
-        beam.advance(self.time, self.h, NO_FORCE)
-        u_free = beam.motion().displacement
+        u_free = beam.advance(self.time, self.h, NO_FORCE).displacement
         if not self._touched:
             spring.advance(self.time, self.h, NO_FORCE)
             return "free", 0.0, 0.0, 0.0
         u_new = self._predicted_tip(u_free, u)  # line 9
         kinetic, potential, dissipated, _ = spring.energies()
-        y_new, pressing = self._spring_end(y, y)  # line 10
         acting, phase, foundation = self._stiffness, "free", 0.0
-        if psi < y_new < u_new:  # lines 11–13
-            self._stiffness = 0.0
-        elif u_new <= psi or u_new <= y_new:  # line 14
+        joined = u_new <= psi  # line 14 then asks for no y_new
+        if not joined:
+            y_new, pressing = self._spring_end(y, y)  # line 10
+            if psi < y_new < u_new:  # lines 11–13
+                self._stiffness = 0.0
+            else:
+                joined = u_new <= y_new  # line 14
+        if joined:
             phase = "tied"
             self._stiffness = acting = self.scene.contact.stiffness  # line 15
             spring.restart(self.time, u_new, z, dissipated)  # line 16
@@ -167,8 +170,9 @@ class PaperLaw(Memory):
             else:  # the spring has come to y_new: only its velocity is another
                 spring.apply_impulse(spring.mass * (z_new - spring.motion().velocity))
         contact = (u_new - u_free) / self._beam_response  # lines 13, 19, 22
-        beam.rewind()
-        beam.advance(self.time, self.h, (contact, 0.0, 0.0))
+        if contact != 0.0:  # else the beam is there
+            beam.rewind()
+            beam.advance(self.time, self.h, (contact, 0.0, 0.0))
         inside = 0.5 * (self._law(u_new, acting) + self._law(u, acting))
         # What no force of the model does: the overwritten tip's work on the beam, the exchanged yˡ on the spring.
         self._injected["beam"] += (contact - inside) * (u_new - u)
@@ -192,16 +196,17 @@ class PaperLaw(Memory):
 
     def _spring_end(self, y: float, guess: float) -> tuple[float, float]:
         """yˡ⁺¹ from y and the mean force ½ (λ(Ψ−yˡ⁺¹)₊^p + λ(Ψ−y)₊^p) that presses the spring on the way."""
-        before, end = self._law(y), guess
+        before, end, reached, pressing = self._law(y), guess, nan, nan
         self._spring.mark()
         response = 0.5 * self.h**2 / self._parameters.mass
         for k in range(1, _MAX_ITERATIONS + 1):
-            pressing = 0.5 * (self._law(end) + before)
-            self._spring.rewind()
-            self._spring.advance(self.time, self.h, (pressing, 0.0, 0.0))
-            reached = self._spring.motion().displacement
+            force = self._law(end)
+            if pressing != 0.5 * (force + before):  # else the spring is where it would come again
+                pressing = 0.5 * (force + before)
+                self._spring.rewind()
+                reached = self._spring.advance(self.time, self.h, (pressing, 0.0, 0.0)).displacement
             depth = self._parameters.equilibrium - end
-            slope = -self.scene.contact.exponent * self._law(end) / depth if depth > 0.0 else 0.0
+            slope = -self.scene.contact.exponent * force / depth if depth > 0.0 else 0.0
             change = (end - reached) / (1.0 + 0.5 * response * slope)
             if abs(change) <= _TOLERANCE:
                 self._solves += 1
@@ -216,8 +221,8 @@ class PaperLaw(Memory):
         n, response = 0.0, 0.5 * self.h**2 / self._parameters.mass
         for _ in range(_MAX_ITERATIONS):
             self._spring.rewind()
-            self._spring.advance(self.time, self.h, (pressing, 0.0, 0.0), (n, 0.0, 0.0))
-            miss = self._phi - self._spring.motion().displacement
+            reached = self._spring.advance(self.time, self.h, (pressing, 0.0, 0.0), (n, 0.0, 0.0)).displacement
+            miss = self._phi - reached
             if abs(miss) <= _TOLERANCE:
                 return n
             n += miss / response
@@ -254,7 +259,7 @@ class PaperLaw(Memory):
             "events": self._events,
             "halved_steps": 0,
             "iterations": self._iterations,
-            "spring_steps_per_solve": self._iterations / self._solves if self._solves else 0.0,
+            "iterations_per_solve": self._iterations / self._solves if self._solves else 0.0,
             "max_energy_residual": self._ledger.relative,
             "max_energy_residual_joule": self._ledger.largest_residual,
             "injected_into_beam": self._injected["beam"],

@@ -68,7 +68,7 @@ def test_flight_before_contact_costs_one_step_of_each_body(counted, coupling):
     assert run.summary["iterations"] == 0
     for body in ("beam", "spring"):
         assert calls[body, "fmi2DoStep"] == 50
-        assert calls[body, "fmi2SetReal"] == 50  # the force; no load, no impulse
+        assert calls[body, "fmi2SetReal"] == 51  # the parameters, then the force; no load, no impulse
         assert calls[body, SET_SLOPES] == 0
         assert calls[body, "fmi2GetFMUstate"] == 50
         assert calls[body, "fmi2SetFMUstate"] == 0

@@ -143,7 +143,7 @@ def test_the_scenes_pass_every_phase_and_event():
 #: What changes during a run, but is set anew before it is used.
 SET_ANEW = {
     *(f"{body}.{name}" for body in ("FmuBeam", "FmuSpring") for name in ("_marked_pending", "_marked_motion")),
-    *(f"Fmu.{name}" for name in ("moved", "_time", "_size", "_messages")),
+    *(f"Fmu.{name}" for name in ("moved", "_time", "_size", "_start_time", "_messages")),
     *(f"EventFunctions.{name}" for name in ("_phase", "_ends", "_samples")),
     "Pair._last",
 }
