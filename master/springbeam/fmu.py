@@ -337,6 +337,7 @@ class _FmuBody(Memory):
         self._impulse = Reals(fmu, self._IMPULSE)
         n = len(self._FORCES)
         forces = [fmu.reference(name, "Real") for name in self._FORCES]
+        Reals(fmu, *self._FORCES)  # a wrong reference is found before the run
         self._inputs: Any = (c_double * (3 * n))()  # the forces, then Ḟ and F̈ of each
         self._set_forces = fmu.prepared("fmi2SetReal", (c_uint * n)(*forces), c_size_t(n), self._inputs)
         self._set_slopes = fmu.prepared(

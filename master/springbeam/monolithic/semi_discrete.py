@@ -18,6 +18,7 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from numpy.polynomial import legendre
+from scipy.special import roots_jacobi
 
 from ..scene import Beam
 from ..trajectory import SHAPE_POINTS
@@ -103,8 +104,8 @@ def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _lobatto(degree: int) -> np.ndarray:
     """The p + 1 Gauss–Lobatto nodes in [0, 1]."""
-    inner = legendre.legroots(legendre.legder([0.0] * degree + [1.0])) if degree > 1 else np.zeros(0)
-    return np.concatenate([[0.0], 0.5 + 0.5 * np.sort(inner), [1.0]])
+    inner = roots_jacobi(degree - 1, 1, 1)[0] if degree > 1 else np.zeros(0)  # of P_p'
+    return np.concatenate([[0.0], 0.5 + 0.5 * inner, [1.0]])
 
 
 def _gauss(points: int) -> tuple[np.ndarray, np.ndarray]:
