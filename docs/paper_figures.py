@@ -126,7 +126,7 @@ def table_2(all_runs: dict[int, tuple[Trajectory, ...]]) -> None:
         per_step = [1e3 * run.summary["wall_time"] / run.summary["macro_steps"] for run in (paper, aliased)]
         print(
             f"  {number}: {printed[0]:.3f} | {newton['spring']:.4f} ({newton['spring_predicted']:.4f}, "
-            f"{newton['spring_joined']:.4f}) | {paper.summary['iterations_per_solve']:.4f}; "
+            f"{newton['spring_joined']:.4f}) | {paper.summary['spring_steps_per_solve']:.4f}; "
             f"{1e3 * printed[1]:.2f} | {1e3 * newton['time_per_step']:.2f} | {per_step[0]:.2f} | {per_step[1]:.2f}"
         )
 

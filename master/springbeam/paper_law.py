@@ -8,7 +8,6 @@ and ``energy_residual`` shows it. Readings where the print leaves something open
 
 from __future__ import annotations
 
-from math import nan
 from typing import Any, Protocol
 
 import numpy as np
@@ -196,15 +195,14 @@ class PaperLaw(Memory):
 
     def _spring_end(self, y: float, guess: float) -> tuple[float, float]:
         """yˡ⁺¹ from y and the mean force ½ (λ(Ψ−yˡ⁺¹)₊^p + λ(Ψ−y)₊^p) that presses the spring on the way."""
-        before, end, reached, pressing = self._law(y), guess, nan, nan
+        before, end = self._law(y), guess
         self._spring.mark()
         response = 0.5 * self.h**2 / self._parameters.mass
         for k in range(1, _MAX_ITERATIONS + 1):
             force = self._law(end)
-            if pressing != 0.5 * (force + before):  # else the spring is where it would come again
-                pressing = 0.5 * (force + before)
-                self._spring.rewind()
-                reached = self._spring.advance(self.time, self.h, (pressing, 0.0, 0.0)).displacement
+            pressing = 0.5 * (force + before)
+            self._spring.rewind()
+            reached = self._spring.advance(self.time, self.h, (pressing, 0.0, 0.0)).displacement
             depth = self._parameters.equilibrium - end
             slope = -self.scene.contact.exponent * force / depth if depth > 0.0 else 0.0
             change = (end - reached) / (1.0 + 0.5 * response * slope)
@@ -259,7 +257,7 @@ class PaperLaw(Memory):
             "events": self._events,
             "halved_steps": 0,
             "iterations": self._iterations,
-            "iterations_per_solve": self._iterations / self._solves if self._solves else 0.0,
+            "spring_steps_per_solve": self._iterations / self._solves if self._solves else 0.0,
             "max_energy_residual": self._ledger.relative,
             "max_energy_residual_joule": self._ledger.largest_residual,
             "injected_into_beam": self._injected["beam"],
