@@ -51,10 +51,11 @@ class Detector:
             assert pair.spring is not None
             tip_share = common_velocity(1.0, 0.0, pair.beam.mass, pair.spring.mass)
         self._functions = EventFunctions(scene, tip_share)
+        self._level = pair.stop or 0.0
 
     def tolerance(self, ends: Ends) -> float:
         """What positions can be told apart to [m]."""
-        return position_tolerance(ends, self._pair.stop or 0.0, self._steps.size)
+        return position_tolerance(ends, self._level, self._steps.size)
 
     def _rest(self, ends: Ends) -> float:
         """Speed below which ends do not move against each other [m/s].

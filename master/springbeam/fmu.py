@@ -38,8 +38,9 @@ from .trajectory import SHAPE_POINTS
 
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
 _WARNING, _DISCARD, _ERROR, _FATAL = 1, 2, 3, 4
-#: ``Motion(*values)`` in a third of the time.
+#: ``Motion(*values)`` and ``Energies(*values)`` in a third of the time.
 _motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
+_energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
 
@@ -487,7 +488,7 @@ class FmuBeam(_FmuBody):
         return self._advance(time, size, contact)
 
     def energies(self) -> Energies:
-        return Energies(*self._stored())
+        return _energies_of(Energies, self._stored())
 
     def shape(self) -> np.ndarray:
         """Deflection [m] at `SHAPE_POINTS`, shape (21,)."""
@@ -523,7 +524,7 @@ class FmuSpring(_FmuBody):
     def energies(self) -> Energies:
         kinetic, potential, dissipated = self._stored()
         load = -self._spring.external_force * self._current.displacement
-        return Energies(kinetic, potential, self._dissipated_before + dissipated, load)
+        return _energies_of(Energies, (kinetic, potential, self._dissipated_before + dissipated, load))
 
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)

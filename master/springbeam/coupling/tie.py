@@ -19,7 +19,8 @@ from ..subsystem import Body, Force, Motion, StepRefused
 from . import Conditions, force
 
 _MAX_ITERATIONS = 20
-_EPS = float(np.finfo(float).eps)
+#: Of a sum of modes, relative to the largest it has been.
+_ROUNDING = 16.0 * float(np.finfo(float).eps)
 #: Where the iteration stops to converge within this factor of the tolerance it has met the bodies' own rounding.
 _NOISE = 1e3
 
@@ -59,8 +60,8 @@ class Tie(Memory):
         self._conditions = conditions
         self._degree = degree
         self._tolerance = tolerance
-        #: By the size of the step: B, and by kind of partner the inverse of B − S.
-        self._responses: dict[float, tuple[Matrix, dict[str, Matrix]]] = {}
+        #: By the size of the step: B, and by kind of partner −(B − S)⁻¹ and whether S was measured.
+        self._responses: dict[float, tuple[Matrix, dict[str, tuple[Matrix, bool]]]] = {}
         self._last_size = 0.0
         self._reach = 0.0  #: largest displacement of an end under a force found [m]
         self.iterations = 0  #: Newton updates since the start
@@ -87,16 +88,18 @@ class Tie(Memory):
             self._responses[size] = known  # the last one used comes last
             if len(self._responses) > SIZES_REMEMBERED:
                 del self._responses[next(iter(self._responses))]
-        B, inverses = known
+        B, descents = known
         kind = type(partner).__name__
-        inverse = inverses.get(kind) or _inverse(B, self._free_response(partner, size))
+        first = kind not in descents
+        descent, measured = descents.get(kind) or (_descent(B, self._free_response(partner, size)), False)
         partner.rewind()
         partner_end = partner.advance(time, size, acting)
         r_partner = conditions(partner_end, size)
-        tolerance = self._absolute_tolerance(start, beam_end, partner_end, size, _times(B, a))
+        # Rounding at least. What is asked is known once the motion is; that under the guess may be far from it.
+        tolerance = _ROUNDING * max(self._reach, abs(start.displacement))
         residual = list(map(sub, r_beam, r_partner))
         norm = max(map(abs, residual))
-        measured = False
+        fresh = False
         noise = 1.0
         for iteration in range(_MAX_ITERATIONS):
             if not norm < inf:
@@ -108,37 +111,38 @@ class Tie(Memory):
                 beam.rewind()
                 beam_end, at_beam = beam.advance(time, size, acting), a
                 r_beam = conditions(beam_end, size)  # in place of the affine prediction
-                # A bad guess moves the bodies far: what counts is the motion under the force found.
-                tolerance = self._absolute_tolerance(start, beam_end, partner_end, size, _times(B, a))
                 residual = list(map(sub, r_beam, r_partner))
                 norm = max(map(abs, residual))
             else:
                 self.iterations += 1
-                step = [-x for x in _times(inverse, residual)]
+                step = _times(descent, residual)
                 a = list(map(add, a, step))
                 acting = force.derivatives(a, size)
                 r_beam = list(map(add, r_beam, _times(B, step)))
                 partner.rewind()
                 partner_end = partner.advance(time, size, acting)
                 r_partner = conditions(partner_end, size)
+                tolerance = self._absolute_tolerance(start, partner_end, size, _times(B, a))
                 residual = list(map(sub, r_beam, r_partner))
                 norm = max(map(abs, residual))
                 if norm > noise * tolerance:  # below, the difference is rounding and would spoil what is known
-                    inverse = _broyden(inverse, step, residual)
-            if norm > noise * tolerance and norm > 0.3 * previous:
-                if not measured:
+                    descent = _broyden(descent, step, residual)
+            if norm > noise * tolerance:
+                stagnates = norm > 0.3 * previous
+                # Of a size that comes again S is measured once: it then saves a step of the partner in most.
+                if (stagnates and not fresh) or not (first or measured):
                     S = self._measure(partner, time, size, a, r_partner, partner_end, 1e-4)
                     partner.rewind()
                     partner.advance(time, size, acting)
-                    inverse, measured = _inverse(B, S), True
-                elif norm <= _NOISE * tolerance:  # the bodies' own rounding: nothing left to gain
+                    descent, measured, fresh = _descent(B, S), True, True
+                elif stagnates and norm <= _NOISE * tolerance:  # the bodies' own rounding: nothing left to gain
                     noise = _NOISE
         else:
             raise NotConverged(norm, _MAX_ITERATIONS)
         self._last_size = size
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
         self._reach = max(self._reach, abs(beam_end.displacement), abs(partner_end.displacement))
-        inverses[kind] = inverse
+        descents[kind] = (descent, measured)
         return acting
 
     def _free_response(self, partner: Body, size: float) -> Matrix:
@@ -166,11 +170,12 @@ class Tie(Memory):
             columns.append([(x - y) / delta for x, y in zip(r_changed, r, strict=True)])
         return _transposed(columns)
 
-    def _absolute_tolerance(self, start: Motion, beam: Motion, partner: Motion, size: float, by_force: Vector) -> float:
-        (u0, v0, _, _), (u, v, _, _), (y, z, _, _) = start, beam, partner
-        change = max(size * max(map(abs, (v0, v, z))), abs(u - u0))
+    def _absolute_tolerance(self, start: Motion, end: Motion, size: float, by_force: Vector) -> float:
+        """Of the conditions [m]; ``start`` is the beam's motion, ``end`` the partner's, which the tip goes to."""
+        (u, v, _, _), (y, z, _, _) = start, end
+        change = max(size * max(abs(v), abs(z)), abs(y - u))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
-        rounding = 16.0 * _EPS * max(self._reach, *map(abs, (u0, u, y, *by_force)))
+        rounding = _ROUNDING * max(self._reach, abs(u), abs(y), *map(abs, by_force))
         return max(self._tolerance * change, rounding)
 
 
@@ -184,23 +189,23 @@ def _transposed(rows: Iterable[Iterable[float]]) -> Matrix:
     return [list(column) for column in zip(*rows, strict=True)]
 
 
-def _inverse(B: Matrix, S: Matrix) -> Matrix:
-    """(B − S)⁻¹. Raises NotConverged if there is none."""
+def _descent(B: Matrix, S: Matrix) -> Matrix:
+    """−(B − S)⁻¹, from residuals to Newton's steps. Raises NotConverged if there is none."""
     try:
-        inverse: Matrix = np.linalg.inv(np.subtract(B, S)).tolist()
+        descent: Matrix = np.linalg.inv(np.subtract(S, B)).tolist()
     except np.linalg.LinAlgError:
         raise NotConverged(float("nan"), 0) from None
-    return inverse
+    return descent
 
 
-def _broyden(inverse: Matrix, step: Vector, residual: Vector) -> Matrix:
-    """Broyden's rank-one update of the inverse Jacobian after ``step``, which was to leave no residual.
+def _broyden(descent: Matrix, step: Vector, residual: Vector) -> Matrix:
+    """Broyden's rank-one update of D = −J⁻¹, J the Jacobian, after ``step``, which was to leave no residual.
 
-    J⁻¹ + d (sᵀJ⁻¹) / (sᵀ(s − d)) with d = −J⁻¹r: Broyden (1965), in the form of Sherman and Morrison.
+    D + d (sᵀD) / (sᵀ(s − d)) with d = D r: Broyden (1965), in the form of Sherman and Morrison.
     """
-    d = [-x for x in _times(inverse, residual)]
+    d = _times(descent, residual)
     denominator = sum(s * (s - x) for s, x in zip(step, d, strict=True))
     if denominator == 0.0:
-        return inverse
-    row = [sum(map(mul, step, column)) / denominator for column in zip(*inverse, strict=True)]
-    return [[x + y * z for x, z in zip(line, row, strict=True)] for line, y in zip(inverse, d, strict=True)]
+        return descent
+    row = [sum(map(mul, step, column)) / denominator for column in zip(*descent, strict=True)]
+    return [[x + y * z for x, z in zip(line, row, strict=True)] for line, y in zip(descent, d, strict=True)]
