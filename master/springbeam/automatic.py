@@ -41,10 +41,6 @@ def choice(scene: Scene) -> Choice:
     if fastest * H <= STABLE:
         return Choice("hermite", 2, f"ω_max H = {fastest * H:.3g} <= {STABLE:g}")
     slowest = slowest_frequency(beam)
-    stop = scene.stop
-    if slowest * H <= TURN and scene.spring is not None and stop is not None and 0.0 < stop.restitution < 1.0:
-        # The mismatch of the tie is reversed by each, and asks for a force ∝ 1/step on the short steps between them.
-        return Choice("energy", 0, f"ω_max H = {fastest * H:.3g} > {STABLE:g}, impacts on the foundation that die out")
     if slowest * H <= TURN:
         return Choice("energy", 2, f"ω_max H = {fastest * H:.3g} > {STABLE:g}")
     return Choice("energy", 0, f"ω₁H = {slowest * H:.3g} > {TURN:g}")

@@ -26,7 +26,7 @@ def auto(scene=PAIR, **changes):
 
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [("soft", ("hermite", 2)), ("beam-on-stop", ("hermite", 2)), ("steel-bumper", ("energy", 0)),
+    [("soft", ("hermite", 2)), ("beam-on-stop", ("hermite", 2)), ("steel-bumper", ("energy", 2)),
      ("bar-impact", ("energy", 2)), ("paper-fig2", ("energy", 0)), ("duffing", ("energy", 0))],
 )  # fmt: skip
 def test_what_the_shipped_scenes_get(name, expected):

@@ -34,6 +34,7 @@ NOT_RUN = {
     "./build.sh run": "is what made the FMUs that are tested",
     "./build.sh test": "is what runs this",
     "./build.sh bench": "measures for minutes; tests/bench/test_bench.py sees that it runs",
+    ".venv/bin/python docs/accuracy.py": "takes minutes",
     ".venv/bin/python docs/paper_figures.py": "takes minutes",
     "springbeam animate results/soft": "draws for half a minute; the command is in test_animation.py",
     "springbeam stability": "takes minutes; parts of it are run in test_stability_grid.py, test_critical_steps.py",

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..automatic import Choice, choice
+from ..automatic import STABLE, Choice, choice
 from ..linearised import contact_energy, spring_frequency, spring_stiffness
 from ..monolithic.semi_discrete import ModalBeam, modal_beam
 from ..scene import Beam, Scene
@@ -95,6 +95,12 @@ def predict(scene: Scene) -> Prediction:
             for scheme, degree in SCHEMES[law]
             if scene.beam is None or scene.beam.integrator == "modal" or degree == 0
         )  # fmt: skip
+    if any(s.scheme == "hermite" and s.critical_step is not None for s in schemes):
+        assert pair is not None
+        notes.append(
+            "hermite is unstable in bands of H: some narrower than 3 % may lie below its critical H, none has been "
+            f"seen below ω_max H = {STABLE:g}, {STABLE / _frequencies(pair)[0]:.3g} s here"
+        )
     Z = None if scene.beam is None else math.sqrt(shear_stiffness(scene.beam) * scene.beam.density * scene.beam.area)
     mass = None if scene.spring is None else scene.spring.mass
     resolved = None if modal is None else int(np.sum(modal.omega * H <= RESOLVED))

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
-from itertools import cycle
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
-from ..drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+from ..drawing import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, YELLOW
 from . import Point, Study
 
-_COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PURPLE)
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+#: Colour and marker by family; steps from tolerances look like the scheme, but dotted and hollow.
+_LOOKS = {
+    "energy 0": (BLUE, "o"), "energy 1": (SKY, "s"), "energy 2": (GREEN, "^"),
+    "hermite 1": (ORANGE, "D"), "hermite 2": (VERMILLION, "v"),
+    "auto": (BLACK, "+"), "IDA tolerance": (PURPLE, "*"), "fixed_point 0": (YELLOW, "<"), "aitken 0": (YELLOW, ">"),
+    "jacobi 0": (ORANGE, "D"), "jacobi 1": (VERMILLION, "v"),
+    "gauss_seidel 0": (GREEN, "^"), "gauss_seidel 1": (PURPLE, "P"),
+    "DOP853": (GREY, "o"), "LSODA": (GREY, "s"), "Radau": (GREY, "^"), "Algorithm 1": (GREY, "X"),
+    "modes": (BLUE, "o"), "elements of degree 1": (SKY, "s"),
+    "elements of degree 4": (GREEN, "^"), "elements of degree 8": (VERMILLION, "v"),
+}  # fmt: skip
+_ADAPTIVE = " adaptive"
 #: Errors outside are drawn at the edge: nothing is right, or rounding.
-_WORST, _BEST = 1e1, 1e-13
+_WORST, _BEST = 1.0, 1e-13
+_NOTE_WIDTH = 85  #: characters a column of the picture
 
 
 def draw(study: Study, path: Path) -> None:
@@ -41,7 +52,10 @@ def draw(study: Study, path: Path) -> None:
     for ax in axes:
         ax.set(xscale="log", yscale="log", ylabel="largest relative error of u_tip and y")
         ax.grid(alpha=0.3)
-    figure.suptitle(f"{study.scene.title}: errors up to t = {study.scene.time.t_end:.4g} s")
+    figure.suptitle(f"{study.scene.title}: errors up to t = {study.scene.time.t_end:.6g} s")
+    if study.notes:
+        lines = [line for note in study.notes for line in textwrap.wrap(note, _NOTE_WIDTH * columns)]
+        figure.supxlabel("\n".join(lines), fontsize="small", x=0.01, ha="left")
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
@@ -51,12 +65,13 @@ def _clipped(point: Point) -> float:
 
 
 def _curves(ax: Axes, points: list[Point], cost: Callable[[Point], float]) -> None:
-    families = dict.fromkeys(p.configuration.family for p in points)
-    for family, colour, marker in zip(families, cycle(_COLOURS), cycle(_MARKERS), strict=False):
+    for family in dict.fromkeys(p.configuration.family for p in points):
         mine = [p for p in points if p.configuration.family == family]
-        monolithic = mine[0].configuration.monolithic
+        colour, marker = _LOOKS[family.removesuffix(_ADAPTIVE)]
+        hollow = mine[0].configuration.monolithic or family.endswith(_ADAPTIVE)
+        line = ":" if family.endswith(_ADAPTIVE) else "--" if mine[0].configuration.monolithic else "-"
         ax.plot(
             [cost(p) for p in mine], [_clipped(p) for p in mine], marker=marker, markersize=5, color=colour,
-            linestyle="--" if monolithic else "-", linewidth=1.2, label=family,
-            markerfacecolor="none" if monolithic else colour,
+            linestyle="none" if family == "auto" else line, linewidth=1.2, label=family,
+            markerfacecolor="none" if hollow else colour, zorder=3 if family == "auto" else 2,
         )  # fmt: skip
