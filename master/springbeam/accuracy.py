@@ -31,19 +31,22 @@ from .trajectory import Event, Trajectory
 
 #: Fewest macro steps, and the largest number tried; pilot runs in a row that may stop early.
 _FEWEST, _MOST, _MOST_STOPPED = 8, 50_000, 6
-#: Growth of the number of macro steps from run to run: at least, at most, and after a run that stopped.
-_LEAST_GROWTH, _MOST_GROWTH, _AFTER_STOP = 1.2, 4.0, 1.4
+#: Growth of the number of macro steps from run to run: at least, at most, after a run that gained energy, and after
+#: one that stopped for another reason, which may be gone at the next size.
+_LEAST_GROWTH, _MOST_GROWTH, _AFTER_GAIN, _AFTER_STOP = 1.2, 4.0, 1.4, 1.01
+#: Energy residual above which it was too large a macro step that stopped a run.
+_GAIN = 0.05
 #: An estimate of the displacement's error is to be so many times smaller than the accuracy.
-_SAFETY = 2.0
+_SAFETY = 1.5
 #: Runs that differ by more are both unresolved, whatever their order [of the motion].
-_UNRESOLVED = 0.05
+_UNRESOLVED = 0.2
 #: Orders of the error of a displacement that are relied on, and of the time of an event, where `hermite` measures them.
 _LOWEST, _HIGHEST, _OF_EVENTS = 2.0, 6.0, 3.0
 #: What the first macro step turns the fastest wave by [rad], over accuracy^(1/6); a mode that dies out within this
 #: fraction of its retardation time needs no resolution; and what a macro step turns a body alone by [rad].
-_FIRST_TURN, _DIES_OUT, _ALONE = 28.0, 0.4, 2.0
+_FIRST_TURN, _DIES_OUT, _ALONE = 31.0, 0.4, 2.0
 #: Displacement error over energy residual, of runs with so many changes of contact after the first.
-_AMPLIFIED = (1.0, 3.0, 60.0)
+_AMPLIFIED = (1.0, 3.0, 100.0)
 #: Law "compliance": the first and the second tolerance of the adaptive steps over the accuracy, and the largest.
 _FIRST_TOLERANCE, _SECOND_TOLERANCE, _LARGEST_TOLERANCE = 8.0, 0.8, 0.1
 #: IDA's tolerance over the accuracy, and its bounds.
@@ -156,11 +159,11 @@ class _Search:
         self._scheme = {"scheme": taken.scheme, "degree": taken.degree}
         beam, compliant = scene.beam, scene.contact.law == "compliance" and scene.spring is not None
         self._adaptive = compliant and beam is not None and beam.integrator == "modal"
-        self._runs, self._calls, self._spent, self._stopped = 0, 0, 0.0, 0
+        self._runs, self._calls, self._spent, self._stopped, self._after_stop = 0, 0, 0.0, 0, 1.0
 
     def run(self) -> Picked:
         fineness, coarse, estimate = self._first(), None, None
-        if self._scheme["scheme"] == "hermite" and fineness > 2.0 * _FEWEST:
+        if self._scheme["scheme"] == "hermite" and fineness >= 2.0 * _FEWEST:
             coarse = self._pilot(_FEWEST, undisturbed=True)
             if coarse is not None:
                 fineness = self._rung(_FEWEST * self._second(coarse))
@@ -168,7 +171,7 @@ class _Search:
             calls, spent = self._calls, self._spent
             fine = self._pilot(fineness)
             if fine is None:
-                growth = _AFTER_STOP
+                growth = self._after_stop
             elif coarse is None:
                 growth, coarse = self._second(fine), fine
             else:
@@ -258,7 +261,11 @@ class _Search:
         self._runs += 1
         self._calls += sum(int(made.summary.get(f"{body}_steps", 0)) for body in ("beam", "spring"))
         self._spent += float(made.summary["wall_time"])
-        return None if made.summary["status"] != "done" else _Pilot(fineness, made)
+        pilot = _Pilot(fineness, made)
+        if made.summary["status"] == "done":
+            return pilot
+        self._after_stop = _AFTER_GAIN if self._adaptive or pilot.residual > _GAIN else _AFTER_STOP
+        return None
 
     def _estimate(self, coarse: _Pilot, fine: _Pilot) -> _Estimate:
         displacement = self._displacement(coarse.run, fine.run)
