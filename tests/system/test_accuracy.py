@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from springbeam.cli import app
+from springbeam.contact_times import apart
 from springbeam.monolithic import event_driven
 from springbeam.recording import MemoryRecorder, load_trajectory
-from springbeam.runner import run, simulate
-from springbeam.scene import SceneError, scene_from_dict
+from springbeam.runner import RunStopped, run, simulate
+from springbeam.scene import SceneError, scene_from_dict, with_changes
 
 STIFF_ON_SOFT = {
     "time": {"t_end": 0.25},
@@ -35,10 +37,34 @@ SPRING_ALONE = {
     "time": {"t_end": 5.0},
     "spring": {"equilibrium": 0.4, "linear_stiffness": 4.0, "cubic_stiffness": -1.0},
 }
+ONE_CONTACT = {  # the highest frequencies of the mesh are not resolved at 1e-3
+    "time": {"t_end": 0.07},
+    "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 50, "initial_velocity_slope": -1.0},
+    "spring": {"linear_stiffness": 3.0, "cubic_stiffness": -0.2},
+}
+TIES = {  # of few modes, with a release, a separation, and contact again
+    "time": {"t_end": 0.896},
+    "beam": {
+        "young_modulus": 150.0,
+        "shear_modulus": 90.0,
+        "second_moment_of_area": 0.3,
+        "n_elements": 20,
+        "n_modes": 6,
+        "initial_velocity_slope": -1.2,
+    },
+    "spring": {"mass": 0.6, "linear_stiffness": 12.0},
+}
+SCENES = {
+    "beam-spring": STIFF_ON_SOFT,
+    "with-stop": WITH_STOP,
+    "spring": SPRING_ALONE,
+    "one contact": ONE_CONTACT,
+    "ties": TIES,
+}
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5])
-@pytest.mark.parametrize("tables", [STIFF_ON_SOFT, WITH_STOP, SPRING_ALONE], ids=["beam-spring", "with-stop", "spring"])
+@pytest.mark.parametrize("tables", SCENES.values(), ids=SCENES)
 def test_the_promise_is_kept(tables, accuracy):
     found = simulate(scene_from_dict({**tables, "accuracy": accuracy}))
     reference = event_driven.simulate(scene_from_dict(tables), sample_times=np.unique(found.time))
@@ -51,6 +77,43 @@ def test_the_promise_is_kept(tables, accuracy):
     strikes = [[e.time for e in t.events if e.kind == "stop_impact"] for t in (found, reference)]
     if strikes[1]:
         assert abs(strikes[0][0] - strikes[1][0]) <= accuracy * tables["time"]["t_end"]
+
+
+@cache
+def sweep(name: str) -> list[tuple[int, float]]:
+    """doStep calls and error (the larger of u_tip and event times) of runs that only who knows the answer can choose
+    from: both schemes that `--accuracy` takes, from 8 macro steps on, √2 times as many from run to run."""
+    scene = scene_from_dict(SCENES[name])
+    runs = []
+    for scheme in ("energy", "hermite"):
+        for k in range(13):
+            H = scene.time.t_end / round(8 * 2 ** (k / 2))
+            try:
+                runs.append(simulate(with_changes(scene, coupling={"scheme": scheme, "degree": 2, "macro_step": H})))
+            except RunStopped:  # hermite, unstable
+                continue
+    reference = event_driven.simulate(scene, sample_times=np.unique(np.concatenate([made.time for made in runs])))
+    column = "u_tip" if scene.beam is not None else "y"
+    exact = reference[column]
+    found = []
+    for made in runs:
+        error = np.abs(made[column] - exact[np.searchsorted(reference.time, made.time)]).max()
+        times = apart(made, reference, 2.0 * made.scene.coupling.H)[0] / scene.time.t_end
+        found.append((calls(made.summary), max(error / np.abs(exact - exact[0]).max(), times)))
+    return found
+
+
+def calls(summary: dict) -> int:
+    return summary.get("beam_steps", 0) + summary.get("spring_steps", 0)
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("name", ["beam-spring", "with-stop", "spring", "one contact"])
+def test_it_costs_at_most_three_times_the_cheapest_run(name, accuracy):
+    """All pilot runs together; it is so on three scenes of four (docs/accuracy.md)."""
+    cheapest = min(cost for cost, error in sweep(name) if error <= accuracy)
+    summary = simulate(scene_from_dict({**SCENES[name], "accuracy": accuracy})).summary
+    assert summary["accuracy"]["pilot_steps"] + calls(summary) <= 3 * cheapest
 
 
 def test_more_accuracy_costs_more_steps():

@@ -1,0 +1,68 @@
+"""How far two runs are apart in the times of their contacts, on events made by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from springbeam.contact_times import apart, changes_of_contact
+from springbeam.scene import scene_from_dict
+from springbeam.trajectory import Event, Trajectory
+
+SCENE = scene_from_dict(
+    {"time": {"t_end": 1.0}, "beam": {"initial_velocity_slope": -1.0}, "spring": {}, "stop": {"position": -0.1}}
+)
+
+
+def run(*events, phase="free"):
+    columns = {"time": np.array([0.0, 1.0]), "phase": np.array([phase, phase])}
+    return Trajectory(SCENE, columns, [Event(time, kind) for time, kind in events])
+
+
+CONTACT = run((0.1, "impact"), (0.4, "separation"))
+
+
+def test_a_shift_counts_in_full():
+    shifted = run((0.103, "impact"), (0.395, "separation"))
+    assert apart(CONTACT, shifted, window=0.01) == (pytest.approx(0.005), 2)
+    assert apart(shifted, CONTACT, window=0.01) == (pytest.approx(0.005), 2)
+
+
+def test_a_graze_and_a_flight_shorter_than_the_window_are_no_evidence():
+    graze = run((0.1, "impact"), (0.4, "separation"), (0.7, "impact"), (0.7, "separation"))
+    flight = run((0.1, "impact"), (0.1, "separation"), (0.105, "impact"), (0.4, "separation"))
+    for other in (graze, flight):
+        assert apart(CONTACT, other, window=0.01)[0] == 0.0
+        assert apart(other, CONTACT, window=0.01)[0] == 0.0
+
+
+def test_a_lasting_contact_that_one_run_lacks_counts():
+    second = run((0.1, "impact"), (0.4, "separation"), (0.7, "impact"), (0.8, "separation"))
+    assert apart(CONTACT, second, window=0.01)[0] == pytest.approx(0.3)  # to the end of the run
+    assert apart(second, CONTACT, window=0.2)[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("last", "phase", "distance"),
+    [((0.4, "release"), "free", 0.0), ((0.4, "release"), "touch", 0.6)],
+    ids=["opens", "goes on in touch"],
+)
+def test_a_release_ends_the_contact_only_without_a_push(last, phase, distance):
+    assert apart(CONTACT, run((0.1, "impact"), last, phase=phase), window=0.01)[0] == pytest.approx(distance)
+
+
+def test_strokes_that_die_out_are_one_however_many():
+    few = run((0.2, "stop_impact"), (0.25, "stop_impact"), (0.26, "seated"), (0.5, "unseated"))
+    many = run(*((0.2 + 0.06 * (1 - 0.5**k), "stop_impact") for k in range(9)), (0.26, "seated"), (0.502, "unseated"))
+    assert apart(few, many, window=0.06) == (pytest.approx(0.002), 2)
+
+
+def test_a_stroke_that_one_run_lacks_counts():
+    assert apart(run((0.2, "stop_impact")), run((0.2, "stop_impact"), (0.6, "stop_impact")), 0.01)[0] == pytest.approx(
+        0.4
+    )
+
+
+def test_changes_are_counted_after_the_first():
+    assert changes_of_contact(run((0.0, "impact"), phase="tied")) == 0
+    assert changes_of_contact(run((0.0, "impact"), (0.3, "stop_impact"), (0.4, "release"))) == 2
