@@ -57,18 +57,18 @@ class TwistedFactors {
 
   /// x = (LDLᵀ)⁻¹ b
   void solve(const VectorXd& b, VectorXd& x) const {
-    x = b;
-    const Index last = x.size() / 2 - 1;
-    Values left = {x[0], x[1]}, right = {x[2 * last], x[2 * last + 1]};
+    x.resize(b.size());
+    const Index last = b.size() / 2 - 1;
+    Values left = {b[0], b[1]}, right = {b[2 * last], b[2 * last + 1]};
     for (Index i = 0, j = last; i < middle_; ++i, --j) {
-      left = eliminate(i, i + 1, left, x);
-      if (j > middle_) right = eliminate(j, j - 1, right, x);  // one less where the number of nodes is even
+      left = eliminate(i, left, b, i + 1, x);
+      if (j > middle_) right = eliminate(j, right, b, j - 1, x);  // one less where the number of nodes is even
     }
     const Node& f = node(middle_);
     double &x0 = x[2 * middle_], &x1 = x[2 * middle_ + 1];
-    x0 = left[0] + right[0] - x0;
-    x1 = f.inverse[1] * (left[1] + right[1] - x1 - f.within * x0);
-    x0 = f.inverse[0] * x0 - f.within * x1;
+    const double y0 = left[0] + right[0] - b[2 * middle_];
+    x1 = f.inverse[1] * (left[1] + right[1] - b[2 * middle_ + 1] - f.within * y0);
+    x0 = f.inverse[0] * y0 - f.within * x1;
     left = right = {x0, x1};
     for (Index i = middle_ - 1, j = middle_ + 1; i >= 0; --i, ++j) {
       left = substitute(i, left, x);
@@ -86,13 +86,13 @@ class TwistedFactors {
 
   // y: right-hand side of node i less what was eliminated before; returns that of the next. Inlined, so that it stays
   // in registers; what is waited for comes last in each sum.
-  EIGEN_ALWAYS_INLINE Values eliminate(Index i, Index next, const Values& y, VectorXd& x) const {
+  EIGEN_ALWAYS_INLINE Values eliminate(Index i, const Values& y, const VectorXd& b, Index next, VectorXd& x) const {
     const Node& f = node(i);
     const double y0 = y[0], y1 = y[1] - f.within * y0;
     x[2 * i] = f.inverse[0] * y0;
     x[2 * i + 1] = f.inverse[1] * y1;
-    return {x[2 * next] - f.next(0, 0) * y0 - f.next(0, 1) * y1,
-            x[2 * next + 1] - f.next(1, 0) * y0 - f.next(1, 1) * y1};
+    return {b[2 * next] - f.next(0, 0) * y0 - f.next(0, 1) * y1,
+            b[2 * next + 1] - f.next(1, 0) * y0 - f.next(1, 1) * y1};
   }
 
   // z: the solution at the next node towards the middle; returns that at node i.
@@ -236,10 +236,8 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
  private:
   void midpoint_step(const StepMatrix& S, double h, const TipForce& c, double distributed_load) {
     if (!free_.holds(h, distributed_load, q_, v_)) {
-      mesh_.mass_times(v_.data(), rhs_.data());
-      mesh_.stiffness_times(q_.data(), work_.data());
-      rhs_ -= (0.5 * h) * work_;
-      add_load(0.5 * h, 0.0, distributed_load);
+      start_with_load(0.5 * h, 0.0, distributed_load);
+      mesh_.add_products(1.0, v_, -0.5 * h, q_, rhs_);
       free_.size = 0.0;
       solve(S, free_.w);
       free_.q = q_;
@@ -268,12 +266,9 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
       a += (1.0 - alpha_m_) * w_;
     }
     const double f = 1.0 - alpha_f_;
-    mesh_.mass_times(a.data(), rhs_.data());
-    rhs_ *= -alpha_m_;
+    start_with_load(1.0, force_at(c, f * h), distributed_load);
     work2_ = alpha_ * (v_ + (f * (1.0 - gamma_) * h) * a) + q_ + (f * h) * (v_ + ((0.5 - beta_) * h) * a);
-    mesh_.stiffness_times(work2_.data(), work_.data());
-    rhs_ -= work_;
-    add_load(1.0, force_at(c, f * h), distributed_load);
+    mesh_.add_products(-alpha_m_, a, -1.0, work2_, rhs_);
     VectorXd a1(mesh_.size());
     solve(S, a1);
 
@@ -316,9 +311,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   /// x = S⁻¹ rhs_ with one step of iterative refinement.
   void solve(const StepMatrix& S, VectorXd& x) {
     solve_once(S, x);
-    mesh_.mass_times(x.data(), work_.data());
-    mesh_.stiffness_times(x.data(), work2_.data());
-    rhs_ -= S.mass * work_ + S.stiffness * work2_;
+    mesh_.add_products(-S.mass, x, -S.stiffness, x, rhs_);
     solve_once(S, work_);
     x += work_;
   }
@@ -350,8 +343,8 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     }
   }
 
-  void add_load(double factor, double tip_force, double distributed_load) {
-    rhs_ += (factor * distributed_load) * uniform_load_ + factor * hat_load_;
+  void start_with_load(double factor, double tip_force, double distributed_load) {
+    rhs_ = (factor * distributed_load) * uniform_load_ + factor * hat_load_;
     rhs_[mesh_.tip_index()] += factor * tip_force / mu_;
   }
 

@@ -146,6 +146,40 @@ void Timoshenko::multiply_stiffness(Degree p, const double* x, double* __restric
   y[tip_index()] = shear;
 }
 
+void Timoshenko::add_linear_products(double a, const double* x, double c, const double* z, double* __restrict y) const {
+  const double m = a * h_ / 6.0, lever = 0.5 * h_ / r_, bend = c * b_top_ / h_, slide = c * s_;
+  double theta0 = 0.0, u0 = 0.0;                      // of z, at the left node
+  double moment = 0.0, shear = 0.0;                   // of the element to the left
+  double left[2] = {0.0, 0.0}, here[2] = {0.0, 0.0};  // x at the nodes before the left one and there
+  for (Index i = 0; i < size(); i += 2) {
+    const Strains s = strains(Linear(), theta0, u0, z + i);
+    const double moment1 = bend * s.h_kappa[0], shear1 = slide * s.gamma[0];
+    if (i > 0) {
+      y[i - 2] += m * (left[0] + 4.0 * here[0] + x[i]) + ((moment - moment1) - lever * (shear + shear1));
+      y[i - 1] += m * (left[1] + 4.0 * here[1] + x[i + 1]) + (shear - shear1);
+    }
+    for (Index f = 0; f < 2; ++f) {
+      left[f] = here[f];
+      here[f] = x[i + f];
+    }
+    moment = moment1;
+    shear = shear1;
+    theta0 = z[i];
+    u0 = z[i + 1];
+  }
+  y[tip_rotation_index()] += m * (left[0] + 2.0 * here[0]) + (moment - lever * shear);
+  y[tip_index()] += m * (left[1] + 2.0 * here[1]) + shear;
+}
+
+void Timoshenko::add_products(double a, const Eigen::VectorXd& x, double c, const Eigen::VectorXd& z,
+                              Eigen::VectorXd& y) const {
+  if (p_ == 1) {
+    add_linear_products(a, x.data(), c, z.data(), y.data());
+  } else {
+    y += a * mass_times(x) + c * stiffness_times(z);
+  }
+}
+
 void Timoshenko::mass_times(const double* x, double* y) const {
   p_ == 1 ? multiply_mass(Linear(), x, y) : multiply_mass(p_, x, y);
 }

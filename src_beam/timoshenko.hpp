@@ -56,6 +56,8 @@ class Timoshenko {
   void mass_times(const double* x, double* y) const;
   /// y = K x, element by element; x and y not overlapping.
   void stiffness_times(const double* x, double* y) const;
+  /// y += a M x + c K z, element by element; y does not overlap x or z. One pass over the beam for linear elements.
+  void add_products(double a, const Eigen::VectorXd& x, double c, const Eigen::VectorXd& z, Eigen::VectorXd& y) const;
   /// y = K⁻¹ x in O(n p), see above; x and y not overlapping.
   void flexibility_times(const double* x, double* y) const;
   /// √(h/(2j+1)) (√b_j κ_j, √s γ_j) of all elements, interleaved: its squared norm is xᵀKx.
@@ -92,6 +94,7 @@ class Timoshenko {
   Field field(Degree p, double left, const double* q) const;
   template <typename Degree>
   void multiply_mass(Degree p, const double* x, double* y) const;
+  void add_linear_products(double a, const double* x, double c, const double* z, double* y) const;
   template <typename Degree>
   void multiply_stiffness(Degree p, const double* x, double* y) const;
   template <typename Degree>
