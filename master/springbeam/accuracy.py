@@ -196,10 +196,10 @@ class _Search:
                     )  # fmt: skip
                 growth, coarse = self._growth(estimate), fine
             fineness = self._rung(fineness * growth)
-        if coarse is None:
+        if estimate is None:
             found = f"the fastest waves of its mesh take some {fineness:.1g}"
         else:
-            found = "" if estimate is None else f"runs still differ by {estimate.apart:.1e}"
+            found = f"runs still differ by {estimate.apart:.1e}"
         raise SceneError(
             f"accuracy = {self._accuracy:g}: not reached with {_MOST} steps, {found}; ask for less, shorten [time] "
             "t_end, or take a coarser mesh"
