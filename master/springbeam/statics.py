@@ -10,6 +10,7 @@ Deflections are virtual work, u(x_j) = ∫ M m_j/EI + Q q_j/KAG dt, with m_j = (
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -110,3 +111,11 @@ def _work(beam: Beam, start: float, moment: Virtual, shear: Virtual) -> float:
         density = M * moment(t) / bending_stiffness(beam) + Q * shear(t) / shear_stiffness(beam)
         total += (b - a) * float(_WEIGHTS @ density)
     return total
+
+
+def tip_reach(beam: Beam) -> float:
+    """How far the tip may go from a straight beam, roughly [m]: by its loads, or by a static deflection that holds the
+    kinetic energy of the start."""
+    mass = beam.density * beam.area * beam.length
+    swing = beam.length * abs(beam.initial_velocity_slope) * math.sqrt(mass * tip_compliance(beam) / 3.0)
+    return max(swing, abs(tip_load_deflection(beam)))

@@ -218,3 +218,22 @@ def test_a_tip_that_is_let_go_does_not_strike_at_once(degree, size):
     kinds = [event.kind for event in simulate(scene).events if event.kind != "stop_impact"]
     assert kinds == [event.kind for event in event_driven.simulate(scene).events if event.kind != "stop_impact"]
     assert kinds == ["seated", "separation"] * 2
+
+
+@pytest.mark.parametrize(
+    ("scheme", "degree", "size"), [("energy", 2, 1e-2), ("hermite", 1, 1e-3), ("hermite", 2, 1e-3)]
+)
+@pytest.mark.parametrize(("slope", "load"), [(0.0, -0.5), (0.05, -0.5), (0.05, 0.0)])
+def test_a_tip_is_held_at_zero(scheme, degree, size, slope, load):
+    """The tip rests where its displacement is 0 while the beam moves: that is a sum of modes as large as the beam's
+    deflection, and so is its rounding. Relative to the tip's own motion no force would do."""
+    beam = {"distributed_load": load, "initial_deflection_slope": slope, "n_elements": 10}
+    stop = {"position": 0.0, "restitution": 0.0}
+    coupling = {"scheme": scheme, "degree": degree, "macro_step": size}
+    run = simulate(
+        with_changes(load_scene("beam-on-stop"), time={"t_end": 0.5}, beam=beam, stop=stop, coupling=coupling)
+    )
+    seated = run.phase == "seated"
+    assert seated.sum() * size > 0.01
+    assert np.abs(run.u_tip[seated]).max() < 1e-14
+    assert run.summary["halved_steps"] == 0

@@ -52,18 +52,20 @@ class Tie(Memory):
         Degree of the contact force.
     tolerance
         Of the conditions, relative to the motion over the step, the larger of H·max(|u̇|, |ẏ|) and |Δu|.
+    reach
+        A displacement that is to be expected [m]: modes whose sum, the tip, is held at 0 are as large.
     """
 
-    REMEMBERED = ("_responses", "_last_size", "_reach", "iterations")
+    REMEMBERED = ("_responses", "_last_size", "reach", "iterations")
 
-    def __init__(self, conditions: Conditions, degree: int, tolerance: float) -> None:
+    def __init__(self, conditions: Conditions, degree: int, tolerance: float, reach: float = 0.0) -> None:
         self._conditions = conditions
         self._degree = degree
         self._tolerance = tolerance
         #: By the size of the step: B, and by kind of partner −(B − S)⁻¹ and whether S was measured.
         self._responses: dict[float, tuple[Matrix, dict[str, tuple[Matrix, bool]]]] = {}
         self._last_size = 0.0
-        self._reach = 0.0  #: largest displacement of an end under a force found [m]
+        self.reach = reach  #: largest displacement of an end so far, with or without a force found [m]
         self.iterations = 0  #: Newton updates since the start
 
     def solve(self, beam: Body, partner: Body, time: float, size: float, guess: Force, start: Motion) -> Force:
@@ -82,7 +84,8 @@ class Tie(Memory):
         known = self._responses.get(size)
         if known is None:
             at_beam = None
-            known = self._measure(beam, time, size, a, r_beam, beam_end, 1.0), {}
+            length = max(self.reach, abs(beam_end.displacement), size * abs(beam_end.velocity))
+            known = self._measure(beam, time, size, a, r_beam, length), {}
         if size != self._last_size:
             self._responses.pop(size, None)
             self._responses[size] = known  # the last one used comes last
@@ -96,7 +99,7 @@ class Tie(Memory):
         partner_end = partner.advance(time, size, acting)
         r_partner = conditions(partner_end, size)
         # Rounding at least. What is asked is known once the motion is; that under the guess may be far from it.
-        tolerance = _ROUNDING * max(self._reach, abs(start.displacement))
+        tolerance = _ROUNDING * max(self.reach, abs(start.displacement))
         residual = list(map(sub, r_beam, r_partner))
         norm = max(map(abs, residual))
         fresh = False
@@ -131,7 +134,8 @@ class Tie(Memory):
                 stagnates = norm > 0.3 * previous
                 # Of a size that comes again S is measured once: it then saves a step of the partner in most.
                 if (stagnates and not fresh) or not (first or measured):
-                    S = self._measure(partner, time, size, a, r_partner, partner_end, 1e-4)
+                    length = 1e-4 * max(abs(partner_end.displacement), size * abs(partner_end.velocity))
+                    S = self._measure(partner, time, size, a, r_partner, length)
                     partner.rewind()
                     partner.advance(time, size, acting)
                     descent, measured, fresh = _descent(B, S), True, True
@@ -141,7 +145,7 @@ class Tie(Memory):
             raise NotConverged(norm, _MAX_ITERATIONS)
         self._last_size = size
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
-        self._reach = max(self._reach, abs(beam_end.displacement), abs(partner_end.displacement))
+        self.reach = max(self.reach, abs(beam_end.displacement), abs(partner_end.displacement))
         descents[kind] = (descent, measured)
         return acting
 
@@ -151,16 +155,13 @@ class Tie(Memory):
         unit = force.free_mass_response(self._degree, size, partner.mass)
         return _transposed([self._conditions(m, size) for m in unit])
 
-    def _measure(
-        self, body: Body, time: float, size: float, a: Vector, r: Sequence[float], end: Motion, fraction: float
-    ) -> Matrix:
-        """Columns ∂conditions/∂a_k by differences about ``a``, where they are ``r`` and the motion ends at ``end``.
+    def _measure(self, body: Body, time: float, size: float, a: Vector, r: Sequence[float], length: float) -> Matrix:
+        """Columns ∂conditions/∂a_k by differences about ``a``, where they are ``r``.
 
-        The difference would move a free mass by ``fraction`` of the motion; it is exact where the body is linear, as
-        the massless beam is.
+        The difference would move a free mass by ``length`` [m]; it is exact where the body is linear, as the massless
+        beam is.
         """
-        length = max(abs(end.displacement), size * abs(end.velocity), 1e-150)
-        delta = fraction * 2.0 * body.mass * length / (size * size) or 1.0
+        delta = 2.0 * body.mass * max(length, 1e-150) / (size * size) or 1.0
         columns = []
         for k in range(len(a)):
             changed = a.copy()
@@ -175,7 +176,7 @@ class Tie(Memory):
         (u, v, _, _), (y, z, _, _) = start, end
         change = max(size * max(abs(v), abs(z)), abs(y - u))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
-        rounding = _ROUNDING * max(self._reach, abs(u), abs(y), *map(abs, by_force))
+        rounding = _ROUNDING * max(self.reach, abs(u), abs(y), *map(abs, by_force))
         return max(self._tolerance * change, rounding)
 
 
