@@ -72,7 +72,7 @@ BYTES: dict[str, tuple[bytes, str]] = {
         GOOD.encode() + b"mass = " + b"[" * 150 + b"]" * 150,
         "[spring] mass = [[…]]: must be a finite number greater than 0",
     ),
-    "a dotted key of many parts": (GOOD.encode() + b".".join([b"a"] * 2000) + b" = 1", "[spring] a: unknown key; …"),
+    "a dotted key of many parts": (GOOD.encode() + b".".join([b"a"] * 300) + b" = 1", "[spring] a: unknown key; …"),
     "a long key": (GOOD.encode() + b"k" * 5000 + b" = 1", f"[spring] {'k' * 59}…: unknown key; allowed: …"),
     "a long line": (GOOD.encode() + b"mass = " + b"x" * 5000, "not TOML: … (at line 5, column 8): mass = …"),
     "too long": (GOOD.encode() + b"#" * LONGEST_FILE, f"{LONGEST_FILE + len(GOOD)} bytes, more than a scene has; …"),
