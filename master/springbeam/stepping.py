@@ -118,8 +118,8 @@ class Pair(Memory):
         driven = coupling.scheme in DISPLACEMENT_DRIVEN
         scheme = "energy" if self._exchange is not None or driven else coupling.scheme
         self._fixed_point = FixedPoint(coupling.scheme == "aitken", coupling.tolerance) if driven else None
-        reach = 0.0 if scene.beam is None else max(tip_reach(scene.beam), abs(self._tip().displacement))
-        self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance, reach)
+        expected = 0.0 if scene.beam is None else tip_reach(scene.beam)
+        self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance, expected)
         self._compliance = Compliance(*law, coupling.tolerance)
         self.one_way: OneWay | None = None
         if coupling.feedback != "two_way":
@@ -191,8 +191,6 @@ class Pair(Memory):
 
     def accept(self, step: Step) -> None:
         """``step`` is made; of a one-way coupling, what it neglects counts from now on."""
-        if step.contact is NO_FORCE:
-            self._tie.reach = max(self._tie.reach, *(abs(end.displacement) for end in step.end))
         if self.one_way is not None:
             driver = 0 if self.one_way.beam_drives else 1
             moved = step.end[driver].displacement - step.start[driver].displacement

@@ -52,20 +52,21 @@ class Tie(Memory):
         Degree of the contact force.
     tolerance
         Of the conditions, relative to the motion over the step, the larger of H·max(|u̇|, |ẏ|) and |Δu|.
-    reach
+    expected
         A displacement that is to be expected [m]: modes whose sum, the tip, is held at 0 are as large.
     """
 
-    REMEMBERED = ("_responses", "_last_size", "reach", "iterations")
+    REMEMBERED = ("_responses", "_last_size", "_reach", "iterations")
 
-    def __init__(self, conditions: Conditions, degree: int, tolerance: float, reach: float = 0.0) -> None:
+    def __init__(self, conditions: Conditions, degree: int, tolerance: float, expected: float = 0.0) -> None:
         self._conditions = conditions
         self._degree = degree
         self._tolerance = tolerance
         #: By the size of the step: B, and by kind of partner −(B − S)⁻¹ and whether S was measured.
         self._responses: dict[float, tuple[Matrix, dict[str, tuple[Matrix, bool]]]] = {}
         self._last_size = 0.0
-        self.reach = reach  #: largest displacement of an end so far, with or without a force found [m]
+        self._reach = 0.0  #: largest displacement of an end under a force found [m]
+        self._expected = expected
         self.iterations = 0  #: Newton updates since the start
 
     def solve(self, beam: Body, partner: Body, time: float, size: float, guess: Force, start: Motion) -> Force:
@@ -84,7 +85,7 @@ class Tie(Memory):
         known = self._responses.get(size)
         if known is None:
             at_beam = None
-            length = max(self.reach, abs(beam_end.displacement), size * abs(beam_end.velocity))
+            length = max(self._expected, abs(beam_end.displacement), size * abs(beam_end.velocity))
             known = self._measure(beam, time, size, a, r_beam, length), {}
         if size != self._last_size:
             self._responses.pop(size, None)
@@ -99,16 +100,16 @@ class Tie(Memory):
         partner_end = partner.advance(time, size, acting)
         r_partner = conditions(partner_end, size)
         # Rounding at least. What is asked is known once the motion is; that under the guess may be far from it.
-        tolerance = _ROUNDING * max(self.reach, abs(start.displacement))
+        tolerance = enough = _ROUNDING * max(self._reach, abs(start.displacement))
         residual = list(map(sub, r_beam, r_partner))
         norm = max(map(abs, residual))
         fresh = False
-        noise = 1.0
+        noise, unseen = 1.0, 0.0
         for iteration in range(_MAX_ITERATIONS):
             if not norm < inf:
                 raise NotConverged(norm, iteration)
             previous = norm
-            if norm <= noise * tolerance:
+            if norm <= enough:
                 if at_beam is a:
                     break
                 beam.rewind()
@@ -126,11 +127,12 @@ class Tie(Memory):
                 partner_end = partner.advance(time, size, acting)
                 r_partner = conditions(partner_end, size)
                 tolerance = self._absolute_tolerance(start, partner_end, size, _times(B, a))
+                enough = max(noise * tolerance, unseen)
                 residual = list(map(sub, r_beam, r_partner))
                 norm = max(map(abs, residual))
-                if norm > noise * tolerance:  # below, the difference is rounding and would spoil what is known
+                if norm > enough:  # below, the difference is rounding and would spoil what is known
                     descent = _broyden(descent, step, residual)
-            if norm > noise * tolerance:
+            if norm > enough:
                 stagnates = norm > 0.3 * previous
                 # Of a size that comes again S is measured once: it then saves a step of the partner in most.
                 if (stagnates and not fresh) or not (first or measured):
@@ -139,13 +141,15 @@ class Tie(Memory):
                     partner.rewind()
                     partner.advance(time, size, acting)
                     descent, measured, fresh = _descent(B, S), True, True
-                elif stagnates and norm <= _NOISE * tolerance:  # the bodies' own rounding: nothing left to gain
-                    noise = _NOISE
+                elif stagnates and norm <= max(_NOISE * tolerance, _ROUNDING * self._expected):
+                    # The bodies' own rounding: nothing left to gain.
+                    noise, unseen = _NOISE, _ROUNDING * self._expected
+                    enough = max(noise * tolerance, unseen)
         else:
             raise NotConverged(norm, _MAX_ITERATIONS)
         self._last_size = size
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
-        self.reach = max(self.reach, abs(beam_end.displacement), abs(partner_end.displacement))
+        self._reach = max(self._reach, abs(beam_end.displacement), abs(partner_end.displacement))
         descents[kind] = (descent, measured)
         return acting
 
@@ -176,7 +180,7 @@ class Tie(Memory):
         (u, v, _, _), (y, z, _, _) = start, end
         change = max(size * max(abs(v), abs(z)), abs(y - u))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
-        rounding = _ROUNDING * max(self.reach, abs(u), abs(y), *map(abs, by_force))
+        rounding = _ROUNDING * max(self._reach, abs(u), abs(y), *map(abs, by_force))
         return max(self._tolerance * change, rounding)
 
 
