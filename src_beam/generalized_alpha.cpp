@@ -161,7 +161,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
                                mu_, 1.0 / mu_, alpha_, 1.0 / mesh_.radius_of_gyration()}) {
       ordinary_ = ordinary_ && value < ordinary;
     }
-    load_ = hat_load_;
+    find_load();
   }
 
   void step(double size, const TipForce& c, double distributed_load) override {
@@ -184,7 +184,7 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
     if (distributed_load == now_.distributed_load) return;
     if (!midpoint_ && now_.started) now_.pending_load += distributed_load - now_.distributed_load;
     now_.distributed_load = distributed_load;
-    load_ = distributed_load * uniform_load_ + hat_load_;
+    find_load();
   }
 
   double tip_displacement() const override { return q_[mesh_.tip_index()]; }
@@ -342,6 +342,8 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
       throw_not_finite(h, c, distributed_load);
     }
   }
+
+  void find_load() { load_ = now_.distributed_load * uniform_load_ + hat_load_; }
 
   void start_with_load(double factor, double tip_force, double distributed_load) {
     rhs_ = (factor * distributed_load) * uniform_load_ + factor * hat_load_;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,9 @@ import springbeam
 from springbeam.monolithic import event_driven
 
 ROOT = Path(__file__).resolve().parents[1]
+
+# A shell ignores it in what it runs in the background, and so would the programs that tests start and interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
