@@ -97,6 +97,8 @@ def written(name: str, lines: list[str]) -> None:
 
 
 def main(names: list[str]) -> None:
+    if unknown := set(names) - set(WINDOWS):
+        raise SystemExit(f"{', '.join(sorted(unknown))}: no study; there are {', '.join(WINDOWS)}")
     for name in names or list(WINDOWS):
         window = WINDOWS[name]
         scene = with_changes(load_scene(window.scene), **window.changes)

@@ -157,7 +157,7 @@ class _UndisturbedRecorder(MemoryRecorder):
     """Of a run that has but one event. Raises _Disturbed."""
 
     def event(self, event: Event) -> None:
-        if self.trajectory().events:
+        if self._events:
             raise _Disturbed
         super().event(event)
 

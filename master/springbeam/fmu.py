@@ -38,10 +38,10 @@ from .trajectory import SHAPE_POINTS
 
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
 _WARNING, _DISCARD, _ERROR, _FATAL = 1, 2, 3, 4
+_STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 #: ``Motion(*values)`` and ``Energies(*values)`` in a third of the time.
 _motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
 _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
-_STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
 
 class FmuError(BodyFailed):
