@@ -2,8 +2,8 @@
 
 Unknowns are the Legendre coefficients a of C; residuals are the conditions of the gap, in metres. The beam is linear:
 its conditions are affine in a with a matrix that depends on H alone, which is measured once per H and remembered.
-The spring's matrix starts as that of a free mass, is measured when a size comes again, and follows by Broyden's rank-one
-updates, so a step usually costs two beam steps and two spring steps.
+The spring's matrix starts as that of a free mass, is measured when a size comes again, and follows by Broyden's
+rank-one updates, so a step usually costs two beam steps and two spring steps.
 """
 
 from __future__ import annotations
