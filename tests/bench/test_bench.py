@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import importlib
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from springbeam import load_scene, with_changes
+from springbeam.monolithic import algorithm1
 
 HERE = Path(__file__).parent
 PAGE = HERE.parents[1] / "docs" / "performance.md"
@@ -22,3 +26,16 @@ def test_every_group_runs(group: str, fmu_folder: Path) -> None:
     assert rows
     assert not any("nan" in row or "inf " in row for row in rows)
     assert PAGE.read_bytes() == before
+
+
+def test_algorithm_1_as_printed_has_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(HERE)
+    printed = importlib.import_module("printed")
+    scene = with_changes(
+        load_scene("paper-fig2"), beam={"n_elements": 40}, contact={"law": "paper"}, time={"t_end": 0.7}
+    )
+    ours, theirs = algorithm1.simulate(scene), printed.simulate(scene)
+    for name in ("u_tip", "v_tip", "y", "contact_force"):
+        scale = abs(ours[name]).max()
+        assert abs(ours[name] - theirs[name]).max() <= 1e-10 * scale, name
+    assert ours.summary["newton"]["solves"] == theirs.summary["newton"]["solves"]

@@ -243,21 +243,32 @@ class _Algorithm:
         self._dissipate(q, new, 0.0)
         return new, 2.0 * (new - q) / h - v
 
-    def _contact_step(
-        self, q: np.ndarray, v: np.ndarray, y: float, z: float, stiffness: float
-    ) -> tuple[np.ndarray, np.ndarray, float, float, float]:
-        """Lines 8–30: the state at l + 1 and λ_nc as the step leaves it."""
-        h, psi, response = self.h, self.spring.equilibrium, self.tip_response
-        # Line 9: (62), nonlinear only at the tip.
+    def _tip(self, q: np.ndarray, v: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
+        """u_tip by (62), which is nonlinear only there, and what the beam would do without a force on it."""
+        h, response = self.h, self.tip_response
         before = self._compliance(q[-1], stiffness)[0]
         known = self.solve(self.B @ q + 4.0 * h * (self.discrete.M @ v) + 2.0 * h**2 * self.load)
         known_tip = float(known[-1] + h**2 * response[-1] * before)
 
-        def tip(w: float) -> tuple[float, float]:
+        def equation(w: float) -> tuple[float, float]:
             force, slope = self._compliance(w, stiffness)
             return w - known_tip - h**2 * response[-1] * force, 1.0 - h**2 * response[-1] * slope
 
-        u_new = self._newton(tip, float(q[-1]), "beam")
+        return self._newton(equation, float(q[-1]), "beam"), known
+
+    def _beam(self, known: np.ndarray, u: float) -> tuple[np.ndarray, float]:
+        """All rows of (62) but the tip's, with u_tip given, and the force there that does so, its mean over the step
+        [N]."""
+        h, response = self.h, self.tip_response
+        force = (u - known[-1]) / response[-1]
+        return known + response * force, float(force / (2.0 * h**2))
+
+    def _contact_step(
+        self, q: np.ndarray, v: np.ndarray, y: float, z: float, stiffness: float
+    ) -> tuple[np.ndarray, np.ndarray, float, float, float]:
+        """Lines 8–30: the state at l + 1 and λ_nc as the step leaves it."""
+        h, psi = self.h, self.spring.equilibrium
+        u_new, known = self._tip(q, v, stiffness)  # line 9
         y_new = self._spring_step(y, z, y, stiffness, "predicted")  # line 10
         case, foundation, y_used = 0, 0.0, y
         acting = stiffness
@@ -273,9 +284,7 @@ class _Algorithm:
             if y_new <= self.phi:  # lines 20–24
                 u_new = y_new = self.phi
                 foundation = self._foundation_force(y, z, y_new, stiffness)
-        # Lines 13, 19, 22: all rows of (62) but the tip's, with u_tip given: a force at the tip does that.
-        q_new = known + response * ((u_new - known[-1]) / response[-1])
-        on_tip = float((u_new - known[-1]) / (2.0 * h**2 * response[-1]))  # mean over the step [N]
+        q_new, on_tip = self._beam(known, u_new)  # lines 13, 19, 22
         v_new = 2.0 * (q_new - q) / h - v  # line 29
         z_base = y_used if self.y_temp == "both" and case == 14 else y
         z_new = 2.0 * (y_new - z_base) / h - z

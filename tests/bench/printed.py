@@ -1,0 +1,51 @@
+"""Algorithm 1 as printed, each of its linear systems handed to `scipy.sparse.linalg.spsolve`.
+
+`springbeam.monolithic.algorithm1` gets the same numbers from one solution a step with factors made once, because (62)
+is nonlinear at the tip alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from springbeam.monolithic import algorithm1
+from springbeam.scene import Scene
+from springbeam.trajectory import Trajectory
+
+
+def simulate(scene: Scene) -> Trajectory:
+    """As `springbeam.monolithic.algorithm1.simulate`, with its defaults."""
+    start_velocity: algorithm1.StartVelocity = "tip" if scene.contact.impact == "tip" else "rest"
+    return _AsPrinted(scene, start_velocity, "equation", 1e-12).run()
+
+
+class _AsPrinted(algorithm1._Algorithm):
+    def __init__(self, *arguments: object) -> None:
+        super().__init__(*arguments)  # type: ignore[arg-type]
+        d, h = self.discrete, self.h
+        self.A = (4.0 * d.M + (h**2 + 2.0 * self.beam.alpha_b * h) * d.K).tocsr()
+        self.inner, self.column = self.A[:-1, :-1].tocsc(), self.A[:-1, [-1]].toarray().ravel()
+        self.at_tip = sp.csr_array(([1.0], ([d.M.shape[0] - 1], [d.M.shape[0] - 1])), shape=d.M.shape)
+
+    def _tip(self, q: np.ndarray, v: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
+        h, x = self.h, q.copy()
+        known = self.B @ q + 4.0 * h * (self.discrete.M @ v) + 2.0 * h**2 * self.load
+        before = self._compliance(q[-1], stiffness)[0]
+
+        def equation(w: float) -> tuple[float, float]:
+            """Newton's step on all unknowns, told by that of the tip."""
+            x[-1] = w
+            force, slope = self._compliance(w, stiffness)
+            residual = self.A @ x - known
+            residual[-1] -= h**2 * (force + before)
+            change = spla.spsolve((self.A - h**2 * slope * self.at_tip).tocsc(), residual)
+            x[:-1] -= change[:-1]
+            return float(change[-1]), 1.0
+
+        return self._newton(equation, float(q[-1]), "beam"), known
+
+    def _beam(self, known: np.ndarray, u: float) -> tuple[np.ndarray, float]:
+        x = np.append(spla.spsolve(self.inner, known[:-1] - self.column * u), u)
+        return x, float((self.A @ x - known)[-1] / (2.0 * self.h**2))
