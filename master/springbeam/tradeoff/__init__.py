@@ -90,9 +90,9 @@ class Study:
     notes: list[str] = field(default_factory=list)
 
     def front(self) -> list[Point]:
-        """Pareto front, the cheapest first: no other point is both quicker and more accurate. Errors of 1 and more, as
-        large as the motion, are no results."""
-        best, front = 1.0, []
+        """Pareto front, the cheapest first: no other point is both quicker and more accurate. Errors of a tenth of the
+        motion and more are no results."""
+        best, front = 0.1, []
         for point in sorted((p for p in self.points if not p.configuration.refined), key=lambda p: p.solve):
             if point.displacement < best:
                 best = point.displacement

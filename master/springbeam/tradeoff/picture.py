@@ -12,18 +12,19 @@ from matplotlib.axes import Axes
 from ..drawing import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION, YELLOW
 from . import Point, Study
 
-#: Colour and marker by family; steps from tolerances look like the scheme, but dotted and hollow.
+#: Colour and marker by family; like the scheme, but hollow: dotted with steps from tolerances, dash-dotted with another
+#: tolerance of IDA.
 _LOOKS = {
     "energy 0": (BLUE, "o"), "energy 1": (SKY, "s"), "energy 2": (GREEN, "^"),
     "hermite 1": (ORANGE, "D"), "hermite 2": (VERMILLION, "v"),
-    "auto": (BLACK, "+"), "IDA tolerance": (PURPLE, "*"), "fixed_point 0": (YELLOW, "<"), "aitken 0": (YELLOW, ">"),
+    "auto": (BLACK, "+"), "fixed_point 0": (YELLOW, "<"), "aitken 0": (YELLOW, ">"),
     "jacobi 0": (ORANGE, "D"), "jacobi 1": (VERMILLION, "v"),
     "gauss_seidel 0": (GREEN, "^"), "gauss_seidel 1": (PURPLE, "P"),
     "DOP853": (GREY, "o"), "LSODA": (GREY, "s"), "Radau": (GREY, "^"), "Algorithm 1": (GREY, "X"),
     "modes": (BLUE, "o"), "elements of degree 1": (SKY, "s"),
     "elements of degree 4": (GREEN, "^"), "elements of degree 8": (VERMILLION, "v"),
 }  # fmt: skip
-_ADAPTIVE = " adaptive"
+_ADAPTIVE, _IDA = " adaptive", ", IDA "
 #: Errors outside are drawn at the edge: nothing is right, or rounding.
 _WORST, _BEST = 1.0, 1e-13
 _NOTE_WIDTH = 85  #: characters a column of the picture
@@ -34,7 +35,7 @@ def draw(study: Study, path: Path) -> None:
     same = [p for p in study.points if not p.configuration.refined and p.errors is not None]
     models = [p for p in study.points if p.configuration.refined and p.errors is not None]
     columns = 3 if models else 2
-    figure, axes = plt.subplots(1, columns, figsize=(6.0 * columns, 6.0), layout="constrained")
+    figure, axes = plt.subplots(1, columns, figsize=(6.0 * columns, 6.5), layout="constrained")
     _curves(axes[0], same, lambda p: p.solve * 1e3)
     front = study.front()
     axes[0].plot(
@@ -42,7 +43,6 @@ def draw(study: Study, path: Path) -> None:
         color=BLACK, linewidth=6.0, alpha=0.15, zorder=0, label="Pareto front",
     )  # fmt: skip
     axes[0].set(xlabel="solve, wall time [ms]", title="coupling and integration, same model")
-    axes[0].legend(fontsize="small", ncols=2)
     _curves(axes[1], [p for p in same if not p.configuration.monolithic], lambda p: p.beam_steps + p.spring_steps)
     axes[1].set(xlabel="doStep calls of both FMUs", title="co-simulation, same model")
     if models:
@@ -52,6 +52,8 @@ def draw(study: Study, path: Path) -> None:
     for ax in axes:
         ax.set(xscale="log", yscale="log", ylabel="largest relative error of u_tip and y")
         ax.grid(alpha=0.3)
+    key = axes[0].get_legend_handles_labels()
+    figure.legend(*key, loc="outside lower center", fontsize="small", ncols=3 * columns)
     figure.suptitle(f"{study.scene.title}: errors up to t = {study.scene.time.t_end:.6g} s")
     if study.notes:
         lines = [line for note in study.notes for line in textwrap.wrap(note, _NOTE_WIDTH * columns)]
@@ -67,9 +69,15 @@ def _clipped(point: Point) -> float:
 def _curves(ax: Axes, points: list[Point], cost: Callable[[Point], float]) -> None:
     for family in dict.fromkeys(p.configuration.family for p in points):
         mine = [p for p in points if p.configuration.family == family]
-        colour, marker = _LOOKS[family.removesuffix(_ADAPTIVE)]
-        hollow = mine[0].configuration.monolithic or family.endswith(_ADAPTIVE)
-        line = ":" if family.endswith(_ADAPTIVE) else "--" if mine[0].configuration.monolithic else "-"
+        colour, marker = _LOOKS[family.removesuffix(_ADAPTIVE).partition(_IDA)[0]]
+        line = "-"
+        if mine[0].configuration.monolithic:
+            line = "--"
+        elif family.endswith(_ADAPTIVE):
+            line = ":"
+        elif _IDA in family:
+            line = "-."
+        hollow = line != "-"
         ax.plot(
             [cost(p) for p in mine], [_clipped(p) for p in mine], marker=marker, markersize=5, color=colour,
             linestyle="none" if family == "auto" else line, linewidth=1.2, label=family,
