@@ -271,7 +271,17 @@ def tied_phase(scene: Scene) -> tuple[float, int]:
     return clock[-1] - clock[0], len(clock) - 1
 
 
+def through_fmpy(effort: Effort, calls: int = 20_000) -> Row:
+    """What a call costs through FMPy's own methods: says how fast Python is on this machine."""
+    body = fmu.FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
+    read, references = body.fmu._slave.getReal, [body.fmu.reference("displacement", "Real")]
+    costs = [1e6 * timed(lambda: [read(references) for _ in range(calls)]) / calls for _ in range(effort.rounds)]
+    body.close()
+    return Row("4", "for scale: one variable read by FMPy's getReal", "", f"{median_and_spread(costs)} µs")
+
+
 def master(effort: Effort) -> Iterator[Row]:
+    yield through_fmpy(effort)
     empty = nothing()
     for H, scheme, degree in ((2.5e-4, "energy", 0), (1e-3, "energy", 0), (1e-3, "energy", 2), (1e-3, "hermite", 2)):
         coupling = {"macro_step": H, "scheme": scheme, "degree": degree}

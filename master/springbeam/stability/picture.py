@@ -40,7 +40,7 @@ def draw(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], directory
             _map(ax, s, _grid(s, cells, outcomes), panel)
         for ax in axes.flat[len(SLICES) :]:
             ax.set_visible(False)
-        _samples(axes.flat[len(SLICES)], cells, outcomes, name)
+        _samples(axes.flat[-1], cells, outcomes, name)
         legend(figure, axes)
         paths.append(directory / f"{name}.png")
         figure.savefig(paths[-1], dpi=100)
@@ -120,4 +120,5 @@ def _samples(ax: Axes, cells: Sequence[dict[str, Any]], outcomes: Sequence[Outco
         ax.set(xscale="log", xlabel="energy residual")
     ax.set_title(f"hypercube, {len(mine)} cells", fontsize="medium")
     ax.set_yticks(list(places), names, fontsize="small")
+    ax.yaxis.tick_right()  # at the edge of the picture: on the left they would part all columns
     ax.invert_yaxis()

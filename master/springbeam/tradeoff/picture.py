@@ -52,12 +52,12 @@ def draw(study: Study, path: Path) -> None:
     for ax in axes:
         ax.set(xscale="log", yscale="log", ylabel="largest relative error of u_tip and y")
         ax.grid(alpha=0.3)
-    key = axes[0].get_legend_handles_labels()
-    figure.legend(*key, loc="outside lower center", fontsize="small", ncols=3 * columns)
     figure.suptitle(f"{study.scene.title}: errors up to t = {study.scene.time.t_end:.6g} s")
-    if study.notes:
-        lines = [line for note in study.notes for line in textwrap.wrap(note, _NOTE_WIDTH * columns)]
-        figure.supxlabel("\n".join(lines), fontsize="small", x=0.01, ha="left")
+    notes = [line for note in study.notes for line in textwrap.wrap(note, _NOTE_WIDTH * columns)]
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", fontsize="small", ncols=3 * columns,
+        title="\n".join(notes) or None, title_fontsize="small", alignment="left",
+    )  # fmt: skip
     figure.savefig(path, dpi=110)
     plt.close(figure)
 
