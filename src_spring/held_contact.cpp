@@ -1,6 +1,5 @@
 #include "held_contact.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -28,8 +27,7 @@ void HeldContact::begin(const TipMessage& seen, double y, const Top& top) {
   tip_ = first_.displacement;
   const double free = tip_ + size_ * first_.velocity;
   if (held_back) {
-    force_ = 0.0;
-    next_ = free;
+    send(0.0, free);
   } else {
     choose(y, free, top);
   }
@@ -64,8 +62,12 @@ void HeldContact::choose(double y, double free, const Top& top) {
     force = next;
     if (!std::isfinite(force)) break;
   }
-  force_ = force;
-  next_ = free + response_[0] * force_;
+  send(force, free);
+}
+
+void HeldContact::send(double force, double free) {
+  next_ = free + response_[0] * force;
+  force_ = std::isfinite(next_) ? force : std::numeric_limits<double>::infinity();
 }
 
 /// C with C = mean(start, free − yielding·C). The mean falls with C: there is one, between 0 and what no yielding
@@ -91,7 +93,9 @@ std::array<double, HeldContact::state_length> HeldContact::state() const {
 }
 
 void HeldContact::restore(const double* state) {
-  if (!std::all_of(state, state + state_length, [](double x) { return std::isfinite(x); })) {
+  const auto finite = [state](int i) { return std::isfinite(state[i]); };
+  // The force (2) may be past all numbers, and then the tip's next place (1) is.
+  if (!finite(0) || !finite(3) || !finite(4) || !finite(5) || (finite(2) && !finite(1))) {
     throw std::invalid_argument("spring: a saved state has numbers that are not finite");
   }
   for (double* member : {&tip_, &next_, &force_, &first_.displacement, &first_.velocity}) *member = *state++;

@@ -39,7 +39,7 @@ class HeldContact {
   /// A step was made under force(), at whose start the tip was `seen`, and the top is at y: choose the next force.
   void advance(const TipMessage& seen, double y, const Top& top);
 
-  /// C over the next step [N]; not finite if the law leaves the range of floating-point numbers.
+  /// C over the next step [N]; not finite if it, or where the tip goes, leaves the range of floating-point numbers.
   double force() const { return force_; }
   double energy(double y) const { return law_.energy(y - tip_); }  ///< Φ [J]
   double tip() const { return tip_; }                              ///< u_tip now [m], as foreseen
@@ -48,11 +48,12 @@ class HeldContact {
 
   static constexpr std::size_t state_length = 6;
   std::array<double, state_length> state() const;
-  /// @throws std::invalid_argument (state unchanged) if a number is not finite
+  /// @throws std::invalid_argument (state unchanged) if a number but for force() is not finite
   void restore(const double* state);
 
  private:
   void choose(double y, double free, const Top& top);
+  void send(double force, double free);
   double root(double start, double free, double yielding) const;
   double mean(double start, double end) const;
 

@@ -194,8 +194,17 @@ TEST(HeldContact, AForceOutOfRangeIsNoForce) {
   const double force = c.contact.force();
   c.contact.begin({-1e300, 0.0}, 0.0, c.foresee());
   EXPECT_FALSE(std::isfinite(c.contact.force()));
+  const auto state = c.contact.state();
   c.contact.begin(c.seen, 0.0, c.foresee());
   EXPECT_NEAR(c.contact.force(), force, 1e-12 * force);
+  c.contact.restore(state.data());
+  EXPECT_EQ(c.contact.state(), state);
+}
+
+TEST(HeldContact, ATipThatLeavesTheRangeIsNoForce) {
+  Collision c(Compliance(1e6, 1.5), 0.0, 1e3);
+  c.contact.begin({1e300, 1e306}, 0.0, c.foresee());
+  EXPECT_FALSE(std::isfinite(c.contact.force()));
 }
 
 TEST(HeldContact, ARestoredStateGoesOnBitByBit) {
@@ -213,9 +222,11 @@ TEST(HeldContact, ARestoredStateGoesOnBitByBit) {
     EXPECT_EQ(c.contact.state(), other.contact.state());
   }
   EXPECT_GT(c.tip.v, 0.0);  // the collision was among these steps
-  auto forged = state;
-  forged[2] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THROW(other.contact.restore(forged.data()), std::invalid_argument);
+  for (const std::size_t i : {0, 1, 3, 4, 5}) {
+    auto forged = state;
+    forged[i] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_THROW(other.contact.restore(forged.data()), std::invalid_argument) << i;
+  }
   EXPECT_EQ(c.contact.state(), other.contact.state());
 }
 
