@@ -1,4 +1,4 @@
-"""An accuracy instead of a scheme, a macro step and IDA's tolerance: they are picked by pilot runs.
+"""An accuracy instead of a scheme, a macro step and tolerances: they are picked by pilot runs.
 
 The error is that of the coupling and the time integration, for the scene's own mesh and modes: these are the model.
 (Impacts on the foundation converge only slowly with the mesh, since what they meet is the mass of its tip.)
@@ -23,36 +23,39 @@ from .automatic import choice
 from .contact_times import apart, changes_of_contact
 from .linearised import spring_frequency
 from .recording import MemoryRecorder
-from .resolution import shear_frequency, slowest_frequency
+from .resolution import fastest_frequency, shear_frequency
 from .runner import RunStopped, run
 from .scene import Scene, SceneError, scene_from_dict, with_changes
 from .statics import tip_compliance
 from .trajectory import Event, Trajectory
 
-#: Fewest macro steps, and the largest number tried; pilot runs in a row that may stop early.
-_FEWEST, _MOST, _MOST_STOPPED = 8, 50_000, 6
+#: Fewest macro steps where bodies are coupled and where not, and the largest number tried; pilot runs in a row that
+#: may stop early.
+_FEWEST, _UNCOUPLED, _MOST, _MOST_STOPPED = 8, 4, 50_000, 6
 #: Growth of the number of macro steps from run to run: at least, at most, after a run that gained energy, and after
 #: one that stopped for another reason, which may be gone at the next size.
 _LEAST_GROWTH, _MOST_GROWTH, _AFTER_GAIN, _AFTER_STOP = 1.2, 4.0, 1.4, 1.01
 #: Energy residual above which it was too large a macro step that stopped a run.
 _GAIN = 0.05
-#: An estimate of the displacement's error is to be so many times smaller than the accuracy.
+#: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
 #: Runs that differ by more are both unresolved, whatever their order [of the motion].
-_UNRESOLVED = 0.2
+_UNRESOLVED = 0.02
 #: By how much the finer one of two runs of different events is trusted to be better.
 _DOUBTED = 30.0
 #: Orders of the error of a displacement that are relied on, and of the time of an event, where `hermite` measures them.
-_LOWEST, _HIGHEST, _OF_EVENTS = 2.0, 6.0, 3.0
+_LOWEST, _HIGHEST, _OF_EVENTS = 1.0, 6.0, 3.0
 #: What the first macro step turns the fastest wave by [rad], over accuracy^(1/6); a mode that dies out within this
-#: fraction of its retardation time needs no resolution; and what a macro step turns a body alone by [rad].
-_FIRST_TURN, _DIES_OUT, _ALONE = 26.0, 0.4, 2.0
-#: Displacement error over energy residual, of runs with so many changes of contact after the first.
-_AMPLIFIED = (1.0, 3.0, 100.0)
+#: fraction of its retardation time needs no resolution; and what the first macro step turns a body alone by [rad].
+_FIRST_TURN, _DIES_OUT, _ALONE = 26.0, 0.3, 2.0
+#: Displacement error over energy residual, of runs with changes of contact after the first.
+_AMPLIFIED = 10.0
+#: doStep calls per macro step of a run that pays for its events rather than its steps: more steps cost hardly more.
+_CALLS_PER_STEP = 8.0
 #: Law "compliance": the first and the second tolerance of the adaptive steps over the accuracy, and the largest.
-_FIRST_TOLERANCE, _SECOND_TOLERANCE, _LARGEST_TOLERANCE = 8.0, 0.8, 0.1
-#: IDA's tolerance over the accuracy, and its bounds.
-_IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-4, 1e-12, 1e-8
+_FIRST_TOLERANCE, _SECOND_TOLERANCE, _LARGEST_TOLERANCE = 4.0, 0.4, 0.1
+#: The coupling's and IDA's tolerance over the accuracy, and the bounds of the latter.
+_COUPLING_SHARE, _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-4, 1e-12, 1e-8
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ class Picked:
     run: Trajectory  #: the last pilot run, which keeps it
     displacement_error: float  #: estimate, relative to the largest change of the tip (or spring top)
     event_error: float  #: estimate of the largest error of a change of contact, relative to the time that is run
-    events: int  #: changes of contact that this is about, those further apart than four macro steps
+    events: int  #: changes of contact that this is about, those further apart than two steps of the coarser run
     pilot_runs: int
     pilot_steps: int  #: doStep calls of the pilot runs before the last
     pilot_time: float  #: [s]
@@ -176,7 +179,7 @@ class _Search:
 
     def run(self) -> Picked:
         fineness, coarse, estimate = self._first(), None, None
-        if self._scheme["scheme"] == "hermite" and fineness >= 2.0 * _FEWEST:
+        if self._scene.spring is not None and self._scheme["scheme"] == "hermite" and fineness >= 2.0 * _FEWEST:
             coarse = self._pilot(_FEWEST, undisturbed=True)
             if coarse is not None:
                 fineness = self._rung(_FEWEST * self._second(coarse))
@@ -188,14 +191,15 @@ class _Search:
                 growth, coarse = self._second(fine), fine
             else:
                 estimate = self._estimate(coarse, fine)
-                worst = max(_SAFETY * estimate.displacement, estimate.event)
+                worst = _SAFETY * max(estimate.displacement, estimate.event)
                 if worst <= self._accuracy and estimate.apart <= _UNRESOLVED:
                     return Picked(
                         self._accuracy, fine.run, estimate.displacement, estimate.event, estimate.events,
                         self._runs - 1, self._calls - fine.calls, self._spent - fine.spent,
                     )  # fmt: skip
                 growth, coarse = self._growth(estimate), fine
-            fineness = self._rung(fineness * growth)
+            least = 0.0 if fine is None or self._adaptive else fine.calls / _CALLS_PER_STEP
+            fineness = self._rung(max(fineness * growth, least))
         if estimate is None:
             found = f"the fastest waves of its mesh take some {fineness:.1g}"
         else:
@@ -211,31 +215,32 @@ class _Search:
         beam, spring = self._scene.beam, self._scene.spring
         if self._adaptive:
             return 1.0 / min(_FIRST_TOLERANCE * self._accuracy, _LARGEST_TOLERANCE)
+        if (beam is None or spring is None) and self._scene.stop is None:
+            return _UNCOUPLED  # exact but for IDA
         of_spring = 0.0 if spring is None else spring_frequency(self._scene)
         if beam is None:
             return self._rung(of_spring * self._span / _ALONE)
-        if spring is None and self._scene.stop is None:
-            return self._rung(slowest_frequency(beam) * self._span / _ALONE)
         if beam.fidelity == "quasi_static":
             assert spring is not None
             return self._rung(math.hypot(of_spring, 1.0 / math.sqrt(tip_compliance(beam) * spring.mass)) * self._span)
-        waves = shear_frequency(beam)
+        waves = min(shear_frequency(beam), fastest_frequency(beam))
         if beam.alpha_b > 0.0:
             waves = min(waves, _DIES_OUT / beam.alpha_b)
-        return self._rung(max(waves, of_spring) * self._span / (_FIRST_TURN * self._accuracy ** (1.0 / 6.0)))
+        turn = _ALONE if spring is None else _FIRST_TURN * self._accuracy ** (1.0 / 6.0)
+        return self._rung(max(waves, of_spring) * self._span / turn)
 
     def _second(self, first: _Pilot) -> float:
         if self._adaptive:
             return 1.0 / (first.fineness * _SECOND_TOLERANCE * self._accuracy)
         if self._scheme["scheme"] != "hermite":
             return _LEAST_GROWTH
-        expected = _AMPLIFIED[min(changes_of_contact(first.run), len(_AMPLIFIED) - 1)] * first.residual
+        expected = first.residual * (_AMPLIFIED if changes_of_contact(first.run) else 1.0)
         return min(max(math.pow(expected / self._accuracy, 1.0 / _HIGHEST), _LEAST_GROWTH), _MOST_GROWTH)
 
     def _growth(self, estimate: _Estimate) -> float:
         """What makes the next estimate hold, with a margin, by the orders of convergence expected."""
-        displacement = 1.5 * _SAFETY * estimate.expected / self._accuracy
-        event = 1.5 * estimate.event / self._accuracy
+        margin = 1.5 * _SAFETY / self._accuracy
+        displacement, event = margin * estimate.expected, margin * estimate.event
         of_displacement, of_event = (1.0, 1.0) if self._adaptive else (5.0, 3.5)
         growth = max(math.pow(displacement, 1.0 / of_displacement), math.pow(event, 1.0 / of_event))
         return min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
@@ -256,7 +261,8 @@ class _Search:
         If it is to be ``undisturbed``, a second event stops it.
         """
         steps = {"relative_tolerance": 1.0 / fineness} if self._adaptive else {"macro_step": self._span / fineness}
-        tables: dict[str, dict[str, Any]] = {"coupling": {**self._scheme, **steps}}
+        agreed = max(_COUPLING_SHARE * self._accuracy, _TIGHTEST)
+        tables: dict[str, dict[str, Any]] = {"coupling": {**self._scheme, **steps, "tolerance": agreed}}
         if self._scene.spring is not None:
             tolerance = min(max(_IDA_SHARE * self._accuracy, _TIGHTEST), _LOOSEST)
             tables["spring"] = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}

@@ -216,7 +216,7 @@ class Scene(_Table):
     """A validated scene. ``beam``, ``spring`` and ``stop`` are ``None`` where the scene does not have them."""
 
     title: str = ""
-    #: Picks mesh, modes, scheme, macro step and IDA's tolerance instead of those given: `springbeam.accuracy`.
+    #: Picks scheme, macro step and tolerances instead of those given: `springbeam.accuracy`.
     accuracy: Annotated[float | None, Field(gt=0.0, lt=1.0)] = None
     time: Time
     beam: Beam | None = None

@@ -36,6 +36,7 @@ NOT_RUN = {
     "./build.sh bench": "measures for minutes; tests/bench/test_bench.py sees that it runs",
     ".venv/bin/python docs/accuracy.py": "takes minutes",
     ".venv/bin/python docs/paper_figures.py": "takes minutes",
+    ".venv/bin/python docs/promise.py": "takes minutes; test_accuracy.py judges some scenes with it",
     "springbeam animate results/soft": "draws for half a minute; the command is in test_animation.py",
     "springbeam stability": "takes minutes; parts of it are run in test_stability_grid.py, test_critical_steps.py",
     "springbeam tradeoff soft --until 0.0712": "takes minutes; the command is in test_tradeoff.py",
