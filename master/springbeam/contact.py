@@ -147,9 +147,6 @@ class Transitions(Memory):
         assert self._mass is not None
         assert self._scene.spring is not None
         psi = self._scene.spring.equilibrium
-        if phase.seated:
-            # The seated spring does not move: the tip strikes the foundation through it.
-            return Phase(Joint.TIED, seated=True), foundation_impact(None, 0.0, tip.velocity, self._tip_mass, 0.0)
         impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
         at_equilibrium = abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
@@ -157,7 +154,8 @@ class Transitions(Memory):
             tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
         else:
             tied = low.displacement < psi
-        return Phase(Joint.TIED if tied else Joint.TOUCH), impact
+        # A top that stands on the foundation is driven into it, and strikes it at once; a massless tip cannot do that.
+        return Phase(Joint.TIED if tied else Joint.TOUCH, phase.seated and self._tip_mass == 0.0), impact
 
     def _rises_from_rest(self) -> bool:
         """Whether a massless tip and the spring, at rest together at Ψ, are pushed up."""

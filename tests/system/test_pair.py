@@ -188,6 +188,36 @@ def test_bounces_die_out_and_the_spring_stays_seated():
 # -- a scene pays for what it contains ------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("impact", ["inelastic", "tip"])
+def test_a_tip_that_meets_a_seated_spring_drives_it_into_the_foundation(impact):
+    """The spring is pressed down and has come to rest; it and the tip leave with the restitution of the stop."""
+    scene = with_changes(
+        load_scene("soft"),
+        time={"t_end": 0.5},
+        beam={
+            "n_elements": 6,
+            "shear_modulus": 80.0,
+            "initial_deflection_slope": 0.1,
+            "initial_velocity_slope": -1.0,
+            "approach": "elastic",
+        },
+        spring={"mass": 0.05, "damping": 0.5, "linear_stiffness": 5.0, "cubic_stiffness": 0.0, "external_force": -2.0},
+        stop={"position": -0.01, "restitution": 0.4},
+        contact={"impact": impact},
+        coupling={"scheme": "hermite", "degree": 2, "macro_step": 5e-4},
+    )
+    found = simulate(scene)
+    exact = event_driven.simulate(scene, sample_times=np.unique(found.time))
+    for name in ("u_tip", "y"):
+        error = np.abs(found[name] - exact[name][np.searchsorted(exact.time, found.time)]).max()
+        assert error <= 1e-9 * np.abs(exact[name]).max()
+    for trajectory in (found, exact):
+        kinds = [event.kind for event in trajectory.events]
+        first = kinds.index("impact")
+        assert kinds[first - 1 : first + 2] == ["seated", "impact", "stop_impact"]
+        assert trajectory.events[first].time == trajectory.events[first + 1].time
+
+
 def test_duffing_alone_has_the_exact_period():
     """Softening, from rest at A: T = 4K(m)/ω, ω² = k1 + k2A²/2, m = −k2A²/2ω²."""
     trajectory = run("duffing")
