@@ -4,10 +4,10 @@ The error is that of the coupling and the time integration, for the scene's own 
 (Impacts on the foundation converge only slowly with the mesh, since what they meet is the mass of its tip.)
 
 Two runs are compared: if the finer one has ρ times the steps and its error is of order p, that error is the
-difference over ρᵖ − 1. `hermite` tells p itself: its energy residual is an error of the same order, summed up over the
-run, so ρᵖ is the ratio of the two residuals. The first run has the macro step that the fastest waves at the tip ask
-for, the second what the residual of the first lets expect, a third what the difference of these two does; each agrees
-with the one before or gives way to a finer one (``docs/accuracy.md``).
+difference over ρᵖ − 1. `hermite`, and `jacobi` with law "compliance", tell p themselves: their energy residual is an
+error of the same order, summed up over the run, so ρᵖ is the ratio of the two residuals. The first run has the macro
+step that the fastest waves at the tip ask for, the second what the residual of the first lets expect, a third what the
+difference of these two does; each agrees with the one before or gives way to a finer one (``docs/accuracy.md``).
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from .automatic import choice
 from .contact_times import apart, changes_of_contact
@@ -34,7 +33,8 @@ from .trajectory import Event, Trajectory
 _FEWEST, _UNCOUPLED, _MOST, _MOST_STOPPED = 8, 4, 50_000, 6
 #: Growth of the number of macro steps from run to run: at least, at most, after a run that gained energy, and after
 #: one that stopped for another reason, which may be gone at the next size.
-_LEAST_GROWTH, _MOST_GROWTH, _AFTER_GAIN, _AFTER_STOP = 1.2, 4.0, 1.4, 1.01
+_LEAST_GROWTH, _MOST_GROWTH = 1.2, 4.0
+_AFTER_GAIN, _AFTER_STOP = {"energy": 1.4, "hermite": 1.4, "jacobi": 2.0}, 1.01
 #: Energy residual above which it was too large a macro step that stopped a run.
 _GAIN = 0.05
 #: An estimate of the error is to be so many times smaller than the accuracy.
@@ -43,17 +43,18 @@ _SAFETY = 1.5
 _UNRESOLVED = 0.02
 #: By how much the finer one of two runs of different events is trusted to be better.
 _DOUBTED = 30.0
-#: Orders of the error of a displacement that are relied on, and of the time of an event, where `hermite` measures them.
-_LOWEST, _HIGHEST, _OF_EVENTS = 1.0, 6.0, 3.0
-#: What the first macro step turns the fastest wave by [rad], over accuracy^(1/6); a mode that dies out within this
-#: fraction of its retardation time needs no resolution; and what the first macro step turns a body alone by [rad].
-_FIRST_TURN, _DIES_OUT, _ALONE = 26.0, 0.3, 2.0
-#: Displacement error over energy residual, of runs with changes of contact after the first.
+#: Orders of the error, by the schemes whose energy residual has the same; the lowest that is relied on, and the highest
+#: of the time of an event.
+_ORDERS = {"hermite": 6.0, "jacobi": 2.0}
+_LOWEST, _OF_EVENTS = 1.0, 3.0
+#: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a body alone by;
+#: and the part of a mode's retardation time within which it dies out and needs no resolution.
+_TURN = {"hermite": 26.0, "jacobi": 150.0}
+_ALONE, _DIES_OUT = 2.0, 0.3
+#: Displacement error over energy residual of `hermite`, in runs with changes of contact after the first.
 _AMPLIFIED = 10.0
 #: doStep calls per macro step of a run that pays for its events rather than its steps: more steps cost hardly more.
 _CALLS_PER_STEP = 8.0
-#: Law "compliance": the first and the second tolerance of the adaptive steps over the accuracy, and the largest.
-_FIRST_TOLERANCE, _SECOND_TOLERANCE, _LARGEST_TOLERANCE = 4.0, 0.4, 0.1
 #: The coupling's and IDA's tolerance over the accuracy, and the bounds of the latter.
 _COUPLING_SHARE, _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-4, 1e-12, 1e-8
 
@@ -83,11 +84,7 @@ class Picked:
     def summary(self) -> dict[str, Any]:
         """As it goes into ``summary.json``."""
         coupling, spring = self.scene.coupling, self.scene.spring
-        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree}
-        if coupling.adaptive:
-            picked["relative_tolerance"] = coupling.relative_tolerance
-        else:
-            picked["macro_step"] = coupling.H
+        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree, "macro_step": coupling.H}
         if spring is not None:
             picked["ida_relative_tolerance"] = spring.relative_tolerance
         return {
@@ -121,9 +118,9 @@ def pick(scene: Scene) -> Picked:
 
 @dataclass(frozen=True)
 class _Pilot:
-    """A run, and how fine it is: macro steps, or one over the tolerance of the adaptive ones."""
+    """A run, and its macro steps where no event cuts them."""
 
-    fineness: float
+    steps: float
     run: Trajectory
 
     @property
@@ -172,19 +169,20 @@ class _Search:
         self._span = scene.time.t_end - (scene.contact_time or 0.0)
         fine = with_changes(self._scene, coupling={"macro_step": 1e-9 * self._span})
         taken = choice(fine)  # of schemes, the one where everything is resolved
-        self._scheme = {"scheme": taken.scheme, "degree": taken.degree}
-        beam, compliant = scene.beam, scene.contact.law == "compliance" and scene.spring is not None
-        self._adaptive = compliant and beam is not None and beam.integrator == "modal"
+        self._scheme, self._degree = taken.scheme, taken.degree
+        exchanged = scene.contact.law == "compliance" and scene.coupling.feedback == "two_way"
+        if exchanged and scene.spring is not None and scene.beam is not None and scene.beam.integrator == "modal":
+            self._scheme, self._degree = "jacobi", 1  # as accurate as `energy`, for half the calls
         self._runs, self._calls, self._spent, self._stopped, self._after_stop = 0, 0, 0.0, 0, 1.0
 
     def run(self) -> Picked:
-        fineness, coarse, estimate = self._first(), None, None
-        if self._scene.spring is not None and self._scheme["scheme"] == "hermite" and fineness >= 2.0 * _FEWEST:
+        steps, coarse, estimate = self._first(), None, None
+        if self._scene.spring is not None and self._scheme == "hermite" and steps >= 2.0 * _FEWEST:
             coarse = self._pilot(_FEWEST, undisturbed=True)
             if coarse is not None:
-                fineness = self._rung(_FEWEST * self._second(coarse))
-        while fineness <= (1.0 / _TIGHTEST if self._adaptive else _MOST):
-            fine = self._pilot(fineness)
+                steps = self._rung(_FEWEST * self._second(coarse))
+        while steps <= _MOST:
+            fine = self._pilot(steps)
             if fine is None:
                 growth = self._after_stop
             elif coarse is None:
@@ -198,10 +196,10 @@ class _Search:
                         self._runs - 1, self._calls - fine.calls, self._spent - fine.spent,
                     )  # fmt: skip
                 growth, coarse = self._growth(estimate), fine
-            least = 0.0 if fine is None or self._adaptive else fine.calls / _CALLS_PER_STEP
-            fineness = self._rung(max(fineness * growth, least))
+            least = 0.0 if fine is None else fine.calls / _CALLS_PER_STEP
+            steps = self._rung(max(steps * growth, least))
         if estimate is None:
-            found = f"the fastest waves of its mesh take some {fineness:.1g}"
+            found = f"the fastest waves of its mesh take some {steps:.1g}"
         else:
             found = f"runs still differ by {estimate.apart:.1e}"
         raise SceneError(
@@ -213,8 +211,6 @@ class _Search:
 
     def _first(self) -> float:
         beam, spring = self._scene.beam, self._scene.spring
-        if self._adaptive:
-            return 1.0 / min(_FIRST_TOLERANCE * self._accuracy, _LARGEST_TOLERANCE)
         if (beam is None or spring is None) and self._scene.stop is None:
             return _UNCOUPLED  # exact but for IDA
         of_spring = 0.0 if spring is None else spring_frequency(self._scene)
@@ -226,43 +222,48 @@ class _Search:
         waves = min(shear_frequency(beam), fastest_frequency(beam))
         if beam.alpha_b > 0.0:
             waves = min(waves, _DIES_OUT / beam.alpha_b)
-        turn = _ALONE if spring is None else _FIRST_TURN * self._accuracy ** (1.0 / 6.0)
+        turn = _ALONE
+        if spring is not None:
+            like = "jacobi" if self._scheme == "jacobi" else "hermite"
+            turn = _TURN[like] * self._accuracy ** (1.0 / _ORDERS[like])
         return self._rung(max(waves, of_spring) * self._span / turn)
 
     def _second(self, first: _Pilot) -> float:
-        if self._adaptive:
-            return 1.0 / (first.fineness * _SECOND_TOLERANCE * self._accuracy)
-        if self._scheme["scheme"] != "hermite":
+        if self._scheme not in _ORDERS:
             return _LEAST_GROWTH
-        expected = first.residual * (_AMPLIFIED if changes_of_contact(first.run) else 1.0)
-        return min(max(math.pow(expected / self._accuracy, 1.0 / _HIGHEST), _LEAST_GROWTH), _MOST_GROWTH)
+        amplified = _AMPLIFIED if self._scheme == "hermite" and changes_of_contact(first.run) else 1.0
+        growth = math.pow(amplified * first.residual / self._accuracy, 1.0 / _ORDERS[self._scheme])
+        return min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
 
     def _growth(self, estimate: _Estimate) -> float:
         """What makes the next estimate hold, with a margin, by the orders of convergence expected."""
         margin = 1.5 * _SAFETY / self._accuracy
         displacement, event = margin * estimate.expected, margin * estimate.event
-        of_displacement, of_event = (1.0, 1.0) if self._adaptive else (5.0, 3.5)
+        of_displacement, of_event = (2.0, 2.0) if self._scheme == "jacobi" else (5.0, 3.5)
         growth = max(math.pow(displacement, 1.0 / of_displacement), math.pow(event, 1.0 / of_event))
         return min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
 
     def _rung(self, steps: float) -> float:
         """Macro steps, at least these: four sizes an octave, so that any two runs have many times in common."""
-        if self._adaptive:
-            return steps
         steps = max(steps, _FEWEST)
         unit = max(2.0 ** (math.floor(math.log2(steps)) - 2), 4.0)
         return unit * math.ceil(steps / unit * (1.0 - 1e-9))
 
     # -- runs -------------------------------------------------------------------------------------------------------
 
-    def _pilot(self, fineness: float, *, undisturbed: bool = False) -> _Pilot | None:
+    def _pilot(self, steps: float, *, undisturbed: bool = False) -> _Pilot | None:
         """``None`` if it stops early, which a finer one may not. Raises RunStopped if that goes on.
 
         If it is to be ``undisturbed``, a second event stops it.
         """
-        steps = {"relative_tolerance": 1.0 / fineness} if self._adaptive else {"macro_step": self._span / fineness}
-        agreed = max(_COUPLING_SHARE * self._accuracy, _TIGHTEST)
-        tables: dict[str, dict[str, Any]] = {"coupling": {**self._scheme, **steps, "tolerance": agreed}}
+        tables: dict[str, dict[str, Any]] = {
+            "coupling": {
+                "scheme": self._scheme,
+                "degree": self._degree,
+                "macro_step": self._span / steps,
+                "tolerance": max(_COUPLING_SHARE * self._accuracy, _TIGHTEST),
+            }
+        }
         if self._scene.spring is not None:
             tolerance = min(max(_IDA_SHARE * self._accuracy, _TIGHTEST), _LOOSEST)
             tables["spring"] = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
@@ -275,27 +276,22 @@ class _Search:
             self._stopped += not isinstance(stopped.__cause__, _Disturbed)
             if self._stopped == _MOST_STOPPED:
                 raise
-        pilot = _Pilot(fineness, recorder.trajectory())
+        pilot = _Pilot(steps, recorder.trajectory())
         self._runs, self._calls, self._spent = self._runs + 1, self._calls + pilot.calls, self._spent + pilot.spent
         if pilot.run.summary["status"] == "done":
             return pilot
-        self._after_stop = _AFTER_GAIN if self._adaptive or pilot.residual > _GAIN else _AFTER_STOP
+        self._after_stop = _AFTER_GAIN[self._scheme] if pilot.residual > _GAIN else _AFTER_STOP
         return None
 
     def _estimate(self, coarse: _Pilot, fine: _Pilot) -> _Estimate:
         displacement = self._displacement(coarse.run, fine.run)
-        window = 2.0 * self._span / (len(coarse.run) if self._adaptive else coarse.fineness)
-        event, events = apart(coarse.run, fine.run, window)
+        event, events = apart(coarse.run, fine.run, 2.0 * self._span / coarse.steps)
         event /= self._span
-        ratio = fine.fineness / coarse.fineness
-        if self._adaptive:
-            order = of_event = 1.0
-        else:
-            order = _LOWEST
-            if self._scheme["scheme"] == "hermite" and fine.residual > 0.0 < coarse.residual:
-                seen = math.log(coarse.residual / fine.residual) / math.log(ratio)
-                order = min(max(seen, _LOWEST), _HIGHEST)
-            of_event = min(order, _OF_EVENTS)
+        ratio, order = fine.steps / coarse.steps, _LOWEST
+        if self._scheme in _ORDERS and fine.residual > 0.0 < coarse.residual:
+            seen = math.log(coarse.residual / fine.residual) / math.log(ratio)
+            order = min(max(seen, _LOWEST), _ORDERS[self._scheme])
+        of_event = min(order, _OF_EVENTS)
         expected, of_event = displacement / (ratio**order - 1.0), event / (ratio**of_event - 1.0)
         kinds, others = ([e.kind for e in pilot.run.events] for pilot in (coarse, fine))
         # No order holds through an event that only one of the two has.
@@ -304,20 +300,11 @@ class _Search:
 
     def _displacement(self, coarse: Trajectory, fine: Trajectory) -> float:
         """The largest difference, relative to the largest change."""
-        name, velocity = ("u_tip", "v_tip") if "u_tip" in fine.columns else ("y", "z")
+        name = "u_tip" if "u_tip" in fine.columns else "y"
         values = fine[name]
         scale = float(np.abs(values - values[0]).max()) or 1.0
-        if self._adaptive:
-            # Nowhere the same times, but many rows. Before an event the row has the velocity after it.
-            rows = np.flatnonzero(np.diff(fine.time, append=np.inf) > 0.0)
-            at = np.clip(np.searchsorted(fine.time[rows], coarse.time), 1, len(rows) - 1)
-            smooth = ~np.isin(fine.time[rows][at], [event.time for event in fine.events])
-            curve = CubicHermiteSpline(fine.time[rows], values[rows], fine[velocity][rows])
-            difference = coarse[name][smooth] - curve(coarse.time[smooth])
-        else:
-            at, rows = _common(coarse.time, fine.time)
-            difference = coarse[name][at] - values[rows]
-        return float(np.abs(difference).max(initial=0.0)) / scale
+        at, rows = _common(coarse.time, fine.time)
+        return float(np.abs(coarse[name][at] - values[rows]).max(initial=0.0)) / scale
 
 
 def _common(coarse: np.ndarray, fine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
