@@ -83,11 +83,11 @@ def taken(found: Study, H: float) -> str:
     return f"`{auto.scheme}` {auto.degree}"
 
 
-def written(name: str, lines: list[str]) -> None:
-    """Put ``lines`` into the page, in place of what stands between the marks of ``name``."""
+def written(name: str, lines: list[str], script: str = "accuracy.py") -> None:
+    """Put ``lines`` into the page, in place of what stands between the marks of ``name`` and of who writes it."""
     page = DOCS / "accuracy.md"
     text = page.read_text(encoding="utf-8")
-    begin, end = f"<!-- {name}: docs/accuracy.py -->\n", f"<!-- end of {name} -->"
+    begin, end = f"<!-- {name}: docs/{script} -->\n", f"<!-- end of {name} -->"
     new, count = re.subn(
         re.escape(begin) + ".*?" + re.escape(end), lambda _: begin + "\n".join(lines) + "\n" + end, text, flags=re.S
     )

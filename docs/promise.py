@@ -1,4 +1,4 @@
-"""What `--accuracy` costs and keeps on random scenes:  .venv/bin/python docs/promise.py [NUMBER]…   (five minutes)
+"""What `--accuracy` costs and keeps on random scenes:  .venv/bin/python docs/promise.py [NUMBER]…   (three minutes)
 
 Writes the table of docs/accuracy.md, "What the promise costs". With NUMBERs only these scenes are run, and printed.
 """
@@ -192,7 +192,7 @@ def swept(scene: Scene, most: int) -> list[Run]:
 
 
 def of_number(number: int) -> list[Kept]:
-    """Nothing if the reference finds no end of the events."""
+    """Nothing if the reference finds no end of the events, or all accuracies are refused."""
     try:
         return judged(drawn(number), number)
     except event_driven.ReferenceFailure:
@@ -206,7 +206,9 @@ def judged(scene: Scene, number: int = 0) -> list[Kept]:
     for accuracy in ACCURACIES:
         with suppress(SceneError, RunStopped):
             ours[accuracy] = promised(scene, accuracy)
-    rivals = swept(scene, max((run.calls for run in ours.values()), default=0))
+    if not ours:
+        return []
+    rivals = swept(scene, max(run.calls for run in ours.values()))
     every = [*ours.values(), *rivals]
     reference = event_driven.simulate(scene, sample_times=np.unique(np.concatenate([run.compared for run in every])))
     displacements = {run.name: displacement(run, reference) for run in every}
@@ -256,16 +258,9 @@ def named(kept: list[Kept]) -> list[str]:
     ]
 
 
-def written(lines: list[str]) -> None:
-    """Put ``lines`` into the page, between its marks."""
-    page = DOCS / "accuracy.md"
-    text = page.read_text(encoding="utf-8")
-    begin, end = "<!-- promise: docs/promise.py -->\n", "<!-- end of promise -->"
-    before, rest = text.split(begin)
-    page.write_text(before + begin + "\n".join(lines) + "\n" + end + rest.split(end)[1], encoding="utf-8")
-
-
 def main(numbers: list[int]) -> None:
+    from accuracy import written  # beside this script
+
     todo = numbers or list(range(SCENES))
     kept: list[Kept] = []
     with get_context("spawn").Pool(PROCESSES) as pool:
@@ -279,10 +274,9 @@ def main(numbers: list[int]) -> None:
             )
     lines = [*table(kept), "", *named(kept)]
     if not numbers:
-        compared = len({k.number for k in kept})
-        refused = len(ACCURACIES) * compared - len(kept)
-        unknown = f"the reference finds no end of events: {SCENES - compared}"
-        written([*lines, f"* Of {SCENES} scenes not compared, as {unknown}; accuracies refused: {refused}"])
+        missing = len(ACCURACIES) * SCENES - len(kept)
+        unknown = f"* Not compared: {missing}, that are refused or where the reference finds no end of events"
+        written("promise", [*lines, unknown], "promise.py")
     print(*lines, sep="\n")
 
 

@@ -94,7 +94,7 @@ std::array<double, HeldContact::state_length> HeldContact::state() const {
 
 void HeldContact::restore(const double* state) {
   const auto finite = [state](int i) { return std::isfinite(state[i]); };
-  // The force (2) may be past all numbers, and then the tip's next place (1) is.
+  // The force (2) may be past all numbers, and then so is the tip's next place (1).
   if (!finite(0) || !finite(3) || !finite(4) || !finite(5) || (finite(2) && !finite(1))) {
     throw std::invalid_argument("spring: a saved state has numbers that are not finite");
   }

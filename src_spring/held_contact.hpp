@@ -48,12 +48,12 @@ class HeldContact {
 
   static constexpr std::size_t state_length = 6;
   std::array<double, state_length> state() const;
-  /// @throws std::invalid_argument (state unchanged) if a number but for force() is not finite
+  /// @throws std::invalid_argument (state unchanged) if a number that force() does not decide is not finite
   void restore(const double* state);
 
  private:
   void choose(double y, double free, const Top& top);
-  void send(double force, double free);
+  void send(double force, double free);  ///< the force over the next step; where the tip goes without one
   double root(double start, double free, double yielding) const;
   double mean(double start, double end) const;
 

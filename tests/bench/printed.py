@@ -1,4 +1,4 @@
-"""Algorithm 1 as printed, each of its linear systems handed to `scipy.sparse.linalg.spsolve`.
+"""Algorithm 1 as printed, from first contact on each of its linear systems handed to `scipy.sparse.linalg.spsolve`.
 
 `springbeam.monolithic.algorithm1` gets the same numbers from one solution a step with factors made once, because (62)
 is nonlinear at the tip alone.
@@ -24,14 +24,13 @@ def simulate(scene: Scene) -> Trajectory:
 class _AsPrinted(algorithm1._Algorithm):
     def __init__(self, *arguments: object) -> None:
         super().__init__(*arguments)  # type: ignore[arg-type]
-        d, h = self.discrete, self.h
-        self.A = (4.0 * d.M + (h**2 + 2.0 * self.beam.alpha_b * h) * d.K).tocsr()
-        self.inner, self.column = self.A[:-1, :-1].tocsc(), self.A[:-1, [-1]].toarray().ravel()
-        self.at_tip = sp.csr_array(([1.0], ([d.M.shape[0] - 1], [d.M.shape[0] - 1])), shape=d.M.shape)
+        last = self.A.shape[0] - 1
+        self.inner, self.column = self.A[:-1, :-1], self.A[:-1, [-1]].toarray().ravel()
+        self.at_tip = sp.csc_array(([1.0], ([last], [last])), shape=self.A.shape)
 
     def _tip(self, q: np.ndarray, v: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
         h, x = self.h, q.copy()
-        known = self.B @ q + 4.0 * h * (self.discrete.M @ v) + 2.0 * h**2 * self.load
+        known = self._right_side(q, v)
         before = self._compliance(q[-1], stiffness)[0]
 
         def equation(w: float) -> tuple[float, float]:
@@ -40,7 +39,7 @@ class _AsPrinted(algorithm1._Algorithm):
             force, slope = self._compliance(w, stiffness)
             residual = self.A @ x - known
             residual[-1] -= h**2 * (force + before)
-            change = spla.spsolve((self.A - h**2 * slope * self.at_tip).tocsc(), residual)
+            change = spla.spsolve(self.A - h**2 * slope * self.at_tip, residual)
             x[:-1] -= change[:-1]
             return float(change[-1]), 1.0
 

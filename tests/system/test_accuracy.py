@@ -90,7 +90,7 @@ def test_it_costs_little_more_than_the_cheapest_run_of_the_sweep():
     assert [k.accuracy for k in kept] == [1e-3, 1e-4, 1e-5] * len(SCENES)
     assert not any(k.broken for k in kept)
     ratios = sorted(k.ratio for k in kept)
-    assert ratios[len(ratios) // 2] <= 3.0
+    assert sum(ratio > 3.0 for ratio in ratios) <= len(ratios) // 5
     assert ratios[-1] <= 4.0
 
 

@@ -185,9 +185,6 @@ def test_bounces_die_out_and_the_spring_stays_seated():
     assert trajectory.foundation_force.min() > -1e-9 * trajectory.foundation_force.max()
 
 
-# -- a scene pays for what it contains ------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("impact", ["inelastic", "tip"])
 def test_a_tip_that_meets_a_seated_spring_drives_it_into_the_foundation(impact):
     """The spring is pressed down and has come to rest; it and the tip leave with the restitution of the stop."""
@@ -216,6 +213,9 @@ def test_a_tip_that_meets_a_seated_spring_drives_it_into_the_foundation(impact):
         first = kinds.index("impact")
         assert kinds[first - 1 : first + 2] == ["seated", "impact", "stop_impact"]
         assert trajectory.events[first].time == trajectory.events[first + 1].time
+
+
+# -- a scene pays for what it contains ------------------------------------------------------------------------------
 
 
 def test_duffing_alone_has_the_exact_period():

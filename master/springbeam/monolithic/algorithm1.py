@@ -113,9 +113,8 @@ class _Algorithm:
         d, h, alpha = self.discrete, self.h, scene.beam.alpha_b
         self.load = scene.beam.distributed_load * d.uniform_load + scene.beam.tip_load_coefficient * d.hat_load
         self.B = (4.0 * d.M + (2.0 * alpha * h - h**2) * d.K).tocsr()
-        self.solve: Callable[[np.ndarray], np.ndarray] = spla.splu(
-            (4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()
-        ).solve
+        self.A = (4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()
+        self.solve: Callable[[np.ndarray], np.ndarray] = spla.splu(self.A).solve
         #: A⁻¹e: how (62) answers to a force at the tip.
         self.tip_response = self.solve(d.tip_vector)
         self.phi = -np.inf if scene.stop is None else scene.stop.position
@@ -237,9 +236,14 @@ class _Algorithm:
     def _first_contact(self, q: np.ndarray, v: np.ndarray, y: float, z: float) -> Event:
         return Event(self.time, "impact", y, z, float(q[-1]), float(v[-1]))
 
+    def _right_side(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Of (62), without a force on the tip."""
+        right: np.ndarray = self.B @ q + 4.0 * self.h * (self.discrete.M @ v) + 2.0 * self.h**2 * self.load
+        return right
+
     def _free_beam_step(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         h = self.h
-        new = self.solve(self.B @ q + 4.0 * h * (self.discrete.M @ v) + 2.0 * h**2 * self.load)
+        new = self.solve(self._right_side(q, v))
         self._dissipate(q, new, 0.0)
         return new, 2.0 * (new - q) / h - v
 
@@ -247,7 +251,7 @@ class _Algorithm:
         """u_tip by (62), which is nonlinear only there, and what the beam would do without a force on it."""
         h, response = self.h, self.tip_response
         before = self._compliance(q[-1], stiffness)[0]
-        known = self.solve(self.B @ q + 4.0 * h * (self.discrete.M @ v) + 2.0 * h**2 * self.load)
+        known = self.solve(self._right_side(q, v))
         known_tip = float(known[-1] + h**2 * response[-1] * before)
 
         def equation(w: float) -> tuple[float, float]:
