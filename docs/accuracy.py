@@ -83,9 +83,9 @@ def taken(found: Study, H: float) -> str:
     return f"`{auto.scheme}` {auto.degree}"
 
 
-def written(name: str, lines: list[str], script: str = "accuracy.py") -> None:
+def written(name: str, lines: list[str], script: str = "accuracy.py", page_name: str = "accuracy.md") -> None:
     """Put ``lines`` into the page, in place of what stands between the marks of ``name`` and of who writes it."""
-    page = DOCS / "accuracy.md"
+    page = DOCS / page_name
     text = page.read_text(encoding="utf-8")
     begin, end = f"<!-- {name}: docs/{script} -->\n", f"<!-- end of {name} -->"
     new, count = re.subn(

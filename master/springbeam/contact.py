@@ -10,6 +10,7 @@ from enum import Enum
 from functools import cached_property
 
 from .memory import Memory
+from .resolution import MISMATCH
 from .scene import Scene, Spring
 from .statics import tip_compliance, tip_load_deflection
 from .subsystem import Motion
@@ -104,11 +105,11 @@ class Transitions(Memory):
         What an impulse meets at the tip and at the spring top [kg]; ``None`` for an absent body.
     """
 
-    REMEMBERED = ("_fastest_impact",)
+    REMEMBERED = ("_fastest", "_fastest_impact")
 
     def __init__(self, scene: Scene, tip_mass: float | None, mass: float | None) -> None:
         self._scene, self._tip_mass, self._mass = scene, tip_mass, mass
-        self._fastest_impact = 0.0
+        self._fastest = self._fastest_impact = 0.0  #: of an end at an event, and into the foundation [m/s]
 
     def happens(
         self,
@@ -126,6 +127,7 @@ class Transitions(Memory):
         with it, ``end_force`` is C [N], ``tolerance`` what positions can be told apart to [m].
         """
         tip, low = ends
+        self._fastest = max(self._fastest, abs(tip.velocity), abs(low.velocity))
         if kind == "impact":
             return kind, *self._meet(phase, tip, low, tolerance)
         if kind == "stop_impact":
@@ -202,8 +204,13 @@ class Transitions(Memory):
         return "stop_impact", phase, foundation_impact(*striking, restitution=e)
 
     def _part(self, opened: Phase, tip: Motion, low: Motion) -> Impact:
-        """A tie that opens while its ends still close (the energy scheme lets velocities differ): they meet first."""
-        closing = tip.velocity - low.velocity
-        if self._mass is None or self._tip_mass is None or closing >= 0.0 or opened.seated:
+        """Ends that a tie lets go have one velocity; where a scheme has let theirs differ, they take that first.
+
+        Unless they part by so much that it is no error but a vibration that the macro step does not follow.
+        """
+        parting = tip.velocity - low.velocity
+        if self._mass is None or self._tip_mass is None or opened.seated or parting == 0.0:
+            return Impact()
+        if parting > MISMATCH * self._fastest:
             return Impact()
         return meeting("inelastic", tip.velocity, low.velocity, self._tip_mass, self._mass)

@@ -57,6 +57,11 @@ class Detector:
         """What positions can be told apart to [m]."""
         return position_tolerance(ends, self._level, self._steps.size)
 
+    def passed_at_once(self, ends: Ends) -> float:
+        """The same, or what the ends pass in no time [m]: an event there is at once with what is there."""
+        speed = max(abs(end.velocity) for end in ends)
+        return self.tolerance(ends) + _NO_TIME * self._steps.size * speed
+
     def _rest(self, ends: Ends) -> float:
         """Speed below which ends do not move against each other [m/s].
 

@@ -8,6 +8,8 @@ from .memory import Memory
 
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
 _SHORT_REMAINDER = 0.25
+#: The first step after an impact, as a fraction of H: ends that have just met often part or meet again within H.
+_AFTER_IMPACT = 0.125
 #: Times closer than this fraction of H are one.
 _SAME = 1e-9
 
@@ -22,16 +24,21 @@ _SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
 class MacroGrid(Memory):
     """The grid t₀ + k H up to t_end [s]."""
 
-    REMEMBERED = ("_index",)
+    REMEMBERED = ("_index", "_struck")
 
     def __init__(self, start: float, end: float, macro_step: float) -> None:
         self._start, self._end = start, end
         self.size = macro_step  #: H [s]
         self._index = 0
+        self._struck = False
 
     def next(self, time: float) -> tuple[float, float]:
         """The time at which the step from ``time`` should end, and its size (exactly H where it is a whole one)."""
         H = self.size
+        if self._struck:
+            self._struck = False
+            if time + _AFTER_IMPACT * H < self._end:
+                return time + _AFTER_IMPACT * H, _AFTER_IMPACT * H
         target = self._start + (self._index + 1) * H
         size = target - time
         on_grid = abs(size - H) <= _SAME * H
@@ -49,6 +56,10 @@ class MacroGrid(Memory):
         latest = time + _SAME * H
         while start + (self._index + 1) * H <= latest:
             self._index += 1
+
+    def struck(self) -> None:
+        """An impact has just changed velocities."""
+        self._struck = True
 
 
 class AdaptiveSteps(Memory):
@@ -84,6 +95,9 @@ class AdaptiveSteps(Memory):
 
     def reached(self, time: float) -> None:
         """Events shift what follows."""
+
+    def struck(self) -> None:
+        """Error estimates tell by themselves."""
 
     def judge(self, size: float, error: float, order: int) -> bool:
         """Whether a step of ``size`` [s] with ``error`` (1 is the tolerance) holds; `size` is then that of the next.

@@ -17,7 +17,7 @@ from .contact import Joint, Phase, Transitions
 from .coupling.fixed_point import Diverged
 from .coupling.tie import NotConverged
 from .detection import Detector
-from .events import interpolated
+from .events import cubic_crossing, gap, interpolated
 from .ledger import Ledger, bounds
 from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
@@ -248,9 +248,12 @@ class Simulation(Memory):
         if kind == "impact":
             state.reclosed = state.time - self._last_opening <= _AT_ONCE * self._steps.size
         ends = pair.ends()
+        tolerance = self._detector.passed_at_once(ends) if kind == "impact" else self._detector.tolerance(ends)
         kind, phase, impact = self._transitions.happens(
-            kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), self._detector.tolerance(ends)
+            kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
         )
+        if kind in ("impact", "stop_impact"):
+            self._steps.struck()
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.massless_tip(phase)
         self._ledger.impact_loss += lost
@@ -274,12 +277,15 @@ class Simulation(Memory):
 
     def _note_contact(self, step: Step) -> None:
         """Compliance: opening and closing are nothing special, they are told from the step that crossed."""
-        before, after = (tip.displacement - low.displacement for tip, low in (step.start, step.end))
-        touching = after < 0.0
+        before, after = gap(step.start), gap(step.end)
+        touching = after[0] < 0.0
         self._state.phase = Phase(Joint.TOUCH if touching else Joint.FREE, self._state.phase.seated)
-        if (before < 0.0) == touching:
+        if (before[0] < 0.0) == touching:
             return
-        at = step.size * before / (before - after)
+        if touching:
+            at = 0.0 if before[0] == 0.0 else cubic_crossing(before, after, step.size)
+        else:  # backwards in time it closes
+            at = step.size - cubic_crossing((after[0], -after[1]), (before[0], -before[1]), step.size)
         ends = [interpolated(step.start[i], step.end[i], step.size, at) for i in (1, 0)]
         self._events += 1
         values = [x for end in ends for x in end]

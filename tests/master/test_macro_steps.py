@@ -1,7 +1,8 @@
-"""Where macro steps end, by themselves: the adaptive sizes, and what they are chosen by."""
+"""Where macro steps end, by themselves: the grid, the adaptive sizes, and what they are chosen by."""
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import log2
 
 import numpy as np
@@ -13,7 +14,7 @@ from springbeam.coupling.energy import created_mismatch
 from springbeam.coupling.hermite import gap_inside
 from springbeam.coupling.tie import Tie
 from springbeam.local_error import _beside_cubic
-from springbeam.macro_steps import AdaptiveSteps, StepTooShort
+from springbeam.macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from springbeam.subsystem import NO_FORCE, Motion
 
 LENGTH = 3.0
@@ -27,6 +28,22 @@ def after(steps: AdaptiveSteps, *judgements: tuple[float, int]) -> float:
     for error, order in judgements:
         assert steps.judge(steps.size, error, order) == (error <= 1.0)
     return steps.size
+
+
+def test_the_step_after_an_impact_is_short_and_the_next_one_back_on_the_grid():
+    H = 0.1
+    grid = MacroGrid(1.0, 2.0, H)
+    for struck, ends in [(1.0, (1.0125, 1.1)), (1.15, (1.1625, 1.2)), (1.28, (1.2925, 1.4)), (1.495, (1.5075, 1.6))]:
+        grid.reached(struck)
+        grid.struck()
+        for start, end in pairwise((struck, *ends)):
+            target, size = grid.next(start)
+            assert target == pytest.approx(end, abs=1e-12)
+            assert size == pytest.approx(end - start, abs=1e-12)
+            grid.reached(target)
+    grid.reached(1.99)
+    grid.struck()
+    assert grid.next(1.99) == (2.0, 2.0 - 1.99)
 
 
 def test_sizes_are_few_and_change_by_bounded_factors():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import simulate
+from scipy.interpolate import CubicHermiteSpline
 
 from springbeam.monolithic import event_driven
 from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
@@ -54,6 +55,19 @@ def test_hermite_has_the_events_of_the_reference(changes):
         assert a.time == pytest.approx(b.time, abs=1e-7)
         assert (a.z, a.v_tip) == pytest.approx((b.z, b.v_tip), abs=1e-6)
         assert a.energy_loss == pytest.approx(b.energy_loss, abs=1e-7)
+
+
+@pytest.mark.parametrize("macro_step", [5e-4, 4e-3])
+def test_contacts_of_the_compliance_law_begin_and_end_where_the_cubic_of_their_step_does(macro_step):
+    law = {"law": "compliance", "stiffness": 2e3, "exponent": 1.5}
+    run = simulate(soft(contact=law, coupling={"scheme": "energy", "degree": 0, "macro_step": macro_step}))
+    gap = CubicHermiteSpline(run.time, run.u_tip - run.y, run.v_tip - run.z)
+    changes = [e for e in run.events if e.kind in ("impact", "separation")]
+    assert [e.kind for e in changes] == ["impact", "separation", "impact"]
+    for event in changes:
+        assert abs(gap(event.time)) <= 1e-13
+        assert event.u_tip == pytest.approx(event.y, abs=1e-13)
+        assert (gap(event.time, 1) < 0.0) == (event.kind == "impact")
 
 
 def scene_of(size: float, scheme: str, degree: int, stop: dict | None = None, *, beam: dict, spring: dict) -> Scene:
