@@ -3,20 +3,22 @@
 The error is that of the coupling and the time integration, for the scene's own mesh and modes: these are the model.
 (Impacts on the foundation converge only slowly with the mesh, since what they meet is the mass of its tip.)
 
-Two runs are compared: if the finer one has ρ times the steps and its error is of order p, that error is the
-difference over ρᵖ − 1. `hermite`, and `jacobi` with law "compliance", tell p themselves: their energy residual is an
-error of the same order, summed up over the run, so ρᵖ is the ratio of the two residuals. The first run has the macro
-step that the fastest waves at the tip ask for, the second what the residual of the first lets expect, a third what the
-difference of these two does; each agrees with the one before or gives way to a finer one (``docs/accuracy.md``).
+Two runs are compared: if the finer one is q times as accurate, its error is their difference over q − 1. With equal
+macro steps, ρ times as many, q is ρᵖ; `hermite` tells p itself: its energy residual is an error of the same order,
+summed up over the run, so ρᵖ is the ratio of the two residuals. With steps from a tolerance the error follows that
+(law "compliance", whose contacts are short beside the flights between them). A first run is as fine as the fastest
+waves at the tip or the accuracy ask for, each one after it as fine as those before let expect, until two agree
+(``docs/accuracy.md``).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from .automatic import choice
 from .contact_times import apart, changes_of_contact
@@ -26,37 +28,42 @@ from .resolution import fastest_frequency, shear_frequency
 from .runner import RunStopped, run
 from .scene import Scene, SceneError, scene_from_dict, with_changes
 from .statics import tip_compliance
-from .trajectory import Event, Trajectory
+from .trajectory import Trajectory
 
-#: Fewest macro steps where bodies are coupled and where not, and the largest number tried; pilot runs in a row that
-#: may stop early.
-_FEWEST, _UNCOUPLED, _MOST, _MOST_STOPPED = 8, 4, 50_000, 6
-#: Growth of the number of macro steps from run to run: at least, at most, after a run that gained energy, and after
-#: one that stopped for another reason, which may be gone at the next size.
-_LEAST_GROWTH, _MOST_GROWTH = 1.2, 4.0
-_AFTER_GAIN, _AFTER_STOP = {"energy": 1.4, "hermite": 1.4, "jacobi": 2.0}, 1.01
-#: Energy residual above which it was too large a macro step that stopped a run.
-_GAIN = 0.05
+#: Most macro steps of a run; pilot runs in a row that may stop early.
+_MOST, _MOST_STOPPED = 50_000, 6
 #: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
 #: Runs that differ by more are both unresolved, whatever their order [of the motion].
 _UNRESOLVED = 0.02
 #: By how much the finer one of two runs of different events is trusted to be better.
 _DOUBTED = 30.0
-#: Orders of the error, by the schemes whose energy residual has the same; the lowest that is relied on, and the highest
-#: of the time of an event.
-_ORDERS = {"hermite": 6.0, "jacobi": 2.0}
-_LOWEST, _OF_EVENTS = 1.0, 3.0
+#: The coupling's and IDA's tolerance over the accuracy, and the bounds of the latter.
+_COUPLING_SHARE, _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-4, 1e-12, 1e-8
+
+# Equal macro steps.
+#: Fewest, where bodies are coupled and where not.
+_FEWEST, _UNCOUPLED = 8, 4
+#: Growth of their number from run to run: at least, at most, after a run that gained energy, and after one that
+#: stopped for another reason, which may be gone at the next size.
+_LEAST_GROWTH, _MOST_GROWTH, _AFTER_GAIN, _AFTER_STOP = 1.2, 4.0, 1.4, 1.01
+#: Energy residual above which it was too large a macro step that stopped a run.
+_GAIN = 0.05
+#: Order of the error of `hermite`; the lowest that is relied on, and the highest of the time of an event.
+_ORDER, _LOWEST, _OF_EVENTS = 6.0, 1.0, 2.5
 #: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a body alone by;
-#: and the part of a mode's retardation time within which it dies out and needs no resolution.
-_TURN = {"hermite": 26.0, "jacobi": 150.0}
-_ALONE, _DIES_OUT = 2.0, 0.3
+#: and ω α_b above which waves die out within two periods and need no resolution.
+_TURN, _ALONE, _DIES_OUT = 26.0, 2.0, 0.15
 #: Displacement error over energy residual of `hermite`, in runs with changes of contact after the first.
 _AMPLIFIED = 10.0
 #: doStep calls per macro step of a run that pays for its events rather than its steps: more steps cost hardly more.
 _CALLS_PER_STEP = 8.0
-#: The coupling's and IDA's tolerance over the accuracy, and the bounds of the latter.
-_COUPLING_SHARE, _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-4, 1e-12, 1e-8
+
+# Steps from a tolerance.
+#: Tolerance of the first run over the accuracy; how much finer the second is, one after a stop, and any other.
+_LOOSE, _FINER, _FINER_AFTER_STOP, _FINER_LEAST, _FINER_MOST = 5.0, 15.0, 10.0, 5.0, 30.0
+#: The number of steps goes as this power of 1/tolerance.
+_STEPS_PER_TOLERANCE = 0.5
 
 
 @dataclass(frozen=True)
@@ -84,7 +91,11 @@ class Picked:
     def summary(self) -> dict[str, Any]:
         """As it goes into ``summary.json``."""
         coupling, spring = self.scene.coupling, self.scene.spring
-        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree, "macro_step": coupling.H}
+        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree}
+        if coupling.adaptive:
+            picked["relative_tolerance"] = coupling.relative_tolerance
+        else:
+            picked["macro_step"] = coupling.H
         if spring is not None:
             picked["ida_relative_tolerance"] = spring.relative_tolerance
         return {
@@ -118,14 +129,18 @@ def pick(scene: Scene) -> Picked:
 
 @dataclass(frozen=True)
 class _Pilot:
-    """A run, and its macro steps where no event cuts them."""
+    """A run, and how fine it is: its macro steps where no event cuts them, or 1/tolerance."""
 
-    steps: float
+    fineness: float
     run: Trajectory
 
     @property
     def residual(self) -> float:
         return float(self.run.summary["max_energy_residual"])
+
+    @property
+    def macro_steps(self) -> int:
+        return int(self.run.summary["macro_steps"])
 
     @property
     def calls(self) -> int:
@@ -136,6 +151,11 @@ class _Pilot:
     def spent(self) -> float:
         """[s]"""
         return float(self.run.summary["wall_time"])
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Of the tip, without a beam of the spring top [m]."""
+        return self.run["u_tip" if "u_tip" in self.run.columns else "y"]
 
 
 @dataclass(frozen=True)
@@ -149,17 +169,136 @@ class _Estimate:
     apart: float  #: by how much the two differ in the larger of both
 
 
-class _Disturbed(Exception):
-    """There is more than the first event."""
+class _Way(Protocol):
+    """How runs are made finer."""
+
+    def first(self) -> float:
+        """How fine the first run is."""
+
+    def coupling(self, fineness: float) -> dict[str, Any]:
+        """Keys of ``[coupling]`` for a run so fine."""
+
+    def second(self, first: _Pilot) -> float:
+        """How fine the second run is."""
+
+    def next(self, fine: _Pilot, estimate: _Estimate) -> float:
+        """How fine a run is whose estimate, after ``estimate``, is expected to hold."""
+
+    def after_stop(self, stopped: _Pilot) -> float:
+        """How fine the run after one that has stopped early is."""
+
+    def steps(self, fineness: float, last: _Pilot | None) -> float:
+        """How many macro steps a run so fine is expected to take."""
+
+    def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
+        """How many times as accurate ``fine`` is, in displacements and in times of events."""
+
+    def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
+        """Of the displacements [m], where they are compared."""
 
 
-class _UndisturbedRecorder(MemoryRecorder):
-    """Of a run that has but one event. Raises _Disturbed."""
+class _EqualSteps:
+    """Fineness is the number of macro steps."""
 
-    def event(self, event: Event) -> None:
-        if self._events:
-            raise _Disturbed
-        super().event(event)
+    def __init__(self, scene: Scene, accuracy: float, span: float) -> None:
+        self._scene, self._accuracy, self._span = scene, accuracy, span
+        fine = with_changes(scene, coupling={"macro_step": 1e-9 * span})
+        taken = choice(fine)  # of schemes, the one where everything is resolved
+        self._scheme, self._degree = taken.scheme, taken.degree
+
+    def first(self) -> float:
+        beam, spring = self._scene.beam, self._scene.spring
+        if (beam is None or spring is None) and self._scene.stop is None:
+            return _UNCOUPLED  # exact but for IDA
+        of_spring = 0.0 if spring is None else spring_frequency(self._scene)
+        if beam is None:
+            return _rung(of_spring * self._span / _ALONE)
+        if beam.fidelity == "quasi_static":
+            assert spring is not None
+            return _rung(math.hypot(of_spring, 1.0 / math.sqrt(tip_compliance(beam) * spring.mass)) * self._span)
+        waves = min(shear_frequency(beam), fastest_frequency(beam))
+        if beam.alpha_b > 0.0:
+            waves = min(waves, _DIES_OUT / beam.alpha_b)
+        turn = _ALONE if spring is None else _TURN * self._accuracy ** (1.0 / _ORDER)
+        return _rung(max(waves, of_spring) * self._span / turn)
+
+    def coupling(self, fineness: float) -> dict[str, Any]:
+        return {"scheme": self._scheme, "degree": self._degree, "macro_step": self._span / fineness}
+
+    def second(self, first: _Pilot) -> float:
+        growth = _LEAST_GROWTH
+        if self._scheme == "hermite":
+            amplified = _AMPLIFIED if changes_of_contact(first.run) else 1.0
+            growth = math.pow(amplified * first.residual / self._accuracy, 1.0 / _ORDER)
+        return self._grown(first, growth)
+
+    def next(self, fine: _Pilot, estimate: _Estimate) -> float:
+        margin = 1.5 * _SAFETY / self._accuracy
+        return self._grown(
+            fine, max(math.pow(margin * estimate.expected, 0.2), math.pow(margin * estimate.event, 1.0 / 3.5))
+        )
+
+    def after_stop(self, stopped: _Pilot) -> float:
+        return _rung(stopped.fineness * (_AFTER_GAIN if stopped.residual > _GAIN else _AFTER_STOP))
+
+    def steps(self, fineness: float, last: _Pilot | None) -> float:
+        return fineness
+
+    def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
+        ratio, order = fine.fineness / coarse.fineness, _LOWEST
+        if self._scheme == "hermite" and fine.residual > 0.0 < coarse.residual:
+            seen = math.log(coarse.residual / fine.residual) / math.log(ratio)
+            order = min(max(seen, _LOWEST), _ORDER)
+        return ratio**order, ratio ** min(order, _OF_EVENTS)
+
+    def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
+        """At the times that are rows of both, but for rounding."""
+        times, wanted = fine.run.time, coarse.run.time
+        index = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
+        index -= np.abs(times[index - 1] - wanted) < np.abs(times[index] - wanted)
+        common = np.abs(times[index] - wanted) <= 1e-9 * self._span
+        return np.asarray(coarse.displacement[common] - fine.displacement[index[common]])
+
+    def _grown(self, last: _Pilot, growth: float) -> float:
+        return _rung(max(last.fineness * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH), last.calls / _CALLS_PER_STEP))
+
+
+class _Tolerances:
+    """Fineness is 1/tolerance, of scheme `energy` 0 with steps from that tolerance, where no velocity ever jumps."""
+
+    def __init__(self, accuracy: float) -> None:
+        self._accuracy = accuracy
+
+    def first(self) -> float:
+        return 1.0 / (_LOOSE * self._accuracy)
+
+    def coupling(self, fineness: float) -> dict[str, Any]:
+        return {"scheme": "energy", "degree": 0, "relative_tolerance": 1.0 / fineness}
+
+    def second(self, first: _Pilot) -> float:
+        return _FINER * first.fineness
+
+    def next(self, fine: _Pilot, estimate: _Estimate) -> float:
+        wanted = _SAFETY * max(estimate.expected, estimate.event) / self._accuracy
+        return fine.fineness * min(max(math.pow(wanted, 1.2), _FINER_LEAST), _FINER_MOST)
+
+    def after_stop(self, stopped: _Pilot) -> float:
+        return _FINER_AFTER_STOP * stopped.fineness
+
+    def steps(self, fineness: float, last: _Pilot | None) -> float:
+        if last is None:
+            return 0.0
+        return float(last.macro_steps * (fineness / last.fineness) ** _STEPS_PER_TOLERANCE)
+
+    def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
+        ratio = fine.fineness / coarse.fineness
+        return ratio, ratio
+
+    def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
+        """At all rows of the coarser run, between those of the finer one by its velocity."""
+        times, rows = np.unique(fine.run.time, return_index=True)
+        between = CubicHermiteSpline(times, fine.displacement[rows], fine.run.v_tip[rows])
+        return np.asarray(coarse.displacement - between(coarse.run.time))
 
 
 class _Search:
@@ -167,26 +306,24 @@ class _Search:
         data = scene.model_dump(exclude={"accuracy"}, exclude_none=True)
         self._scene, self._accuracy = scene_from_dict(data), accuracy
         self._span = scene.time.t_end - (scene.contact_time or 0.0)
-        fine = with_changes(self._scene, coupling={"macro_step": 1e-9 * self._span})
-        taken = choice(fine)  # of schemes, the one where everything is resolved
-        self._scheme, self._degree = taken.scheme, taken.degree
-        exchanged = scene.contact.law == "compliance" and scene.coupling.feedback == "two_way"
-        if exchanged and scene.spring is not None and scene.beam is not None and scene.beam.integrator == "modal":
-            self._scheme, self._degree = "jacobi", 1  # as accurate as `energy`, for half the calls
-        self._runs, self._calls, self._spent, self._stopped, self._after_stop = 0, 0, 0.0, 0, 1.0
+        compliant = scene.contact.law == "compliance" and scene.coupling.feedback == "two_way"
+        self._way: _Way
+        if compliant and scene.spring is not None and scene.beam is not None and scene.beam.integrator == "modal":
+            self._way = _Tolerances(accuracy)
+        else:
+            self._way = _EqualSteps(self._scene, accuracy, self._span)
+        self._runs, self._calls, self._spent, self._stopped = 0, 0, 0.0, 0
 
     def run(self) -> Picked:
-        steps, coarse, estimate = self._first(), None, None
-        if self._scene.spring is not None and self._scheme == "hermite" and steps >= 2.0 * _FEWEST:
-            coarse = self._pilot(_FEWEST, undisturbed=True)
-            if coarse is not None:
-                steps = self._rung(_FEWEST * self._second(coarse))
-        while steps <= _MOST:
-            fine = self._pilot(steps)
-            if fine is None:
-                growth = self._after_stop
-            elif coarse is None:
-                growth, coarse = self._second(fine), fine
+        way, coarse, estimate = self._way, None, None
+        fineness = way.first()
+        while way.steps(fineness, coarse) <= _MOST:
+            fine = self._pilot(fineness)
+            if fine.run.summary["status"] != "done":
+                fineness = way.after_stop(fine)
+                continue
+            if coarse is None:
+                fineness = way.second(fine)
             else:
                 estimate = self._estimate(coarse, fine)
                 worst = _SAFETY * max(estimate.displacement, estimate.event)
@@ -195,11 +332,10 @@ class _Search:
                         self._accuracy, fine.run, estimate.displacement, estimate.event, estimate.events,
                         self._runs - 1, self._calls - fine.calls, self._spent - fine.spent,
                     )  # fmt: skip
-                growth, coarse = self._growth(estimate), fine
-            least = 0.0 if fine is None else fine.calls / _CALLS_PER_STEP
-            steps = self._rung(max(steps * growth, least))
+                fineness = way.next(fine, estimate)
+            coarse = fine
         if estimate is None:
-            found = f"the fastest waves of its mesh take some {steps:.1g}"
+            found = f"the fastest waves of its mesh take some {fineness:.1g}"
         else:
             found = f"runs still differ by {estimate.apart:.1e}"
         raise SceneError(
@@ -207,109 +343,46 @@ class _Search:
             "t_end, or take a coarser mesh"
         )
 
-    # -- how fine ---------------------------------------------------------------------------------------------------
-
-    def _first(self) -> float:
-        beam, spring = self._scene.beam, self._scene.spring
-        if (beam is None or spring is None) and self._scene.stop is None:
-            return _UNCOUPLED  # exact but for IDA
-        of_spring = 0.0 if spring is None else spring_frequency(self._scene)
-        if beam is None:
-            return self._rung(of_spring * self._span / _ALONE)
-        if beam.fidelity == "quasi_static":
-            assert spring is not None
-            return self._rung(math.hypot(of_spring, 1.0 / math.sqrt(tip_compliance(beam) * spring.mass)) * self._span)
-        waves = min(shear_frequency(beam), fastest_frequency(beam))
-        if beam.alpha_b > 0.0:
-            waves = min(waves, _DIES_OUT / beam.alpha_b)
-        turn = _ALONE
-        if spring is not None:
-            like = "jacobi" if self._scheme == "jacobi" else "hermite"
-            turn = _TURN[like] * self._accuracy ** (1.0 / _ORDERS[like])
-        return self._rung(max(waves, of_spring) * self._span / turn)
-
-    def _second(self, first: _Pilot) -> float:
-        if self._scheme not in _ORDERS:
-            return _LEAST_GROWTH
-        amplified = _AMPLIFIED if self._scheme == "hermite" and changes_of_contact(first.run) else 1.0
-        growth = math.pow(amplified * first.residual / self._accuracy, 1.0 / _ORDERS[self._scheme])
-        return min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
-
-    def _growth(self, estimate: _Estimate) -> float:
-        """What makes the next estimate hold, with a margin, by the orders of convergence expected."""
-        margin = 1.5 * _SAFETY / self._accuracy
-        displacement, event = margin * estimate.expected, margin * estimate.event
-        of_displacement, of_event = (2.0, 2.0) if self._scheme == "jacobi" else (5.0, 3.5)
-        growth = max(math.pow(displacement, 1.0 / of_displacement), math.pow(event, 1.0 / of_event))
-        return min(max(growth, _LEAST_GROWTH), _MOST_GROWTH)
-
-    def _rung(self, steps: float) -> float:
-        """Macro steps, at least these: four sizes an octave, so that any two runs have many times in common."""
-        steps = max(steps, _FEWEST)
-        unit = max(2.0 ** (math.floor(math.log2(steps)) - 2), 4.0)
-        return unit * math.ceil(steps / unit * (1.0 - 1e-9))
-
-    # -- runs -------------------------------------------------------------------------------------------------------
-
-    def _pilot(self, steps: float, *, undisturbed: bool = False) -> _Pilot | None:
-        """``None`` if it stops early, which a finer one may not. Raises RunStopped if that goes on.
-
-        If it is to be ``undisturbed``, a second event stops it.
-        """
-        tables: dict[str, dict[str, Any]] = {
-            "coupling": {
-                "scheme": self._scheme,
-                "degree": self._degree,
-                "macro_step": self._span / steps,
-                "tolerance": max(_COUPLING_SHARE * self._accuracy, _TIGHTEST),
-            }
+    def _pilot(self, fineness: float) -> _Pilot:
+        """It may stop early, which a finer one may not. Raises RunStopped if that goes on."""
+        coupling = {
+            **self._way.coupling(fineness),
+            "tolerance": max(_COUPLING_SHARE * self._accuracy, _TIGHTEST),
         }
+        tables: dict[str, dict[str, Any]] = {"coupling": coupling}
         if self._scene.spring is not None:
             tolerance = min(max(_IDA_SHARE * self._accuracy, _TIGHTEST), _LOOSEST)
             tables["spring"] = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
         scene = with_changes(self._scene, **tables)
-        recorder = _UndisturbedRecorder(scene) if undisturbed else MemoryRecorder(scene)
+        recorder = MemoryRecorder(scene)
         try:
             run(scene, recorder)
             self._stopped = 0
-        except RunStopped as stopped:
-            self._stopped += not isinstance(stopped.__cause__, _Disturbed)
+        except RunStopped:
+            self._stopped += 1
             if self._stopped == _MOST_STOPPED:
                 raise
-        pilot = _Pilot(steps, recorder.trajectory())
+        pilot = _Pilot(fineness, recorder.trajectory())
         self._runs, self._calls, self._spent = self._runs + 1, self._calls + pilot.calls, self._spent + pilot.spent
-        if pilot.run.summary["status"] == "done":
-            return pilot
-        self._after_stop = _AFTER_GAIN[self._scheme] if pilot.residual > _GAIN else _AFTER_STOP
-        return None
+        return pilot
 
     def _estimate(self, coarse: _Pilot, fine: _Pilot) -> _Estimate:
-        displacement = self._displacement(coarse.run, fine.run)
-        event, events = apart(coarse.run, fine.run, 2.0 * self._span / coarse.steps)
+        values = fine.displacement
+        scale = float(np.abs(values - values[0]).max()) or 1.0
+        displacement = float(np.abs(self._way.difference(coarse, fine)).max(initial=0.0)) / scale
+        step = coarse.run.scene.coupling.macro_step or self._span / coarse.macro_steps
+        event, events = apart(coarse.run, fine.run, 2.0 * step)
         event /= self._span
-        ratio, order = fine.steps / coarse.steps, _LOWEST
-        if self._scheme in _ORDERS and fine.residual > 0.0 < coarse.residual:
-            seen = math.log(coarse.residual / fine.residual) / math.log(ratio)
-            order = min(max(seen, _LOWEST), _ORDERS[self._scheme])
-        of_event = min(order, _OF_EVENTS)
-        expected, of_event = displacement / (ratio**order - 1.0), event / (ratio**of_event - 1.0)
+        better, of_event = self._way.better(coarse, fine)
+        expected = displacement / (better - 1.0)
         kinds, others = ([e.kind for e in pilot.run.events] for pilot in (coarse, fine))
         # No order holds through an event that only one of the two has.
         doubted = expected if kinds == others else max(expected, displacement / _DOUBTED)
-        return _Estimate(doubted, expected, of_event, events, max(displacement, event))
-
-    def _displacement(self, coarse: Trajectory, fine: Trajectory) -> float:
-        """The largest difference, relative to the largest change."""
-        name = "u_tip" if "u_tip" in fine.columns else "y"
-        values = fine[name]
-        scale = float(np.abs(values - values[0]).max()) or 1.0
-        at, rows = _common(coarse.time, fine.time)
-        return float(np.abs(coarse[name][at] - values[rows]).max(initial=0.0)) / scale
+        return _Estimate(doubted, expected, event / (of_event - 1.0), events, max(displacement, event))
 
 
-def _common(coarse: np.ndarray, fine: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of both at the same time, but for rounding."""
-    index = np.clip(np.searchsorted(fine, coarse), 1, len(fine) - 1)
-    index -= np.abs(fine[index - 1] - coarse) < np.abs(fine[index] - coarse)
-    close = np.abs(fine[index] - coarse) <= 1e-9 * float(fine[-1] - fine[0])
-    return np.flatnonzero(close), index[close]
+def _rung(steps: float) -> float:
+    """Macro steps, at least these: four sizes an octave, so that any two runs have many times in common."""
+    steps = max(steps, _FEWEST)
+    unit = max(2.0 ** (math.floor(math.log2(steps)) - 2), 4.0)
+    return unit * math.ceil(steps / unit * (1.0 - 1e-9))
