@@ -76,7 +76,9 @@ def picture(errors: dict[tuple[str, int], np.ndarray], path: Path) -> None:
         k = list(PHASES).index(phase)
         for ((scheme, degree), values), marker in zip(errors.items(), "os^dv", strict=True):
             ax.loglog(STEPS, values[:, k, 0], marker=marker, label=f"{scheme} {degree}")
-        ax.set(title=phase, xlabel="macro step H [s]")
+        ax.set(title=phase, xlabel="macro step H [ms]")
+        ax.set_xticks(STEPS, [f"{1e3 * H:g}" for H in STEPS])
+        ax.minorticks_off()
         ax.grid(visible=True, alpha=0.3)
     axes[0].set_ylabel("largest error of y [m]")
     axes[0].legend()

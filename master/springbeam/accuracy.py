@@ -53,7 +53,7 @@ _GAIN = 0.05
 _ORDER, _LOWEST, _OF_EVENTS = 6.0, 1.0, 2.5
 #: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a body alone by;
 #: and ω α_b above which waves die out within two periods and need no resolution.
-_TURN, _ALONE, _DIES_OUT = 26.0, 2.0, 0.15
+_TURN, _ALONE, _DIES_OUT = 26.0, 4.0, 0.15
 #: Displacement error over energy residual of `hermite`, in runs with changes of contact after the first.
 _AMPLIFIED = 10.0
 #: doStep calls per macro step of a run that pays for its events rather than its steps: more steps cost hardly more.

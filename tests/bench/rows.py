@@ -297,8 +297,8 @@ def master(effort: Effort) -> Iterator[Row]:
             outside.append(1e6 * (seconds / steps - of_fmus))
         name = f"`soft` tied, {scheme} {degree}, H = {H:g}"
         for body, goal in (("beam", 2), ("spring", 3)):
-            # A first step measures what is remembered from then on.
-            per_step = (summary[f"{body}_steps"] - degree - 1) / summary["macro_steps"]
+            # The first steps of each size, H/8 after the impact, what is left of H, and H, measure what is remembered.
+            per_step = (summary[f"{body}_steps"] - 3 * (degree + 1)) / summary["macro_steps"]
             yield Row("4", f"{name}: {body} doSteps per macro step", f"≤ {goal}", f"{per_step:.3f}", per_step <= goal)
         yield Row(
             "4",
@@ -459,10 +459,9 @@ def long_run(effort: Effort) -> Iterator[Row]:
         program = [sys.executable, str(HERE / "long_run.py"), *arguments]
         output = subprocess.run(program, stdout=subprocess.PIPE, text=True, check=True).stdout
     marks, _ = json.loads(output)
-    resident, clock = np.array(marks).T
-    per_step = np.diff(clock) / (steps // 10)
+    resident, per_step = np.array(marks).T
     growth = float(resident[-1] - resident[0]) / 1e6
-    change = float(per_step[-1] / per_step[0])
+    change = float(per_step[-1] / per_step[1])
     yield Row(
         "7",
         f"`soft` with losses, {steps:.0e} macro steps into files: memory",
@@ -472,7 +471,7 @@ def long_run(effort: Effort) -> Iterator[Row]:
     )
     yield Row(
         "7",
-        "the same: time per step, last tenth over second tenth",
+        "the same: time of a tied step, last tenth over second tenth",
         "constant",
         f"{change:.2f} ({min(per_step) * 1e6:.0f} – {max(per_step) * 1e6:.0f} µs)",
         0.8 < change < 1.2,
@@ -482,7 +481,7 @@ def long_run(effort: Effort) -> Iterator[Row]:
 # -- 8: what an accuracy costs ----------------------------------------------------------------------------------------
 
 #: Ours: macro steps, and tolerances of the coupling and of IDA; the force is quadratic.
-STEPS = (3, 4, 6, 8, 12, 16, 20, 24, 28, 32, 40)
+STEPS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 28, 32, 40)
 TOLERANCES = ((1e-4, 1e-3), (1e-5, 1e-3), (1e-6, 1e-4), (1e-8, 1e-8))
 RIVALS = {"DOP853": (1e-1, 1e-2, 1e-3, 1e-4), "LSODA": (1e-2, 1e-3), "Radau": (1e-2,)}
 #: A method so many times dearer than the cheapest is not tried on the finer mesh.

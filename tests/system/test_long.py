@@ -24,7 +24,7 @@ H = 2e-3
 
 SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": H}, time={"t_end": STEPS * H})
 SCENES = {
-    # Meets, bounces, is released and hits the foundation for ever; everything takes a little energy.
+    # Meets, bounces, is released and hits the foundation; everything takes a little energy, until the ends stay joined.
     "lossy": with_changes(
         SOFT, beam={"alpha_b": 1e-6}, spring={"damping": 1e-3}, stop={"restitution": 0.999}
     ),
@@ -32,7 +32,7 @@ SCENES = {
     "conservative": with_changes(SOFT, beam={"distributed_load": -4.0, "initial_velocity_slope": 0.0}, stop=None),
 }  # fmt: skip
 
-#: Prints, for every tenth of the steps, memory in use [bytes] and the clock [s]; then the summary.
+#: Prints, for every tenth of the steps, memory in use [bytes] and the mean time of a tied step [s]; then the summary.
 RUN = Path(__file__).parents[1] / "bench" / "long_run.py"
 
 
@@ -43,8 +43,7 @@ def test_a_long_run(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str
     arguments = [json.dumps(scene.model_dump(exclude_none=True)), str(directory), str(STEPS)]
     output = subprocess.run([sys.executable, str(RUN), *arguments], stdout=subprocess.PIPE, text=True, check=True)
     marks, summary = json.loads(output.stdout)
-    resident, clock = np.array(marks).T
-    per_step = np.diff(clock) / (STEPS // 10)
+    resident, per_step = np.array(marks).T
 
     time = np.loadtxt(directory / "trajectory.csv", delimiter=",", skiprows=1, usecols=0)
     events = list(load_events(directory))
@@ -54,7 +53,7 @@ def test_a_long_run(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str
         print(
             f"\n{name}: {summary['macro_steps']} steps, {len(events)} events, energy residual "
             f"{summary['max_energy_residual']:.1e}; memory {resident[0] / 1e6:.1f} to {resident[-1] / 1e6:.1f} MB; "
-            f"per step {1e6 * per_step[0]:.0f} µs in the second tenth, {1e6 * per_step[-1]:.0f} µs in the last"
+            f"a tied step {1e6 * per_step[1]:.0f} µs in the second tenth, {1e6 * per_step[-1]:.0f} µs in the last"
         )
     assert summary["status"] == "done"
     assert len(events) > STEPS // 1000
