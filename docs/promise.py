@@ -1,4 +1,4 @@
-"""What `--accuracy` costs and keeps on random scenes:  .venv/bin/python docs/promise.py [NUMBER]…   (three minutes)
+"""What `--accuracy` costs and keeps on random scenes:  .venv/bin/python docs/promise.py [NUMBER]…   (seven minutes)
 
 Writes the table of docs/accuracy.md, "What the promise costs". With NUMBERs only these scenes are run, and printed.
 """

@@ -51,9 +51,9 @@ _LEAST_GROWTH, _MOST_GROWTH, _AFTER_GAIN, _AFTER_STOP = 1.2, 4.0, 1.4, 1.01
 _GAIN = 0.05
 #: Order of the error of `hermite`; the lowest that is relied on, and the highest of the time of an event.
 _ORDER, _LOWEST, _OF_EVENTS = 6.0, 1.0, 2.5
-#: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a body alone by;
-#: and ω α_b above which waves die out within two periods and need no resolution.
-_TURN, _ALONE, _DIES_OUT = 26.0, 4.0, 0.15
+#: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a beam and a spring
+#: alone by; and ω α_b above which waves die out within two periods and need no resolution.
+_TURN, _BEAM_ALONE, _SPRING_ALONE, _DIES_OUT = 26.0, 2.0, 4.0, 0.15
 #: Displacement error over energy residual of `hermite`, in runs with changes of contact after the first.
 _AMPLIFIED = 10.0
 #: doStep calls per macro step of a run that pays for its events rather than its steps: more steps cost hardly more.
@@ -212,14 +212,14 @@ class _EqualSteps:
             return _UNCOUPLED  # exact but for IDA
         of_spring = 0.0 if spring is None else spring_frequency(self._scene)
         if beam is None:
-            return _rung(of_spring * self._span / _ALONE)
+            return _rung(of_spring * self._span / _SPRING_ALONE)
         if beam.fidelity == "quasi_static":
             assert spring is not None
             return _rung(math.hypot(of_spring, 1.0 / math.sqrt(tip_compliance(beam) * spring.mass)) * self._span)
         waves = min(shear_frequency(beam), fastest_frequency(beam))
         if beam.alpha_b > 0.0:
             waves = min(waves, _DIES_OUT / beam.alpha_b)
-        turn = _ALONE if spring is None else _TURN * self._accuracy ** (1.0 / _ORDER)
+        turn = _BEAM_ALONE if spring is None else _TURN * self._accuracy ** (1.0 / _ORDER)
         return _rung(max(waves, of_spring) * self._span / turn)
 
     def coupling(self, fineness: float) -> dict[str, Any]:
