@@ -51,6 +51,8 @@ _LEAST_GROWTH, _MOST_GROWTH, _AFTER_GAIN, _AFTER_STOP = 1.2, 4.0, 1.4, 1.01
 _GAIN = 0.05
 #: Order of the error of `hermite`; the lowest that is relied on, and the highest of the time of an event.
 _ORDER, _LOWEST, _OF_EVENTS = 6.0, 1.0, 2.5
+#: Orders by which a third run and any after it are made finer, and how much smaller its estimate is to be.
+_EXPECTED, _EXPECTED_OF_EVENTS, _MARGIN = 5.0, 3.5, 1.5
 #: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a beam and a spring
 #: alone by; and ω α_b above which waves die out within two periods and need no resolution.
 _TURN, _BEAM_ALONE, _SPRING_ALONE, _DIES_OUT = 26.0, 2.0, 4.0, 0.15
@@ -233,10 +235,9 @@ class _EqualSteps:
         return self._grown(first, growth)
 
     def next(self, fine: _Pilot, estimate: _Estimate) -> float:
-        margin = 1.5 * _SAFETY / self._accuracy
-        return self._grown(
-            fine, max(math.pow(margin * estimate.expected, 0.2), math.pow(margin * estimate.event, 1.0 / 3.5))
-        )
+        margin = _MARGIN * _SAFETY / self._accuracy
+        displacement = math.pow(margin * estimate.expected, 1.0 / _EXPECTED)
+        return self._grown(fine, max(displacement, math.pow(margin * estimate.event, 1.0 / _EXPECTED_OF_EVENTS)))
 
     def after_stop(self, stopped: _Pilot) -> float:
         return _rung(stopped.fineness * (_AFTER_GAIN if stopped.residual > _GAIN else _AFTER_STOP))
@@ -335,7 +336,7 @@ class _Search:
                 fineness = way.next(fine, estimate)
             coarse = fine
         if estimate is None:
-            found = f"the fastest waves of its mesh take some {fineness:.1g}"
+            found = f"a run that may do takes some {way.steps(fineness, coarse):.1g}"
         else:
             found = f"runs still differ by {estimate.apart:.1e}"
         raise SceneError(

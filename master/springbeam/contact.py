@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -105,11 +106,11 @@ class Transitions(Memory):
         What an impulse meets at the tip and at the spring top [kg]; ``None`` for an absent body.
     """
 
-    REMEMBERED = ("_fastest", "_fastest_impact")
+    REMEMBERED = ("_fastest_impact",)
 
-    def __init__(self, scene: Scene, tip_mass: float | None, mass: float | None) -> None:
-        self._scene, self._tip_mass, self._mass = scene, tip_mass, mass
-        self._fastest = self._fastest_impact = 0.0  #: of an end at an event, and into the foundation [m/s]
+    def __init__(self, scene: Scene, tip_mass: float | None, mass: float | None, fastest: Callable[[], float]) -> None:
+        self._scene, self._tip_mass, self._mass, self._fastest = scene, tip_mass, mass, fastest
+        self._fastest_impact = 0.0
 
     def happens(
         self,
@@ -127,7 +128,6 @@ class Transitions(Memory):
         with it, ``end_force`` is C [N], ``tolerance`` what positions can be told apart to [m].
         """
         tip, low = ends
-        self._fastest = max(self._fastest, abs(tip.velocity), abs(low.velocity))
         if kind == "impact":
             return kind, *self._meet(phase, tip, low, tolerance)
         if kind == "stop_impact":
@@ -211,6 +211,6 @@ class Transitions(Memory):
         parting = tip.velocity - low.velocity
         if self._mass is None or self._tip_mass is None or opened.seated or parting == 0.0:
             return Impact()
-        if parting > MISMATCH * self._fastest:
+        if parting > MISMATCH * self._fastest():
             return Impact()
         return meeting("inelastic", tip.velocity, low.velocity, self._tip_mass, self._mass)

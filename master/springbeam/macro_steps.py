@@ -37,8 +37,9 @@ class MacroGrid(Memory):
         H = self.size
         if self._struck:
             self._struck = False
-            if time + _AFTER_IMPACT * H < self._end:
-                return time + _AFTER_IMPACT * H, _AFTER_IMPACT * H
+            size = _AFTER_IMPACT * H
+            if time + size < self._end:
+                return time + size, size
         target = self._start + (self._index + 1) * H
         size = target - time
         on_grid = abs(size - H) <= _SAME * H

@@ -112,9 +112,9 @@ class Simulation(Memory):
         else:
             self._steps = MacroGrid(start_time, scene.time.t_end, scene.coupling.H)
         self._error = LocalError(scene, self._pair) if scene.coupling.adaptive else None
-        self._detector = Detector(scene, self._pair, self._steps, lambda: self._rows.largest_speed)
+        self._detector = Detector(scene, self._pair, self._steps, self._fastest)
         self._transitions = Transitions(
-            scene, None if beam is None else beam.mass, None if spring is None else spring.mass
+            scene, None if beam is None else beam.mass, None if spring is None else spring.mass, self._fastest
         )
         self._ledger = Ledger()
         self._energy_warns, self._energy_stops = bounds(scene)
@@ -141,6 +141,10 @@ class Simulation(Memory):
     def time(self) -> float:
         """Reached so far [s]."""
         return self._state.time
+
+    def _fastest(self) -> float:
+        """The largest speed of an end so far [m/s]."""
+        return self._rows.largest_speed
 
     def _run(self) -> None:
         state, steps, t_end = self._state, self._steps, self._scene.time.t_end
