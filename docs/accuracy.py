@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 from PIL import Image
 
 from springbeam import load_scene, with_changes
-from springbeam.automatic import choice
-from springbeam.tradeoff import Point, Study, study
-from springbeam.tradeoff.picture import draw
+from springbeam.scene.automatic import choice
+from springbeam.studies.tradeoff import Point, Study, study
+from springbeam.studies.tradeoff.picture import draw
 
 DOCS = Path(__file__).parent
 _COLOURS = 64  #: of a picture: a fifth of its size

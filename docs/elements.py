@@ -16,7 +16,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from springbeam import Scene, load_scene, simulate, with_changes
-from springbeam.fmu import FmuBeam
+from springbeam.bodies.fmu_bodies import FmuBeam
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
 

@@ -16,8 +16,8 @@ from matplotlib.lines import Line2D
 from scipy.sparse.linalg import splu
 
 from springbeam import Scene, Trajectory, load_scene, simulate, with_changes
-from springbeam.drawing import BLACK, BLUE, GREEN, VERMILLION, decimated
 from springbeam.monolithic import algorithm1, event_driven, semi_discrete
+from springbeam.pictures.drawing import BLACK, BLUE, GREEN, VERMILLION, decimated
 
 IMAGES = Path(__file__).resolve().parent / "images"
 FIGURES = (2, 3, 4, 5)

@@ -16,23 +16,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springbeam import simulate, with_changes
-from springbeam.accuracy import pick
-from springbeam.contact_times import apart
 from springbeam.monolithic import event_driven
-from springbeam.resolution import fastest_frequency, slowest_frequency
-from springbeam.runner import RunStopped
+from springbeam.results.contact_times import apart
+from springbeam.results.trajectory import Trajectory
+from springbeam.run.outcome import RunStopped
 from springbeam.scene import Beam, Scene, SceneError, scene_from_dict
-from springbeam.statics import tip_compliance, tip_inertia
-from springbeam.tradeoff import comparable_until
-from springbeam.tradeoff.configurations import configurations
-from springbeam.tradeoff.errors import errors
-from springbeam.trajectory import Trajectory
+from springbeam.scene.resolution import fastest_frequency, slowest_frequency
+from springbeam.scene.statics import tip_compliance, tip_inertia
+from springbeam.studies.accuracy import pick
+from springbeam.studies.tradeoff import comparable_until
+from springbeam.studies.tradeoff.configurations import configurations
+from springbeam.studies.tradeoff.errors import errors
 
 DOCS = Path(__file__).parent
 ACCURACIES = (1e-3, 1e-4, 1e-5)
 KINDS = ("pair", "damped pair", "pair of few modes", "pair with stop", "beam on stop", "law compliance", "spring")
 #: Families of the sweep that make the runs of others, for as many calls or more.
-REPEATED = {"auto", "fixed_point 0", "aitken 0"}
+REPEATED = {"auto"}
 #: What a promise may cost, and how many that cost more are named.
 MOST, DEAREST = 3.0, 8
 PROCESSES = 2

@@ -6,9 +6,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .runner import RunStopped, resume, simulate
+    from .api import simulate
+    from .results.trajectory import Event, Trajectory
+    from .run.outcome import RunStopped
+    from .run.runner import resume
     from .scene import Scene, SceneError, load_scene, with_changes
-    from .trajectory import Event, Trajectory
 
 __all__ = [
     "Event",
@@ -23,14 +25,14 @@ __all__ = [
 ]
 
 _HOME = {
-    "Event": "trajectory",
-    "RunStopped": "runner",
+    "Event": "results.trajectory",
+    "RunStopped": "run.outcome",
     "Scene": "scene",
     "SceneError": "scene",
-    "Trajectory": "trajectory",
+    "Trajectory": "results.trajectory",
     "load_scene": "scene",
-    "resume": "runner",
-    "simulate": "runner",
+    "resume": "run.runner",
+    "simulate": "api",
     "with_changes": "scene",
 }
 

@@ -8,8 +8,8 @@ import os
 import sys
 from time import perf_counter
 
-from springbeam.recording import FileRecorder, RunDirectory
-from springbeam.runner import run
+from springbeam.results.recording import FileRecorder, RunDirectory
+from springbeam.run.runner import run
 from springbeam.scene import scene_from_dict
 
 

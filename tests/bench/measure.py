@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import process_time
 
-from springbeam import runner
 from springbeam.monolithic import algorithm1, event_driven
+from springbeam.run import runner
 
 
 class _Clock:

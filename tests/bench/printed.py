@@ -11,8 +11,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from springbeam.monolithic import algorithm1
+from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene
-from springbeam.trajectory import Trajectory
 
 
 def simulate(scene: Scene) -> Trajectory:

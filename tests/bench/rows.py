@@ -24,13 +24,14 @@ import sweeps
 from measure import Times, compare, median_and_spread, timed
 from scipy.interpolate import CubicHermiteSpline
 
-from springbeam import fmu, load_scene, simulate, with_changes
+from springbeam import load_scene, simulate, with_changes
+from springbeam.bodies import fmu
 from springbeam.monolithic import algorithm1, event_driven
 from springbeam.monolithic.semi_discrete import assemble
-from springbeam.recording import MemoryRecorder
+from springbeam.results.recording import MemoryRecorder
+from springbeam.results.trajectory import Trajectory
+from springbeam.run.simulation import Simulation
 from springbeam.scene import Scene
-from springbeam.simulation import Simulation
-from springbeam.trajectory import Trajectory
 
 HERE = Path(__file__).parent
 PROGRAMS = HERE.parents[1] / "build" / "tests" / "bench"

@@ -15,8 +15,9 @@ from typing import Any
 
 from measure import timed
 
-from springbeam import load_scene, sweep, with_changes
-from springbeam.sweep.design import design, parse_axis
+from springbeam import load_scene, with_changes
+from springbeam.studies import sweep
+from springbeam.studies.sweep.design import design, parse_axis
 
 #: End of the runs [s] and how many.
 SIZES = ((0.6, 12), (0.02, 120))

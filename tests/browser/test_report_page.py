@@ -17,9 +17,9 @@ import pytest
 from typer.testing import CliRunner
 
 from springbeam.cli import app
-from springbeam.recording import REPORT, load_trajectory
+from springbeam.results.recording import REPORT, load_trajectory
+from springbeam.results.trajectory import Trajectory
 from springbeam.scene import shipped_scenes
-from springbeam.trajectory import Trajectory
 
 pytestmark = pytest.mark.browser
 

@@ -11,8 +11,9 @@ from zipfile import ZipFile, ZipInfo
 import pytest
 from typer.testing import CliRunner
 
-from springbeam import archive, cli
-from springbeam.archive import UnsafeArchive, unpack
+from springbeam import cli
+from springbeam.bodies import archive
+from springbeam.bodies.archive import UnsafeArchive, unpack
 
 
 def named(name: str) -> ZipInfo:

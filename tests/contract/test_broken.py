@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 import springbeam
-from springbeam.fmu import FmuError, load_bodies
+from springbeam.bodies.factory import load_bodies
+from springbeam.bodies.fmu import FmuError
 
 Files = dict[str, bytes]
 XML = "modelDescription.xml"

@@ -16,11 +16,13 @@ from math import factorial
 import numpy as np
 from scipy.linalg import eigh, expm
 
-from springbeam.recording import MemoryRecorder
+from springbeam.bodies.protocol import NO_FORCE, Energies, Force, Motion
+from springbeam.results.recording import MemoryRecorder
+from springbeam.results.trajectory import Trajectory
+from springbeam.run.outcome import RunStopped
+from springbeam.run.simulation import Simulation
 from springbeam.scene import Beam, Scene
-from springbeam.simulation import RunStopped, Simulation
-from springbeam.subsystem import NO_FORCE, Energies, Force, Motion
-from springbeam.trajectory import SHAPE_POINTS, Trajectory
+from springbeam.scene.statics import SHAPE_POINTS
 
 _EPS = float(np.finfo(float).eps)
 

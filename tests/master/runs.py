@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from springbeam.recording import columns_of
+from springbeam.results.recording import columns_of
+from springbeam.results.trajectory import EVENT_KINDS, Event, Trajectory
 from springbeam.scene import load_scene
-from springbeam.trajectory import EVENT_KINDS, SHAPE_POINTS, Event, Trajectory
+from springbeam.scene.statics import SHAPE_POINTS
 
 PAIR = load_scene("soft")
 

@@ -13,11 +13,12 @@ from PIL import Image
 from runs import PAIR, a_trajectory
 from typer.testing import CliRunner
 
-from springbeam import animation, cli
-from springbeam.animation import AnimationError, animate
-from springbeam.drawing import NOT_RESOLVED
-from springbeam.motion import motion_of
-from springbeam.recording import FileRecorder, RunDirectory
+from springbeam import cli
+from springbeam.pictures import animation
+from springbeam.pictures.animation import AnimationError, animate
+from springbeam.pictures.drawing import NOT_RESOLVED
+from springbeam.pictures.motion import motion_of
+from springbeam.results.recording import FileRecorder, RunDirectory
 from springbeam.scene import with_changes
 
 SCENES = {

@@ -9,13 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 from springbeam import SceneError, load_scene, simulate, with_changes
-from springbeam.automatic import STABLE, choice, decided
 from springbeam.cli import app
-from springbeam.linearised import spring_frequency
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.resolution import mesh_frequency, slowest_frequency
 from springbeam.scene import Beam
-from springbeam.stability.linear import LinearBody, LinearPair, spectral_radius
+from springbeam.scene.automatic import STABLE, choice, decided
+from springbeam.scene.linearised import spring_frequency
+from springbeam.scene.resolution import mesh_frequency, slowest_frequency
+from springbeam.studies.stability.linear import LinearBody, LinearPair, spectral_radius
 
 PAIR = load_scene("soft")
 

@@ -17,14 +17,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import springbeam.runner
+import springbeam.run.runner
 from springbeam import cli
+from springbeam.bodies.fmu import FmuError
 from springbeam.cli import common
-from springbeam.fmu import FmuError
-from springbeam.recording import PICTURES, load_trajectory
-from springbeam.runner import RunStopped
+from springbeam.results.recording import PICTURES, load_trajectory
+from springbeam.results.trajectory import Event
+from springbeam.run.outcome import RunStopped
 from springbeam.scene import shipped_scenes
-from springbeam.trajectory import Event
 
 SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
 
@@ -46,7 +46,7 @@ def fake_run(scene, recorder, progress=None, **checkpoints):
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(springbeam.runner, "run", fake_run)
+    monkeypatch.setattr(springbeam.run.runner, "run", fake_run)
     for name in ("COLUMNS", "TERMINAL_WIDTH", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS"):
         monkeypatch.delenv(name, raising=False)
     return tmp_path
@@ -69,7 +69,7 @@ def replace_run(monkeypatch, error, after=fake_run):
             after(scene, Stop(), progress)
         raise error
 
-    monkeypatch.setattr(springbeam.runner, "run", run)
+    monkeypatch.setattr(springbeam.run.runner, "run", run)
 
 
 # -- a run that ends well -----------------------------------------------------------------------------------------
@@ -95,7 +95,7 @@ def test_what_rounding_leaves_of_a_zero_is_shown_as_0(here, monkeypatch):
         recorder.event(Event(0.2, "release", -1.355e-20, 0.25, 0.0, 0.25))
         fake_run(scene, recorder)
 
-    monkeypatch.setattr(springbeam.runner, "run", released)
+    monkeypatch.setattr(springbeam.run.runner, "run", released)
     (event,) = [line for line in springbeam_command("run", "soft").stdout.splitlines() if line.startswith("release")]
     assert event.split() == ["release", "0.20000000", "0", "0.25"]
 
@@ -148,7 +148,7 @@ def test_report_fits_80_columns_and_says_how_many_events_are_not_shown(here, mon
             recorder.event(Event(123.456789 + i, "stop_impact", -1.2345e-5, -1.234e-5, 0.1, 0.1, -1.234e-7, 1e-9, 1e-9))
         fake_run(scene, recorder)
 
-    monkeypatch.setattr(springbeam.runner, "run", many)
+    monkeypatch.setattr(springbeam.run.runner, "run", many)
     result = springbeam_command("run", "soft", "--no-plots")
     lines = result.stdout.splitlines()
     assert max(map(len, lines)) <= 80
@@ -163,7 +163,7 @@ def test_warnings_are_shown_as_they_are(here, monkeypatch):
         fake_run(scene, recorder)
         recorder.finish({**SUMMARY, "warnings": ["[beam] is [bold]coarse[/bold]"]})
 
-    monkeypatch.setattr(springbeam.runner, "run", warned)
+    monkeypatch.setattr(springbeam.run.runner, "run", warned)
     assert "warning   [beam] is [bold]coarse[/bold]" in springbeam_command("run", "soft", "--no-plots").stdout
 
 
@@ -223,7 +223,7 @@ def test_a_value_that_is_not_finite_stops_the_run(here, monkeypatch):
         fake_run(scene, recorder)
         recorder.row(dict.fromkeys(recorder.columns, float("nan")) | {"time": 0.7, "phase": "free"})
 
-    monkeypatch.setattr(springbeam.runner, "run", run)
+    monkeypatch.setattr(springbeam.run.runner, "run", run)
     result = springbeam_command("run", "soft", "--no-plots")
     assert result.exit_code == 3
     assert "u_tip = nan at t = 0.7 s" in result.stderr
@@ -239,7 +239,7 @@ def test_an_unforeseen_error_is_not_hidden(here, monkeypatch):
 
 SLOW = """
 import sys, time
-import springbeam.runner
+import springbeam.run.runner
 from springbeam import cli
 
 def run(scene, recorder, progress=None, **checkpoints):
@@ -252,7 +252,7 @@ def run(scene, recorder, progress=None, **checkpoints):
             print("going", flush=True)
         time.sleep(1e-3)
 
-springbeam.runner.run = run
+springbeam.run.runner.run = run
 sys.argv[0] = "springbeam"
 cli.main()
 """

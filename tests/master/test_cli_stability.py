@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from springbeam.cli import app
 from springbeam.scene import load_scene, with_changes
-from springbeam.stability.predict import predict
+from springbeam.studies.stability.predict import predict
 
 COARSE = ["--set", "beam.n_elements=10"]
 

@@ -7,8 +7,8 @@ import pytest
 from bodies import DuffingBody, drift, modal_beam, orders
 from scipy.integrate import quad
 
+from springbeam.bodies.protocol import NO_FORCE, Motion
 from springbeam.coupling.compliance import Compliance, compliance_energy, compliance_force, discrete_gradient
-from springbeam.subsystem import NO_FORCE, Motion
 
 EPS = float(np.finfo(float).eps)
 PAIRS = [(0.0, 1e-3), (1e-3, 0.0), (1e-3, -2e-3), (-1e-3, 5e-4), (1e-3, 1.05e-3), (1e-3, 1.2e-3), (-1e-3, -2e-3)]

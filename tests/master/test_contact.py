@@ -5,10 +5,19 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
+from springbeam.contact.phases.phases import (
+    Impact,
+    Joint,
+    Phase,
+    Transitions,
+    foundation_impact,
+    meeting,
+    rebound,
+    spring_force,
+)
 
-from springbeam.contact import Impact, Joint, Phase, Transitions, foundation_impact, meeting, rebound, spring_force
+from springbeam.bodies.protocol import Motion
 from springbeam.scene import Spring, load_scene
-from springbeam.subsystem import Motion
 
 MASSES = [(0.25, 1.0), (1.0, 0.01), (3.0, 100.0)]
 VELOCITIES = [(-1.0, 0.0), (-0.2, 0.7), (0.1, 0.3)]

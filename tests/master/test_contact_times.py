@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from springbeam.contact_times import apart, changes_of_contact
+from springbeam.results.contact_times import apart, changes_of_contact
+from springbeam.results.trajectory import Event, Trajectory
 from springbeam.scene import scene_from_dict
-from springbeam.trajectory import Event, Trajectory
 
 SCENE = scene_from_dict(
     {"time": {"t_end": 1.0}, "beam": {"initial_velocity_slope": -1.0}, "spring": {}, "stop": {"position": -0.1}}

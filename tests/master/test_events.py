@@ -7,9 +7,7 @@ import math
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
-
-from springbeam.contact import Joint, Phase, common_velocity
-from springbeam.events import (
+from springbeam.contact.phases.events import (
     EventFunctions,
     Sample,
     cubic_crossing,
@@ -19,8 +17,10 @@ from springbeam.events import (
     lowest_inside,
     stays_above,
 )
+from springbeam.contact.phases.phases import Joint, Phase, common_velocity
+
+from springbeam.bodies.protocol import Motion
 from springbeam.scene import load_scene
-from springbeam.subsystem import Motion
 
 SIZE = 0.02
 #: Coefficients in x = τ/H, ascending.

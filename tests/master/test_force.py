@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Legendre, Polynomial
 
-from springbeam.coupling import force
+from springbeam.bodies import force
 
 EPS = float(np.finfo(float).eps)
 #: Of degree 0, 1 and 2, with coefficients of both signs.

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from bodies import DuffingBody
 
-from springbeam.coupling import conditions, force
+from springbeam.bodies import force
+from springbeam.bodies.protocol import NO_FORCE, Motion
+from springbeam.coupling import conditions
 from springbeam.coupling.energy import created_mismatch
 from springbeam.coupling.hermite import gap_inside
 from springbeam.coupling.tie import Tie
-from springbeam.local_error import _beside_cubic
-from springbeam.macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
-from springbeam.subsystem import NO_FORCE, Motion
+from springbeam.run.local_error import _beside_cubic
+from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 
 LENGTH = 3.0
 

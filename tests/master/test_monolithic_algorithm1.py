@@ -9,8 +9,8 @@ import pytest
 
 from springbeam.monolithic.algorithm1 import AlgorithmFailure, simulate
 from springbeam.monolithic.semi_discrete import assemble
+from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene, load_scene, with_changes
-from springbeam.trajectory import Trajectory
 
 
 def figure(number: int) -> Scene:

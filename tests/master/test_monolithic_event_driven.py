@@ -12,8 +12,8 @@ from scipy.special import ellipj, ellipk
 from springbeam.monolithic.event_driven import ReferenceFailure, simulate
 from springbeam.monolithic.hybrid_system import HybridSystem, Phase
 from springbeam.monolithic.semi_discrete import assemble
+from springbeam.results.trajectory import COLUMNS, EVENT_KINDS, Trajectory
 from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
-from springbeam.trajectory import COLUMNS, EVENT_KINDS, Trajectory
 
 
 def soft(n_elements: int = 10, **tables: dict[str, Any]) -> Scene:

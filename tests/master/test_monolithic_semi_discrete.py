@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam
-from springbeam.trajectory import SHAPE_POINTS
+from springbeam.scene.statics import SHAPE_POINTS
 
 
 def beam(bending: float = 1.0, shear: float = 1.0, **changes: object) -> Beam:

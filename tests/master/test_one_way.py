@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from bodies import modal_beam, simulate
 
-from springbeam import statics
+from springbeam.bodies.protocol import Held
 from springbeam.coupling.compliance import Compliance, discrete_gradient
 from springbeam.coupling.one_way import OneWay
-from springbeam.scene import Beam, Scene, SceneError, load_scene, with_changes
-from springbeam.simulation import RunStopped
-from springbeam.subsystem import Held
+from springbeam.run.outcome import RunStopped
+from springbeam.scene import Beam, Scene, SceneError, load_scene, statics, with_changes
 
 LAW = (100.0, 1.0)
 

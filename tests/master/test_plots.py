@@ -13,8 +13,8 @@ from hypothesis.extra import numpy as npst
 from matplotlib.image import imread
 from runs import EVERY_EVENT, PAIR, a_trajectory
 
-from springbeam import plots
-from springbeam.drawing import (
+from springbeam.pictures import plots
+from springbeam.pictures.drawing import (
     EVENT_LOOKS,
     NOT_RESOLVED,
     PIXEL_COLUMNS,
@@ -23,10 +23,11 @@ from springbeam.drawing import (
     phase_intervals,
     readable_unit,
 )
-from springbeam.plots import plot_run
-from springbeam.recording import PICTURES, columns_of
+from springbeam.pictures.plots import plot_run
+from springbeam.results.recording import PICTURES, columns_of
+from springbeam.results.trajectory import Event
 from springbeam.scene import with_changes
-from springbeam.trajectory import SHAPE_POINTS, Event
+from springbeam.scene.statics import SHAPE_POINTS
 
 A, B, C, D, E = PICTURES
 

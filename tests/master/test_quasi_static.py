@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, orders
 from scipy.sparse.linalg import spsolve
+from springbeam.contact.phases.phases import Joint, Phase, meeting
 
-from springbeam import statics
-from springbeam.contact import Joint, Phase, meeting
-from springbeam.crosscheck import contact_changes
+from springbeam.bodies.protocol import NO_FORCE
+from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble
-from springbeam.quasi_static import QuasiStaticBeam
-from springbeam.recording import MemoryRecorder
-from springbeam.scene import Beam, Scene, SceneError, scene_from_dict, suspicions
-from springbeam.simulation import Simulation
-from springbeam.stepping import Pair
-from springbeam.subsystem import NO_FORCE
-from springbeam.trajectory import SHAPE_POINTS, Trajectory
+from springbeam.results.recording import MemoryRecorder
+from springbeam.results.trajectory import Trajectory
+from springbeam.run.simulation import Simulation
+from springbeam.run.stepping import Pair
+from springbeam.scene import Beam, Scene, SceneError, scene_from_dict, statics, suspicions
+from springbeam.scene.statics import SHAPE_POINTS
+from springbeam.studies.crosscheck import contact_changes
 
 BEAM = Beam(
     density=2.0, area=0.5, second_moment_of_area=0.3, young_modulus=30.0, shear_modulus=50.0, shear_coefficient=0.8,

@@ -17,7 +17,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springbeam.recording import (
+from springbeam.results.recording import (
     PICTURES,
     FileRecorder,
     MemoryRecorder,
@@ -31,8 +31,8 @@ from springbeam.recording import (
     load_summary,
     load_trajectory,
 )
+from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, Event
 from springbeam.scene import load_scene, with_changes
-from springbeam.trajectory import COLUMNS, EVENT_COLUMNS, Event
 
 PAIR = load_scene("soft")
 BEAM_AND_STOP = with_changes(PAIR, spring=None)

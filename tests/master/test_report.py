@@ -15,12 +15,13 @@ from runs import EVERY_EVENT, PAIR, a_trajectory
 from typer.testing import CliRunner
 
 from springbeam import cli
-from springbeam.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS, readable_unit
-from springbeam.motion import COIL_HEIGHTS, MOST_FRAMES, motion_of
-from springbeam.recording import REPORT, FileRecorder, RunDirectory
-from springbeam.report import page, shipped_command
+from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS, readable_unit
+from springbeam.pictures.motion import COIL_HEIGHTS, MOST_FRAMES, motion_of
+from springbeam.pictures.report import page, shipped_command
+from springbeam.results.recording import REPORT, FileRecorder, RunDirectory
+from springbeam.results.trajectory import Event
 from springbeam.scene import load_scene, scene_from_dict, shipped_scenes, with_changes
-from springbeam.trajectory import SHAPE_POINTS, Event
+from springbeam.scene.statics import SHAPE_POINTS
 
 if sys.version_info >= (3, 11):
     import tomllib

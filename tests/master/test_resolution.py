@@ -7,8 +7,8 @@ import pytest
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.resolution import MISMATCH, fastest_frequency, modes_below, not_resolved, slowest_frequency
 from springbeam.scene import scene_from_dict, shipped_scenes
+from springbeam.scene.resolution import MISMATCH, fastest_frequency, modes_below, not_resolved, slowest_frequency
 
 BEAMS = [name for name in shipped_scenes() if load_scene(name).beam is not None]
 PAIR = load_scene("soft")

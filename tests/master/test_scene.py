@@ -9,15 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springbeam.scene import (
-    Scene,
-    SceneError,
-    load_scene,
-    scene_from_dict,
-    shipped_scenes,
-    suspicions,
-    with_changes,
-)
+from springbeam.scene import Scene, SceneError, load_scene, scene_from_dict, shipped_scenes, suspicions, with_changes
 
 PAIR = """
 [time]

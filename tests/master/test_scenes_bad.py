@@ -13,7 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from springbeam import cli
-from springbeam.scene import LONGEST_FILE, load_scene
+from springbeam.scene import load_scene
+from springbeam.scene.reading import LONGEST_FILE
 
 FOLDER = Path(__file__).parents[1] / "scenes_bad"
 SCENES = sorted(FOLDER.glob("*.toml"))

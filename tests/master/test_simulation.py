@@ -10,10 +10,10 @@ import pytest
 from bodies import simulate
 from scipy.interpolate import CubicHermiteSpline
 
+from springbeam.bodies.protocol import StepRefused
 from springbeam.monolithic import event_driven
+from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
-from springbeam.subsystem import StepRefused
-from springbeam.trajectory import Trajectory
 
 
 def soft(n: int = 6, **tables: dict[str, Any]) -> Scene:

@@ -9,16 +9,22 @@ import pytest
 from bodies import DuffingBody, ModalBody, modal_beam
 from scipy.linalg import expm
 
+from springbeam.bodies.protocol import NO_FORCE
 from springbeam.coupling import conditions
 from springbeam.coupling.compliance import Compliance
 from springbeam.coupling.exchange import Exchange
 from springbeam.coupling.tie import Tie
 from springbeam.scene import load_scene, with_changes
-from springbeam.stability import two_mass
-from springbeam.stability.critical import Preloaded
-from springbeam.stability.linear import LinearBody, LinearPair, amplification, impulse_integrals, spectral_radius
-from springbeam.stability.predict import THRESHOLD, critical_step, predict
-from springbeam.subsystem import NO_FORCE
+from springbeam.studies.stability import two_mass
+from springbeam.studies.stability.critical import Preloaded
+from springbeam.studies.stability.linear import (
+    LinearBody,
+    LinearPair,
+    amplification,
+    impulse_integrals,
+    spectral_radius,
+)
+from springbeam.studies.stability.predict import THRESHOLD, critical_step, predict
 
 TIES = [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
 EXCHANGES = [("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]

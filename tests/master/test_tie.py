@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, ModalBody, drift, modal_beam, orders
 
-from springbeam.coupling import conditions, force
+from springbeam.bodies import force
+from springbeam.bodies.protocol import NO_FORCE, Force, Motion, StepRefused
+from springbeam.coupling import conditions
 from springbeam.coupling.tie import NotConverged, Tie
-from springbeam.subsystem import NO_FORCE, Force, Motion, StepRefused
 
 SCHEMES = [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
 

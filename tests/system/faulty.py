@@ -15,10 +15,10 @@ from typing import Any
 import fmpy.fmi1
 import pytest
 
-from springbeam import detection, simulation
-from springbeam.paper_law import PaperLaw
-from springbeam.rows import Rows
-from springbeam.stepping import Pair
+from springbeam.run import detection, simulation
+from springbeam.run.paper_law import PaperLaw
+from springbeam.run.rows import Rows
+from springbeam.run.stepping import Pair
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 NAMES = {"Discard": DISCARD, "Error": ERROR, "Fatal": FATAL}

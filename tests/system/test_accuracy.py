@@ -13,8 +13,8 @@ from typer.testing import CliRunner
 
 from springbeam.cli import app
 from springbeam.monolithic import event_driven
-from springbeam.recording import MemoryRecorder, load_trajectory
-from springbeam.runner import run, simulate
+from springbeam.results.recording import MemoryRecorder, load_trajectory
+from springbeam.run.runner import run, simulate
 from springbeam.scene import SceneError, scene_from_dict
 
 _PROMISE = importlib.util.spec_from_file_location("promise", Path(__file__).parents[2] / "docs" / "promise.py")

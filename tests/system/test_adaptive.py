@@ -10,8 +10,8 @@ import pytest
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
+from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene
-from springbeam.trajectory import Trajectory
 
 
 def soft(tolerance: float, scheme: str = "energy", degree: int = 0, t_end: float = 0.28, **tables: Any) -> Scene:

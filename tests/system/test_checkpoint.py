@@ -17,16 +17,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from springbeam.contact.phases.phases import Joint, Phase
 from typer.testing import CliRunner
 
 import springbeam
-from springbeam import cli, runner
-from springbeam.checkpoint import Checkpoint, CheckpointRefused, decoded, encoded
-from springbeam.contact import Joint, Phase
-from springbeam.fmu import FmuError
-from springbeam.recording import FileRecorder, MemoryRecorder, ResultsUnreadable, RunDirectory, load_trajectory
+from springbeam import cli
+from springbeam.bodies.fmu import FmuError
+from springbeam.bodies.protocol import Motion
+from springbeam.results.recording import FileRecorder, MemoryRecorder, ResultsUnreadable, RunDirectory, load_trajectory
+from springbeam.run import runner
+from springbeam.run.checkpoint import Checkpoint, CheckpointRefused, decoded, encoded
 from springbeam.scene import load_scene, with_changes
-from springbeam.subsystem import Motion
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
@@ -49,7 +50,7 @@ class Interrupt:
 def interrupted_into(directory: Path, steps: int = 200, scene=SCENE) -> Path:
     """With a checkpoint every 40 steps or so, by a clock that is told the time by being asked."""
     with (
-        patch("springbeam.checkpoint.perf_counter", side_effect=count(1.0)),
+        patch("springbeam.run.checkpoint.perf_counter", side_effect=count(1.0)),
         pytest.raises(KeyboardInterrupt),
         FileRecorder(scene, RunDirectory.create(directory)) as recorder,
     ):

@@ -15,9 +15,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
-from springbeam.fmu import fmu_directory
-from springbeam.recording import load_summary
+from springbeam.results.recording import load_summary
 from springbeam.scene import load_scene, shipped_scenes
 
 COMMAND = typer.main.get_command(app)

@@ -7,12 +7,13 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from springbeam.contact.phases.events import EventFunctions
+from springbeam.contact.phases.phases import Joint, Phase
 
-from springbeam import fmu, load_scene, simulate, with_changes
-from springbeam.contact import Joint, Phase
-from springbeam.events import EventFunctions
+from springbeam import load_scene, simulate, with_changes
+from springbeam.bodies import fmu
+from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene, shipped_scenes
-from springbeam.trajectory import Trajectory
 
 SET_SLOPES = "fmi2SetRealInputDerivatives"
 

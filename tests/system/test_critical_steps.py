@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 from springbeam import load_scene, with_changes
 from springbeam.cli import app
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.stability import critical, two_mass
-from springbeam.stability.critical import LARGE_STEP, Comparison, comparison, comparisons, growth
-from springbeam.stability.predict import THRESHOLD, linear_pair
+from springbeam.studies.stability import critical, two_mass
+from springbeam.studies.stability.critical import LARGE_STEP, Comparison, comparison, comparisons, growth
+from springbeam.studies.stability.predict import THRESHOLD, linear_pair
 
 
 def compared(law: str, stiffness: float, scheme: str, degree: int, n: int = 4) -> Comparison:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
-from springbeam import crosscheck as module
 from springbeam import load_scene, with_changes
 from springbeam.cli import app
-from springbeam.crosscheck import crosscheck, orders
+from springbeam.studies import crosscheck as module
+from springbeam.studies.crosscheck import crosscheck, orders
 
 SHORT = {"time": {"t_end": 0.2}, "coupling": {"macro_step": 5e-4}}
 

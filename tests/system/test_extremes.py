@@ -9,8 +9,8 @@ import pytest
 
 from springbeam import RunStopped, simulate
 from springbeam.monolithic import event_driven
+from springbeam.results.trajectory import Trajectory
 from springbeam.scene import load_scene, scene_from_dict, with_changes
-from springbeam.trajectory import Trajectory
 
 #: 50 mg of spring top, pressed by a tip 1000 times as fast as its own motion, on a foundation 1 μm below it.
 LIGHT_TOP: dict[str, Any] = {
@@ -181,7 +181,7 @@ def test_rebounds_that_cannot_be_seen_end_seated():
 
 def test_bouncing_without_end_stops_by_name(monkeypatch):
     """A damped beam on a lossless stop: its rebounds shrink, but never by enough to be the last."""
-    monkeypatch.setattr("springbeam.simulation._MAX_EVENTS_IN_STEP", 300)
+    monkeypatch.setattr("springbeam.run.simulation._MAX_EVENTS_IN_STEP", 300)
     beam = {"density": 672.6, "area": 0.07, "shear_modulus": 53.6, "alpha_b": 1.0, "n_elements": 6}
     tables = {
         "time": {"t_end": 1.5},

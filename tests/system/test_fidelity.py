@@ -7,12 +7,13 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from springbeam import fmu, simulate, with_changes
-from springbeam.crosscheck import crosscheck
-from springbeam.fmu import FmuBeam
+from springbeam import simulate, with_changes
+from springbeam.bodies import fmu
+from springbeam.bodies.fmu_bodies import FmuBeam
+from springbeam.bodies.protocol import NO_FORCE
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam, Scene, scene_from_dict
-from springbeam.subsystem import NO_FORCE
+from springbeam.studies.crosscheck import crosscheck
 
 
 @pytest.mark.parametrize("reduced", [False, True])

@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 from springbeam import RunStopped, load_scene, simulate
 from springbeam.cli import app
 from springbeam.monolithic import event_driven
+from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene, shipped_scenes, with_changes
-from springbeam.trajectory import Trajectory
 
 
 @lru_cache(maxsize=32)

@@ -21,8 +21,8 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from springbeam import cli
-from springbeam.recording import load_trajectory
-from springbeam.rows import Rows
+from springbeam.results.recording import load_trajectory
+from springbeam.run.rows import Rows
 from springbeam.scene import Scene, SceneError, load_scene
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")

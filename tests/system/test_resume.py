@@ -12,16 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import BaseModel
+from springbeam.contact.phases.phases import Phase
 
-from springbeam.checkpoint import decoded, encoded
-from springbeam.contact import Phase
-from springbeam.fmu import load_bodies
-from springbeam.memory import Memory
-from springbeam.paper_law import PaperLaw
-from springbeam.recording import MemoryRecorder
-from springbeam.runner import _as_in_paper
+from springbeam.bodies.factory import load_bodies
+from springbeam.bodies.memory import Memory
+from springbeam.results.recording import MemoryRecorder
+from springbeam.run.checkpoint import decoded, encoded
+from springbeam.run.paper_law import PaperLaw
+from springbeam.run.runner import _as_in_paper
+from springbeam.run.simulation import Simulation
 from springbeam.scene import Scene, load_scene, with_changes
-from springbeam.simulation import Simulation
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 

@@ -12,12 +12,12 @@ from typer.testing import CliRunner
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.cli import app
-from springbeam.ledger import APPROXIMATE, EXACT, bounds
-from springbeam.simulation import Simulation
-from springbeam.stability import grid
-from springbeam.stability.cells import AXES, SLICES, sampled_cells, scene_dict, slice_cells
-from springbeam.stability.grid import CLASSES, Outcome, judged, run_cell, run_cells, write_csv
-from springbeam.trajectory import Trajectory
+from springbeam.results.trajectory import Trajectory
+from springbeam.run.ledger import APPROXIMATE, EXACT, bounds
+from springbeam.run.simulation import Simulation
+from springbeam.studies.stability import grid
+from springbeam.studies.stability.cells import AXES, SLICES, sampled_cells, scene_dict, slice_cells
+from springbeam.studies.stability.grid import CLASSES, Outcome, judged, run_cell, run_cells, write_csv
 
 SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro_step": 2e-3}}
 

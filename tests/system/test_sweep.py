@@ -14,11 +14,11 @@ import psutil
 import pytest
 from typer.testing import CliRunner
 
-from springbeam import sweep
 from springbeam.cli import app
-from springbeam.runner import simulate
+from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, with_changes
-from springbeam.sweep.design import Axis, design, parse_axis, varied
+from springbeam.studies import sweep
+from springbeam.studies.sweep.design import Axis, design, parse_axis, varied
 
 METRICS = ("y_min", "first_stop_impact", "energy_residual")
 

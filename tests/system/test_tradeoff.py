@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from springbeam import tradeoff
 from springbeam.cli import app
 from springbeam.monolithic import event_driven
 from springbeam.scene import SceneError, load_scene, with_changes
-from springbeam.tradeoff.configurations import configurations
-from springbeam.tradeoff.errors import errors
+from springbeam.studies import tradeoff
+from springbeam.studies.tradeoff.configurations import configurations
+from springbeam.studies.tradeoff.errors import errors
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,12 @@ from scipy.linalg import eigh
 from scipy.special import airy
 from typer.testing import CliRunner
 
-from springbeam import stepping, verify
+from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
+from springbeam.bodies.protocol import StepRefused
 from springbeam.cli import app
-from springbeam.fmu import FmuBeam, FmuSpring
-from springbeam.subsystem import StepRefused
-from springbeam.verify import Check
+from springbeam.run import stepping
+from springbeam.studies import verify
+from springbeam.studies.verify import Check
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,17 @@ from typing import Annotated
 
 import typer
 
-from . import checks, doctor, report, resume, run, scenes, stability, sweep, tradeoff
+from . import (
+    checks,
+    doctor,
+    report,
+    resume,
+    run,
+    scenes,
+    stability,
+    sweep,
+    tradeoff,
+)
 from .common import STOPPED, Command, Group
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."

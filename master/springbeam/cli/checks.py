@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from ..fmu import FmuError
+from ..bodies.fmu import FmuError
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,
@@ -26,7 +26,7 @@ from .common import (
 )
 
 if TYPE_CHECKING:
-    from ..crosscheck import OrderRow, Report
+    from ..studies.crosscheck import OrderRow, Report
 
 
 def crosscheck(
@@ -44,11 +44,11 @@ def crosscheck(
 
     Example: springbeam crosscheck soft --set coupling.scheme=hermite --set coupling.degree=2 --orders
     """
-    from ..crosscheck import crosscheck as compare
-    from ..crosscheck import orders
     from ..monolithic.event_driven import ReferenceFailure
-    from ..plots import plot_crosscheck
-    from ..runner import RunStopped
+    from ..pictures.plots import plot_crosscheck
+    from ..run.outcome import RunStopped
+    from ..studies.crosscheck import crosscheck as compare
+    from ..studies.crosscheck import orders
 
     console = console_for(silent=as_json)
     with bad_input_reported():
@@ -89,7 +89,7 @@ def verify(as_json: JsonOption = False) -> None:
 
     Example: springbeam verify
     """
-    from .. import verify as checks
+    from ..studies import verify as checks
 
     try:
         if as_json:

@@ -20,9 +20,9 @@ from rich.console import Console
 from rich.progress import Progress, ProgressColumn
 from typer.core import TyperCommand, TyperGroup
 
-from ..checkpoint import CheckpointRefused
-from ..fmu import FmuError
-from ..recording import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory, json_ready
+from ..bodies.fmu import FmuError
+from ..results.recording import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory, json_ready
+from ..run.checkpoint import CheckpointRefused
 from ..scene import SceneError, scene_keys, shipped_scenes
 
 DISAGREES = 1

@@ -14,7 +14,9 @@ from typing import Any
 import typer
 from rich.text import Text
 
-from ..fmu import FmuBeam, FmuError, FmuSpring, fmu_directory
+from ..bodies.archive import fmu_directory
+from ..bodies.fmu import FmuError
+from ..bodies.fmu_bodies import FmuBeam, FmuSpring
 from ..scene import Beam, Spring
 from .common import DISAGREES, JsonOption, console_for, print_json
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn
 
-from ..recording import ANIMATIONS, REPORT, load_trajectory
+from ..results.recording import ANIMATIONS, REPORT, load_trajectory
 from .common import BAD_INPUT, QuietOption, RunArgument, bad_input_reported, fail, progress_bar, results_directory
 
 ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace a file that is already there.")]
@@ -29,7 +29,7 @@ def report(
     with bad_input_reported():
         trajectory = load_trajectory(results_directory(directory))
         target = _free(out or directory / REPORT, force)
-        from ..report import page  # plotly takes a second to load
+        from ..pictures.report import page  # plotly takes a second to load
 
         target.write_text(page(trajectory), encoding="utf-8")
     typer.echo(target)
@@ -57,8 +57,8 @@ def animate(
     with bad_input_reported():
         trajectory = load_trajectory(results_directory(directory))
         target = _free(out or directory / ANIMATIONS[0], force)
-        from ..animation import AnimationError
-        from ..animation import animate as write
+        from ..pictures.animation import AnimationError
+        from ..pictures.animation import animate as write
 
         def progress(times: Sequence[float]) -> Iterable[float]:
             with progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), quiet=quiet) as bar:

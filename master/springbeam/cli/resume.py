@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..recording import RunDirectory
+from ..results.recording import RunDirectory
 from .common import JsonOption, NoPlotsOption, QuietOption, bad_input_reported, results_directory
 from .run import carry_out
 
@@ -24,7 +24,7 @@ def resume(
 
     Example: springbeam resume results/soft
     """
-    from ..runner import last_checkpoint
+    from ..run.runner import last_checkpoint
 
     with bad_input_reported():
         start = last_checkpoint(results_directory(directory))

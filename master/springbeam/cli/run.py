@@ -15,11 +15,19 @@ from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemaini
 from rich.table import Table
 from rich.text import Text
 
-from ..checkpoint import Checkpoint
-from ..fmu import FmuError
-from ..recording import FileRecorder, NonFiniteValue, RunDirectory, load_events, load_summary, load_trajectory, replay
+from ..bodies.fmu import FmuError
+from ..results.recording import (
+    FileRecorder,
+    NonFiniteValue,
+    RunDirectory,
+    load_events,
+    load_summary,
+    load_trajectory,
+    replay,
+)
+from ..results.trajectory import Event, Trajectory, rounded
+from ..run.checkpoint import Checkpoint
 from ..scene import Scene, load_scene, scene_from_dict
-from ..trajectory import Event, Trajectory, rounded
 from .common import (
     BAD_INPUT,
     STOPPED,
@@ -91,8 +99,8 @@ def _picked(scene: Scene) -> Trajectory | None:
     """The run that keeps the accuracy asked for, if any is."""
     if scene.accuracy is None:
         return None
-    from ..accuracy import pick
-    from ..runner import RunStopped
+    from ..run.outcome import RunStopped
+    from ..studies.accuracy import pick
 
     try:
         with watched(lambda cause: f"a pilot run for accuracy = {scene.accuracy:g}: {cause}"):
@@ -112,7 +120,7 @@ def carry_out(
     as_json: bool,
     made: Trajectory | None = None,
 ) -> None:
-    """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.runner.run`.
+    """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.run.runner.run`.
 
     A run that is already ``made`` is only written.
     """
@@ -137,7 +145,7 @@ def carry_out(
 
 def _draw(console: Console, directory: RunDirectory) -> str | None:
     """Returns why there are no pictures, or ``None``."""
-    from ..plots import plot_run  # matplotlib takes a second to load
+    from ..pictures.plots import plot_run  # matplotlib takes a second to load
 
     try:
         pictures = plot_run(load_trajectory(directory.path), directory.path)
@@ -169,8 +177,8 @@ def _run_into(
 
     What keeps it from recording anything is raised.
     """
-    from ..runner import RunStopped
-    from ..runner import run as run_scene
+    from ..run.outcome import RunStopped
+    from ..run.runner import run as run_scene
 
     t_end = recorder.scene.time.t_end
 

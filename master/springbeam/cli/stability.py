@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 from rich.table import Table
 from rich.text import Text
 
-from ..fmu import fingerprints
+from ..bodies.factory import fingerprints
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,
@@ -34,8 +34,8 @@ from .common import (
 )
 
 if TYPE_CHECKING:
-    from ..stability.grid import Outcome
-    from ..stability.predict import Prediction
+    from ..studies.stability.grid import Outcome
+    from ..studies.stability.predict import Prediction
 
 #: Reasons that the summary lists, the most frequent ones, and characters of each.
 _REASONS, _REASON_WIDTH = 12, 66
@@ -50,7 +50,7 @@ def predict(
 
     Example: springbeam predict soft --set coupling.macro_step=4e-3
     """
-    from ..stability.predict import predict as prediction_of
+    from ..studies.stability.predict import predict as prediction_of
 
     with bad_input_reported():
         what = load_scene(scene, settings or ())
@@ -140,9 +140,9 @@ def stability(
         return
     from concurrent.futures.process import BrokenProcessPool
 
-    from ..stability.cells import sampled_cells, slice_cells
-    from ..stability.grid import run_cells, write_csv, write_scene
-    from ..stability.picture import draw
+    from ..studies.stability.cells import sampled_cells, slice_cells
+    from ..studies.stability.grid import run_cells, write_csv, write_scene
+    from ..studies.stability.picture import draw
 
     cells = [*sampled_cells(samples, seed), *slice_cells(resolution)]
     table = out / "stability.csv"
@@ -198,9 +198,9 @@ _AGREEMENT = 0.05
 
 def _critical(*, quiet: bool, as_json: bool) -> None:
     """Critical macro steps and the constants of the two-mass oscillator; exit code 1 if they are not as predicted."""
-    from ..stability import two_mass
-    from ..stability.critical import LARGE_STEP, comparisons
-    from ..stability.predict import THRESHOLD
+    from ..studies.stability import two_mass
+    from ..studies.stability.critical import LARGE_STEP, comparisons
+    from ..studies.stability.predict import THRESHOLD
 
     steps = Table(box=None, pad_edge=False, header_style="bold", title="critical macro steps", title_justify="left")
     steps.add_column("coupling", no_wrap=True)
@@ -248,8 +248,8 @@ def _critical(*, quiet: bool, as_json: bool) -> None:
 
 def _outcome_table(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome]) -> Table:
     """A row per coupling, with the largest residual of those that were done."""
-    from ..stability.cells import COUPLINGS
-    from ..stability.grid import CLASSES
+    from ..studies.stability.cells import COUPLINGS
+    from ..studies.stability.grid import CLASSES
 
     table = Table(box=None, pad_edge=False, header_style="bold", title=f"{len(cells)} cells", title_justify="left")
     table.add_column("coupling", no_wrap=True)

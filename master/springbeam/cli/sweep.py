@@ -76,9 +76,9 @@ def sweep(
     """
     if missing := [name for name in ("distributed", "pyarrow") if find_spec(name) is None]:
         fail(BAD_INPUT, f"sweep needs the packages {' and '.join(missing)}: pip install 'springbeam[sweep]'")
-    from .. import sweep as sweeps
-    from ..sweep.design import design, parse_axis
-    from ..sweep.picture import draw
+    from ..studies import sweep as sweeps
+    from ..studies.sweep.design import design, parse_axis
+    from ..studies.sweep.picture import draw
 
     directory = out or Path("results") / f"{Path(scene).stem}-sweep"
     state, left = TextColumn("{task.fields[state]}"), TimeRemainingColumn()

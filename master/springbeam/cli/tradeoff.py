@@ -10,8 +10,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
 
-from ..fmu import FmuError
-from ..recording import RunDirectory
+from ..bodies.fmu import FmuError
+from ..results.recording import RunDirectory
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,
@@ -28,7 +28,7 @@ from .common import (
 )
 
 if TYPE_CHECKING:
-    from ..tradeoff import Choice, Point, Study
+    from ..studies.tradeoff import Choice, Point, Study
 
 
 def tradeoff(
@@ -54,8 +54,8 @@ def tradeoff(
     Example: springbeam tradeoff soft --until 0.0712
     """
     from ..monolithic.event_driven import ReferenceFailure
-    from ..tradeoff import study, write_csv
-    from ..tradeoff.picture import draw
+    from ..studies.tradeoff import study, write_csv
+    from ..studies.tradeoff.picture import draw
 
     with bad_input_reported():
         what = load_scene(scene, settings or ())

@@ -19,7 +19,7 @@ from typing import Any, NoReturn
 
 import typer
 
-from ..fmu import call_under_way
+from ..bodies.fmu import call_under_way
 from .common import STOPPED
 
 #: How long a signal may wait for the main thread [s].

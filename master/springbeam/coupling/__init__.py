@@ -7,8 +7,7 @@ the gap g = u_tip − y over that step. A *scheme* is the choice of these condit
 * `hermite` — g(t+H) = ġ(t+H) = 0 and vanishing moments: displacements and velocities agree at every macro point.
 
 `tie` solves the conditions of either; `compliance` is the discrete gradient of the normal-compliance law, `one_way`
-the same with one body that does not feel it, `exchange` what ordinary masters do, `fixed_point` the tie by exchanging
-displacement against force; `force` holds the polynomials.
+the same with one body that does not feel it, `exchange` what ordinary masters do.
 ``docs/coupling.md`` derives all of it.
 """
 
@@ -16,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..subsystem import Motion
+from ..bodies.protocol import Motion
 from . import energy, hermite
 
 #: Conditions of a scheme as a linear map of an end's motion over a step of size H, each in metres.

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import brentq
 
-from ..memory import Memory
-from ..subsystem import Body, Force, Motion
+from ..bodies.memory import Memory
+from ..bodies.protocol import Body, Force, Motion
 from .tie import SIZES_REMEMBERED, NotConverged
 
 _MAX_ITERATIONS = 30

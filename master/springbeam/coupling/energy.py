@@ -11,7 +11,7 @@ well conditioned:  ∫ g dτ = I₁  and  ∫ s g dτ = I₁ − 2 I₂/H,  with
 
 from __future__ import annotations
 
-from ..subsystem import Motion
+from ..bodies.protocol import Motion
 
 
 def _degree_0(m: Motion, size: float) -> tuple[float, ...]:

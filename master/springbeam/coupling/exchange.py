@@ -12,7 +12,7 @@ the second body of ``gauss_seidel`` towards the force at the step's end with y c
 
 from __future__ import annotations
 
-from ..subsystem import Body, Force, Motion
+from ..bodies.protocol import Body, Force, Motion
 from .compliance import compliance_force
 
 

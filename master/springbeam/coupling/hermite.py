@@ -7,7 +7,7 @@ on an event hands the right velocities to it, and the order holds through events
 
 from __future__ import annotations
 
-from ..subsystem import Motion
+from ..bodies.protocol import Motion
 
 
 def _degree_1(m: Motion, size: float) -> tuple[float, ...]:

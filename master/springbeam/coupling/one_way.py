@@ -14,8 +14,8 @@ work of C on the driving end, which it does not feel, is booked, so that the led
 
 from __future__ import annotations
 
-from ..memory import Memory
-from ..subsystem import NO_FORCE, Body, Force, Held
+from ..bodies.memory import Memory
+from ..bodies.protocol import NO_FORCE, Body, Force, Held
 from .compliance import Compliance, discrete_gradient
 
 

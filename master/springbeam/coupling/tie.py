@@ -14,9 +14,10 @@ from operator import add, mul, sub
 
 import numpy as np
 
-from ..memory import Memory
-from ..subsystem import Body, Force, Motion, StepRefused
-from . import Conditions, force
+from ..bodies import force
+from ..bodies.memory import Memory
+from ..bodies.protocol import Body, Force, Motion, StepRefused
+from . import Conditions
 
 _MAX_ITERATIONS = 20
 #: Of a sum of modes, relative to the largest it has been.

@@ -28,8 +28,8 @@ from typing import Literal, get_args
 import numpy as np
 import scipy.sparse.linalg as spla
 
+from ..results.trajectory import COLUMNS, Event, Trajectory
 from ..scene import Scene
-from ..trajectory import COLUMNS, Event, Trajectory
 from .semi_discrete import SemiDiscreteBeam, assemble
 
 StartVelocity = Literal["rest", "tip", "average"]

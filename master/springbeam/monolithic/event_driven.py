@@ -31,8 +31,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import brentq
 
+from ..results.trajectory import COLUMNS, Event, Trajectory
 from ..scene import Scene
-from ..trajectory import COLUMNS, Event, Trajectory
 from .exponential import ExponentialPropagator, LinearForm
 from .hybrid_system import HybridSystem, Motion, Phase, ReferenceFailure
 from .propagators import SCIPY_METHODS, Propagator, RungeKuttaPropagator, Segment

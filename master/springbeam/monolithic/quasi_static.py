@@ -21,8 +21,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from ..results.trajectory import COLUMNS, Event, Trajectory
 from ..scene import Beam, Scene
-from ..trajectory import COLUMNS, Event, Trajectory
 from .hybrid_system import Phase, ReferenceFailure
 
 _AT_ONCE = 20

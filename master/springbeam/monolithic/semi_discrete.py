@@ -21,7 +21,7 @@ from numpy.polynomial import legendre
 from scipy.special import roots_jacobi
 
 from ..scene import Beam
-from ..trajectory import SHAPE_POINTS
+from ..scene.statics import SHAPE_POINTS
 
 #: Up to this many unknowns all modes are computed, also where few are wanted.
 _DENSE_SIZE = 400

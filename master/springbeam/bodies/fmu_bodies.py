@@ -1,0 +1,233 @@
+"""The two FMUs as bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from ctypes import byref, c_double, c_int, c_size_t, c_uint, sizeof
+from math import isfinite
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..scene import Beam, Spring
+from ..scene.statics import SHAPE_POINTS
+from .archive import fmu_directory
+from .fmu import WARNING, Fmu, FmuError, Reals
+from .memory import Memory
+from .protocol import NO_FORCE, Energies, Force, Motion, StepRefused
+
+#: The numbers by which the beam FMU knows its integrators.
+_INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
+#: ``Motion(*values)`` and ``Energies(*values)`` in a third of the time.
+_motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
+_energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
+
+
+class _FmuBody(Memory):
+    """What both bodies do alike; a subclass names its variables."""
+
+    REMEMBERED: ClassVar[tuple[str, ...]] = ("fmu", "_pending", "_current")
+
+    _MOTION: tuple[str, ...]
+    _ENERGIES: tuple[str, ...]
+    _IMPULSE: str
+    _FORCES: tuple[str, ...]
+    _current: Motion
+    _marked_motion: Motion
+
+    def __init__(self, fmu: Fmu) -> None:
+        self.fmu = fmu
+        try:
+            self._prepare(fmu)
+        except BaseException:
+            fmu.close()
+            raise
+
+    def _prepare(self, fmu: Fmu) -> None:
+        self._motion, self._energies = Reals(fmu, *self._MOTION), Reals(fmu, *self._ENERGIES)
+        self._impulse = Reals(fmu, self._IMPULSE)
+        n = len(self._FORCES)
+        forces = [fmu.reference(name, "Real") for name in self._FORCES]
+        Reals(fmu, *self._FORCES)  # a wrong reference is found before the run
+        self._inputs: Any = (c_double * (3 * n))()  # the forces, then Ḟ and F̈ of each
+        self._set_forces = fmu.prepared("fmi2SetReal", (c_uint * n)(*forces), c_size_t(n), self._inputs)
+        self._set_slopes = fmu.prepared(
+            "fmi2SetRealInputDerivatives",
+            (c_uint * (2 * n))(*[reference for reference in forces for _ in (1, 2)]),
+            c_size_t(2 * n),
+            (c_int * (2 * n))(*[1, 2] * n),
+            byref(self._inputs, n * sizeof(c_double)),
+        )
+        self._pending = self._marked_pending = 0.0
+        self.mass = self._mass()
+        if not isfinite(self.mass):
+            raise FmuError(f"{fmu.path}: the mass of its end is {self.mass}")
+        self._begin()
+
+    def _mass(self) -> float:
+        raise NotImplementedError
+
+    @property
+    def steps(self) -> int:
+        """doStep calls so far."""
+        return self.fmu.steps
+
+    @property
+    def rewinds(self) -> int:
+        """How often the state was set back."""
+        return self.fmu.rewinds
+
+    def mark(self) -> None:
+        self.fmu.mark()
+        self._marked_pending, self._marked_motion = self._pending, self._current
+
+    def rewind(self) -> None:
+        if self.fmu.moved:
+            self.fmu.rewind()
+            self._pending, self._current = self._marked_pending, self._marked_motion
+
+    def motion(self) -> Motion:
+        return self._current
+
+    def apply_impulse(self, impulse: float) -> None:
+        # The FMU applies it at the start of its next step; motion and energies already show it.
+        self._pending += impulse
+        self._impulse.set((self._pending,))
+        self._current = self._current._replace(velocity=self._current.velocity + impulse / self.mass)
+
+    def _advance(self, time: float, size: float, inputs: Sequence[float]) -> Motion:
+        """``inputs`` at the start of the step: the forces, then Ḟ and F̈ of each."""
+        fmu, n = self.fmu, len(self._FORCES)
+        if not isfinite(sum(inputs)):
+            raise StepRefused(f"{fmu.path.name}: the force it should step under is not finite: {list(inputs[:n])}")
+        self._inputs[:] = inputs
+        fmu.moved = True
+        if (status := self._set_forces()) > WARNING:
+            raise fmu.failed(status, f"cannot set {', '.join(self._FORCES)}")
+        if any(inputs[n:]) and (status := self._set_slopes()) > WARNING:
+            raise fmu.failed(status, "cannot set input derivatives")
+        fmu.step(time, size)
+        self._pending = 0.0
+        self._current = motion = self._read_motion()
+        return motion
+
+    def _begin(self) -> None:
+        """Read the motion that the FMU was initialised to."""
+        try:
+            self._current = self._marked_motion = self._read_motion()
+        except StepRefused as refused:
+            raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
+
+    def _read_motion(self) -> Motion:
+        motion = _motion_of(Motion, self._motion.get())
+        if not isfinite(sum(motion)):
+            raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
+        return motion
+
+    def _stored(self) -> tuple[float, ...]:
+        """The energies [J]; the kinetic one with the impulse that is still pending."""
+        energies = self._energies.get()
+        if self._pending != 0.0:
+            before = self._current.velocity - self._pending / self.mass
+            return (energies[0] + 0.5 * self._pending * (before + self._current.velocity), *energies[1:])
+        return energies
+
+    def close(self) -> None:
+        self.fmu.close()
+
+
+class FmuBeam(_FmuBody):
+    """``beam.fmu`` as a body."""
+
+    _MOTION = (
+        "tip_displacement",
+        "tip_velocity",
+        "tip_displacement_integral",
+        "tip_displacement_integral_2",
+    )
+    _ENERGIES = ("kinetic_energy", "strain_energy", "dissipated_energy", "load_potential")
+    _IMPULSE = "tip_impulse"
+    _FORCES = ("tip_force",)
+
+    def __init__(self, beam: Beam, start_time: float, deflection_slope: float) -> None:
+        """At ``start_time`` [s], with u = ``deflection_slope``·x."""
+        parameters: dict[str, float | int | bool] = beam.model_dump(exclude={"approach", "fidelity"})
+        parameters["integrator"] = _INTEGRATORS[beam.integrator]
+        parameters["initial_deflection_slope"] = deflection_slope
+        super().__init__(Fmu("beam", fmu_directory() / "beam.fmu", parameters, start_time))
+
+    def _prepare(self, fmu: Fmu) -> None:
+        super()._prepare(fmu)
+        self._shape = Reals(fmu, *[f"deflection[{i}]" for i in range(1, len(SHAPE_POINTS) + 1)])
+
+    def _mass(self) -> float:
+        return Reals(self.fmu, "tip_mass").get()[0]
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        return self._advance(time, size, contact)
+
+    def energies(self) -> Energies:
+        return _energies_of(Energies, self._stored())
+
+    def shape(self) -> np.ndarray:
+        """Deflection [m] at `SHAPE_POINTS`, shape (21,)."""
+        self._shape.get()
+        return np.array(np.frombuffer(self._shape.values))
+
+
+class FmuSpring(_FmuBody):
+    """``spring.fmu`` as a body; contact law and foundation are the master's."""
+
+    REMEMBERED = (*_FmuBody.REMEMBERED, "_dissipated_before")
+
+    _MOTION = ("displacement", "velocity", "displacement_integral", "displacement_integral_2")
+    _ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy")
+    _IMPULSE = "impulse"
+    _FORCES = ("contact_force", "foundation_force")
+
+    def __init__(self, spring: Spring, start_time: float) -> None:
+        self._spring = spring
+        parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
+        parameters["displacement"] = spring.equilibrium
+        parameters["velocity"] = spring.initial_velocity
+        self._dissipated_before = 0.0  #: before the last `restart` [J]
+        super().__init__(Fmu("spring", fmu_directory() / "spring.fmu", parameters, start_time))
+
+    def _mass(self) -> float:
+        return self._spring.mass
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        (c, dc, ddc), (n, dn, ddn) = contact, foundation
+        return self._advance(time, size, (c, n, dc, ddc, dn, ddn))
+
+    def energies(self) -> Energies:
+        kinetic, potential, dissipated = self._stored()
+        load = -self._spring.external_force * self._current.displacement
+        return _energies_of(Energies, (kinetic, potential, self._dissipated_before + dissipated, load))
+
+    def _prepare(self, fmu: Fmu) -> None:
+        super()._prepare(fmu)
+        self._internal_steps = Reals(fmu, "internal_steps")
+
+    @property
+    def internal_steps(self) -> int:
+        """Steps that IDA took on the way here; those of steps that were taken back are not among them.
+
+        Raises FmuError if the FMU has failed, or fails to tell.
+        """
+        if not self.fmu.usable:
+            raise FmuError(f"{self.fmu.path}: has failed")
+        steps = self._internal_steps.get()[0]
+        if not isfinite(steps):
+            raise FmuError(f"{self.fmu.path}: internal_steps = {steps}")
+        return round(steps)
+
+    def restart(self, time: float, displacement: float, velocity: float, dissipated: float = 0.0) -> None:
+        """Start again at ``time`` [s] from y [m] and z [m/s], by the exact start values of the FMU.
+
+        ``dissipated`` is what damping has taken until then [J].
+        """
+        self._dissipated_before = dissipated
+        self.fmu.reset(time, {"displacement": displacement, "velocity": velocity})
+        self._pending = 0.0
+        self._begin()

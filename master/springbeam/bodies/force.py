@@ -1,0 +1,86 @@
+"""The contact force of one step: C(τ) = Σ a_k P_k(2τ/H − 1), Legendre polynomials on [0, H], degree ≤ 2."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import mul
+
+import numpy as np
+
+from .protocol import Force, Motion
+
+#: Gauss–Legendre nodes and weights on [0, 1], exact to degree 7: enough for (1 − x)³ P₂.
+_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
+
+
+def derivatives(a: Sequence[float], size: float) -> Force:
+    """(C, Ċ, C̈) at the step's start [N, N/s, N/s²] of Legendre coefficients ``a`` [N] (1 to 3 of them)."""
+    if len(a) == 1:
+        return (a[0], 0.0, 0.0)
+    if len(a) == 2:
+        return (a[0] - a[1], 2.0 * a[1] / size, 0.0)
+    return (a[0] - a[1] + a[2], (2.0 * a[1] - 6.0 * a[2]) / size, 12.0 * a[2] / (size * size))
+
+
+def end_value(force: Force, size: float) -> float:
+    """C(H) [N]."""
+    return force[0] + size * (force[1] + 0.5 * size * force[2])
+
+
+def value(force: Force, tau: float) -> float:
+    """C(τ) [N]."""
+    return force[0] + tau * (force[1] + 0.5 * tau * force[2])
+
+
+def mean(force: Force, size: float) -> float:
+    """∫ C dτ / H [N]."""
+    return force[0] + size * (force[1] / 2.0 + size * force[2] / 6.0)
+
+
+def work(force: Force, gap: Motion, size: float) -> float:
+    """∫ C ġ dτ [J] over a step that starts and ends with the gap closed: −∫ Ċ g dτ, ``gap`` at its end."""
+    return -force[1] * gap.integral - force[2] * (size * gap.integral - gap.integral_2)
+
+
+def sign_changes(force: Force, size: float) -> list[float]:
+    """Where C passes through zero inside the step, ascending."""
+    c, b, a = force[0], force[1], 0.5 * force[2]
+    if a == 0.0:
+        roots = [-c / b] if b != 0.0 else []
+    else:
+        discriminant = b * b - 4.0 * a * c
+        if discriminant <= 0.0:
+            return []
+        q = -0.5 * (b + (discriminant**0.5 if b >= 0.0 else -(discriminant**0.5)))
+        roots = [q / a, c / q] if q != 0.0 else []
+    return sorted(tau for tau in roots if 0.0 < tau < size)
+
+
+def shifted(force: Force, tau: float) -> Force:
+    """The same polynomial, seen from τ on."""
+    if force[1] == 0.0 == force[2]:
+        return force
+    return (value(force, tau), force[1] + tau * force[2], force[2])
+
+
+def legendre(force: Force, size: float, degree: int) -> list[float]:
+    """The degree + 1 Legendre coefficients of the polynomial (cut above ``degree``)."""
+    value, slope, bend = force[0], size * force[1], size * size * force[2]
+    mean = value + slope / 2.0 + bend / 6.0
+    return [mean] if degree == 0 else [mean, slope / 2.0 + bend / 4.0, bend / 12.0][: degree + 1]
+
+
+def _unit_response(k: int) -> tuple[float, float, float, float]:
+    """∫ P_k(2x − 1) (1 − x)ⁿ/n! dx over [0, 1] for n = 1, 0, 2, 3: in the order of `Motion`."""
+    p = _WEIGHTS * np.polynomial.legendre.legval(2.0 * _NODES - 1.0, [0.0] * k + [1.0])
+    left = 1.0 - _NODES
+    return float(p @ left), float(p.sum()), float(p @ left**2) / 2.0, float(p @ left**3) / 6.0
+
+
+_UNIT_RESPONSES = [_unit_response(k) for k in range(3)]
+
+
+def free_mass_response(degree: int, size: float, mass: float) -> list[Motion]:
+    """Motion of a free mass [kg] from rest under −P_k, k = 0 … degree: how a spring answers when H is small."""
+    scales = [-(size**n) / mass for n in (2, 1, 3, 4)]
+    return [Motion(*map(mul, unit, scales)) for unit in _UNIT_RESPONSES[: degree + 1]]

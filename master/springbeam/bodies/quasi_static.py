@@ -1,0 +1,150 @@
+"""The beam without its inertia: a tip compliance, solved here and now, with no FMU.
+
+Without mass every section is in equilibrium, M q̈ = 0, and K (q + α_b q̇) = e C + F leaves one unknown, the tip's
+deflection w from where the loads alone hold it (`springbeam.scene.statics`):
+
+    k (w + α_b ẇ) = C,     1/k = L³/3EI + L/KAG,     u_tip = u_load + w.
+
+Joined, C is a polynomial of degree d over the step and w one of degree d + 1 that starts where it is and satisfies the
+equation in the mean against all polynomials of degree d (a continuous Petrov–Galerkin method; d = 0 is the midpoint
+rule). Since ẇ is such a polynomial, the work of C is accounted for exactly,
+
+    ∫ C ẇ dτ = ½ k Δ(w²) + α_b k ∫ ẇ² dτ,
+
+at any step and any α_b ≥ 0: what the `energy` conditions of `springbeam.coupling.energy` need. (The exact response to a
+polynomial force would not do: without damping it jumps whenever C does.) Nothing at its end, w = w₀ e^{−τ/α_b}.
+"""
+
+from __future__ import annotations
+
+import math
+from operator import mul
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from ..scene import Beam, statics
+from ..scene.statics import SHAPE_POINTS
+from . import force
+from .memory import Memory
+from .protocol import NO_FORCE, Energies, Force, Motion
+
+_SIZES_REMEMBERED = 16
+
+
+class QuasiStaticBeam(Memory):
+    """The massless beam as a body.
+
+    Parameters
+    ----------
+    beam
+        Of the scene; its mesh, modes and density play no part.
+    degree
+        d, of the contact force over a step.
+    tip, velocity
+        u_tip [m] and its rate [m/s] at the start.
+    """
+
+    REMEMBERED = ("_w", "_velocity", "_integrals", "_dissipated")
+
+    #: An impulse meets nothing.
+    mass = 0.0
+
+    def __init__(self, beam: Beam, degree: int, tip: float, velocity: float) -> None:
+        self._stiffness, self._alpha, self._degree = 1.0 / statics.tip_compliance(beam), beam.alpha_b, degree
+        self._tip_shape = statics.tip_force_shape(beam, SHAPE_POINTS)
+        self._load_shape = statics.load_shape(beam, SHAPE_POINTS)
+        self._rest, self._load_energy = statics.tip_load_deflection(beam), statics.load_energy(beam)
+        self._w, self._velocity = tip - self._rest, velocity
+        self._integrals = (0.0, 0.0)  #: of u_tip over the last step, as in `Motion`
+        self._dissipated = 0.0
+        self._responses: dict[float, list[list[float]]] = {}  #: by the size of the step
+        self.mark()
+
+    def mark(self) -> None:
+        self._marked = (self._w, self._velocity, self._integrals, self._dissipated)
+
+    def rewind(self) -> None:
+        self._w, self._velocity, self._integrals, self._dissipated = self._marked
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        """By ``size`` [s] under the contact force C; under `NO_FORCE` itself with nothing at the tip."""
+        if contact is NO_FORCE:
+            self._relax(size)
+        else:
+            self._follow_force(size, contact)
+        return self.motion()
+
+    def _relax(self, size: float) -> None:
+        start, alpha = self._w, self._alpha
+        # α_b = 0: at once.
+        left, gone = (math.exp(-size / alpha), -math.expm1(-size / alpha)) if alpha > 0.0 else (0.0, 1.0)
+        self._w, self._velocity = start * left, -start * left / alpha if alpha > 0.0 else 0.0
+        first = alpha * start * gone
+        self._integrate(size, first, alpha * (start * size - first))
+        self._dissipated += 0.5 * self._stiffness * (start * start - self._w * self._w)
+
+    def _follow_force(self, size: float, contact: Force) -> None:
+        rows = self._responses.get(size)
+        if rows is None:
+            if len(self._responses) >= _SIZES_REMEMBERED:
+                self._responses.clear()
+            rows = self._responses[size] = self._response(size)
+        k = self._stiffness
+        given = [*(c / k for c in force.legendre(contact, size, self._degree)), self._w]
+        self._w, self._velocity, first, second, *rate = [sum(map(mul, row, given)) for row in rows]
+        self._integrate(size, first, second)
+        mean_square = sum(c * c / (2 * j + 1) for j, c in enumerate(rate))
+        self._dissipated += self._alpha * k * size * mean_square
+
+    def _response(self, size: float) -> list[list[float]]:
+        """Rows over (Legendre coefficients of C/k, w at the start), shape (d + 5, d + 2).
+
+        They give w and ẇ at the end, ∫w, ∫∫w, and the d + 1 Legendre coefficients of ẇ.
+        """
+        d = self._degree
+        derivative = 2.0 / size * legendre.legder(np.eye(d + 2))
+        at_start = (-1.0) ** np.arange(d + 2)
+        w = np.linalg.inv(np.vstack([np.eye(d + 1, d + 2) + self._alpha * derivative, at_start]))
+        rate = derivative @ w
+        once, twice = size * w[0], 0.5 * size * size * (w[0] - w[1] / 3.0)
+        rows: list[list[float]] = [row.tolist() for row in (w.sum(axis=0), rate.sum(axis=0), once, twice, *rate)]
+        return rows
+
+    def _integrate(self, size: float, first: float, second: float) -> None:
+        self._integrals = (self._rest * size + first, 0.5 * self._rest * size * size + second)
+
+    def motion(self) -> Motion:
+        return Motion(self._rest + self._w, self._velocity, *self._integrals)
+
+    def energies(self) -> Energies:
+        """The strain energy of w and the loads together, and the loads' potential, −(their work)."""
+        k, w, rest = self._stiffness, self._w, self._rest
+        strain = 0.5 * k * w * w + k * w * rest + 0.5 * self._load_energy
+        return Energies(0.0, strain, self._dissipated, -k * w * rest - self._load_energy)
+
+    def shape(self) -> np.ndarray:
+        """Deflection [m] at `SHAPE_POINTS`, shape (21,)."""
+        return self._load_shape + self._stiffness * self._w * self._tip_shape
+
+    def apply_impulse(self, impulse: float) -> None:
+        raise AssertionError("a massless tip takes no impulse")
+
+    def holding_force(self, displacement: float, velocity: float) -> float:
+        """C that holds the tip at ``displacement`` [m], moving at ``velocity`` [m/s]."""
+        return self._stiffness * (displacement - self._rest + self._alpha * velocity)
+
+    def join(self, velocity: float) -> None:
+        """The tip is held together with an end that moves at ``velocity`` [m/s]."""
+        self._velocity = velocity
+
+    def release(self) -> float:
+        """The tip is let go; without damping it is at rest at once. Returns the energy that this loses [J]."""
+        if self._alpha > 0.0:
+            self._velocity = -self._w / self._alpha
+            return 0.0
+        lost = 0.5 * self._stiffness * self._w * self._w
+        self._w = self._velocity = 0.0
+        return lost
+
+    def close(self) -> None: ...

@@ -1,0 +1,216 @@
+"""Phases and impacts: who is joined to whom, and what an event changes.
+
+``docs/model.md`` states the laws; section names below are its.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+from ..bodies.memory import Memory
+from ..bodies.protocol import Motion
+from ..scene import Scene, Spring
+from ..scene.resolution import MISMATCH
+from ..scene.statics import tip_compliance, tip_load_deflection
+
+#: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
+#: second, if it would also rise no higher than positions can be told apart.
+_SEATING_SPEED, _SEATING_SPEED_UNSEEN = 1e-8, 1e-4
+
+
+class Joint(Enum):
+    """How the beam's tip and what lies below it are joined."""
+
+    FREE = "free"  #: no contact force
+    TIED = "tied"  #: bilateral, u_tip = y < Ψ
+    TOUCH = "touch"  #: unilateral, 0 ≤ C ⊥ u_tip − y ≥ 0
+
+
+@dataclass(frozen=True)
+class Phase:
+    joint: Joint = Joint.FREE
+    #: The lower end is held by the foundation: the spring at y = φ or, without a spring, the tip itself.
+    seated: bool = False
+
+    @cached_property
+    def name(self) -> str:
+        """As in the column ``phase``."""
+        return "seated" if self.seated else self.joint.value
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
+class Impact:
+    """Impulses [N·s], upward on each body, and the energy they take away [J]."""
+
+    on_beam: float = 0.0
+    on_spring: float = 0.0
+    of_foundation: float = 0.0
+    energy_loss: float = 0.0
+
+
+def meeting(kind: str, v: float, z: float, tip_mass: float, mass: float) -> Impact:
+    """Tip [m/s, kg] meets spring top [m/s, kg] (design: section "Interface laws").
+
+    ``inelastic``: J = (z − v)/(1/m_tip + 1/m), equal and opposite, both leave with one velocity; ``rest``: velocities
+    are kept; ``tip``: z := v (Ahn & Tate, Algorithm 1, line 5), which takes the energy from nowhere and books it.
+    A massless tip takes no impulse.
+    """
+    if kind == "inelastic" and tip_mass > 0.0:
+        reduced = 1.0 / (1.0 / tip_mass + 1.0 / mass)
+        j = reduced * (z - v)
+        return Impact(on_beam=j, on_spring=-j, energy_loss=0.5 * reduced * (z - v) ** 2)
+    if kind == "tip":
+        return Impact(on_spring=mass * (v - z), energy_loss=0.5 * mass * (z * z - v * v))
+    return Impact()
+
+
+def rebound(velocity: float, mass: float, restitution: float) -> tuple[float, float]:
+    """Impulse −(1+e) m w [N·s] that reverses w to −e w, and its loss ½ m w² (1 − e²) [J]."""
+    return -(1.0 + restitution) * mass * velocity, 0.5 * mass * velocity**2 * (1.0 - restitution**2)
+
+
+def foundation_impact(z: float | None, mass: float, v: float | None, tip_mass: float, restitution: float) -> Impact:
+    """The lower end strikes the foundation: the spring at ``z``, and the tip at ``v`` if it is tied to it.
+
+    ``None`` marks an end that does not take part. Each velocity is reversed by itself, so nothing is lost at e = 1.
+    """
+    on_spring, loss_spring = rebound(z, mass, restitution) if z is not None else (0.0, 0.0)
+    on_beam, loss_beam = rebound(v, tip_mass, restitution) if v is not None else (0.0, 0.0)
+    return Impact(on_beam, on_spring, on_spring + on_beam, loss_spring + loss_beam)
+
+
+def common_velocity(v: float, z: float, tip_mass: float, mass: float) -> float:
+    """With which joined ends of velocities v and z [m/s] go on: that of their momentum, whatever force joins them."""
+    return (tip_mass * v + mass * z) / (tip_mass + mass)
+
+
+def spring_force(spring: Spring, y: float) -> float:
+    """k1 y + k2 y³ − f_s [N]: what the seated spring hands to the foundation besides C (Ahn & Tate, (6))."""
+    return spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
+
+
+class Transitions(Memory):
+    """What each kind of event does to the phase and to the velocities.
+
+    Parameters
+    ----------
+    scene
+        With the contact law.
+    tip_mass, mass
+        What an impulse meets at the tip and at the spring top [kg]; ``None`` for an absent body.
+    """
+
+    REMEMBERED = ("_fastest_impact",)
+
+    def __init__(self, scene: Scene, tip_mass: float | None, mass: float | None, fastest: Callable[[], float]) -> None:
+        self._scene, self._tip_mass, self._mass, self._fastest = scene, tip_mass, mass, fastest
+        self._fastest_impact = 0.0
+
+    def happens(
+        self,
+        kind: str,
+        phase: Phase,
+        start: tuple[Motion, Motion],
+        elapsed: float,
+        ends: tuple[Motion, Motion],
+        end_force: float,
+        tolerance: float,
+    ) -> tuple[str, Phase, Impact]:
+        """The event's kind (an impact on the foundation may end seated), the phase after it, and the impact.
+
+        ``ends`` are (tip, lower end) before it, ``start`` the same ``elapsed`` [s] ago, where the step began that ends
+        with it, ``end_force`` is C [N], ``tolerance`` what positions can be told apart to [m].
+        """
+        tip, low = ends
+        if kind == "impact":
+            return kind, *self._meet(phase, tip, low, tolerance)
+        if kind == "stop_impact":
+            return self._strike(phase, start, elapsed, ends, tolerance)
+        if kind == "release":
+            if end_force > 0.0:
+                return kind, Phase(Joint.TOUCH), Impact()
+            return kind, Phase(Joint.FREE), self._part(phase, tip, low)
+        if kind == "retie":
+            return kind, Phase(Joint.TIED), Impact()
+        if kind == "unseated":
+            return kind, Phase(phase.joint), Impact()
+        assert kind == "separation"
+        opened = Phase(Joint.FREE, seated=phase.seated and self._mass is not None)
+        return kind, opened, self._part(opened, tip, low)
+
+    def _meet(self, phase: Phase, tip: Motion, low: Motion, tolerance: float) -> tuple[Phase, Impact]:
+        assert self._tip_mass is not None
+        assert self._mass is not None
+        assert self._scene.spring is not None
+        psi = self._scene.spring.equilibrium
+        impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
+        common = low.velocity + impact.on_spring / self._mass
+        at_equilibrium = abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
+        if at_equilibrium:
+            tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
+        else:
+            tied = low.displacement < psi
+        # A top that stands on the foundation is driven into it, and strikes it at once; a massless tip cannot do that.
+        return Phase(Joint.TIED if tied else Joint.TOUCH, phase.seated and self._tip_mass == 0.0), impact
+
+    def _rises_from_rest(self) -> bool:
+        """Whether a massless tip and the spring, at rest together at Ψ, are pushed up."""
+        beam, spring = self._scene.beam, self._scene.spring
+        if self._tip_mass != 0.0 or beam is None or spring is None:
+            return False
+        psi = spring.equilibrium
+        return spring_force(spring, psi) + (psi - tip_load_deflection(beam)) / tip_compliance(beam) < 0.0
+
+    def _strike(
+        self,
+        phase: Phase,
+        start: tuple[Motion, Motion],
+        elapsed: float,
+        ends: tuple[Motion, Motion],
+        tolerance: float,
+    ) -> tuple[str, Phase, Impact]:
+        """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
+        assert self._scene.stop is not None
+        e = self._scene.stop.restitution
+        tip, low = ends
+        tied = self._tip_mass is not None and phase.joint is not Joint.FREE and self._scene.contact.law != "compliance"
+        z = low.velocity if self._mass is not None else None
+        v = tip.velocity if tied or self._mass is None else None
+        striking = (z, self._mass or 0.0, v, self._tip_mass or 0.0)
+        speed = max(abs(w) for w in (z, v) if w is not None)
+        self._fastest_impact = max(self._fastest_impact, speed)
+        # It strikes while rising if the rebound would be over in no time.
+        tip_mass = 0.0 if v is None else self._tip_mass or 0.0
+        after = common_velocity(v or 0.0, z or 0.0, tip_mass, self._mass or 0.0)
+        back = e * speed
+        dies_out = after > 0.0 or back <= _SEATING_SPEED * self._fastest_impact
+        if z is not None and elapsed > 0.0 and back <= _SEATING_SPEED_UNSEEN * self._fastest_impact:
+            # What presses it down is told by the flight: C at its end may be off by what reverses a mismatch of
+            # velocities, (d + 1)(d + 2) times their quotient by the step. It rises by (e z)²/2a; each impact is found
+            # to no better than the tolerance, which brings it as much.
+            before = common_velocity(
+                0.0 if v is None else start[0].velocity, start[1].velocity, tip_mass, self._mass or 0.0
+            )
+            dies_out |= 0.5 * (e * after) ** 2 * elapsed <= tolerance * (before - after)
+        if (dies_out and e < 1.0) or speed == 0.0:
+            joint = phase.joint if self._mass is not None else Joint.TIED
+            return "seated", Phase(joint, seated=True), foundation_impact(*striking, restitution=0.0)
+        return "stop_impact", phase, foundation_impact(*striking, restitution=e)
+
+    def _part(self, opened: Phase, tip: Motion, low: Motion) -> Impact:
+        """Ends that a tie lets go have one velocity; where a scheme has let theirs differ, they take that first.
+
+        Unless they part by so much that it is no error but a vibration that the macro step does not follow.
+        """
+        parting = tip.velocity - low.velocity
+        if self._mass is None or self._tip_mass is None or opened.seated or parting == 0.0:
+            return Impact()
+        if parting > MISMATCH * self._fastest():
+            return Impact()
+        return meeting("inelastic", tip.velocity, low.velocity, self._tip_mass, self._mass)

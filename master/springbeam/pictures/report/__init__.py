@@ -1,0 +1,205 @@
+"""A run as one HTML page that needs nothing else: no network, no server, no other file."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+import tomli_w
+from plotly.offline import get_plotlyjs
+
+from ...results.trajectory import Trajectory, rounded
+from ...scene import Scene, load_scene, shipped_scenes
+from ..drawing import (
+    EVENT_LOOKS,
+    FORCES,
+    IMPULSES,
+    POSITIONS,
+    alternating,
+    mark,
+    present,
+    readable_unit,
+)
+from ..motion import Motion, motion_of
+from .figures import (
+    ALTERNATES,
+    Chart,
+    backdrop,
+    charts,
+    event_key,
+    motions,
+    moving_parts,
+    phase_key,
+    time_unit,
+)
+
+_HERE = Path(__file__).parent
+#: Rows of the table of events.
+_EVENTS_SHOWN = 200
+_EVENT_UNITS = {"y": "m", "z": "m/s", "u_tip": "m", "v_tip": "m/s"}
+_FORCES_READ = ("contact_force", "foundation_force")
+
+
+def page(trajectory: Trajectory) -> str:
+    """The report of a run as HTML; the same run always gives the same text.
+
+    Parameters
+    ----------
+    trajectory
+        Any run, also one that stopped early or has no rows: then only what is there is shown.
+    """
+    time = trajectory.columns["time"]
+    drawable = len(time) > 1 and time[-1] > time[0]
+    over_time = charts(trajectory) if drawable else []
+    motion = motion_of(trajectory) if drawable else None
+    moving = motions(trajectory, motion) if motion is not None else []
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_HERE), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    scene = trajectory.scene
+    events = trajectory.events[:_EVENTS_SHOWN]
+    values = {name: unit for name, unit in _EVENT_UNITS.items() if name in trajectory.columns}
+    return environment.get_template("page.html").render(
+        title=scene.title or "(untitled scene)",
+        version=trajectory.summary.get("version", ""),
+        warnings=_warnings(trajectory),
+        mark=mark(trajectory),
+        moving=moving,
+        frames=0 if motion is None else len(motion.time),
+        charts=over_time,
+        phases=phase_key(trajectory) if drawable else [],
+        event_key=event_key(trajectory),
+        numbers=list(_numbers(trajectory)),
+        events=events,
+        event_values=values,
+        event_scales={name: max((abs(getattr(e, name) or 0.0) for e in events), default=0.0) for name in values},
+        rounded=rounded,
+        event_words={kind: look.words for kind, look in EVENT_LOOKS.items()},
+        more_events=max(0, len(trajectory.events) - _EVENTS_SHOWN),
+        rows=len(time),
+        points=max((chart.points for chart in over_time), default=0),
+        toml=tomli_w.dumps(scene.model_dump(exclude_none=True)),
+        command=shipped_command(scene),
+        data=_as_script(_data(trajectory, over_time, moving, motion) if drawable else None),
+        plotly=get_plotlyjs(),
+        script=(_HERE / "page.js").read_text(encoding="utf-8"),
+        style=(_HERE / "page.css").read_text(encoding="utf-8"),
+    )
+
+
+def shipped_command(scene: Scene) -> str | None:
+    """The command that runs ``scene`` from the shipped scene of its title; ``None`` if it is not made from one."""
+    wanted = scene.model_dump(exclude_none=True)
+    for name in shipped_scenes():
+        shipped = load_scene(name).model_dump(exclude_none=True)
+        if shipped.keys() != wanted.keys() or shipped["title"] != wanted["title"]:
+            continue
+        settings = [
+            f"--set {shlex.quote(f'{table}.{key}={_setting(value)}')}"
+            for table, content in wanted.items()
+            if table != "title"
+            for key, value in content.items()
+            if shipped[table][key] != value
+        ]
+        return " ".join(["springbeam", "run", name, *settings])
+    return None
+
+
+def _setting(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def _warnings(trajectory: Trajectory) -> list[str]:
+    """What a reader must know before believing a curve, the gravest first."""
+    summary = trajectory.summary
+    found = []
+    status = summary.get("status", "done")
+    if status == "running":
+        found.append("The run is not finished: it was still going on when this page was made, or it was killed.")
+    elif status != "done":
+        when = f" at t = {summary['time']:.9g} s" if isinstance(summary.get("time"), float) else ""
+        found.append(f"The run was {status}{when}: {summary.get('cause', 'cause unknown')}")
+    found += [str(warning) for warning in summary.get("warnings", ())]
+    if len(trajectory) and (words := alternating(trajectory)):
+        found.append(f"{', '.join(words)}: {ALTERNATES}. Single values and frames mean little there.")
+    return found
+
+
+def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
+    """Words and values for the table of numbers."""
+    summary, columns = trajectory.summary, trajectory.columns
+    time = columns["time"]
+    for key, words in (("macro_steps", "macro steps"), ("iterations", "iterations for the contact force")):
+        if key in summary:
+            yield words, f"{summary[key]}"
+    for body in ("beam", "spring"):
+        if f"{body}_steps" in summary:
+            steps, rollbacks = summary[f"{body}_steps"], summary[f"{body}_rollbacks"]
+            yield f"steps of the {body} FMU", f"{steps}, {rollbacks} of them taken back"
+    if "wall_time" in summary:
+        yield "wall time", f"{summary['wall_time']:.3g} s"
+    if "max_energy_residual" in summary:
+        yield "largest energy residual, relative", f"{float(summary['max_energy_residual']):.2g}"
+    if summary.get("max_velocity_mismatch"):
+        yield "largest difference of joined velocities", f"{float(summary['max_velocity_mismatch']):.4g} m/s"
+    if not len(time):
+        return
+
+    def extreme(name: str, words: str, unit: str, pick: Any) -> tuple[str, str]:
+        row = int(pick(columns[name]))
+        return words, f"{columns[name][row]:.6g} {unit} at t = {time[row]:.6g} s"
+
+    for name, look in POSITIONS.items():
+        if name in columns:
+            yield extreme(name, f"lowest {look.words}", "m", np.argmin)
+            yield extreme(name, f"highest {look.words}", "m", np.argmax)
+    for name, words in (("contact_force", "largest contact force"), ("foundation_force", "largest foundation force")):
+        if name in columns and np.any(columns[name] != 0.0):
+            yield extreme(name, words, "N", np.argmax)
+    for name, look in IMPULSES.items():
+        if total := sum(getattr(event, name) for event in trajectory.events):
+            yield f"sum of impulses {look.words}", f"{total:.6g} N·s"
+    for name, words in (("e_dissipated", "dissipated by damping"), ("e_impact_loss", "lost in impacts")):
+        if columns[name][-1] != 0.0:
+            yield f"energy {words}", f"{columns[name][-1]:.6g} J"
+
+
+def _data(trajectory: Trajectory, over_time: list[Chart], moving: list[Chart], motion: Motion | None) -> dict[str, Any]:
+    unit = time_unit(trajectory)
+    data: dict[str, Any] = {
+        "unit": {"factor": unit.factor, "name": unit.name},
+        "backdrop": backdrop(trajectory),
+        "charts": {chart.name: chart.figure.to_dict() for chart in [*moving, *over_time]},
+        "overTime": [chart.name for chart in over_time],
+    }
+    if motion is not None:
+        data["motion"] = {
+            "time": motion.time,
+            "phase": trajectory["phase"][motion.row],
+            "readings": list(_readings(trajectory, motion)),
+            "deflection": motion.deflection,
+            "y": motion.y,
+            "parts": {chart.name: moving_parts(trajectory, motion, chart) for chart in moving},
+        }
+    return data
+
+
+def _readings(trajectory: Trajectory, motion: Motion) -> Iterator[dict[str, Any]]:
+    for looks, unit in ((POSITIONS, "m"), ({name: FORCES[name] for name in _FORCES_READ}, "N")):
+        names = present(trajectory, looks)
+        readable = readable_unit([trajectory[name] for name in names], unit)
+        for name in names:
+            values = trajectory[name][motion.row]
+            yield {"words": looks[name].words, "values": values, "factor": readable.factor, "unit": readable.name}
+
+
+def _as_script(data: dict[str, Any] | None) -> str:
+    """JSON that can stand inside a script element."""
+    text = json.dumps(data, default=np.ndarray.tolist, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c")

@@ -1,0 +1,252 @@
+"""Which event comes first inside a step: the step is repeated until it ends on it.
+
+Positions tell of meeting, release and the foundation (`springbeam.contact.events`), forces of separation and unseating.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+from ..bodies import force
+from ..bodies.protocol import Force
+from ..contact.events import (
+    EventFunction,
+    EventFunctions,
+    Sample,
+    cubic_crossing,
+    cubic_value,
+    gap,
+    locate,
+    lowest_inside,
+    position_tolerance,
+    stays_above,
+)
+from ..contact.phases import Joint, Phase, common_velocity
+from ..scene import Scene
+from .macro_steps import AdaptiveSteps, MacroGrid
+from .stepping import Ends, Pair, State, Step
+
+#: An event closer to the start of a step than this fraction of H happens at the start.
+_NO_TIME = 1e-9
+#: Of a velocity, relative to the largest so far.
+_VELOCITY_ROUNDING = 16.0 * 2.0**-52
+#: Repetitions to end a step where the contact force vanishes.
+_MAX_FORCE_CUTS = 8
+
+
+class Detector:
+    """Finds the event that ends a step; the bodies are left where the returned step ends.
+
+    ``fastest`` tells the largest speed of an end so far [m/s].
+    """
+
+    def __init__(
+        self, scene: Scene, pair: Pair, steps: MacroGrid | AdaptiveSteps, fastest: Callable[[], float]
+    ) -> None:
+        self._pair, self._steps, self._fastest = pair, steps, fastest
+        tip_share = 0.0
+        if pair.joinable:
+            assert pair.beam is not None
+            assert pair.spring is not None
+            tip_share = common_velocity(1.0, 0.0, pair.beam.mass, pair.spring.mass)
+        self._functions = EventFunctions(scene, tip_share)
+        self._level = pair.stop or 0.0
+
+    def tolerance(self, ends: Ends) -> float:
+        """What positions can be told apart to [m]."""
+        return position_tolerance(ends, self._level, self._steps.size)
+
+    def passed_at_once(self, ends: Ends) -> float:
+        """The same, or what the ends pass in no time [m]: an event there is at once with what is there."""
+        speed = max(abs(end.velocity) for end in ends)
+        return self.tolerance(ends) + _NO_TIME * self._steps.size * speed
+
+    def _rest(self, ends: Ends) -> float:
+        """Speed below which ends do not move against each other [m/s].
+
+        Velocities are sums of modes that have been as fast as the ends: one that is left of 0, as of a tip that is let
+        go, is rounding.
+        """
+        tip, low = ends
+        return max(1e-12 * max(abs(tip.velocity), abs(low.velocity)), _VELOCITY_ROUNDING * self._fastest())
+
+    def at_start(self, state: State, start: Ends) -> str | None:
+        """The event that is due before any step: its function is 0 and falling."""
+        for index, (value, rate) in enumerate(self._functions.samples(state.phase, start)):
+            if rate < 0.0 and value <= self.tolerance(start) and rate < -self._rest(start):
+                return self._functions.of(state.phase)[index][0]
+        return None
+
+    def first(self, state: State, step: Step) -> tuple[Step, str | None]:
+        """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it."""
+        step, found = self._first_by_position(state, step)
+        if self._pair.compliant and step.size > 0.0:
+            touched = self._touched_inside(state, step)
+            if touched is not step:
+                # The contact force changes where the ends go: what was found may not happen, something else may.
+                step, found = self._first_by_position(state, touched)
+        if step.size == 0.0:
+            return step, found
+        pushing = self._pushing(state.phase)
+        unilateral = None if pushing is None else self._unilateral(state, step, *pushing)
+        if unilateral is None:
+            return self._pair.settled(state, step), found
+        cut, kind = unilateral
+        if 0.0 < cut.size < step.size:
+            # Under the force of the shorter step the ends move differently: they may strike something before.
+            cut, found = self._first_by_position(state, cut)
+            if found is not None:
+                return cut if cut.size == 0.0 else self._pair.settled(state, cut), found
+        return self._pair.settled(state, cut) if cut.size > 0.0 else cut, kind
+
+    def _first_by_position(self, state: State, step: Step) -> tuple[Step, str | None]:
+        """The step, cut to the first event that positions tell of, and its kind; of size 0 if it is at the start."""
+        found: str | None = None
+        functions = self._functions.of(state.phase)
+        for _ in range(2 * len(functions) + 1):
+            candidates, tolerance = [], self.tolerance(step.end)
+            starts = self._functions.samples(state.phase, step.start)
+            ends = self._functions.samples(state.phase, step.end)
+            for (kind, function), start, end in zip(functions, starts, ends, strict=True):
+                # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
+                floor = min(start[0], 0.0) - tolerance
+                if stays_above(start, end, step.size, floor):
+                    continue
+                bracket = self._bracket(state, function, step, floor, start, end)
+                if bracket is None or (kind == found and bracket is step):
+                    continue
+                crossing = cubic_crossing(start, function(bracket.end), bracket.size)
+                candidates.append((crossing, kind, function, bracket))
+            if not candidates:
+                break
+            _, found, function, bracket = min(candidates, key=lambda c: c[0])
+            step = self._located(state, function, bracket)
+            if step.size < _NO_TIME * self._steps.size:
+                # Too short for a contact force: velocities that differ would be turned round by an infinite one.
+                return self._no_step(step), found
+        return step, found
+
+    def _no_step(self, step: Step) -> Step:
+        """No step at all: the bodies back at the mark."""
+        self._pair.rewind()
+        return step._replace(size=0.0, end=step.start)
+
+    # -- events told by positions -----------------------------------------------------------------------------------
+
+    def _bracket(
+        self, state: State, function: EventFunction, step: Step, floor: float, start: Sample, end: Sample
+    ) -> Step | None:
+        """The step itself if ``function`` ends below ``floor``, a shorter one if it dips below it inside, or None."""
+        if end[0] < floor:
+            return step
+        if abs(start[1]) <= self._rest(step.start):
+            # Ends that have just parted may close a little first, by the error of the time at which they were let go.
+            return None
+        inside = lowest_inside(start, end, step.size)
+        if inside is None or cubic_value(start, end, step.size, inside) >= floor:
+            return None
+        dip = self._pair.attempt(state, inside, step.start)
+        return dip if function(dip.end)[0] < floor else None
+
+    def _located(self, state: State, function: EventFunction, bracket: Step) -> Step:
+        last = bracket
+
+        def evaluate(size: float) -> Sample:
+            nonlocal last
+            last = self._pair.attempt(state, size, bracket.start)
+            return function(last.end)
+
+        tolerance = 0.25 * self.tolerance(bracket.end)
+        locate(evaluate, function(bracket.start), function(bracket.end), bracket.size, tolerance, state.time)
+        return last
+
+    def _touched_inside(self, state: State, step: Step) -> Step:
+        """Compliance: a contact that closes and opens inside the step would be missed; it is cut to its middle."""
+        start, end = gap(step.start), gap(step.end)
+        if start[0] < 0.0 or end[0] < 0.0:
+            return step
+        inside = lowest_inside(start, end, step.size)
+        if inside is None or cubic_value(start, end, step.size, inside) >= 0.0:
+            return step
+        cut = self._pair.attempt(state, inside, step.start)
+        return cut if cut.contact[0] > 0.0 else step
+
+    # -- events told by forces --------------------------------------------------------------------------------------
+
+    def _pushing(self, phase: Phase) -> tuple[str, Callable[[Step], Force]] | None:
+        """The event that ends the phase where a force that can only push would pull, and that force."""
+        if phase.seated:
+            return "unseated" if self._pair.spring is not None else "separation", lambda step: step.foundation
+        if phase.joint is Joint.TOUCH and not self._pair.compliant and not self._pair.massless:
+            return "separation", lambda step: step.contact
+        return None
+
+    def _unilateral(
+        self, state: State, step: Step, kind: str, pick: Callable[[Step], Force]
+    ) -> tuple[Step, str] | None:
+        """The step cut where a force that can only push would pull, and the event there."""
+        f = pick(step)
+        if self._pair.degree == 0:
+            return self._unilateral_mean(state, step, kind, f[0])
+        changes = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
+        if f[0] < 0.0:
+            # The sign at the start may be a false alarm: it is one if the ends, let go, close.
+            if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, kind):
+                return self._no_step(step), kind
+            step = self._pair.settled(state, step)
+        if not changes:
+            return None
+        # The polynomial tells where the force of the step vanishes; the step is repeated until it ends there.
+        last, size = step, changes[0]
+        for _ in range(_MAX_FORCE_CUTS):
+            last = self._pair.attempt(state, size, step.start)
+            g = pick(last)
+            value, slope = force.end_value(g, size), g[1] + size * g[2]
+            change = -value / slope if slope < 0.0 else 0.0
+            if not 0.0 < size + change < step.size or abs(change) <= 1e-12 * self._steps.size:
+                break
+            size += change
+        return last, kind
+
+    def _unilateral_mean(self, state: State, step: Step, kind: str, c: float) -> tuple[Step, str] | None:
+        """Degree 0: C belongs to the middle of its step and alternates; means of neighbours do not.
+
+        The line through the last two means tells where the force vanishes, also if that is past this step's middle.
+        """
+        if not state.middles:
+            if c < 0.0 and not state.reclosed and self._opens(state, step, kind):
+                return self._no_step(step), kind
+            return None
+        middle = state.time + 0.5 * step.size
+        points = [(t, n if kind == "unseated" else f) for t, f, n in state.middles] + [(middle, c)]
+        means = [(0.5 * (t0 + t1), 0.5 * (f0 + f1)) for (t0, f0), (t1, f1) in itertools.pairwise(points)]
+        time, mean = means[-1]
+        if mean <= 0.0:
+            if len(means) < 2 and c >= 0.0:
+                return None
+            at = 0.0
+            if len(means) == 2 and means[0][1] > 0.0:
+                at = means[0][0] + (time - means[0][0]) * means[0][1] / (means[0][1] - mean) - state.time
+        elif len(means) == 2 and means[0][1] > mean:
+            at = time + (time - means[0][0]) * mean / (means[0][1] - mean) - state.time
+            if at >= step.size:
+                return None
+        else:
+            return None
+        if at <= _NO_TIME * self._steps.size:
+            return self._no_step(step), kind
+        if at >= step.size:
+            return self._pair.settled(state, step), kind
+        return self._pair.attempt(state, at, step.start), kind
+
+    def _opens(self, state: State, step: Step, kind: str) -> bool:
+        """Do the ends part if they are let go for the step? ("unseated": does the lower end leave the foundation?)"""
+        phase = state.phase
+        if kind == "unseated":
+            assert self._pair.stop is not None
+            low = self._pair.attempt(state, step.size, step.start, Phase(phase.joint)).end[1]
+            return low.displacement > self._pair.stop
+        let_go = Phase(Joint.FREE, phase.seated and self._pair.spring is not None)
+        tip, low = self._pair.attempt(state, step.size, step.start, let_go).end
+        return tip.displacement > low.displacement

@@ -1,0 +1,74 @@
+"""The energy ledger of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import NamedTuple
+
+from ..bodies.memory import Memory
+from ..bodies.protocol import Energies
+from ..scene import Scene
+from ..scene.tables import ORDINARY_SCHEMES
+
+#: Relative energy residual up to which a coupling that creates no energy is exact: rounding and solvers' tolerances.
+EXACT = 1e-8
+#: The same where a scheme, an integrator or Algorithm 1 changes the energy itself.
+APPROXIMATE = 1e-3
+#: A solver's tolerance counts so often: 1e-12 is `EXACT`.
+_TOLERANCES = EXACT / 1e-12
+
+
+def bounds(scene: Scene) -> tuple[float, float]:
+    """Relative energy residuals above which a run warns, and above which it stops."""
+    coupling, beam = scene.coupling, scene.beam
+    changes = coupling.scheme == "hermite" or coupling.scheme in ORDINARY_SCHEMES or scene.contact.law == "paper"
+    if changes or (beam is not None and beam.damped_numerically):
+        return APPROXIMATE, 0.1
+    tolerance = max(coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)
+    return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
+
+
+class Booked(NamedTuple):
+    """A row's energies [J], in the order of `springbeam.results.trajectory.COLUMNS`."""
+
+    e_beam: float
+    e_spring: float
+    e_contact: float
+    e_dissipated: float
+    e_impact_loss: float
+    e_load: float
+    e_total: float
+    energy_residual: float
+
+
+@dataclass
+class Ledger(Memory):
+    """E_beam + E_spring + E_contact + dissipated + impact losses − work of external loads = constant."""
+
+    impact_loss: float = 0.0  #: [J], by whoever applies an impact
+    initial: float | None = None  #: the total of the first row [J]
+    scale: float = 0.0  #: the largest energy so far [J]
+    largest_residual: float = 0.0  #: [J]
+    relative: float = 0.0  #: the largest residual over the scale at its time
+    gain: float = 0.0  #: the same of the residuals that are positive
+
+    def book(self, beam: Energies, spring: Energies, contact: float) -> Booked:
+        """The next row; ``contact`` is the energy of the contact law [J].
+
+        One that is not finite changes nothing: it is no row of the results.
+        """
+        (kinetic, potential, dissipated, load), (kinetic_2, potential_2, dissipated_2, load_2) = beam, spring
+        e_beam, e_spring = kinetic + potential, kinetic_2 + potential_2
+        dissipated, load, lost = dissipated + dissipated_2, load + load_2, self.impact_loss
+        total = e_beam + e_spring + contact + dissipated + lost + load
+        if (initial := self.initial) is None:
+            self.initial = initial = total
+        residual = total - initial
+        if isfinite(residual):
+            self.scale = scale = max(self.scale, abs(initial), e_beam + abs(e_spring) + contact)
+            self.largest_residual = max(self.largest_residual, abs(residual))
+            if scale > 0.0:
+                self.relative = max(self.relative, abs(residual) / scale)
+                self.gain = max(self.gain, residual / scale)
+        return Booked(e_beam, e_spring, contact, dissipated, lost, load, total, residual)

@@ -1,0 +1,120 @@
+"""How wrong a step is, told from the step itself, for `springbeam.run.macro_steps.AdaptiveSteps`.
+
+Nothing is computed twice for it: conditions of higher order than those the scheme has imposed are looked at where the
+step has them anyway (``docs/coupling.md``, "Adaptive macro steps").
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from ..bodies import force
+from ..bodies.memory import Memory
+from ..bodies.protocol import Motion
+from ..contact.phases import Joint
+from ..coupling import energy, hermite
+from ..coupling.compliance import force_change
+from ..scene import Scene
+from .stepping import Pair, State, Step
+
+#: Joined, the cubic through a step's ends is only looked at for events; it is within this fraction of the motion.
+_SEEN = 1e-2
+#: Displacements are rounded to so many ulp.
+_ULPS, _EPS = 16.0, 2.0**-52
+#: Order of the cubic.
+_CUBIC = 4
+
+
+class LocalError(Memory):
+    """Estimates relative to the tolerances of a scene, and the scales that these are relative to."""
+
+    REMEMBERED = ("_lowest", "_highest", "_fastest")
+
+    def __init__(self, scene: Scene, pair: Pair) -> None:
+        self._scene, self._pair = scene, pair
+        self._relative = scene.coupling.relative_tolerance or 0.0
+        self._absolute = scene.coupling.absolute_tolerance or 0.0
+        ends = pair.ends()
+        self._lowest = self._highest = (ends[0].displacement, ends[1].displacement)  #: positions of the ends so far [m]
+        self._fastest = 0.0  #: [m/s]
+
+    def of(self, state: State, step: Step, energy_scale: float) -> tuple[float, int]:
+        """The step's error, 1 is the tolerance, and the order in which it falls with the size of the step.
+
+        ``energy_scale`` is the largest energy so far [J].
+        """
+        pair, size = self._pair, step.size
+        ranges = self._ranges(step)
+        cubic = [_beside_cubic(a, b, size) for a, b in zip(step.start, step.end, strict=True)]
+        span = min((r for r in ranges if r > 0.0), default=0.0)
+        if span == 0.0:
+            return 0.0, _CUBIC
+        tolerance = self._relative + self._absolute / span
+        if pair.compliant:
+            law = self._scene.contact
+            change = force_change(step.start, step.end, law.stiffness, law.exponent)
+            of_speed = size * change / (12.0 * self._reduced_mass() * self._speed(step)) if change > 0.0 else 0.0
+            return max(self._curve(cubic, ranges, self._relative), (of_speed / tolerance, 2))
+        if state.phase.joint is Joint.FREE:
+            return self._curve(cubic, ranges, self._relative)
+        seen = self._curve(cubic, ranges, max(self._relative, _SEEN))
+        gaps = [Motion(*(x - y for x, y in zip(*ends, strict=True))) for ends in (step.start, step.end)]
+        degree = pair.degree
+        if self._scene.coupling.scheme == "hermite":
+            of_length, order = hermite.gap_inside(gaps[1], size, degree) / span, hermite.ORDER_INSIDE[degree]
+            work = abs(force.work(step.contact, gaps[1], size))
+            of_energy = work / energy_scale if work > 0.0 else 0.0
+            return max(seen, (of_length / tolerance, order), (of_energy / tolerance, order + 1))
+        # Of the motion's energy, and of its length (all that a massless tip has).
+        created, order = energy.created_mismatch(gaps[0], gaps[1], degree), energy.ORDER_CREATED[degree]
+        of_energy = created * sqrt(0.5 * self._reduced_mass() / energy_scale) if energy_scale > 0.0 else 0.0
+        of_length = size * created / (6.0 * span)
+        return max(seen, (of_energy / tolerance, order), (of_length / tolerance, order + 1))
+
+    def accept(self, step: Step) -> None:
+        """The motion has come so far."""
+        self._fastest = self._speed(step)
+        for end in (step.start, step.end):
+            self._lowest = (min(self._lowest[0], end[0].displacement), min(self._lowest[1], end[1].displacement))
+            self._highest = (max(self._highest[0], end[0].displacement), max(self._highest[1], end[1].displacement))
+
+    def _ranges(self, step: Step) -> list[float]:
+        """Lengths over which the ends have moved, with this step [m]."""
+        ranges = []
+        for i, (low, high) in enumerate(zip(self._lowest, self._highest, strict=True)):
+            a, b = step.start[i].displacement, step.end[i].displacement
+            ranges.append(max(high, a, b) - min(low, a, b))
+        return ranges
+
+    def _speed(self, step: Step) -> float:
+        return max(self._fastest, *(abs(end.velocity) for ends in (step.start, step.end) for end in ends))
+
+    def _curve(self, errors: list[float], ranges: list[float], relative: float) -> tuple[float, int]:
+        allowed = (self._absolute + relative * r for r in ranges)
+        told = zip(errors, ranges, allowed, self._told_apart(), strict=True)
+        ratios = [e / (a + least) for e, r, a, least in told if r > 0.0]
+        return max(ratios, default=0.0), _CUBIC
+
+    def _told_apart(self) -> list[float]:
+        """Up to where displacements of the ends are rounding, and the spring's tolerance [m]: no step is too long for
+        that, though from rest the motion so far is shorter still."""
+        reach = [max(abs(low), abs(high)) for low, high in zip(self._lowest, self._highest, strict=True)]
+        tip, lower = (_ULPS * _EPS * r for r in reach)
+        if (spring := self._scene.spring) is not None:
+            lower += spring.relative_tolerance * reach[1] + spring.absolute_tolerance
+        return [tip, lower]
+
+    def _reduced_mass(self) -> float:
+        masses = [body.mass for body in (self._pair.beam, self._pair.lower) if body is not None]
+        return 1.0 / sum(1.0 / m for m in masses) if min(masses) > 0.0 else 0.0
+
+
+def _beside_cubic(start: Motion, end: Motion, size: float) -> float:
+    """How far, as means over the step, the motion is from the cubic through its ends [m].
+
+    ∫w of the cubic is H (w₀ + w₁)/2 + H² (v₀ − v₁)/12, ∫∫w is H² (7w₀ + 3w₁)/20 + H³ (v₀/20 − v₁/30).
+    """
+    w0, v0, w1, v1 = *start[:2], *end[:2]
+    mean = end.integral / size - 0.5 * (w0 + w1) - size * (v0 - v1) / 12.0
+    moment = end.integral_2 / size**2 - (7.0 * w0 + 3.0 * w1) / 20.0 - size * (v0 / 20.0 - v1 / 30.0)
+    return max(abs(mean), 2.0 * abs(moment))

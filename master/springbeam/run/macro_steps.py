@@ -1,0 +1,131 @@
+"""Where macro steps end: on the grid t₀ + k H, which events do not shift, or where an error estimate allows."""
+
+from __future__ import annotations
+
+from math import ceil, log2
+
+from ..bodies.memory import Memory
+
+#: A remainder of the macro grid shorter than this fraction of H joins the next step.
+_SHORT_REMAINDER = 0.25
+#: The first step after an impact, as a fraction of H: ends that have just met often part or meet again within H.
+_AFTER_IMPACT = 0.125
+#: Times closer than this fraction of H are one.
+_SAME = 1e-9
+
+#: Adaptive sizes are the run's length times 2^(−k/4): few enough for the coupling to remember its response to each.
+_PER_OCTAVE = 4
+#: k/4 of the first step, of the longest and of the shortest.
+_FIRST, _LONGEST, _SHORTEST = 14, 2, 40
+#: A step is changed by at most these factors at once, and aims below the tolerance by the safety factor.
+_SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
+
+
+class MacroGrid(Memory):
+    """The grid t₀ + k H up to t_end [s]."""
+
+    REMEMBERED = ("_index", "_struck")
+
+    def __init__(self, start: float, end: float, macro_step: float) -> None:
+        self._start, self._end = start, end
+        self.size = macro_step  #: H [s]
+        self._index = 0
+        self._struck = False
+
+    def next(self, time: float) -> tuple[float, float]:
+        """The time at which the step from ``time`` should end, and its size (exactly H where it is a whole one)."""
+        H = self.size
+        if self._struck:
+            self._struck = False
+            size = _AFTER_IMPACT * H
+            if time + size < self._end:
+                return time + size, size
+        target = self._start + (self._index + 1) * H
+        size = target - time
+        on_grid = abs(size - H) <= _SAME * H
+        if size < _SHORT_REMAINDER * H:
+            self._index += 1
+            target, size, on_grid = target + H, size + H, False
+        if target >= self._end - _SAME * H:
+            target, size = self._end, self._end - time
+            on_grid = abs(size - H) <= _SAME * H
+        return target, H if on_grid else size
+
+    def reached(self, time: float) -> None:
+        """Grid points up to ``time`` are behind."""
+        start, H = self._start, self.size
+        latest = time + _SAME * H
+        while start + (self._index + 1) * H <= latest:
+            self._index += 1
+
+    def struck(self) -> None:
+        """An impact has just changed velocities."""
+        self._struck = True
+
+
+class AdaptiveSteps(Memory):
+    """Sizes that keep the error of each step at its tolerance.
+
+    The error of a step of size H goes as H^order, so the next one is 0.9 (tolerance/error)^(1/order) times as long,
+    rounded down to the sizes there are. A step above the tolerance is rejected and repeated; the one after it does not
+    grow. A step that an event has cut says nothing about the next.
+
+    Parameters
+    ----------
+    start, end
+        The run [s].
+    """
+
+    REMEMBERED = ("_rung", "_just_rejected", "rejections")
+
+    def __init__(self, start: float, end: float) -> None:
+        self._end, self._length = end, end - start
+        self._rung = _FIRST * _PER_OCTAVE
+        self._just_rejected = False
+        self.rejections = 0
+
+    @property
+    def size(self) -> float:
+        """H [s] of a whole step from here."""
+        return self._length * float(2.0 ** (-self._rung / _PER_OCTAVE))
+
+    def next(self, time: float) -> tuple[float, float]:
+        """The time at which the step from ``time`` should end, and its size."""
+        size, left = self.size, self._end - time
+        return (self._end, left) if left <= (1.0 + _SHORT_REMAINDER) * size else (time + size, size)
+
+    def reached(self, time: float) -> None:
+        """Events shift what follows."""
+
+    def struck(self) -> None:
+        """Error estimates tell by themselves."""
+
+    def judge(self, size: float, error: float, order: int) -> bool:
+        """Whether a step of ``size`` [s] with ``error`` (1 is the tolerance) holds; `size` is then that of the next.
+
+        Raises
+        ------
+        StepTooShort
+            If it does not hold and there is no shorter one.
+        """
+        factor = _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
+        if error <= 1.0:
+            self._rung = self._rung_below(size * min(factor, 1.0 if self._just_rejected else _GROW))
+            self._just_rejected = False
+            return True
+        self.rejections += 1
+        self._just_rejected = True
+        self._rung = max(self._rung + 1, self._rung_below(size * max(factor, _SHRINK)))
+        if self._rung > _SHORTEST * _PER_OCTAVE:
+            raise StepTooShort(size)
+        return False
+
+    def _rung_below(self, size: float) -> int:
+        return max(_LONGEST * _PER_OCTAVE, ceil(_PER_OCTAVE * log2(self._length / size) - _SAME))
+
+
+class StepTooShort(RuntimeError):
+    """The error estimate stays above the tolerance however short the step."""
+
+    def __init__(self, size: float) -> None:
+        super().__init__(f"the error stays above the tolerance, down to a macro step of {size:.3g} s")

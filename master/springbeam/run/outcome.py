@@ -1,0 +1,25 @@
+"""How a run tells of its progress, and how it ends early."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import isfinite
+
+#: ``progress(time, phase, macro_steps)``, called once per accepted step.
+Progress = Callable[[float, str, int], None]
+#: Cause of a run that ends because a number has become too large.
+OVERFLOW = "a force, an energy or a position is larger than a double holds"
+
+
+class RunStopped(RuntimeError):
+    """The run ended before t_end; everything up to ``time`` [s] has been recorded.
+
+    ``residual`` [m] is that of the conditions that could not be met, ``None`` where the cause is another.
+    """
+
+    def __init__(self, cause: str, time: float, residual: float | None = None) -> None:
+        if residual is not None and not isfinite(residual):
+            residual = None
+        at = "" if residual is None else f", residual {residual:.3g} m"
+        super().__init__(f"stopped at t = {time:.9g} s: {cause}{at}")
+        self.cause, self.time, self.residual = cause, time, residual

@@ -1,0 +1,66 @@
+"""What a run reports of each accepted step: a row, and now and then the beam's shape."""
+
+from __future__ import annotations
+
+from operator import itemgetter
+
+from ..bodies.memory import Memory
+from ..bodies.protocol import BeamBody
+from ..contact.phases import Joint
+from ..coupling.compliance import compliance_force
+from ..results.recording import Recorder
+from ..results.trajectory import COLUMNS
+from ..scene import Scene
+from .ledger import Ledger
+from .stepping import Pair, State
+
+#: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
+_SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
+
+
+class Rows(Memory):
+    """Writes rows and shapes of a pair into a recorder, and keeps their extremes."""
+
+    REMEMBERED = ("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed")
+
+    def __init__(self, scene: Scene, pair: Pair, ledger: Ledger, recorder: Recorder, start_time: float) -> None:
+        self._pair, self._ledger, self._recorder = pair, ledger, recorder
+        self._shapes_left = _SHAPES_AFTER_CONTACT
+        self._next_shape = start_time
+        self._equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
+        self._law = (scene.contact.stiffness, scene.contact.exponent)
+        self._shape_every = scene.time.t_end / _SHAPES_OVER_RUN
+        #: The columns of the scene, out of all.
+        self._present = itemgetter(*(COLUMNS.index(name) for name in recorder.columns))
+        self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
+        self.largest_speed = 0.0  #: of tip and lower end [m/s]
+
+    def write(self, state: State) -> None:
+        """The row of the present state. Raises NonFiniteValue."""
+        pair, time, phase = self._pair, state.time, state.phase
+        (u, v, _, _), (y, z, _, _) = pair.ends()
+        joined = phase.joint is not Joint.FREE
+        contact = smoothed = state.contact[0]
+        inside, mismatch = 0.0, v - z if joined else 0.0
+        if pair.compliant:
+            contact = smoothed = inside = compliance_force(y - u, *self._law)
+        else:
+            if joined:
+                smoothed = state.smoothed
+                self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
+            if pair.joinable:
+                inside = compliance_force(self._equilibrium - u, *self._law)
+        self.largest_speed = max(self.largest_speed, abs(v), abs(z))
+        forces = (contact, smoothed, inside, contact - inside, state.foundation[0])
+        row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *self._ledger.book(*pair.energies()))
+        self._recorder.row(self._present(row))
+        if pair.beam is not None:
+            early = joined and self._shapes_left > 0
+            if early or time >= self._next_shape:
+                self._shape(pair.beam, time, early)
+
+    def _shape(self, beam: BeamBody, time: float, early: bool) -> None:
+        self._shapes_left -= early
+        while self._next_shape <= time:
+            self._next_shape += self._shape_every
+        self._recorder.shape(time, beam.shape())

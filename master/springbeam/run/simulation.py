@@ -1,0 +1,342 @@
+"""The master's run: macro steps from event to event.
+
+One step is *mark* (the bodies remember their state), *attempt* (advance under the phase's law; may be repeated with
+any size, each time from the mark; `springbeam.run.stepping`), *detect* (which event comes first inside the step?
+`springbeam.run.detection`) and *accept*. An event shortens the step to itself, acts (`springbeam.contact.phases`), and
+the run goes on from there. Every row closes the ledger (`springbeam.run.rows`, `springbeam.run.ledger`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..bodies.memory import Memory
+from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, StepRefused
+from ..contact.events import cubic_crossing, gap, interpolated
+from ..contact.phases import Joint, Phase, Transitions
+from ..coupling.tie import NotConverged
+from ..results.recording import NonFiniteValue, Recorder
+from ..results.trajectory import Event
+from ..scene import Scene
+from ..scene.automatic import decided
+from ..scene.resolution import not_resolved
+from .detection import Detector
+from .ledger import Ledger, bounds
+from .local_error import LocalError
+from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
+from .outcome import OVERFLOW, Progress, RunStopped
+from .rows import Rows
+from .stepping import Pair, State, Step
+
+#: A step that is refused is halved this often before the run stops.
+_MAX_HALVINGS = 20
+#: Events closer than this fraction of H are at once; so many of them and the contact is said to chatter. Impacts that
+#: die out are up to 370 (e = 0.997) between this and `_NO_TIME` of `springbeam.run.detection`, where they are seated.
+_AT_ONCE, _MAX_EVENTS_AT_ONCE = 1e-6, 500
+#: Events within H. Impacts that die out are up to 18,000 (e = 0.999); those of a lossy body on a lossless stop are
+#: without end.
+_MAX_EVENTS_IN_STEP = 20_000
+
+
+class Simulation(Memory):
+    """One run of a scene with given bodies.
+
+    Parameters
+    ----------
+    scene
+        What is simulated.
+    start_time
+        Where the run starts [s], `springbeam.scene.Scene.contact_time` or 0.
+    beam, spring
+        The bodies at the start time; ``None`` where the scene has none.
+    recorder
+        Receives rows, events and shapes.
+    progress
+        Called once per accepted step.
+    """
+
+    REMEMBERED = (
+        "_pair",
+        "_state",
+        "_steps",
+        "_error",
+        "_transitions",
+        "_ledger",
+        "_rows",
+        "_begun",
+        "_last_opening",
+        "_at_once",
+        "_in_step",
+        "_macro_steps",
+        "_events",
+        "_halvings",
+    )
+
+    def __init__(
+        self,
+        scene: Scene,
+        start_time: float,
+        beam: BeamBody | None,
+        spring: Body | None,
+        recorder: Recorder,
+        progress: Progress | None = None,
+    ) -> None:
+        scene, self._choice = decided(scene)
+        self._scene, self._recorder, self._progress = scene, recorder, progress
+        self._pair = Pair(scene, beam, spring)
+        self._state = State(start_time)
+        self._steps: MacroGrid | AdaptiveSteps
+        if scene.coupling.adaptive:
+            self._steps = AdaptiveSteps(start_time, scene.time.t_end)
+        else:
+            self._steps = MacroGrid(start_time, scene.time.t_end, scene.coupling.H)
+        self._error = LocalError(scene, self._pair) if scene.coupling.adaptive else None
+        self._detector = Detector(scene, self._pair, self._steps, self._fastest)
+        self._transitions = Transitions(
+            scene, None if beam is None else beam.mass, None if spring is None else spring.mass, self._fastest
+        )
+        self._ledger = Ledger()
+        self._energy_warns, self._energy_stops = bounds(scene)
+        self._rows = Rows(scene, self._pair, self._ledger, recorder, start_time)
+        self._begun = False
+        self._last_opening = -float("inf")
+        self._at_once = (0, start_time)  #: events at once, and since when [s]
+        self._in_step = (0, start_time)  #: the same within one macro step
+        self._macro_steps = self._events = self._halvings = 0
+
+    def run(self) -> None:
+        """Until t_end, from the start or from where `restore` has put it.
+
+        Raises RunStopped; what was computed is with the recorder.
+        """
+        try:
+            self._run()
+        except (BodyFailed, NonFiniteValue) as failed:
+            raise RunStopped(str(failed), self.time) from failed
+        except OverflowError as error:
+            raise RunStopped(OVERFLOW, self.time) from error
+
+    @property
+    def time(self) -> float:
+        """Reached so far [s]."""
+        return self._state.time
+
+    def _fastest(self) -> float:
+        """The largest speed of an end so far [m/s]."""
+        return self._rows.largest_speed
+
+    def _run(self) -> None:
+        state, steps, t_end = self._state, self._steps, self._scene.time.t_end
+        if not self._begun:
+            self._settle_start()
+            self._record()
+            self._begun = True
+        while state.time < t_end:
+            target, size = steps.next(state.time)
+            step, event = self._advance(size)
+            whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
+            end = target if whole else state.time + step.size
+            self._count_events(end, step.size)
+            if step.size > 0.0:
+                if self._error is not None:
+                    self._error.accept(step)
+                state.accept(step, end)
+                self._pair.accept(step)
+                self._macro_steps += 1
+                if self._pair.compliant:
+                    self._note_contact(step)
+            steps.reached(state.time)
+            if event is not None:
+                self._act(event, step)
+            self._record()
+            if self._progress is not None:
+                self._progress(state.time, state.phase.name, self._macro_steps)
+
+    def _advance(self, size: float) -> tuple[Step, str | None]:
+        """The next step and the event it ends on, the bodies left at its end."""
+        state, pair = self._state, self._pair
+        pair.mark()
+        start = pair.ends()
+        halvings = 0
+        while True:
+            try:
+                at_start = self._detector.at_start(state, start)
+                if at_start is not None:
+                    return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
+                step = pair.attempt(state, size, start)
+                if self._error is None or self._holds(step, self._error):
+                    return self._detector.first(state, step)
+                pair.rewind()
+                size = self._steps.size
+            except (StepRefused, OverflowError) as refused:
+                pair.rewind()
+                if halvings == _MAX_HALVINGS:
+                    residual = refused.residual if isinstance(refused, NotConverged) else None
+                    cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
+                    raise RunStopped(cause, state.time, residual) from refused
+                halvings += 1
+                self._halvings += 1
+                size *= 0.5
+
+    def _holds(self, step: Step, local_error: LocalError) -> bool:
+        """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set."""
+        assert isinstance(self._steps, AdaptiveSteps)
+        error, order = local_error.of(self._state, step, self._ledger.scale)
+        try:
+            return self._steps.judge(step.size, error, order)
+        except StepTooShort as too_short:
+            raise RunStopped(f"{too_short}, where it is {error:.3g} of it", step.time) from too_short
+
+    # -- events -----------------------------------------------------------------------------------------------------
+
+    def _count_events(self, end: float, size: float) -> None:
+        """Of a step that ends at ``end`` [s] after ``size`` [s], maybe on an event. Raises RunStopped."""
+        H = self._steps.size
+        if size >= H:
+            self._at_once = self._in_step = (1, end)
+            return
+        at_once, since = self._at_once
+        self._at_once = (at_once + 1, since) if end - since <= _AT_ONCE * H else (1, end)
+        if at_once >= _MAX_EVENTS_AT_ONCE:
+            raise RunStopped(f"the contact chatters: {at_once} events at once", self._state.time)
+        in_step, since = self._in_step
+        self._in_step = (in_step + 1, since) if end - since <= H else (1, end)
+        if in_step >= _MAX_EVENTS_IN_STEP:
+            raise RunStopped(
+                f"the contact chatters: {in_step} events within a macro step of {H:g} s; a restitution below 1 "
+                "lets impacts die out",
+                self._state.time,
+            )
+
+    def _settle_start(self) -> None:
+        """First contact at the start: the tip on the spring top (or the stop), moving down or at rest."""
+        state, pair = self._state, self._pair
+        if pair.beam is None or pair.lower is None or pair.compliant:
+            return
+        tip, low = start = pair.ends()
+        tolerance = self._detector.tolerance(start) + 1e-12 * abs(low.displacement)
+        if abs(tip.displacement - low.displacement) > tolerance or tip.velocity - low.velocity > 0.0:
+            return
+        pair.mark()
+        # The bodies are recorded as they arrive: the ledger starts before the impact.
+        self._ledger.book(*pair.energies())
+        at_start = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
+        self._act("impact" if pair.joinable else "stop_impact", at_start)
+
+    def _act(self, kind: str, step: Step) -> None:
+        """The event at the end of ``step`` happens."""
+        state, pair = self._state, self._pair
+        if kind in ("separation", "release"):
+            self._last_opening = state.time
+        if kind == "impact":
+            state.reclosed = state.time - self._last_opening <= _AT_ONCE * self._steps.size
+        ends = pair.ends()
+        tolerance = self._detector.passed_at_once(ends) if kind == "impact" else self._detector.tolerance(ends)
+        kind, phase, impact = self._transitions.happens(
+            kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
+        )
+        if kind in ("impact", "stop_impact"):
+            self._steps.struck()
+        pair.apply_impulses(impact.on_beam, impact.on_spring)
+        lost = impact.energy_loss + pair.massless_tip(phase)
+        self._ledger.impact_loss += lost
+        state.enter(phase)
+        tip, low = pair.ends()
+        beam, spring = pair.beam is not None, pair.spring is not None
+        self._events += 1
+        self._recorder.event(
+            Event(
+                state.time,
+                kind,
+                low.displacement if spring else None,
+                low.velocity if spring else None,
+                tip.displacement if beam else None,
+                tip.velocity if beam else None,
+                impact.on_beam,
+                impact.of_foundation,
+                lost,
+            )
+        )
+
+    def _note_contact(self, step: Step) -> None:
+        """Compliance: opening and closing are nothing special, they are told from the step that crossed."""
+        before, after = gap(step.start), gap(step.end)
+        touching = after[0] < 0.0
+        self._state.phase = Phase(Joint.TOUCH if touching else Joint.FREE, self._state.phase.seated)
+        if (before[0] < 0.0) == touching:
+            return
+        if touching:
+            at = 0.0 if before[0] == 0.0 else cubic_crossing(before, after, step.size)
+        else:  # backwards in time it closes
+            at = step.size - cubic_crossing((after[0], -after[1]), (before[0], -before[1]), step.size)
+        ends = [interpolated(step.start[i], step.end[i], step.size, at) for i in (1, 0)]
+        self._events += 1
+        values = [x for end in ends for x in end]
+        self._recorder.event(Event(step.time + at, "impact" if touching else "separation", *values))
+
+    # -- what is reported -------------------------------------------------------------------------------------------
+
+    def _record(self) -> None:
+        self._rows.write(self._state)
+        # What numerical damping takes is not an error; what it brings is.
+        if (self._ledger.gain if self._numerically_damped else self._ledger.relative) > self._energy_stops:
+            raise RunStopped(self._energy_cause(), self._state.time)
+        one_way, allowed = self._pair.one_way, self._scene.coupling.feedback_tolerance
+        if one_way is not None and one_way.share > allowed:
+            raise RunStopped(
+                f"coupling.feedback = {self._scene.coupling.feedback!r} may by now neglect {one_way.neglected:.3g} m "
+                f"of the driving end's motion, {one_way.share:.2g} of the largest penetration; allowed is "
+                f"coupling.feedback_tolerance = {allowed:g}. Take 'two_way', or allow more",
+                self._state.time,
+            )
+
+    @property
+    def _numerically_damped(self) -> bool:
+        beam = self._scene.beam
+        return beam is not None and beam.damped_numerically
+
+    def _energy_cause(self) -> str:
+        coupling, beam = self._scene.coupling, self._scene.beam
+        causes, remedies = [], []
+        if self._pair.lossy:
+            causes.append(f"{coupling.scheme} of degree {coupling.degree}")
+            remedies.append(
+                f"the macro step {self._steps.size:g} s is too large for it; take a smaller one, or "
+                "coupling.scheme = 'energy'"
+            )
+        if self._numerically_damped:
+            assert beam is not None
+            causes.append(f"beam.rho_inf = {beam.rho_inf:g}")
+            remedies.append("no column books what numerical damping takes; beam.rho_inf = 1 takes nothing")
+        if not causes:
+            causes.append("rounding, or a solver's tolerance,")
+            remedies.append("the results are not to be trusted; try another coupling.macro_step")
+        percent = 100.0 * self._ledger.relative
+        return f"{' with '.join(causes)} has changed the energy by {percent:.2g} %: {'; '.join(remedies)}"
+
+    def summary(self) -> dict[str, Any]:
+        """Counts, residuals and warnings, as they go into ``summary.json``."""
+        warnings, rows = [], self._rows
+        if self._ledger.relative > self._energy_warns:
+            warnings.append(self._energy_cause())
+        unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed)
+        if unresolved is not None:
+            warnings.append(unresolved)
+        one_way = self._pair.one_way
+        neglected = {} if one_way is None else {"neglected_motion": one_way.neglected, "neglected_share": one_way.share}
+        coupling = {} if self._choice is None else {"coupling": self._choice._asdict()}
+        return {
+            **neglected,
+            **coupling,
+            "time": self._state.time,
+            "macro_steps": self._macro_steps,
+            "events": self._events,
+            "halved_steps": self._halvings,
+            **({"rejected_steps": self._steps.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
+            "iterations": self._pair.iterations,
+            "max_energy_residual": self._ledger.relative,
+            "max_energy_residual_joule": self._ledger.largest_residual,
+            "max_velocity_mismatch": rows.largest_mismatch,
+            "resolved": unresolved is None,
+            "warnings": warnings,
+        }

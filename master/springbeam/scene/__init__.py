@@ -1,0 +1,31 @@
+"""What is simulated: scene files, their keys, and what follows from them before anything is built or loaded.
+
+Imports nothing else of the package. Floors, from below: ``tables`` (the keys) → ``statics`` → ``scene`` (all tables) →
+``rules``, ``messages`` → ``reading`` (files, overrides; start here) → estimates: ``linearised``, ``resolution``,
+``automatic``. ``shipped/`` has the scenes that come with the package.
+"""
+
+from .messages import key_kind, scene_keys
+from .reading import load_scene, parse_value, scene_from_dict, shipped_scenes, with_changes
+from .rules import suspicions
+from .scene import Scene
+from .tables import Beam, Contact, Coupling, SceneError, Spring, Stop, Time
+
+__all__ = [
+    "Beam",
+    "Contact",
+    "Coupling",
+    "Scene",
+    "SceneError",
+    "Spring",
+    "Stop",
+    "Time",
+    "key_kind",
+    "load_scene",
+    "parse_value",
+    "scene_from_dict",
+    "scene_keys",
+    "shipped_scenes",
+    "suspicions",
+    "with_changes",
+]

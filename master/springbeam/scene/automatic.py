@@ -1,0 +1,55 @@
+"""``coupling.scheme = "auto"``: `hermite` where it is stable and the motion resolved, `energy` elsewhere.
+
+The choice depends on the scene alone (``docs/coupling.md``, "The scheme that fits").
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .linearised import spring_frequency
+from .reading import with_changes
+from .resolution import TURN, mesh_frequency, slowest_frequency
+from .scene import Scene
+
+#: Largest ω_max H at which `hermite` of degree 2 is taken; amplification has been seen from 3.2 on.
+STABLE = 3.0
+
+
+class Choice(NamedTuple):
+    """What couples the scene, and why."""
+
+    scheme: str
+    degree: int
+    because: str
+
+
+def choice(scene: Scene) -> Choice:
+    """The scheme and degree for ``scene``, whatever its own say."""
+    beam, coupling = scene.beam, scene.coupling
+    if scene.contact.law != "transmission":
+        return Choice("energy", 0, f'contact.law = "{scene.contact.law}"')
+    if beam is None:
+        return Choice("energy", 0, "one body")
+    if beam.integrator != "modal":
+        return Choice("energy", 0, f'beam.integrator = "{beam.integrator}"')
+    if beam.fidelity == "quasi_static":
+        return Choice("energy", 2, 'beam.fidelity = "quasi_static"')
+    if coupling.macro_step is None:
+        return Choice("hermite", 2, "the steps follow from tolerances")
+    H = coupling.macro_step
+    fastest = max(mesh_frequency(beam), 0.0 if scene.spring is None else spring_frequency(scene))
+    if fastest * H <= STABLE:
+        return Choice("hermite", 2, f"ω_max H = {fastest * H:.3g} <= {STABLE:g}")
+    slowest = slowest_frequency(beam)
+    if slowest * H <= TURN:
+        return Choice("energy", 2, f"ω_max H = {fastest * H:.3g} > {STABLE:g}")
+    return Choice("energy", 0, f"ω₁H = {slowest * H:.3g} > {TURN:g}")
+
+
+def decided(scene: Scene) -> tuple[Scene, Choice | None]:
+    """The scene with a scheme and a degree in place of ``"auto"``, and why these; ``None`` if it names its own."""
+    if scene.coupling.scheme != "auto":
+        return scene, None
+    taken = choice(scene)
+    return with_changes(scene, coupling={"scheme": taken.scheme, "degree": taken.degree}), taken

@@ -1,0 +1,116 @@
+"""Say in words what is wrong with a key or a value, and what would be allowed."""
+
+from __future__ import annotations
+
+import datetime
+import difflib
+import json
+import re
+from collections.abc import Iterable
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from .scene import TABLES, Scene
+from .tables import SceneError
+
+
+def scene_keys() -> list[str]:
+    """All keys as ``table.key``."""
+    return [f"{table}.{key}" for table, model in TABLES.items() for key in model.model_fields]
+
+
+def key_kind(table: str, key: str) -> type:
+    """What ``[table] key`` takes, of int, float, bool and str. Raises SceneError if there is no such key."""
+    if table not in TABLES:
+        raise SceneError(_explain_top("extra_forbidden", {}, table))
+    if key not in TABLES[table].model_fields:
+        raise SceneError(f"[{table}] {key}: unknown key; {_nearest_key(table, key)}")
+    kinds = {get_origin(part) or part for part in _alternatives(TABLES[table].model_fields[key].annotation)}
+    return next((kind for kind in (int, bool, float) if kind in kinds), str)
+
+
+def _alternatives(annotation: Any) -> tuple[Any, ...]:
+    return get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
+
+
+def explain(error: Any) -> list[str]:
+    """Lines ``[table] key = value: what is wrong and what would be allowed`` for one of pydantic's errors."""
+    kind, value, loc = error["type"], error["input"], [str(part) for part in error["loc"]]
+    if kind == "value_error":
+        prefix = f"[{loc[0]}] " if loc else ""
+        return [prefix + line for line in error["msg"].removeprefix("Value error, ").splitlines()]
+    if len(loc) == 1:
+        return [_explain_top(kind, value, loc[0])]
+    table, key = loc[0], ".".join(map(_bare, loc[1:]))
+    if kind == "extra_forbidden":
+        return [f"[{table}] {key}: unknown key; {_nearest_key(table, key)}"]
+    if kind == "missing":
+        return [f"[{table}] {key}: missing; must be {_allowed(TABLES[table].model_fields[key])}"]
+    return [f"[{table}] {key} = {_toml(value)}: must be {_allowed(TABLES[table].model_fields[key])}"]
+
+
+def _explain_top(kind: str, value: Any, name: str) -> str:
+    if kind == "missing":
+        return f"[{name}]: missing table; it must have {', '.join(TABLES[name].model_fields)}"
+    if kind == "extra_forbidden" and isinstance(value, dict):
+        return f"[{_bare(name)}]: unknown table; {nearest(name, TABLES)}allowed: {', '.join(TABLES)}"
+    if kind == "extra_forbidden":
+        return f"{_bare(name)} = {_toml(value)}: unknown key outside a table; {_nearest_key('', name)}"
+    allowed = _allowed(Scene.model_fields[name]) if name not in TABLES else f"a table, written as [{name}]"
+    return f"{name} = {_toml(value)}: must be {allowed}"
+
+
+def nearest(name: str, candidates: Iterable[str]) -> str:
+    close = difflib.get_close_matches(name, candidates, n=1)
+    return f"did you mean {close[0]}? " if close else ""
+
+
+def _nearest_key(table: str, key: str) -> str:
+    here = list(TABLES[table].model_fields) if table else ["title", *(f"[{name}]" for name in TABLES)]
+    elsewhere = [name for name, model in TABLES.items() if key in model.model_fields]
+    hint = f"it belongs to [{elsewhere[0]}]; " if elsewhere else nearest(key, here)
+    return f"{hint}allowed: {', '.join(here)}"
+
+
+def _allowed(field: FieldInfo) -> str:
+    """What a key may be, in words, from its declaration."""
+    if get_origin(field.annotation) is Literal:
+        return " or ".join(_toml(choice) for choice in get_args(field.annotation))
+    nouns: dict[Any, str] = {bool: "true or false", str: "a text in quotes", int: "a whole number"}
+    noun = nouns.get(field.annotation, "a finite number")
+    bounds = {
+        name: value
+        for m in field.metadata
+        for name in ("gt", "ge", "le", "lt")
+        if (value := getattr(m, name, None)) is not None
+    }
+    words = {"gt": "greater than", "ge": "at least", "le": "at most", "lt": "less than"}
+    return " ".join([noun, " and ".join(f"{words[name]} {value:.15g}" for name, value in bounds.items())]).strip()
+
+
+def _toml(value: Any) -> str:
+    """A value as it may stand in a file, in one line of at most 60 characters."""
+    if isinstance(value, dict):
+        return "{…}"
+    if isinstance(value, (bool, str)):
+        return one_line(json.dumps(value, ensure_ascii=False))
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
+    if isinstance(value, list):
+        shown = [_toml(item) if not isinstance(item, list) else "[…]" for item in value[:8]]
+        return one_line(f"[{', '.join(shown)}{', …' if len(value) > 8 else ''}]")
+    if isinstance(value, int) and value.bit_length() > 1000:  # more digits than Python may convert
+        return one_line(hex(value)[:50] + "…")
+    return one_line(repr(value))
+
+
+def _bare(key: str) -> str:
+    """A key as it may stand in a file."""
+    return one_line(key if re.fullmatch("[A-Za-z0-9_.-]+", key) else json.dumps(key, ensure_ascii=False))
+
+
+def one_line(text: str, longest: int = 60) -> str:
+    text = "".join(c if c.isprintable() else "�" for c in text)
+    return text if len(text) <= longest else text[: longest - 1] + "…"

@@ -1,0 +1,172 @@
+"""Read and change scenes: TOML files, dictionaries, ``--set`` overrides; each result is validated."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from .messages import explain, nearest, one_line
+from .rules import impossible
+from .scene import TABLES, Scene
+from .tables import STEP_KEY, TOLERANCE_KEYS, SceneError
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+#: Bytes of a scene file.
+LONGEST_FILE = 1_000_000
+
+
+#: For those who meet TOML here first.
+_TOML_IS = "a line is a [table] or key = value, with numbers like 0.5 or 1e-3 and texts in quotes"
+
+
+def shipped_scenes() -> dict[str, Path]:
+    """Names and files of the scenes that come with the package."""
+    folder = Path(str(resources.files("springbeam.scene") / "shipped"))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def load_scene(path_or_name: str | Path, overrides: Iterable[str] = ()) -> Scene:
+    """Read and validate a scene.
+
+    Parameters
+    ----------
+    path_or_name
+        A TOML file, or the name of a shipped scene.
+    overrides
+        ``"table.key=value"`` strings, the value in TOML syntax (a bare word is taken as a string).
+
+    Raises
+    ------
+    SceneError
+        If the file cannot be read or the scene cannot be run.
+    """
+    path = _scene_file(path_or_name)
+    if (size := path.stat().st_size) > LONGEST_FILE:
+        raise SceneError(f"{path}: {size} bytes, more than a scene has; at most {LONGEST_FILE} are read")
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        data = tomllib.loads(text)
+    except OSError as error:
+        raise SceneError(f"{path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path}: not TOML, which is text in UTF-8: {error.reason} at byte {error.start}") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"{path}: not TOML: {error}{_line_of(error, text)}; {_TOML_IS}") from error
+    except ValueError as error:  # Python's own limit on the digits of an integer
+        raise SceneError(f"{path}: a number in it has more digits than can be read") from error
+    except RecursionError as error:
+        raise SceneError(f"{path}: nested too deeply; a scene has tables with plain values in them") from error
+    changes = {_override(data, override): override for override in overrides}
+    try:
+        return scene_from_dict(data, source=str(path))
+    except SceneError as error:
+        raise SceneError(_blamed(str(error), str(path), changes)) from None
+
+
+def _line_of(error: Exception, text: str) -> str:
+    """The line that a TOML error is about, for its message."""
+    found = re.search(r"at line (\d+)", str(error))
+    lines = text.splitlines()
+    return f": {one_line(lines[int(found[1]) - 1].strip())}" if found and int(found[1]) <= len(lines) else ""
+
+
+def _blamed(message: str, path: str, changes: Mapping[tuple[str, str], str]) -> str:
+    """The message with ``--set`` named instead of the file where it is about a value given there."""
+    lines = []
+    for line in message.splitlines():
+        said = line.removeprefix(f"{path}: ")
+        found = re.match(r"\[(\w+)\](?: (\w+))?", said)
+        given = [
+            text for (table, key), text in changes.items() if found and found[1] == table and found[2] in (key, None)
+        ]
+        source = f"--set {given[-1]}" if given else f"{path} with --set" if changes else path
+        lines.append(f"{source}: {said}")
+    return "\n".join(lines)
+
+
+def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
+    """Validate a scene given as nested dictionaries; ``source`` names it in errors."""
+    try:
+        scene = Scene.model_validate(data)
+        lines = impossible(scene)
+    except ValidationError as error:
+        lines = [line for e in error.errors() for line in explain(e)]
+    if lines:
+        raise SceneError("\n".join(f"{source}: {line}" for line in lines))
+    return scene
+
+
+def with_changes(scene: Scene, **tables: Mapping[str, Any] | None) -> Scene:
+    """A validated copy with keys changed: ``with_changes(scene, coupling={"macro_step": 1e-3})``.
+
+    ``None`` takes a table out: ``with_changes(scene, stop=None)``.
+    """
+    data = scene.model_dump(exclude_none=True)
+    for table, changes in tables.items():
+        if changes is None:
+            data[table] = None
+            continue
+        content = data.setdefault(table, {})
+        for key, value in changes.items():
+            _change(content, key, value)
+    return scene_from_dict({table: content for table, content in data.items() if content is not None})
+
+
+def _scene_file(path_or_name: str | Path) -> Path:
+    shipped = shipped_scenes()
+    if str(path_or_name) in shipped:
+        return shipped[str(path_or_name)]
+    path = Path(path_or_name)
+    try:
+        if path.is_file():
+            return path
+        what = "is a directory" if path.is_dir() else "not a file" if path.exists() else "no such file"
+    except OSError as error:  # a name too long
+        raise SceneError(f"{one_line(str(path))}: {error.strerror}") from error
+    if path.suffix != ".toml":
+        what += ", and not a shipped scene"
+    raise SceneError(f"{path_or_name}: {what}; {nearest(path.stem, shipped)}shipped scenes: {', '.join(shipped)}")
+
+
+def _override(data: dict[str, Any], override: str) -> tuple[str, str]:
+    """Returns the table and the key that it has set."""
+    target, separator, text = override.partition("=")
+    table, dot, key = (part.strip() for part in target.partition("."))
+    if not (separator and dot and table and key):
+        raise SceneError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
+    content = data.setdefault(table, {})
+    if not isinstance(content, dict):
+        raise SceneError(f"--set {override}: {table} is not a table; tables: {', '.join(TABLES)}")
+    _change(content, key, parse_value(text.strip()))
+    return table, key
+
+
+def _change(content: dict[str, Any], key: str, value: Any) -> None:
+    """Set a key of a table; a macro step takes the place of tolerances, and the other way round."""
+    for other in TOLERANCE_KEYS if key == STEP_KEY else (STEP_KEY,) if key in TOLERANCE_KEYS else ():
+        content.pop(other, None)
+    content[key] = value
+
+
+def parse_value(text: str) -> Any:
+    """A value in TOML syntax; what is none is a bare word, taken as a string."""
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        parsed = {}
+    if parsed.keys() == {"value"}:
+        return parsed["value"]
+    try:
+        return float(text)  # ".5" and "1." are not TOML
+    except ValueError:
+        return text

@@ -1,0 +1,141 @@
+"""Does the macro step resolve the motion? The criterion of every run, and what would resolve it.
+
+A run is called *not resolved* if (``docs/coupling.md``, "Is the motion resolved?")
+
+* the slowest oscillation of a body turns more than `TURN` in a macro step: its rows are aliased; or
+* the velocities of the joined ends differ by more than `MISMATCH` of their largest speed.
+
+Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
+`springbeam.studies.stability.predict` has the mesh's.
+"""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+
+from .linearised import spring_frequency
+from .scene import Scene
+from .statics import bending_stiffness, locking, lowest_frequency, shear_stiffness
+from .tables import Beam
+
+#: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
+TURN = 1.0
+#: Velocity mismatch of tip and spring top, relative to their speed, above which the motion is called unresolved.
+MISMATCH = 0.2
+
+
+def not_resolved(scene: Scene, mismatch: float, speed: float) -> str | None:
+    """Why the run did not resolve its motion and what would, in words; ``None`` if it did.
+
+    Parameters
+    ----------
+    scene
+        As run.
+    mismatch, speed
+        The largest difference of the joined ends' velocities, and the largest speed of an end [m/s].
+    """
+    H = scene.coupling.macro_step
+    if H is not None:  # steps that follow from tolerances are judged by their error
+        for name, omega, else_ in _slowest(scene):
+            if omega * H > TURN:
+                return (
+                    f"not resolved: the slowest oscillation of the {name} turns {omega * H:.3g} rad in a macro step. "
+                    f"Velocities, forces and times of events are samples of a faster motion; coupling.macro_step <= "
+                    f"{_rounded_down(TURN / omega)} resolves it{else_}"
+                )
+    if mismatch <= MISMATCH * speed:
+        return None
+    return (
+        f"not resolved: the joined ends' velocities differ by up to {mismatch:.3g} m/s of {speed:.3g} m/s; velocities "
+        f"and forces alternate from step to step. {_remedy(scene)}"
+    )
+
+
+def _slowest(scene: Scene) -> list[tuple[str, float, str]]:
+    """(body, frequency [rad/s], what else would do) of the bodies that oscillate."""
+    found = []
+    beam, spring = scene.beam, scene.spring
+    if beam is not None and beam.fidelity == "dynamic":
+        omega = slowest_frequency(beam)
+        if beam.alpha_b * omega < 2.0:  # else it creeps
+            static = spring is not None and scene.contact.law == "transmission"
+            found.append(("beam", omega, ', beam.fidelity = "quasi_static" leaves it out' if static else ""))
+    if spring is not None:
+        omega = spring_frequency(scene)
+        if spring.damping < 2.0 * spring.mass * omega:
+            found.append(("spring", omega, ""))
+    return found
+
+
+def _remedy(scene: Scene) -> str:
+    beam, H = scene.beam, scene.coupling.macro_step
+    if scene.contact.impact != "inelastic":
+        return f'contact.impact = "{scene.contact.impact}" leaves the difference in; "inelastic" does not'
+    if H is None:
+        return "Smaller tolerances resolve the motion"
+    if beam is None or beam.fidelity == "quasi_static":
+        return f"A coupling.macro_step below {H:g} s resolves the motion"
+    fewer = modes_below(beam, 0.5 * TURN / H)  # the loads' static shapes, kept as well, are up to twice as fast
+    modes = f", beam.n_modes = {fewer} keeps what this step resolves" if fewer > 0 else ""
+    higher = ", so may a higher coupling.degree" if beam.integrator == "modal" and scene.coupling.degree < 2 else ""
+    return (
+        f"coupling.macro_step <= {_rounded_down(TURN / fastest_frequency(beam))} resolves the modes kept{higher}{modes}"
+    )
+
+
+def _rounded_down(size: float) -> str:
+    """To two digits, in seconds."""
+    return f"{0.95 * size:.1e} s"
+
+
+# -- frequencies ----------------------------------------------------------------------------------------------------
+
+
+def slowest_frequency(beam: Beam) -> float:
+    """Lowest frequency of the beam, with its tip free [rad/s]."""
+    return lowest_frequency(beam) * sqrt(locking(beam))
+
+
+def fastest_frequency(beam: Beam) -> float:
+    """Highest frequency kept [rad/s]: of the mesh, or of the ``n_modes``-th wave."""
+    high = mesh_frequency(beam)
+    if beam.integrator != "modal" or beam.n_modes == 0 or modes_below(beam, high) <= beam.n_modes:
+        return high
+    low = 0.0
+    while high - low > 1e-3 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if modes_below(beam, middle) < beam.n_modes else (low, middle)
+    return high
+
+
+def mesh_frequency(beam: Beam) -> float:
+    """Highest frequency of the mesh [rad/s], about."""
+    bending, shear = bending_stiffness(beam), shear_stiffness(beam)
+    inertia, mass = beam.density * beam.second_moment_of_area, beam.density * beam.area
+    return sqrt(_gradient(beam) * max(bending / inertia, shear / mass) + shear / inertia)
+
+
+def shear_frequency(beam: Beam) -> float:
+    """Highest frequency of shear waves on the mesh [rad/s], about: those that an impact at the tip sets off."""
+    return sqrt(_gradient(beam) * shear_stiffness(beam) / (beam.density * beam.area))
+
+
+def _gradient(beam: Beam) -> float:
+    """Of ∫v'²/∫v² over polynomials on an element: 12/h² for p = 1, 60/h² for p = 2, then a little more [1/m²]."""
+    h, p = beam.length / beam.n_elements, beam.element_degree
+    return p * (p + 1) * (p + 2) * (p + 3) / (2.0 * h**2)
+
+
+def modes_below(beam: Beam, omega: float) -> int:
+    """About how many modes are slower than ``omega`` [rad/s]: half waves of both kinds that fit into the length.
+
+    Wave numbers k of the Timoshenko beam, k² = ω² (a + b)/2 ± ω √(ω² (a − b)²/4 + ρA/EI) with a = ρ/E, b = ρA/KAG; the
+    second is real above √(KAG/ρI).
+    """
+    bending, shear = bending_stiffness(beam), shear_stiffness(beam)
+    inertia, mass = beam.density * beam.second_moment_of_area, beam.density * beam.area
+    a, b = inertia / bending, mass / shear
+    middle = 0.5 * omega**2 * (a + b)
+    apart = omega * sqrt((0.5 * omega * (a - b)) ** 2 + mass / bending)
+    number = beam.length / pi * (sqrt(middle + apart) + sqrt(max(middle - apart, 0.0)))
+    return int(number + 0.5)

@@ -1,0 +1,314 @@
+"""What several keys decide together: scenes that cannot be run although each value is allowed, and suspicious ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from .scene import TABLES, Scene
+from .statics import bending_stiffness, locking, shear_stiffness, tip_compliance, tip_inertia
+from .tables import ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring
+
+#: Two weeks at a microsecond a step: a mistyped macro step, not a run.
+MOST_MACRO_STEPS = 1e12
+
+
+def _extreme(scene: Scene) -> str:
+    """The value furthest from 1, by its place."""
+    places = {
+        f"[{table}] {key}": float(value)
+        for table in TABLES
+        for key, value in (getattr(scene, table) or ())
+        if isinstance(value, (int, float)) and value != 0.0
+    }
+    place = max(places, key=lambda name: abs(math.log10(abs(places[name]))))
+    return f"{place} = {places[place]!r}"
+
+
+def impossible(scene: Scene) -> list[str]:
+    """Return why ``scene`` cannot be run, as lines ``[table] key = value: reason and remedy``; empty if it can."""
+    try:
+        found = [message for check in _CHECKS for message in check(scene)]
+        if not found:
+            suspicions(scene)  # what is certain to overflow once the scene runs overflows here
+            beam = scene.beam
+            if beam is not None and not 0.0 < min(quantities := _beam_quantities(beam)) <= max(quantities) < math.inf:
+                raise OverflowError
+    except ArithmeticError:
+        found = ["no double holds what follows from these values; check their units: " + _extreme(scene)]
+    return found
+
+
+def _beam_quantities(beam: Beam) -> tuple[float, ...]:
+    """What the equations are made of: ρA, ρI, EI, KAG, their wave speeds squared, and 1/k of the tip."""
+    stiffness = (bending_stiffness(beam), shear_stiffness(beam))
+    inertia = (beam.density * beam.area, beam.density * beam.second_moment_of_area)
+    speeds = tuple(k / m if m > 0.0 else math.inf for k, m in zip(stiffness, reversed(inertia), strict=True))
+    return (*stiffness, *inertia, *speeds, tip_compliance(beam))
+
+
+def _bodies(scene: Scene) -> Iterator[str]:
+    if scene.beam is None and scene.spring is None:
+        yield "no body: a scene needs [beam], [spring] or both"
+    if scene.spring is not None and scene.stop is not None and scene.stop.position >= scene.spring.equilibrium:
+        yield (
+            f"[stop] position = {scene.stop.position}: the foundation must lie below "
+            f"[spring] equilibrium = {scene.spring.equilibrium}"
+        )
+
+
+def _spring_holds(scene: Scene) -> Iterator[str]:
+    if (spring := scene.spring) is None:
+        return
+    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    if (k2 < 0.0 and k1 <= 0.0) or (k1 < 0.0 and k2 <= 0.0):
+        yield (
+            f"[spring] linear_stiffness = {k1}: with cubic_stiffness = {k2} the spring pushes away from y = 0 "
+            "everywhere; one of them must be greater than 0"
+        )
+    elif k2 < 0.0 and abs(spring.equilibrium) >= (hilltop := math.sqrt(k1 / -k2)):
+        yield (
+            f"[spring] equilibrium = {spring.equilibrium}: the softening spring escapes from beyond "
+            f"|y| = √(linear_stiffness/|cubic_stiffness|) = {hilltop:.6g} m; it must start inside"
+        )
+    elif k2 < 0.0:
+        free = scene.beam is None and (spring.external_force > 0.0 or scene.stop is None)
+        if free and abs(spring.external_force) >= (largest := _largest_load(spring)):
+            yield (
+                f"[spring] external_force = {spring.external_force}: the softening spring can hold less than "
+                f"2/3 linear_stiffness √(linear_stiffness/3|cubic_stiffness|) = {largest:.6g} N"
+            )
+            return
+        # Nothing takes energy away or pushes back: what is above the rim of the well runs over it.
+        lossless = (
+            scene.beam is None and spring.damping == 0.0 and (scene.stop is None or scene.stop.restitution == 1.0)
+        )
+        energy, depth = _spring_energy(spring), _well_depth(scene)
+        if lossless and energy > depth:
+            yield (
+                f"[spring] cubic_stiffness = {k2}: the softening spring starts with {energy:.6g} J and escapes from a "
+                f"well {depth:.6g} J deep; use a smaller initial_velocity or external_force, an equilibrium nearer to "
+                "0, or a larger linear_stiffness"
+            )
+
+
+def _potential(spring: Spring, y: float) -> float:
+    """Of the spring and its load [J]."""
+    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    return y * (y * (0.5 * k1 + 0.25 * k2 * y * y) - spring.external_force)
+
+
+def _spring_energy(spring: Spring) -> float:
+    """At the start, with the load's potential [J]."""
+    return 0.5 * spring.mass * spring.initial_velocity**2 + _potential(spring, spring.equilibrium)
+
+
+def _largest_load(spring: Spring) -> float:
+    """Of which a softening spring has an equilibrium, 2/3 k1 √(k1/3|k2|) [N]."""
+    return 2.0 / 3.0 * spring.linear_stiffness * math.sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
+
+
+def _well_depth(scene: Scene) -> float:
+    """Potential [J] at the lower rim of a softening spring's well, of those that the foundation does not bar.
+
+    −∞ where the load leaves no well. The rims are the outer roots of k1 y + k2 y³ = f_s: y = 2a cos θ with
+    a² = k1/3|k2| and cos 3θ = −f_s/(2|k2|a³) (Viète).
+    """
+    spring = scene.spring
+    assert spring is not None
+    a = math.sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
+    if not abs(spring.external_force) < _largest_load(spring):
+        return -math.inf
+    theta = math.acos(-spring.external_force / _largest_load(spring)) / 3.0
+    low, high = 2.0 * a * math.cos(theta + 2.0 / 3.0 * math.pi), 2.0 * a * math.cos(theta)
+    barred = scene.stop is not None and scene.stop.position > low
+    return min(_potential(spring, y) for y in ((high,) if barred else (low, high)))
+
+
+def _tip_arrives(scene: Scene) -> Iterator[str]:
+    beam, target, clearance = scene.beam, scene.tip_target, scene.initial_clearance
+    if beam is None or target is None or clearance is None:
+        return
+    name, height = target
+    if clearance < 0.0:
+        yield (
+            f"[beam] initial_deflection_slope = {beam.initial_deflection_slope}: the tip starts {-clearance:.6g} m "
+            f"below {name} = {height}; it must start there or above"
+        )
+    elif (t_c := scene.contact_time) is not None and t_c > scene.time.t_end:
+        when = f"not before t = {t_c:.6g} s, after [time] t_end = {scene.time.t_end}" if math.isfinite(t_c) else "never"
+        yield (
+            f"[beam] initial_velocity_slope = {beam.initial_velocity_slope}: the undeformed tip reaches "
+            f'{name} = {height} {when}; use a (more) negative initial_velocity_slope, or approach = "elastic"'
+        )
+
+
+def _law_applies(scene: Scene) -> Iterator[str]:
+    beam, contact, coupling = scene.beam, scene.contact, scene.coupling
+    if contact.law == "paper":
+        for table in ("beam", "spring", "stop"):
+            if getattr(scene, table) is None:
+                yield f'[contact] law = "paper": Algorithm 1 needs a [{table}]'
+        if beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf != 1.0:
+            yield f'[beam] rho_inf = {beam.rho_inf}: [contact] law = "paper" is the midpoint rule, rho_inf = 1'
+    if contact.law == "compliance":
+        if contact.stiffness == 0.0:
+            yield (
+                '[contact] stiffness = 0.0: with law = "compliance" nothing would hold the bodies apart; it must be '
+                "greater than 0"
+            )
+        if coupling.scheme not in ORDINARY_SCHEMES and (coupling.scheme == "hermite" or coupling.degree != 0):
+            yield (
+                f'[coupling] scheme = "{coupling.scheme}", degree = {coupling.degree}: [contact] law = "compliance" '
+                'needs scheme = "energy" and degree = 0 (its discrete gradient), "gauss_seidel" or "jacobi"'
+            )
+    elif coupling.scheme in ORDINARY_SCHEMES:
+        yield (
+            f'[coupling] scheme = "{coupling.scheme}": exchanges the force of [contact] law = "compliance"; '
+            f'law = "{contact.law}" needs "energy" or "hermite"'
+        )
+
+
+def _feedback_negligible(scene: Scene) -> Iterator[str]:
+    beam, spring, contact, coupling = scene.beam, scene.spring, scene.contact, scene.coupling
+    if coupling.feedback == "two_way":
+        return
+    name = f'[coupling] feedback = "{coupling.feedback}"'
+    if beam is None or spring is None:
+        yield f'{name}: there is one body only; use "two_way"'
+        return
+    if contact.law != "compliance" or coupling.scheme not in ("energy", "auto"):
+        yield (
+            f'{name}: needs [contact] law = "compliance" and [coupling] scheme = "energy"; a tie is felt by both ends. '
+            'Use "two_way"'
+        )
+    if coupling.feedback == "spring_drives" and (spring.cubic_stiffness != 0.0 or spring.linear_stiffness <= 0.0):
+        yield (
+            f"{name}: what it neglects is bounded for a linear spring only; linear_stiffness must be greater than 0 "
+            'and cubic_stiffness 0.0, or use "two_way"'
+        )
+        return
+    # A contact of depth p has V = 2 λ p, whatever p.
+    share = 4.0 * contact.stiffness / (scene.driver_stiffness or math.inf)
+    if contact.exponent == 1.0 and share > coupling.feedback_tolerance:
+        yield (
+            f"{name}: neglects up to 4·stiffness/(stiffness of the driving end) = {share:.2g} of the penetration; "
+            f'allowed is feedback_tolerance = {coupling.feedback_tolerance:g}. Use "two_way", or allow more'
+        )
+
+
+def _inertia_needed(scene: Scene) -> Iterator[str]:
+    beam, contact, scheme = scene.beam, scene.contact, scene.coupling.scheme
+    if beam is None or beam.fidelity == "dynamic":
+        return
+    name = '[beam] fidelity = "quasi_static"'
+    if scene.spring is None:
+        yield f'{name}: a beam without inertia moves with a [spring] or not at all; use fidelity = "dynamic"'
+    if contact.law == "compliance" and scene.coupling.feedback != "beam_drives":
+        yield (
+            f'{name}: is in series with the compliance of [contact] law = "compliance", and what lies between them has '
+            'no inertia; use law = "transmission", fidelity = "dynamic", or neglect the force on the beam: '
+            '[coupling] feedback = "beam_drives"'
+        )
+    if contact.law == "paper":
+        yield f'{name}: [contact] law = "paper" integrates the beam by (62); use fidelity = "dynamic"'
+    if contact.law == "transmission" and contact.impact == "tip":
+        yield (
+            f'{name}: [contact] impact = "tip" gives the spring the velocity of the tip, which without inertia has '
+            'none of its own; use impact = "inelastic"'
+        )
+    if scheme == "hermite":
+        yield (
+            f'{name}: [coupling] scheme = "hermite" sets the velocity of the tip, which without inertia is the '
+            'spring\'s; use scheme = "energy"'
+        )
+    if beam.approach == "elastic":
+        if beam.initial_velocity_slope != 0.0:
+            yield (
+                f"[beam] initial_velocity_slope = {beam.initial_velocity_slope}: without inertia, and approach = "
+                '"elastic", nothing carries a velocity; use 0.0, or fidelity = "dynamic"'
+            )
+        if beam.alpha_b == 0.0 and beam.initial_deflection_slope != 0.0:
+            yield (
+                f"[beam] initial_deflection_slope = {beam.initial_deflection_slope}: without inertia and damping the "
+                'beam starts in its static deflection; use 0.0, approach = "undeformed", or alpha_b > 0'
+            )
+
+
+def _coupling_resolves(scene: Scene) -> Iterator[str]:
+    beam, coupling, t_end = scene.beam, scene.coupling, scene.time.t_end
+    if coupling.macro_step is None:
+        key = next(key for key in TOLERANCE_KEYS if getattr(coupling, key) is not None)
+        if scene.contact.law == "paper":
+            yield f'[coupling] {key}: [contact] law = "paper" is Algorithm 1, which has one macro_step'
+        if coupling.scheme in ORDINARY_SCHEMES:
+            yield f'[coupling] {key}: scheme = "{coupling.scheme}" never repeats a step; give macro_step instead'
+    elif coupling.macro_step > t_end:
+        yield f"[coupling] macro_step = {coupling.macro_step}: must be at most [time] t_end = {t_end}"
+    elif t_end / coupling.macro_step > MOST_MACRO_STEPS:
+        yield (
+            f"[coupling] macro_step = {coupling.macro_step}: [time] t_end = {t_end} would take "
+            f"{t_end / coupling.macro_step:.1e} macro steps; at most {MOST_MACRO_STEPS:.0e} are allowed"
+        )
+    if beam is not None and beam.integrator == "generalized_alpha":
+        remedy = '[beam] integrator = "generalized_alpha" sees only the mean of the contact force; use "modal"'
+        if coupling.scheme == "hermite":
+            yield f'[coupling] scheme = "hermite": {remedy}, or scheme = "energy"'
+        elif coupling.degree > 0:
+            yield f"[coupling] degree = {coupling.degree}: {remedy}, or degree = 0"
+
+
+#: What cannot be run although each value is allowed; each yields ``[table] key = value: reason and remedy``.
+_CHECKS = (
+    _bodies,
+    _spring_holds,
+    _tip_arrives,
+    _law_applies,
+    _inertia_needed,
+    _feedback_negligible,
+    _coupling_resolves,
+)
+
+
+def _beam_energy(scene: Scene) -> float:
+    """Kinetic, and of the shear of a straight slope, as the beam arrives [J]; without the work of its loads."""
+    if (beam := scene.beam) is None or beam.fidelity == "quasi_static":
+        return 0.0
+    target, slope = scene.tip_target, beam.initial_deflection_slope
+    if beam.approach == "undeformed" and target is not None:
+        slope = target[1] / beam.length
+    kinetic = beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
+    return kinetic + 0.5 * shear_stiffness(beam) * beam.length * slope**2
+
+
+def suspicions(scene: Scene) -> list[str]:
+    """What can be run but may not be meant; for a run's warnings."""
+    found = []
+    beam, spring = scene.beam, scene.spring
+    if spring is not None and spring.cubic_stiffness < 0.0:
+        energy, depth = _spring_energy(spring) + _beam_energy(scene), _well_depth(scene)
+        if energy > depth:
+            deep = f"well is {depth:.3g} J deep" if depth > -math.inf else "well is gone under external_force"
+            found.append(
+                f"[spring] cubic_stiffness = {spring.cubic_stiffness}: the motion starts with {energy:.3g} J, the "
+                f"softening spring's {deep}; the run stops should it escape"
+            )
+    if beam is not None and (factor := locking(beam)) > 1.05:
+        found.append(
+            f"[beam] n_elements = {beam.n_elements}: full integration locks, the beam is {factor:.3g} times too "
+            "stiff; use reduced_integration = true, element_degree = 3, or more elements"
+        )
+    if beam is not None and beam.fidelity == "quasi_static" and scene.spring is not None:
+        share = tip_inertia(beam) / scene.spring.mass
+        if share > 0.05 and scene.contact.law == "transmission":
+            found.append(
+                f'[beam] fidelity = "quasi_static": leaves out an inertia that at the tip is {share:.2g} of the '
+                f"spring's mass; the joined motion is about {math.sqrt(1.0 + share) - 1.0:.0%} too fast"
+            )
+        if beam.approach == "undeformed" and beam.initial_velocity_slope != 0.0:
+            energy = beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
+            found.append(
+                f'[beam] fidelity = "quasi_static": the beam arrives without its kinetic energy, {energy:.3g} J; its '
+                "blow, and the vibration it leaves, are not in the result"
+            )
+    return found

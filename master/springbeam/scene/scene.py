@@ -1,0 +1,92 @@
+"""A whole scene: its tables, and what follows from them before anything is built or loaded."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field
+
+from .statics import tip_compliance, tip_load_deflection
+from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time
+
+
+class Scene(Table):
+    """The tables of a scene; ``beam``, ``spring`` and ``stop`` are ``None`` where the scene does not have them.
+
+    `springbeam.scene.reading` makes scenes that can be run; a scene made by hand is not held against the rules.
+    """
+
+    title: str = ""
+    #: Picks scheme, macro step and tolerances instead of those given: `springbeam.studies.accuracy`.
+    accuracy: Annotated[float | None, Field(gt=0.0, lt=1.0)] = None
+    time: Time
+    beam: Beam | None = None
+    spring: Spring | None = None
+    stop: Stop | None = None
+    contact: Contact = Contact()
+    coupling: Coupling = Coupling()
+
+    @property
+    def fmus(self) -> tuple[str, ...]:
+        """Names of the FMUs that the scene is made of; a beam without inertia is none."""
+        beam = self.beam is not None and self.beam.fidelity == "dynamic"
+        return ("beam",) * beam + ("spring",) * (self.spring is not None)
+
+    @property
+    def driver_stiffness(self) -> float | None:
+        """Static force per displacement [N/m] of the end that drives a one-way coupling; ``None`` without one."""
+        if self.coupling.feedback == "beam_drives" and self.beam is not None:
+            return 1.0 / tip_compliance(self.beam)
+        if self.coupling.feedback == "spring_drives" and self.spring is not None:
+            return self.spring.linear_stiffness
+        return None
+
+    @property
+    def tip_target(self) -> tuple[str, float] | None:
+        """What the beam's tip meets first, as ``("[table] key", height [m])``: the spring, else the stop."""
+        if self.beam is None:
+            return None
+        if self.spring is not None:
+            return "[spring] equilibrium", self.spring.equilibrium
+        return None if self.stop is None else ("[stop] position", self.stop.position)
+
+    @property
+    def initial_tip(self) -> float | None:
+        """u_tip at the start [m]: s₀ L, or the static deflection of a beam let go without inertia and damping."""
+        if (beam := self.beam) is None:
+            return None
+        if beam.fidelity == "quasi_static" and beam.approach == "elastic" and beam.alpha_b == 0.0:
+            return tip_load_deflection(beam)
+        return beam.initial_deflection_slope * beam.length
+
+    @property
+    def initial_clearance(self) -> float | None:
+        """Height [m] of the tip above `tip_target` at the start, 0 where only rounding separates them."""
+        tip = self.initial_tip
+        if tip is None or self.tip_target is None:
+            return None
+        target = self.tip_target[1]
+        return 0.0 if math.isclose(tip, target, rel_tol=1e-12) else tip - target
+
+    @property
+    def contact_time(self) -> float | None:
+        """First contact t_c [s] of an undeformed approach; ``None`` where there is none to compute beforehand."""
+        clearance = self.initial_clearance
+        if self.beam is None or clearance is None or self.beam.approach == "elastic":
+            return None
+        velocity = self.beam.initial_velocity_slope * self.beam.length
+        if clearance == 0.0 and velocity <= 0.0:
+            return 0.0
+        return -clearance / velocity if clearance > 0.0 > velocity else math.inf
+
+
+#: The tables by their names in a file.
+TABLES: dict[str, type[Table]] = {
+    "time": Time,
+    "beam": Beam,
+    "spring": Spring,
+    "stop": Stop,
+    "contact": Contact,
+    "coupling": Coupling,
+}

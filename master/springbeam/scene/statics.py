@@ -1,0 +1,134 @@
+"""Statics of the clamped Timoshenko beam, exact, and its lowest frequency: no mesh, closed under quadrature.
+
+With t = L − x the distance from the tip, a tip force of 1 N has the shear force 1 and the moment t; the loads of a
+scene, p(t) = f_b + c (1 − t/h)₊ [N/m] (c the ``tip_load_coefficient``, h the last element's length), have
+
+    Q(t) = ∫₀ᵗ p,     M(t) = ∫₀ᵗ Q.
+
+Deflections are virtual work, u(x_j) = ∫ M m_j/EI + Q q_j/KAG dt, with m_j = (t − t_j)₊ and q_j = 1 for t > t_j.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import scipy.linalg
+
+from .tables import Beam
+
+#: Where the beam's shape is sampled, as fractions of its length.
+SHAPE_POINTS = np.linspace(0.0, 1.0, 21)
+
+#: A virtual moment or shear force over t.
+Virtual = Callable[[np.ndarray], np.ndarray]
+
+#: Gauss–Legendre on [0, 1], exact to degree 7: M² has degree 6.
+_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
+_RITZ_DEGREE = 6
+
+
+def bending_stiffness(beam: Beam) -> float:
+    """EI [N·m²]."""
+    return beam.young_modulus * beam.second_moment_of_area
+
+
+def shear_stiffness(beam: Beam) -> float:
+    """KAG [N]."""
+    return beam.shear_coefficient * beam.area * beam.shear_modulus
+
+
+def tip_compliance(beam: Beam) -> float:
+    """Tip deflection under a tip force, L³/3EI + L/KAG [m/N]."""
+    return beam.length**3 / (3.0 * bending_stiffness(beam)) + beam.length / shear_stiffness(beam)
+
+
+def tip_force_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:
+    """Deflection [m/N] at x = ``fractions``·L under a tip force, x/KAG + x²(3L − x)/6EI."""
+    x = fractions * beam.length
+    return np.asarray(x / shear_stiffness(beam) + x**2 * (3.0 * beam.length - x) / (6.0 * bending_stiffness(beam)))
+
+
+def tip_inertia(beam: Beam) -> float:
+    """Inertia of the beam that moves as under a tip force, as a tip mass [kg] (Rayleigh): 33/140 ρAL if slender."""
+    x = beam.length * _NODES
+    turn = (beam.length * x - x**2 / 2.0) / bending_stiffness(beam)
+    shape, inertia = tip_force_shape(beam, _NODES), beam.second_moment_of_area / beam.area
+    density = beam.density * beam.area * (shape**2 + inertia * turn**2)
+    return beam.length * float(_WEIGHTS @ density) / tip_compliance(beam) ** 2
+
+
+def lowest_frequency(beam: Beam) -> float:
+    """Lowest frequency, clamped and free [rad/s], by Ritz's method: u and θ polynomials of degree 6 over the length."""
+    nodes, weights = np.polynomial.legendre.leggauss(_RITZ_DEGREE + 1)  # exact for their products
+    x = 0.5 * (nodes + 1.0)
+    powers = np.arange(1, _RITZ_DEGREE + 1)
+    w = x[:, None] ** powers
+    slope, zero = powers * x[:, None] ** (powers - 1) / beam.length, np.zeros_like(w)
+    area, inertia = beam.density * beam.area, beam.density * beam.second_moment_of_area
+    rows = (
+        ((area, np.hstack([w, zero])), (inertia, np.hstack([zero, w]))),
+        ((shear_stiffness(beam), np.hstack([slope, -w])), (bending_stiffness(beam), np.hstack([zero, slope]))),
+    )
+    mass, stiffness = (sum(c * (B.T * weights) @ B for c, B in energy) for energy in rows)
+    return float(np.sqrt(scipy.linalg.eigh(stiffness, mass, eigvals_only=True, subset_by_index=(0, 0))[0]))
+
+
+def load_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:
+    """Deflection [m] at x = ``fractions``·L under the loads."""
+    ends = beam.length * (1.0 - fractions)
+
+    def beyond(end: float) -> Virtual:
+        return lambda t: t - end
+
+    return np.array([_work(beam, float(end), beyond(end), np.ones_like) for end in ends])
+
+
+def tip_load_deflection(beam: Beam) -> float:
+    """Tip deflection under the loads [m]."""
+    return float(load_shape(beam, np.ones(1))[0])
+
+
+def load_energy(beam: Beam) -> float:
+    """Work of the loads on their own deflection, ∫ M²/EI + Q²/KAG [J]: twice the energy they store."""
+    return _work(beam, 0.0, lambda t: _loads(beam, t)[1], lambda t: _loads(beam, t)[0])
+
+
+def _loads(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(Q, M) of the loads at the distances ``t`` from the tip [N, N·m]."""
+    f, c, h = beam.distributed_load, beam.tip_load_coefficient, beam.length / beam.n_elements
+    s = np.minimum(t, h)
+    force = c * (s - s**2 / (2.0 * h))
+    return f * t + force, f * t**2 / 2.0 + c * (s**2 / 2.0 - s**3 / (6.0 * h)) + c * h / 2.0 * (t - s)
+
+
+def _work(beam: Beam, start: float, moment: Virtual, shear: Virtual) -> float:
+    """∫ M m/EI + Q q/KAG dt from ``start`` to the clamp, for virtual m(t) and q(t)."""
+    h, total = beam.length / beam.n_elements, 0.0
+    for a, b in ((start, max(start, h)), (max(start, h), beam.length)):
+        t = a + (b - a) * _NODES
+        Q, M = _loads(beam, t)
+        density = M * moment(t) / bending_stiffness(beam) + Q * shear(t) / shear_stiffness(beam)
+        total += (b - a) * float(_WEIGHTS @ density)
+    return total
+
+
+def tip_reach(beam: Beam) -> float:
+    """How far the tip may go from a straight beam, roughly [m]: by its loads, or by a static deflection that holds the
+    kinetic energy of the start."""
+    mass = beam.density * beam.area * beam.length
+    swing = beam.length * abs(beam.initial_velocity_slope) * math.sqrt(mass * tip_compliance(beam) / 3.0)
+    return max(swing, abs(tip_load_deflection(beam)))
+
+
+def locking(beam: Beam) -> float:
+    """Static tip stiffness of the mesh over that of the beam, with full integration (model.md, "Locking")."""
+    if beam.fidelity == "quasi_static" or beam.reduced_integration or beam.element_degree > 2:
+        return 1.0
+    bending, shear, h = bending_stiffness(beam), shear_stiffness(beam), beam.length / beam.n_elements
+    if beam.element_degree == 1:
+        return 1.0 + shear * h**2 / (12.0 * bending)
+    compliance = tip_compliance(beam)
+    missing = beam.length * h**2 / (12.0 * bending) / (1.0 + 60.0 * bending / (shear * h**2))
+    return compliance / (compliance - missing)

@@ -1,0 +1,390 @@
+"""An accuracy instead of a scheme, a macro step and tolerances: they are picked by pilot runs.
+
+The error is that of the coupling and the time integration, for the scene's own mesh and modes: these are the model.
+(Impacts on the foundation converge only slowly with the mesh, since what they meet is the mass of its tip.)
+
+Two runs are compared: if the finer one is q times as accurate, its error is their difference over q − 1. With equal
+macro steps, ρ times as many, q is ρᵖ; `hermite` tells p itself: its energy residual is an error of the same order,
+summed up over the run, so ρᵖ is the ratio of the two residuals. With steps from a tolerance the error follows that
+(law "compliance", whose contacts are short beside the flights between them). A first run is as fine as the fastest
+waves at the tip or the accuracy ask for, each one after it as fine as those before let expect, until two agree
+(``docs/accuracy.md``).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from ..results.contact_times import apart, changes_of_contact
+from ..results.recording import MemoryRecorder
+from ..results.trajectory import Trajectory
+from ..run.outcome import RunStopped
+from ..run.runner import run
+from ..scene import Scene, SceneError, scene_from_dict, with_changes
+from ..scene.automatic import choice
+from ..scene.linearised import spring_frequency
+from ..scene.resolution import fastest_frequency, shear_frequency
+from ..scene.statics import tip_compliance
+
+#: Most macro steps of a run; pilot runs in a row that may stop early.
+_MOST, _MOST_STOPPED = 50_000, 6
+#: An estimate of the error is to be so many times smaller than the accuracy.
+_SAFETY = 1.5
+#: Runs that differ by more are both unresolved, whatever their order [of the motion].
+_UNRESOLVED = 0.02
+#: By how much the finer one of two runs of different events is trusted to be better.
+_DOUBTED = 30.0
+#: The coupling's and IDA's tolerance over the accuracy, and the bounds of the latter.
+_COUPLING_SHARE, _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-4, 1e-12, 1e-8
+
+# Equal macro steps.
+#: Fewest, where bodies are coupled and where not.
+_FEWEST, _UNCOUPLED = 8, 4
+#: Growth of their number from run to run: at least, at most, after a run that gained energy, and after one that
+#: stopped for another reason, which may be gone at the next size.
+_LEAST_GROWTH, _MOST_GROWTH, _AFTER_GAIN, _AFTER_STOP = 1.2, 4.0, 1.4, 1.01
+#: Energy residual above which it was too large a macro step that stopped a run.
+_GAIN = 0.05
+#: Order of the error of `hermite`; the lowest that is relied on, and the highest of the time of an event.
+_ORDER, _LOWEST, _OF_EVENTS = 6.0, 1.0, 2.5
+#: Orders by which a third run and any after it are made finer, and how much smaller its estimate is to be.
+_EXPECTED, _EXPECTED_OF_EVENTS, _MARGIN = 5.0, 3.5, 1.5
+#: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a beam and a spring
+#: alone by; and ω α_b above which waves die out within two periods and need no resolution.
+_TURN, _BEAM_ALONE, _SPRING_ALONE, _DIES_OUT = 26.0, 2.0, 4.0, 0.15
+#: Displacement error over energy residual of `hermite`, in runs with changes of contact after the first.
+_AMPLIFIED = 10.0
+#: doStep calls per macro step of a run that pays for its events rather than its steps: more steps cost hardly more.
+_CALLS_PER_STEP = 8.0
+
+# Steps from a tolerance.
+#: Tolerance of the first run over the accuracy; how much finer the second is, one after a stop, and any other.
+_LOOSE, _FINER, _FINER_AFTER_STOP, _FINER_LEAST, _FINER_MOST = 5.0, 15.0, 10.0, 5.0, 30.0
+#: The number of steps goes as this power of 1/tolerance.
+_STEPS_PER_TOLERANCE = 0.5
+
+
+@dataclass(frozen=True)
+class Picked:
+    """A scene that keeps the accuracy, and what is known about it."""
+
+    asked: float
+    run: Trajectory  #: the last pilot run, which keeps it
+    displacement_error: float  #: estimate, relative to the largest change of the tip (or spring top)
+    event_error: float  #: estimate of the largest error of a change of contact, relative to the time that is run
+    events: int  #: changes of contact that this is about, those further apart than two steps of the coarser run
+    pilot_runs: int
+    pilot_steps: int  #: doStep calls of the pilot runs before the last
+    pilot_time: float  #: [s]
+
+    @property
+    def scene(self) -> Scene:
+        """Asks for no accuracy: it says how it is run."""
+        return self.run.scene
+
+    def trajectory(self) -> Trajectory:
+        """The run, what was picked and found in its summary."""
+        return replace(self.run, summary={**self.run.summary, "accuracy": self.summary()})
+
+    def summary(self) -> dict[str, Any]:
+        """As it goes into ``summary.json``."""
+        coupling, spring = self.scene.coupling, self.scene.spring
+        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree}
+        if coupling.adaptive:
+            picked["relative_tolerance"] = coupling.relative_tolerance
+        else:
+            picked["macro_step"] = coupling.H
+        if spring is not None:
+            picked["ida_relative_tolerance"] = spring.relative_tolerance
+        return {
+            "asked": self.asked,
+            "picked": picked,
+            "estimated_displacement_error": self.displacement_error,
+            "estimated_event_error": self.event_error,
+            "events_compared": self.events,
+            "pilot_runs": self.pilot_runs,
+            "pilot_steps": self.pilot_steps,
+            "pilot_time": self.pilot_time,
+        }
+
+
+def pick(scene: Scene) -> Picked:
+    """Settings with which ``scene`` keeps its ``accuracy``, and the run with them.
+
+    Raises
+    ------
+    SceneError
+        If the scene asks for none, or it cannot be reached; the message says how far it was.
+    RunStopped
+        If the run with these settings would stop early.
+    """
+    if scene.accuracy is None:
+        raise SceneError("accuracy: the scene asks for none")
+    if scene.contact.law == "paper":
+        raise SceneError('accuracy: [contact] law = "paper" is defined by its macro step; take another law')
+    return _Search(scene, scene.accuracy).run()
+
+
+@dataclass(frozen=True)
+class _Pilot:
+    """A run, and how fine it is: its macro steps where no event cuts them, or 1/tolerance."""
+
+    fineness: float
+    run: Trajectory
+
+    @property
+    def residual(self) -> float:
+        return float(self.run.summary["max_energy_residual"])
+
+    @property
+    def macro_steps(self) -> int:
+        return int(self.run.summary["macro_steps"])
+
+    @property
+    def calls(self) -> int:
+        """doStep calls of both FMUs."""
+        return sum(int(self.run.summary.get(f"{body}_steps", 0)) for body in ("beam", "spring"))
+
+    @property
+    def spent(self) -> float:
+        """[s]"""
+        return float(self.run.summary["wall_time"])
+
+    @property
+    def displacement(self) -> np.ndarray:
+        """Of the tip, without a beam of the spring top [m]."""
+        return self.run["u_tip" if "u_tip" in self.run.columns else "y"]
+
+
+@dataclass(frozen=True)
+class _Estimate:
+    """Of the finer one of two runs, relative to the largest change of the tip, and to the time that is run."""
+
+    displacement: float
+    expected: float  #: the same, if the order of convergence holds
+    event: float
+    events: int
+    apart: float  #: by how much the two differ in the larger of both
+
+
+class _Way(Protocol):
+    """How runs are made finer."""
+
+    def first(self) -> float:
+        """How fine the first run is."""
+
+    def coupling(self, fineness: float) -> dict[str, Any]:
+        """Keys of ``[coupling]`` for a run so fine."""
+
+    def second(self, first: _Pilot) -> float:
+        """How fine the second run is."""
+
+    def next(self, fine: _Pilot, estimate: _Estimate) -> float:
+        """How fine a run is whose estimate, after ``estimate``, is expected to hold."""
+
+    def after_stop(self, stopped: _Pilot) -> float:
+        """How fine the run after one that has stopped early is."""
+
+    def steps(self, fineness: float, last: _Pilot | None) -> float:
+        """How many macro steps a run so fine is expected to take."""
+
+    def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
+        """How many times as accurate ``fine`` is, in displacements and in times of events."""
+
+    def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
+        """Of the displacements [m], where they are compared."""
+
+
+class _EqualSteps:
+    """Fineness is the number of macro steps."""
+
+    def __init__(self, scene: Scene, accuracy: float, span: float) -> None:
+        self._scene, self._accuracy, self._span = scene, accuracy, span
+        fine = with_changes(scene, coupling={"macro_step": 1e-9 * span})
+        taken = choice(fine)  # of schemes, the one where everything is resolved
+        self._scheme, self._degree = taken.scheme, taken.degree
+
+    def first(self) -> float:
+        beam, spring = self._scene.beam, self._scene.spring
+        if (beam is None or spring is None) and self._scene.stop is None:
+            return _UNCOUPLED  # exact but for IDA
+        of_spring = 0.0 if spring is None else spring_frequency(self._scene)
+        if beam is None:
+            return _rung(of_spring * self._span / _SPRING_ALONE)
+        if beam.fidelity == "quasi_static":
+            assert spring is not None
+            return _rung(math.hypot(of_spring, 1.0 / math.sqrt(tip_compliance(beam) * spring.mass)) * self._span)
+        waves = min(shear_frequency(beam), fastest_frequency(beam))
+        if beam.alpha_b > 0.0:
+            waves = min(waves, _DIES_OUT / beam.alpha_b)
+        turn = _BEAM_ALONE if spring is None else _TURN * self._accuracy ** (1.0 / _ORDER)
+        return _rung(max(waves, of_spring) * self._span / turn)
+
+    def coupling(self, fineness: float) -> dict[str, Any]:
+        return {"scheme": self._scheme, "degree": self._degree, "macro_step": self._span / fineness}
+
+    def second(self, first: _Pilot) -> float:
+        growth = _LEAST_GROWTH
+        if self._scheme == "hermite":
+            amplified = _AMPLIFIED if changes_of_contact(first.run) else 1.0
+            growth = math.pow(amplified * first.residual / self._accuracy, 1.0 / _ORDER)
+        return self._grown(first, growth)
+
+    def next(self, fine: _Pilot, estimate: _Estimate) -> float:
+        margin = _MARGIN * _SAFETY / self._accuracy
+        displacement = math.pow(margin * estimate.expected, 1.0 / _EXPECTED)
+        return self._grown(fine, max(displacement, math.pow(margin * estimate.event, 1.0 / _EXPECTED_OF_EVENTS)))
+
+    def after_stop(self, stopped: _Pilot) -> float:
+        return _rung(stopped.fineness * (_AFTER_GAIN if stopped.residual > _GAIN else _AFTER_STOP))
+
+    def steps(self, fineness: float, last: _Pilot | None) -> float:
+        return fineness
+
+    def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
+        ratio, order = fine.fineness / coarse.fineness, _LOWEST
+        if self._scheme == "hermite" and fine.residual > 0.0 < coarse.residual:
+            seen = math.log(coarse.residual / fine.residual) / math.log(ratio)
+            order = min(max(seen, _LOWEST), _ORDER)
+        return ratio**order, ratio ** min(order, _OF_EVENTS)
+
+    def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
+        """At the times that are rows of both, but for rounding."""
+        times, wanted = fine.run.time, coarse.run.time
+        index = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
+        index -= np.abs(times[index - 1] - wanted) < np.abs(times[index] - wanted)
+        common = np.abs(times[index] - wanted) <= 1e-9 * self._span
+        return np.asarray(coarse.displacement[common] - fine.displacement[index[common]])
+
+    def _grown(self, last: _Pilot, growth: float) -> float:
+        return _rung(max(last.fineness * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH), last.calls / _CALLS_PER_STEP))
+
+
+class _Tolerances:
+    """Fineness is 1/tolerance, of scheme `energy` 0 with steps from that tolerance, where no velocity ever jumps."""
+
+    def __init__(self, accuracy: float) -> None:
+        self._accuracy = accuracy
+
+    def first(self) -> float:
+        return 1.0 / (_LOOSE * self._accuracy)
+
+    def coupling(self, fineness: float) -> dict[str, Any]:
+        return {"scheme": "energy", "degree": 0, "relative_tolerance": 1.0 / fineness}
+
+    def second(self, first: _Pilot) -> float:
+        return _FINER * first.fineness
+
+    def next(self, fine: _Pilot, estimate: _Estimate) -> float:
+        wanted = _SAFETY * max(estimate.expected, estimate.event) / self._accuracy
+        return fine.fineness * min(max(math.pow(wanted, 1.2), _FINER_LEAST), _FINER_MOST)
+
+    def after_stop(self, stopped: _Pilot) -> float:
+        return _FINER_AFTER_STOP * stopped.fineness
+
+    def steps(self, fineness: float, last: _Pilot | None) -> float:
+        if last is None:
+            return 0.0
+        return float(last.macro_steps * (fineness / last.fineness) ** _STEPS_PER_TOLERANCE)
+
+    def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
+        ratio = fine.fineness / coarse.fineness
+        return ratio, ratio
+
+    def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
+        """At all rows of the coarser run, between those of the finer one by its velocity."""
+        times, rows = np.unique(fine.run.time, return_index=True)
+        between = CubicHermiteSpline(times, fine.displacement[rows], fine.run.v_tip[rows])
+        return np.asarray(coarse.displacement - between(coarse.run.time))
+
+
+class _Search:
+    def __init__(self, scene: Scene, accuracy: float) -> None:
+        data = scene.model_dump(exclude={"accuracy"}, exclude_none=True)
+        self._scene, self._accuracy = scene_from_dict(data), accuracy
+        self._span = scene.time.t_end - (scene.contact_time or 0.0)
+        compliant = scene.contact.law == "compliance" and scene.coupling.feedback == "two_way"
+        self._way: _Way
+        if compliant and scene.spring is not None and scene.beam is not None and scene.beam.integrator == "modal":
+            self._way = _Tolerances(accuracy)
+        else:
+            self._way = _EqualSteps(self._scene, accuracy, self._span)
+        self._runs, self._calls, self._spent, self._stopped = 0, 0, 0.0, 0
+
+    def run(self) -> Picked:
+        way, coarse, estimate = self._way, None, None
+        fineness = way.first()
+        while way.steps(fineness, coarse) <= _MOST:
+            fine = self._pilot(fineness)
+            if fine.run.summary["status"] != "done":
+                fineness = way.after_stop(fine)
+                continue
+            if coarse is None:
+                fineness = way.second(fine)
+            else:
+                estimate = self._estimate(coarse, fine)
+                worst = _SAFETY * max(estimate.displacement, estimate.event)
+                if worst <= self._accuracy and estimate.apart <= _UNRESOLVED:
+                    return Picked(
+                        self._accuracy, fine.run, estimate.displacement, estimate.event, estimate.events,
+                        self._runs - 1, self._calls - fine.calls, self._spent - fine.spent,
+                    )  # fmt: skip
+                fineness = way.next(fine, estimate)
+            coarse = fine
+        if estimate is None:
+            found = f"a run that may do takes some {way.steps(fineness, coarse):.1g}"
+        else:
+            found = f"runs still differ by {estimate.apart:.1e}"
+        raise SceneError(
+            f"accuracy = {self._accuracy:g}: not reached with {_MOST} steps, {found}; ask for less, shorten [time] "
+            "t_end, or take a coarser mesh"
+        )
+
+    def _pilot(self, fineness: float) -> _Pilot:
+        """It may stop early, which a finer one may not. Raises RunStopped if that goes on."""
+        coupling = {
+            **self._way.coupling(fineness),
+            "tolerance": max(_COUPLING_SHARE * self._accuracy, _TIGHTEST),
+        }
+        tables: dict[str, dict[str, Any]] = {"coupling": coupling}
+        if self._scene.spring is not None:
+            tolerance = min(max(_IDA_SHARE * self._accuracy, _TIGHTEST), _LOOSEST)
+            tables["spring"] = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
+        scene = with_changes(self._scene, **tables)
+        recorder = MemoryRecorder(scene)
+        try:
+            run(scene, recorder)
+            self._stopped = 0
+        except RunStopped:
+            self._stopped += 1
+            if self._stopped == _MOST_STOPPED:
+                raise
+        pilot = _Pilot(fineness, recorder.trajectory())
+        self._runs, self._calls, self._spent = self._runs + 1, self._calls + pilot.calls, self._spent + pilot.spent
+        return pilot
+
+    def _estimate(self, coarse: _Pilot, fine: _Pilot) -> _Estimate:
+        values = fine.displacement
+        scale = float(np.abs(values - values[0]).max()) or 1.0
+        displacement = float(np.abs(self._way.difference(coarse, fine)).max(initial=0.0)) / scale
+        step = coarse.run.scene.coupling.macro_step or self._span / coarse.macro_steps
+        event, events = apart(coarse.run, fine.run, 2.0 * step)
+        event /= self._span
+        better, of_event = self._way.better(coarse, fine)
+        expected = displacement / (better - 1.0)
+        kinds, others = ([e.kind for e in pilot.run.events] for pilot in (coarse, fine))
+        # No order holds through an event that only one of the two has.
+        doubted = expected if kinds == others else max(expected, displacement / _DOUBTED)
+        return _Estimate(doubted, expected, event / (of_event - 1.0), events, max(displacement, event))
+
+
+def _rung(steps: float) -> float:
+    """Macro steps, at least these: four sizes an octave, so that any two runs have many times in common."""
+    steps = max(steps, _FEWEST)
+    unit = max(2.0 ** (math.floor(math.log2(steps)) - 2), 4.0)
+    return unit * math.ceil(steps / unit * (1.0 - 1e-9))

@@ -1,0 +1,221 @@
+"""Critical macro steps measured, beside those that the spectral radius predicts.
+
+Measured are the FMUs, coupled by the solvers of a run without its events: the linear closed contact of
+`springbeam.studies.stability.linear`, stepped until its growth shows. `Preloaded` makes the one-sided law λ p₊ a
+two-sided one: the bodies are counted from where a preload holds them in equilibrium.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from ...bodies import force
+from ...bodies.factory import load_bodies
+from ...bodies.protocol import NO_FORCE, Body, Energies, Force, Motion
+from ...coupling import conditions
+from ...coupling.compliance import Compliance
+from ...coupling.exchange import Exchange
+from ...coupling.tie import Tie
+from ...monolithic.semi_discrete import modal_beam
+from ...scene import Scene, load_scene, with_changes
+from .linear import LinearPair, spectral_radius
+from .predict import SCHEMES, THRESHOLD, critical_step, linear_pair
+
+#: Penetration in equilibrium [m], and first amplitude of the motion [m]: it may grow 1e6-fold before contact opens.
+_PRELOAD, _AMPLITUDE = 1e4, 1e-3
+#: Growth of the energy at which the rate is told, and how many macro steps it may take to get there.
+_GROWN, _MOST_STEPS = 1e10, 8000
+
+
+class Preloaded:
+    """A body counted from its equilibrium under a constant contact force, where its end is at ``offset`` [m]."""
+
+    def __init__(self, body: Body, offset: float, preload: float) -> None:
+        self._body, self._offset, self._preload = body, offset, preload
+        self.mass = body.mass
+
+    def mark(self) -> None:
+        self._body.mark()
+
+    def rewind(self) -> None:
+        self._body.rewind()
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        self._body.advance(time, size, (contact[0] - self._preload, contact[1], contact[2]), foundation)
+        return self.motion()
+
+    def motion(self) -> Motion:
+        w = self._body.motion()
+        return w._replace(displacement=w.displacement + self._offset)
+
+    def energies(self) -> Energies:
+        return self._body.energies()
+
+    def apply_impulse(self, impulse: float) -> None:
+        self._body.apply_impulse(impulse)
+
+    def close(self) -> None:
+        self._body.close()
+
+    def save(self) -> dict[str, Any]:
+        return self._body.save()
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        self._body.restore(saved)
+
+
+def growth(scene: Scene) -> float:
+    """Measured spectral radius of the scene's coupling: the factor by which amplitudes grow per macro step.
+
+    The scene's pair without stop and events, tied or in closed contact (``contact.exponent`` must be 1), the spring
+    without its cubic term and at its equilibrium, the tip on it. The rate is that of the second half of the steps up
+    to `_GROWN`.
+    """
+    coupling, contact = scene.coupling, scene.contact
+    H, compliant = coupling.H, contact.law == "compliance"
+    spring = {"cubic_stiffness": 0.0, "equilibrium": 0.0, "external_force": 0.0, "initial_velocity": 0.0}
+    at_rest = {"distributed_load": 0.0, "initial_deflection_slope": 0.0, "initial_velocity_slope": 0.0}
+    linear = with_changes(scene, stop=None, spring=spring, beam={**at_rest, "approach": "elastic"})
+    beam, top = load_bodies(linear, 0.0)
+    assert beam is not None
+    assert top is not None
+    pair: tuple[Body, Body] = (beam, top)
+    frequency = 1.0 / H
+    if compliant:
+        preload = contact.stiffness * _PRELOAD
+        pair = (Preloaded(beam, -0.5 * _PRELOAD, preload), Preloaded(top, 0.5 * _PRELOAD, preload))
+        frequency = math.sqrt(contact.stiffness * (1.0 / beam.mass + 1.0 / top.mass))
+    try:
+        step = _stepper(linear, pair)
+        # Tied ends start with one velocity; in contact it is their relative motion that grows.
+        speed = _AMPLITUDE * frequency
+        reduced = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
+        impulses = (-reduced * speed, reduced * speed) if compliant else (beam.mass * speed, top.mass * speed)
+        for body, impulse in zip(pair, impulses, strict=True):
+            body.apply_impulse(impulse)
+        energies = [_energy(linear, pair)]
+        while len(energies) <= _MOST_STEPS and energies[-1] < _GROWN * energies[0]:
+            for body in pair:
+                body.mark()
+            step(H * (len(energies) - 1))
+            energies.append(_energy(linear, pair))
+    finally:
+        beam.close()
+        top.close()
+    n = len(energies) - 1
+    return float((energies[n] / energies[n // 2]) ** (0.5 / (n - n // 2)))
+
+
+def _energy(scene: Scene, pair: tuple[Body, Body]) -> float:
+    """Of the bodies, and of the contact law about its preload [J]."""
+    energy = sum(body.energies().kinetic + body.energies().potential for body in pair)
+    if scene.contact.law == "compliance":
+        beam, top = (body.motion().displacement for body in pair)
+        energy += 0.5 * scene.contact.stiffness * (top - beam - _PRELOAD) ** 2
+    return energy
+
+
+def _stepper(scene: Scene, pair: tuple[Body, Body]) -> Callable[[float], None]:
+    """``step(time)`` advances both bodies by the scene's coupling."""
+    coupling, contact = scene.coupling, scene.contact
+    H, (beam, top) = coupling.H, pair
+    if contact.law == "compliance" and coupling.scheme != "energy":
+        sequential = coupling.scheme == "gauss_seidel"
+        exchange = Exchange(sequential, coupling.degree, contact.stiffness, contact.exponent)
+        return lambda time: _discard(exchange.solve(beam, top, time, H, (beam.motion(), top.motion())))
+    guess = NO_FORCE
+    tie = Tie(conditions(coupling.scheme, coupling.degree), coupling.degree, coupling.tolerance)
+    law = Compliance(contact.stiffness, contact.exponent, coupling.tolerance)
+
+    def step(time: float) -> None:
+        nonlocal guess
+        if contact.law == "compliance":
+            p = top.motion().displacement - beam.motion().displacement
+            guess = law.solve(beam, top, time, H, guess, p)
+        else:
+            guess = force.shifted(tie.solve(beam, top, time, H, guess, beam.motion()), H)
+
+    return step
+
+
+def _discard(_: object) -> None: ...
+
+
+#: Distances from a predicted critical H, of itself, at which stability and instability are sought. The first ones are
+#: small: ``hermite`` is unstable in bands that can be 0.2 % wide.
+_SOUGHT = (0.001, 0.003, 0.01, 0.03, 0.1)
+
+
+def measured_critical_step(scene: Scene, near: float, precision: float = 0.002) -> float | None:
+    """H [s] around ``near`` at which `growth` passes 1 + `THRESHOLD`, by bisection to ``precision`` of itself.
+
+    ``None`` if it does not within 10 % of ``near``.
+    """
+
+    def unstable(H: float) -> bool:
+        return growth(with_changes(scene, coupling={"macro_step": H})) > 1.0 + THRESHOLD
+
+    low = next((H for x in _SOUGHT if not unstable(H := near * (1.0 - x))), None)
+    high = next((H for x in _SOUGHT if unstable(H := near * (1.0 + x))), None)
+    if low is None or high is None:
+        return None
+    while high > (1.0 + precision) * low:
+        middle = math.sqrt(low * high)
+        if unstable(middle):
+            high = middle
+        else:
+            low = middle
+    return math.sqrt(low * high)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A coupling's critical macro step, predicted and measured [s]; ``None``: stable at any."""
+
+    law: str
+    scheme: str
+    degree: int
+    stiffness: float  #: λ [N/m] of `compliance`; 0 for the tie
+    predicted: float | None
+    measured: float | None
+    #: Factor by which amplitudes grow per macro step at `LARGE_STEP`: spectral radius, and measured.
+    radius: float
+    growth: float
+
+
+#: λ [N/m] at which ordinary exchanges are compared, and a macro step at which they are not stable [s].
+STIFFNESSES, LARGE_STEP = (1e4, 1e8), 0.004
+
+
+#: Search for the narrow bands of ``hermite``.
+_FINE = 1.005
+
+
+def comparisons(n_elements: int = 10) -> Iterator[Comparison]:
+    """Every scheme on the scene ``soft`` with so many elements, linear spring and contact."""
+    soft = with_changes(load_scene("soft"), stop=None, beam={"n_elements": n_elements}, spring={"cubic_stiffness": 0.0})
+    assert soft.beam is not None
+    modal = modal_beam(soft.beam)
+    for law, stiffness in (*(("compliance", value) for value in STIFFNESSES), ("transmission", 0.0)):
+        for scheme, degree in SCHEMES[law]:
+            contact = {"law": law, "stiffness": stiffness or 1.0, "exponent": 1.0}
+            coupling = {"scheme": scheme, "degree": degree, "macro_step": LARGE_STEP}
+            scene = with_changes(soft, contact=contact, coupling=coupling)
+            pair = linear_pair(scene, modal)
+            assert pair is not None
+            yield comparison(scene, pair)
+
+
+def comparison(scene: Scene, pair: LinearPair) -> Comparison:
+    """Of ``scene`` and its linearised ``pair``."""
+    coupling, law = scene.coupling, scene.contact.law
+    scheme, degree = coupling.scheme, coupling.degree
+    predicted = critical_step(pair, scheme, degree, factor=_FINE if scheme == "hermite" else None)
+    measured = None if predicted is None else measured_critical_step(scene, predicted)
+    return Comparison(
+        law, scheme, degree, pair.stiffness, predicted, measured,
+        spectral_radius(pair, scheme, degree, coupling.H), growth(scene),
+    )  # fmt: skip

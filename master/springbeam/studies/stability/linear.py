@@ -1,0 +1,253 @@
+"""The coupled step of a linear pair as a matrix: exact bodies, any scheme, its spectral radius.
+
+Bodies are oscillators ξ̈ + c ξ̇ + ω² ξ = b F with the interface displacement w = bᵀξ. With S the response to a unit
+impulse and S_j its j-fold integral (S₋₁ = Ṡ), a step of size h under F(τ) = Σ F_j τʲ/j! is exact::
+
+    ξ(h) = (Ṡ + cS) ξ₀ + S ξ̇₀ + b Σ F_j S_{j+1}      ∫ξ, ∫∫ξ: each index one, two higher
+    ξ̇(h) = −ω²S ξ₀ + Ṡ ξ̇₀ + b Σ F_j S_j
+
+A step of a scheme is written as what it does to a state; applied to the columns of the identity it gives its matrix.
+Nothing here uses the bodies or the solvers of a run, except the conditions that define a scheme.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import factorial
+
+import numpy as np
+
+from ...bodies import force
+from ...bodies.protocol import Motion
+from ...coupling import conditions
+
+#: S₋₁ … S₅: what a quadratic force and two integrals of the displacement need.
+_ORDERS = 7
+_TERMS = 24
+#: Roots nearer than this share of their modulus are moved apart: S changes by its square.
+_CRITICAL = 1e-6
+
+
+def _phi(z: np.ndarray) -> list[np.ndarray]:
+    """φ_0 … φ_5 with φ_0 = e^z, φ_{j+1} = (φ_j − 1/j!)/z."""
+    near = np.abs(z) < 1.0
+    small, large = np.where(near, z, 0.0), np.where(near, 1.0, z)
+    values, recurred = [], np.exp(large)
+    for j in range(_ORDERS - 1):
+        if j > 0:
+            recurred = (recurred - 1.0 / factorial(j - 1)) / large
+        series = np.polynomial.polynomial.polyval(small, [1.0 / factorial(n + j) for n in range(_TERMS)])
+        values.append(np.where(near, series, recurred))
+    return values
+
+
+def impulse_integrals(omega2: np.ndarray, c: np.ndarray, h: float) -> np.ndarray:
+    """S₋₁ … S₅ at time ``h`` [s].
+
+    Parameters
+    ----------
+    omega2, c : (r,) arrays
+        ω² [1/s²], may be 0 or negative; c ≥ 0 [1/s].
+
+    Returns
+    -------
+    (7, r) array
+        Row j + 1 is S_j [s^{j+1}].
+    """
+    discriminant = np.sqrt((0.25 * c * c - omega2).astype(complex))
+    fast = -0.5 * c - discriminant
+    fast = np.where(np.abs(discriminant) < _CRITICAL * np.abs(fast), fast * (1.0 + 2.0 * _CRITICAL), fast)
+    result = np.empty((_ORDERS, len(omega2)))
+
+    smooth = np.abs(fast) * h < 1.0
+    if np.any(smooth):
+        x, d = omega2[smooth] * h * h, c[smooth] * h
+        derivatives = [np.zeros_like(x), np.ones_like(x)]
+        for _ in range(_TERMS):
+            derivatives.append(-d * derivatives[-1] - x * derivatives[-2])
+        for j in range(-1, _ORDERS - 1):
+            series = [b / factorial(n + j) for n, b in enumerate(derivatives) if n + j >= 0]
+            result[j + 1, smooth] = h ** (j + 1) * np.sum(series, axis=0)
+    if not np.all(smooth):
+        s2 = fast[~smooth]
+        s1 = omega2[~smooth] / s2  # the roots' product; their sum would cancel
+        phi1, phi2 = _phi(s1 * h), _phi(s2 * h)
+        result[0, ~smooth] = ((s1 * phi1[0] - s2 * phi2[0]) / (s1 - s2)).real
+        for j in range(_ORDERS - 1):
+            result[j + 1, ~smooth] = (h**j * (phi1[j] - phi2[j]) / (s1 - s2)).real
+    return result
+
+
+@dataclass(frozen=True)
+class LinearBody:
+    """Oscillators that one interface force moves.
+
+    Attributes
+    ----------
+    omega2, c : (r,) arrays
+        ω² [1/s²] and c [1/s].
+    b : (r,) array
+        w = bᵀξ [m] with mass-normalised ξ [m·√kg].
+    """
+
+    omega2: np.ndarray
+    c: np.ndarray
+    b: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Length 2r of a state (ξ, ξ̇)."""
+        return 2 * len(self.omega2)
+
+    @property
+    def mass(self) -> float:
+        """What an impulse at the interface meets [kg]."""
+        return 1.0 / float(self.b @ self.b)
+
+    def displacement(self, x: np.ndarray) -> np.ndarray:
+        """w [m] of states, the columns of ``x``."""
+        return np.asarray(self.b @ x[: len(self.b)])
+
+    def velocity(self, x: np.ndarray) -> np.ndarray:
+        """ẇ [m/s]."""
+        return np.asarray(self.b @ x[len(self.b) :])
+
+
+class Step:
+    """The exact step of a `LinearBody` over ``h`` [s]."""
+
+    def __init__(self, body: LinearBody, h: float) -> None:
+        self.body, self.h = body, h
+        S = impulse_integrals(body.omega2, body.c, h)[:, :, None]
+        c, omega2, b = (v[:, None] for v in (body.c, body.omega2, body.b))
+        self._free = ((S[0] + c * S[1], S[1]), (-omega2 * S[1], S[0]))
+        self._free_integrals = ((S[1] + c * S[2], S[2]), (S[2] + c * S[3], S[3]))
+        self._forced = [[b * S[j] for j in range(2 - row, 5 - row)] for row in (0, 1)]
+        self._forced_integrals = [[b * S[j] for j in range(3 + row, 6 + row)] for row in (0, 1)]
+
+    def __call__(self, x: np.ndarray, forces: Sequence[np.ndarray | float] = ()) -> tuple[np.ndarray, np.ndarray]:
+        """States and motions (`Motion` as rows, shape (4, columns)) after the step.
+
+        ``x`` has a state per column; ``forces`` are F, Ḟ, F̈ at the start, as many as there are, per column.
+        """
+        r = len(self.body.b)
+        xi, rate = x[:r], x[r:]
+
+        def response(free: tuple[np.ndarray, np.ndarray], forced: list[np.ndarray]) -> np.ndarray:
+            total = free[0] * xi + free[1] * rate
+            for f, g in zip(forces, forced, strict=False):
+                total = total + g * f
+            return np.asarray(total)
+
+        end = np.vstack([response(*pair) for pair in zip(self._free, self._forced, strict=True)])
+        integrals = [self.body.b @ response(*pair)
+                     for pair in zip(self._free_integrals, self._forced_integrals, strict=True)]  # fmt: skip
+        return end, np.array([self.body.displacement(end), self.body.velocity(end), *integrals])
+
+    def response(self, degree: int) -> tuple[np.ndarray, np.ndarray]:
+        """States and motions from rest under P₀ … P_degree, a column each."""
+        units = [force.derivatives(row.tolist(), self.h) for row in np.eye(degree + 1)]
+        return self(np.zeros((self.body.size, degree + 1)), list(np.array(units).T))
+
+
+@dataclass(frozen=True)
+class LinearPair:
+    """Beam and spring; the spring takes −C. ``stiffness`` [N/m] is that of the contact law, for `compliance`."""
+
+    beam: LinearBody
+    spring: LinearBody
+    stiffness: float = 0.0
+
+    def split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States of the beam and of the spring."""
+        return x[: self.beam.size], x[self.beam.size :]
+
+    def penetration(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """y − u_tip [m] and its rate [m/s]."""
+        a, s = self.split(x)
+        return (
+            self.spring.displacement(s) - self.beam.displacement(a),
+            self.spring.velocity(s) - self.beam.velocity(a),
+        )
+
+
+#: ``step(x)``: what one macro step makes of the states in the columns of x.
+CoupledStep = Callable[[np.ndarray], np.ndarray]
+
+
+def tied_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledStep:
+    """The tie by ``energy`` or ``hermite``: as `springbeam.coupling.tie.Tie` solves it, in closed form."""
+    condition = conditions(scheme, degree)
+    T = np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
+    beam, spring = Step(pair.beam, h), Step(pair.spring, h)
+    (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(degree), spring.response(degree)
+    inverse = np.linalg.inv(T @ (beam_motions + spring_motions))
+
+    def step(x: np.ndarray) -> np.ndarray:
+        a, s = pair.split(x)
+        (a, u), (s, y) = beam(a), spring(s)
+        coefficients = -inverse @ (T @ (u - y))
+        return np.vstack([a + beam_states @ coefficients, s - spring_states @ coefficients])
+
+    return step
+
+
+def discrete_gradient_step(pair: LinearPair, h: float) -> CoupledStep:
+    """`compliance` by ``energy``: the discrete gradient of a quadratic energy, C = k (p + p⁺)/2."""
+    beam, spring = Step(pair.beam, h), Step(pair.spring, h)
+    (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(0), spring.response(0)
+    compliance = 2.0 / pair.stiffness + beam_motions[0, 0] + spring_motions[0, 0]
+
+    def step(x: np.ndarray) -> np.ndarray:
+        p, _ = pair.penetration(x)
+        a, s = pair.split(x)
+        (a, u), (s, y) = beam(a), spring(s)
+        c = (p + y[0] - u[0]) / compliance
+        return np.vstack([a + beam_states * c, s - spring_states * c])
+
+    return step
+
+
+def exchange_step(pair: LinearPair, sequential: bool, degree: int, h: float) -> CoupledStep:
+    """`compliance` by ``jacobi`` or ``gauss_seidel``: as `springbeam.coupling.exchange.Exchange` does it."""
+    beam, spring, k = Step(pair.beam, h), Step(pair.spring, h), pair.stiffness
+
+    def step(x: np.ndarray) -> np.ndarray:
+        p, rate = pair.penetration(x)
+        a, s = pair.split(x)
+        forces = [k * p, k * rate][: degree + 1]
+        end, u = beam(a, forces)
+        if sequential:
+            moved = pair.spring.displacement(s) + degree * h * pair.spring.velocity(s)
+            at_end = k * (moved - u[0])
+            forces = [k * p, (at_end - k * p) / h] if degree else [at_end]
+        return np.vstack([end, spring(s, [-f for f in forces])[0]])
+
+    return step
+
+
+def coupled_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledStep:
+    """The step of a scheme: with `compliance` where the pair has a contact stiffness, else of the tie."""
+    if pair.stiffness == 0.0:
+        return tied_step(pair, scheme, degree, h)
+    if scheme == "energy":
+        return discrete_gradient_step(pair, h)
+    return exchange_step(pair, scheme == "gauss_seidel", degree, h)
+
+
+def amplification(pair: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
+    """Matrix of one macro step of size ``h`` [s], for states (ξ, ξ̇) of the beam, then of the spring."""
+    n = pair.beam.size + pair.spring.size
+    return coupled_step(pair, scheme, degree, h)(np.eye(n))
+
+
+def spectral_radius(pair: LinearPair, scheme: str, degree: int, h: float) -> float:
+    """Largest modulus of an eigenvalue of `amplification`."""
+    units = np.concatenate(
+        [np.repeat(1.0, len(v)) if rate else np.maximum(np.sqrt(np.abs(v)), 1.0 / h)
+         for v in (pair.beam.omega2, pair.spring.omega2) for rate in (False, True)]
+    )  # fmt: skip
+    # In units of velocity throughout: eigenvalues stay, rounding does not see the frequencies.
+    matrix = amplification(pair, scheme, degree, h) * units[:, None] / units
+    return float(np.abs(np.linalg.eigvals(matrix)).max())

@@ -1,0 +1,244 @@
+"""What a scene's coupling will do, told before it runs: is it stable, is the motion resolved, which scheme fits.
+
+The scene is linearised where it is stiffest: the hardening spring at the largest deflection and the contact law at the
+largest penetration that the energy at first contact allows; a softening spring at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...monolithic.semi_discrete import ModalBeam, modal_beam
+from ...scene import Beam, Scene
+from ...scene.automatic import STABLE, Choice, choice
+from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
+from ...scene.statics import shear_stiffness
+from .linear import LinearBody, LinearPair, spectral_radius
+
+#: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.
+THRESHOLD = 1e-3
+#: Beams with more modes are predicted with so many.
+MOST_MODES = 128
+#: Modes with less than this share of 1/m_tip do not take part: the tip neither moves nor shows them.
+_UNMOVED = 1e-12
+#: ωH up to which a mode is called resolved: 2π steps a period.
+RESOLVED = 1.0
+#: The search for a critical macro step begins here, in units of 1/(highest frequency), and goes up by these factors.
+_SEARCH = {"hermite": (2.5, 1.03), "jacobi": (1e-3, 2.0), "gauss_seidel": (1e-3, 2.0)}
+
+#: (scheme, degree) that a law can be coupled by.
+SCHEMES = {
+    "transmission": (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)),
+    "compliance": (("energy", 0), ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)),
+}
+
+
+@dataclass(frozen=True)
+class SchemePrediction:
+    """One scheme on the scene."""
+
+    scheme: str
+    degree: int
+    spectral_radius: float  #: at the scene's macro step
+    critical_step: float | None  #: smallest unstable H [s]; None: none found, see `critical_step`
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """All that can be said of a scene's coupling beforehand; ``None`` where the scene lacks what it takes."""
+
+    macro_step: float  #: H [s]
+    threshold: float  #: of the spectral radius above 1, from which on a coupling is called unstable
+    omega_1: float | None  #: lowest and highest frequency kept of the beam [rad/s]
+    omega_max: float | None
+    spring_frequency: float | None  #: of the linearised spring [rad/s]; 0 where it does not oscillate
+    contact_frequency: float | None  #: of tip and spring top on the linearised contact law [rad/s]
+    tip_mass: float | None  #: [kg]
+    impedance: float | None  #: Z = √(KAG ρA) [N·s/m]
+    displacement_gain: float | None  #: 2m/(ZH): the fixed-point gain of an exchange of displacement against force
+    resolved_modes: int | None  #: of the beam's, with ωH ≤ `RESOLVED`
+    modes: int | None
+    schemes: tuple[SchemePrediction, ...]
+    advised: tuple[str, int] | None  #: scheme and degree
+    auto: Choice | None  #: what ``scheme = "auto"`` takes, where there is something to couple
+    notes: tuple[str, ...]
+
+
+def predict(scene: Scene) -> Prediction:
+    """Predict the coupling of ``scene`` (no FMU is loaded)."""
+    H = scene.coupling.H
+    notes = []
+    modal = None
+    if scene.beam is not None and scene.beam.fidelity == "quasi_static":
+        notes.append("a quasi-static beam has no inertia and no step of its own: nothing to predict")
+    elif scene.beam is not None:
+        beam, truncated = _reduced(scene.beam)
+        modal = modal_beam(beam)
+        if truncated:
+            notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
+        if beam.integrator == "generalized_alpha":
+            notes.append("predicted for exact modes; generalized_alpha with rho_inf = 1 adds no energy of its own")
+    pair = None if modal is None else linear_pair(scene, modal)
+    schemes: tuple[SchemePrediction, ...] = ()
+    if scene.contact.law == "paper":
+        notes.append("Algorithm 1 (law = 'paper') overwrites the tip's position: no matrix of this kind")
+    elif pair is None and not notes:
+        notes.append("nothing to couple: a scene with one body and no stop under its tip")
+    elif pair is not None:
+        law = "compliance" if pair.stiffness > 0.0 else "transmission"
+        schemes = tuple(
+            SchemePrediction(scheme, degree, spectral_radius(pair, scheme, degree, H),
+                             critical_step(pair, scheme, degree))
+            for scheme, degree in SCHEMES[law]
+            if scene.beam is None or scene.beam.integrator == "modal" or degree == 0
+        )  # fmt: skip
+    if any(s.scheme == "hermite" and s.critical_step is not None for s in schemes):
+        assert pair is not None
+        notes.append(
+            "hermite is unstable in bands of H: some narrower than 3 % may lie below its critical H, none has been "
+            f"seen below ω_max H = {STABLE:g}, {STABLE / _frequencies(pair)[0]:.3g} s here"
+        )
+    Z = None if scene.beam is None else math.sqrt(shear_stiffness(scene.beam) * scene.beam.density * scene.beam.area)
+    mass = None if scene.spring is None else scene.spring.mass
+    resolved = None if modal is None else int(np.sum(modal.omega * H <= RESOLVED))
+    if modal is not None and resolved == 0:
+        notes.append(
+            f"the motion is not resolved: the beam's lowest mode turns {modal.omega[0] * H:.3g} rad in a macro step; "
+            f"H <= {RESOLVED / modal.omega[0]:.3g} s resolves it"
+        )
+    contact = None
+    if pair is not None and pair.stiffness > 0.0:
+        contact = math.sqrt(pair.stiffness * (1.0 / pair.beam.mass + 1.0 / pair.spring.mass))
+    return Prediction(
+        macro_step=H,
+        threshold=THRESHOLD,
+        omega_1=None if modal is None else float(modal.omega[0]),
+        omega_max=None if modal is None else float(modal.omega[-1]),
+        spring_frequency=None if scene.spring is None else spring_frequency(scene),
+        contact_frequency=contact,
+        tip_mass=None if modal is None else 1.0 / modal.inverse_tip_mass,
+        impedance=Z,
+        displacement_gain=None if mass is None or Z is None else 2.0 * mass / (Z * H),
+        resolved_modes=resolved,
+        modes=None if modal is None else len(modal.omega),
+        schemes=schemes,
+        advised=_advised(schemes, H, resolved),
+        auto=choice(scene) if schemes else None,
+        notes=tuple(notes),
+    )
+
+
+def _reduced(beam: Beam) -> tuple[Beam, bool]:
+    kept = 2 * beam.n_elements * beam.element_degree
+    if beam.integrator == "modal" and beam.n_modes > 0:
+        kept = beam.n_modes
+    if kept <= MOST_MODES:
+        return beam, False
+    return beam.model_copy(update={"n_modes": MOST_MODES}), True
+
+
+def _advised(schemes: tuple[SchemePrediction, ...], H: float, resolved: int | None) -> tuple[str, int] | None:
+    """The scheme of the highest order among those that are stable here and at every smaller step.
+
+    Where not even the lowest mode is resolved a higher degree buys nothing: ``energy`` of degree 0.
+    """
+    sure = [s for s in schemes if s.critical_step is None or s.critical_step > H]
+    sure = [s for s in sure if s.spectral_radius <= 1.0 + THRESHOLD and s.scheme in ("energy", "hermite")]
+    if not sure:
+        return None
+    best = max(sure, key=lambda s: (s.scheme == "hermite", s.degree)) if resolved else sure[0]
+    return best.scheme, best.degree
+
+
+# -- the linearised scene -------------------------------------------------------------------------------------------
+
+
+def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
+    """The beam of ``scene`` in its modes and the linearised spring; without a spring, the tip against the foundation.
+
+    ``None`` where the scene joins no two bodies.
+    """
+    if scene.spring is None and scene.stop is None:
+        return None
+    moved = modal.tip**2 > _UNMOVED * modal.inverse_tip_mass
+    omega2 = modal.omega[moved] ** 2
+    beam = LinearBody(omega2, modal.alpha * omega2, modal.tip[moved])
+    if scene.spring is None:
+        return LinearPair(beam, LinearBody(np.zeros(0), np.zeros(0), np.zeros(0)))
+    stiffness = _contact_stiffness(scene) if scene.contact.law == "compliance" else 0.0
+    return LinearPair(beam, spring_body(scene), stiffness)
+
+
+def spring_body(scene: Scene) -> LinearBody:
+    """The spring with k1 + 3 k2 y² at its stiffest."""
+    spring = scene.spring
+    assert spring is not None
+    m = spring.mass
+    return LinearBody(np.array([spring_stiffness(scene) / m]), np.array([spring.damping / m]), np.array([m**-0.5]))
+
+
+def _contact_stiffness(scene: Scene) -> float:
+    """λ p δ^{p−1} [N/m] at the penetration δ that takes all the energy."""
+    stiffness, p = scene.contact.stiffness, scene.contact.exponent
+    if p == 1.0:
+        return stiffness
+    depth = ((p + 1.0) * contact_energy(scene) / stiffness) ** (1.0 / (p + 1.0))
+    return float(stiffness * p * depth ** (p - 1.0))
+
+
+# -- critical steps -------------------------------------------------------------------------------------------------
+
+
+def _frequencies(pair: LinearPair) -> tuple[float, float]:
+    """Highest and lowest frequency of the pair [rad/s]: of the bodies, and of the contact law between them."""
+    omega = np.sqrt(np.abs(np.concatenate([pair.beam.omega2, pair.spring.omega2])))
+    highest, lowest = float(omega.max()), float(omega[omega > 0.0].min())
+    if pair.stiffness > 0.0:
+        highest = max(highest, math.sqrt(pair.stiffness * (1.0 / pair.beam.mass + 1.0 / pair.spring.mass)))
+    return highest, lowest
+
+
+def critical_step(
+    pair: LinearPair, scheme: str, degree: int, threshold: float = THRESHOLD, factor: float | None = None
+) -> float | None:
+    """Smallest H [s] at which the spectral radius exceeds 1 + ``threshold``, to 1e-3 of itself; None if there is none.
+
+    Searched upwards by factors of 1.03 (``hermite``, from 2.5/ω_max; narrower bands may be missed) or 2 (``jacobi``,
+    ``gauss_seidel``, from 1e-3/ω_max), or of ``factor``, until the slowest mode turns 10 rad in a step. Not for
+    ``energy``, which changes no energy at any H.
+    """
+    if scheme == "energy":
+        return None
+    start, usual = _SEARCH[scheme]
+    factor = usual if factor is None else factor
+    fast, slow = _frequencies(pair)
+    H = start / fast
+    while H * slow <= 10.0:
+        if spectral_radius(pair, scheme, degree, H) > 1.0 + threshold:
+            low, high = H / factor, H
+            while high - low > 1e-3 * high:
+                middle = 0.5 * (low + high)
+                if spectral_radius(pair, scheme, degree, middle) > 1.0 + threshold:
+                    high = middle
+                else:
+                    low = middle
+            return high
+        H *= factor
+    return None
+
+
+def bands(
+    pair: LinearPair, scheme: str, degree: int, sizes: np.ndarray, threshold: float = THRESHOLD
+) -> list[tuple[float, float]]:
+    """Intervals of H between ``sizes`` [s], ascending, in which the spectral radius exceeds 1 + ``threshold``."""
+    unstable = [spectral_radius(pair, scheme, degree, h) > 1.0 + threshold for h in sizes]
+    found: list[tuple[float, float]] = []
+    for i, bad in enumerate(unstable):
+        if bad and (i == 0 or not unstable[i - 1]):
+            found.append((float(sizes[i]), float(sizes[i])))
+        elif bad:
+            found[-1] = (found[-1][0], float(sizes[i]))
+    return found

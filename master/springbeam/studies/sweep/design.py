@@ -1,0 +1,131 @@
+"""What a sweep varies: ``TABLE.KEY=VALUES``, and the scenes that come of it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from scipy.stats import qmc
+
+from ...scene import Scene, SceneError, key_kind, parse_value, with_changes
+
+Sampling = Literal["random", "latin_hypercube"]
+#: A mistyped count, not a sweep.
+MOST_RUNS = 10_000_000
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One varied key: ``values``, or a range that is sampled, or both for a grid."""
+
+    table: str
+    key: str
+    values: tuple[Any, ...] = ()
+    low: float = 0.0
+    high: float = 0.0
+    log: bool = False
+    whole: bool = False  #: the key takes whole numbers
+
+    @property
+    def name(self) -> str:
+        return f"{self.table}.{self.key}"
+
+    @property
+    def is_range(self) -> bool:
+        return self.high != self.low
+
+    def at(self, fraction: float) -> float | int:
+        """The value at a fraction in [0, 1] of the range, exactly its ends at 0 and 1."""
+        if self.log:
+            value = self.low ** (1.0 - fraction) * self.high**fraction
+        else:
+            value = self.low * (1.0 - fraction) + self.high * fraction
+        return round(value) if self.whole else float(value)
+
+
+def parse_axis(text: str) -> Axis:
+    """``table.key=`` and a list ``1,2,5``, a grid ``low:high:count``, or a range to sample ``low:high``.
+
+    ``:log`` at the end spaces a grid or a range evenly in the logarithm.
+
+    Raises
+    ------
+    SceneError
+        If it is none of these; the message says what is allowed.
+    """
+    target, separator, values = text.partition("=")
+    table, dot, key = (part.strip() for part in target.partition("."))
+    if not (separator and dot and table and key and values.strip()):
+        raise _wrong(text, "must be TABLE.KEY=VALUES, as in spring.mass=0.5:2:16")
+    try:
+        kind = key_kind(table, key)
+    except SceneError as error:
+        raise _wrong(text, str(error)) from None
+    parts = [part.strip() for part in values.split(":")]
+    if len(parts) == 1:
+        listed = tuple(parse_value(value.strip()) for value in values.split(","))
+        if kind is not str and (words := [value for value in listed if isinstance(value, str)]):
+            raise _wrong(text, f"{words[0]!r} is no value of {key}; a list is 1,2,5, a range LOW:HIGH:COUNT")
+        return Axis(table, key, listed)
+    log = parts[-1] == "log"
+    parts = parts[:-1] if log else parts
+    try:
+        low, high = float(parts[0]), float(parts[1])
+        count = int(parts[2]) if len(parts) == 3 else 0
+    except (ValueError, IndexError):
+        raise _wrong(text, "a range is LOW:HIGH:COUNT, or LOW:HIGH with --samples; :log may follow") from None
+    if len(parts) > 3 or (len(parts) == 3 and count < 2) or low == high or not math.isfinite(high - low):
+        raise _wrong(text, "a range is LOW:HIGH:COUNT with LOW and HIGH different and COUNT of at least 2")
+    if log and not (low > 0.0 and high > 0.0):
+        raise _wrong(text, "a logarithmic range needs LOW and HIGH greater than 0")
+    if count > MOST_RUNS:
+        raise _wrong(text, f"at most {MOST_RUNS} values are allowed")
+    axis = Axis(table, key, (), low, high, log, kind is int)
+    return replace(axis, values=tuple(axis.at(k / (count - 1)) for k in range(count)))
+
+
+def _wrong(text: str, why: str) -> SceneError:
+    return SceneError(f"--vary {text}: {why}")
+
+
+def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) -> list[tuple[Any, ...]]:
+    """Values of the axes, one tuple per run.
+
+    Without sampled ranges that is the product of all lists and grids, the last axis fastest. With ``samples`` > 0 each
+    axis is sampled: ranges and grids between their ends, lists by equal shares.
+    """
+    if not axes:
+        raise SceneError("--vary: nothing varies; give at least one TABLE.KEY=VALUES")
+    names = [axis.name for axis in axes]
+    if doubled := sorted({name for name in names if names.count(name) > 1}):
+        raise SceneError(f"--vary {doubled[0]}: given twice")
+    if samples == 0:
+        if open_ranges := [axis.name for axis in axes if not axis.values]:
+            raise SceneError(f"--vary {open_ranges[0]}: a range without a count is sampled; give --samples, or a count")
+        total = math.prod(len(axis.values) for axis in axes)
+        if total > MOST_RUNS:
+            raise SceneError(f"--vary: {total} runs; at most {MOST_RUNS} are allowed")
+        return list(itertools.product(*(axis.values for axis in axes)))
+    if sampling == "latin_hypercube":
+        unit = qmc.LatinHypercube(len(axes), seed=seed).random(samples)
+    else:
+        unit = np.random.default_rng(seed).random((samples, len(axes)))
+    return [tuple(_sampled(axis, float(x)) for axis, x in zip(axes, row, strict=True)) for row in unit]
+
+
+def _sampled(axis: Axis, fraction: float) -> Any:
+    if not axis.is_range:
+        return axis.values[min(int(fraction * len(axis.values)), len(axis.values) - 1)]
+    return axis.at(fraction)
+
+
+def varied(scene: Scene, axes: Sequence[Axis], values: Sequence[Any]) -> Scene:
+    """The scene of one run. Raises SceneError if it cannot be run."""
+    tables: dict[str, dict[str, Any]] = {}
+    for axis, value in zip(axes, values, strict=True):
+        tables.setdefault(axis.table, {})[axis.key] = value
+    return with_changes(scene, **tables)

@@ -1,0 +1,94 @@
+"""Pictures of a sweep: a metric over one varied key as a curve, over two as a map."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+
+from ...pictures.drawing import BLUE, VERMILLION
+from .design import Axis
+from .metrics import UNITS
+
+#: A metric that varies less, relative to its largest value, is constant.
+_ROUNDING = 1e-12
+#: So many values of a key are named on its axis.
+_FEW = 8
+
+
+def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], metrics: Sequence[str], path: Path) -> bool:
+    """Draw to ``path`` what the one or two keys of a sweep change; ``False`` where there is nothing to draw."""
+    numbers = {name: np.array([np.nan if v is None else v for v in columns[name]], dtype=float) for name in metrics}
+    shown = [name for name in metrics if _varies(numbers[name])]
+    if len(axes) not in (1, 2) or not shown:
+        return False
+    wide = min(3, len(shown))
+    high = -(-len(shown) // wide)
+    figure, panels = plt.subplots(high, wide, figsize=(4.0 * wide, 3.0 * high), squeeze=False, layout="constrained")
+    for ax in panels.flat[len(shown) :]:
+        ax.remove()
+    for ax, name in zip(panels.flat, shown, strict=False):
+        ax.set_title(f"{name} [{UNITS[name]}]" if name in UNITS else name, fontsize="medium")
+        if len(axes) == 1:
+            _curve(ax, columns[axes[0].name], numbers[name], axes[0])
+        else:
+            _map(figure, ax, columns, numbers[name], axes)
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+    return True
+
+
+def _varies(values: np.ndarray) -> bool:
+    found = values[np.isfinite(values)]
+    return found.size > 1 and bool(np.ptp(found) > _ROUNDING * np.abs(found).max())
+
+
+def _curve(ax: Axes, at: list[Any], values: np.ndarray, axis: Axis) -> None:
+    failed = np.isnan(values)
+    if any(isinstance(value, str) for value in at):
+        ax.plot([str(v) for v in at], values, "o", color=BLUE)
+    else:
+        position = np.array(at, dtype=float)
+        order = np.argsort(position, kind="stable")
+        ax.plot(position[order], values[order], ".-", color=BLUE, linewidth=1.0)
+        if failed.any():
+            low = ax.get_ylim()[0]
+            ax.plot(position[failed], np.full(failed.sum(), low), "x", color=VERMILLION, clip_on=False)
+        if axis.log:
+            ax.set_xscale("log")
+    ax.set_xlabel(axis.name)
+    ax.grid(alpha=0.3)
+
+
+def _map(figure: Figure, ax: Axes, columns: dict[str, list[Any]], values: np.ndarray, axes: Sequence[Axis]) -> None:
+    levels = [list(dict.fromkeys(columns[axis.name])) for axis in axes]
+    grid = len(values) == len(levels[0]) * len(levels[1]) and all(axis.values for axis in axes)
+    words = [any(isinstance(v, str) for v in level) for level in levels]
+    if grid:
+        x = np.arange(len(levels[0])) if words[0] else np.array(levels[0], dtype=float)
+        y = np.arange(len(levels[1])) if words[1] else np.array(levels[1], dtype=float)
+        picture: ScalarMappable = ax.pcolormesh(
+            x, y, values.reshape(len(x), len(y)).T, shading="nearest", cmap="cividis"
+        )
+    else:
+        x, y = (np.array([level.index(v) for v in columns[a.name]] if word else columns[a.name], dtype=float)
+                for a, level, word in zip(axes, levels, words, strict=True))  # fmt: skip
+        picture = ax.scatter(x, y, c=values, s=14, cmap="cividis")
+    for axis, set_scale, set_ticks, level, word in (
+        (axes[0], ax.set_xscale, ax.set_xticks, levels[0], words[0]),
+        (axes[1], ax.set_yscale, ax.set_yticks, levels[1], words[1]),
+    ):
+        if word:
+            set_ticks(range(len(level)), [str(v) for v in level])
+        elif axis.log:
+            set_scale("log")
+        elif grid and len(level) <= _FEW:
+            set_ticks(level)
+    ax.set(xlabel=axes[0].name, ylabel=axes[1].name)
+    figure.colorbar(picture, ax=ax)

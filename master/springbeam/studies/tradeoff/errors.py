@@ -1,0 +1,92 @@
+"""How far a run is from the reference: displacements, event times, impulses, energy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...results.trajectory import Trajectory
+from ..crosscheck import contact_changes
+
+#: Contacts shorter than this many macro steps are no evidence either way.
+_SHORT = 2.0
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative errors over the compared window; NaN where the scene or the run lacks the quantity.
+
+    Displacements are relative to the largest deviation of the reference from its start, impulses to the sum of the
+    reference's, the energy residual to the largest energy.
+    """
+
+    u_tip_max: float
+    u_tip_l2: float  #: root mean square
+    y_max: float
+    y_l2: float
+    event_time: float  #: largest of the changes of contact that the reference has [s]; NaN if one is missed
+    impulse: float
+    energy: float
+
+    @property
+    def displacement(self) -> float:
+        """The larger of the maximum errors of u_tip and y."""
+        return float(np.nanmax([self.u_tip_max, self.y_max]))
+
+
+def errors(run: Trajectory, reference: Trajectory, macro_step: float) -> Errors:
+    """Errors of ``run`` at those of its rows whose times the reference has.
+
+    ``macro_step`` [s] says which contacts are too short for the run to see.
+    """
+    index = np.searchsorted(reference.time, run.time).clip(max=len(reference) - 1)
+    rows = np.flatnonzero(reference.time[index] == run.time)
+    index = index[rows]
+    values: dict[str, float] = {}
+    for name in ("u_tip", "y"):
+        if name in run.columns and name in reference.columns:
+            exact = reference[name]
+            scale = float(np.abs(exact - exact[0]).max()) or 1.0
+            difference = (run[name][rows] - exact[index]) / scale
+            values[f"{name}_max"] = float(np.abs(difference).max())
+            values[f"{name}_l2"] = float(np.sqrt(np.mean(difference**2)))
+        else:
+            values[f"{name}_max"] = values[f"{name}_l2"] = float("nan")
+    return Errors(
+        **values,
+        event_time=_event_time(run, reference, _SHORT * macro_step),
+        impulse=_impulse(run, reference),
+        energy=_energy(run.summary),
+    )
+
+
+def _event_time(run: Trajectory, reference: Trajectory, window: float) -> float:
+    end = float(run.time[-1])
+    ours = contact_changes(run.events, window)
+    theirs = [change for change in contact_changes(reference.events, window) if change[1] < end]
+    worst = 0.0
+    for i, (kind, time) in enumerate(theirs):
+        if i >= len(ours) or ours[i][0] != kind:
+            # One that the run, still on its way, may have just beyond the end.
+            return worst if i == len(theirs) - 1 and end - time <= window else float("nan")
+        worst = max(worst, abs(ours[i][1] - time))
+    return worst
+
+
+def _impulse(run: Trajectory, reference: Trajectory) -> float:
+    def total(trajectory: Trajectory) -> np.ndarray:
+        events = [(e.impulse_contact, e.impulse_foundation) for e in trajectory.events]
+        return np.asarray(np.sum(np.reshape(events, (-1, 2)), axis=0))
+
+    exact = total(reference)
+    scale = float(np.abs(exact).sum())
+    return float(np.abs(total(run) - exact).sum()) / scale if scale > 0.0 else float("nan")
+
+
+def _energy(summary: dict[str, Any]) -> float:
+    for key in ("max_energy_residual", "largest_relative_energy_residual"):
+        if key in summary:
+            return float(summary[key])
+    return float("nan")
