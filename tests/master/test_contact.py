@@ -5,7 +5,9 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
-from springbeam.contact.phases.phases import (
+
+from springbeam.bodies.protocol import Motion
+from springbeam.contact.phases import (
     Impact,
     Joint,
     Phase,
@@ -15,8 +17,6 @@ from springbeam.contact.phases.phases import (
     rebound,
     spring_force,
 )
-
-from springbeam.bodies.protocol import Motion
 from springbeam.scene import Spring, load_scene
 
 MASSES = [(0.25, 1.0), (1.0, 0.01), (3.0, 100.0)]

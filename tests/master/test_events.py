@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
-from springbeam.contact.phases.events import (
+
+from springbeam.bodies.protocol import Motion
+from springbeam.contact.events import (
     EventFunctions,
     Sample,
     cubic_crossing,
@@ -17,9 +19,7 @@ from springbeam.contact.phases.events import (
     lowest_inside,
     stays_above,
 )
-from springbeam.contact.phases.phases import Joint, Phase, common_velocity
-
-from springbeam.bodies.protocol import Motion
+from springbeam.contact.phases import Joint, Phase, common_velocity
 from springbeam.scene import load_scene
 
 SIZE = 0.02

@@ -53,7 +53,7 @@ def test_a_scene_gets_the_pictures_of_what_it_has(tmp_path, scene, expected):
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(expected)
     for path in written:
         image = imread(path)
-        assert image.shape[1] == round(plots._WIDTH * plots._DPI)
+        assert image.shape[1] == round(plots.WIDTH * plots.DPI)
         assert image[..., :3].std() > 0.02  # not blank
 
 

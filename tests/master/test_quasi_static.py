@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, orders
 from scipy.sparse.linalg import spsolve
-from springbeam.contact.phases.phases import Joint, Phase, meeting
 
 from springbeam.bodies.protocol import NO_FORCE
 from springbeam.bodies.quasi_static import QuasiStaticBeam
+from springbeam.contact.phases import Joint, Phase, meeting
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.recording import MemoryRecorder

@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from springbeam.contact.phases.phases import Joint, Phase
 from typer.testing import CliRunner
 
 import springbeam
 from springbeam import cli
 from springbeam.bodies.fmu import FmuError
 from springbeam.bodies.protocol import Motion
+from springbeam.contact.phases import Joint, Phase
 from springbeam.results.recording import FileRecorder, MemoryRecorder, ResultsUnreadable, RunDirectory, load_trajectory
 from springbeam.run import runner
 from springbeam.run.checkpoint import Checkpoint, CheckpointRefused, decoded, encoded

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from springbeam.contact.phases.events import EventFunctions
-from springbeam.contact.phases.phases import Joint, Phase
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies import fmu
+from springbeam.contact.events import EventFunctions
+from springbeam.contact.phases import Joint, Phase
 from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene, shipped_scenes
 

@@ -54,7 +54,7 @@ def test_a_wheel_brings_the_fmus_and_runs_where_there_is_no_checkout(wheel, tmp_
         names = set(archive.namelist())
         archive.extractall(tmp_path / "site")
     assert {f"springbeam/fmus/{name}" for name in ("beam.fmu", "spring.fmu", "spring_beam.ssp")} <= names
-    assert {f"springbeam/scenes/{p.name}" for p in (ROOT / "master/springbeam/scenes").iterdir()} <= names
+    assert {f"springbeam/scene/shipped/{p.name}" for p in (ROOT / "master/springbeam/scene/shipped").iterdir()} <= names
     script = """
 import sys
 sys.meta_path = [finder for finder in sys.meta_path if "editable" not in type(finder).__module__]

@@ -44,7 +44,8 @@ COMMANDS = {
 #: Runs commands in children of a process that has imported everything, so that a kill seldom meets an import.
 NURSERY = """
 import json, os, sys
-from springbeam import cli, runner
+from springbeam import cli
+from springbeam.run import runner
 
 for line in sys.stdin:
     arguments, log = json.loads(line)

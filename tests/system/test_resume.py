@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import BaseModel
-from springbeam.contact.phases.phases import Phase
 
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.memory import Memory
+from springbeam.contact.phases import Phase
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.checkpoint import decoded, encoded
 from springbeam.run.paper_law import PaperLaw

@@ -45,10 +45,10 @@ def crosscheck(
     Example: springbeam crosscheck soft --set coupling.scheme=hermite --set coupling.degree=2 --orders
     """
     from ..monolithic.event_driven import ReferenceFailure
-    from ..pictures.plots import plot_crosscheck
     from ..run.outcome import RunStopped
     from ..studies.crosscheck import crosscheck as compare
     from ..studies.crosscheck import orders
+    from ..studies.crosscheck.picture import draw
 
     console = console_for(silent=as_json)
     with bad_input_reported():
@@ -66,7 +66,7 @@ def crosscheck(
         except (RunStopped, ReferenceFailure) as error:
             fail(STOPPED, str(error))
         if out is not None:
-            plot_crosscheck(report, out)
+            draw(report, out)
     if as_json:
         print_json(_as_json(report))
     for note in report.notes:

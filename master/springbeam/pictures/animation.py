@@ -37,7 +37,7 @@ from .drawing import (
     readable_unit,
 )
 from .motion import COIL_ACROSS, COIL_WIDTH, STOP_WIDTH, Motion, motion_of
-from .plots import LINES, STYLE
+from .timeline import LINES, STYLE
 
 SUFFIXES = (".gif", ".mp4")
 _SIZE, _DPI = (8.0, 5.0), 100

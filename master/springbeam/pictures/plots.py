@@ -6,21 +6,17 @@ printer.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator
 
 from ..results.recording import PICTURES
@@ -30,18 +26,10 @@ from .drawing import (
     BLACK,
     BLUE,
     ENERGIES,
-    EVENT_LOOKS,
     FORCES,
-    GREEN,
     GREY,
     IMPULSES,
-    ORANGE,
-    OTHER_SHADES,
-    PHASE_SHADES,
-    PHASE_WORDS,
     POSITIONS,
-    PURPLE,
-    SKY,
     VELOCITIES,
     VERMILLION,
     Look,
@@ -51,65 +39,16 @@ from .drawing import (
     energy_scale,
     first_contact,
     levels,
-    mark,
     much_smaller,
-    phase_intervals,
     present,
     readable_unit,
     sizes_beside_the_largest,
     stackable,
     stem_foot,
 )
+from .timeline import DPI, IMPULSE_MARKERS, LEVEL_LINES, REMARK, STYLE, Timeline, figure_for, key, note
 
-if TYPE_CHECKING:
-    from ..studies.crosscheck import Report
-
-#: What tells lines apart besides their colour.
-LINES: dict[str, dict[str, Any]] = {
-    "u_tip": {"linewidth": 2.2, "alpha": 0.75},
-    "y": {"linewidth": 0.9},
-    "contact_force": {"linewidth": 0.7},
-    "contact_force_smoothed": {"linewidth": 1.2},
-    "compliance_force": {"linewidth": 1.0, "linestyle": "--"},
-    "foundation_force": {"linewidth": 0.9},
-    "e_total": {"linewidth": 1.4, "linestyle": (0, (4, 2))},
-}
-_EVENT_MARKERS = {
-    "impact": "v",
-    "stop_impact": "^",
-    "release": "o",
-    "retie": "s",
-    "separation": "D",
-    "seated": "<",
-    "unseated": ">",
-}
-_LEVEL_LINES: dict[str, dict[str, Any]] = {"Ψ": {"lw": 0.8, "ls": (0, (4, 3))}, "φ": {"lw": 1.3}}
-#: Of a beam on a stop both are equal: one within the other.
-_IMPULSE_MARKERS: dict[str, dict[str, Any]] = {
-    "impulse_contact": {"marker": "o", "markersize": 5.5, "markerfacecolor": "none"},
-    "impulse_foundation": {"marker": "^", "markersize": 3.0},
-}
-
-STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.titlesize": 9.0,
-    "axes.labelsize": 9.0,
-    "legend.fontsize": 8.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.7,
-    "lines.linewidth": 1.1,
-    "lines.solid_joinstyle": "round",
-    "axes.formatter.useoffset": False,
-    "agg.path.chunksize": 10000,
-}
-_REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
-_DPI = 160
-_WIDTH = 8.2  # inches
-_MANY_EVENTS = 60
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
-_MARK_HEIGHT, _MARK_ROW = 1.045, 0.04
-_KEY_COLUMNS = 4
 #: Early to late, dark to light, but not so light that a line is lost on paper.
 _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 256)), "clock")
 
@@ -144,147 +83,9 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
             figure = draw(trajectory)
             if figure is not None:
                 path = Path(directory) / name
-                figure.savefig(path, dpi=_DPI)
+                figure.savefig(path, dpi=DPI)
                 written.append(path)
     return written
-
-
-def plot_crosscheck(report: Report, path: Path) -> None:
-    """Co-simulation and reference in one picture, and every error below its bound."""
-    trajectory, reference = report.trajectory, report.reference
-    with matplotlib.rc_context(STYLE):
-        timeline = _Timeline.of(trajectory, "Co-simulation and reference", [2.2, 3.0])
-        above, below = timeline.axes
-        names = present(trajectory, POSITIONS)
-        unit = readable_unit([trajectory[name] for name in names], "m")
-        for name, colour in zip(names, (BLUE, VERMILLION), strict=False):
-            above.plot(
-                timeline.unit.factor * trajectory["time"], unit.factor * trajectory[name],
-                color=colour, lw=2.5, alpha=0.5, label=f"{name}, co-simulation",
-            )  # fmt: skip
-            above.plot(
-                timeline.unit.factor * reference["time"], unit.factor * reference[name], color=BLACK, lw=0.7,
-                label=f"{name}, reference",
-            )  # fmt: skip
-        above.set_ylabel(f"position [{unit.name}]")
-        _key(above)
-        colours = (BLUE, SKY, VERMILLION, ORANGE, GREEN, PURPLE, GREY)
-        for row, colour in zip(report.rows, colours, strict=False):
-            time = timeline.unit.factor * row.times
-            below.semilogy(
-                time, np.where(row.errors > 0.0, row.errors, np.nan), color=colour, lw=0.9, label=row.quantity
-            )
-            below.semilogy(time, row.bounds, color=colour, lw=0.9, ls=":")
-        low = min((float(r.errors[r.errors > 0.0].min()) for r in report.rows if (r.errors > 0.0).any()), default=1e-16)
-        high = max((float(max(r.errors.max(), r.bounds.max())) for r in report.rows), default=1.0)
-        below.set_ylim(max(low, 1e-18), 10.0 * high)
-        below.axvline(timeline.unit.factor * report.horizon, color=BLACK, lw=0.8, ls="--")
-        below.set_ylabel("error (lines), bound (dots)\n[unit of the quantity]")
-        _key(below)
-        timeline.figure.savefig(path, dpi=_DPI)
-
-
-# -- axes ---------------------------------------------------------------------------------------------------------
-
-
-@dataclass
-class _Timeline:
-    """A figure of panels over a common time axis, phases shaded and events marked."""
-
-    trajectory: Trajectory
-    figure: Figure
-    axes: list[Axes]
-    unit: Unit
-
-    @classmethod
-    def of(cls, trajectory: Trajectory, title: str, heights: Sequence[float]) -> _Timeline:
-        figure = _figure(trajectory, title, 1.0 + sum(heights))
-        axes = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
-        unit = readable_unit([trajectory["time"]], "s")
-        timeline = cls(trajectory, figure, axes, unit)
-        axes[-1].set_xlabel(f"time t [{unit.name}]")
-        axes[0].set_xlim(unit.factor * trajectory["time"][0], unit.factor * trajectory["time"][-1])
-        keys: list[Patch | Line2D] = [*timeline._shade(), *timeline._mark_events()]
-        # Legends fill column by column; these read row by row.
-        keys = [key for column in range(_KEY_COLUMNS) for key in keys[column::_KEY_COLUMNS]]
-        if keys:
-            figure.legend(handles=keys, loc="outside lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
-        return timeline
-
-    def line(self, ax: Axes, unit: Unit, name: str, look: Look, **style: Any) -> None:
-        """A column over time; where it alternates from step to step, as dots on a faint line."""
-        style = {"color": look.colour, "label": look.words, **LINES.get(name, {}), **style}
-        values = self.trajectory[name]
-        rows = decimated(self.trajectory["time"], values)
-        t, v = self.unit.factor * self.trajectory["time"][rows], unit.factor * values[rows]
-        if alternates(values):
-            style = {**style, "linewidth": 0.25, "marker": ".", "markersize": 1.6, "markeredgewidth": 0.0}
-            _note(ax, "alternates from step\nto step")
-        ax.plot(t, v, **style)
-
-    def _shade(self) -> list[Patch]:
-        spans: dict[str, list[tuple[float, float]]] = {}
-        for phase, start, end in phase_intervals(self.trajectory["time"], self.trajectory["phase"]):
-            spans.setdefault(phase, []).append((self.unit.factor * start, self.unit.factor * (end - start)))
-        others = iter(OTHER_SHADES * len(spans))
-        patches = []
-        if spans.keys() == {"free"}:
-            return []
-        for phase, intervals in spans.items():
-            colour = PHASE_SHADES.get(phase) or next(others)
-            for ax in self.axes:
-                ax.broken_barh(
-                    intervals, (0.0, 1.0), transform=ax.get_xaxis_transform(), color=colour, lw=0.0, zorder=0
-                )
-            patches.append(Patch(facecolor=colour, edgecolor=GREY, linewidth=0.5, label=PHASE_WORDS.get(phase, phase)))
-        return patches
-
-    def _mark_events(self) -> list[Line2D]:
-        """Marks above the first panel and lines through all; of many events only ticks, a row for each kind."""
-        events = self.trajectory.events
-        many = len(events) > _MANY_EVENTS
-        handles: list[Line2D] = []
-        for kind, (colour, words) in EVENT_LOOKS.items():
-            times = self.unit.factor * np.array([event.time for event in events if event.kind == kind])
-            if not len(times):
-                continue
-            height = _MARK_HEIGHT + (_MARK_ROW * len(handles) if many else 0.0)
-            marker = "|" if many else _EVENT_MARKERS[kind]
-            look: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 4.0, "ls": "none"}
-            visible = times[decimated(times, times)]
-            first = self.axes[0]
-            first.plot(
-                visible, np.full(len(visible), height), transform=first.get_xaxis_transform(), clip_on=False, **look
-            )
-            for ax in [] if many else self.axes:
-                ax.vlines(
-                    visible, 0.0, 1.0, transform=ax.get_xaxis_transform(), color=colour, lw=0.4, alpha=0.6, zorder=1
-                )
-            key = {"markersize": 8.0, "markeredgewidth": 1.5} if many else {}
-            handles.append(Line2D([], [], label=f"{words} ({len(times)})", **(look | key)))
-        return handles
-
-
-def _figure(trajectory: Trajectory, title: str, height: float) -> Figure:
-    figure = Figure(figsize=(_WIDTH, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    scene = trajectory.scene.title
-    figure.suptitle(f"{title}\n{scene}" if scene else title, fontsize=10.0, x=0.01, ha="left")
-    figure.text(0.99, 0.985, mark(trajectory), fontsize=8.0, weight="bold", color=VERMILLION, ha="right", va="top")
-    return figure
-
-
-def _key(ax: Axes) -> None:
-    ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), frameon=False, borderaxespad=0.0, handlelength=1.6)
-
-
-def _note(ax: Axes, text: str) -> None:
-    """A remark beside the panel, under its key; once, however often it is made."""
-    notes = [note for note in ax.texts if note.get_gid() == "note"]
-    if not notes:
-        ax.text(1.012, 0.0, text, transform=ax.transAxes, va="bottom", gid="note", **_REMARK)
-    elif text not in notes[0].get_text():
-        notes[0].set_text(f"{notes[0].get_text()}\n{text}")
 
 
 def _visible(ax: Axes, trajectory: Trajectory, looks: Mapping[str, Look], unit: str) -> list[str]:
@@ -292,7 +93,7 @@ def _visible(ax: Axes, trajectory: Trajectory, looks: Mapping[str, Look], unit: 
     seen, unseen = sizes_beside_the_largest(trajectory, looks)
     if unseen:
         sizes = [f"{looks[name].words} ≤ {size:.2g} {unit}" for name, size in unseen.items()]
-        _note(ax, "too small to draw:\n" + "\n".join(sizes))
+        note(ax, "too small to draw:\n" + "\n".join(sizes))
     return seen
 
 
@@ -307,7 +108,7 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     times, shapes = times[first : first + _SHAPES_EARLY], shapes[first : first + _SHAPES_EARLY]
     if len(times) < 2:
         return None
-    figure = _figure(trajectory, "(A) The beam right after first contact", 3.6)
+    figure = figure_for(trajectory, "(A) The beam right after first contact", 3.6)
     left, right = figure.subplots(1, 2)
     steps = np.diff(times)
     apart = steps > 1e-6 * np.max(steps, initial=0.0)  # between rows of one event Δu is rounding
@@ -323,7 +124,7 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
         right.set_title(
             f"mean from shape to shape; the tip's own velocity reaches {unit.factor * fastest:.2g} {unit.name}:\n"
             "the motion is faster than the steps",
-            **_REMARK,
+            **REMARK,
         )
     return figure
 
@@ -336,7 +137,7 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
     times, shapes = times[first:], shapes[first:]
     if len(times) < _SHAPES_EARLY:
         return None
-    figure = _figure(trajectory, "(B) Subsequent motion of the beam", 3.6)
+    figure = figure_for(trajectory, "(B) Subsequent motion of the beam", 3.6)
     left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     jumpy = alternates(shapes[:, -1])
     # Of shapes that alternate, evenly spaced ones may all be of one kind: pairs show both.
@@ -347,7 +148,7 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
     _levels(left, trajectory, readable_unit([shapes[some]], "m"))
     _map(figure, right, trajectory, times, shapes)
     if jumpy:
-        left.set_title("pairs of successive shapes: they alternate\nfrom step to step", **_REMARK)
+        left.set_title("pairs of successive shapes: they alternate\nfrom step to step", **REMARK)
     return figure
 
 
@@ -407,7 +208,7 @@ def _levels(ax: Axes, trajectory: Trajectory, unit: Unit, *, whole_width: bool =
         level = unit.factor * value
         if not low - reach <= level <= high + reach:
             continue
-        ax.axhline(level, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **_LEVEL_LINES[symbol])
+        ax.axhline(level, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **LEVEL_LINES[symbol])
         place: dict[str, Any] = {"xytext": (3.0, 0.0), "va": "center"}
         if whole_width:  # beside the panel is the key
             place = {"xytext": (-2.0, 1.5), "ha": "right"}
@@ -424,7 +225,7 @@ def _positions(trajectory: Trajectory) -> Figure | None:
     whose = "beam's tip" if "v_tip" in speeds else "spring's top"
     title = "(C) Positions, and velocity" if len(positions) > 1 else "(C) Position and velocity"
     hidden = much_smaller(trajectory, positions)
-    timeline = _Timeline.of(trajectory, f"{title} of the {whose}", [2.4] + [1.2] * bool(hidden) + [1.6])
+    timeline = Timeline.of(trajectory, f"{title} of the {whose}", [2.4] + [1.2] * bool(hidden) + [1.6])
     above, *close, below = timeline.axes
     unit = readable_unit([trajectory[name] for name in positions], "m")
     for name in positions:
@@ -438,17 +239,17 @@ def _positions(trajectory: Trajectory) -> Figure | None:
         ax.set_ylabel(f"position [{unit.name}]")
     _velocity_panel(timeline, below, speeds)
     for ax in timeline.axes:
-        _key(ax)
+        key(ax)
     return timeline.figure
 
 
-def _velocity_panel(timeline: _Timeline, ax: Axes, names: list[str]) -> None:
+def _velocity_panel(timeline: Timeline, ax: Axes, names: list[str]) -> None:
     unit = readable_unit([timeline.trajectory[name] for name in names], "m/s")
     ax.axhline(0.0, color=GREY, lw=0.5)
     for name in names:
         timeline.line(ax, unit, name, VELOCITIES[name])
     ax.set_ylabel(f"velocity [{unit.name}]")
-    _key(ax)
+    key(ax)
 
 
 def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
@@ -459,7 +260,7 @@ def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
     if not forces and not impulses:
         return None
     title = "(D) Velocity of the spring's top, and forces" if speeds else "(D) Forces"
-    timeline = _Timeline.of(trajectory, title, panels)
+    timeline = Timeline.of(trajectory, title, panels)
     axes = iter(timeline.axes)
     if speeds:
         _velocity_panel(timeline, next(axes), speeds)
@@ -470,17 +271,17 @@ def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
     return timeline.figure
 
 
-def _force_panel(timeline: _Timeline, ax: Axes, names: list[str]) -> None:
+def _force_panel(timeline: Timeline, ax: Axes, names: list[str]) -> None:
     trajectory = timeline.trajectory
     unit = readable_unit([trajectory[name] for name in names], "N")
     ax.axhline(0.0, color=GREY, lw=0.5)
     for name in _visible(ax, trajectory, {name: FORCES[name] for name in names}, "N"):
         timeline.line(ax, unit, name, FORCES[name])
     ax.set_ylabel(f"force [{unit.name}]")
-    _key(ax)
+    key(ax)
 
 
-def _impulse_panel(timeline: _Timeline, ax: Axes) -> None:
+def _impulse_panel(timeline: Timeline, ax: Axes) -> None:
     events = timeline.trajectory.events
     sizes = np.array([getattr(e, name) for e in events for name in IMPULSES if getattr(e, name) != 0.0])
     foot = stem_foot(sizes)
@@ -490,20 +291,20 @@ def _impulse_panel(timeline: _Timeline, ax: Axes) -> None:
         if len(points):
             t, j = timeline.unit.factor * points[:, 0], unit.factor * points[:, 1]
             ax.vlines(t, foot or 0.0, j, color=colour, lw=1.0)
-            ax.plot(t, j, color=colour, linestyle="none", label=label, **_IMPULSE_MARKERS[name])
+            ax.plot(t, j, color=colour, linestyle="none", label=label, **IMPULSE_MARKERS[name])
     if foot is None:
         ax.axhline(0.0, color=GREY, lw=0.5)
     else:
         ax.set_yscale("log")
         ax.set_ylim(foot, 2.0 * float(np.max(sizes)))
     ax.set_ylabel(f"impulse [{unit.name}]")
-    _key(ax)
+    key(ax)
 
 
 def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
     gap = present(trajectory, ["gap"])
     title = "(E) Gap and energy" if gap else "(E) Energy"
-    timeline = _Timeline.of(trajectory, title, [1.5] * bool(gap) + [2.2, 1.4])
+    timeline = Timeline.of(trajectory, title, [1.5] * bool(gap) + [2.2, 1.4])
     *above, energies, residual = timeline.axes
     if gap:
         unit = readable_unit([trajectory["gap"]], "m")
@@ -511,13 +312,13 @@ def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
         words = "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ"
         timeline.line(above[0], unit, "gap", Look(BLUE, words))
         above[0].set_ylabel(f"gap [{unit.name}]")
-        _key(above[0])
+        key(above[0])
     _energy_panel(timeline, energies)
     _residual_panel(timeline, residual)
     return timeline.figure
 
 
-def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
+def _energy_panel(timeline: Timeline, ax: Axes) -> None:
     """Stacked where no part is negative, else lines."""
     trajectory = timeline.trajectory
     there = {name: ENERGIES[name] for name in present(trajectory, ENERGIES) if np.any(trajectory[name] != 0.0)}
@@ -538,10 +339,10 @@ def _energy_panel(timeline: _Timeline, ax: Axes) -> None:
             timeline.line(ax, unit, name, ENERGIES[name])
     timeline.line(ax, unit, "e_total", Look(BLACK, "total"))
     ax.set_ylabel(f"energy [{unit.name}]")
-    _key(ax)
+    key(ax)
 
 
-def _residual_panel(timeline: _Timeline, ax: Axes) -> None:
+def _residual_panel(timeline: Timeline, ax: Axes) -> None:
     columns = timeline.trajectory.columns
     relative = np.abs(columns["energy_residual"]) / energy_scale(timeline.trajectory)
     rows = decimated(columns["time"], relative)
@@ -552,5 +353,5 @@ def _residual_panel(timeline: _Timeline, ax: Axes) -> None:
         ax.set_ylim(0.3 * max(float(np.min(relative[rows])), 1e-18), 5.0 * float(np.max(relative[rows])))
         ax.yaxis.set_major_locator(LogLocator(numticks=6))
     else:
-        _note(ax, "zero throughout")
+        note(ax, "zero throughout")
     ax.set_ylabel("energy residual\n/ largest energy [–]")

@@ -25,8 +25,8 @@ import numpy as np
 from pydantic_core import to_json
 
 from ..scene import Scene, scene_from_dict
-from .trajectory import COLUMNS, EVENT_COLUMNS, EVENT_KINDS, Event, Trajectory
 from ..scene.statics import SHAPE_POINTS
+from .trajectory import COLUMNS, EVENT_COLUMNS, EVENT_KINDS, Event, Trajectory
 
 try:
     import fcntl

@@ -22,14 +22,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..monolithic import algorithm1, event_driven
-from ..results.trajectory import Event, Trajectory
-from ..run.outcome import RunStopped
-from ..run.runner import simulate
-from ..scene import Scene, SceneError, with_changes
-from ..scene.automatic import decided
-from ..scene.resolution import mesh_frequency
-from ..scene.statics import tip_compliance
+from ...monolithic import algorithm1, event_driven
+from ...results.trajectory import Event, Trajectory
+from ...run.outcome import RunStopped
+from ...run.runner import simulate
+from ...scene import Scene, SceneError, with_changes
+from ...scene.automatic import decided
+from ...scene.resolution import mesh_frequency
+from ...scene.statics import tip_compliance
 
 _SAFETY = 4.0
 #: Relative tolerance of IDA, the spring FMU's default.
