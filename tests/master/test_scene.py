@@ -179,6 +179,49 @@ BAD = {
         changed(beam={"integrator": "generalized_alpha", "rho_inf": 0.5}, contact={"law": "paper"}),
         ["[beam] rho_inf = 0.5", "paper", "rho_inf = 1"],
     ),
+    "damping negative in contact": (changed(contact={"damping": -1.0}), ["[contact] damping = -1.0", "at least 0"]),
+    "damped transmission": (
+        changed(contact={"damping": 0.5}),
+        ["[contact] damping = 0.5", 'law = "transmission" has none', '"compliance" or "link"'],
+    ),
+    "damped tie": (
+        changed(contact={"law": "tie", "damping": 0.5}),
+        ["[contact] damping = 0.5", 'law = "tie" has none'],
+    ),
+    "tie without beam": (changed(beam=None, contact={"law": "tie"}), ['law = "tie"', "this scene has no [beam]"]),
+    "link without spring": (changed(spring=None, contact={"law": "link"}), ['law = "link"', "has no [spring]"]),
+    "tie that keeps velocities": (
+        changed(contact={"law": "tie", "impact": "rest"}),
+        ['[contact] impact = "rest"', 'use "inelastic"'],
+    ),
+    "tie of ends apart": (
+        changed(contact={"law": "tie"}, beam={"initial_deflection_slope": 0.1}),
+        ["initial_deflection_slope = 0.1", "starts at 0.1 m", "equilibrium = 0.0", 'use "link"'],
+    ),
+    "tie of a tip below": (
+        changed(contact={"law": "tie"}, beam={"initial_deflection_slope": -0.1}),
+        ["starts at -0.1 m", 'use "link"'],
+    ),
+    "link of nothing": (
+        changed(contact={"law": "link", "stiffness": 0.0}),
+        ["[contact] stiffness = 0.0", 'law = "link"', "a damping greater than 0"],
+    ),
+    "link by hermite": (
+        changed(contact={"law": "link"}, coupling={"scheme": "hermite", "degree": 1}),
+        ['scheme = "hermite"', 'law = "link" needs scheme = "energy"'],
+    ),
+    "link by jacobi": (
+        changed(contact={"law": "link"}, coupling={"scheme": "jacobi"}),
+        ['scheme = "jacobi"', 'law = "link" needs "energy"'],
+    ),
+    "one way, damped": (
+        changed(contact={"law": "compliance", "damping": 0.1}, coupling={"feedback": "beam_drives"}),
+        ['feedback = "beam_drives"', "[contact] damping = 0.0", '"two_way"'],
+    ),
+    "link of a beam without inertia": (
+        changed(contact={"law": "link"}, beam={"fidelity": "quasi_static"}),
+        ['fidelity = "quasi_static"', 'law = "tie" or fidelity = "dynamic"'],
+    ),
     "stop above spring": (changed(stop={"position": 0.1}), ["[stop] position = 0.1", "below", "equilibrium = 0.0"]),
     "stop at spring": (changed(stop={"position": 0.0}), ["[stop] position = 0.0", "below", "equilibrium = 0.0"]),
     "step longer than run": (changed(coupling={"macro_step": 1.0}), ["macro_step = 1.0", "t_end = 0.6"]),
@@ -290,6 +333,15 @@ GOOD = {
     "paper on midpoint": changed(beam={"integrator": "generalized_alpha"}, contact={"law": "paper"}),
     "hermite": changed(coupling={"scheme": "hermite", "degree": 2}),
     "no compliance part": changed(contact={"stiffness": 0.0}),
+    "tie, ends at one height": changed(
+        contact={"law": "tie"}, spring={"equilibrium": 0.07}, beam={"initial_deflection_slope": 0.1, "length": 0.7}
+    ),
+    "tie, both upwards": changed(contact={"law": "tie"}, beam={"initial_velocity_slope": 1.0}),
+    "tie by hermite": changed(contact={"law": "tie"}, coupling={"scheme": "hermite", "degree": 2}),
+    "tie of a beam without inertia": changed(contact={"law": "tie"}, beam={"fidelity": "quasi_static"}),
+    "link, ends apart": changed(contact={"law": "link", "damping": 2.0}, beam={"initial_deflection_slope": -0.1}),
+    "dashpot": changed(contact={"law": "link", "stiffness": 0.0, "damping": 2.0}),
+    "Hunt and Crossley": changed(contact={"law": "compliance", "damping": 0.5}),
     "one step": changed(coupling={"macro_step": 0.6}),
     "adaptive": adaptive(relative_tolerance=1e-4, absolute_tolerance=1e-9),
     "adaptive, absolute": adaptive(absolute_tolerance=1e-9),
@@ -327,6 +379,9 @@ def test_every_impossibility_is_reported_at_once():
         # 0.1·0.7 < 0.07 in doubles: only rounding parts tip and spring.
         ({"beam": {"initial_deflection_slope": 0.1, "length": 0.7}, "spring": {"equilibrium": 0.07}}, 0.0),
         ({"beam": {"initial_velocity_slope": 0.0}}, 0.0),
+        # Joined from the start, wherever the ends are and move.
+        ({"contact": {"law": "link"}, "beam": {"initial_deflection_slope": 0.5}}, None),
+        ({"contact": {"law": "tie"}, "beam": {"initial_velocity_slope": 1.0}}, None),
     ],
 )
 def test_contact_time_of_the_undeformed_approach(changes, expected):

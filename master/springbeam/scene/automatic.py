@@ -27,7 +27,7 @@ class Choice(NamedTuple):
 def choice(scene: Scene) -> Choice:
     """The scheme and degree for ``scene``, whatever its own say."""
     beam, coupling = scene.beam, scene.coupling
-    if scene.contact.law != "transmission":
+    if not scene.contact.rigid:
         return Choice("energy", 0, f'contact.law = "{scene.contact.law}"')
     if beam is None:
         return Choice("energy", 0, "one body")

@@ -58,7 +58,7 @@ def _slowest(scene: Scene) -> list[tuple[str, float, str]]:
     if beam is not None and beam.fidelity == "dynamic":
         omega = slowest_frequency(beam)
         if beam.alpha_b * omega < 2.0:  # else it creeps
-            static = spring is not None and scene.contact.law == "transmission"
+            static = spring is not None and scene.contact.rigid
             found.append(("beam", omega, ', beam.fidelity = "quasi_static" leaves it out' if static else ""))
     if spring is not None:
         omega = spring_frequency(scene)

@@ -143,6 +143,29 @@ def _tip_arrives(scene: Scene) -> Iterator[str]:
         )
 
 
+def _ends_can_be_joined(scene: Scene) -> Iterator[str]:
+    beam, spring, contact = scene.beam, scene.spring, scene.contact
+    name = f'[contact] law = "{contact.law}"'
+    if contact.damping > 0.0 and contact.law not in ("compliance", "link"):
+        yield f'[contact] damping = {contact.damping}: law = "{contact.law}" has none; use 0.0, "compliance" or "link"'
+    if not contact.lasting:
+        return
+    for table in ("beam", "spring"):
+        if getattr(scene, table) is None:
+            yield f"{name}: joins a [beam] and a [spring]; this scene has no [{table}]"
+    if contact.law == "link" and contact.stiffness == contact.damping == 0.0:
+        yield f"[contact] stiffness = 0.0: {name} needs a stiffness or a damping greater than 0"
+    if contact.law == "tie" and contact.impact != "inelastic":
+        yield f'[contact] impact = "{contact.impact}": law = "tie" gives both ends one velocity; use "inelastic"'
+    if contact.law == "tie" and beam is not None and spring is not None:
+        tip, top = scene.initial_tip or 0.0, spring.equilibrium
+        if not math.isclose(tip, top, rel_tol=1e-12):
+            yield (
+                f"[beam] initial_deflection_slope = {beam.initial_deflection_slope}: the tip starts at {tip:.6g} m, "
+                f'but law = "tie" holds it at [spring] equilibrium = {top}; let them start at one height, or use "link"'
+            )
+
+
 def _law_applies(scene: Scene) -> Iterator[str]:
     beam, contact, coupling = scene.beam, scene.contact, scene.coupling
     if contact.law == "paper":
@@ -163,10 +186,13 @@ def _law_applies(scene: Scene) -> Iterator[str]:
                 'needs scheme = "energy" and degree = 0 (its discrete gradient), "gauss_seidel" or "jacobi"'
             )
     elif coupling.scheme in ORDINARY_SCHEMES:
+        schemes = '"energy"' if contact.law == "link" else '"energy" or "hermite"'
         yield (
             f'[coupling] scheme = "{coupling.scheme}": exchanges the force of [contact] law = "compliance"; '
-            f'law = "{contact.law}" needs "energy" or "hermite"'
+            f'law = "{contact.law}" needs {schemes}'
         )
+    elif contact.law == "link" and coupling.scheme == "hermite":
+        yield '[coupling] scheme = "hermite": holds rigid ties; [contact] law = "link" needs scheme = "energy"'
 
 
 def _feedback_negligible(scene: Scene) -> Iterator[str]:
@@ -181,6 +207,11 @@ def _feedback_negligible(scene: Scene) -> Iterator[str]:
         yield (
             f'{name}: needs [contact] law = "compliance" and [coupling] scheme = "energy"; a tie is felt by both ends. '
             'Use "two_way"'
+        )
+    if contact.damping > 0.0:
+        yield (
+            f"{name}: what it neglects is bounded without damping of the contact only; use [contact] damping = 0.0, "
+            'or "two_way"'
         )
     if coupling.feedback == "spring_drives" and (spring.cubic_stiffness != 0.0 or spring.linear_stiffness <= 0.0):
         yield (
@@ -209,6 +240,11 @@ def _inertia_needed(scene: Scene) -> Iterator[str]:
             f'{name}: is in series with the compliance of [contact] law = "compliance", and what lies between them has '
             'no inertia; use law = "transmission", fidelity = "dynamic", or neglect the force on the beam: '
             '[coupling] feedback = "beam_drives"'
+        )
+    if contact.law == "link":
+        yield (
+            f'{name}: is in series with the link of [contact] law = "link", and what lies between them has no inertia; '
+            'use law = "tie" or fidelity = "dynamic"'
         )
     if contact.law == "paper":
         yield f'{name}: [contact] law = "paper" integrates the beam by (62); use fidelity = "dynamic"'
@@ -263,6 +299,7 @@ _CHECKS = (
     _bodies,
     _spring_holds,
     _tip_arrives,
+    _ends_can_be_joined,
     _law_applies,
     _inertia_needed,
     _feedback_negligible,
@@ -300,7 +337,7 @@ def suspicions(scene: Scene) -> list[str]:
         )
     if beam is not None and beam.fidelity == "quasi_static" and scene.spring is not None:
         share = tip_inertia(beam) / scene.spring.mass
-        if share > 0.05 and scene.contact.law == "transmission":
+        if share > 0.05 and scene.contact.rigid:
             found.append(
                 f'[beam] fidelity = "quasi_static": leaves out an inertia that at the tip is {share:.2g} of the '
                 f"spring's mass; the joined motion is about {math.sqrt(1.0 + share) - 1.0:.0%} too fast"

@@ -44,8 +44,11 @@ class Scene(Table):
 
     @property
     def tip_target(self) -> tuple[str, float] | None:
-        """What the beam's tip meets first, as ``("[table] key", height [m])``: the spring, else the stop."""
-        if self.beam is None:
+        """What the beam's tip meets first, as ``("[table] key", height [m])``: the spring, else the stop.
+
+        ``None`` where there is nothing to meet, or where the law joins the tip to the spring from the start.
+        """
+        if self.beam is None or self.contact.lasting:
             return None
         if self.spring is not None:
             return "[spring] equilibrium", self.spring.equilibrium

@@ -124,10 +124,23 @@ class Stop(Table):
 
 
 class Contact(Table):
-    law: Literal["transmission", "compliance", "paper"] = "transmission"
+    """What force C belongs to the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
+
+    law: Literal["transmission", "compliance", "tie", "link", "paper"] = "transmission"
     impact: Literal["inelastic", "rest", "tip"] = "inelastic"
-    stiffness: NonNegative = 1.0e4  #: λ_nc [N/m^p]
-    exponent: Annotated[float, Field(ge=1.0, le=100.0)] = 3.0  #: p
+    stiffness: NonNegative = 1.0e4  #: λ_nc [N/m^p], of "link" [N/m]
+    exponent: Annotated[float, Field(ge=1.0, le=100.0)] = 3.0  #: p; "link" has none
+    damping: NonNegative = 0.0  #: "compliance": χ [s/m] (Hunt & Crossley 1975); "link": c [N·s/m]
+
+    @property
+    def rigid(self) -> bool:
+        """Whether ends that have met share one position."""
+        return self.law in ("transmission", "tie")
+
+    @property
+    def lasting(self) -> bool:
+        """Whether the law joins the ends from the start and for good, for either sign of C."""
+        return self.law in ("tie", "link")
 
 
 #: How long macro steps are: one key, or the others.
