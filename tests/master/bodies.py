@@ -16,7 +16,7 @@ from math import factorial
 import numpy as np
 from scipy.linalg import eigh, expm
 
-from springbeam.bodies.protocol import NO_FORCE, Energies, Force, Motion
+from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
 from springbeam.results.recording import MemoryRecorder
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.outcome import RunStopped
@@ -51,7 +51,7 @@ def stumpff(theta: np.ndarray) -> list[np.ndarray]:
     return c
 
 
-class ModalBody:
+class ModalBody(BeamBody):
     """ä + α ω² ȧ + ω² a = b C + f per mode, w = bᵀa; F = +C.
 
     Parameters
@@ -151,8 +151,6 @@ class ModalBody:
     def shape(self) -> np.ndarray:
         return self._sampler @ self.a
 
-    def close(self): ...
-
 
 def beam_body(beam: Beam, slope: float | None = None) -> ModalBody:
     """The scene's beam: P1 elements, full integration, all modes. ``slope`` replaces initial_deflection_slope."""
@@ -203,7 +201,7 @@ def modal_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> ModalBo
 _ORDER = 22
 
 
-class DuffingBody:
+class DuffingBody(Body):
     """m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series in steps short enough for rounding."""
 
     def __init__(self, mass=1.0, k1=3.0, k2=-0.2, y=0.0, z=0.0, damping=0.0, external=0.0):
@@ -289,7 +287,9 @@ class DuffingBody:
         self.z += impulse / self.mass
         self._moved = True
 
-    def close(self): ...
+    def holding_force(self, displacement, velocity):
+        y = displacement
+        return self.k1 * y + self.k2 * y**3 - self.external + self.damping * velocity
 
 
 def _sum(coefficients: list[float], h: float) -> float:

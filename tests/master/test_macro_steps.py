@@ -11,9 +11,9 @@ from bodies import DuffingBody
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion
-from springbeam.coupling import conditions
 from springbeam.coupling.energy import created_mismatch
 from springbeam.coupling.hermite import gap_inside
+from springbeam.coupling.protocol import Window
 from springbeam.coupling.tie import Tie
 from springbeam.run.local_error import _beside_cubic
 from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
@@ -165,7 +165,7 @@ def test_free_masses_create_no_mismatch(degree):
     for body in (upper, b):
         body.mark()
     start = (upper.motion(), b.motion())
-    Tie(conditions("energy", degree), degree, 1e-12).solve(upper, b, 0.0, size, NO_FORCE, start[0])
+    Tie("energy", degree, 1e-12).solve(upper, b, Window(0.0, size, start), NO_FORCE)
     gaps = [Motion(*np.subtract(*ends)) for ends in (start, (upper.motion(), b.motion()))]
     assert gaps[1].velocity == pytest.approx(-((-1) ** degree) * gaps[0].velocity, rel=1e-9)
     assert created_mismatch(*gaps, degree) < 1e-9 * abs(gaps[0].velocity)

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from bodies import modal_beam, simulate
 
-from springbeam.bodies.protocol import Held
-from springbeam.coupling.compliance import Compliance, discrete_gradient
+from springbeam.bodies.protocol import NO_FORCE, Held, Motion
+from springbeam.contact.laws import Compliance
 from springbeam.coupling.one_way import OneWay
+from springbeam.coupling.projection import Projection
+from springbeam.coupling.protocol import Step, Window
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import Beam, Scene, SceneError, load_scene, statics, with_changes
 
@@ -99,20 +101,35 @@ def test_both_ends_known_leave_nothing_to_solve() -> None:
     """The beam drives and the spring is seated: C is the discrete gradient of where the tip has gone."""
     beam, start = modal_beam(6), 1e-3
     beam.mark()
-    one_way = OneWay(Compliance(*LAW, 1e-12), *LAW, beam_drives=True, driver_stiffness=1e6)
-    force = one_way.solve(beam, Held(0.0), 0.0, 0.01, (5.0, 0.0, 0.0), start)
-    assert force == (discrete_gradient(start, -beam.motion().displacement, *LAW), 0.0, 0.0)
+    law = Compliance(*LAW)
+    one_way = OneWay(law, 0, 1e-12, upper_drives=True, driver_stiffness=1e6)
+    ends = (beam.motion()._replace(displacement=-start), Held(0.0).motion())
+    force = one_way.solve(beam, Held(0.0), Window(0.0, 0.01, ends), (5.0, 0.0, 0.0))
+    assert force == (Projection(law, 0)(start, [-beam.motion().displacement], 0.01).a[0], 0.0, 0.0)
     assert beam.steps == 1
 
 
 def test_the_accounts_are_those_of_the_docstring() -> None:
-    one_way = OneWay(Compliance(*LAW, 1e-12), *LAW, beam_drives=True, driver_stiffness=50.0)
-    assert (one_way.neglected, one_way.share) == (0.0, 0.0)
+    one_way = OneWay(Compliance(*LAW), 0, 1e-12, upper_drives=True, driver_stiffness=50.0)
+    assert one_way.neglected() == (0.0, 0.0)
+    tip = 0.0
     for force, moved, depth in ((2.0, -0.1, 0.02), (5.0, 0.2, 0.05), (1.0, 0.3, 0.01), (0.0, 0.0, -0.2)):
-        one_way.accept(force, moved, depth)
-    assert one_way.neglected == pytest.approx(2.0 * (2.0 + 3.0 + 4.0 + 1.0) / 50.0)
-    assert one_way.share == pytest.approx(one_way.neglected / 0.05)
-    assert one_way.work == pytest.approx(2.0 * -0.1 + 5.0 * 0.2 + 1.0 * 0.3)
+        before, tip = tip, tip + moved
+        ends = [(Motion(u, 0.0, 0.0, 0.0), Motion(u + depth, 0.0, 0.0, 0.0)) for u in (before, tip)]
+        one_way.accept(Step(0.0, 1.0, (force, 0.0, 0.0), NO_FORCE, *ends))
+    left_out = one_way.neglected()
+    assert left_out.motion == pytest.approx(2.0 * (2.0 + 3.0 + 4.0 + 1.0) / 50.0)
+    assert left_out.share == pytest.approx(left_out.motion / 0.05)
+    assert one_way.booking(ends[1]).unfelt == pytest.approx(2.0 * -0.1 + 5.0 * 0.2 + 1.0 * 0.3)
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_the_bound_counts_the_turns_of_a_polynomial_force(degree: int) -> None:
+    """∫|Ċ| of 1 − 6τ + 6τ² over [0, 1]: from 1 down to −1/2 and up again, 3; the jump to its start, 1."""
+    one_way = OneWay(Compliance(*LAW), degree, 1e-12, upper_drives=True, driver_stiffness=2.0)
+    ends = (Motion(0.0, 0.0, 0.0, 0.0), Motion(0.0, 0.0, 0.0, 0.0))
+    one_way.accept(Step(0.0, 1.0, [(1.0, 0.0, 0.0), (1.0, -6.0, 0.0), (1.0, -6.0, 12.0)][degree], NO_FORCE, ends, ends))
+    assert one_way.neglected().motion == pytest.approx([1.0, 7.0, 4.0][degree])
 
 
 def test_a_run_stops_when_the_bound_passes_the_tolerance() -> None:

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as npst
 from matplotlib.image import imread
 from runs import EVERY_EVENT, PAIR, a_trajectory
 
-from springbeam.pictures import plots
+from springbeam.pictures import plots, timeline
 from springbeam.pictures.drawing import (
     EVENT_LOOKS,
     NOT_RESOLVED,
@@ -53,7 +53,7 @@ def test_a_scene_gets_the_pictures_of_what_it_has(tmp_path, scene, expected):
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(expected)
     for path in written:
         image = imread(path)
-        assert image.shape[1] == round(plots.WIDTH * plots.DPI)
+        assert image.shape[1] == round(timeline.WIDTH * timeline.DPI)
         assert image[..., :3].std() > 0.02  # not blank
 
 
@@ -89,7 +89,7 @@ def test_a_run_that_stopped_at_its_second_row_is_drawn(tmp_path):
     ids=["no residual", "no force", "stiff", "negative", "all zero", "unknown phase", "extreme", "alternating"],
 )
 def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, monkeypatch, columns):
-    monkeypatch.setattr(plots, "_DPI", 40)
+    monkeypatch.setattr(plots, "DPI", 40)
     plot_run(a_trajectory(events=EVERY_EVENT, **columns), tmp_path)
     assert [str(warning.message) for warning in recwarn] == []
 

@@ -11,8 +11,8 @@ from bodies import DuffingBody, ModalBody, drift, modal_beam, orders
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Force, Motion, StepRefused
-from springbeam.coupling import conditions
-from springbeam.coupling.tie import NotConverged, Tie
+from springbeam.coupling.protocol import NotConverged, Window
+from springbeam.coupling.tie import Tie
 
 SCHEMES = [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
 
@@ -34,12 +34,12 @@ def after_impact(n: int, stiffness: float = 100.0, **spring: float) -> tuple[Mod
 
 
 def couple(scheme: str, degree: int, size: float, steps: int, beam, spring) -> list[Row]:
-    tie = Tie(conditions(scheme, degree), degree, 1e-12)
+    tie = Tie(scheme, degree, 1e-12)
     rows, guess = [], NO_FORCE
     for i in range(steps):
         for body in (beam, spring):
             body.mark()
-        f = tie.solve(beam, spring, i * size, size, guess, beam.motion())
+        f = tie.solve(beam, spring, Window(i * size, size, (beam.motion(), spring.motion())), guess)
         guess = force.shifted(f, size)
         rows.append(Row(beam.motion(), spring.motion(), f, drift((beam, spring))))
     return rows
@@ -88,11 +88,11 @@ def test_a_wild_guess_does_not_loosen_the_conditions(scheme, degree):
     whole contact force moves them in such a step."""
     size = 1e-5
     beam, spring = after_impact(6)
-    tie = Tie(conditions(scheme, degree), degree, 1e-12)
+    tie = Tie(scheme, degree, 1e-12)
     for guess in ((1e15, 0.0, 0.0), NO_FORCE, NO_FORCE):
         for body in (beam, spring):
             body.mark()
-        tie.solve(beam, spring, 0.0, size, guess, beam.motion())
+        tie.solve(beam, spring, Window(0.0, size, (beam.motion(), spring.motion())), guess)
     assert abs(beam.motion().displacement - spring.motion().displacement) <= 1e-12 * size
 
 
@@ -224,13 +224,13 @@ class Refusing(DuffingBody):
 
 def test_a_refused_step_propagates_and_the_marks_are_kept():
     beam, spring = modal_beam(4), Refusing()
-    tie = Tie(conditions("energy", 1), 1, 1e-12)
+    tie = Tie("energy", 1, 1e-12)
     start = [beam.motion(), spring.motion()]
     for body in (beam, spring):
         body.mark()
     spring.left = 1
     with pytest.raises(StepRefused, match="enough"):
-        tie.solve(beam, spring, 0.0, 1e-3, NO_FORCE, start[0])
+        tie.solve(beam, spring, Window(0.0, 1e-3, start), NO_FORCE)
     for body in (beam, spring):
         body.rewind()
     assert [beam.motion(), spring.motion()] == start
@@ -247,11 +247,11 @@ class Deaf(DuffingBody):
 
 def test_not_converged_carries_the_gap_that_is_left():
     beam, spring = modal_beam(4), Deaf()
-    tie = Tie(conditions("energy", 0), 0, 1e-12)
+    tie = Tie("energy", 0, 1e-12)
     for body in (beam, spring):
         body.mark()
     with pytest.raises(NotConverged) as caught:
-        tie.solve(beam, spring, 0.0, 1e-3, NO_FORCE, beam.motion())
+        tie.solve(beam, spring, Window(0.0, 1e-3, (beam.motion(), spring.motion())), NO_FORCE)
     # The tip, falling 1 mm, is on the other side of zero from where the end jumps to: 0.5 m at least.
     assert 0.499 <= caught.value.residual < float("inf")
     assert f"{caught.value.residual:.3g} m" in str(caught.value)
@@ -260,9 +260,9 @@ def test_not_converged_carries_the_gap_that_is_left():
 def test_a_body_that_is_not_finite_does_not_converge():
     beam, spring = modal_beam(4), DuffingBody(external=float("inf"))
     spring._reach = lambda y, size: size  # its step control needs finite numbers
-    tie = Tie(conditions("energy", 0), 0, 1e-12)
+    tie = Tie("energy", 0, 1e-12)
     for body in (beam, spring):
         body.mark()
     with pytest.raises(NotConverged) as caught:
-        tie.solve(beam, spring, 0.0, 1e-3, NO_FORCE, beam.motion())
+        tie.solve(beam, spring, Window(0.0, 1e-3, (beam.motion(), spring.motion())), NO_FORCE)
     assert not caught.value.residual < float("inf")

@@ -13,8 +13,7 @@ from ..scene import Beam, Spring
 from ..scene.statics import SHAPE_POINTS
 from .archive import fmu_directory
 from .fmu import WARNING, Fmu, FmuError, Reals
-from .memory import Memory
-from .protocol import NO_FORCE, Energies, Force, Motion, StepRefused
+from .protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion, StepRefused
 
 #: The numbers by which the beam FMU knows its integrators.
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
@@ -23,7 +22,7 @@ _motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
 _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
 
 
-class _FmuBody(Memory):
+class _FmuBody(Body):
     """What both bodies do alike; a subclass names its variables."""
 
     REMEMBERED: ClassVar[tuple[str, ...]] = ("fmu", "_pending", "_current")
@@ -136,7 +135,7 @@ class _FmuBody(Memory):
         self.fmu.close()
 
 
-class FmuBeam(_FmuBody):
+class FmuBeam(_FmuBody, BeamBody):
     """``beam.fmu`` as a body."""
 
     _MOTION = (
@@ -195,6 +194,11 @@ class FmuSpring(_FmuBody):
 
     def _mass(self) -> float:
         return self._spring.mass
+
+    def holding_force(self, displacement: float, velocity: float) -> float:
+        spring, y = self._spring, displacement
+        static = spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
+        return static + spring.damping * velocity
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         (c, dc, ddc), (n, dn, ddn) = contact, foundation

@@ -42,6 +42,20 @@ def work(force: Force, gap: Motion, size: float) -> float:
     return -force[1] * gap.integral - force[2] * (size * gap.integral - gap.integral_2)
 
 
+def work_on(force: Force, start: Motion, end: Motion, size: float) -> float:
+    """Return ∫ C ẇ dτ [J] over a step on an end that moves from ``start`` to ``end``, by parts: C Δw − ∫ Ċ Δw."""
+    w0 = start.displacement
+    once, twice = end.integral - w0 * size, end.integral_2 - 0.5 * w0 * size * size
+    return end_value(force, size) * (end.displacement - w0) - force[1] * once - force[2] * (size * once - twice)
+
+
+def variation(force: Force, size: float) -> float:
+    """∫ |Ċ| dτ [N] over a step."""
+    turn = -force[1] / force[2] if force[2] != 0.0 else 0.0
+    values = [force[0], value(force, turn) if 0.0 < turn < size else force[0], end_value(force, size)]
+    return abs(values[1] - values[0]) + abs(values[2] - values[1])
+
+
 def sign_changes(force: Force, size: float) -> list[float]:
     """Where C passes through zero inside the step, ascending."""
     c, b, a = force[0], force[1], 0.5 * force[2]

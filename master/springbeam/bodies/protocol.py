@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from .memory import Memory
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
-#: Nothing touches the end. (A contact force that comes out as 0 is another tuple: a massless end tells them apart.)
+#: No force over the whole step.
 NO_FORCE: Force = (0.0, 0.0, 0.0)
 
 
@@ -40,51 +40,94 @@ class Energies(NamedTuple):
     load_potential: float
 
 
-class Body(Protocol):
-    """A body with one interface end and a state that can be rewound.
+class Body(Memory):
+    """A body with one interface end and a state that can be rewound; a body of one's own derives from it.
 
-    ``advance`` prescribes the contact force C on the step: the beam takes it as +C, the spring as −C.
-    Impulses act at once: ``motion`` and ``energies`` show the state after them.
+    ``advance`` prescribes the contact force C on the step: the upper body takes it as +C, the lower one as −C.
+    Impulses act at once: ``motion`` and ``energies`` show the state after them. Every method but ``close`` may raise
+    BodyFailed.
     """
 
     #: What an impulse at the end meets [kg].
     mass: float
 
+    @property
+    def massless(self) -> bool:
+        """Whether the end has no inertia: it then has the velocity of what it is joined to, and springs back alone."""
+        return self.mass == 0.0
+
     def mark(self) -> None:
         """Remember the present state as the one ``rewind`` returns to."""
+        raise NotImplementedError
 
     def rewind(self) -> None:
         """Return to the marked state. Costs nothing if nothing happened since."""
+        raise NotImplementedError
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        """Advance from ``time`` by ``size`` [s]; returns `motion`. Raises StepRefused; ``rewind`` then recovers.
+        """Advance from ``time`` by ``size`` [s] and return `motion`. Raises StepRefused; ``rewind`` then recovers."""
+        raise NotImplementedError
 
-        This and every other method but ``close`` may raise BodyFailed.
-        """
+    def advance_alone(self, time: float, size: float) -> Motion:
+        """Advance with nothing at the end; parameters and errors as of `advance`."""
+        return self.advance(time, size, NO_FORCE)
 
-    def motion(self) -> Motion: ...
+    def motion(self) -> Motion:
+        raise NotImplementedError
 
-    def energies(self) -> Energies: ...
+    def energies(self) -> Energies:
+        """Return what the body stores and has dissipated; a body that cannot tell stores nothing."""
+        return Energies(0.0, 0.0, 0.0, 0.0)
 
     def apply_impulse(self, impulse: float) -> None:
         """Upward impulse [N·s]."""
+        raise NotImplementedError
 
-    def save(self) -> dict[str, Any]:
-        """Everything that the body's future depends on, and its counts, as `springbeam.bodies.memory.Memory.save`."""
+    def holding_force(self, displacement: float, velocity: float) -> float:
+        """Return the upward force [N] that keeps the end at ``displacement`` [m] and ``velocity`` [m/s]."""
+        raise NotImplementedError
 
-    def restore(self, saved: dict[str, Any]) -> None:
-        """Go on from what ``save`` of a body with the same parameters returned, to the last bit as that would have."""
+    def join(self, velocity: float) -> None:
+        """Let a massless end take the velocity [m/s] of what it is joined to; other ends keep theirs."""
+
+    def release(self) -> float:
+        """Let go of a massless end, which may spring back; return the energy that this loses [J]."""
+        return 0.0
 
     def close(self) -> None:
         """Free what the body holds; it is not used afterwards."""
 
 
-class BeamBody(Body, Protocol):
+class BeamBody(Body):
+    """A body that can show its shape."""
+
     def shape(self) -> np.ndarray:
-        """Deflection [m] at `springbeam.scene.statics.SHAPE_POINTS`, shape (21,)."""
+        """Return the deflection [m] at `springbeam.scene.statics.SHAPE_POINTS`, shape (21,)."""
+        raise NotImplementedError
 
 
-class Held(Memory):
+class Prescribed(Body):
+    """An end that moves as told, whatever acts on it: a driving body, seen from the driven one."""
+
+    mass = float("inf")
+
+    def __init__(self, motion: Motion) -> None:
+        self._motion = motion
+
+    def mark(self) -> None: ...
+
+    def rewind(self) -> None: ...
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        return self._motion
+
+    def motion(self) -> Motion:
+        return self._motion
+
+    def apply_impulse(self, impulse: float) -> None: ...
+
+
+class Held(Body):
     """An end held at rest at a fixed position: the foundation, or a spring seated on it."""
 
     REMEMBERED = ("_size",)
@@ -107,9 +150,4 @@ class Held(Memory):
         w, h = self._position, self._size
         return Motion(w, 0.0, w * h, 0.5 * w * h * h)
 
-    def energies(self) -> Energies:
-        return Energies(0.0, 0.0, 0.0, 0.0)
-
     def apply_impulse(self, impulse: float) -> None: ...
-
-    def close(self) -> None: ...

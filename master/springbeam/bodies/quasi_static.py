@@ -26,13 +26,12 @@ from numpy.polynomial import legendre
 from ..scene import Beam, statics
 from ..scene.statics import SHAPE_POINTS
 from . import force
-from .memory import Memory
-from .protocol import NO_FORCE, Energies, Force, Motion
+from .protocol import NO_FORCE, BeamBody, Energies, Force, Motion
 
 _SIZES_REMEMBERED = 16
 
 
-class QuasiStaticBeam(Memory):
+class QuasiStaticBeam(BeamBody):
     """The massless beam as a body.
 
     Parameters
@@ -68,14 +67,10 @@ class QuasiStaticBeam(Memory):
         self._w, self._velocity, self._integrals, self._dissipated = self._marked
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        """By ``size`` [s] under the contact force C; under `NO_FORCE` itself with nothing at the tip."""
-        if contact is NO_FORCE:
-            self._relax(size)
-        else:
-            self._follow_force(size, contact)
+        self._follow_force(size, contact)
         return self.motion()
 
-    def _relax(self, size: float) -> None:
+    def advance_alone(self, time: float, size: float) -> Motion:
         start, alpha = self._w, self._alpha
         # α_b = 0: at once.
         left, gone = (math.exp(-size / alpha), -math.expm1(-size / alpha)) if alpha > 0.0 else (0.0, 1.0)
@@ -83,6 +78,7 @@ class QuasiStaticBeam(Memory):
         first = alpha * start * gone
         self._integrate(size, first, alpha * (start * size - first))
         self._dissipated += 0.5 * self._stiffness * (start * start - self._w * self._w)
+        return self.motion()
 
     def _follow_force(self, size: float, contact: Force) -> None:
         rows = self._responses.get(size)
@@ -131,20 +127,16 @@ class QuasiStaticBeam(Memory):
         raise AssertionError("a massless tip takes no impulse")
 
     def holding_force(self, displacement: float, velocity: float) -> float:
-        """C that holds the tip at ``displacement`` [m], moving at ``velocity`` [m/s]."""
         return self._stiffness * (displacement - self._rest + self._alpha * velocity)
 
     def join(self, velocity: float) -> None:
-        """The tip is held together with an end that moves at ``velocity`` [m/s]."""
         self._velocity = velocity
 
     def release(self) -> float:
-        """The tip is let go; without damping it is at rest at once. Returns the energy that this loses [J]."""
         if self._alpha > 0.0:
             self._velocity = -self._w / self._alpha
             return 0.0
+        # Without damping the tip is at rest at once.
         lost = 0.5 * self._stiffness * self._w * self._w
         self._w = self._velocity = 0.0
         return lost
-
-    def close(self) -> None: ...

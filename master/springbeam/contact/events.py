@@ -13,6 +13,7 @@ import numpy as np
 from ..bodies.protocol import Motion
 from ..scene import Beam, Scene, Spring
 from ..scene.statics import tip_compliance, tip_load_deflection
+from .laws import Law
 from .phases import Joint, Phase, spring_force
 
 _EPS = float(np.finfo(float).eps)
@@ -75,9 +76,10 @@ class EventFunctions:
     from each other by what the energy schemes leave open, and one of them may even go the other way.
     """
 
-    def __init__(self, scene: Scene, tip_share: float) -> None:
+    def __init__(self, scene: Scene, law: Law, tip_share: float) -> None:
         self._scene, self._tip_share = scene, tip_share
-        self._ties = scene.beam is not None and scene.spring is not None and scene.contact.law != "compliance"
+        pair = scene.beam is not None and scene.spring is not None
+        self._ties, self._meets = pair and not law.soft, pair and not law.soft and not law.lasting
         self._phase: Phase | None = None
         self._functions: list[tuple[str, EventFunction]] = []
         #: The ends last asked for, and the samples there: a step starts where the one before has ended.
@@ -101,7 +103,7 @@ class EventFunctions:
         spring, stop = self._scene.spring, self._scene.stop
         functions: list[tuple[str, EventFunction]] = []
         share = self._tip_share if self._ties and phase.joint is not Joint.FREE else 0.0
-        if self._ties:
+        if self._meets:
             assert spring is not None
             if phase.joint is Joint.FREE:
                 functions.append(("impact", gap))

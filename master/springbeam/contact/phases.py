@@ -15,6 +15,7 @@ from ..bodies.protocol import Motion
 from ..scene import Scene, Spring
 from ..scene.resolution import MISMATCH
 from ..scene.statics import tip_compliance, tip_load_deflection
+from .laws import Law
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
 #: second, if it would also rise no higher than positions can be told apart.
@@ -101,14 +102,19 @@ class Transitions(Memory):
     Parameters
     ----------
     scene
-        With the contact law.
+        What is simulated.
+    law
+        Between the ends.
     tip_mass, mass
         What an impulse meets at the tip and at the spring top [kg]; ``None`` for an absent body.
     """
 
     REMEMBERED = ("_fastest_impact",)
 
-    def __init__(self, scene: Scene, tip_mass: float | None, mass: float | None, fastest: Callable[[], float]) -> None:
+    def __init__(
+        self, scene: Scene, law: Law, tip_mass: float | None, mass: float | None, fastest: Callable[[], float]
+    ) -> None:
+        self._law = law
         self._scene, self._tip_mass, self._mass, self._fastest = scene, tip_mass, mass, fastest
         self._fastest_impact = 0.0
 
@@ -152,7 +158,9 @@ class Transitions(Memory):
         impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
         at_equilibrium = abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
-        if at_equilibrium:
+        if self._law.lasting:
+            tied = True
+        elif at_equilibrium:
             tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
         else:
             tied = low.displacement < psi
@@ -179,7 +187,7 @@ class Transitions(Memory):
         assert self._scene.stop is not None
         e = self._scene.stop.restitution
         tip, low = ends
-        tied = self._tip_mass is not None and phase.joint is not Joint.FREE and self._scene.contact.law != "compliance"
+        tied = self._tip_mass is not None and phase.joint is not Joint.FREE and not self._law.soft
         z = low.velocity if self._mass is not None else None
         v = tip.velocity if tied or self._mass is None else None
         striking = (z, self._mass or 0.0, v, self._tip_mass or 0.0)

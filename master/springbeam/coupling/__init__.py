@@ -1,27 +1,38 @@
-"""The contact force over one macro step.
+"""How the contact force of a macro step is found.
 
-On a step of size H the force is a polynomial of degree d; its d + 1 coefficients are found from d + 1 conditions on
-the gap g = u_tip − y over that step. A *scheme* is the choice of these conditions:
-
-* `energy`  — g(t+H) = 0 and vanishing moments of g: the contact force does no net work, at any H;
-* `hermite` — g(t+H) = ġ(t+H) = 0 and vanishing moments: displacements and velocities agree at every macro point.
-
-`tie` solves the conditions of either; `compliance` is the discrete gradient of the normal-compliance law, `one_way`
-the same with one body that does not feel it, `exchange` what ordinary masters do.
-``docs/coupling.md`` derives all of it.
+On a step of size H the force is a polynomial of degree d; a *coupling* (``protocol``; start there) finds its d + 1
+coefficients and advances both bodies. ``tie`` holds ends together by the conditions of a scheme (``energy``, creates no
+energy at any H; ``hermite``, velocities agree, too), ``soft`` applies a contact law that is a function of the
+penetration, ``projection`` says what that is over a step; both are ``solver`` with another aim. ``one_way`` leaves one
+end unmoved, ``exchange`` is what ordinary masters do. Imports `contact`, `bodies` and `scene`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from ..contact.laws import Law
+from ..scene import Scene
+from ..scene.statics import tip_reach
+from ..scene.tables import ORDINARY_SCHEMES
+from .exchange import Exchange
+from .one_way import OneWay
+from .protocol import Coupling
+from .soft import SoftSolver
+from .tie import Tie
 
-from ..bodies.protocol import Motion
-from . import energy, hermite
 
-#: Conditions of a scheme as a linear map of an end's motion over a step of size H, each in metres.
-Conditions = Callable[[Motion, float], tuple[float, ...]]
-
-
-def conditions(scheme: str, degree: int) -> Conditions:
-    """The d + 1 conditions of ``scheme`` at ``degree``."""
-    return {"energy": energy.CONDITIONS, "hermite": hermite.CONDITIONS}[scheme][degree]
+def coupling_of(scene: Scene, law: Law) -> Coupling:
+    """Return what couples the bodies of ``scene`` while ``law`` acts between them."""
+    asked = scene.coupling
+    if not law.soft:
+        expected = 0.0 if scene.beam is None else tip_reach(scene.beam)
+        # An exchange of values is for soft laws; a tip alone rests on its foundation by the default scheme.
+        scheme = "energy" if asked.scheme in ORDINARY_SCHEMES else asked.scheme
+        return Tie(scheme, asked.degree, asked.tolerance, expected)
+    if asked.scheme in ORDINARY_SCHEMES:
+        return Exchange(law, asked.scheme == "gauss_seidel", asked.degree)
+    if asked.feedback == "two_way":
+        return SoftSolver(law, asked.degree, asked.tolerance)
+    stiffness = scene.driver_stiffness
+    assert stiffness is not None
+    drives = asked.feedback == "beam_drives"
+    return OneWay(law, asked.degree, asked.tolerance, upper_drives=drives, driver_stiffness=stiffness)

@@ -12,6 +12,7 @@ well conditioned:  ∫ g dτ = I₁  and  ∫ s g dτ = I₁ − 2 I₂/H,  with
 from __future__ import annotations
 
 from ..bodies.protocol import Motion
+from .protocol import Conditions
 
 
 def _degree_0(m: Motion, size: float) -> tuple[float, ...]:
@@ -26,7 +27,7 @@ def _degree_2(m: Motion, size: float) -> tuple[float, ...]:
     return (m.displacement, m.integral / size, (m.integral - 2.0 * m.integral_2 / size) / size)
 
 
-CONDITIONS = {0: _degree_0, 1: _degree_1, 2: _degree_2}
+CONDITIONS: dict[int, Conditions] = {0: _degree_0, 1: _degree_1, 2: _degree_2}
 
 #: Order in the step's size of the velocity mismatch that one step creates.
 ORDER_CREATED = {0: 2, 1: 3, 2: 4}

@@ -8,6 +8,7 @@ on an event hands the right velocities to it, and the order holds through events
 from __future__ import annotations
 
 from ..bodies.protocol import Motion
+from .protocol import Conditions
 
 
 def _degree_1(m: Motion, size: float) -> tuple[float, ...]:
@@ -18,7 +19,7 @@ def _degree_2(m: Motion, size: float) -> tuple[float, ...]:
     return (m.displacement, size * m.velocity, m.integral / size)
 
 
-CONDITIONS = {1: _degree_1, 2: _degree_2}
+CONDITIONS: dict[int, Conditions] = {1: _degree_1, 2: _degree_2}
 
 #: Order in the step's size of `gap_inside`.
 ORDER_INSIDE = {1: 4, 2: 5}

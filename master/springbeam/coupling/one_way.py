@@ -1,7 +1,7 @@
-"""One-way coupling of the normal-compliance law: the contact force acts on one end only, the other one drives.
+"""One-way coupling by a soft law: the contact force acts on one end only, the other one drives.
 
 For a driving end that the force would hardly move. It makes one step per macro step, with nothing at its end; the
-driven body then finds the force of the discrete gradient (`compliance`) from where the driving end has gone.
+driven body then finds the force of the projected law (`soft`) from how the driving end has moved.
 
 What is neglected is bounded. A linear body at rest, stiffness k, answers a step of the force by at most twice its
 static deflection (undamped, each mode by φ²/ω² (1 − cos ωt); damped, by less), and any force is a sum of steps, so
@@ -14,61 +14,73 @@ work of C on the driving end, which it does not feel, is booked, so that the led
 
 from __future__ import annotations
 
-from ..bodies.memory import Memory
-from ..bodies.protocol import NO_FORCE, Body, Force, Held
-from .compliance import Compliance, discrete_gradient
+from math import inf
+
+from ..bodies import force
+from ..bodies.protocol import Body, Force, Prescribed
+from ..contact.laws import SoftLaw
+from .projection import Projection
+from .protocol import Booking, Coupling, Ends, ErrorEstimate, Neglected, Scales, Step, Window
+from .soft import SoftSolver, penetration
 
 
-class OneWay(Memory):
-    """The step's force, and what has been neglected.
+class OneWay(Coupling):
+    """Coupling that one end does not feel, and what has been neglected.
 
     Parameters
     ----------
-    compliance
-        Solver of the law.
-    stiffness, exponent
-        λ_nc [N/m^q] and q of the law.
-    beam_drives
-        Whether the beam drives the spring, or the spring the beam.
+    law, degree, tolerance
+        As of `SoftSolver`.
+    upper_drives
+        Whether the upper body drives the lower one, or the lower the upper.
     driver_stiffness
         k: static force per displacement of the driving end [N/m].
     """
 
-    REMEMBERED = ("_variation", "_force", "_deepest", "work")
+    REMEMBERED = ("_solver", "_variation", "_force", "_deepest", "_work")
 
     def __init__(
-        self, compliance: Compliance, stiffness: float, exponent: float, beam_drives: bool, driver_stiffness: float
+        self, law: SoftLaw, degree: int, tolerance: float, *, upper_drives: bool, driver_stiffness: float
     ) -> None:
-        self._compliance, self._law = compliance, (stiffness, exponent)
-        self.beam_drives, self._stiffness = beam_drives, driver_stiffness
+        self._solver, self.law, self.degree = SoftSolver(law, degree, tolerance), law, degree
+        self._projection = Projection(law, degree)
+        self._upper_drives, self._stiffness = upper_drives, driver_stiffness
         self._variation = self._force = self._deepest = 0.0
-        self.work = 0.0  #: of the contact force on the driving end, which does not feel it [J]
+        self._work = 0.0  #: of the contact force on the driving end, which does not feel it [J]
 
-    def solve(self, beam: Body, partner: Body, time: float, size: float, guess: Force, start: float) -> Force:
-        """Advance both bodies from their marks by ``size`` [s]; parameters and errors as of `Compliance.solve`."""
-        driver, driven = (beam, partner) if self.beam_drives else (partner, beam)
+    @property
+    def iterations(self) -> int:
+        return self._solver.iterations
+
+    def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
+        driver, driven = (upper, lower) if self._upper_drives else (lower, upper)
         driver.rewind()
-        end = Held(driver.advance(time, size, NO_FORCE).displacement)
-        if driven.mass == float("inf"):
-            depth = driven.motion().displacement - end.motion().displacement
-            return (discrete_gradient(start, depth, *self._law), 0.0, 0.0)
-        if self.beam_drives:
-            return self._compliance.solve(end, driven, time, size, guess, start)
-        return self._compliance.solve(driven, end, time, size, guess, start)
+        end = Prescribed(driver.advance_alone(window.time, window.size))
+        if driven.mass == inf:
+            driven.advance(window.time, window.size, guess)
+            ends = (end.motion(), driven.motion()) if self._upper_drives else (driven.motion(), end.motion())
+            start, x = penetration(Step(window.time, window.size, guess, guess, window.ends, ends), self.degree)
+            return force.derivatives(self._projection(start, x, window.size).a, window.size)
+        upper, lower = (end, driven) if self._upper_drives else (driven, end)
+        return self._solver.solve(upper, lower, window, guess)
 
-    def accept(self, force: float, moved: float, depth: float) -> None:
-        """A step is made, with its ``force`` [N]; the driving end ``moved`` [m], ``depth`` [m] is the penetration."""
-        self._variation += abs(force - self._force)
-        self._force = force
-        self._deepest = max(self._deepest, depth)
-        self.work += (force if self.beam_drives else -force) * moved
+    def accept(self, step: Step) -> None:
+        self._solver.accept(step)
+        contact, size = step.contact, step.size
+        self._variation += abs(contact[0] - self._force) + force.variation(contact, size)
+        self._force = force.end_value(contact, size)
+        tip, low = step.end
+        self._deepest = max(self._deepest, low.displacement - tip.displacement)
+        driver = 0 if self._upper_drives else 1
+        work = force.work_on(contact, step.start[driver], step.end[driver], size)
+        self._work += work if self._upper_drives else -work
 
-    @property
-    def neglected(self) -> float:
-        """Bound of the driving end's motion that is left out, 2 V/k [m]."""
-        return 2.0 * self._variation / self._stiffness
+    def booking(self, ends: Ends) -> Booking:
+        return self._solver.booking(ends)._replace(unfelt=self._work)
 
-    @property
-    def share(self) -> float:
-        """`neglected` over the largest penetration so far, 0 before contact."""
-        return self.neglected / self._deepest if self._deepest > 0.0 else 0.0
+    def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
+        return self._solver.local_errors(step, scales)
+
+    def neglected(self) -> Neglected:
+        motion = 2.0 * self._variation / self._stiffness
+        return Neglected(motion, motion / self._deepest if self._deepest > 0.0 else 0.0)

@@ -23,9 +23,10 @@ from ..contact.events import (
     stays_above,
 )
 from ..contact.phases import Joint, Phase, common_velocity
+from ..coupling.protocol import Ends, Step
 from ..scene import Scene
 from .macro_steps import AdaptiveSteps, MacroGrid
-from .stepping import Ends, Pair, State, Step
+from .stepping import Pair, State
 
 #: An event closer to the start of a step than this fraction of H happens at the start.
 _NO_TIME = 1e-9
@@ -50,7 +51,7 @@ class Detector:
             assert pair.beam is not None
             assert pair.spring is not None
             tip_share = common_velocity(1.0, 0.0, pair.beam.mass, pair.spring.mass)
-        self._functions = EventFunctions(scene, tip_share)
+        self._functions = EventFunctions(scene, pair.law, tip_share)
         self._level = pair.stop or 0.0
 
     def tolerance(self, ends: Ends) -> float:
@@ -81,7 +82,7 @@ class Detector:
     def first(self, state: State, step: Step) -> tuple[Step, str | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it."""
         step, found = self._first_by_position(state, step)
-        if self._pair.compliant and step.size > 0.0:
+        if self._pair.opens_softly and step.size > 0.0:
             touched = self._touched_inside(state, step)
             if touched is not step:
                 # The contact force changes where the ends go: what was found may not happen, something else may.
@@ -164,13 +165,13 @@ class Detector:
     def _touched_inside(self, state: State, step: Step) -> Step:
         """Compliance: a contact that closes and opens inside the step would be missed; it is cut to its middle."""
         start, end = gap(step.start), gap(step.end)
-        if start[0] < 0.0 or end[0] < 0.0:
+        if start[0] < 0.0 or end[0] < 0.0 or any(step.contact):
             return step
         inside = lowest_inside(start, end, step.size)
         if inside is None or cubic_value(start, end, step.size, inside) >= 0.0:
             return step
         cut = self._pair.attempt(state, inside, step.start)
-        return cut if cut.contact[0] > 0.0 else step
+        return cut if any(cut.contact) else step
 
     # -- events told by forces --------------------------------------------------------------------------------------
 
@@ -178,7 +179,7 @@ class Detector:
         """The event that ends the phase where a force that can only push would pull, and that force."""
         if phase.seated:
             return "unseated" if self._pair.spring is not None else "separation", lambda step: step.foundation
-        if phase.joint is Joint.TOUCH and not self._pair.compliant and not self._pair.massless:
+        if phase.joint is Joint.TOUCH and not self._pair.law.soft and not self._pair.upper.massless:
             return "separation", lambda step: step.contact
         return None
 
@@ -187,7 +188,7 @@ class Detector:
     ) -> tuple[Step, str] | None:
         """The step cut where a force that can only push would pull, and the event there."""
         f = pick(step)
-        if self._pair.degree == 0:
+        if self._pair.coupling(state.phase).degree == 0:
             return self._unilateral_mean(state, step, kind, f[0])
         changes = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
         if f[0] < 0.0:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..bodies.memory import Memory
 from ..bodies.protocol import Energies
+from ..coupling.protocol import Booking
 from ..scene import Scene
 from ..scene.tables import ORDINARY_SCHEMES
 
@@ -53,14 +54,16 @@ class Ledger(Memory):
     relative: float = 0.0  #: the largest residual over the scale at its time
     gain: float = 0.0  #: the same of the residuals that are positive
 
-    def book(self, beam: Energies, spring: Energies, contact: float) -> Booked:
-        """The next row; ``contact`` is the energy of the contact law [J].
+    def book(self, beam: Energies, spring: Energies, between: Booking) -> Booked:
+        """Return the next row; ``between`` is what the coupling adds.
 
         One that is not finite changes nothing: it is no row of the results.
         """
         (kinetic, potential, dissipated, load), (kinetic_2, potential_2, dissipated_2, load_2) = beam, spring
         e_beam, e_spring = kinetic + potential, kinetic_2 + potential_2
-        dissipated, load, lost = dissipated + dissipated_2, load + load_2, self.impact_loss
+        contact, law_dissipated, unfelt = between
+        dissipated, load = dissipated + dissipated_2 + law_dissipated, load + unfelt + load_2
+        lost = self.impact_loss
         total = e_beam + e_spring + contact + dissipated + lost + load
         if (initial := self.initial) is None:
             self.initial = initial = total

@@ -6,16 +6,12 @@ step has them anyway (``docs/coupling.md``, "Adaptive macro steps").
 
 from __future__ import annotations
 
-from math import sqrt
-
-from ..bodies import force
 from ..bodies.memory import Memory
 from ..bodies.protocol import Motion
 from ..contact.phases import Joint
-from ..coupling import energy, hermite
-from ..coupling.compliance import force_change
+from ..coupling.protocol import Scales, Step
 from ..scene import Scene
-from .stepping import Pair, State, Step
+from .stepping import Pair, State
 
 #: Joined, the cubic through a step's ends is only looked at for events; it is within this fraction of the motion.
 _SEEN = 1e-2
@@ -50,26 +46,12 @@ class LocalError(Memory):
         if span == 0.0:
             return 0.0, _CUBIC
         tolerance = self._relative + self._absolute / span
-        if pair.compliant:
-            law = self._scene.contact
-            change = force_change(step.start, step.end, law.stiffness, law.exponent)
-            of_speed = size * change / (12.0 * self._reduced_mass() * self._speed(step)) if change > 0.0 else 0.0
-            return max(self._curve(cubic, ranges, self._relative), (of_speed / tolerance, 2))
-        if state.phase.joint is Joint.FREE:
-            return self._curve(cubic, ranges, self._relative)
-        seen = self._curve(cubic, ranges, max(self._relative, _SEEN))
-        gaps = [Motion(*(x - y for x, y in zip(*ends, strict=True))) for ends in (step.start, step.end)]
-        degree = pair.degree
-        if self._scene.coupling.scheme == "hermite":
-            of_length, order = hermite.gap_inside(gaps[1], size, degree) / span, hermite.ORDER_INSIDE[degree]
-            work = abs(force.work(step.contact, gaps[1], size))
-            of_energy = work / energy_scale if work > 0.0 else 0.0
-            return max(seen, (of_length / tolerance, order), (of_energy / tolerance, order + 1))
-        # Of the motion's energy, and of its length (all that a massless tip has).
-        created, order = energy.created_mismatch(gaps[0], gaps[1], degree), energy.ORDER_CREATED[degree]
-        of_energy = created * sqrt(0.5 * self._reduced_mass() / energy_scale) if energy_scale > 0.0 else 0.0
-        of_length = size * created / (6.0 * span)
-        return max(seen, (of_energy / tolerance, order), (of_length / tolerance, order + 1))
+        coupling = pair.coupling(state.phase)
+        scales = Scales(span, self._speed(step), energy_scale, self._reduced_mass())
+        tied = not pair.law.soft and state.phase.joint is not Joint.FREE
+        curve = self._curve(cubic, ranges, max(self._relative, _SEEN) if tied else self._relative)
+        told = coupling.local_errors(step, scales)
+        return max(curve, *((error / tolerance, order) for error, order in told)) if told else curve
 
     def accept(self, step: Step) -> None:
         """The motion has come so far."""
@@ -105,8 +87,9 @@ class LocalError(Memory):
         return [tip, lower]
 
     def _reduced_mass(self) -> float:
-        masses = [body.mass for body in (self._pair.beam, self._pair.lower) if body is not None]
-        return 1.0 / sum(1.0 / m for m in masses) if min(masses) > 0.0 else 0.0
+        masses = [body.mass for body in (self._pair.upper, self._pair.lower)]
+        inverse = sum(1.0 / m for m in masses) if min(masses) > 0.0 else 0.0
+        return 1.0 / inverse if inverse > 0.0 else 0.0
 
 
 def _beside_cubic(start: Motion, end: Motion, size: float) -> float:

@@ -8,13 +8,15 @@ and ``energy_residual`` shows it. Readings where the print leaves something open
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from ..bodies.fmu_bodies import FmuSpring
 from ..bodies.memory import Memory
-from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, StepRefused
-from ..coupling.compliance import compliance_force
+from ..bodies.protocol import NO_FORCE, BeamBody, BodyFailed, StepRefused
+from ..contact.laws import Compliance
+from ..coupling.protocol import NOTHING_BOOKED
 from ..results.recording import NonFiniteValue, Recorder
 from ..results.trajectory import Event
 from ..scene import Scene
@@ -25,11 +27,6 @@ from .outcome import OVERFLOW, Progress, RunStopped
 _MAX_ITERATIONS = 50
 #: Of the spring's and the tip's position (section 6: ε = 1e-12) [m].
 _TOLERANCE = 1e-12
-
-
-class RestartableBody(Body, Protocol):
-    def restart(self, time: float, displacement: float, velocity: float, dissipated: float = 0.0) -> None:
-        """Start again at ``time`` [s] from a displacement [m] and velocity [m/s], ``dissipated`` [J] until then."""
 
 
 class PaperLaw(Memory):
@@ -56,7 +53,7 @@ class PaperLaw(Memory):
         scene: Scene,
         start_time: float,
         beam: BeamBody,
-        spring: RestartableBody,
+        spring: FmuSpring,
         recorder: Recorder,
         progress: Progress | None = None,
     ) -> None:
@@ -129,7 +126,7 @@ class PaperLaw(Memory):
     def _law(self, w: float, stiffness: float | None = None) -> float:
         """λ (Ψ − w)₊^p [N] with the λ_nc that lines 12 and 15 have left, or with ``stiffness``."""
         acting = self._stiffness if stiffness is None else stiffness
-        return compliance_force(self._parameters.equilibrium - w, acting, self.scene.contact.exponent)
+        return Compliance(acting, self.scene.contact.exponent).force(self._parameters.equilibrium - w)
 
     def _step(self) -> tuple[str, float, float, float]:
         """Lines 8–30. Returns the phase and the means of the tip's force, λ_nc(Ψ−u)₊^p and N over the step [N]."""
@@ -241,7 +238,7 @@ class PaperLaw(Memory):
         (u, v), (y, z) = tip[:2], top[:2]
         mismatch = v - z if phase != "free" else 0.0
         forces = (contact, contact, inside, contact - inside, foundation)
-        energies = self._ledger.book(self._beam.energies(), self._spring.energies(), 0.0)
+        energies = self._ledger.book(self._beam.energies(), self._spring.energies(), NOTHING_BOOKED)
         self.recorder.row((self.time, u, v, y, z, *forces, u - y, mismatch, phase, *energies))
         self.recorder.shape(self.time, self._beam.shape())
 

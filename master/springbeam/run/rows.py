@@ -6,8 +6,8 @@ from operator import itemgetter
 
 from ..bodies.memory import Memory
 from ..bodies.protocol import BeamBody
+from ..contact.laws import Compliance
 from ..contact.phases import Joint
-from ..coupling.compliance import compliance_force
 from ..results.recording import Recorder
 from ..results.trajectory import COLUMNS
 from ..scene import Scene
@@ -28,7 +28,8 @@ class Rows(Memory):
         self._shapes_left = _SHAPES_AFTER_CONTACT
         self._next_shape = start_time
         self._equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
-        self._law = (scene.contact.stiffness, scene.contact.exponent)
+        #: Of the two forces that the paper adds up, the one inside a rigid contact.
+        self._inside = Compliance(scene.contact.stiffness, scene.contact.exponent)
         self._shape_every = scene.time.t_end / _SHAPES_OVER_RUN
         #: The columns of the scene, out of all.
         self._present = itemgetter(*(COLUMNS.index(name) for name in recorder.columns))
@@ -40,18 +41,18 @@ class Rows(Memory):
         pair, time, phase = self._pair, state.time, state.phase
         (u, v, _, _), (y, z, _, _) = pair.ends()
         joined = phase.joint is not Joint.FREE
-        contact = smoothed = state.contact[0]
-        inside, mismatch = 0.0, v - z if joined else 0.0
-        if pair.compliant:
-            contact = smoothed = inside = compliance_force(y - u, *self._law)
+        contact = state.contact[0]
+        smoothed = state.smoothed if joined else contact
+        inside, reaction, mismatch = 0.0, contact, v - z if joined else 0.0
+        if pair.law.soft:
+            inside, reaction = pair.law.force(y - u, z - v), 0.0
         else:
-            if joined:
-                smoothed = state.smoothed
-                self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
+            self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
             if pair.joinable:
-                inside = compliance_force(self._equilibrium - u, *self._law)
+                inside = self._inside.force(self._equilibrium - u)
+                reaction = contact - inside
         self.largest_speed = max(self.largest_speed, abs(v), abs(z))
-        forces = (contact, smoothed, inside, contact - inside, state.foundation[0])
+        forces = (contact, smoothed, inside, reaction, state.foundation[0])
         row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *self._ledger.book(*pair.energies()))
         self._recorder.row(self._present(row))
         if pair.beam is not None:

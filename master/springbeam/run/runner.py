@@ -62,8 +62,6 @@ def run(
     """
     if scene.accuracy is not None:
         raise SceneError("accuracy: not yet picked for; springbeam.studies.accuracy.pick gives the scene that keeps it")
-    if scene.contact.lasting or scene.contact.damping > 0.0:
-        raise SceneError(f'[contact] law = "{scene.contact.law}", damping = {scene.contact.damping}: not yet coupled')
     began = perf_counter()
     before = 0.0 if start is None else start.wall_time
     after_step = progress

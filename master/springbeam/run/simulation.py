@@ -14,7 +14,7 @@ from ..bodies.memory import Memory
 from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, StepRefused
 from ..contact.events import cubic_crossing, gap, interpolated
 from ..contact.phases import Joint, Phase, Transitions
-from ..coupling.tie import NotConverged
+from ..coupling.protocol import NotConverged, Step
 from ..results.recording import NonFiniteValue, Recorder
 from ..results.trajectory import Event
 from ..scene import Scene
@@ -26,7 +26,7 @@ from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .outcome import OVERFLOW, Progress, RunStopped
 from .rows import Rows
-from .stepping import Pair, State, Step
+from .stepping import Pair, State
 
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
@@ -84,7 +84,7 @@ class Simulation(Memory):
         scene, self._choice = decided(scene)
         self._scene, self._recorder, self._progress = scene, recorder, progress
         self._pair = Pair(scene, beam, spring)
-        self._state = State(start_time)
+        self._state = State(start_time, self._pair.initial_phase)
         self._steps: MacroGrid | AdaptiveSteps
         if scene.coupling.adaptive:
             self._steps = AdaptiveSteps(start_time, scene.time.t_end)
@@ -93,7 +93,11 @@ class Simulation(Memory):
         self._error = LocalError(scene, self._pair) if scene.coupling.adaptive else None
         self._detector = Detector(scene, self._pair, self._steps, self._fastest)
         self._transitions = Transitions(
-            scene, None if beam is None else beam.mass, None if spring is None else spring.mass, self._fastest
+            scene,
+            self._pair.law,
+            None if beam is None else beam.mass,
+            None if spring is None else spring.mass,
+            self._fastest,
         )
         self._ledger = Ledger()
         self._energy_warns, self._energy_stops = bounds(scene)
@@ -140,10 +144,10 @@ class Simulation(Memory):
             if step.size > 0.0:
                 if self._error is not None:
                     self._error.accept(step)
+                self._pair.coupling(state.phase).accept(step)
                 state.accept(step, end)
-                self._pair.accept(step)
                 self._macro_steps += 1
-                if self._pair.compliant:
+                if self._pair.opens_softly:
                     self._note_contact(step)
             steps.reached(state.time)
             if event is not None:
@@ -211,7 +215,7 @@ class Simulation(Memory):
     def _settle_start(self) -> None:
         """First contact at the start: the tip on the spring top (or the stop), moving down or at rest."""
         state, pair = self._state, self._pair
-        if pair.beam is None or pair.lower is None or pair.compliant:
+        if pair.beam is None or pair.law.soft or (pair.spring is None and pair.stop is None):
             return
         tip, low = start = pair.ends()
         tolerance = self._detector.tolerance(start) + 1e-12 * abs(low.displacement)
@@ -238,7 +242,7 @@ class Simulation(Memory):
         if kind in ("impact", "stop_impact"):
             self._steps.struck()
         pair.apply_impulses(impact.on_beam, impact.on_spring)
-        lost = impact.energy_loss + pair.massless_tip(phase)
+        lost = impact.energy_loss + pair.follow_phase(phase)
         self._ledger.impact_loss += lost
         state.enter(phase)
         tip, low = pair.ends()
@@ -281,11 +285,11 @@ class Simulation(Memory):
         # What numerical damping takes is not an error; what it brings is.
         if (self._ledger.gain if self._numerically_damped else self._ledger.relative) > self._energy_stops:
             raise RunStopped(self._energy_cause(), self._state.time)
-        one_way, allowed = self._pair.one_way, self._scene.coupling.feedback_tolerance
-        if one_way is not None and one_way.share > allowed:
+        neglected, allowed = self._pair.joined.neglected(), self._scene.coupling.feedback_tolerance
+        if neglected is not None and neglected.share > allowed:
             raise RunStopped(
-                f"coupling.feedback = {self._scene.coupling.feedback!r} may by now neglect {one_way.neglected:.3g} m "
-                f"of the driving end's motion, {one_way.share:.2g} of the largest penetration; allowed is "
+                f"coupling.feedback = {self._scene.coupling.feedback!r} may by now neglect {neglected.motion:.3g} m "
+                f"of the driving end's motion, {neglected.share:.2g} of the largest penetration; allowed is "
                 f"coupling.feedback_tolerance = {allowed:g}. Take 'two_way', or allow more",
                 self._state.time,
             )
@@ -298,7 +302,7 @@ class Simulation(Memory):
     def _energy_cause(self) -> str:
         coupling, beam = self._scene.coupling, self._scene.beam
         causes, remedies = [], []
-        if self._pair.lossy:
+        if not self._pair.joined.energy_exact:
             causes.append(f"{coupling.scheme} of degree {coupling.degree}")
             remedies.append(
                 f"the macro step {self._steps.size:g} s is too large for it; take a smaller one, or "
@@ -322,8 +326,8 @@ class Simulation(Memory):
         unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed)
         if unresolved is not None:
             warnings.append(unresolved)
-        one_way = self._pair.one_way
-        neglected = {} if one_way is None else {"neglected_motion": one_way.neglected, "neglected_share": one_way.share}
+        left_out = self._pair.joined.neglected()
+        neglected = {} if left_out is None else {"neglected_motion": left_out.motion, "neglected_share": left_out.share}
         coupling = {} if self._choice is None else {"coupling": self._choice._asdict()}
         return {
             **neglected,

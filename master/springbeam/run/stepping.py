@@ -3,45 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from ..bodies import force
 from ..bodies.memory import Memory
-from ..bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Held, Motion
-from ..bodies.quasi_static import QuasiStaticBeam
-from ..contact.phases import Joint, Phase, spring_force
-from ..coupling import conditions
-from ..coupling.compliance import Compliance, compliance_energy
-from ..coupling.exchange import Exchange
-from ..coupling.one_way import OneWay
-from ..coupling.tie import Tie
+from ..bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Held
+from ..contact.laws import Transmission, law_of
+from ..contact.phases import Joint, Phase
+from ..coupling import coupling_of
+from ..coupling.protocol import Booking, Coupling, Ends, Step, Uncoupled, Window
 from ..scene import Scene
-from ..scene.statics import tip_reach
-from ..scene.tables import ORDINARY_SCHEMES
 
 #: The force of a step is continued over at most this many times its size; beyond, its end value is held.
 _REACH_OF_FORCE = 4.0
-
-#: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
-Ends = tuple[Motion, Motion]
-
-_AT_REST = Motion(0.0, 0.0, 0.0, 0.0)
-_NOTHING = Energies(0.0, 0.0, 0.0, 0.0)
-
-
-def _at_rest() -> Motion:
-    return _AT_REST
-
-
-class Step(NamedTuple):
-    """An attempted step and what the bodies' ends did on it."""
-
-    time: float
-    size: float
-    contact: Force  #: C on the step
-    foundation: Force  #: N on the step
-    start: Ends  #: at the mark
-    end: Ends
 
 
 @dataclass
@@ -87,8 +60,12 @@ class State(Memory):
             self.foundation = NO_FORCE
 
 
+#: In place of a body that the scene does not have: at rest at 0.
+_ABSENT = Held(0.0)
+
+
 class Pair(Memory):
-    """Beam and spring of a scene, one of them possibly missing, and the law between them.
+    """Both bodies of a scene, one of them possibly missing, and what couples them in each phase.
 
     Parameters
     ----------
@@ -98,43 +75,44 @@ class Pair(Memory):
         The bodies; ``None`` where the scene has none.
     """
 
-    REMEMBERED = ("beam", "spring", "_held", "_tie", "_compliance", "one_way")
+    REMEMBERED = ("beam", "spring", "_held", "_joined")
 
     def __init__(self, scene: Scene, beam: BeamBody | None, spring: Body | None) -> None:
-        self._scene = scene
         self.beam, self.spring = beam, spring
         self.stop = None if scene.stop is None else scene.stop.position
         self._held = None if self.stop is None else Held(self.stop)
-        self.lower: Body | None = self._held if spring is None else spring
-        self._bodies: list[Body] = [body for body in (beam, self.lower) if body is not None]
-        #: Where the ends are.
-        self._tip, self._low = (_at_rest if body is None else body.motion for body in (beam, self.lower))
+        self.upper: Body = beam or _ABSENT
+        self.lower: Body = spring or self._held or _ABSENT
+        self._bodies: list[Body] = [body for body in (beam, spring) if body is not None]
         self._last: Step | None = None  #: at whose end the bodies are
+        #: Whether tip and spring top can be joined.
         self.joinable = beam is not None and spring is not None
-        self.compliant = scene.contact.law == "compliance" and self.joinable
-        coupling, law = scene.coupling, (scene.contact.stiffness, scene.contact.exponent)
-        self._exchange: Exchange | None = None
-        if coupling.scheme in ORDINARY_SCHEMES:
-            self._exchange = Exchange(coupling.scheme == "gauss_seidel", coupling.degree, *law)
-        scheme = "energy" if self._exchange is not None else coupling.scheme
-        expected = 0.0 if scene.beam is None else tip_reach(scene.beam)
-        self._tie = Tie(conditions(scheme, coupling.degree), coupling.degree, coupling.tolerance, expected)
-        self._compliance = Compliance(*law, coupling.tolerance)
-        self.one_way: OneWay | None = None
-        if coupling.feedback != "two_way":
-            stiffness = scene.driver_stiffness
-            assert stiffness is not None
-            self.one_way = OneWay(self._compliance, *law, coupling.feedback == "beam_drives", stiffness)
-        #: A tip without inertia: C follows from where it is held.
-        self.massless = isinstance(beam, QuasiStaticBeam)
-        #: Of the contact force over a step.
-        self.degree = 0 if self.compliant else coupling.degree
-        #: Whether the coupling may create energy, so that its residual is watched.
-        self.lossy = scheme == "hermite" or self._exchange is not None
+        #: Between tip and spring top; a tip alone is tied to the foundation while it rests there.
+        self.law = law_of(scene.contact) if self.joinable else Transmission()
+        self._alone, self._joined = Uncoupled(), coupling_of(scene, self.law)
+
+    @property
+    def opens_softly(self) -> bool:
+        """Whether contact opens and closes inside steps, without an event that ends them."""
+        return self.law.soft and not self.law.lasting
+
+    @property
+    def initial_phase(self) -> Phase:
+        """Before anything happens; ends that a soft law joins for good are joined from the start."""
+        return Phase(Joint.TIED) if self.law.soft and self.law.lasting else Phase()
+
+    def coupling(self, phase: Phase) -> Coupling:
+        """What couples the bodies in ``phase``: a soft law acts wherever the ends are."""
+        return self._joined if self.law.soft or phase.joint is not Joint.FREE else self._alone
+
+    @property
+    def joined(self) -> Coupling:
+        """What couples the bodies where the law acts."""
+        return self._joined
 
     @property
     def iterations(self) -> int:
-        return self._tie.iterations + self._compliance.iterations
+        return self._joined.iterations
 
     def mark(self) -> None:
         """Remember the bodies' states as those that steps start from."""
@@ -147,51 +125,28 @@ class Pair(Memory):
             body.rewind()
 
     def attempt(self, state: State, size: float, start: Ends, phase: Phase | None = None) -> Step:
-        """From the mark by ``size`` [s] under the law of the phase (``phase`` instead of the state's own).
+        """Step from the mark by ``size`` [s] under the law of the phase (``phase`` instead of the state's own).
 
         Raises StepRefused.
         """
         phase = state.phase if phase is None else phase
-        contact = foundation = NO_FORCE
-        upper, lower, spring = self.beam, self.lower, self.spring
-        partner = self._held if phase.seated else lower
-        if self.compliant:
-            assert upper is not None
-            assert partner is not None
-            if self._exchange is not None:
-                contact = self._exchange.solve(upper, partner, state.time, size, start)
-            else:
-                solver = self._compliance if self.one_way is None else self.one_way
-                penetration = start[1].displacement - start[0].displacement
-                contact = solver.solve(upper, partner, state.time, size, state.contact, penetration)
-        elif phase.joint is Joint.FREE:
-            if upper is not None:
-                upper.rewind()
-                upper.advance(state.time, size, NO_FORCE)
-            if lower is not None and not phase.seated:
-                lower.rewind()
-                lower.advance(state.time, size, NO_FORCE)
-        else:
-            assert upper is not None
-            assert partner is not None
-            contact = self._tie.solve(upper, partner, state.time, size, state.guess(size), start[0])
-        if phase.seated:
-            foundation = contact
-            if spring is not None:
-                static = spring_force(self._scene.spring, self.stop)  # type: ignore[arg-type]
-                foundation = (contact[0] + static, contact[1], contact[2])
-                spring.rewind()
-                # C and the part of N that bears it cancel: together, rounding of a large C would move a light top.
-                spring.advance(state.time, size, NO_FORCE, (static, 0.0, 0.0))
-        self._last = step = Step(state.time, size, contact, foundation, start, (self._tip(), self._low()))
+        partner = self._held if phase.seated and self._held is not None else self.lower
+        window = Window(state.time, size, start)
+        contact = self.coupling(phase).solve(self.upper, partner, window, state.guess(size))
+        foundation = self._held_down(state.time, size, contact) if phase.seated else NO_FORCE
+        self._last = step = Step(state.time, size, contact, foundation, start, self.ends())
         return step
 
-    def accept(self, step: Step) -> None:
-        """``step`` is made; of a one-way coupling, what it neglects counts from now on."""
-        if self.one_way is not None:
-            driver = 0 if self.one_way.beam_drives else 1
-            moved = step.end[driver].displacement - step.start[driver].displacement
-            self.one_way.accept(step.contact[0], moved, step.end[1].displacement - step.end[0].displacement)
+    def _held_down(self, time: float, size: float, contact: Force) -> Force:
+        """The foundation's force N on the lower end that it holds; the spring advances at rest under it."""
+        if self.spring is None:
+            return contact
+        assert self.stop is not None
+        static = self.spring.holding_force(self.stop, 0.0)
+        self.spring.rewind()
+        # C and the part of N that bears it cancel: together, rounding of a large C would move a light top.
+        self.spring.advance(time, size, NO_FORCE, (static, 0.0, 0.0))
+        return (contact[0] + static, contact[1], contact[2])
 
     def settled(self, state: State, step: Step) -> Step:
         """Leave the bodies at the end of ``step`` (a look inside it may have moved them)."""
@@ -204,38 +159,24 @@ class Pair(Memory):
         if self.spring is not None and on_spring != 0.0:
             self.spring.apply_impulse(on_spring)
 
-    def massless_tip(self, phase: Phase) -> float:
-        """A massless tip takes the velocity of what ``phase`` joins it to, or springs back; the energy it loses [J]."""
-        if not isinstance(self.beam, QuasiStaticBeam):
-            return 0.0
+    def follow_phase(self, phase: Phase) -> float:
+        """Let a massless tip take the velocity of what ``phase`` joins it to, or spring back; return its loss [J]."""
         if phase.joint is Joint.FREE:
-            return self.beam.release()
-        assert self.lower is not None
-        self.beam.join(self.lower.motion().velocity)
+            return self.upper.release()
+        self.upper.join(self.lower.motion().velocity)
         return 0.0
 
     def ends(self) -> Ends:
         """(tip, lower end); the one that is missing is at rest at 0."""
-        return self._tip(), self._low()
+        return self.upper.motion(), self.lower.motion()
 
-    def energies(self) -> tuple[Energies, Energies, float]:
-        """Of the beam, of the spring, and of the contact law [J].
-
-        The work on an end that drives without feeling it counts as a load's on that body.
-        """
-        contact = 0.0
-        beam = _NOTHING if self.beam is None else self.beam.energies()
-        spring = _NOTHING if self.spring is None else self.spring.energies()
-        if self.compliant:
-            tip, low = self.ends()
-            law = self._scene.contact
-            contact = compliance_energy(low.displacement - tip.displacement, law.stiffness, law.exponent)
-        if self.one_way is not None:
-            beam = beam._replace(load_potential=beam.load_potential + self.one_way.work)
-        return beam, spring, contact
+    def energies(self) -> tuple[Energies, Energies, Booking]:
+        """Energies of the beam, of the spring and of what couples them [J]."""
+        return self.upper.energies(), self.lower.energies(), self._joined.booking(self.ends())
 
     def end_force(self, state: State, step: Step) -> float:
         """C at the end of the step as well as the degree tells; exactly, where the tip has no mass [N]."""
-        if isinstance(self.beam, QuasiStaticBeam):
-            return self.beam.holding_force(*self.ends()[1][:2])
-        return force.end_value(step.contact, step.size) if self.degree > 0 else state.smoothed
+        if self.upper.massless:
+            low = self.lower.motion()
+            return self.upper.holding_force(low.displacement, low.velocity)
+        return force.end_value(step.contact, step.size) if self._joined.degree > 0 else state.smoothed

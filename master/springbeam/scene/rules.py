@@ -174,25 +174,21 @@ def _law_applies(scene: Scene) -> Iterator[str]:
                 yield f'[contact] law = "paper": Algorithm 1 needs a [{table}]'
         if beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf != 1.0:
             yield f'[beam] rho_inf = {beam.rho_inf}: [contact] law = "paper" is the midpoint rule, rho_inf = 1'
-    if contact.law == "compliance":
-        if contact.stiffness == 0.0:
-            yield (
-                '[contact] stiffness = 0.0: with law = "compliance" nothing would hold the bodies apart; it must be '
-                "greater than 0"
-            )
-        if coupling.scheme not in ORDINARY_SCHEMES and (coupling.scheme == "hermite" or coupling.degree != 0):
-            yield (
-                f'[coupling] scheme = "{coupling.scheme}", degree = {coupling.degree}: [contact] law = "compliance" '
-                'needs scheme = "energy" and degree = 0 (its discrete gradient), "gauss_seidel" or "jacobi"'
-            )
-    elif coupling.scheme in ORDINARY_SCHEMES:
-        schemes = '"energy"' if contact.law == "link" else '"energy" or "hermite"'
+    if contact.law == "compliance" and contact.stiffness == 0.0:
         yield (
-            f'[coupling] scheme = "{coupling.scheme}": exchanges the force of [contact] law = "compliance"; '
-            f'law = "{contact.law}" needs {schemes}'
+            '[contact] stiffness = 0.0: with law = "compliance" nothing would hold the bodies apart; it must be '
+            "greater than 0"
         )
-    elif contact.law == "link" and coupling.scheme == "hermite":
-        yield '[coupling] scheme = "hermite": holds rigid ties; [contact] law = "link" needs scheme = "energy"'
+    if coupling.scheme in ORDINARY_SCHEMES and contact.law not in ("compliance", "link"):
+        yield (
+            f'[coupling] scheme = "{coupling.scheme}": exchanges the force of [contact] law = "compliance" or "link"; '
+            f'law = "{contact.law}" needs "energy" or "hermite"'
+        )
+    if coupling.scheme == "hermite" and contact.law in ("compliance", "link"):
+        yield (
+            f'[coupling] scheme = "hermite": holds rigid ties; [contact] law = "{contact.law}" needs '
+            'scheme = "energy", "gauss_seidel" or "jacobi"'
+        )
 
 
 def _feedback_negligible(scene: Scene) -> Iterator[str]:

@@ -10,15 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from ...bodies import force
 from ...bodies.factory import load_bodies
 from ...bodies.protocol import NO_FORCE, Body, Energies, Force, Motion
-from ...coupling import conditions
-from ...coupling.compliance import Compliance
-from ...coupling.exchange import Exchange
-from ...coupling.tie import Tie
+from ...contact.laws import law_of
+from ...coupling import coupling_of
+from ...coupling.protocol import Window
 from ...monolithic.semi_discrete import modal_beam
 from ...scene import Scene, load_scene, with_changes
 from .linear import LinearPair, spectral_radius
@@ -28,13 +26,17 @@ from .predict import SCHEMES, THRESHOLD, critical_step, linear_pair
 _PRELOAD, _AMPLITUDE = 1e4, 1e-3
 #: Growth of the energy at which the rate is told, and how many macro steps it may take to get there.
 _GROWN, _MOST_STEPS = 1e10, 8000
+#: Distances from a predicted critical H, of itself, at which stability and instability are sought. The first ones are
+#: small: ``hermite`` is unstable in bands that can be 0.2 % wide.
+_SOUGHT = (0.001, 0.003, 0.01, 0.03, 0.1)
 
 
-class Preloaded:
+class Preloaded(Body):
     """A body counted from its equilibrium under a constant contact force, where its end is at ``offset`` [m]."""
 
     def __init__(self, body: Body, offset: float, preload: float) -> None:
         self._body, self._offset, self._preload = body, offset, preload
+        self._size = 0.0  #: of the last step [s]
         self.mass = body.mass
 
     def mark(self) -> None:
@@ -44,27 +46,19 @@ class Preloaded:
         self._body.rewind()
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        self._size = size
         self._body.advance(time, size, (contact[0] - self._preload, contact[1], contact[2]), foundation)
         return self.motion()
 
     def motion(self) -> Motion:
-        w = self._body.motion()
-        return w._replace(displacement=w.displacement + self._offset)
+        (w, v, once, twice), w0, h = self._body.motion(), self._offset, self._size
+        return Motion(w + w0, v, once + w0 * h, twice + 0.5 * w0 * h * h)
 
     def energies(self) -> Energies:
         return self._body.energies()
 
     def apply_impulse(self, impulse: float) -> None:
         self._body.apply_impulse(impulse)
-
-    def close(self) -> None:
-        self._body.close()
-
-    def save(self) -> dict[str, Any]:
-        return self._body.save()
-
-    def restore(self, saved: dict[str, Any]) -> None:
-        self._body.restore(saved)
 
 
 def growth(scene: Scene) -> float:
@@ -120,33 +114,16 @@ def _energy(scene: Scene, pair: tuple[Body, Body]) -> float:
 
 def _stepper(scene: Scene, pair: tuple[Body, Body]) -> Callable[[float], None]:
     """``step(time)`` advances both bodies by the scene's coupling."""
-    coupling, contact = scene.coupling, scene.contact
-    H, (beam, top) = coupling.H, pair
-    if contact.law == "compliance" and coupling.scheme != "energy":
-        sequential = coupling.scheme == "gauss_seidel"
-        exchange = Exchange(sequential, coupling.degree, contact.stiffness, contact.exponent)
-        return lambda time: _discard(exchange.solve(beam, top, time, H, (beam.motion(), top.motion())))
+    H, (beam, top) = scene.coupling.H, pair
+    coupling = coupling_of(scene, law_of(scene.contact))
     guess = NO_FORCE
-    tie = Tie(conditions(coupling.scheme, coupling.degree), coupling.degree, coupling.tolerance)
-    law = Compliance(contact.stiffness, contact.exponent, coupling.tolerance)
 
     def step(time: float) -> None:
         nonlocal guess
-        if contact.law == "compliance":
-            p = top.motion().displacement - beam.motion().displacement
-            guess = law.solve(beam, top, time, H, guess, p)
-        else:
-            guess = force.shifted(tie.solve(beam, top, time, H, guess, beam.motion()), H)
+        window = Window(time, H, (beam.motion(), top.motion()))
+        guess = force.shifted(coupling.solve(beam, top, window, guess), H)
 
     return step
-
-
-def _discard(_: object) -> None: ...
-
-
-#: Distances from a predicted critical H, of itself, at which stability and instability are sought. The first ones are
-#: small: ``hermite`` is unstable in bands that can be 0.2 % wide.
-_SOUGHT = (0.001, 0.003, 0.01, 0.03, 0.1)
 
 
 def measured_critical_step(scene: Scene, near: float, precision: float = 0.002) -> float | None:

@@ -20,7 +20,8 @@ import numpy as np
 
 from ...bodies import force
 from ...bodies.protocol import Motion
-from ...coupling import conditions
+from ...coupling.projection import numbers_to_legendre
+from ...coupling.tie import SCHEMES
 
 #: S₋₁ … S₅: what a quadratic force and two integrals of the displacement need.
 _ORDERS = 7
@@ -178,7 +179,7 @@ CoupledStep = Callable[[np.ndarray], np.ndarray]
 
 def tied_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledStep:
     """The tie by ``energy`` or ``hermite``: as `springbeam.coupling.tie.Tie` solves it, in closed form."""
-    condition = conditions(scheme, degree)
+    condition = SCHEMES[scheme][degree]
     T = np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
     beam, spring = Step(pair.beam, h), Step(pair.spring, h)
     (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(degree), spring.response(degree)
@@ -193,18 +194,22 @@ def tied_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledSt
     return step
 
 
-def discrete_gradient_step(pair: LinearPair, h: float) -> CoupledStep:
-    """`compliance` by ``energy``: the discrete gradient of a quadratic energy, C = k (p + p⁺)/2."""
+def projected_step(pair: LinearPair, degree: int, h: float) -> CoupledStep:
+    """`compliance` by ``energy``, in closed form: of a linear law, C has the first Legendre coefficients of k p̃."""
+    k, n = pair.stiffness, degree + 1
+    from_numbers, from_start = (part[:n] for part in numbers_to_legendre(degree))
+    condition = SCHEMES["energy"][degree]
+    T = np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
     beam, spring = Step(pair.beam, h), Step(pair.spring, h)
-    (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(0), spring.response(0)
-    compliance = 2.0 / pair.stiffness + beam_motions[0, 0] + spring_motions[0, 0]
+    (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(degree), spring.response(degree)
+    inverse = np.linalg.inv(np.eye(n) / k + from_numbers @ T @ (beam_motions + spring_motions))
 
     def step(x: np.ndarray) -> np.ndarray:
         p, _ = pair.penetration(x)
         a, s = pair.split(x)
         (a, u), (s, y) = beam(a), spring(s)
-        c = (p + y[0] - u[0]) / compliance
-        return np.vstack([a + beam_states * c, s - spring_states * c])
+        coefficients = inverse @ (from_numbers @ T @ (y - u) + np.outer(from_start, p))
+        return np.vstack([a + beam_states @ coefficients, s - spring_states @ coefficients])
 
     return step
 
@@ -232,7 +237,7 @@ def coupled_step(pair: LinearPair, scheme: str, degree: int, h: float) -> Couple
     if pair.stiffness == 0.0:
         return tied_step(pair, scheme, degree, h)
     if scheme == "energy":
-        return discrete_gradient_step(pair, h)
+        return projected_step(pair, degree, h)
     return exchange_step(pair, scheme == "gauss_seidel", degree, h)
 
 

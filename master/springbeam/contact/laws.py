@@ -1,0 +1,171 @@
+"""Interface laws: which contact force belongs to the penetration of the two ends, and what it stores and dissipates.
+
+The penetration p = y − u_tip [m] is positive where the tip has sunk into what lies below it, its rate ṗ = z − v_tip
+[m/s]; the contact force C [N] lifts the tip and presses the lower end. ``docs/model.md`` states the laws. A *rigid* law
+has no force of its own: it holds the ends together, and C is whatever that takes. A *soft* one is a function of both,
+
+    C = F(p) + D(p, ṗ),     F = Φ′,     D ṗ ≥ 0,
+
+so that Φ is what it stores and ∫ D ṗ dt what it dissipates. To add a law, write its class here, name it in `law_of`,
+and write it again, independently, in `springbeam.monolithic.laws`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, Protocol
+
+import numpy as np
+
+from ..scene import Contact
+
+
+class RigidLaw:
+    """The ends move together while they are joined; the force is a reaction."""
+
+    soft: ClassVar[Literal[False]] = False
+    #: Whether the ends are joined for good: they never meet, let go or open.
+    lasting: ClassVar[bool] = False
+
+
+class Transmission(RigidLaw):
+    """Winkler's assumption made consistent: tied below Ψ, unilateral contact above, free after it opens."""
+
+
+class Tie(RigidLaw):
+    """A bolted joint: u_tip = y for good, whatever the sign of C."""
+
+    lasting = True
+
+
+class SoftLaw(Protocol):
+    """A contact force that is a function of the penetration and its rate."""
+
+    soft: ClassVar[Literal[True]]
+    lasting: ClassVar[bool]
+    #: Whether F vanishes for p ≤ 0; if not, F is linear.
+    one_sided: ClassVar[bool]
+
+    @property
+    def damped(self) -> bool:
+        """Whether D is not zero."""
+
+    def force(self, p: float, rate: float = 0.0) -> float:
+        """Return C [N] at a penetration p [m] that grows at ``rate`` [m/s]. Raises OverflowError past all doubles."""
+
+    def potential(self, p: float) -> float:
+        """Return Φ(p) [J]. Raises OverflowError past all doubles."""
+
+    def slope(self, p: float) -> float:
+        """Return F′(p) [N/m]."""
+
+    def elastic(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return F [N] and F′ [N/m] of an array of penetrations [m], where F does not vanish."""
+
+    def resistance(self, p: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return D [N], ∂D/∂p [N/m] and ∂D/∂ṗ [N·s/m] of arrays, where F does not vanish."""
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """Normal compliance C = λ p₊^q (1 + χ ṗ)₊ (Ahn & Tate, (5), with the moving obstacle y; χ: Hunt & Crossley 1975).
+
+    Parameters
+    ----------
+    stiffness
+        λ [N/m^q].
+    exponent
+        q ≥ 1.
+    damping
+        χ ≥ 0 [s/m]; the force never pulls.
+    """
+
+    stiffness: float
+    exponent: float
+    damping: float = 0.0
+
+    soft: ClassVar[Literal[True]] = True
+    lasting: ClassVar[bool] = False
+    one_sided: ClassVar[bool] = True
+
+    @property
+    def damped(self) -> bool:
+        return self.damping > 0.0
+
+    def force(self, p: float, rate: float = 0.0) -> float:
+        if p <= 0.0:
+            return 0.0
+        elastic: float = self.stiffness * p**self.exponent
+        return elastic * max(1.0 + self.damping * rate, 0.0) if self.damped else elastic
+
+    def potential(self, p: float) -> float:
+        q = self.exponent + 1.0
+        return float(self.stiffness * p**q / q) if p > 0.0 else 0.0
+
+    def slope(self, p: float) -> float:
+        return float(self.exponent * self.stiffness * p ** (self.exponent - 1.0)) if p > 0.0 else 0.0
+
+    def elastic(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        slope = self.stiffness * p ** (self.exponent - 1.0)
+        return slope * p, self.exponent * slope
+
+    def resistance(self, p: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        force, slope = self.elastic(p)
+        share = np.maximum(self.damping * rate, -1.0)
+        return force * share, slope * share, np.where(share > -1.0, self.damping * force, 0.0)
+
+
+@dataclass(frozen=True)
+class Link:
+    """An elastic link C = k p + c ṗ, whatever the sign of p.
+
+    Parameters
+    ----------
+    stiffness
+        k [N/m].
+    damping
+        c ≥ 0 [N·s/m].
+    """
+
+    stiffness: float
+    damping: float = 0.0
+
+    soft: ClassVar[Literal[True]] = True
+    lasting: ClassVar[bool] = True
+    one_sided: ClassVar[bool] = False
+
+    @property
+    def damped(self) -> bool:
+        return self.damping > 0.0
+
+    def force(self, p: float, rate: float = 0.0) -> float:
+        return self.stiffness * p + self.damping * rate
+
+    def potential(self, p: float) -> float:
+        return 0.5 * self.stiffness * p * p
+
+    def slope(self, p: float) -> float:
+        return self.stiffness
+
+    def elastic(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.stiffness * p, np.full_like(p, self.stiffness)
+
+    def resistance(self, p: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.damping * rate, np.zeros_like(p), np.full_like(p, self.damping)
+
+
+Law = RigidLaw | SoftLaw
+
+
+def law_of(contact: Contact) -> Law:
+    """Return the law that a scene's table ``[contact]`` names; law ``paper`` is `springbeam.run.paper_law`."""
+    match contact.law:
+        case "transmission":
+            return Transmission()
+        case "tie":
+            return Tie()
+        case "compliance":
+            return Compliance(contact.stiffness, contact.exponent, contact.damping)
+        case "link":
+            return Link(contact.stiffness, contact.damping)
+    raise ValueError(f"contact.law = {contact.law!r}: not a law of the master's")

@@ -1,0 +1,116 @@
+"""What a run asks of a coupling, and what both exchange: windows and steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ..bodies.memory import Memory
+from ..bodies.protocol import NO_FORCE, Body, Force, Motion, StepRefused
+
+#: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
+Ends = tuple[Motion, Motion]
+#: Conditions on the gap over a step of size H as a linear map of an end's motion, each in metres.
+Conditions = Callable[[Motion, float], tuple[float, ...]]
+#: A relative error of a step, and the order in which it falls with the step's size.
+ErrorEstimate = tuple[float, int]
+
+
+class Window(NamedTuple):
+    """A step that is to be made."""
+
+    time: float  #: where it begins [s]
+    size: float  #: [s]
+    ends: Ends  #: at its beginning
+
+
+class Step(NamedTuple):
+    """An attempted step and what the bodies' ends did on it."""
+
+    time: float
+    size: float
+    contact: Force  #: C on the step
+    foundation: Force  #: N on the step
+    start: Ends  #: at the mark
+    end: Ends
+
+
+class Booking(NamedTuple):
+    """Energies that a coupling adds to those of the bodies [J]."""
+
+    stored: float = 0.0  #: in the contact law
+    dissipated: float = 0.0  #: by the contact law since the start
+    unfelt: float = 0.0  #: work of the contact force on an end that does not feel it
+
+
+NOTHING_BOOKED = Booking()
+
+
+class Neglected(NamedTuple):
+    """Motion of a driving end that one-way coupling leaves out, at most."""
+
+    motion: float  #: [m]
+    share: float  #: of the largest penetration so far
+
+
+class Scales(NamedTuple):
+    """What the errors of a step are relative to."""
+
+    span: float  #: the shorter of the lengths over which the ends have moved [m]
+    speed: float  #: the largest of an end [m/s]
+    energy: float  #: the largest so far [J]
+    reduced_mass: float  #: of both ends [kg]
+
+
+class Coupling(Memory):
+    """Finds the contact force of a step and advances both bodies under it."""
+
+    #: Degree of the contact force over a step.
+    degree: int = 0
+    #: Whether the force does no net work but what is booked, at any step.
+    energy_exact: bool = True
+
+    @property
+    def iterations(self) -> int:
+        """Corrections of the force since the start."""
+        return 0
+
+    def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
+        """Advance both bodies from their marks over ``window`` and return the contact force.
+
+        ``guess`` is the force as far as known. Raises StepRefused, as NotConverged where the force was not found.
+        """
+        raise NotImplementedError
+
+    def accept(self, step: Step) -> None:
+        """Count from now on what ``step``, which is made, has dissipated."""
+
+    def booking(self, ends: Ends) -> Booking:
+        """Return the energies at the ``ends``."""
+        return NOTHING_BOOKED
+
+    def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
+        """Return estimates of the step's error that its motion does not show by itself."""
+        return []
+
+    def neglected(self) -> Neglected | None:
+        """Return what of the motion is left out by now, ``None`` if nothing is."""
+        return None
+
+
+class Uncoupled(Coupling):
+    """Nothing between the bodies: each advances alone."""
+
+    def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
+        for body in (upper, lower):
+            body.rewind()
+            body.advance_alone(window.time, window.size)
+        return NO_FORCE
+
+
+class NotConverged(StepRefused):
+    """The contact force of a step was not found; ``residual`` [m] is that of the conditions on the gap."""
+
+    def __init__(self, residual: float, iterations: int) -> None:
+        super().__init__(f"contact force not found after {iterations} iterations, gap condition {residual:.3g} m")
+        self.residual = residual

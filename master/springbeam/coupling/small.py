@@ -1,0 +1,41 @@
+"""Vectors and matrices of one to three unknowns as lists of floats: numpy's overhead would be most of a step's time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from operator import mul
+
+import numpy as np
+
+Vector = list[float]
+Matrix = list[list[float]]
+
+
+def times(A: Matrix, x: Vector) -> Vector:
+    """Return A x."""
+    if len(x) == 1:
+        return [A[0][0] * x[0]]
+    return [sum(map(mul, row, x)) for row in A]
+
+
+def transposed(rows: Iterable[Iterable[float]]) -> Matrix:
+    return [list(column) for column in zip(*rows, strict=True)]
+
+
+def inverse(A: Matrix) -> Matrix:
+    """Return A⁻¹. Raises numpy.linalg.LinAlgError if there is none."""
+    found: Matrix = np.linalg.inv(A).tolist()
+    return found
+
+
+def broyden(descent: Matrix, step: Vector, residual: Vector) -> Matrix:
+    """Return Broyden's rank-one update of D = −J⁻¹, J the Jacobian, after ``step``, which was to leave no residual.
+
+    D + d (sᵀD) / (sᵀ(s − d)) with d = D r: Broyden (1965), in the form of Sherman and Morrison.
+    """
+    d = times(descent, residual)
+    denominator = sum(s * (s - x) for s, x in zip(step, d, strict=True))
+    if denominator == 0.0:
+        return descent
+    row = [sum(map(mul, step, column)) / denominator for column in zip(*descent, strict=True)]
+    return [[x + y * z for x, z in zip(line, row, strict=True)] for line, y in zip(descent, d, strict=True)]

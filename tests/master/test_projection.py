@@ -1,0 +1,139 @@
+"""The projected law by itself: energy to rounding, the discrete gradient, slopes, quadrature, dissipation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.polynomial import legendre
+from scipy.integrate import quad
+
+from springbeam.contact.laws import Compliance, Link
+from springbeam.coupling.projection import Projection
+
+EPS = float(np.finfo(float).eps)
+SIZE = 0.01
+PAIRS = [(0.0, 1e-3), (1e-3, 0.0), (1e-3, -2e-3), (-1e-3, 5e-4), (1e-3, 1.05e-3), (1e-3, 1.2e-3), (-1e-3, -2e-3)]
+#: A penetration's end, mean and mean of s p [mm], after a start of 1 mm or −1 mm.
+SHAPES = {"in": [1.5, 1.3, 0.1], "opens": [-1.0, 0.4, -0.5], "dips in": [-1.0, 0.3, -0.4], "out": [-2.0, -1.0, 0.1]}
+
+
+def numbers(name: str, degree: int) -> tuple[float, list[float]]:
+    return (-1e-3 if name in ("dips in", "out") else 1e-3), [1e-3 * value for value in SHAPES[name][: degree + 1]]
+
+
+def series(projection: Projection, start: float, x: list[float]) -> np.ndarray:
+    """Legendre coefficients of the penetration's polynomial, from its defining conditions."""
+    d = projection.degree
+    rows = [[1.0] * (d + 2), [(-1.0) ** k for k in range(d + 2)]]
+    rows += [[(1.0 / (2 * j + 1)) if k == j else 0.0 for k in range(d + 2)] for j in range(d)]
+    return np.linalg.solve(np.array(rows), [x[0], start, *x[1:]])
+
+
+def integral(function, c: np.ndarray) -> float:
+    """∫ over s in [−1, 1], by pieces between the zeros of the series."""
+    zeros = [float(r.real) for r in legendre.legroots(c) if abs(r.imag) < 1e-12 and -1.0 < r.real < 1.0]
+    return quad(function, -1.0, 1.0, points=zeros or None, epsabs=0.0, epsrel=1e-10, limit=400)[0]
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("q", [1.0, 1.5, 2.0, 3.0, 10.0])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_the_work_is_what_the_law_stores(degree, q, shape):
+    """∫ C ṗ = ΔΦ to a few roundings of Φ, wherever the penetration changes sign."""
+    law = Compliance(1e4, q)
+    projection = Projection(law, degree)
+    start, x = numbers(shape, degree)
+    a = projection(start, x, SIZE).a
+    stored = [law.potential(p) for p in (start, x[0])]
+    parts = np.abs(a).sum() * (abs(start) + np.abs(x).sum())
+    assert projection.work(a, start, x) == pytest.approx(stored[1] - stored[0], abs=16 * EPS * (max(stored) + parts))
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("q", [1.0, 1.5, 3.0])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_it_is_the_projection_of_the_force(degree, q, shape):
+    """Against adaptive quadrature; 16 graded points of a power beside its zero leave 1e-7 of the largest force."""
+    law = Compliance(1e4, q)
+    projection = Projection(law, degree)
+    start, x = numbers(shape, degree)
+    c = series(projection, start, x)
+    largest = law.force(float(np.abs(legendre.legval(np.linspace(-1, 1, 50), c)).max()))
+    for k, value in enumerate(projection(start, x, SIZE).a):
+        unit = [0.0] * k + [1.0]
+        exact = (k + 0.5) * integral(lambda s, e=unit: law.force(legendre.legval(s, c)) * legendre.legval(s, e), c)
+        assert value == pytest.approx(exact, abs=1e-7 * largest)
+
+
+@pytest.mark.parametrize("law", [Compliance(1e4, 1.5), Compliance(1e4, 3.0, 0.5), Link(1e4, 20.0)], ids=repr)
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("shape", ["in", "opens", "dips in"])
+def test_slopes_are_those_of_the_force(law, degree, shape):
+    """Central differences, second order in 1e-5 of the penetration; the correction along p̃′ is not differentiated."""
+    projection = Projection(law, degree)
+    start, x = numbers(shape, degree)
+    slope = np.array(projection(start, x, SIZE).slope)
+    for j in range(degree + 1):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = list(x)
+            moved[j] += sign * 1e-8
+            ends.append(np.array(projection(start, moved, SIZE).a))
+        assert (ends[0] - ends[1]) / 2e-8 == pytest.approx(slope[:, j], rel=1e-4, abs=1e-4 * np.abs(slope).max())
+
+
+@given(
+    start=st.floats(-1e-2, 1e-2), end=st.floats(-1e-2, 1e-2), mean=st.floats(-1e-2, 1e-2), skew=st.floats(-5e-3, 5e-3),
+    degree=st.sampled_from([0, 1, 2]), q=st.floats(1.0, 4.0), chi=st.floats(0.0, 3.0),
+)  # fmt: skip
+def test_damping_never_gives_energy(start, end, mean, skew, degree, q, chi):
+    law = Compliance(1e4, q, chi)
+    projection = Projection(law, degree)
+    x = [end, mean, skew][: degree + 1]
+    a = projection(start, x, SIZE).a
+    gained = law.potential(end) - law.potential(start)
+    scale = abs(gained) + sum(map(abs, a)) * (abs(start) + sum(map(abs, x)))
+    assert projection.work(a, start, x) - gained >= -64 * EPS * scale
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_a_link_dissipates_its_dashpots_work(degree):
+    """D ṗ = c ṗ², of p̃ exactly."""
+    law = Link(0.0, 20.0)
+    projection = Projection(law, degree)
+    start, x = numbers("in", degree)
+    rate = 2.0 / SIZE * legendre.legder(series(projection, start, x))
+    exact = 20.0 * 0.5 * SIZE * quad(lambda s: legendre.legval(s, rate) ** 2, -1.0, 1.0)[0]
+    assert projection.work(projection(start, x, SIZE).a, start, x) == pytest.approx(exact, rel=1e-13)
+
+
+# -- degree 0: the discrete gradient ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("q", [1.0, 1.5, 3.0])
+@pytest.mark.parametrize("change", [0.0, 1e-14, 1e-9, 1e-4, -1e-4])
+def test_small_changes_do_not_cancel(change, q):
+    """DG = λp^q (1 + q δ/2 + q(q−1) δ²/6 + …) for p1 = p(1 + δ): the quotient would lose EPS/δ."""
+    p, law = 2e-3, Compliance(1e4, q)
+    exact = law.force(p) * (1.0 + q * change / 2 + q * (q - 1.0) * change**2 / 6)
+    # The next term is q(q−1)(q−2) δ³/24 ≤ δ³/4.
+    found = Projection(law, 0)(p, [p * (1.0 + change)], SIZE).a[0]
+    assert found == pytest.approx(exact, rel=8 * EPS + abs(change) ** 3)
+
+
+@pytest.mark.parametrize("q", [1.0, 1.5, 3.0])
+def test_both_branches_meet(q):
+    """Change of 10 % of the larger p, from either side: the branches agree to the quotient's cancellation."""
+    p1, projection = 1e-3 / 0.9, Projection(Compliance(1e4, q), 0)
+    sides = [projection(1e-3, [p1 * (1.0 + s)], SIZE).a[0] for s in (-1e-12, 1e-12)]
+    assert sides[0] == pytest.approx(sides[1], rel=1e-11)
+
+
+@pytest.mark.parametrize(("p0", "p1"), PAIRS)
+def test_it_is_symmetric_in_time_and_vanishes_out_of_contact(p0, p1):
+    projection = Projection(Compliance(1e4, 2.0), 0)
+    there, back = (projection(a, [b], SIZE).a[0] for a, b in ((p0, p1), (p1, p0)))
+    assert there == pytest.approx(back, rel=1e-13)
+    assert (there == 0.0) == (max(p0, p1) <= 0.0)
