@@ -186,30 +186,36 @@ class Transitions(Memory):
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
         assert self._scene.stop is not None
         e = self._scene.stop.restitution
-        tip, low = ends
         tied = self._tip_mass is not None and phase.joint is not Joint.FREE and not self._law.soft
-        z = low.velocity if self._mass is not None else None
-        v = tip.velocity if tied or self._mass is None else None
-        striking = (z, self._mass or 0.0, v, self._tip_mass or 0.0)
+        v, z = self._striking(ends, tied)
         speed = max(abs(w) for w in (z, v) if w is not None)
         self._fastest_impact = max(self._fastest_impact, speed)
+        after, before = (self._common(*self._striking(motions, tied)) for motions in (ends, start))
         # It strikes while rising if the rebound would be over in no time.
-        tip_mass = 0.0 if v is None else self._tip_mass or 0.0
-        after = common_velocity(v or 0.0, z or 0.0, tip_mass, self._mass or 0.0)
-        back = e * speed
-        dies_out = after > 0.0 or back <= _SEATING_SPEED * self._fastest_impact
-        if z is not None and elapsed > 0.0 and back <= _SEATING_SPEED_UNSEEN * self._fastest_impact:
+        dies_out = after > 0.0 or e * speed <= _SEATING_SPEED * self._fastest_impact
+        if z is not None and elapsed > 0.0 and e * speed <= _SEATING_SPEED_UNSEEN * self._fastest_impact:
             # What presses it down is told by the flight: C at its end may be off by what reverses a mismatch of
             # velocities, (d + 1)(d + 2) times their quotient by the step. It rises by (e z)²/2a; each impact is found
             # to no better than the tolerance, which brings it as much.
-            before = common_velocity(
-                0.0 if v is None else start[0].velocity, start[1].velocity, tip_mass, self._mass or 0.0
-            )
             dies_out |= 0.5 * (e * after) ** 2 * elapsed <= tolerance * (before - after)
+        masses = self._mass or 0.0, self._tip_mass or 0.0
         if (dies_out and e < 1.0) or speed == 0.0:
             joint = phase.joint if self._mass is not None else Joint.TIED
-            return "seated", Phase(joint, seated=True), foundation_impact(*striking, restitution=0.0)
-        return "stop_impact", phase, foundation_impact(*striking, restitution=e)
+            return "seated", Phase(joint, seated=True), foundation_impact(z, masses[0], v, masses[1], restitution=0.0)
+        return "stop_impact", phase, foundation_impact(z, masses[0], v, masses[1], restitution=e)
+
+    def _striking(self, ends: tuple[Motion, Motion], tied: bool) -> tuple[float | None, float | None]:
+        """Velocities (tip, spring top) [m/s] of those that strike the foundation; ``None`` for one that does not."""
+        tip, low = ends
+        return (
+            tip.velocity if tied or self._mass is None else None,
+            low.velocity if self._mass is not None else None,
+        )
+
+    def _common(self, v: float | None, z: float | None) -> float:
+        """Velocity [m/s] with which those go on that strike together."""
+        tip_mass = 0.0 if v is None else self._tip_mass or 0.0
+        return common_velocity(v or 0.0, z or 0.0, tip_mass, self._mass or 0.0)
 
     def _part(self, opened: Phase, tip: Motion, low: Motion) -> Impact:
         """Ends that a tie lets go have one velocity; where a scheme has let theirs differ, they take that first.

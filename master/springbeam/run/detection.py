@@ -5,11 +5,9 @@ Positions tell of meeting, release and the foundation (`springbeam.contact.event
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
+from typing import NamedTuple
 
-from ..bodies import force
-from ..bodies.protocol import Force
 from ..contact.events import (
     EventFunction,
     EventFunctions,
@@ -17,23 +15,32 @@ from ..contact.events import (
     cubic_crossing,
     cubic_value,
     gap,
+    interpolated,
     locate,
     lowest_inside,
     position_tolerance,
     stays_above,
 )
-from ..contact.phases import Joint, Phase, common_velocity
+from ..contact.phases import common_velocity
 from ..coupling.protocol import Ends, Step
 from ..scene import Scene
 from .macro_steps import AdaptiveSteps, MacroGrid
+from .separation import Separation
 from .stepping import Pair, State
 
 #: An event closer to the start of a step than this fraction of H happens at the start.
 _NO_TIME = 1e-9
 #: Of a velocity, relative to the largest so far.
 _VELOCITY_ROUNDING = 16.0 * 2.0**-52
-#: Repetitions to end a step where the contact force vanishes.
-_MAX_FORCE_CUTS = 8
+
+
+class SoftChange(NamedTuple):
+    """Contact by a soft law begins or ends."""
+
+    kind: str
+    time: float  #: [s]
+    tip: Sample  #: displacement [m] and velocity [m/s]
+    low: Sample
 
 
 class Detector:
@@ -51,6 +58,7 @@ class Detector:
             assert pair.beam is not None
             assert pair.spring is not None
             tip_share = common_velocity(1.0, 0.0, pair.beam.mass, pair.spring.mass)
+        self._separation = Separation(pair, _NO_TIME)
         self._functions = EventFunctions(scene, pair.law, tip_share)
         self._level = pair.stop or 0.0
 
@@ -89,8 +97,7 @@ class Detector:
                 step, found = self._first_by_position(state, touched)
         if step.size == 0.0:
             return step, found
-        pushing = self._pushing(state.phase)
-        unilateral = None if pushing is None else self._unilateral(state, step, *pushing)
+        unilateral = self._separation.first(state, step, self._steps.size)
         if unilateral is None:
             return self._pair.settled(state, step), found
         cut, kind = unilateral
@@ -125,13 +132,8 @@ class Detector:
             step = self._located(state, function, bracket)
             if step.size < _NO_TIME * self._steps.size:
                 # Too short for a contact force: velocities that differ would be turned round by an infinite one.
-                return self._no_step(step), found
+                return self._separation.no_step(step), found
         return step, found
-
-    def _no_step(self, step: Step) -> Step:
-        """No step at all: the bodies back at the mark."""
-        self._pair.rewind()
-        return step._replace(size=0.0, end=step.start)
 
     # -- events told by positions -----------------------------------------------------------------------------------
 
@@ -173,81 +175,20 @@ class Detector:
         cut = self._pair.attempt(state, inside, step.start)
         return cut if any(cut.contact) else step
 
-    # -- events told by forces --------------------------------------------------------------------------------------
+    # -- soft contact ------------------------------------------------------------------------------------------------
 
-    def _pushing(self, phase: Phase) -> tuple[str, Callable[[Step], Force]] | None:
-        """The event that ends the phase where a force that can only push would pull, and that force."""
-        if phase.seated:
-            return "unseated" if self._pair.spring is not None else "separation", lambda step: step.foundation
-        if phase.joint is Joint.TOUCH and not self._pair.law.soft and not self._pair.upper.massless:
-            return "separation", lambda step: step.contact
-        return None
+    def soft_change(self, step: Step) -> SoftChange | None:
+        """Return where contact by a soft law has opened or closed in ``step``, ``None`` if it has not.
 
-    def _unilateral(
-        self, state: State, step: Step, kind: str, pick: Callable[[Step], Force]
-    ) -> tuple[Step, str] | None:
-        """The step cut where a force that can only push would pull, and the event there."""
-        f = pick(step)
-        if self._pair.coupling(state.phase).degree == 0:
-            return self._unilateral_mean(state, step, kind, f[0])
-        changes = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
-        if f[0] < 0.0:
-            # The sign at the start may be a false alarm: it is one if the ends, let go, close.
-            if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, kind):
-                return self._no_step(step), kind
-            step = self._pair.settled(state, step)
-        if not changes:
-            return None
-        # The polynomial tells where the force of the step vanishes; the step is repeated until it ends there.
-        last, size = step, changes[0]
-        for _ in range(_MAX_FORCE_CUTS):
-            last = self._pair.attempt(state, size, step.start)
-            g = pick(last)
-            value, slope = force.end_value(g, size), g[1] + size * g[2]
-            change = -value / slope if slope < 0.0 else 0.0
-            if not 0.0 < size + change < step.size or abs(change) <= 1e-12 * self._steps.size:
-                break
-            size += change
-        return last, kind
-
-    def _unilateral_mean(self, state: State, step: Step, kind: str, c: float) -> tuple[Step, str] | None:
-        """Degree 0: C belongs to the middle of its step and alternates; means of neighbours do not.
-
-        The line through the last two means tells where the force vanishes, also if that is past this step's middle.
+        Nothing special happens there: the zero is that of the cubic through both ends of the step.
         """
-        if not state.middles:
-            if c < 0.0 and not state.reclosed and self._opens(state, step, kind):
-                return self._no_step(step), kind
+        before, after = gap(step.start), gap(step.end)
+        touching = after[0] < 0.0
+        if (before[0] < 0.0) == touching:
             return None
-        middle = state.time + 0.5 * step.size
-        points = [(t, n if kind == "unseated" else f) for t, f, n in state.middles] + [(middle, c)]
-        means = [(0.5 * (t0 + t1), 0.5 * (f0 + f1)) for (t0, f0), (t1, f1) in itertools.pairwise(points)]
-        time, mean = means[-1]
-        if mean <= 0.0:
-            if len(means) < 2 and c >= 0.0:
-                return None
-            at = 0.0
-            if len(means) == 2 and means[0][1] > 0.0:
-                at = means[0][0] + (time - means[0][0]) * means[0][1] / (means[0][1] - mean) - state.time
-        elif len(means) == 2 and means[0][1] > mean:
-            at = time + (time - means[0][0]) * mean / (means[0][1] - mean) - state.time
-            if at >= step.size:
-                return None
-        else:
-            return None
-        if at <= _NO_TIME * self._steps.size:
-            return self._no_step(step), kind
-        if at >= step.size:
-            return self._pair.settled(state, step), kind
-        return self._pair.attempt(state, at, step.start), kind
-
-    def _opens(self, state: State, step: Step, kind: str) -> bool:
-        """Do the ends part if they are let go for the step? ("unseated": does the lower end leave the foundation?)"""
-        phase = state.phase
-        if kind == "unseated":
-            assert self._pair.stop is not None
-            low = self._pair.attempt(state, step.size, step.start, Phase(phase.joint)).end[1]
-            return low.displacement > self._pair.stop
-        let_go = Phase(Joint.FREE, phase.seated and self._pair.spring is not None)
-        tip, low = self._pair.attempt(state, step.size, step.start, let_go).end
-        return tip.displacement > low.displacement
+        if touching:
+            at = 0.0 if before[0] == 0.0 else cubic_crossing(before, after, step.size)
+        else:  # backwards in time it closes
+            at = step.size - cubic_crossing((after[0], -after[1]), (before[0], -before[1]), step.size)
+        tip, low = (interpolated(step.start[i], step.end[i], step.size, at) for i in (0, 1))
+        return SoftChange("impact" if touching else "separation", step.time + at, tip, low)

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..bodies.memory import Memory
 from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, StepRefused
-from ..contact.events import cubic_crossing, gap, interpolated
+from ..contact.events import gap
 from ..contact.phases import Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
 from ..results.recording import NonFiniteValue, Recorder
@@ -148,7 +148,7 @@ class Simulation(Memory):
                 state.accept(step, end)
                 self._macro_steps += 1
                 if self._pair.opens_softly:
-                    self._note_contact(step)
+                    self._note_soft_contact(step)
             steps.reached(state.time)
             if event is not None:
                 self._act(event, step)
@@ -262,21 +262,13 @@ class Simulation(Memory):
             )
         )
 
-    def _note_contact(self, step: Step) -> None:
-        """Compliance: opening and closing are nothing special, they are told from the step that crossed."""
-        before, after = gap(step.start), gap(step.end)
-        touching = after[0] < 0.0
+    def _note_soft_contact(self, step: Step) -> None:
+        touching = gap(step.end)[0] < 0.0
         self._state.phase = Phase(Joint.TOUCH if touching else Joint.FREE, self._state.phase.seated)
-        if (before[0] < 0.0) == touching:
-            return
-        if touching:
-            at = 0.0 if before[0] == 0.0 else cubic_crossing(before, after, step.size)
-        else:  # backwards in time it closes
-            at = step.size - cubic_crossing((after[0], -after[1]), (before[0], -before[1]), step.size)
-        ends = [interpolated(step.start[i], step.end[i], step.size, at) for i in (1, 0)]
-        self._events += 1
-        values = [x for end in ends for x in end]
-        self._recorder.event(Event(step.time + at, "impact" if touching else "separation", *values))
+        change = self._detector.soft_change(step)
+        if change is not None:
+            self._events += 1
+            self._recorder.event(Event(change.time, change.kind, *change.low, *change.tip))
 
     # -- what is reported -------------------------------------------------------------------------------------------
 

@@ -1,0 +1,129 @@
+"""Events told by forces: a force that can only push is about to pull, so that ends part or a seat is left.
+
+The step is cut to where the force vanishes. A force of degree 1 or 2 tells by its own polynomial; the constant of
+degree 0 belongs to the middle of its step and alternates, so that the means of neighbouring steps tell.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ..bodies import force
+from ..bodies.protocol import Force
+from ..contact.phases import Joint, Phase
+from ..coupling.protocol import Step
+from .stepping import Pair, State
+
+#: Repetitions to end a step where the contact force vanishes.
+_MAX_CUTS = 8
+
+
+class Push(NamedTuple):
+    """A force that can only push, and the event that ends its phase."""
+
+    event: str
+    force: Callable[[Step], Force]
+
+
+class Separation:
+    """Finds where the force of a unilateral phase vanishes; the bodies are left where the returned step ends.
+
+    ``no_time`` is the fraction of H below which an event happens at the start of its step.
+    """
+
+    def __init__(self, pair: Pair, no_time: float) -> None:
+        self._pair, self._no_time = pair, no_time
+
+    def first(self, state: State, step: Step, macro_step: float) -> tuple[Step, str] | None:
+        """Return ``step`` cut to the event, of size 0 if it is at the start, and its kind; ``None`` if none is due."""
+        push = self._pushing(state.phase)
+        if push is None:
+            return None
+        if self._pair.coupling(state.phase).degree == 0:
+            return self._by_means(state, step, push, macro_step)
+        return self._by_polynomial(state, step, push, macro_step)
+
+    def no_step(self, step: Step) -> Step:
+        """Return no step at all, the bodies back at the mark."""
+        self._pair.rewind()
+        return step._replace(size=0.0, end=step.start)
+
+    def _pushing(self, phase: Phase) -> Push | None:
+        if phase.seated:
+            return Push("unseated" if self._pair.spring is not None else "separation", lambda step: step.foundation)
+        if phase.joint is Joint.TOUCH and not self._pair.law.soft and not self._pair.upper.massless:
+            return Push("separation", lambda step: step.contact)
+        return None
+
+    def _by_polynomial(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, str] | None:
+        f = push.force(step)
+        falling = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
+        if f[0] < 0.0:
+            # The sign at the start may be a false alarm: it is one if the ends, let go, close.
+            if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, push.event):
+                return self.no_step(step), push.event
+            step = self._pair.settled(state, step)
+        if not falling:
+            return None
+        # The polynomial tells where the force of the step vanishes; the step is repeated until it ends there.
+        last, size = step, falling[0]
+        for _ in range(_MAX_CUTS):
+            last = self._pair.attempt(state, size, step.start)
+            g = push.force(last)
+            value, slope = force.end_value(g, size), g[1] + size * g[2]
+            change = -value / slope if slope < 0.0 else 0.0
+            if not 0.0 < size + change < step.size or abs(change) <= 1e-12 * macro_step:
+                break
+            size += change
+        return last, push.event
+
+    def _by_means(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, str] | None:
+        c = push.force(step)[0]
+        if not state.middles:
+            if c < 0.0 and not state.reclosed and self._opens(state, step, push.event):
+                return self.no_step(step), push.event
+            return None
+        points = [(t, n if push.event == "unseated" else f) for t, f, n in state.middles]
+        zero = _zero_of_means([*points, (state.time + 0.5 * step.size, c)], state.time)
+        if zero is None or (zero >= step.size and _mean(points[-1][1], c) > 0.0):
+            return None
+        if zero <= self._no_time * macro_step:
+            return self.no_step(step), push.event
+        if zero >= step.size:
+            return self._pair.settled(state, step), push.event
+        return self._pair.attempt(state, zero, step.start), push.event
+
+    def _opens(self, state: State, step: Step, event: str) -> bool:
+        """Do the ends part if they are let go for the step? ("unseated": does the lower end leave the foundation?)"""
+        phase = state.phase
+        if event == "unseated":
+            assert self._pair.stop is not None
+            low = self._pair.attempt(state, step.size, step.start, Phase(phase.joint)).end[1]
+            return low.displacement > self._pair.stop
+        let_go = Phase(Joint.FREE, phase.seated and self._pair.spring is not None)
+        tip, low = self._pair.attempt(state, step.size, step.start, let_go).end
+        return tip.displacement > low.displacement
+
+
+def _mean(first: float, second: float) -> float:
+    return 0.5 * (first + second)
+
+
+def _zero_of_means(points: list[tuple[float, float]], start: float) -> float | None:
+    """Return when the force vanishes, after ``start`` [s], by the line through its last two means; ``None`` if not.
+
+    ``points`` are (middle [s], force [N]) of two or three steps, the last one that which begins at ``start``. The line
+    also tells of zeros past the last mean.
+    """
+    means = [(_mean(t0, t1), _mean(f0, f1)) for (t0, f0), (t1, f1) in itertools.pairwise(points)]
+    time, mean = means[-1]
+    if len(means) == 2:
+        before, higher = means[0]
+        if mean <= 0.0 < higher:
+            return before + (time - before) * higher / (higher - mean) - start
+        if higher > mean > 0.0:
+            return time + (time - before) * mean / (higher - mean) - start
+        return 0.0 if mean <= 0.0 else None
+    return 0.0 if mean <= 0.0 and points[-1][1] < 0.0 else None
