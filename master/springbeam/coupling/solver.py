@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import inf
 from operator import add, sub
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -34,11 +34,9 @@ _STAGNATES = 0.3
 SIZES_REMEMBERED = 64
 
 
-class Descent(NamedTuple):
-    """How corrections follow from residuals against one kind of lower body."""
-
-    matrix: Matrix  #: D = −(B − S)⁻¹ [N/m]
-    measured: bool  #: whether S was measured; if not, it is that of a free mass, followed by Broyden's updates
+#: How corrections follow from residuals against one kind of lower body: D = −(B − S)⁻¹ [N/m], and whether S was
+#: measured; if not, it is that of a free mass, followed by Broyden's updates.
+Descent = tuple[Matrix, bool]
 
 
 @dataclass
@@ -51,6 +49,8 @@ class _Response:
 
 class _Enough:
     """Up to which residual [m] the conditions count as met."""
+
+    __slots__ = ("_expected", "_noise", "_tolerance", "_unseen", "residual")
 
     def __init__(self, rounding: float, expected: float) -> None:
         self._tolerance = self.residual = rounding
@@ -100,17 +100,11 @@ class StepSolver(Coupling):
         return self._corrections
 
     def save(self) -> dict[str, Any]:
-        sizes = {
-            size: (known.B, {k: tuple(d) for k, d in known.descents.items()}) for size, known in self._sizes.items()
-        }
-        return {**super().save(), "_sizes": sizes}
+        return {**super().save(), "_sizes": {size: (known.B, known.descents) for size, known in self._sizes.items()}}
 
     def restore(self, saved: dict[str, Any]) -> None:
         super().restore(saved)
-        self._sizes = {
-            size: _Response(B, {kind: Descent(*d) for kind, d in descents.items()})
-            for size, (B, descents) in saved["_sizes"].items()
-        }
+        self._sizes = {size: _Response(*known) for size, known in saved["_sizes"].items()}
 
     def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> tuple[Vector, Vector] | None:
         """Return what the conditions should be, and the coefficients that would make them so; ``None``: zero.
@@ -209,7 +203,7 @@ class StepSolver(Coupling):
         self._last_size = size
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
         self._reach = max(self._reach, abs(upper_end.displacement), abs(lower_end.displacement))
-        known.descents[kind] = Descent(descent, measured)
+        known.descents[kind] = (descent, measured)
         return acting
 
     def _remember(self, size: float, known: _Response) -> None:

@@ -39,7 +39,7 @@ class Rows(Memory):
     def write(self, state: State) -> None:
         """The row of the present state. Raises NonFiniteValue."""
         pair, time, phase = self._pair, state.time, state.phase
-        (u, v, _, _), (y, z, _, _) = pair.ends()
+        (u, v, _, _), (y, z, _, _) = ends = pair.ends()
         joined = phase.joint is not Joint.FREE
         contact = state.contact[0]
         smoothed = state.smoothed if joined else contact
@@ -53,7 +53,7 @@ class Rows(Memory):
                 reaction = contact - inside
         self.largest_speed = max(self.largest_speed, abs(v), abs(z))
         forces = (contact, smoothed, inside, reaction, state.foundation[0])
-        row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *self._ledger.book(*pair.energies()))
+        row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *self._ledger.book(*pair.energies(ends)))
         self._recorder.row(self._present(row))
         if pair.beam is not None:
             early = joined and self._shapes_left > 0

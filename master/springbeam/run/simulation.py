@@ -101,6 +101,7 @@ class Simulation(Memory):
         )
         self._ledger = Ledger()
         self._energy_warns, self._energy_stops = bounds(scene)
+        self._numerically_damped = scene.beam is not None and scene.beam.damped_numerically
         self._rows = Rows(scene, self._pair, self._ledger, recorder, start_time)
         self._begun = False
         self._last_opening = -float("inf")
@@ -223,7 +224,7 @@ class Simulation(Memory):
             return
         pair.mark()
         # The bodies are recorded as they arrive: the ledger starts before the impact.
-        self._ledger.book(*pair.energies())
+        self._ledger.book(*pair.energies(start))
         at_start = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
         self._act("impact" if pair.joinable else "stop_impact", at_start)
 
@@ -285,11 +286,6 @@ class Simulation(Memory):
                 f"coupling.feedback_tolerance = {allowed:g}. Take 'two_way', or allow more",
                 self._state.time,
             )
-
-    @property
-    def _numerically_damped(self) -> bool:
-        beam = self._scene.beam
-        return beam is not None and beam.damped_numerically
 
     def _energy_cause(self) -> str:
         coupling, beam = self._scene.coupling, self._scene.beam

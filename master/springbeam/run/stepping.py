@@ -84,12 +84,15 @@ class Pair(Memory):
         self.upper: Body = beam or _ABSENT
         self.lower: Body = spring or self._held or _ABSENT
         self._bodies: list[Body] = [body for body in (beam, spring) if body is not None]
+        #: Where the ends are; looked up once, since every step asks a few times.
+        self._tip, self._low = self.upper.motion, self.lower.motion
         self._last: Step | None = None  #: at whose end the bodies are
         #: Whether tip and spring top can be joined.
         self.joinable = beam is not None and spring is not None
         #: Between tip and spring top; a tip alone is tied to the foundation while it rests there.
         self.law = law_of(scene.contact) if self.joinable else Transmission()
-        self._alone, self._joined = Uncoupled(), coupling_of(scene, self.law)
+        self._joined = coupling_of(scene, self.law)
+        self._apart = self._joined if self.law.soft else Uncoupled()
 
     @property
     def opens_softly(self) -> bool:
@@ -103,7 +106,7 @@ class Pair(Memory):
 
     def coupling(self, phase: Phase) -> Coupling:
         """What couples the bodies in ``phase``: a soft law acts wherever the ends are."""
-        return self._joined if self.law.soft or phase.joint is not Joint.FREE else self._alone
+        return self._apart if phase.joint is Joint.FREE else self._joined
 
     @property
     def joined(self) -> Coupling:
@@ -134,7 +137,7 @@ class Pair(Memory):
         window = Window(state.time, size, start)
         contact = self.coupling(phase).solve(self.upper, partner, window, state.guess(size))
         foundation = self._held_down(state.time, size, contact) if phase.seated else NO_FORCE
-        self._last = step = Step(state.time, size, contact, foundation, start, self.ends())
+        self._last = step = Step(state.time, size, contact, foundation, start, (self._tip(), self._low()))
         return step
 
     def _held_down(self, time: float, size: float, contact: Force) -> Force:
@@ -168,11 +171,11 @@ class Pair(Memory):
 
     def ends(self) -> Ends:
         """(tip, lower end); the one that is missing is at rest at 0."""
-        return self.upper.motion(), self.lower.motion()
+        return self._tip(), self._low()
 
-    def energies(self) -> tuple[Energies, Energies, Booking]:
-        """Energies of the beam, of the spring and of what couples them [J]."""
-        return self.upper.energies(), self.lower.energies(), self._joined.booking(self.ends())
+    def energies(self, ends: Ends) -> tuple[Energies, Energies, Booking]:
+        """Energies of the beam, of the spring and of what couples them [J], where the ends are."""
+        return self.upper.energies(), self.lower.energies(), self._joined.booking(ends)
 
     def end_force(self, state: State, step: Step) -> float:
         """C at the end of the step as well as the degree tells; exactly, where the tip has no mass [N]."""
