@@ -14,8 +14,13 @@ from typer.testing import CliRunner
 from springbeam.cli import app
 from springbeam.monolithic import event_driven
 from springbeam.results.recording import MemoryRecorder, load_trajectory
-from springbeam.run.runner import run, simulate
-from springbeam.scene import SceneError, scene_from_dict
+from springbeam.run.runner import run
+from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
+from springbeam.studies.accuracy import simulate
+from springbeam.studies.crosscheck import crosscheck, orders
+from springbeam.studies.stability.predict import predict
+from springbeam.studies.sweep import row
+from springbeam.studies.tradeoff import study
 
 _PROMISE = importlib.util.spec_from_file_location("promise", Path(__file__).parents[2] / "docs" / "promise.py")
 promise = sys.modules["promise"] = importlib.util.module_from_spec(_PROMISE)
@@ -123,10 +128,90 @@ def test_an_impossible_accuracy_is_refused(value):
         scene_from_dict({**WITH_STOP, "accuracy": value})
 
 
-def test_a_run_wants_it_picked():
-    scene = scene_from_dict({**WITH_STOP, "accuracy": 1e-3})
-    with pytest.raises(SceneError, match="not yet picked"):
-        run(scene, MemoryRecorder(scene))
+# -- a scene that asks for an accuracy, in the studies ---------------------------------------------------------------
+
+ASKING = """accuracy = 1e-4
+[time]
+t_end = 0.05
+[beam]
+young_modulus = 100.0
+shear_modulus = 100.0
+n_elements = 6
+initial_velocity_slope = -1.0
+[spring]
+linear_stiffness = 3.0
+"""
+
+
+@pytest.fixture
+def asking(tmp_path):
+    path = tmp_path / "asking.toml"
+    path.write_text(ASKING)
+    return path
+
+
+@pytest.mark.parametrize("study_of", [crosscheck, orders, lambda scene: run(scene, MemoryRecorder(scene))])
+def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked(study_of, asking):
+    with pytest.raises(SceneError, match=r"accuracy = 0\.0001"):
+        study_of(load_scene(asking))
+
+
+def test_crosscheck_compares_the_scene_that_was_picked(asking):
+    picked = simulate(load_scene(asking)).scene
+    result = CliRunner().invoke(app, ["crosscheck", str(asking), "--json"])
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert found["scene"] == json.loads(json.dumps(picked.model_dump(exclude_none=True)))
+    assert found["horizon"] == 0.05
+    assert "accuracy 0.0001 asked: hermite 2, H = " in CliRunner().invoke(app, ["crosscheck", str(asking)]).stdout
+
+
+def test_orders_are_those_of_the_scheme_that_was_picked(asking):
+    """`hermite` 2 has order 6 in the displacement, until rounding and IDA's looser tolerance take over."""
+    result = CliRunner().invoke(app, ["crosscheck", str(asking), "--orders", "--json"])
+    (tip,) = [row for row in json.loads(result.stdout)["orders"] if row["quantity"] == "u_tip"]
+    assert 4.5 <= tip["orders"][0] <= 7.0
+
+
+def test_crosscheck_refuses_an_accuracy_that_tolerances_keep(asking):
+    asking.write_text(ASKING + '[contact]\nlaw = "compliance"\n')
+    result = CliRunner().invoke(app, ["crosscheck", str(asking)])
+    assert result.exit_code == 2
+    assert "crosscheck needs a macro step" in result.stderr
+
+
+def test_each_run_of_a_sweep_picks_its_own():
+    scene = scene_from_dict({**STIFF_ON_SOFT, "accuracy": 1e-3})
+    found = row(scene, (), (), ("y_min", "macro_steps"))
+    expected = simulate(scene)
+    assert found["status"] == "done"
+    assert (found["y_min"], found["macro_steps"]) == (expected.y.min(), expected.summary["macro_steps"])
+
+
+def test_tradeoff_leaves_the_accuracy_out_and_says_so(asking):
+    """Each configuration once had the name of one and the settings that were picked."""
+    found = study(load_scene(asking), repeats=1)
+    assert any("accuracy = 0.0001 is left out" in note for note in found.notes)
+    calls = {p.configuration.setting: p.macro_steps for p in found.points if p.configuration.family == "energy 0"}
+    assert len(set(calls.values())) == len(calls) == 4
+
+
+def test_a_prediction_says_that_the_accuracy_picks_otherwise(asking):
+    assert any("accuracy = 0.0001 picks" in note for note in predict(load_scene(asking)).notes)
+
+
+@pytest.mark.parametrize("key", ["scheme", "degree", "macro_step", "relative_tolerance", "tolerance"])
+def test_what_it_picks_cannot_be_given_beside_it(key, asking):
+    value = {"scheme": "hermite", "degree": 1}.get(key, 1e-3)
+    scene = load_scene(asking)
+    with pytest.raises(SceneError, match=rf"\[coupling\] {key}: accuracy = 0\.0001 picks"):
+        with_changes(scene, coupling={key: value})
+    changed = with_changes(scene, accuracy=None, coupling={"degree": 1, key: value})
+    assert (changed.accuracy, getattr(changed.coupling, key)) == (None, value)
+    for arguments in ([str(asking)], ["soft", "--accuracy", "1e-4"]):
+        result = CliRunner().invoke(app, ["run", *arguments, "--set", f"coupling.{key}={value}"])
+        assert result.exit_code == 2
+        assert f"--set coupling.{key}={value}: accuracy = 0.0001 picks" in result.stderr
 
 
 def test_command(tmp_path):

@@ -89,6 +89,11 @@ def test_the_product_has_the_last_axis_fastest():
     assert design(axes, 0, 0, "random") == [(1, 0.0), (1, 0.1), (1, 0.2), (2, 0.0), (2, 0.1), (2, 0.2)]
 
 
+def test_what_the_accuracy_picks_cannot_be_varied():
+    with pytest.raises(SceneError, match=r"--vary coupling\.degree: accuracy = 0\.001 picks"):
+        planned("coupling.degree=0,1", scene=with_changes(small(), accuracy=1e-3))
+
+
 def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
     axes = [parse_axis("spring.mass=1:1000:log"), parse_axis("spring.damping=0:1"), parse_axis("beam.n_elements=1,2,4")]
     values = design(axes, 30, 7, "latin_hypercube")

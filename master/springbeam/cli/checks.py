@@ -24,6 +24,7 @@ from .common import (
     fail,
     print_json,
 )
+from .run import picked, picked_in_words
 
 if TYPE_CHECKING:
     from ..studies.crosscheck import OrderRow, Report
@@ -53,6 +54,12 @@ def crosscheck(
     console = console_for(silent=as_json)
     with bad_input_reported():
         what = load_scene(scene, settings or ())
+        made = picked(what)
+        if made is not None:
+            what, how = made.scene, picked_in_words(made.summary["accuracy"])
+            console.print(Text(f"accuracy {how}"))
+            if what.coupling.adaptive:
+                fail(BAD_INPUT, f"accuracy {how}; crosscheck needs a macro step: take accuracy out of {scene}")
         try:
             if with_orders:
                 found = orders(what)

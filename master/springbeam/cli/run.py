@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Mapping
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from time import monotonic
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -27,7 +28,7 @@ from ..results.recording import (
 )
 from ..results.trajectory import Event, Trajectory, rounded
 from ..run.checkpoint import Checkpoint
-from ..scene import Scene, load_scene, scene_from_dict
+from ..scene import Scene, load_scene
 from .common import (
     BAD_INPUT,
     STOPPED,
@@ -84,19 +85,17 @@ def run(
     Example: springbeam run soft --set coupling.macro_step=5e-4 --out results/fine
     """
     with bad_input_reported():
-        what = load_scene(scene, settings or ())
-        if accuracy is not None:
-            if not 0.0 < accuracy < 1.0:
-                fail(BAD_INPUT, f"--accuracy {accuracy:g}: must be between 0 and 1, as in --accuracy 1e-4")
-            what = scene_from_dict({**what.model_dump(exclude_none=True), "accuracy": accuracy}, source=scene)
-        made = _picked(what)
+        if accuracy is not None and not 0.0 < accuracy < 1.0:
+            fail(BAD_INPUT, f"--accuracy {accuracy:g}: must be between 0 and 1, as in --accuracy 1e-4")
+        what = load_scene(scene, settings or (), accuracy)
+        made = picked(what)
         what = what if made is None else made.scene
         directory = _run_directory(scene, out, force)
     carry_out(what, directory, seconds=checkpoint, no_plots=no_plots, quiet=quiet, as_json=as_json, made=made)
 
 
-def _picked(scene: Scene) -> Trajectory | None:
-    """The run that keeps the accuracy asked for, if any is."""
+def picked(scene: Scene) -> Trajectory | None:
+    """Return the run that keeps the accuracy asked for, ``None`` if none is."""
     if scene.accuracy is None:
         return None
     from ..run.outcome import RunStopped
@@ -281,20 +280,22 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}")
     if "accuracy" in summary:
         found = summary["accuracy"]
-        picked = found["picked"]
-        how = (
-            f"H = {picked['macro_step']:.3g} s"
-            if "macro_step" in picked
-            else f"tolerance {picked['relative_tolerance']:.3g}"
-        )
         console.print(
-            f"accuracy  {found['asked']:g} asked: {picked['scheme']} {picked['degree']}, {how}\n"
+            f"accuracy  {picked_in_words(found)}\n"
             f"          errors {found['estimated_displacement_error']:.1e} (displacement), "
             f"{found['estimated_event_error']:.1e} (times of {found['events_compared']} events)"
         )
     for warning in summary.get("warnings", ()):
         console.print(Text(f"warning   {warning}"))
     console.print(Text(f"results   {directory.path}"), soft_wrap=True)
+
+
+def picked_in_words(accuracy: Mapping[str, Any]) -> str:
+    """Return what was asked for and what was picked, from ``accuracy`` of a summary."""
+    found = accuracy["picked"]
+    step = "macro_step" in found
+    how = f"H = {found['macro_step']:.3g} s" if step else f"tolerance {found['relative_tolerance']:.3g}"
+    return f"{accuracy['asked']:g} asked: {found['scheme']} {found['degree']}, {how}"
 
 
 def _event_table(first: list[Event], last: list[Event], between: int, scene: Scene) -> Table:

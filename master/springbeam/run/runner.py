@@ -61,7 +61,10 @@ def run(
         If the results do not belong to ``start``, or another process is writing them.
     """
     if scene.accuracy is not None:
-        raise SceneError("accuracy: not yet picked for; springbeam.studies.accuracy.pick gives the scene that keeps it")
+        raise SceneError(
+            f"accuracy = {scene.accuracy:g}: the settings that keep it are not picked yet; run "
+            "springbeam.studies.accuracy.pick(scene).scene, or take accuracy out"
+        )
     began = perf_counter()
     before = 0.0 if start is None else start.wall_time
     after_step = progress

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from .messages import explain, nearest, one_line
 from .rules import impossible
 from .scene import TABLES, Scene
-from .tables import STEP_KEY, TOLERANCE_KEYS, SceneError
+from .tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS, SceneError
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -35,7 +35,7 @@ def shipped_scenes() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def load_scene(path_or_name: str | Path, overrides: Iterable[str] = ()) -> Scene:
+def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy: float | None = None) -> Scene:
     """Read and validate a scene.
 
     Parameters
@@ -44,6 +44,8 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = ()) -> Scene
         A TOML file, or the name of a shipped scene.
     overrides
         ``"table.key=value"`` strings, the value in TOML syntax (a bare word is taken as a string).
+    accuracy
+        Takes the place of the scene's own ``accuracy``, if any.
 
     Raises
     ------
@@ -66,7 +68,12 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = ()) -> Scene
         raise SceneError(f"{path}: a number in it has more digits than can be read") from error
     except RecursionError as error:
         raise SceneError(f"{path}: nested too deeply; a scene has tables with plain values in them") from error
-    changes = {_override(data, override): override for override in overrides}
+    changes = _override(data, overrides)
+    if accuracy is not None:
+        data["accuracy"] = accuracy
+    for (table, key), override in changes.items():
+        if (picked := _picked(data, table, key)) is not None:
+            raise SceneError(f"--set {override}: {picked}; leave one of the two out")
     try:
         return scene_from_dict(data, source=str(path))
     except SceneError as error:
@@ -106,20 +113,36 @@ def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
     return scene
 
 
-def with_changes(scene: Scene, **tables: Mapping[str, Any] | None) -> Scene:
-    """A validated copy with keys changed: ``with_changes(scene, coupling={"macro_step": 1e-3})``.
+def with_changes(scene: Scene, **changes: Any) -> Scene:
+    """Return a validated copy with keys changed: ``with_changes(scene, coupling={"macro_step": 1e-3})``.
 
-    ``None`` takes a table out: ``with_changes(scene, stop=None)``.
+    ``None`` takes a table out, ``with_changes(scene, stop=None)``, or the accuracy.
+
+    Raises
+    ------
+    SceneError
+        If the changed scene cannot be run, or its ``accuracy`` would overrule a change.
     """
     data = scene.model_dump(exclude_none=True)
-    for table, changes in tables.items():
-        if changes is None:
-            data[table] = None
-            continue
-        content = data.setdefault(table, {})
-        for key, value in changes.items():
-            _change(content, key, value)
-    return scene_from_dict({table: content for table, content in data.items() if content is not None})
+    for name, change in changes.items():
+        if isinstance(change, Mapping):
+            _change(data.setdefault(name, {}), change)
+        else:
+            data[name] = change
+    data = {name: content for name, content in data.items() if content is not None}
+    for table, change in changes.items():
+        for key in change if isinstance(change, Mapping) else ():
+            if (picked := _picked(data, table, key)) is not None:
+                raise SceneError(f"[{table}] {key}: {picked}; with_changes(scene, accuracy=None, …) takes it out")
+    return scene_from_dict(data)
+
+
+def _picked(data: Mapping[str, Any], table: str, key: str) -> str | None:
+    """Return why a key of ``data`` would play no part, ``None`` if it does."""
+    accuracy = data.get("accuracy")
+    if accuracy is None or key not in PICKED_BY_ACCURACY.get(table, ()):
+        return None
+    return f"accuracy = {accuracy} picks {table}.{key} itself"
 
 
 def _scene_file(path_or_name: str | Path) -> Path:
@@ -138,24 +161,30 @@ def _scene_file(path_or_name: str | Path) -> Path:
     raise SceneError(f"{path_or_name}: {what}; {nearest(path.stem, shipped)}shipped scenes: {', '.join(shipped)}")
 
 
-def _override(data: dict[str, Any], override: str) -> tuple[str, str]:
-    """Returns the table and the key that it has set."""
-    target, separator, text = override.partition("=")
-    table, dot, key = (part.strip() for part in target.partition("."))
-    if not (separator and dot and table and key):
-        raise SceneError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
-    content = data.setdefault(table, {})
-    if not isinstance(content, dict):
-        raise SceneError(f"--set {override}: {table} is not a table; tables: {', '.join(TABLES)}")
-    _change(content, key, parse_value(text.strip()))
-    return table, key
+def _override(data: dict[str, Any], overrides: Iterable[str]) -> dict[tuple[str, str], str]:
+    """Set what the overrides say, and return them by table and key; of two for one key the last counts."""
+    given: dict[tuple[str, str], str] = {}
+    values: dict[str, dict[str, Any]] = {}
+    for override in overrides:
+        target, separator, text = override.partition("=")
+        table, dot, key = (part.strip() for part in target.partition("."))
+        if not (separator and dot and table and key):
+            raise SceneError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
+        if not isinstance(data.setdefault(table, {}), dict):
+            raise SceneError(f"--set {override}: {table} is not a table; tables: {', '.join(TABLES)}")
+        given[table, key] = override
+        values.setdefault(table, {})[key] = parse_value(text.strip())
+    for table, changes in values.items():
+        _change(data[table], changes)
+    return given
 
 
-def _change(content: dict[str, Any], key: str, value: Any) -> None:
-    """Set a key of a table; a macro step takes the place of tolerances, and the other way round."""
-    for other in TOLERANCE_KEYS if key == STEP_KEY else (STEP_KEY,) if key in TOLERANCE_KEYS else ():
-        content.pop(other, None)
-    content[key] = value
+def _change(content: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Set keys of a table. A macro step takes the place of tolerances, and the other way round."""
+    for key, value in changes.items():
+        for other in TOLERANCE_KEYS if key == STEP_KEY else (STEP_KEY,) if key in TOLERANCE_KEYS else ():
+            content.pop(other, None)
+        content[key] = value
 
 
 def parse_value(text: str) -> Any:

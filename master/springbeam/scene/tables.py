@@ -147,6 +147,13 @@ class Contact(Table):
 STEP_KEY, TOLERANCE_KEYS = "macro_step", ("relative_tolerance", "absolute_tolerance")
 
 
+#: What ``accuracy`` picks, by table: it takes the place of these keys.
+PICKED_BY_ACCURACY = {
+    "coupling": ("scheme", "degree", STEP_KEY, *TOLERANCE_KEYS, "tolerance"),
+    "spring": TOLERANCE_KEYS,
+}
+
+
 #: Schemes that exchange once per macro step, as ordinary masters do.
 ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
 

@@ -23,9 +23,9 @@ from scipy.interpolate import CubicHermiteSpline
 from ..results.contact_times import apart, changes_of_contact
 from ..results.recording import MemoryRecorder
 from ..results.trajectory import Trajectory
-from ..run.outcome import RunStopped
-from ..run.runner import run
-from ..scene import Scene, SceneError, scene_from_dict, with_changes
+from ..run import runner
+from ..run.outcome import Progress, RunStopped
+from ..scene import Scene, SceneError, with_changes
 from ..scene.automatic import choice
 from ..scene.linearised import spring_frequency
 from ..scene.resolution import fastest_frequency, shear_frequency
@@ -113,8 +113,30 @@ class Picked:
         }
 
 
+def simulate(scene: Scene, progress: Progress | None = None) -> Trajectory:
+    """Co-simulate ``scene``, with settings that keep its ``accuracy`` if it asks for one, and return the trajectory.
+
+    Parameters
+    ----------
+    scene
+        What is simulated.
+    progress
+        Called with time [s], phase and number of macro steps once per accepted step; not while settings are searched.
+
+    Raises
+    ------
+    RunStopped
+        If the run ends early.
+    SceneError
+        If the accuracy cannot be reached.
+    FmuError
+        If an FMU cannot be found or loaded.
+    """
+    return runner.simulate(scene, progress) if scene.accuracy is None else pick(scene).trajectory()
+
+
 def pick(scene: Scene) -> Picked:
-    """Settings with which ``scene`` keeps its ``accuracy``, and the run with them.
+    """Return settings with which ``scene`` keeps its ``accuracy``, and the run with them.
 
     Raises
     ------
@@ -205,7 +227,7 @@ class _EqualSteps:
 
     def __init__(self, scene: Scene, accuracy: float, span: float) -> None:
         self._scene, self._accuracy, self._span = scene, accuracy, span
-        fine = with_changes(scene, coupling={"macro_step": 1e-9 * span})
+        fine = with_changes(scene, accuracy=None, coupling={"macro_step": 1e-9 * span})
         taken = choice(fine)  # of schemes, the one where everything is resolved
         self._scheme, self._degree = taken.scheme, taken.degree
 
@@ -275,7 +297,8 @@ class _Tolerances:
         return 1.0 / (_LOOSE * self._accuracy)
 
     def coupling(self, fineness: float) -> dict[str, Any]:
-        return {"scheme": "energy", "degree": 0, "relative_tolerance": 1.0 / fineness}
+        tolerances = {"relative_tolerance": 1.0 / fineness, "absolute_tolerance": None}
+        return {"scheme": "energy", "degree": 0, **tolerances}
 
     def second(self, first: _Pilot) -> float:
         return _FINER * first.fineness
@@ -305,15 +328,14 @@ class _Tolerances:
 
 class _Search:
     def __init__(self, scene: Scene, accuracy: float) -> None:
-        data = scene.model_dump(exclude={"accuracy"}, exclude_none=True)
-        self._scene, self._accuracy = scene_from_dict(data), accuracy
+        self._scene, self._accuracy = scene, accuracy
         self._span = scene.time.t_end - (scene.contact_time or 0.0)
         compliant = scene.contact.law == "compliance" and scene.coupling.feedback == "two_way"
         self._way: _Way
         if compliant and scene.spring is not None and scene.beam is not None and scene.beam.integrator == "modal":
             self._way = _Tolerances(accuracy)
         else:
-            self._way = _EqualSteps(self._scene, accuracy, self._span)
+            self._way = _EqualSteps(scene, accuracy, self._span)
         self._runs, self._calls, self._spent, self._stopped = 0, 0, 0.0, 0
 
     def run(self) -> Picked:
@@ -355,10 +377,10 @@ class _Search:
         if self._scene.spring is not None:
             tolerance = min(max(_IDA_SHARE * self._accuracy, _TIGHTEST), _LOOSEST)
             tables["spring"] = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
-        scene = with_changes(self._scene, **tables)
+        scene = with_changes(self._scene, accuracy=None, **tables)
         recorder = MemoryRecorder(scene)
         try:
-            run(scene, recorder)
+            runner.run(scene, recorder)
             self._stopped = 0
         except RunStopped:
             self._stopped += 1

@@ -71,6 +71,8 @@ def predict(scene: Scene) -> Prediction:
     """Predict the coupling of ``scene`` (no FMU is loaded)."""
     H = scene.coupling.H
     notes = []
+    if scene.accuracy is not None:
+        notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")
     modal = None
     if scene.beam is not None and scene.beam.fidelity == "quasi_static":
         notes.append("a quasi-static beam has no inertia and no step of its own: nothing to predict")

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 
 from ...bodies.fmu import FmuError
 from ...run.outcome import RunStopped
-from ...run.runner import simulate
 from ...scene import Scene, SceneError, scene_from_dict
-from .design import Axis, varied
+from ..accuracy import simulate
+from .design import Axis, compatible, varied
 from .metrics import METRICS
 
 if TYPE_CHECKING:
@@ -45,12 +45,15 @@ class SweepError(RuntimeError):
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is swept."""
+    """What is swept. Raises SceneError if some of the axes would play no part."""
 
     scene: Scene
     axes: tuple[Axis, ...]
     values: Sequence[tuple[Any, ...]]  #: of the axes, per run
     metrics: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        compatible(self.scene, self.axes)
 
     def description(self) -> dict[str, Any]:
         """What tells one sweep from another, as it goes into ``sweep.json``."""

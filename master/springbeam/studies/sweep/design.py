@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ...scene import Scene, SceneError, key_kind, parse_value, with_changes
+from ...scene.tables import PICKED_BY_ACCURACY
 
 Sampling = Literal["random", "latin_hypercube"]
 #: A mistyped count, not a sweep.
@@ -115,6 +116,17 @@ def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) ->
     else:
         unit = np.random.default_rng(seed).random((samples, len(axes)))
     return [tuple(_sampled(axis, float(x)) for axis, x in zip(axes, row, strict=True)) for row in unit]
+
+
+def compatible(scene: Scene, axes: Sequence[Axis]) -> None:
+    """Raise SceneError if an axis would play no part beside the accuracy of ``scene``."""
+    if scene.accuracy is not None:
+        for axis in axes:
+            if axis.key in PICKED_BY_ACCURACY.get(axis.table, ()):
+                raise SceneError(
+                    f"--vary {axis.name}: accuracy = {scene.accuracy:g} picks it in each run; vary something else, or "
+                    "take accuracy out of the scene"
+                )
 
 
 def _sampled(axis: Axis, fraction: float) -> Any:

@@ -142,7 +142,10 @@ def study(scene: Scene, until: float | None = None, repeats: int = 3, progress: 
     if scene.contact.law == "transmission" and scene.contact.impact == "rest" and scene.beam and scene.spring:
         raise SceneError('[contact] impact = "rest": a rigid tie has no reference there; take "inelastic" or "tip"')
     window = comparable_until(scene) if until is None else min(until, scene.time.t_end)
-    scene = with_changes(scene, time={"t_end": window})
+    notes = []
+    if scene.accuracy is not None:
+        notes.append(f"accuracy = {scene.accuracy:g} is left out: each configuration has its own scheme and steps")
+    scene = with_changes(scene, accuracy=None, time={"t_end": window})
     every = configurations(scene)
     hopeless = [c for c in every if _hopeless(c)]
     todo = [c for c in every if c not in hopeless]
@@ -167,7 +170,6 @@ def study(scene: Scene, until: float | None = None, repeats: int = 3, progress: 
             timings.setdefault(configuration, []).append((solve, setup))
             if repeat == 0 and solve > _LIMIT:
                 given_up[configuration.family] = configuration
-    notes = []
     if given_up:
         names = "; ".join(c.name for c in given_up.values())
         notes.append(f"given up after {_LIMIT:g} s, finer ones of their kind not run: {names}")
