@@ -508,6 +508,16 @@ def test_a_tolerance_takes_the_place_of_the_macro_step_and_back():
     assert not fixed.coupling.adaptive
 
 
+def test_a_step_and_a_tolerance_at_once_are_refused():
+    """The first of the two was dropped without a word."""
+    both = {"macro_step": 1e-3, "relative_tolerance": 1e-4}
+    for ordered in (both, dict(reversed(both.items()))):
+        with pytest.raises(SceneError, match=r"macro_step = 0\.001: with relative_tolerance"):
+            with_changes(load_scene("soft"), coupling=ordered)
+        with pytest.raises(SceneError, match=r"--set coupling\.macro_step=0\.001: .* with relative_tolerance"):
+            load_scene("soft", [f"coupling.{key}={value}" for key, value in ordered.items()])
+
+
 def test_without_step_and_tolerance_there_is_a_step():
     assert scene_from_dict({**load_pair(), "coupling": {}}).coupling.H == 0.004
 

@@ -89,6 +89,14 @@ def test_the_product_has_the_last_axis_fastest():
     assert design(axes, 0, 0, "random") == [(1, 0.0), (1, 0.1), (1, 0.2), (2, 0.0), (2, 0.1), (2, 0.2)]
 
 
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("tolerance", ["relative_tolerance", "absolute_tolerance"])
+def test_a_macro_step_beside_a_tolerance_is_refused_with_both_named(tolerance, order):
+    texts = ["coupling.macro_step=1e-3,2e-3", f"coupling.{tolerance}=1e-3,1e-4"]
+    with pytest.raises(SceneError, match=rf"--vary coupling\.macro_step.* --vary coupling\.{tolerance}"):
+        planned(*texts[::order])
+
+
 def test_what_the_accuracy_picks_cannot_be_varied():
     with pytest.raises(SceneError, match=r"--vary coupling\.degree: accuracy = 0\.001 picks"):
         planned("coupling.degree=0,1", scene=with_changes(small(), accuracy=1e-3))

@@ -180,11 +180,13 @@ def _override(data: dict[str, Any], overrides: Iterable[str]) -> dict[tuple[str,
 
 
 def _change(content: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Set keys of a table. A macro step takes the place of tolerances, and the other way round."""
-    for key, value in changes.items():
-        for other in TOLERANCE_KEYS if key == STEP_KEY else (STEP_KEY,) if key in TOLERANCE_KEYS else ():
+    """Set keys of a table. A macro step takes the place of tolerances, and the other way round, unless both are new."""
+    given = {key for key, value in changes.items() if value is not None}
+    stepped, adaptive = STEP_KEY in given, not given.isdisjoint(TOLERANCE_KEYS)
+    if stepped != adaptive:
+        for other in TOLERANCE_KEYS if stepped else (STEP_KEY,):
             content.pop(other, None)
-        content[key] = value
+    content.update(changes)
 
 
 def parse_value(text: str) -> Any:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ...scene import Scene, SceneError, key_kind, parse_value, with_changes
-from ...scene.tables import PICKED_BY_ACCURACY
+from ...scene.tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS
 
 Sampling = Literal["random", "latin_hypercube"]
 #: A mistyped count, not a sweep.
@@ -119,7 +119,7 @@ def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) ->
 
 
 def compatible(scene: Scene, axes: Sequence[Axis]) -> None:
-    """Raise SceneError if an axis would play no part beside the accuracy of ``scene``."""
+    """Raise SceneError if an axis would play no part beside another one, or beside the accuracy of ``scene``."""
     if scene.accuracy is not None:
         for axis in axes:
             if axis.key in PICKED_BY_ACCURACY.get(axis.table, ()):
@@ -127,6 +127,13 @@ def compatible(scene: Scene, axes: Sequence[Axis]) -> None:
                     f"--vary {axis.name}: accuracy = {scene.accuracy:g} picks it in each run; vary something else, or "
                     "take accuracy out of the scene"
                 )
+    keys = [axis.key for axis in axes if axis.table == "coupling"]
+    tolerances = [key for key in TOLERANCE_KEYS if key in keys]
+    if STEP_KEY in keys and tolerances:
+        raise SceneError(
+            f"--vary coupling.{STEP_KEY}: with --vary coupling.{tolerances[0]} the steps follow from the tolerance; "
+            "vary one of the two"
+        )
 
 
 def _sampled(axis: Axis, fraction: float) -> Any:
