@@ -253,6 +253,17 @@ def test_changed_results_are_refused_and_not_touched(interrupted, name):
     assert files(interrupted) == before
 
 
+def test_checkpoints_of_a_run_that_picks_its_accuracy_are_refused(tmp_path, monkeypatch):
+    """They were left out without a word; `springbeam resume` found none."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "asking.toml").write_text("accuracy = 1e-3\n[time]\nt_end = 0.1\n[spring]\nequilibrium = 0.1\n")
+    for arguments in (["soft", "--accuracy", "1e-3"], ["asking.toml"]):
+        result = command("run", *arguments, "--checkpoint", "0")
+        assert result.exit_code == 2
+        assert "--checkpoint 0: a run with accuracy = 0.001" in result.stderr
+        assert not (tmp_path / "results").exists()
+
+
 def test_checkpoints_need_a_directory():
     with pytest.raises(TypeError, match="directory"):
         runner.run(SCENE, MemoryRecorder(SCENE), seconds=1.0)

@@ -72,7 +72,7 @@ def run(
             "--checkpoint",
             metavar="SECONDS",
             min=0.0,
-            help="Every so many seconds save what springbeam resume needs, should the run be killed.",
+            help="Every so many seconds save what springbeam resume needs, should the run be killed. Not with an accuracy.",
         ),
     ] = None,
     no_plots: NoPlotsOption = False,
@@ -88,6 +88,12 @@ def run(
         if accuracy is not None and not 0.0 < accuracy < 1.0:
             fail(BAD_INPUT, f"--accuracy {accuracy:g}: must be between 0 and 1, as in --accuracy 1e-4")
         what = load_scene(scene, settings or (), accuracy)
+        if checkpoint is not None and what.accuracy is not None:
+            fail(
+                BAD_INPUT,
+                f"--checkpoint {checkpoint:g}: a run with accuracy = {what.accuracy:g} is written when it is done, and "
+                "has nothing to resume before; leave one of the two out",
+            )
         made = picked(what)
         what = what if made is None else made.scene
         directory = _run_directory(scene, out, force)
