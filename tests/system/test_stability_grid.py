@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -15,8 +17,9 @@ from springbeam.cli import app
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.ledger import APPROXIMATE, EXACT, bounds
 from springbeam.run.simulation import Simulation
+from springbeam.scene import Coupling, SceneError
 from springbeam.studies.stability import grid
-from springbeam.studies.stability.cells import AXES, SLICES, sampled_cells, scene_dict, slice_cells
+from springbeam.studies.stability.cells import AXES, COUPLINGS, SLICES, sampled_cells, scene_dict, slice_cells
 from springbeam.studies.stability.grid import CLASSES, Outcome, judged, run_cell, run_cells, write_csv
 
 SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro_step": 2e-3}}
@@ -47,6 +50,29 @@ def test_energy_kept_is_conserved_or_dissipative_by_what_was_lost():
     assert judged(run).kind == "dissipative"  # the impact takes 4e-2 of it
     assert judged(changed(run, e_impact_loss=0.0 * run.time)).kind == "conserved"
     assert judged(run).residual < EXACT
+
+
+@pytest.mark.parametrize("law", ["transmission", "compliance"])
+def test_the_cells_have_every_scheme_that_a_law_takes(law):
+    """`auto` was missing."""
+    contact = {"law": law, "exponent": 1.0}
+    taken = set()
+    for scheme in get_args(Coupling.model_fields["scheme"].annotation):
+        for degree in range(3):
+            with suppress(SceneError):
+                with_changes(load_scene("soft"), contact=contact, coupling={"scheme": scheme, "degree": degree})
+                taken.add((law, scheme, degree))
+    assert {coupling for coupling in COUPLINGS if coupling[0] == law} == taken
+
+
+def test_what_auto_takes_decides_how_it_is_judged():
+    """`hermite` 2 changes the energy by its own error, `energy` 0 does not."""
+    for run, taken in ((done("auto"), "hermite"), (done("auto", integrator="generalized_alpha"), "energy")):
+        assert run.summary["coupling"]["scheme"] == taken
+        off = changed(run, (), energy_residual=residual(run, 10.0 * EXACT))
+        assert judged(off).kind == ("approximate" if taken == "hermite" else "garbage")
+    damped = done("auto", integrator="generalized_alpha", rho_inf=0.5)
+    assert judged(changed(damped, (), energy_residual=residual(damped, -0.5))).kind == "dissipative"
 
 
 @pytest.mark.parametrize("scheme", ["energy", "hermite"])

@@ -72,7 +72,7 @@ def run(
             "--checkpoint",
             metavar="SECONDS",
             min=0.0,
-            help="Every so many seconds save what springbeam resume needs, should the run be killed. Not with an accuracy.",
+            help="Save every so many seconds what springbeam resume needs. Not beside an accuracy.",
         ),
     ] = None,
     no_plots: NoPlotsOption = False,

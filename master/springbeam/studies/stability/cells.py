@@ -42,12 +42,13 @@ class Axis:
         return float(self.low * (self.high / self.low) ** x)
 
 
-#: law, scheme, degree: every pair that a scene may ask for.
+#: law, scheme, degree: all that a scene may ask for; Algorithm 1 has no scheme.
 COUPLINGS = (
     *(("transmission", scheme, degree)
-      for scheme, degree in (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2))),
+      for scheme, degree in (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2), ("auto", 0))),
     *(("compliance", scheme, degree)
-      for scheme, degree in (("energy", 0), ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1))),
+      for scheme, degree in (("energy", 0), ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1),
+                             ("auto", 0))),
     ("paper", "energy", 0),
 )  # fmt: skip
 

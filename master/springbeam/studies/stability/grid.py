@@ -34,7 +34,8 @@ from ...results.trajectory import Trajectory
 from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
 from ...run.runner import run
-from ...scene import SceneError, scene_from_dict
+from ...scene import Scene, SceneError, scene_from_dict
+from ...scene.automatic import decided
 from .cells import AXES, scene_dict
 
 #: In the order in which pictures and tables show them; the last must stay empty.
@@ -108,12 +109,13 @@ def judged(run: Trajectory, cause: str = "") -> Outcome:
     if faults := list(_faults(run, outcome, scale)):
         outcome.kind, outcome.reason = "garbage", "; ".join(faults)
         return outcome
-    bound, _ = bounds(run.scene)
+    scene, _ = decided(run.scene)
+    bound, _ = bounds(scene)
     said = [text for text in summary["warnings"] if "energy" in text]
     lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
     if outcome.residual <= EXACT:
         outcome.kind = "dissipative" if lost > EXACT * scale[-1] else "conserved"
-    elif _only_damped_numerically(run) and relative.max() <= EXACT:
+    elif _only_damped_numerically(scene) and relative.max() <= EXACT:
         outcome.kind = "dissipative"
     elif outcome.residual <= bound or said:
         outcome.kind, outcome.reason = "approximate", "; ".join(said)
@@ -122,8 +124,8 @@ def judged(run: Trajectory, cause: str = "") -> Outcome:
     return outcome
 
 
-def _only_damped_numerically(run: Trajectory) -> bool:
-    beam, scheme, law = run.scene.beam, run.scene.coupling.scheme, run.scene.contact.law
+def _only_damped_numerically(scene: Scene) -> bool:
+    beam, scheme, law = scene.beam, scene.coupling.scheme, scene.contact.law
     return beam is not None and beam.damped_numerically and scheme == "energy" and law != "paper"
 
 
