@@ -64,7 +64,8 @@ def simulate(
     y_temp: YTemp = "equation",
     tolerance: float = 1e-12,
 ) -> Trajectory:
-    """Run Algorithm 1 with h_t = ``coupling.macro_step`` on a scene with beam and spring.
+    """Run Algorithm 1 with h_t = ``coupling.macro_step`` on a scene with beam and spring, and a shorter last step to
+    ``time.t_end`` where that is off the grid.
 
     Parameters
     ----------
@@ -108,17 +109,22 @@ class _Algorithm:
         assert scene.spring is not None
         self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
         self.start_velocity, self.y_temp, self.tolerance = start_velocity, y_temp, tolerance
-        self.h = scene.coupling.H
         self.discrete: SemiDiscreteBeam = assemble(scene.beam)
-        d, h, alpha = self.discrete, self.h, scene.beam.alpha_b
+        d = self.discrete
         self.load = scene.beam.distributed_load * d.uniform_load + scene.beam.tip_load_coefficient * d.hat_load
+        self._set_step(scene.coupling.H)
+        self.phi = -np.inf if scene.stop is None else scene.stop.position
+        self.iterations: dict[str, list[int]] = {"beam": [], "predicted": [], "joined": []}
+
+    def _set_step(self, h: float) -> None:
+        """Factorise (62) for steps of ``h`` [s]."""
+        d, alpha = self.discrete, self.beam.alpha_b
+        self.h = h
         self.B = (4.0 * d.M + (2.0 * alpha * h - h**2) * d.K).tocsr()
         self.A = (4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()
         self.solve: Callable[[np.ndarray], np.ndarray] = spla.splu(self.A).solve
         #: A⁻¹e: how (62) answers to a force at the tip.
         self.tip_response = self.solve(d.tip_vector)
-        self.phi = -np.inf if scene.stop is None else scene.stop.position
-        self.iterations: dict[str, list[int]] = {"beam": [], "predicted": [], "joined": []}
 
     # Laws -----------------------------------------------------------------------------------------------------------
 
@@ -198,11 +204,14 @@ class _Algorithm:
             z = self._velocity_at_contact(v)
         self._record(q, v, y, z, "tied" if touched else "free", 0.0, 0.0, 0.0, 0)
         stiffness = self.scene.contact.stiffness if touched else 0.0
-        steps = int(np.floor((self.scene.time.t_end - self.time) / self.h * (1.0 + 1e-12)))
+        whole, rest = self.scene.equal_steps
+        steps = whole + (rest > 0.0)
         begin, began = self.time, clock.perf_counter()
         self._events = [self._first_contact(q, v, y, z)] if touched else []
         for step in range(1, steps + 1):
-            self.time = begin + step * self.h
+            if step > whole:
+                self._set_step(rest)
+            self.time = begin + step * self.h if step <= whole else self.scene.time.t_end
             if touched:
                 try:
                     q, v, y, z, stiffness = self._contact_step(q, v, y, z, stiffness)

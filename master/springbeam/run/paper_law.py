@@ -3,7 +3,8 @@
 The beam FMU steps by ``generalized_alpha`` with ρ∞ = 1, which is (62); the spring's midpoint rule (53) is replaced by
 IDA over the step, restarted by its exact start values wherever the algorithm overwrites y or z. The tip is moved to y
 (lines 18, 21) by the constant tip force that does so; nothing opposes that force, so its work is energy from nowhere,
-and ``energy_residual`` shows it. Readings where the print leaves something open: ``docs/paper.md``.
+and ``energy_residual`` shows it. Readings where the print leaves something open: ``docs/paper.md``. Steps are of
+``coupling.macro_step``; where ``time.t_end`` is off their grid the last one is shorter.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ class PaperLaw(Memory):
         "_beam",
         "_spring",
         "time",
+        "h",
         "_begun",
         "_touched",
         "_stiffness",
@@ -77,13 +79,18 @@ class PaperLaw(Memory):
         """Until t_end. Raises RunStopped; what was computed is with the recorder."""
         t0, t_end = self._start_time, self.scene.time.t_end
         psi = self._parameters.equilibrium
+        whole, rest = self.scene.equal_steps
         try:
             if not self._begun:
                 self._begin()
-            while t0 + (self._steps + 1) * self.h <= t_end * (1.0 + 1e-12):
+            while self._steps < whole + (rest > 0.0):
+                last = self._steps == whole
+                if last:
+                    self.h = rest
+                    self._measure_beam()
                 phase, contact, inside, foundation = self._step()
                 self._steps += 1
-                self.time = t0 + self._steps * self.h
+                self.time = t_end if last else t0 + self._steps * self.h
                 if phase == "seated":
                     self._event("stop_impact", impulse_foundation=self.h * foundation)
                 if not self._touched and self._beam.motion().displacement <= psi:

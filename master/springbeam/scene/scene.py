@@ -10,6 +10,10 @@ from pydantic import Field
 from .statics import tip_compliance, tip_load_deflection
 from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time
 
+#: Remainders of the macro grid, as fractions of H: shorter than the first is rounding; shorter than the second, a step
+#: would drown in rounding.
+_SAME, _SHORTEST = 1e-9, 1e-6
+
 
 class Scene(Table):
     """The tables of a scene; ``beam``, ``spring`` and ``stop`` are ``None`` where the scene does not have them.
@@ -82,6 +86,19 @@ class Scene(Table):
         if clearance == 0.0 and velocity <= 0.0:
             return 0.0
         return -clearance / velocity if clearance > 0.0 > velocity else math.inf
+
+    @property
+    def equal_steps(self) -> tuple[int, float]:
+        """Number of whole macro steps up to t_end, and the size of a last, shorter one [s], 0 if there is none.
+
+        A remainder that is next to nothing joins the step before it.
+        """
+        H, span = self.coupling.H, self.time.t_end - (self.contact_time or 0.0)
+        whole = math.floor(span / H * (1.0 + 1e-12))
+        rest = span - whole * H
+        if rest <= _SAME * H:
+            return whole, 0.0
+        return (whole, rest) if rest >= _SHORTEST * H or whole == 0 else (whole - 1, rest + H)
 
 
 #: The tables by their names in a file.
