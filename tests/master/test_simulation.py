@@ -236,6 +236,20 @@ def test_a_value_that_is_not_finite_stops_the_run():
     assert np.isfinite(stopped.e_total).all()
 
 
+@pytest.mark.parametrize("start", [0.0, 0.95, 1.0])
+def test_shapes_are_kept_evenly_from_the_start_of_the_run(start):
+    """400 of them, and those of 20 steps after first contact: where that was at 0.95 of 1 s, 39 were left."""
+    scene, length = soft(beam={"initial_deflection_slope": start}, stop=None, time={"t_end": 1.0}), 1.0 - start
+    run = simulate(with_changes(scene, coupling={"macro_step": length / 800 or 1e-3}))
+    times = run.shapes[0]
+    assert times[0] == start
+    if length == 0.0:
+        assert len(times) == len(run) > 0
+        return
+    assert 400 <= len(times) <= 421
+    assert np.diff([*times, 1.0]).max() <= (1 / 400 + 1 / 800) * length * (1.0 + 1e-9)
+
+
 # -- the ledger -----------------------------------------------------------------------------------------------------
 
 

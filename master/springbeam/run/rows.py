@@ -30,7 +30,8 @@ class Rows(Memory):
         self._equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
         #: Of the two forces that the paper adds up, the one inside a rigid contact.
         self._inside = Compliance(scene.contact.stiffness, scene.contact.exponent)
-        self._shape_every = scene.time.t_end / _SHAPES_OVER_RUN
+        length = scene.time.t_end - start_time or 1.0  # 0 where contact is at t_end: the one shape is that of the start
+        self._shape_every = length / _SHAPES_OVER_RUN
         #: The columns of the scene, out of all.
         self._present = itemgetter(*(COLUMNS.index(name) for name in recorder.columns))
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
