@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from operator import itemgetter
 
 from ..bodies.memory import Memory
@@ -16,12 +17,19 @@ from .stepping import Pair, State
 
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
+#: Largest value of a column that the motion does not depend on [N]; pictures multiply two of them.
+_MOST_SHOWN = 1e150
+#: Warning of a run that has reached it.
+NOT_SHOWN = (
+    f"compliance_force is larger than {_MOST_SHOWN:g} N at times and is written as that, tie_reaction with it; "
+    "the motion does not depend on either. A smaller contact.stiffness or contact.exponent keeps them in range"
+)
 
 
 class Rows(Memory):
     """Writes rows and shapes of a pair into a recorder, and keeps their extremes."""
 
-    REMEMBERED = ("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed")
+    REMEMBERED = ("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed", "not_shown")
 
     def __init__(self, scene: Scene, pair: Pair, ledger: Ledger, recorder: Recorder, start_time: float) -> None:
         self._pair, self._ledger, self._recorder = pair, ledger, recorder
@@ -36,6 +44,7 @@ class Rows(Memory):
         self._present = itemgetter(*(COLUMNS.index(name) for name in recorder.columns))
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
         self.largest_speed = 0.0  #: of tip and lower end [m/s]
+        self.not_shown = False  #: whether a compliance force was too large for its column
 
     def write(self, state: State) -> None:
         """The row of the present state. Raises NonFiniteValue."""
@@ -50,7 +59,7 @@ class Rows(Memory):
         else:
             self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
             if pair.joinable:
-                inside = self._inside.force(self._equilibrium - u)
+                inside = self._diagnostic(self._equilibrium - u)
                 reaction = contact - inside
         self.largest_speed = max(self.largest_speed, abs(v), abs(z))
         forces = (contact, smoothed, inside, reaction, state.foundation[0])
@@ -60,6 +69,15 @@ class Rows(Memory):
             early = joined and self._shapes_left > 0
             if early or time >= self._next_shape:
                 self._shape(pair.beam, time, early)
+
+    def _diagnostic(self, p: float) -> float:
+        """Return the normal-compliance part of a tied contact [N] at a penetration ``p`` [m]; it drives nothing."""
+        try:
+            force = self._inside.force(p)
+        except OverflowError:
+            force = inf
+        self.not_shown |= force > _MOST_SHOWN
+        return min(force, _MOST_SHOWN)
 
     def _shape(self, beam: BeamBody, time: float, early: bool) -> None:
         self._shapes_left -= early

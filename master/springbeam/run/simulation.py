@@ -25,7 +25,7 @@ from .ledger import Ledger, bounds
 from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .outcome import OVERFLOW, Progress, RunStopped
-from .rows import Rows
+from .rows import NOT_SHOWN, Rows
 from .stepping import Pair, State
 
 #: A step that is refused is halved this often before the run stops.
@@ -314,6 +314,8 @@ class Simulation(Memory):
         unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed)
         if unresolved is not None:
             warnings.append(unresolved)
+        if rows.not_shown:
+            warnings.append(NOT_SHOWN)
         left_out = self._pair.joined.neglected()
         neglected = {} if left_out is None else {"neglected_motion": left_out.motion, "neglected_share": left_out.share}
         coupling = {} if self._choice is None else {"coupling": self._choice._asdict()}
