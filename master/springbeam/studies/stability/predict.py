@@ -27,7 +27,7 @@ _UNMOVED = 1e-12
 #: ωH up to which a mode is called resolved: 2π steps a period.
 RESOLVED = 1.0
 #: The search for a critical macro step begins here, in units of 1/(highest frequency), and goes up by these factors.
-_SEARCH = {"hermite": (2.5, 1.03), "jacobi": (1e-3, 2.0), "gauss_seidel": (1e-3, 2.0)}
+_SEARCH = {"hermite": (STABLE / 1.2, 1.03), "jacobi": (1e-3, 2.0), "gauss_seidel": (1e-3, 2.0)}
 
 #: (scheme, degree) that a law can be coupled by.
 SCHEMES = {
