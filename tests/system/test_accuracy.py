@@ -128,6 +128,32 @@ def test_an_impossible_accuracy_is_refused(value):
         scene_from_dict({**WITH_STOP, "accuracy": value})
 
 
+@pytest.mark.parametrize("law", ["transmission", "compliance"])
+def test_a_run_may_be_shorter_than_the_default_macro_step(law, tmp_path):
+    """4 ms, which nothing uses here, was held against it."""
+    short = {**STIFF_ON_SOFT, "time": {"t_end": 1e-3}, "contact": {"law": law}}
+    run = simulate(scene_from_dict({**short, "accuracy": 1e-3}))
+    assert run.time[-1] == 1e-3
+    path = tmp_path / "short.toml"
+    path.write_text(f'[time]\nt_end = 1e-3\n[spring]\nequilibrium = 0.1\n[contact]\nlaw = "{law}"\n')
+    result = CliRunner().invoke(app, ["run", str(path), "--accuracy", "1e-3", "--out", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    with pytest.raises(SceneError, match=r"macro_step = 0\.004, the default: .*; give a smaller one, or an accuracy"):
+        load_scene(path)
+
+
+@pytest.mark.parametrize("scheme", ["hermite", "jacobi"])
+def test_what_it_replaces_need_not_fit(scheme):
+    """A scheme that the integrator or the law does not take: the accuracy picks one that it does."""
+    tables = {**STIFF_ON_SOFT, "time": {"t_end": 0.05}, "accuracy": 1e-2}
+    if scheme == "hermite":
+        tables["beam"] = {**tables["beam"], "integrator": "generalized_alpha"}
+    else:
+        tables["contact"] = {"law": "compliance"}
+    run = simulate(scene_from_dict({**tables, "coupling": {"scheme": scheme, "degree": 1}}))
+    assert (run.scene.coupling.scheme, run.scene.coupling.degree) == ("energy", 0)
+
+
 # -- a scene that asks for an accuracy, in the studies ---------------------------------------------------------------
 
 ASKING = """accuracy = 1e-4

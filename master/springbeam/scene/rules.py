@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from .scene import TABLES, Scene
 from .statics import bending_stiffness, locking, shear_stiffness, tip_compliance, tip_inertia
-from .tables import ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring
+from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring
 
 #: Two weeks at a microsecond a step: a mistyped macro step, not a run.
 MOST_MACRO_STEPS = 1e12
@@ -269,6 +269,8 @@ def _inertia_needed(scene: Scene) -> Iterator[str]:
 
 def _coupling_resolves(scene: Scene) -> Iterator[str]:
     beam, coupling, t_end = scene.beam, scene.coupling, scene.time.t_end
+    if scene.accuracy is not None:
+        return  # it picks scheme, degree and steps that go together
     if coupling.macro_step is None:
         key = next(key for key in TOLERANCE_KEYS if getattr(coupling, key) is not None)
         if scene.contact.law == "paper":
@@ -276,7 +278,11 @@ def _coupling_resolves(scene: Scene) -> Iterator[str]:
         if coupling.scheme in ORDINARY_SCHEMES:
             yield f'[coupling] {key}: scheme = "{coupling.scheme}" never repeats a step; give macro_step instead'
     elif coupling.macro_step > t_end:
-        yield f"[coupling] macro_step = {coupling.macro_step}: must be at most [time] t_end = {t_end}"
+        default = ", the default" if coupling.macro_step == DEFAULT_STEP else ""
+        yield (
+            f"[coupling] macro_step = {coupling.macro_step}{default}: must be at most [time] t_end = {t_end}; give a "
+            "smaller one, or an accuracy, which picks one"
+        )
     elif t_end / coupling.macro_step > MOST_MACRO_STEPS:
         yield (
             f"[coupling] macro_step = {coupling.macro_step}: [time] t_end = {t_end} would take "

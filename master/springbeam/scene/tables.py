@@ -147,6 +147,10 @@ class Contact(Table):
 STEP_KEY, TOLERANCE_KEYS = "macro_step", ("relative_tolerance", "absolute_tolerance")
 
 
+#: H [s] of a scene that gives neither: that of Ahn & Tate's section 6.
+DEFAULT_STEP = 0.004
+
+
 #: What ``accuracy`` picks, by table: it takes the place of these keys.
 PICKED_BY_ACCURACY = {
     "coupling": ("scheme", "degree", STEP_KEY, *TOLERANCE_KEYS, "tolerance"),
@@ -162,7 +166,7 @@ class Coupling(Table):
     #: "auto" picks scheme and degree: `springbeam.scene.automatic`.
     scheme: Literal["energy", "hermite", "auto", "gauss_seidel", "jacobi"] = "energy"
     degree: Annotated[int, Field(ge=0, le=2)] = 0  #: of the contact force over a step
-    macro_step: Annotated[float | None, Field(gt=0.0)] = None  #: H [s]; 0.004 where no tolerance is given
+    macro_step: Annotated[float | None, Field(gt=0.0)] = None  #: H [s]; `DEFAULT_STEP` where no tolerance is given
     #: Instead of ``macro_step``: of a step's error, relative to the motion so far, and absolute [m].
     relative_tolerance: Annotated[float | None, Field(gt=0.0, le=0.1)] = None
     absolute_tolerance: Annotated[float | None, Field(gt=0.0)] = None
@@ -176,7 +180,7 @@ class Coupling(Table):
     @classmethod
     def _default_step(cls, data: Any) -> Any:
         if isinstance(data, dict) and all(data.get(key) is None for key in (STEP_KEY, *TOLERANCE_KEYS)):
-            return {**data, STEP_KEY: 0.004}
+            return {**data, STEP_KEY: DEFAULT_STEP}
         return data
 
     @model_validator(mode="after")

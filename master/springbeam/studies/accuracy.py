@@ -227,7 +227,7 @@ class _EqualSteps:
 
     def __init__(self, scene: Scene, accuracy: float, span: float) -> None:
         self._scene, self._accuracy, self._span = scene, accuracy, span
-        fine = with_changes(scene, accuracy=None, coupling={"macro_step": 1e-9 * span})
+        fine = with_changes(scene, accuracy=None, coupling={"scheme": "auto", "degree": 0, "macro_step": 1e-9 * span})
         taken = choice(fine)  # of schemes, the one where everything is resolved
         self._scheme, self._degree = taken.scheme, taken.degree
 
