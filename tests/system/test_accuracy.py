@@ -128,6 +128,18 @@ def test_an_impossible_accuracy_is_refused(value):
         scene_from_dict({**WITH_STOP, "accuracy": value})
 
 
+@pytest.mark.parametrize("reach", [1e3, 1.0, 1e-9, 1e-12])
+def test_the_size_of_the_motion_does_not_matter(reach):
+    """IDA's absolute tolerance was 1e-10 m whatever the scene: a motion of 1 nm had its energy changed, and stopped."""
+    spring = {"linear_stiffness": 100.0, "damping": 0.2, "equilibrium": reach}
+    run = simulate(scene_from_dict({"time": {"t_end": 5.0}, "spring": spring, "accuracy": 1e-3}))
+    omega = np.sqrt(100.0 - 0.1**2)
+    exact = np.exp(-0.1 * run.time) * (np.cos(omega * run.time) + 0.1 / omega * np.sin(omega * run.time))
+    assert np.abs(run.y / reach - exact).max() <= 1e-7  # IDA is asked for 1e-4 of the accuracy
+    assert len(run) == 9
+    assert run.summary["max_energy_residual"] <= 1e-6
+
+
 @pytest.mark.parametrize("law", ["transmission", "compliance"])
 def test_a_run_may_be_shorter_than_the_default_macro_step(law, tmp_path):
     """4 ms, which nothing uses here, was held against it."""

@@ -41,6 +41,8 @@ _UNRESOLVED = 0.02
 _DOUBTED = 30.0
 #: The coupling's and IDA's tolerance over the accuracy, and the bounds of the latter.
 _COUPLING_SHARE, _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-4, 1e-12, 1e-8
+#: IDA's absolute tolerance over its relative one and the range of the spring top.
+_IDA_ABSOLUTE = 1e-2
 
 # Equal macro steps.
 #: Fewest, where bodies are coupled and where not.
@@ -337,6 +339,7 @@ class _Search:
         else:
             self._way = _EqualSteps(scene, accuracy, self._span)
         self._runs, self._calls, self._spent, self._stopped = 0, 0, 0.0, 0
+        self._range = 0.0  #: of the spring top in the run before [m]
 
     def run(self) -> Picked:
         way, coarse, estimate = self._way, None, None
@@ -376,7 +379,10 @@ class _Search:
         tables: dict[str, dict[str, Any]] = {"coupling": coupling}
         if self._scene.spring is not None:
             tolerance = min(max(_IDA_SHARE * self._accuracy, _TIGHTEST), _LOOSEST)
-            tables["spring"] = {"relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
+            tables["spring"] = {"relative_tolerance": tolerance}
+            if self._range > 0.0:
+                absolute = min(_IDA_ABSOLUTE * tolerance * self._range, _LOOSEST)
+                tables["spring"]["absolute_tolerance"] = max(absolute, np.finfo(float).tiny)
         scene = with_changes(self._scene, accuracy=None, **tables)
         recorder = MemoryRecorder(scene)
         try:
@@ -387,6 +393,8 @@ class _Search:
             if self._stopped == _MOST_STOPPED:
                 raise
         pilot = _Pilot(fineness, recorder.trajectory())
+        if "y" in pilot.run.columns:
+            self._range = float(np.ptp(pilot.run["y"]))
         self._runs, self._calls, self._spent = self._runs + 1, self._calls + pilot.calls, self._spent + pilot.spent
         return pilot
 
