@@ -36,7 +36,7 @@ springbeam report results/soft    look at it: one HTML page with a time slider
 springbeam crosscheck soft        is it right? beside an independent reference
 springbeam doctor                 is this installation sound?"""
 
-#: Where the output goes to a file.
+#: Errors of a standard output that is a file.
 _NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO)
 
 app = typer.Typer(
@@ -50,7 +50,7 @@ app = typer.Typer(
 
 
 def main() -> None:
-    """Entry point of the console script."""
+    """Run the command; entry point of the console script."""
     try:
         app()
     except OSError as error:
@@ -69,7 +69,7 @@ def _show_version(wanted: bool) -> None:
 
 
 def version() -> str:
-    """Version of the installed package."""
+    """Return the version of the installed package."""
     try:
         return metadata.version("springbeam")
     except metadata.PackageNotFoundError:

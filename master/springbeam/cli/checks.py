@@ -34,10 +34,11 @@ def crosscheck(
     scene: SceneArgument,
     settings: SettingsOption = None,
     with_orders: Annotated[
-        bool, typer.Option("--orders", help="Repeat at H/2, H/4, H/8 and print observed orders instead.")
+        bool, typer.Option("--orders", help="Repeat the run at H/2, H/4, H/8 and print observed orders instead.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="PNG", help="Draw both, and errors below bounds, here.")
+        Path | None,
+        typer.Option("--out", "-o", metavar="PNG", help="Draw both runs and their errors into this file."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

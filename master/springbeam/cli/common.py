@@ -1,4 +1,4 @@
-"""What the commands share: arguments, exit codes, errors.
+"""Arguments, exit codes and errors that the commands share.
 
 Results go to stdout, progress and errors to stderr. ``--json`` puts one JSON document on stdout and nothing else,
 ``--quiet`` only where the results are. Colours are for terminals, and NO_COLOR turns them off (rich sees to both).
@@ -31,12 +31,12 @@ STOPPED = 3
 
 
 def complete_scene(incomplete: str) -> list[str]:
-    """Shipped scenes; where there is none the shell goes on with files."""
+    """Return the shipped scenes that begin so; if there is none, the shell offers files."""
     return [name for name in shipped_scenes() if name.startswith(incomplete)]
 
 
 def complete_key(incomplete: str) -> list[str]:
-    """``table.key=`` of a scene."""
+    """Return the keys of a scene that begin so, each as ``table.key=``."""
     return [f"{name}=" for name in scene_keys() if name.startswith(incomplete)]
 
 
@@ -57,7 +57,7 @@ SettingsOption = Annotated[
         autocompletion=complete_key,
     ),
 ]
-RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Where springbeam run has left its results.")]
+RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory with the results of springbeam run.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document, and nothing else, on stdout.")]
 QuietOption = Annotated[
     bool, typer.Option("--quiet", "-q", help="No progress bar and no tables; print only where the results are.")
@@ -66,7 +66,7 @@ NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no picture
 
 
 class _TellingParameters:
-    """Flags are shown without a type: a reader would try ``--force true``."""
+    """Shows flags without a type, which would make a reader try ``--force true``."""
 
     def get_params(self, ctx: Any) -> list[Any]:
         parameters: list[Any] = super().get_params(ctx)  # type: ignore[misc]
@@ -77,7 +77,7 @@ class _TellingParameters:
 
 
 class Command(_TellingParameters, TyperCommand):
-    """A command that can be interrupted, and says what to do with an argument too many."""
+    """A command that can be interrupted, and that explains an argument too many."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         ctx.allow_extra_args = True
@@ -97,7 +97,7 @@ class Command(_TellingParameters, TyperCommand):
 
 
 class Group(_TellingParameters, TyperGroup):
-    """Says what may have been meant by a word that is no command."""
+    """A group of commands that suggests one for a word that is none."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         word = args[0]
@@ -110,12 +110,12 @@ class Group(_TellingParameters, TyperGroup):
 
 
 def console_for(*, silent: bool) -> Console:
-    """For results, on stdout; silent if there is only a path or JSON to print."""
+    """Return the console for results, on stdout; it is silent if only a path or JSON is to be printed."""
     return Console(highlight=False, quiet=silent)
 
 
 def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
-    """On stderr, if that is a terminal."""
+    """Return a progress bar on stderr, which shows if that is a terminal."""
     console = Console(stderr=True)
     return Progress(
         *columns, console=console, transient=True, redirect_stdout=False, disable=quiet or not console.is_terminal
@@ -123,12 +123,12 @@ def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
 
 
 def print_json(document: Any) -> None:
-    """JSON has no NaN: what is not finite, as in the summary of a run that stopped, goes by its name."""
+    """Print ``document`` as JSON; a number that is not finite, as in a run that stopped, becomes its name."""
     typer.echo(json.dumps(json_ready(document), indent=2, allow_nan=False, ensure_ascii=False))
 
 
 def results_directory(path: Path) -> Path:
-    """``path`` if it holds a run; otherwise the command ends, and says which do."""
+    """Return ``path`` if it holds a run; otherwise end the command with an error that names directories that do."""
     if not RunDirectory(path).summary.exists():
         what = "holds no run" if path.is_dir() else "is no directory" if path.exists() else "no such directory"
         there = sorted(file.parent for file in Path("results").glob("*/summary.json"))
@@ -142,6 +142,7 @@ def results_directory(path: Path) -> Path:
 
 @contextmanager
 def bad_input_reported() -> Iterator[None]:
+    """End the command with exit code 2 and one error for what the user can mend."""
     try:
         yield
     except ResultsExist as error:
@@ -156,7 +157,7 @@ def bad_input_reported() -> Iterator[None]:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Ctrl-C, and SIGTERM, which batch systems send, end the command with exit code 3."""
+    """End the command with exit code 3 on Ctrl-C, and on SIGTERM, which batch systems send."""
     main_thread = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGTERM, _interrupt) if main_thread else None
     try:
@@ -173,5 +174,6 @@ def _interrupt(*_: Any) -> NoReturn:
 
 
 def fail(code: int, message: str) -> NoReturn:
+    """End the command with an error on stderr."""
     typer.echo(f"error: {message}", err=True)
     raise typer.Exit(code)

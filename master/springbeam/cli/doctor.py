@@ -59,7 +59,7 @@ def doctor(as_json: JsonOption = False) -> None:
 
 
 def _found() -> dict[str, Any]:
-    """Everything that `doctor` says."""
+    """Return everything that `doctor` prints."""
     fmus = {}
     for name in ("beam", "spring"):
         path = fmu_directory() / f"{name}.fmu"

@@ -63,7 +63,7 @@ def run(
         typer.Option(
             "--accuracy",
             metavar="RELATIVE",
-            help="Pick scheme, macro step and tolerances so that tip displacement and event times are within it.",
+            help="Pick scheme, macro step and tolerances that keep tip displacement and event times so accurate.",
         ),
     ] = None,
     checkpoint: Annotated[
@@ -149,7 +149,7 @@ def carry_out(
 
 
 def _draw(console: Console, directory: RunDirectory) -> str | None:
-    """Returns why there are no pictures, or ``None``."""
+    """Draw the pictures; return why there are none, or ``None``."""
     from ..pictures.plots import plot_run  # matplotlib takes a second to load
 
     try:
@@ -178,9 +178,9 @@ def _run_into(
     *,
     quiet: bool,
 ) -> str | None:
-    """Returns why the run stopped early, or ``None``; the results are closed and can be loaded either way.
+    """Run the scene, or write a run that is ``made``, and return why it stopped early, or ``None``.
 
-    What keeps it from recording anything is raised.
+    The results are closed and can be loaded either way. Raises what keeps the run from recording anything.
     """
     from ..run.outcome import RunStopped
     from ..run.runner import run as run_scene
@@ -233,7 +233,7 @@ def _run_into(
 
 
 class _ProgressBar:
-    """Simulated time, phase and speed on stderr, when that is a terminal."""
+    """Shows simulated time, phase and speed on stderr, if that is a terminal."""
 
     def __init__(self, t_end: float, *, quiet: bool) -> None:
         self._bar = progress_bar(

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ..studies.stability.grid import Outcome
     from ..studies.stability.predict import Prediction
 
-#: Reasons that the summary lists, the most frequent ones, and characters of each.
+#: How many reasons the summary lists, and how many characters of each.
 _REASONS, _REASON_WIDTH = 12, 66
 
 
@@ -112,7 +112,7 @@ def _schemes_table(p: Prediction) -> Table:
 def stability(
     critical: Annotated[
         bool,
-        typer.Option("--critical", help="Instead: critical macro steps of all schemes, predicted and measured."),
+        typer.Option("--critical", help="Compare predicted and measured critical macro steps of all schemes instead."),
     ] = False,
     samples: Annotated[
         int, typer.Option("--samples", metavar="N", min=0, help="Cells of the hypercube over all parameters.")
@@ -120,7 +120,7 @@ def stability(
     resolution: Annotated[
         int, typer.Option("--resolution", metavar="N", min=0, help="Values of each parameter of a slice; 0: no slices.")
     ] = 6,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Of the hypercube.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the hypercube.")] = 1,
     workers: Annotated[
         int | None, typer.Option("--workers", metavar="N", min=1, help="Processes. Default: one per core.")
     ] = None,
@@ -192,12 +192,12 @@ def stability(
         raise typer.Exit(DISAGREES)
 
 
-#: Predicted and measured critical macro steps agree so far, and constants of the two-mass oscillator.
+#: Largest relative difference of predicted and measured critical macro steps, and of the two-mass constants.
 _AGREEMENT = 0.05
 
 
 def _critical(*, quiet: bool, as_json: bool) -> None:
-    """Critical macro steps and the constants of the two-mass oscillator; exit code 1 if they are not as predicted."""
+    """Compare critical macro steps and the two-mass oscillator with predictions; exit code 1 if they disagree."""
     from ..studies.stability import two_mass
     from ..studies.stability.critical import LARGE_STEP, comparisons
     from ..studies.stability.predict import THRESHOLD
@@ -247,7 +247,7 @@ def _critical(*, quiet: bool, as_json: bool) -> None:
 
 
 def _outcome_table(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome]) -> Table:
-    """A row per coupling, with the largest residual of those that were done."""
+    """Return a row per coupling, with the largest residual of the runs that were done."""
     from ..studies.stability.cells import COUPLINGS
     from ..studies.stability.grid import CLASSES
 
@@ -268,7 +268,7 @@ def _outcome_table(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome])
 
 
 def _reason_table(outcomes: Sequence[Outcome]) -> Table:
-    """Why cells were refused or stopped, numbers left out, the most frequent reasons first."""
+    """Return why cells were refused or stopped, without numbers, the most frequent reasons first."""
     counts = Counter((o.kind, _without_numbers(o.reason)) for o in outcomes if o.kind in ("refused", "stopped"))
     table = Table(box=None, pad_edge=False, show_header=False)
     for _ in range(3):

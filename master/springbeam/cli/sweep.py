@@ -47,7 +47,7 @@ def sweep(
         Literal["latin_hypercube", "random"], typer.Option("--sampling", help="How --samples are placed.")
     ] = "latin_hypercube",
     seed: Annotated[
-        int, typer.Option("--seed", metavar="N", min=0, help="Of the samples: the same seed, the same runs.")
+        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the samples; one seed gives the same runs again.")
     ] = 0,
     metric: Annotated[
         list[str] | None,
@@ -64,7 +64,7 @@ def sweep(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="DIR", help="Where rows go; a sweep that was begun there goes on."),
+        typer.Option("--out", "-o", metavar="DIR", help="Directory of the rows; a sweep that was begun there goes on."),
     ] = None,
     no_plots: NoPlotsOption = False,
     quiet: QuietOption = False,

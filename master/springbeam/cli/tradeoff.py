@@ -39,7 +39,8 @@ def tradeoff(
         typer.Option("--until", metavar="SECONDS", help="End of the compared window. Default: as far as it can be."),
     ] = None,
     repeats: Annotated[
-        int, typer.Option("--repeats", metavar="N", min=1, help="Timings of each configuration; the median counts.")
+        int,
+        typer.Option("--repeats", metavar="N", min=1, help="Timings of a configuration, of which the median counts."),
     ] = 3,
     out: Annotated[
         Path | None,

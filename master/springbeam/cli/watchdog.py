@@ -1,4 +1,4 @@
-"""Ctrl-C while an FMU does not return.
+"""End the command on Ctrl-C while an FMU does not return.
 
 Python acts on a signal between two instructions of the main thread, which a call into a library that never returns
 keeps from ever coming. Its C handler, however, writes the signal to the wakeup descriptor at once, and ctypes lets
@@ -22,7 +22,7 @@ import typer
 from ..bodies.fmu import call_under_way
 from .common import STOPPED
 
-#: How long a signal may wait for the main thread [s].
+#: Longest time that a signal waits for the main thread [s].
 PATIENCE = 5.0
 
 
@@ -42,7 +42,7 @@ class _Watchdog(threading.Thread):
         self._answers = 0
 
     def interrupt(self, *_: Any) -> NoReturn:
-        """The handler of both signals, in the main thread."""
+        """Handle either signal, in the main thread."""
         with self._deciding:
             with suppress(BlockingIOError):
                 while self.signals.recv(4096):
@@ -72,12 +72,12 @@ class _Watchdog(threading.Thread):
 
 @contextmanager
 def watched(last_words: Callable[[str], str]) -> Iterator[None]:
-    """Within, SIGINT and SIGTERM end the process with exit code 3 also while an FMU does not return.
+    """Let SIGINT and SIGTERM end the process with exit code 3, within the block, also while an FMU does not return.
 
     Parameters
     ----------
     last_words
-        Is then told the cause, in another thread; does what can be done without the FMU and returns the message.
+        Called with the cause, in another thread; it does what can be done without the FMU and returns the message.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -26,7 +26,7 @@ from .ledger import Ledger
 from .outcome import OVERFLOW, Progress, RunStopped
 
 _MAX_ITERATIONS = 50
-#: Of the spring's and the tip's position (section 6: ε = 1e-12) [m].
+#: Newton's tolerance of the spring's and the tip's position (section 6: ε = 1e-12) [m].
 _TOLERANCE = 1e-12
 
 

@@ -18,7 +18,7 @@ STABLE = 3.0
 
 
 class Choice(NamedTuple):
-    """What couples the scene, and why."""
+    """The scheme and degree that couple a scene, and the reason."""
 
     scheme: str
     degree: int
@@ -26,7 +26,7 @@ class Choice(NamedTuple):
 
 
 def choice(scene: Scene) -> Choice:
-    """The scheme and degree for ``scene``, whatever its own say."""
+    """Return the scheme and degree that fit ``scene``, whatever it asks for."""
     beam, coupling = scene.beam, scene.coupling
     if not scene.contact.rigid:
         return Choice("energy", 0, f'contact.law = "{scene.contact.law}"')
@@ -49,7 +49,7 @@ def choice(scene: Scene) -> Choice:
 
 
 def decided(scene: Scene) -> tuple[Scene, Choice | None]:
-    """The scene with a scheme and a degree in place of ``"auto"``, and why these; ``None`` if it names its own."""
+    """Return the scene with a scheme and a degree in place of ``"auto"``, and the choice; ``None`` if it has one."""
     if scene.coupling.scheme != "auto":
         return scene, None
     taken = choice(scene)

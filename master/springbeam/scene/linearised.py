@@ -1,4 +1,4 @@
-"""The scene where it is stiffest, for what must be known of it before it runs.
+"""Frequencies of a scene where it is stiffest, for what must be known before it runs.
 
 The hardening spring at the largest deflection that the energy at first contact allows; a softening one at rest.
 """
@@ -12,7 +12,7 @@ from .statics import shear_stiffness
 
 
 def contact_energy(scene: Scene) -> float:
-    """At first contact [J]: of u̇ = s₁x, of u = s₀x with θ = 0 where that is strained, and of the spring."""
+    """Return the energy at first contact [J]: of u̇ = s₁x, of the shear of u = s₀x with θ = 0, and of the spring."""
     energy = 0.0
     if (spring := scene.spring) is not None:
         y, z = spring.equilibrium, spring.initial_velocity
@@ -25,8 +25,10 @@ def contact_energy(scene: Scene) -> float:
 
 
 def spring_stiffness(scene: Scene) -> float:
-    """k1 + 3 k2 y² of the spring at its stiffest [N/m]: at rest if it softens, else on the foundation or where it takes
-    all the energy."""
+    """Return k1 + 3 k2 y² of the spring at its stiffest [N/m].
+
+    That is at rest if it softens, else on the foundation or where it takes all the energy.
+    """
     spring = scene.spring
     assert spring is not None
     k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
@@ -41,6 +43,6 @@ def spring_stiffness(scene: Scene) -> float:
 
 
 def spring_frequency(scene: Scene) -> float:
-    """√(k/m) of the spring at its stiffest [rad/s], 0 where it does not oscillate."""
+    """Return √(k/m) of the spring at its stiffest [rad/s], 0 where it does not oscillate."""
     assert scene.spring is not None
     return sqrt(max(spring_stiffness(scene), 0.0) / scene.spring.mass)

@@ -17,12 +17,12 @@ from .tables import SceneError
 
 
 def scene_keys() -> list[str]:
-    """All keys as ``table.key``."""
+    """Return all keys as ``table.key``."""
     return [f"{table}.{key}" for table, model in TABLES.items() for key in model.model_fields]
 
 
 def key_kind(table: str, key: str) -> type:
-    """What ``[table] key`` takes, of int, float, bool and str. Raises SceneError if there is no such key."""
+    """Return which of int, float, bool and str ``[table] key`` takes. Raises SceneError if there is no such key."""
     if table not in TABLES:
         raise SceneError(_explain_top("extra_forbidden", {}, table))
     if key not in TABLES[table].model_fields:
@@ -36,7 +36,7 @@ def _alternatives(annotation: Any) -> tuple[Any, ...]:
 
 
 def explain(error: Any) -> list[str]:
-    """Lines ``[table] key = value: what is wrong and what would be allowed`` for one of pydantic's errors."""
+    """Return lines ``[table] key = value: what is wrong and what would be allowed`` for one of pydantic's errors."""
     kind, value, loc = error["type"], error["input"], [str(part) for part in error["loc"]]
     if kind == "value_error":
         prefix = f"[{loc[0]}] " if loc else ""
@@ -75,7 +75,7 @@ def _nearest_key(table: str, key: str) -> str:
 
 
 def _allowed(field: FieldInfo) -> str:
-    """What a key may be, in words, from its declaration."""
+    """Return in words what a key may be, from its declaration."""
     if get_origin(field.annotation) is Literal:
         return " or ".join(_toml(choice) for choice in get_args(field.annotation))
     nouns: dict[Any, str] = {bool: "true or false", str: "a text in quotes", int: "a whole number"}
@@ -91,7 +91,7 @@ def _allowed(field: FieldInfo) -> str:
 
 
 def _toml(value: Any) -> str:
-    """A value as it may stand in a file, in one line of at most 60 characters."""
+    """Return a value as it may stand in a file, in one line of at most 60 characters."""
     if isinstance(value, dict):
         return "{…}"
     if isinstance(value, (bool, str)):
@@ -107,7 +107,7 @@ def _toml(value: Any) -> str:
 
 
 def _bare(key: str) -> str:
-    """A key as it may stand in a file."""
+    """Return a key as it may stand in a file."""
     return one_line(key if re.fullmatch("[A-Za-z0-9_.-]+", key) else json.dumps(key, ensure_ascii=False))
 
 

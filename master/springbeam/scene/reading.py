@@ -21,16 +21,16 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-#: Bytes of a scene file.
+#: Most bytes of a scene file.
 LONGEST_FILE = 1_000_000
 
 
-#: For those who meet TOML here first.
+#: TOML in one line, for errors.
 _TOML_IS = "a line is a [table] or key = value, with numbers like 0.5 or 1e-3 and texts in quotes"
 
 
 def shipped_scenes() -> dict[str, Path]:
-    """Names and files of the scenes that come with the package."""
+    """Return names and files of the scenes that come with the package."""
     folder = Path(str(resources.files("springbeam.scene") / "shipped"))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
@@ -43,7 +43,7 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
     path_or_name
         A TOML file, or the name of a shipped scene.
     overrides
-        ``"table.key=value"`` strings, the value in TOML syntax (a bare word is taken as a string).
+        ``"table.key=value"`` strings, the value in TOML syntax; a bare word is taken as a string.
     accuracy
         Takes the place of the scene's own ``accuracy``, if any.
 
@@ -67,7 +67,7 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
     except ValueError as error:  # Python's own limit on the digits of an integer
         raise SceneError(f"{path}: a number in it has more digits than can be read") from error
     except RecursionError as error:
-        raise SceneError(f"{path}: nested too deeply; a scene has tables with plain values in them") from error
+        raise SceneError(f"{path}: nested too deeply; a scene has tables of plain values") from error
     changes = _override(data, overrides)
     if accuracy is not None:
         data["accuracy"] = accuracy
@@ -81,14 +81,14 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
 
 
 def _line_of(error: Exception, text: str) -> str:
-    """The line that a TOML error is about, for its message."""
+    """Return the line that a TOML error is about, for its message."""
     found = re.search(r"at line (\d+)", str(error))
     lines = text.splitlines()
     return f": {one_line(lines[int(found[1]) - 1].strip())}" if found and int(found[1]) <= len(lines) else ""
 
 
 def _blamed(message: str, path: str, changes: Mapping[tuple[str, str], str]) -> str:
-    """The message with ``--set`` named instead of the file where it is about a value given there."""
+    """Return the message with ``--set`` named instead of the file in lines about a value given there."""
     lines = []
     for line in message.splitlines():
         said = line.removeprefix(f"{path}: ")
@@ -190,7 +190,7 @@ def _change(content: dict[str, Any], changes: Mapping[str, Any]) -> None:
 
 
 def parse_value(text: str) -> Any:
-    """A value in TOML syntax; what is none is a bare word, taken as a string."""
+    """Return a value given in TOML syntax; a bare word is taken as a string."""
     try:
         parsed = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):

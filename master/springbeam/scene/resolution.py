@@ -1,4 +1,4 @@
-"""Does the macro step resolve the motion? The criterion of every run, and what would resolve it.
+"""Judge whether the macro step resolves the motion, and say what would.
 
 A run is called *not resolved* if (``docs/coupling.md``, "Is the motion resolved?")
 
@@ -25,12 +25,12 @@ MISMATCH = 0.2
 
 
 def not_resolved(scene: Scene, mismatch: float, speed: float) -> str | None:
-    """Why the run did not resolve its motion and what would, in words; ``None`` if it did.
+    """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
     Parameters
     ----------
     scene
-        As run.
+        The scene as run.
     mismatch, speed
         The largest difference of the joined ends' velocities, and the largest speed of an end [m/s].
     """
@@ -52,7 +52,7 @@ def not_resolved(scene: Scene, mismatch: float, speed: float) -> str | None:
 
 
 def _slowest(scene: Scene) -> list[tuple[str, float, str]]:
-    """(body, frequency [rad/s], what else would do) of the bodies that oscillate."""
+    """Return (body, frequency [rad/s], what else would help) of each body that oscillates."""
     found = []
     beam, spring = scene.beam, scene.spring
     if beam is not None and beam.fidelity == "dynamic":
@@ -84,7 +84,7 @@ def _remedy(scene: Scene) -> str:
 
 
 def _rounded_down(size: float) -> str:
-    """To two digits, in seconds."""
+    """Return ``size`` [s] in two digits, rounded down."""
     return f"{0.95 * size:.1e} s"
 
 
@@ -92,12 +92,12 @@ def _rounded_down(size: float) -> str:
 
 
 def slowest_frequency(beam: Beam) -> float:
-    """Lowest frequency of the beam, with its tip free [rad/s]."""
+    """Return the lowest frequency of the beam, with its tip free [rad/s]."""
     return lowest_frequency(beam) * sqrt(locking(beam))
 
 
 def fastest_frequency(beam: Beam) -> float:
-    """Highest frequency kept [rad/s]: of the mesh, or of the ``n_modes``-th wave."""
+    """Return the highest frequency kept [rad/s]: of the mesh, or of the ``n_modes``-th wave."""
     high = mesh_frequency(beam)
     if beam.integrator != "modal" or beam.n_modes == 0 or modes_below(beam, high) <= beam.n_modes:
         return high
@@ -109,25 +109,25 @@ def fastest_frequency(beam: Beam) -> float:
 
 
 def mesh_frequency(beam: Beam) -> float:
-    """Highest frequency of the mesh [rad/s], about."""
+    """Return an estimate of the highest frequency of the mesh [rad/s]."""
     bending, shear = bending_stiffness(beam), shear_stiffness(beam)
     inertia, mass = beam.density * beam.second_moment_of_area, beam.density * beam.area
     return sqrt(_gradient(beam) * max(bending / inertia, shear / mass) + shear / inertia)
 
 
 def shear_frequency(beam: Beam) -> float:
-    """Highest frequency of shear waves on the mesh [rad/s], about: those that an impact at the tip sets off."""
+    """Return an estimate of the highest frequency of shear waves on the mesh [rad/s], which an impact sets off."""
     return sqrt(_gradient(beam) * shear_stiffness(beam) / (beam.density * beam.area))
 
 
 def _gradient(beam: Beam) -> float:
-    """Of ∫v'²/∫v² over polynomials on an element: 12/h² for p = 1, 60/h² for p = 2, then a little more [1/m²]."""
+    """Return the largest ∫v'²/∫v² on an element [1/m²]: 12/h² for p = 1, 60/h² for p = 2, then a little more."""
     h, p = beam.length / beam.n_elements, beam.element_degree
     return p * (p + 1) * (p + 2) * (p + 3) / (2.0 * h**2)
 
 
 def modes_below(beam: Beam, omega: float) -> int:
-    """About how many modes are slower than ``omega`` [rad/s]: half waves of both kinds that fit into the length.
+    """Estimate how many modes are slower than ``omega`` [rad/s]: half waves of both kinds that fit into the length.
 
     Wave numbers k of the Timoshenko beam, k² = ω² (a + b)/2 ± ω √(ω² (a − b)²/4 + ρA/EI) with a = ρ/E, b = ρA/KAG; the
     second is real above √(KAG/ρI).

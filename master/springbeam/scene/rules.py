@@ -1,4 +1,4 @@
-"""What several keys decide together: scenes that cannot be run although each value is allowed, and suspicious ones."""
+"""Rules for several keys together: scenes that cannot be run although each value is allowed, and suspicious ones."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from .scene import TABLES, Scene
 from .statics import bending_stiffness, locking, shear_stiffness, tip_compliance, tip_inertia
 from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring
 
-#: Two weeks at a microsecond a step: a mistyped macro step, not a run.
+#: More are a mistyped macro step: two weeks at a microsecond a step.
 MOST_MACRO_STEPS = 1e12
 
 
 def _extreme(scene: Scene) -> str:
-    """The value furthest from 1, by its place."""
+    """Return the value furthest from 1, with its place."""
     places = {
         f"[{table}] {key}": float(value)
         for table in TABLES
@@ -40,7 +40,7 @@ def impossible(scene: Scene) -> list[str]:
 
 
 def _beam_quantities(beam: Beam) -> tuple[float, ...]:
-    """What the equations are made of: ρA, ρI, EI, KAG, their wave speeds squared, and 1/k of the tip."""
+    """Return ρA, ρI, EI, KAG, the squares of their wave speeds, and 1/k of the tip: what the equations are made of."""
     stiffness = (bending_stiffness(beam), shear_stiffness(beam))
     inertia = (beam.density * beam.area, beam.density * beam.second_moment_of_area)
     speeds = tuple(k / m if m > 0.0 else math.inf for k, m in zip(stiffness, reversed(inertia), strict=True))
@@ -93,23 +93,23 @@ def _spring_holds(scene: Scene) -> Iterator[str]:
 
 
 def _potential(spring: Spring, y: float) -> float:
-    """Of the spring and its load [J]."""
+    """Return the potential of the spring and its load at ``y`` [J]."""
     k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
     return y * (y * (0.5 * k1 + 0.25 * k2 * y * y) - spring.external_force)
 
 
 def _spring_energy(spring: Spring) -> float:
-    """At the start, with the load's potential [J]."""
+    """Return the energy of the spring and its load at the start [J]."""
     return 0.5 * spring.mass * spring.initial_velocity**2 + _potential(spring, spring.equilibrium)
 
 
 def _largest_load(spring: Spring) -> float:
-    """Of which a softening spring has an equilibrium, 2/3 k1 √(k1/3|k2|) [N]."""
+    """Return the largest load under which a softening spring has an equilibrium, 2/3 k1 √(k1/3|k2|) [N]."""
     return 2.0 / 3.0 * spring.linear_stiffness * math.sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
 
 
 def _well_depth(scene: Scene) -> float:
-    """Potential [J] at the lower rim of a softening spring's well, of those that the foundation does not bar.
+    """Return the potential [J] at the lower rim of a softening spring's well; a rim below the foundation is none.
 
     −∞ where the load leaves no well. The rims are the outer roots of k1 y + k2 y³ = f_s: y = 2a cos θ with
     a² = k1/3|k2| and cos 3θ = −f_s/(2|k2|a³) (Viète).
@@ -296,7 +296,7 @@ def _coupling_resolves(scene: Scene) -> Iterator[str]:
             yield f"[coupling] degree = {coupling.degree}: {remedy}, or degree = 0"
 
 
-#: What cannot be run although each value is allowed; each yields ``[table] key = value: reason and remedy``.
+#: Checks of what cannot be run although each value is allowed; each yields ``[table] key = value: reason and remedy``.
 _CHECKS = (
     _bodies,
     _spring_holds,
@@ -310,7 +310,7 @@ _CHECKS = (
 
 
 def _beam_energy(scene: Scene) -> float:
-    """Kinetic, and of the shear of a straight slope, as the beam arrives [J]; without the work of its loads."""
+    """Return the energy of the beam as it arrives [J]: of motion and of a straight slope's shear, without its loads."""
     if (beam := scene.beam) is None or beam.fidelity == "quasi_static":
         return 0.0
     target, slope = scene.tip_target, beam.initial_deflection_slope
@@ -321,7 +321,7 @@ def _beam_energy(scene: Scene) -> float:
 
 
 def suspicions(scene: Scene) -> list[str]:
-    """What can be run but may not be meant; for a run's warnings."""
+    """Return warnings about what can be run but may not be meant."""
     found = []
     beam, spring = scene.beam, scene.spring
     if spring is not None and spring.cubic_stiffness < 0.0:

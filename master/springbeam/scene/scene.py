@@ -33,7 +33,7 @@ class Scene(Table):
 
     @property
     def fmus(self) -> tuple[str, ...]:
-        """Names of the FMUs that the scene is made of; a beam without inertia is none."""
+        """Names of the FMUs that the scene needs; a beam without inertia needs none."""
         beam = self.beam is not None and self.beam.fidelity == "dynamic"
         return ("beam",) * beam + ("spring",) * (self.spring is not None)
 

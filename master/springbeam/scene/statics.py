@@ -18,7 +18,7 @@ import scipy.linalg
 
 from .tables import Beam
 
-#: Where the beam's shape is sampled, as fractions of its length.
+#: Places at which the beam's shape is sampled, as fractions of its length.
 SHAPE_POINTS = np.linspace(0.0, 1.0, 21)
 
 #: A virtual moment or shear force over t.
@@ -30,28 +30,28 @@ _RITZ_DEGREE = 6
 
 
 def bending_stiffness(beam: Beam) -> float:
-    """EI [N·m²]."""
+    """Return EI [N·m²]."""
     return beam.young_modulus * beam.second_moment_of_area
 
 
 def shear_stiffness(beam: Beam) -> float:
-    """KAG [N]."""
+    """Return KAG [N]."""
     return beam.shear_coefficient * beam.area * beam.shear_modulus
 
 
 def tip_compliance(beam: Beam) -> float:
-    """Tip deflection under a tip force, L³/3EI + L/KAG [m/N]."""
+    """Return the tip deflection under a tip force, L³/3EI + L/KAG [m/N]."""
     return beam.length**3 / (3.0 * bending_stiffness(beam)) + beam.length / shear_stiffness(beam)
 
 
 def tip_force_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:
-    """Deflection [m/N] at x = ``fractions``·L under a tip force, x/KAG + x²(3L − x)/6EI."""
+    """Return the deflection [m/N] at x = ``fractions``·L under a tip force, x/KAG + x²(3L − x)/6EI."""
     x = fractions * beam.length
     return np.asarray(x / shear_stiffness(beam) + x**2 * (3.0 * beam.length - x) / (6.0 * bending_stiffness(beam)))
 
 
 def tip_inertia(beam: Beam) -> float:
-    """Inertia of the beam that moves as under a tip force, as a tip mass [kg] (Rayleigh): 33/140 ρAL if slender."""
+    """Return the tip mass [kg] of a beam that moves in the shape of a tip force (Rayleigh): 33/140 ρAL if slender."""
     x = beam.length * _NODES
     turn = (beam.length * x - x**2 / 2.0) / bending_stiffness(beam)
     shape, inertia = tip_force_shape(beam, _NODES), beam.second_moment_of_area / beam.area
@@ -60,7 +60,7 @@ def tip_inertia(beam: Beam) -> float:
 
 
 def lowest_frequency(beam: Beam) -> float:
-    """Lowest frequency, clamped and free [rad/s], by Ritz's method: u and θ polynomials of degree 6 over the length."""
+    """Return the lowest frequency, clamped and free [rad/s], by Ritz's method: u and θ are polynomials of degree 6."""
     nodes, weights = np.polynomial.legendre.leggauss(_RITZ_DEGREE + 1)  # exact for their products
     x = 0.5 * (nodes + 1.0)
     powers = np.arange(1, _RITZ_DEGREE + 1)
@@ -76,7 +76,7 @@ def lowest_frequency(beam: Beam) -> float:
 
 
 def load_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:
-    """Deflection [m] at x = ``fractions``·L under the loads."""
+    """Return the deflection [m] at x = ``fractions``·L under the loads."""
     ends = beam.length * (1.0 - fractions)
 
     def beyond(end: float) -> Virtual:
@@ -86,17 +86,17 @@ def load_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:
 
 
 def tip_load_deflection(beam: Beam) -> float:
-    """Tip deflection under the loads [m]."""
+    """Return the tip deflection under the loads [m]."""
     return float(load_shape(beam, np.ones(1))[0])
 
 
 def load_energy(beam: Beam) -> float:
-    """Work of the loads on their own deflection, ∫ M²/EI + Q²/KAG [J]: twice the energy they store."""
+    """Return the work of the loads on their own deflection, ∫ M²/EI + Q²/KAG [J], twice the energy they store."""
     return _work(beam, 0.0, lambda t: _loads(beam, t)[1], lambda t: _loads(beam, t)[0])
 
 
 def _loads(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(Q, M) of the loads at the distances ``t`` from the tip [N, N·m]."""
+    """Return (Q, M) of the loads at the distances ``t`` from the tip [N, N·m]."""
     f, c, h = beam.distributed_load, beam.tip_load_coefficient, beam.length / beam.n_elements
     s = np.minimum(t, h)
     force = c * (s - s**2 / (2.0 * h))
@@ -104,7 +104,7 @@ def _loads(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _work(beam: Beam, start: float, moment: Virtual, shear: Virtual) -> float:
-    """∫ M m/EI + Q q/KAG dt from ``start`` to the clamp, for virtual m(t) and q(t)."""
+    """Return ∫ M m/EI + Q q/KAG dt from ``start`` to the clamp, for virtual m(t) and q(t)."""
     h, total = beam.length / beam.n_elements, 0.0
     for a, b in ((start, max(start, h)), (max(start, h), beam.length)):
         t = a + (b - a) * _NODES
@@ -115,15 +115,17 @@ def _work(beam: Beam, start: float, moment: Virtual, shear: Virtual) -> float:
 
 
 def tip_reach(beam: Beam) -> float:
-    """How far the tip may go from a straight beam, roughly [m]: by its loads, or by a static deflection that holds the
-    kinetic energy of the start."""
+    """Estimate how far the tip goes from a straight beam [m].
+
+    That is by its loads, or by a static deflection that holds the kinetic energy of the start.
+    """
     mass = beam.density * beam.area * beam.length
     swing = beam.length * abs(beam.initial_velocity_slope) * math.sqrt(mass * tip_compliance(beam) / 3.0)
     return max(swing, abs(tip_load_deflection(beam)))
 
 
 def locking(beam: Beam) -> float:
-    """Static tip stiffness of the mesh over that of the beam, with full integration (model.md, "Locking")."""
+    """Return the static tip stiffness of a fully integrated mesh over that of the beam (model.md, "Locking")."""
     if beam.fidelity == "quasi_static" or beam.reduced_integration or beam.element_degree > 2:
         return 1.0
     bending, shear, h = bending_stiffness(beam), shear_stiffness(beam), beam.length / beam.n_elements

@@ -1,4 +1,4 @@
-"""The tables of a scene file, one class each: what a key means, its unit, its default and what is allowed.
+"""The tables of a scene file, one class each: meaning, unit, default and range of every key.
 
 Field names are those of the FMU parameters; units are SI. `springbeam.scene.rules` has what several tables decide.
 """
@@ -112,8 +112,8 @@ class Spring(Table):
     equilibrium: float = 0.0  #: Ψ [m]: where the top starts
     external_force: float = 0.0  #: f_s [N]
     initial_velocity: float = 0.0  #: z at the start [m/s]
-    relative_tolerance: Annotated[float, Field(gt=0.0, le=1e-2)] = 1e-12  #: of IDA
-    absolute_tolerance: Annotated[float, Field(gt=0.0, le=1e-2)] = 1e-14  #: of IDA
+    relative_tolerance: Annotated[float, Field(gt=0.0, le=1e-2)] = 1e-12  #: IDA's
+    absolute_tolerance: Annotated[float, Field(gt=0.0, le=1e-2)] = 1e-14  #: IDA's, of y [m] and z [m/s]
 
 
 class Stop(Table):
@@ -143,7 +143,7 @@ class Contact(Table):
         return self.law in ("tie", "link")
 
 
-#: How long macro steps are: one key, or the others.
+#: Keys that set the length of macro steps: the one, or the others.
 STEP_KEY, TOLERANCE_KEYS = "macro_step", ("relative_tolerance", "absolute_tolerance")
 
 
@@ -167,7 +167,7 @@ class Coupling(Table):
     scheme: Literal["energy", "hermite", "auto", "gauss_seidel", "jacobi"] = "energy"
     degree: Annotated[int, Field(ge=0, le=2)] = 0  #: of the contact force over a step
     macro_step: Annotated[float | None, Field(gt=0.0)] = None  #: H [s]; `DEFAULT_STEP` where no tolerance is given
-    #: Instead of ``macro_step``: of a step's error, relative to the motion so far, and absolute [m].
+    #: Largest error of a step, relative to the motion so far, and absolute [m]; instead of ``macro_step``.
     relative_tolerance: Annotated[float | None, Field(gt=0.0, le=0.1)] = None
     absolute_tolerance: Annotated[float | None, Field(gt=0.0)] = None
     tolerance: Annotated[float, Field(gt=0.0, le=1e-3)] = 1.0e-12

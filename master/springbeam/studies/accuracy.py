@@ -86,15 +86,15 @@ class Picked:
 
     @property
     def scene(self) -> Scene:
-        """Asks for no accuracy: it says how it is run."""
+        """The scene with what was picked; it asks for no accuracy."""
         return self.run.scene
 
     def trajectory(self) -> Trajectory:
-        """The run, what was picked and found in its summary."""
+        """Return the run, with what was picked and found in its summary."""
         return replace(self.run, summary={**self.run.summary, "accuracy": self.summary()})
 
     def summary(self) -> dict[str, Any]:
-        """As it goes into ``summary.json``."""
+        """Return what goes into ``summary.json``."""
         coupling, spring = self.scene.coupling, self.scene.spring
         picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree}
         if coupling.adaptive:
@@ -181,47 +181,47 @@ class _Pilot:
 
     @property
     def displacement(self) -> np.ndarray:
-        """Of the tip, without a beam of the spring top [m]."""
+        """Displacement of the tip, without a beam that of the spring top [m]."""
         return self.run["u_tip" if "u_tip" in self.run.columns else "y"]
 
 
 @dataclass(frozen=True)
 class _Estimate:
-    """Of the finer one of two runs, relative to the largest change of the tip, and to the time that is run."""
+    """Errors of the finer one of two runs, over the largest change of the tip and over the time that is run."""
 
     displacement: float
-    expected: float  #: the same, if the order of convergence holds
+    expected: float  #: ``displacement`` if the order of convergence holds
     event: float
     events: int
     apart: float  #: by how much the two differ in the larger of both
 
 
 class _Way(Protocol):
-    """How runs are made finer."""
+    """A way to make runs finer."""
 
     def first(self) -> float:
-        """How fine the first run is."""
+        """Return how fine the first run is."""
 
     def coupling(self, fineness: float) -> dict[str, Any]:
-        """Keys of ``[coupling]`` for a run so fine."""
+        """Return the keys of ``[coupling]`` for a run so fine."""
 
     def second(self, first: _Pilot) -> float:
-        """How fine the second run is."""
+        """Return how fine the second run is."""
 
     def next(self, fine: _Pilot, estimate: _Estimate) -> float:
-        """How fine a run is whose estimate, after ``estimate``, is expected to hold."""
+        """Return how fine a run is whose estimate, after ``estimate``, is expected to hold."""
 
     def after_stop(self, stopped: _Pilot) -> float:
-        """How fine the run after one that has stopped early is."""
+        """Return how fine the run after one that has stopped early is."""
 
     def steps(self, fineness: float, last: _Pilot | None) -> float:
-        """How many macro steps a run so fine is expected to take."""
+        """Return how many macro steps a run so fine is expected to take."""
 
     def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
-        """How many times as accurate ``fine`` is, in displacements and in times of events."""
+        """Return how many times as accurate ``fine`` is, in displacements and in times of events."""
 
     def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
-        """Of the displacements [m], where they are compared."""
+        """Return the difference of the displacements [m] where they are compared."""
 
 
 class _EqualSteps:
@@ -278,7 +278,7 @@ class _EqualSteps:
         return ratio**order, ratio ** min(order, _OF_EVENTS)
 
     def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
-        """At the times that are rows of both, but for rounding."""
+        """Return the difference at the times that are rows of both, but for rounding."""
         times, wanted = fine.run.time, coarse.run.time
         index = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
         index -= np.abs(times[index - 1] - wanted) < np.abs(times[index] - wanted)
@@ -322,7 +322,7 @@ class _Tolerances:
         return ratio, ratio
 
     def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
-        """At all rows of the coarser run, between those of the finer one by its velocity."""
+        """Return the difference at all rows of the coarser run; between its rows the finer one follows its velocity."""
         times, rows = np.unique(fine.run.time, return_index=True)
         between = CubicHermiteSpline(times, fine.displacement[rows], fine.run.v_tip[rows])
         return np.asarray(coarse.displacement - between(coarse.run.time))
@@ -371,7 +371,7 @@ class _Search:
         )
 
     def _pilot(self, fineness: float) -> _Pilot:
-        """It may stop early, which a finer one may not. Raises RunStopped if that goes on."""
+        """Run once. A pilot may stop early, since a finer one may not; raises RunStopped if that goes on."""
         coupling = {
             **self._way.coupling(fineness),
             "tolerance": max(_COUPLING_SHARE * self._accuracy, _TIGHTEST),
@@ -414,7 +414,7 @@ class _Search:
 
 
 def _rung(steps: float) -> float:
-    """Macro steps, at least these: four sizes an octave, so that any two runs have many times in common."""
+    """Round a number of macro steps up: four sizes an octave, so that any two runs have many times in common."""
     steps = max(steps, _FEWEST)
     unit = max(2.0 ** (math.floor(math.log2(steps)) - 2), 4.0)
     return unit * math.ceil(steps / unit * (1.0 - 1e-9))
