@@ -42,15 +42,17 @@ class Axis:
         return float(self.low * (self.high / self.low) ** x)
 
 
+_ENERGY = (("energy", 0), ("energy", 1), ("energy", 2))
+_RIGID = (*_ENERGY, ("hermite", 1), ("hermite", 2), ("auto", 0))
+_SOFT = (*_ENERGY, ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1), ("auto", 0))
 #: law, scheme, degree: all that a scene may ask for; Algorithm 1 has no scheme.
 COUPLINGS = (
-    *(("transmission", scheme, degree)
-      for scheme, degree in (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2), ("auto", 0))),
-    *(("compliance", scheme, degree)
-      for scheme, degree in (("energy", 0), ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1),
-                             ("auto", 0))),
+    *(("transmission", *scheme) for scheme in _RIGID),
+    *(("compliance", *scheme) for scheme in _SOFT),
+    *(("tie", *scheme) for scheme in _RIGID),
+    *(("link", *scheme) for scheme in _SOFT),
     ("paper", "energy", 0),
-)  # fmt: skip
+)
 
 AXES = (
     Axis("coupling", choices=COUPLINGS),
@@ -208,6 +210,8 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
     clearance = cell["clearance"]
     if elastic:
         clearance = min(clearance, 0.1 * speed * steps * H)  # else most would never meet
+    if law in ("tie", "link"):
+        clearance = 0.0  # joined from the start
     # What takes the beam's kinetic energy v²/6.
     reach = abs(psi) + speed / np.sqrt(3.0 * k1)
     k2 = {"hardening": k2, "softening": -k1 / (cell["escape"] * reach) ** 2, "linear": 0.0}[cell["k2_kind"]]

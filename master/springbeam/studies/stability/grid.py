@@ -168,7 +168,7 @@ def _overlap(run: Trajectory) -> float:
     motion = max(float(np.abs(p).max()) for p in positions)
     motion += scene.coupling.H * max(float(np.abs(v).max()) for v in speeds)
     overlap = 0.0
-    if scene.contact.law == "transmission" and scene.beam is not None and scene.spring is not None:
+    if scene.contact.rigid and scene.beam is not None and scene.spring is not None:
         joined = np.isin(run.phase, ("tied", "touch"))
         overlap = float(np.max(np.where(joined, np.abs(run.gap), np.where(run.phase == "free", -run.gap, 0.0))))
     if scene.stop is not None and scene.contact.law != "paper":
