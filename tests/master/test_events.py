@@ -11,15 +11,13 @@ from numpy.polynomial import Polynomial
 from springbeam.bodies.protocol import Motion
 from springbeam.contact.events import (
     EventFunctions,
-    Sample,
+    clearance,
     cubic_crossing,
-    cubic_value,
     interpolated,
     locate,
-    lowest_inside,
-    stays_above,
 )
 from springbeam.contact.laws import Transmission
+from springbeam.contact.paths import Sample
 from springbeam.contact.phases import Joint, Phase, common_velocity
 from springbeam.scene import load_scene
 
@@ -34,13 +32,6 @@ def ends(coefficients) -> tuple[Polynomial, Sample, Sample]:
 
 
 @pytest.mark.parametrize("coefficients", CUBICS)
-def test_cubic_value_is_the_cubic(coefficients):
-    p, start, end = ends(coefficients)
-    for tau in (0.0, 0.003, 0.017, SIZE):
-        assert cubic_value(start, end, SIZE, tau) == pytest.approx(p(tau), abs=1e-14)
-
-
-@pytest.mark.parametrize("coefficients", CUBICS)
 def test_interpolated_is_the_cubic_and_its_rate(coefficients):
     p, start, end = ends(coefficients)
     for tau in (0.0, 0.003, 0.017, SIZE):
@@ -49,36 +40,14 @@ def test_interpolated_is_the_cubic_and_its_rate(coefficients):
         assert got[1] == pytest.approx(p.deriv()(tau), abs=1e-12)  # 1e-14/H, rounded up
 
 
-@pytest.mark.parametrize(
-    "coefficients",
-    [*CUBICS, (0.0, -1.0, 2.0), (1.0, -2.0), (0.0, -1.0, 0.0, 2.0), (0.0, 0.0, -1.0, 2.0)],
-)
-def test_lowest_inside_is_the_minimum(coefficients):
-    """Cubics (one from rest), a parabola and a line; the roots of ṗ where p̈ > 0, if they lie inside."""
-    p, start, end = ends(coefficients)
-    roots = p.deriv().trim().roots() if p.trim().degree() > 1 else []
-    inside = [
-        float(r.real) for r in roots if abs(r.imag) < 1e-12 and 1e-9 < r.real < SIZE - 1e-9 and p.deriv(2)(r.real) > 0.0
-    ]
-    lowest = lowest_inside(start, end, SIZE)
-    assert (lowest is None) == (not inside)
-    if inside:
-        assert lowest == pytest.approx(inside[0], rel=1e-12)
-        assert p(lowest) < min(start[0], end[0])
-
-
 @pytest.mark.parametrize("coefficients", CUBICS)
-def test_a_cubic_bound_to_stay_above_a_level_does(coefficients):
-    """The hull is never above the cubic, and at most as far below as its points are apart."""
+def test_a_cubic_lies_in_its_hull(coefficients):
     p, start, end = ends(coefficients)
-    least = float(p(np.linspace(0.0, SIZE, 2001)).min())
-    assert not stays_above(start, end, SIZE, least + 1e-9)
-    assert stays_above(start, end, SIZE, least - (max(abs(start[1]), abs(end[1])) * SIZE + abs(end[0] - start[0])))
-
-
-def test_the_set_of_cubics_has_both_answers():
-    found = [lowest_inside(*ends(c)[1:], SIZE) is not None for c in CUBICS]
-    assert 1 < sum(found) < len(found)
+    values = p(np.linspace(0.0, SIZE, 2001))
+    lowest, highest = clearance(start, end, SIZE)
+    assert lowest <= values.min() + 1e-15
+    assert highest >= values.max() - 1e-15
+    assert highest - lowest <= max(abs(start[1]), abs(end[1])) * SIZE + abs(end[0] - start[0])
 
 
 @pytest.mark.parametrize("x", [1e-6, 0.25, 0.5, 0.999])

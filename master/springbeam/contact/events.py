@@ -1,12 +1,15 @@
 """Event functions, and where inside a step one of them vanishes.
 
 An event function f is positive while nothing happens and falls through zero at the event. A step knows f and ḟ at
-both ends; the cubic through them tells where to look, also for a contact that opens and closes again inside the step.
+both ends and the means of f; `springbeam.contact.paths` tells from them where to look, also for a contact that closes
+and opens again inside the step.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -14,59 +17,79 @@ from ..bodies.protocol import Motion
 from ..scene import Beam, Scene, Spring
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .laws import Law
+from .paths import Means, Path, Sample
 from .phases import Joint, Phase, spring_force
 
 _EPS = float(np.finfo(float).eps)
 _MAX_EVALUATIONS = 60
 
-
-#: f and ḟ at one time.
-Sample = tuple[float, float]
-#: f, ḟ of the ends (tip, lower end).
-EventFunction = Callable[[tuple[Motion, Motion]], Sample]
+#: The interface ends (tip, lower end).
+Ends = tuple[Motion, Motion]
 
 
-def gap(ends: tuple[Motion, Motion]) -> Sample:
+class EventFunction(Protocol):
+    """f of the ends (tip, lower end), positive while nothing happens."""
+
+    def __call__(self, ends: Ends) -> Sample:
+        """Return f and ḟ."""
+
+    def means(self, ends: Ends, size: float) -> Means | None:
+        """Return the means of f over the step of ``size`` [s] that has ended at ``ends``; ``None`` if nobody knows."""
+
+
+class Gap:
     """g = u_tip − y, or what lies below the tip instead of y."""
-    tip, low = ends
-    return tip.displacement - low.displacement, tip.velocity - low.velocity
 
-
-def _above(end: int, level: float, share: float) -> EventFunction:
-    """Height of an end; its rate is the tip's velocity by ``share``, the lower end's by the rest."""
-
-    def height(ends: tuple[Motion, Motion]) -> Sample:
+    def __call__(self, ends: Ends) -> Sample:
         tip, low = ends
-        return ends[end].displacement - level, low.velocity + share * (tip.velocity - low.velocity)
+        return tip.displacement - low.displacement, tip.velocity - low.velocity
 
-    return height
-
-
-def _below(end: int, level: float, share: float) -> EventFunction:
-    above = _above(end, level, share)
-
-    def depth(ends: tuple[Motion, Motion]) -> Sample:
-        value, rate = above(ends)
-        return -value, -rate
-
-    return depth
+    def means(self, ends: Ends, size: float) -> Means:
+        tip, low = ends
+        return (tip.integral - low.integral) / size, (tip.integral_2 - low.integral_2) / (size * size)
 
 
-def _holding(beam: Beam, spring: Spring) -> EventFunction:
+gap = Gap()
+
+
+@dataclass(frozen=True)
+class Height:
+    """Height of an end above a level, or below it; ``share`` is the tip's part in its rate."""
+
+    end: int  #: 0: the tip, 1: the lower end
+    level: float  #: [m]
+    share: float
+    sign: float = 1.0  #: −1: below
+
+    def __call__(self, ends: Ends) -> Sample:
+        tip, low = ends
+        rate = low.velocity + self.share * (tip.velocity - low.velocity)
+        return self.sign * (ends[self.end].displacement - self.level), self.sign * rate
+
+    def means(self, ends: Ends, size: float) -> Means:
+        end, level = ends[self.end], self.level
+        return self.sign * (end.integral / size - level), self.sign * (end.integral_2 / (size * size) - 0.5 * level)
+
+
+class Holding:
     """C/k of a massless tip on the spring top, y − u_F + α_b z [m]: known from where they are, not from a step's force.
 
     ż of its rate is that of the spring with the tip on it, off the foundation.
     """
-    rest, stiffness, alpha = tip_load_deflection(beam), 1.0 / tip_compliance(beam), beam.alpha_b
 
-    def pressed(ends: tuple[Motion, Motion]) -> Sample:
+    def __init__(self, beam: Beam, spring: Spring) -> None:
+        self._spring, self._alpha = spring, beam.alpha_b
+        self._rest, self._stiffness = tip_load_deflection(beam), 1.0 / tip_compliance(beam)
+
+    def __call__(self, ends: Ends) -> Sample:
         _, low = ends
-        y, z = low.displacement, low.velocity
-        value = y - rest + alpha * z
-        acceleration = -(stiffness * value + spring.damping * z + spring_force(spring, y)) / spring.mass
-        return value, z + alpha * acceleration
+        y, z, spring = low.displacement, low.velocity, self._spring
+        value = y - self._rest + self._alpha * z
+        acceleration = -(self._stiffness * value + spring.damping * z + spring_force(spring, y)) / spring.mass
+        return value, z + self._alpha * acceleration
 
-    return pressed
+    def means(self, ends: Ends, size: float) -> None:
+        return None
 
 
 class EventFunctions:
@@ -83,7 +106,7 @@ class EventFunctions:
         self._phase: Phase | None = None
         self._functions: list[tuple[str, EventFunction]] = []
         #: The ends last asked for, and the samples there: a step starts where the one before has ended.
-        self._ends: tuple[Motion, Motion] | None = None
+        self._ends: Ends | None = None
         self._samples: list[Sample] = []
 
     def of(self, phase: Phase) -> list[tuple[str, EventFunction]]:
@@ -91,7 +114,7 @@ class EventFunctions:
             self._phase, self._functions, self._ends = phase, self._built(phase), None
         return self._functions
 
-    def samples(self, phase: Phase, ends: tuple[Motion, Motion]) -> list[Sample]:
+    def samples(self, phase: Phase, ends: Ends) -> list[Sample]:
         """f, ḟ of each function of ``phase``."""
         functions = self.of(phase)
         if ends != self._ends:
@@ -108,54 +131,29 @@ class EventFunctions:
             if phase.joint is Joint.FREE:
                 functions.append(("impact", gap))
             if phase.joint is Joint.TIED and not phase.seated:
-                functions.append(("release", _below(low, spring.equilibrium, share)))
+                functions.append(("release", Height(low, spring.equilibrium, share, -1.0)))
             if phase.joint is Joint.TOUCH:
-                functions.append(("retie", _above(low, spring.equilibrium, share)))
+                functions.append(("retie", Height(low, spring.equilibrium, share)))
                 beam = self._scene.beam
                 if beam is not None and beam.fidelity == "quasi_static" and not phase.seated:
-                    functions.append(("separation", _holding(beam, spring)))
+                    functions.append(("separation", Holding(beam, spring)))
         if stop is not None and not phase.seated:
             end, share = (tip, 1.0) if spring is None else (low, share)
-            functions.append(("stop_impact", _above(end, stop.position, share)))
+            functions.append(("stop_impact", Height(end, stop.position, share)))
         return functions
 
 
-def position_tolerance(ends: tuple[Motion, Motion], level: float, macro_step: float) -> float:
+def position_tolerance(ends: Ends, level: float, macro_step: float) -> float:
     """What positions can be told apart to [m]: rounding of the displacements, and of the foundation's ``level``."""
     (u, v, _, _), (y, z, _, _) = ends
     return 8.0 * _EPS * max(abs(u), abs(y), abs(level)) + 1e-15 * max(abs(v), abs(z)) * macro_step
 
 
-def stays_above(start: Sample, end: Sample, size: float, level: float) -> bool:
-    """Whether the cubic is bound to stay above ``level``: its Bézier points do, and it lies in their hull."""
+def clearance(start: Sample, end: Sample, size: float) -> tuple[float, float]:
+    """Return the lowest and the highest Bézier point of the cubic through both samples: it lies in their hull."""
     (f0, d0), (f1, d1), third = start, end, size / 3.0
-    return f0 >= level and f1 >= level and f0 + third * d0 >= level and f1 - third * d1 >= level
-
-
-def lowest_inside(start: Sample, end: Sample, size: float) -> float | None:
-    """τ in (0, size) where the cubic through both samples has its minimum, if it has one inside."""
-    d0, d1 = start[1] * size, end[1] * size
-    rise = end[0] - start[0]
-    # f(x) = f0 + d0 x + b x² + a x³ on [0, 1]
-    a, b = d0 + d1 - 2.0 * rise, 3.0 * rise - 2.0 * d0 - d1
-    discriminant = b * b - 3.0 * a * d0
-    if discriminant <= 0.0:
-        return None
-    # The root of f' with f'' > 0, in the form that does not cancel.
-    root = discriminant**0.5
-    denominator = b + root if b > 0.0 else 3.0 * a
-    if denominator == 0.0:
-        return None
-    x = (-d0 if b > 0.0 else root - b) / denominator
-    return x * size if 0.0 < x < 1.0 else None
-
-
-def cubic_value(start: Sample, end: Sample, size: float, tau: float) -> float:
-    """The cubic's value at τ."""
-    x = tau / size
-    d0, d1 = start[1] * size, end[1] * size
-    rise = end[0] - start[0]
-    return start[0] + x * (d0 + x * (3.0 * rise - 2.0 * d0 - d1 + x * (d0 + d1 - 2.0 * rise)))
+    points = (f0, f1, f0 + third * d0, f1 - third * d1)
+    return min(points), max(points)
 
 
 def interpolated(start: Motion, end: Motion, size: float, tau: float) -> Sample:
@@ -163,7 +161,7 @@ def interpolated(start: Motion, end: Motion, size: float, tau: float) -> Sample:
     v, w = start.velocity, end.velocity
     x, rise = tau / size, (end.displacement - start.displacement) / size
     rate = v + x * (2.0 * (3.0 * rise - 2.0 * v - w) + 3.0 * x * (v + w - 2.0 * rise))
-    return cubic_value((start.displacement, v), (end.displacement, w), size, tau), rate
+    return Path.through((start.displacement, v), (end.displacement, w), size).at(x), rate
 
 
 def cubic_crossing(start: Sample, end: Sample, size: float) -> float:

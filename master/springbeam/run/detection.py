@@ -11,16 +11,14 @@ from typing import NamedTuple
 from ..contact.events import (
     EventFunction,
     EventFunctions,
-    Sample,
+    clearance,
     cubic_crossing,
-    cubic_value,
     gap,
     interpolated,
     locate,
-    lowest_inside,
     position_tolerance,
-    stays_above,
 )
+from ..contact.paths import Path, Sample
 from ..contact.phases import common_velocity
 from ..coupling.protocol import Ends, Step
 from ..scene import Scene
@@ -28,6 +26,8 @@ from .macro_steps import AdaptiveSteps, MacroGrid
 from .separation import Separation
 from .stepping import Pair, State
 
+#: A path may be wrong by this share of its distance from the cubic; trial steps to the bottom of a dip.
+_UNSURE, _MAX_DIP_TRIALS = 0.25, 4
 #: An event closer to the start of a step than this fraction of H happens at the start.
 _NO_TIME = 1e-9
 #: Of a velocity, relative to the largest so far.
@@ -119,7 +119,8 @@ class Detector:
             for (kind, function), start, end in zip(functions, starts, ends, strict=True):
                 # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
                 floor = min(start[0], 0.0) - tolerance
-                if stays_above(start, end, step.size, floor):
+                lowest, highest = clearance(start, end, step.size)
+                if lowest - floor > highest - lowest:  # no dip is as deep as the whole change
                     continue
                 bracket = self._bracket(state, function, step, floor, start, end)
                 if bracket is None or (kind == found and bracket is step):
@@ -140,17 +141,33 @@ class Detector:
     def _bracket(
         self, state: State, function: EventFunction, step: Step, floor: float, start: Sample, end: Sample
     ) -> Step | None:
-        """The step itself if ``function`` ends below ``floor``, a shorter one if it dips below it inside, or None."""
+        """Return ``step`` if ``function`` ends below ``floor``, a shorter one if it dips below it inside, or None."""
         if end[0] < floor:
             return step
         if abs(start[1]) <= self._rest(step.start):
             # Ends that have just parted may close a little first, by the error of the time at which they were let go.
             return None
-        inside = lowest_inside(start, end, step.size)
-        if inside is None or cubic_value(start, end, step.size, inside) >= floor:
+        path = Path.through(start, end, step.size, function.means(step.end, step.size))
+        unsure = _UNSURE * path.beside_cubic
+        if clearance(start, end, step.size)[0] - path.beside_cubic >= floor + unsure:
             return None
-        dip = self._pair.attempt(state, inside, step.start)
-        return dip if function(dip.end)[0] < floor else None
+        before, whole = 0.0, step.size
+        for _ in range(_MAX_DIP_TRIALS):
+            inside = path.lowest_inside()
+            if inside is None or path.at(inside) >= floor + unsure:
+                return None
+            dip = self._pair.attempt(state, before + inside * path.size, step.start)
+            bottom = function(dip.end)
+            if bottom[0] < floor:
+                return dip
+            # The bottom is on the side to which the function falls.
+            if bottom[1] < 0.0:
+                start, before = bottom, dip.size
+            else:
+                end, whole = bottom, dip.size
+            shrunk = (whole - before) / step.size
+            path, unsure = Path.through(start, end, whole - before), unsure * shrunk**4
+        return None
 
     def _located(self, state: State, function: EventFunction, bracket: Step) -> Step:
         last = bracket
@@ -169,10 +186,11 @@ class Detector:
         start, end = gap(step.start), gap(step.end)
         if start[0] < 0.0 or end[0] < 0.0 or any(step.contact):
             return step
-        inside = lowest_inside(start, end, step.size)
-        if inside is None or cubic_value(start, end, step.size, inside) >= 0.0:
+        path = Path.through(start, end, step.size, gap.means(step.end, step.size))
+        inside = path.lowest_inside()
+        if inside is None or path.at(inside) >= _UNSURE * path.beside_cubic:
             return step
-        cut = self._pair.attempt(state, inside, step.start)
+        cut = self._pair.attempt(state, inside * step.size, step.start)
         return cut if any(cut.contact) else step
 
     # -- soft contact ------------------------------------------------------------------------------------------------

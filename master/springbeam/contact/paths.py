@@ -1,0 +1,73 @@
+"""How a position moves inside a step: a quintic through both ends' values and rates that has the step's two moments.
+
+The cubic through values and rates alone hides what is shallower than its own error, of order 4 in the step. The bodies
+report ∫ w and ∫∫ w as well: with these the polynomial is of order 6, and its distance from the cubic tells how well
+the step is resolved.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+#: f and ḟ at one time.
+Sample = tuple[float, float]
+#: ∫ f dτ / H and ∫∫ f dτ dτ / H² over a step.
+Means = tuple[float, float]
+
+#: Largest values in (0, 1) of s²(1 − s)² and of s²(1 − s)²(2s − 1).
+_EVEN, _ODD = 1.0 / 16.0, 0.0178885438
+#: Points at which a minimum is looked for, and bisections to it.
+_POINTS, _BISECTIONS = 16, 40
+
+
+class Path(NamedTuple):
+    """f(s) on [0, 1], s = τ/H: the cubic a₀ + a₁ s + a₂ s² + a₃ s³ and s²(1 − s)² [even + odd (2s − 1)]."""
+
+    cubic: tuple[float, float, float, float]
+    even: float
+    odd: float
+    size: float  #: H [s]
+
+    @classmethod
+    def through(cls, start: Sample, end: Sample, size: float, means: Means | None = None) -> Path:
+        """Return the path from ``start`` to ``end`` in a step of ``size`` [s]; a cubic where its means are unknown."""
+        (f0, d0), (f1, d1), even, odd = start, end, 0.0, 0.0
+        d0, d1, rise = d0 * size, d1 * size, f1 - f0
+        if means is not None:
+            beside = means[0] - 0.5 * (f0 + f1) - (d0 - d1) / 12.0
+            twice = means[1] - (7.0 * f0 + 3.0 * f1) / 20.0 - (d0 / 20.0 - d1 / 30.0)
+            even, odd = 30.0 * beside, 210.0 * (beside - 2.0 * twice)
+        return cls((f0, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise), even, odd, size)
+
+    @property
+    def beside_cubic(self) -> float:
+        """Largest distance between path and cubic, at most."""
+        return _EVEN * abs(self.even) + _ODD * abs(self.odd)
+
+    def at(self, s: float) -> float:
+        a0, a1, a2, a3 = self.cubic
+        bubble = s * (1.0 - s)
+        return a0 + s * (a1 + s * (a2 + s * a3)) + bubble * bubble * (self.even + self.odd * (2.0 * s - 1.0))
+
+    def slope(self, s: float) -> float:
+        """df/ds."""
+        _, a1, a2, a3 = self.cubic
+        bubble, tilt = s * (1.0 - s), 2.0 * s - 1.0
+        turning = self.even + self.odd * tilt
+        return a1 + s * (2.0 * a2 + 3.0 * a3 * s) - 2.0 * bubble * tilt * turning + 2.0 * bubble * bubble * self.odd
+
+    def lowest_inside(self) -> float | None:
+        """Return s in (0, 1) of the lowest minimum, ``None`` if there is none inside."""
+        best: float | None = None
+        slopes = [self.slope(i / _POINTS) for i in range(_POINTS + 1)]
+        for i, (before, after) in enumerate(pairwise(slopes)):
+            if not before < 0.0 <= after:
+                continue
+            low, high = i / _POINTS, (i + 1) / _POINTS
+            for _ in range(_BISECTIONS):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if self.slope(middle) < 0.0 else (low, middle)
+            if best is None or self.at(high) < self.at(best):
+                best = high
+        return best if best is None or 0.0 < best < 1.0 else None
