@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from .hybrid_system import HybridSystem, Phase, ReferenceFailure
+from .hybrid_system import HybridSystem, ReferenceFailure
+from .laws import Phase
 from .oscillators import GAUSS, STAGES, Oscillators, StepWeights
 from .propagators import Propagator, Segment
 
@@ -55,7 +56,7 @@ class LinearForm:
     constant : (p,) array
         c, of the constant loads.
     inputs : (k, p) array
-        P: the forces r. First the spring's remainder −(α_s − α_b k1) z − k2 y³, then C of `compliance`; each if
+        P: the forces r. First the spring's remainder −(α_s − α_b k1) z − k2 y³, then the law's force C; each if
         the phase has it.
     outputs : (o, p) array
         J: the interface displacements that r depends on: y, then u; each if it moves and matters.
@@ -72,7 +73,7 @@ class LinearForm:
         self.joined = system.joined(phase)
         self.held = phase.seated and (self.joined or not system.has_spring)
         self.spring_moves = system.has_spring and not phase.seated
-        self.pressed = system.two_bodies and system.compliance and phase.contact != "free"
+        self.pressed = system.law.acts(phase.contact)
         #: Modes of M ξ-space: a = basis ξ (+ offset), and back.
         self.offset = np.zeros(system.r)
         if self.held:
@@ -177,7 +178,8 @@ class LinearForm:
         if self.spring_moves:
             result[0] = -self.extra_damping * w_dot[0] - s.spring.cubic_stiffness * w[0] ** 3
         if self.pressed:
-            result[-1] = s.compliance_force((w[0] if self.spring_moves else X[s.Y]) - w[-1])
+            y, z = (w[0], w_dot[0]) if self.spring_moves else (X[s.Y], X[s.Z])
+            result[-1] = s.law.force(y - w[-1], z - w_dot[-1])
         return result
 
     def weights(self, size: float) -> _Weights:
