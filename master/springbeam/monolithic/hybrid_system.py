@@ -54,7 +54,7 @@ class HybridSystem:
 
     @property
     def dissipative(self) -> bool:
-        return self.alpha_b > 0.0 or self.spring.damping > 0.0
+        return self.alpha_b > 0.0 or self.spring.damping > 0.0 or self.law.dissipative
 
     @property
     def two_bodies(self) -> bool:
@@ -103,7 +103,7 @@ class HybridSystem:
         dX[self.V] = p + self.b * C
         dX[self.Y] = 0.0 if phase.seated else z
         dX[self.Z] = 0.0 if phase.seated else (s - C) * self.inverse_mass
-        dX[self.D] = self.dissipation_rate(X) if self.dissipative else 0.0
+        dX[self.D] = self.dissipation_rate(phase, X) if self.dissipative else 0.0
         return dX
 
     def jacobian(self, phase: Phase, X: np.ndarray) -> np.ndarray:
@@ -133,10 +133,14 @@ class HybridSystem:
             J[Z] = (s - C) * self.inverse_mass
         return J
 
-    def dissipation_rate(self, X: np.ndarray) -> np.ndarray:
-        """α_b ȧᵀω²ȧ + α_s z² [W]."""
+    def dissipation_rate(self, phase: Phase, X: np.ndarray) -> np.ndarray:
+        """α_b ȧᵀω²ȧ + α_s z², and what the law takes [W]."""
         v, z = X[..., self.V], X[..., self.Z]
-        return np.asarray(self.alpha_b * (v**2 @ self.stiffness) + self.spring.damping * z**2)
+        rate = np.asarray(self.alpha_b * (v**2 @ self.stiffness) + self.spring.damping * z**2)
+        if not (self.law.dissipative and self.law.counts(phase.contact)):
+            return rate
+        penetration, closing = X[..., self.Y] - X[..., self.A] @ self.b, z - v @ self.b
+        return np.asarray(rate + self.law.dissipation(phase.contact, penetration, closing))
 
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """X, in place, with what rounding leaves of the phase's constraint removed: y = u, or u = φ when seated."""
@@ -157,7 +161,7 @@ class HybridSystem:
         spring = (0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4) * float(
             self.has_spring
         )
-        contact = self.law.potential(y - a @ self.b) if self.law.acts(phase.contact) else np.zeros_like(y)
+        contact = self.law.potential(y - a @ self.b) if self.law.counts(phase.contact) else np.zeros_like(y)
         return {
             "e_beam": 0.5 * np.sum(v**2 + self.stiffness * a**2, axis=-1),
             "e_spring": spring,

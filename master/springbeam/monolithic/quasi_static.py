@@ -162,7 +162,11 @@ class _Run:
         samples = samples[samples >= self.time]
         if every_event:
             self._record(self.time, self.X)
-        if self.rest + self.X[2] - self.X[0] <= _NOISE * abs(self.psi) and self.arriving <= self.X[1]:
+        if self.law.start != "free" and self.arriving == self.X[1]:
+            self.phase, self.X[2] = Phase(self.law.start), self.X[0] - self.rest
+        elif self.rest + self.X[2] - self.X[0] <= _NOISE * abs(self.psi) and (
+            self.law.start != "free" or self.arriving <= self.X[1]
+        ):
             self._go_on("meet")
         evaluations = 0
         while self.time < self.t_end:
@@ -203,7 +207,8 @@ class _Run:
 
     def _integrate(self) -> tuple[Watch | None, Any]:
         """To the first event or t_end; the event, and scipy's solution."""
-        watched = self._watched()
+        # scipy takes a function that stays at zero, as those of a pair at rest at Ψ, for an event.
+        watched = self._watched() if np.any(self._derivative(self.time, self.X)) else []
         # Events are looked for at the ends of steps: none may hold two crossings of one function.
         s, rigid = self.spring, self.k + abs(self.spring.linear_stiffness)
         reach = abs(self.X[0]) + abs(self.X[1]) * np.sqrt(s.mass / rigid)
@@ -249,6 +254,7 @@ class _Run:
         if contact == "free" and self.alpha == 0.0:
             lost, X[2] = 0.5 * self.k * X[2] ** 2, 0.0
         self.phase = Phase(contact, self.phase.seated)
+        assert kind is not None
         self._emit(kind, energy_loss=lost)
 
     def below(self) -> bool:

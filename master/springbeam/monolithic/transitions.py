@@ -39,6 +39,10 @@ class HybridState:
         self.loss = 0.0
         self.events: list[Event] = []
         self._seat_height = seat_height
+        m = system.motion(self.phase, X)
+        if not (system.law.rigid and abs(float(m.v - m.z)) > system.velocity_noise(X)):
+            self.phase = Phase(system.law.start)
+            system.synchronise(self.phase, X)
 
     # What a phase ends with -----------------------------------------------------------------------------------------
 
@@ -68,8 +72,12 @@ class HybridState:
         self.system.synchronise(self.phase, self.X)
 
     def start(self) -> None:
-        """First contact, and its impact, where tip and obstacle touch at the start."""
+        """First contact, and its impact, where tip and obstacle touch at the start, or are joined from there on."""
         s, X, stop = self.system, self.X, self._stop
+        if s.law.start != "free":
+            if self.phase.contact == "free":
+                self._meet()
+            return
         m = s.motion(self.phase, X)
         noise = s.displacement_noise(X)
         if s.two_bodies and float(m.u - m.y) <= noise:
@@ -102,7 +110,8 @@ class HybridState:
     def _go_on(self, happened: str) -> None:
         contact, kind = self.system.law.after(happened, self)
         self.phase = Phase(contact, self.phase.seated)
-        self._emit(kind)
+        if kind is not None:
+            self._emit(kind)
 
     def _meet(self) -> None:
         s, X = self.system, self.X
@@ -124,6 +133,7 @@ class HybridState:
         contact, kind = s.law.after("meet", self)
         self.phase = Phase(contact)
         s.synchronise(self.phase, X)
+        assert kind is not None
         self._emit(kind, impulse_contact=impulse, energy_loss=before - self._mechanical_energy())
         if was_seated:  # the spring already stands on the foundation
             self._hit_stop()
