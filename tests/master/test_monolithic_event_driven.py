@@ -436,14 +436,16 @@ def test_stiff_beam_of_the_paper_is_resolved() -> None:
     assert one.summary["largest_relative_energy_residual"] < 1e-11
 
 
-@pytest.mark.parametrize("law", ["transmission", "compliance"])
+@pytest.mark.parametrize(
+    ("law", "damping"), [("transmission", 0.0), ("compliance", 0.0), ("compliance", 0.7), ("link", 0.7)]
+)
 @pytest.mark.parametrize("phase", [Phase("free"), Phase("tied"), Phase("tied", seated=True), Phase("touch")])
-def test_jacobian_is_the_derivative_of_the_right_hand_side(law, phase):
+def test_jacobian_is_the_derivative_of_the_right_hand_side(law, damping, phase):
     soft = with_changes(
         load_scene("soft"),
         beam={"n_elements": 4, "alpha_b": 0.01},
         spring={"damping": 0.3},
-        contact={"law": law, "exponent": 1.5},
+        contact={"law": law, "exponent": 1.5, "damping": damping},
     )
     system = HybridSystem(soft)
     X = np.random.default_rng(1).standard_normal(system.size)

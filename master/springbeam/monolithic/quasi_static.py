@@ -109,6 +109,8 @@ class _Run:
         if self.beam.approach == "elastic":
             self.arriving = self._tip_velocity(tip - self.rest)
         self.X = np.array([self.psi, self.spring.initial_velocity + velocity_perturbation, tip - self.rest, 0.0])
+        if self.law.start != "free" and self.arriving == self.X[1]:  # joined already
+            self.phase, self.X[2] = Phase(self.law.start), self.X[0] - self.rest
 
     # Equations ------------------------------------------------------------------------------------------------------
 
@@ -162,11 +164,9 @@ class _Run:
         samples = samples[samples >= self.time]
         if every_event:
             self._record(self.time, self.X)
-        if self.law.start != "free" and self.arriving == self.X[1]:
-            self.phase, self.X[2] = Phase(self.law.start), self.X[0] - self.rest
-        elif self.rest + self.X[2] - self.X[0] <= _NOISE * abs(self.psi) and (
-            self.law.start != "free" or self.arriving <= self.X[1]
-        ):
+        joins = self.law.start != "free"
+        touches = self.rest + self.X[2] - self.X[0] <= _NOISE * abs(self.psi) and self.arriving <= self.X[1]
+        if self.phase.contact == "free" and (joins or touches):
             self._go_on("meet")
         evaluations = 0
         while self.time < self.t_end:
