@@ -69,17 +69,30 @@ def free_masses(
 def linked_masses(
     stiffness: float, damping: float, t_end: float, own: float = 4.0 * np.pi**2, **coupling: Any
 ) -> Scene:
-    """Return a scene of two unit masses, each held by ``own`` [N/m], on a link [N/m, N·s/m]; the tip starts at 1 m.
+    """Return a scene of two unit masses, each held by ``own`` [N/m], on a link [N/m, N·s/m]; the tip starts at 1 m."""
+    link = {"law": "link", "stiffness": stiffness, "damping": damping}
+    return _held_masses(own, own, link, t_end, {"initial_deflection_slope": 1.0}, coupling)
+
+
+def tied_masses(tip: float, top: float, t_end: float, **coupling: Any) -> Scene:
+    """Return a scene of two unit masses, held by ``tip`` and ``top`` [N/m] and tied; the tip starts with −1 m/s."""
+    return _held_masses(tip, top, {"law": "tie"}, t_end, {"initial_velocity_slope": -1.0}, coupling)
+
+
+def _held_masses(
+    tip: float, top: float, contact: dict[str, Any], t_end: float, start: dict[str, float], coupling: dict[str, Any]
+) -> Scene:
+    """A scene of unit masses held by ``tip`` and ``top`` [N/m].
 
     The beam is one linear element that can shear only: a huge rotary inertia keeps θ = 0.
     """
-    beam = {"density": 3.0, "second_moment_of_area": _RIGID, "shear_modulus": own, "n_elements": 1}
+    beam = {"density": 3.0, "second_moment_of_area": _RIGID, "shear_modulus": tip, "n_elements": 1}
     return scene_from_dict(
         {
             "time": {"t_end": t_end},
-            "beam": {**beam, "initial_deflection_slope": 1.0},
-            "spring": {"mass": 1.0, "linear_stiffness": own},
-            "contact": {"law": "link", "stiffness": stiffness, "damping": damping},
+            "beam": {**beam, **start},
+            "spring": {"mass": 1.0, "linear_stiffness": top},
+            "contact": contact,
             "coupling": coupling,
         }
     )
