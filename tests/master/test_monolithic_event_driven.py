@@ -10,7 +10,8 @@ from scipy.linalg import expm
 from scipy.special import ellipj, ellipk
 
 from springbeam.monolithic.event_driven import ReferenceFailure, simulate
-from springbeam.monolithic.hybrid_system import HybridSystem, Phase
+from springbeam.monolithic.hybrid_system import HybridSystem
+from springbeam.monolithic.laws import Phase
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.trajectory import COLUMNS, EVENT_KINDS, Trajectory
 from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
@@ -413,7 +414,7 @@ def test_sampling_does_not_change_the_run() -> None:
     ("changes", "message"),
     [
         ({"contact": {"impact": "rest"}}, "rigid tie"),
-        ({"contact": {"law": "paper"}}, "'transmission' and 'compliance'"),
+        ({"contact": {"law": "paper"}}, "knows 'transmission', 'compliance'"),
         ({"beam": {"initial_deflection_slope": -0.1}}, "below"),
         ({"beam": {"initial_deflection_slope": 0.1, "initial_velocity_slope": 0.0}}, "never"),
     ],
@@ -435,14 +436,16 @@ def test_stiff_beam_of_the_paper_is_resolved() -> None:
     assert one.summary["largest_relative_energy_residual"] < 1e-11
 
 
-@pytest.mark.parametrize("law", ["transmission", "compliance"])
+@pytest.mark.parametrize(
+    ("law", "damping"), [("transmission", 0.0), ("compliance", 0.0), ("compliance", 0.7), ("link", 0.7)]
+)
 @pytest.mark.parametrize("phase", [Phase("free"), Phase("tied"), Phase("tied", seated=True), Phase("touch")])
-def test_jacobian_is_the_derivative_of_the_right_hand_side(law, phase):
+def test_jacobian_is_the_derivative_of_the_right_hand_side(law, damping, phase):
     soft = with_changes(
         load_scene("soft"),
         beam={"n_elements": 4, "alpha_b": 0.01},
         spring={"damping": 0.3},
-        contact={"law": law, "exponent": 1.5},
+        contact={"law": law, "exponent": 1.5, "damping": damping},
     )
     system = HybridSystem(soft)
     X = np.random.default_rng(1).standard_normal(system.size)

@@ -1,7 +1,8 @@
 """Independent references: the pair solved as one system. Imports `scene` and
 `results.trajectory` only, so that agreement with the coupling is evidence.
 
-``event_driven`` integrates the laws `transmission` and `compliance` between located events; ``algorithm1`` is Ahn &
-Tate's own scheme. ``semi_discrete`` is their beam, ``hybrid_system`` the equations of each phase, ``exponential`` and
-``propagators`` two unrelated ways to integrate them.
+Start with ``laws`` (what joins the ends, a class each), ``hybrid_system`` (the equations of each phase) and
+``event_driven`` (the run); ``exponential`` and ``propagators`` are two unrelated ways to integrate a phase,
+``location`` finds its end, ``transitions`` applies what happens there. ``algorithm1`` is Ahn & Tate's own scheme,
+``semi_discrete`` their beam.
 """

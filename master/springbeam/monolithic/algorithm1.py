@@ -28,8 +28,9 @@ from typing import Literal, get_args
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from ..results.trajectory import COLUMNS, Event, Trajectory
+from ..results.trajectory import Event, Trajectory
 from ..scene import Scene
+from .algorithm1_ledger import StepLedger
 from .semi_discrete import SemiDiscreteBeam, assemble
 
 StartVelocity = Literal["rest", "tip", "average"]
@@ -114,6 +115,7 @@ class _Algorithm:
         self.load = scene.beam.distributed_load * d.uniform_load + scene.beam.tip_load_coefficient * d.hat_load
         self._set_step(scene.coupling.H)
         self.phi = -np.inf if scene.stop is None else scene.stop.position
+        self.ledger = StepLedger(scene, d, self.load)
         self.iterations: dict[str, list[int]] = {"beam": [], "predicted": [], "joined": []}
 
     def _set_step(self, h: float) -> None:
@@ -194,15 +196,10 @@ class _Algorithm:
         self.time = 0.0
         q, v = self._initial_beam()
         y, z = self.spring.equilibrium, self.spring.initial_velocity
-        self._rows: dict[str, list[float]] = {}
-        self._shapes: list[np.ndarray] = []
-        self._phases: list[str] = []
-        self._sampler = self.discrete.deflection_sampler()
-        self._totals = {"e_dissipated": 0.0, "e_injected_beam": 0.0, "e_injected_spring": 0.0}
         touched = self.beam.approach == "undeformed"
         if touched:  # nothing to integrate before t_c
             z = self._velocity_at_contact(v)
-        self._record(q, v, y, z, "tied" if touched else "free", 0.0, 0.0, 0.0, 0)
+        self.ledger.record(self.time, q, v, y, z, "tied" if touched else "free")
         stiffness = self.scene.contact.stiffness if touched else 0.0
         whole, rest = self.scene.equal_steps
         steps = whole + (rest > 0.0)
@@ -224,7 +221,7 @@ class _Algorithm:
                 touched, stiffness = True, self.scene.contact.stiffness  # line 6
                 y, z = self.spring.equilibrium, self._velocity_at_contact(v)  # line 5
                 self._events.append(self._first_contact(q, v, y, z))
-            self._record(q, v, y, z, "tied" if touched else "free", 0.0, 0.0, 0.0, 0)
+            self.ledger.record(self.time, q, v, y, z, "tied" if touched else "free")
         return self._trajectory((clock.perf_counter() - began) / max(steps, 1))
 
     def _initial_beam(self) -> tuple[np.ndarray, np.ndarray]:
@@ -253,7 +250,7 @@ class _Algorithm:
     def _free_beam_step(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         h = self.h
         new = self.solve(self._right_side(q, v))
-        self._dissipate(q, new, 0.0)
+        self.ledger.dissipate(h, q, new, 0.0)
         return new, 2.0 * (new - q) / h - v
 
     def _tip(self, q: np.ndarray, v: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
@@ -304,7 +301,8 @@ class _Algorithm:
         if not (np.all(np.isfinite(v_new)) and np.isfinite(z_new)):
             raise AlgorithmFailure(f"the solution overflows at t = {self.time:.6g} s")
         inside = 0.5 * (self._compliance(u_new, acting)[0] + self._compliance(q[-1], acting)[0])
-        self._book(q, q_new, y, z, y_new, z_new, on_tip, inside, foundation, acting)
+        pressing = 0.5 * (self._compliance(y_new, acting)[0] + self._compliance(y, acting)[0])
+        self.ledger.book(h, q, q_new, y, z, y_new, z_new, on_tip - inside, pressing, foundation)
         seated = case == 14 and y_new == self.phi
         phase = "seated" if seated else "tied" if case == 14 else "free"
         if seated:
@@ -312,95 +310,12 @@ class _Algorithm:
             self._events.append(
                 Event(self.time, "stop_impact", y_new, z_new, *tip_state, impulse_foundation=self.h * foundation)
             )
-        self._record(q_new, v_new, y_new, z_new, phase, on_tip, inside, foundation, case)
+        self.ledger.record(self.time, q_new, v_new, y_new, z_new, phase, on_tip, inside, foundation, case)
         return q_new, v_new, y_new, z_new, stiffness
-
-    # Energy ---------------------------------------------------------------------------------------------------------
-
-    def _dissipate(self, q: np.ndarray, q_new: np.ndarray, dy: float) -> None:
-        rate = (q_new - q) / self.h
-        beam = self.beam.alpha_b * float(rate @ (self.discrete.K @ rate)) if self.beam.alpha_b else 0.0
-        self._totals["e_dissipated"] += self.h * beam + self.spring.damping * dy**2 / self.h
-
-    def _book(
-        self,
-        q: np.ndarray,
-        q_new: np.ndarray,
-        y: float,
-        z: float,
-        y_new: float,
-        z_new: float,
-        on_tip: float,
-        inside: float,
-        foundation: float,
-        stiffness: float,
-    ) -> None:
-        """Work that no force of the model does: of the overwritten tip on the beam, of yˡ's exchange on the spring."""
-        dy = y_new - y
-        self._dissipate(q, q_new, dy)
-        self._totals["e_injected_beam"] += (on_tip - inside) * float(q_new[-1] - q[-1])
-        pressing = 0.5 * (self._compliance(y_new, stiffness)[0] + self._compliance(y, stiffness)[0])
-        gained = self._spring_energy(y_new, z_new) - self._spring_energy(y, z)
-        worked = (foundation - pressing + self.spring.external_force) * dy - self.spring.damping * dy**2 / self.h
-        self._totals["e_injected_spring"] += gained - worked
-
-    def _spring_energy(self, y: float, z: float) -> float:
-        p = self.spring
-        return 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
-
-    def _record(
-        self,
-        q: np.ndarray,
-        v: np.ndarray,
-        y: float,
-        z: float,
-        phase: str,
-        on_tip: float,
-        inside: float,
-        foundation: float,
-        case: int,
-    ) -> None:
-        d = self.discrete
-        e_beam = 0.5 * float(v @ (d.M @ v)) + 0.5 * float(np.sum((d.B @ q) ** 2))
-        e_spring = self._spring_energy(y, z)
-        e_load = -float(self.load @ q) - self.spring.external_force * y
-        row = {
-            "time": self.time,
-            "u_tip": float(q[-1]),
-            "v_tip": float(v[-1]),
-            "y": y,
-            "z": z,
-            "contact_force": on_tip,
-            "compliance_force": inside,
-            "tie_reaction": on_tip - inside,
-            "foundation_force": foundation,
-            "gap": float(q[-1]) - y,
-            "velocity_mismatch": float(v[-1]) - z if phase != "free" else 0.0,
-            "e_beam": e_beam,
-            "e_spring": e_spring,
-            "e_contact": 0.0,
-            "e_impact_loss": 0.0,
-            "e_load": e_load,
-            "e_total": e_beam + e_spring + e_load + self._totals["e_dissipated"],
-            "case": float(case),
-            **self._totals,
-        }
-        for name, value in row.items():
-            self._rows.setdefault(name, []).append(value)
-        self._phases.append(phase)
-        self._shapes.append(self._sampler @ q)
 
     # Result ---------------------------------------------------------------------------------------------------------
 
     def _trajectory(self, time_per_step: float) -> Trajectory:
-        columns: dict[str, np.ndarray] = {name: np.array(values) for name, values in self._rows.items()}
-        columns["phase"] = np.array(self._phases, dtype="<U8")
-        columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
-        if self.scene.stop is None:
-            del columns["foundation_force"]
-        ordered = {name: columns[name] for name in COLUMNS if name in columns}
-        ordered.update((name, columns[name]) for name in columns if name not in ordered)
-
         def mean(*solves: str) -> float:
             counts = [k for solve in solves for k in self.iterations[solve]]
             return float(np.mean(counts)) if counts else 0.0
@@ -414,15 +329,10 @@ class _Algorithm:
             solves=len(self.iterations["predicted"]) + len(self.iterations["joined"]),
             time_per_step=time_per_step,
         )
-        after_contact = columns["case"][1:]
         summary = {
             "reference": "algorithm1",
             "start_velocity": self.start_velocity,
             "y_temp": self.y_temp,
             "newton": asdict(statistics),
-            "steps_apart": int(np.sum(after_contact == 11)),
-            "steps_joined": int(np.sum(after_contact == 14)),
-            "largest_energy_residual": float(np.max(np.abs(columns["energy_residual"]))),
         }
-        shapes = (columns["time"], np.array(self._shapes))
-        return Trajectory(self.scene, ordered, self._events, shapes, summary)
+        return self.ledger.trajectory(self._events, summary)

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from .hybrid_system import HybridSystem, Phase, ReferenceFailure
+from .hybrid_system import HybridSystem, ReferenceFailure
+from .laws import Phase
 from .oscillators import GAUSS, STAGES, Oscillators, StepWeights
 from .propagators import Propagator, Segment
 
@@ -55,8 +56,10 @@ class LinearForm:
     constant : (p,) array
         c, of the constant loads.
     inputs : (k, p) array
-        P: the forces r. First the spring's remainder −(α_s − α_b k1) z − k2 y³, then C of `compliance`; each if
-        the phase has it.
+        P: the forces r. First the spring's remainder −(α_s − α_b k1) z − k2 y³, then the law's force C, or what
+        `linked` leaves of it; each if the phase has it.
+    linked : float
+        Stiffness [N/m] of a linear law that is part of the modes, damped like them.
     outputs : (o, p) array
         J: the interface displacements that r depends on: y, then u; each if it moves and matters.
     watched : (w, p) array
@@ -72,7 +75,8 @@ class LinearForm:
         self.joined = system.joined(phase)
         self.held = phase.seated and (self.joined or not system.has_spring)
         self.spring_moves = system.has_spring and not phase.seated
-        self.pressed = system.two_bodies and system.compliance and phase.contact != "free"
+        self.linked, self.rest = self._split()
+        self.pressed = system.law.acts(phase.contact) and self.rest != (0.0, 0.0)
         #: Modes of M ξ-space: a = basis ξ (+ offset), and back.
         self.offset = np.zeros(system.r)
         if self.held:
@@ -86,6 +90,19 @@ class LinearForm:
         self.oscillators = Oscillators(self.omega2, system.alpha_b)
         self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
         self._cache: dict[str, _Weights] = {}
+
+    def _split(self) -> tuple[float, tuple[float, float] | None]:
+        """`linked`, and the (k, c) that it leaves of a linear law; ``None`` where the law is not linear."""
+        s = self.system
+        if s.law.linear is None:
+            return 0.0, None
+        k, c = s.law.linear
+        # The modes' damping α_b k may be far from c; what is left must not be faster than the law itself.
+        mobility = s.inverse_tip_mass + s.inverse_mass
+        left = c - s.alpha_b * k
+        if abs(left) * mobility <= max(c * mobility, float(np.sqrt(k * mobility))):
+            return k, (0.0, left)
+        return 0.0, (k, c)
 
     def _hold(self) -> None:
         """The tip at φ: coordinates orthogonal to b, about the multiple of b that has the tip there."""
@@ -142,6 +159,24 @@ class LinearForm:
         self.outputs = np.array(outputs).reshape(len(outputs), len(self.omega2))
         self.watched = np.array([tip_row, spring_row])
         self.pressing = np.zeros(len(self.omega2))
+        if self.linked > 0.0:
+            self._link(tip_row, spring_row)
+
+    def _link(self, tip_row: np.ndarray, spring_row: np.ndarray) -> None:
+        """From beam and spring side by side to the modes of both with `linked` between them."""
+        s, k = self.system, self.linked
+        relative = spring_row - tip_row
+        if not self.spring_moves and s.scene.stop is not None:
+            self.constant = self.constant + tip_row * (k * s.scene.stop.position)
+        if np.all(self.omega2 >= 0.0):
+            self.omega2, self.basis = _modes(np.vstack([np.diag(np.sqrt(self.omega2)), np.sqrt(k) * relative]))
+        else:
+            self.omega2, self.basis = np.linalg.eigh(np.diag(self.omega2) + k * np.outer(relative, relative))
+        self._to_modes = self.basis.T
+        self.constant = self._to_modes @ self.constant
+        self.inputs, self.outputs, self.watched = (
+            rows @ self.basis for rows in (self.inputs, self.outputs, self.watched)
+        )
 
     def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(ξ, ξ̇) of a state."""
@@ -150,8 +185,8 @@ class LinearForm:
         if self.joined or self.held:
             return self._to_modes @ a, self._to_modes @ v
         if self.spring_moves:
-            return np.append(a, self.root_mass * X[s.Y]), np.append(v, self.root_mass * X[s.Z])
-        return a, v
+            a, v = np.append(a, self.root_mass * X[s.Y]), np.append(v, self.root_mass * X[s.Z])
+        return (self._to_modes @ a, self._to_modes @ v) if self.linked > 0.0 else (a, v)
 
     def unpack(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
         """States of shape (k, 2r + 3) from modes of shape (k, p); X supplies what does not move."""
@@ -161,6 +196,8 @@ class LinearForm:
             states[:, s.A] = xi @ self.basis.T + self.offset
             states[:, s.V] = xi_dot @ self.basis.T
             return s.synchronise(self.phase, states)
+        if self.linked > 0.0:
+            xi, xi_dot = xi @ self.basis.T, xi_dot @ self.basis.T
         states[:, s.A], states[:, s.V] = xi[:, : s.r], xi_dot[:, : s.r]
         if self.spring_moves:
             states[:, s.Y], states[:, s.Z] = xi[:, -1] / self.root_mass, xi_dot[:, -1] / self.root_mass
@@ -177,7 +214,9 @@ class LinearForm:
         if self.spring_moves:
             result[0] = -self.extra_damping * w_dot[0] - s.spring.cubic_stiffness * w[0] ** 3
         if self.pressed:
-            result[-1] = s.compliance_force((w[0] if self.spring_moves else X[s.Y]) - w[-1])
+            y, z = (w[0], w_dot[0]) if self.spring_moves else (X[s.Y], X[s.Z])
+            p, rate = y - w[-1], z - w_dot[-1]
+            result[-1] = s.law.force(p, rate) if self.rest is None else self.rest[0] * p + self.rest[1] * rate
         return result
 
     def weights(self, size: float) -> _Weights:
@@ -310,7 +349,7 @@ class ExponentialPropagator(Propagator):
         states = form.unpack(free, free_dot, X)
         if not np.all(np.isfinite(states)):
             return None
-        rate = form.system.dissipation_rate(states[:-1])
+        rate = form.system.dissipation_rate(form.phase, states[:-1])
         states[-1, form.system.D] = X[form.system.D] + size * float(GAUSS.weights @ rate)
         nodes = np.concatenate([[0.0], GAUSS.nodes * size, [size]])
         return _ExponentialSegment(form, size, nodes, np.vstack([X, states]), self._speed)

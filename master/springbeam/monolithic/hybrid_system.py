@@ -7,24 +7,20 @@ State of every phase, a vector of length 2r + 3 (r modal coordinates of the beam
 Dynamics, with u = bᵀa, p = f − ω²(a + α_b ȧ) the beam's own forces and s = f_s − α_s z − k1 y − k2 y³ the
 spring's (Ahn & Tate, eqs. (1)–(6), (8))::
 
-    free    ä = p + b C,  m z' = s − C,           C = 0; law `compliance`: C = λ_nc (y − u)₊^p
-    tied    ä = p + b C,  m z' = s − C,  u = y:   C = (s/m − bᵀp) / (bᵀb + 1/m)
-    seated  y = φ, z = 0, N = C − s;  tied: u = φ, C = −bᵀp / bᵀb;  without a spring: u = φ, N = C
-
-`touch` has the equations of `tied` and ends where C would become negative.
+    free    ä = p + b C,  m z' = s − C,           C = 0, or the force of the law (`laws`)
+    joined  ä = p + b C,  m z' = s − C,  u = y:   C = (s/m − bᵀp) / (bᵀb + 1/m)
+    seated  y = φ, z = 0, N = C − s;  joined: u = φ, C = −bᵀp / bᵀb;  without a spring: u = φ, N = C
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from ..scene import Scene, Spring
+from .laws import Motion, Phase, law_of
 from .semi_discrete import ModalBeam, modal_beam
-
-Contact = Literal["free", "touch", "tied"]
 
 #: What rounding leaves of a sum that is exactly zero, as a share of its terms.
 _NOISE = 16.0 * float(np.finfo(float).eps)
@@ -34,37 +30,11 @@ class ReferenceFailure(RuntimeError):
     """The reference cannot go on; the message says why and at which time."""
 
 
-class Phase(NamedTuple):
-    contact: Contact
-    seated: bool = False
-
-    @property
-    def name(self) -> str:
-        return "seated" if self.seated else self.contact
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Interface quantities of states X, each with the leading shape of X."""
-
-    u: np.ndarray  #: tip deflection [m]
-    v: np.ndarray  #: tip velocity [m/s]
-    y: np.ndarray  #: spring top [m]
-    z: np.ndarray  #: its velocity [m/s]
-    C: np.ndarray  #: contact force on the beam's tip, upward [N]
-    N: np.ndarray  #: force of the foundation, upward [N]
-    a: np.ndarray  #: modal accelerations ä
-    z_dot: np.ndarray  #: acceleration of the spring top [m/s²]
-
-
 class HybridSystem:
     """Equations of motion, energies and interface forces of a scene, phase by phase."""
 
     def __init__(self, scene: Scene) -> None:
-        if scene.contact.law == "paper":
-            raise ValueError("contact.law = 'paper': this reference knows 'transmission' and 'compliance'")
-        self.scene = scene
-        self.compliance = scene.contact.law == "compliance"
+        self.scene, self.law = scene, law_of(scene)
         self.beam: ModalBeam | None = None if scene.beam is None else modal_beam(scene.beam)
         self.has_spring = scene.spring is not None
         #: Without a spring its terms vanish: no stiffness, and 1/m = 0.
@@ -84,7 +54,7 @@ class HybridSystem:
 
     @property
     def dissipative(self) -> bool:
-        return self.alpha_b > 0.0 or self.spring.damping > 0.0
+        return self.alpha_b > 0.0 or self.spring.damping > 0.0 or self.law.dissipative
 
     @property
     def two_bodies(self) -> bool:
@@ -92,17 +62,12 @@ class HybridSystem:
 
     def joined(self, phase: Phase) -> bool:
         """Whether u = y holds as a constraint."""
-        return self.two_bodies and not self.compliance and phase.contact != "free"
+        return self.law.holds(phase.contact)
 
     def spring_force(self, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """s = f_s − α_s z − k1 y − k2 y³ [N]."""
         p = self.spring
         return np.asarray(p.external_force - p.damping * z - (p.linear_stiffness + p.cubic_stiffness * y**2) * y)
-
-    def compliance_force(self, penetration: np.ndarray) -> np.ndarray:
-        """λ_nc (penetration)₊^p [N]."""
-        law = self.scene.contact
-        return np.asarray(law.stiffness * np.maximum(penetration, 0.0) ** law.exponent)
 
     def motion(self, phase: Phase, X: np.ndarray) -> Motion:
         """Accelerations and interface quantities of states of shape (..., 2r + 3)."""
@@ -110,19 +75,21 @@ class HybridSystem:
         p = self.load - self.stiffness * (a + self.alpha_b * v)
         u_tip, v_tip = a @ self.b, v @ self.b
         s = self.spring_force(y, z) if self.has_spring else np.zeros_like(y)
-        C = self._contact_force(phase, p, y - u_tip, s)
+        C = self._contact_force(phase, p, y - u_tip, z - v_tip, s)
         N = C - s if phase.seated else np.zeros_like(y)
         z_dot = np.zeros_like(y) if phase.seated else (s - C) * self.inverse_mass
         return Motion(u_tip, v_tip, y, z, C, N, p + self.b * C[..., None], z_dot)
 
-    def _contact_force(self, phase: Phase, p: np.ndarray, penetration: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """C [N] of beam forces p (..., r), penetration y − u and spring force s (...)."""
+    def _contact_force(
+        self, phase: Phase, p: np.ndarray, penetration: np.ndarray, rate: np.ndarray, s: np.ndarray
+    ) -> np.ndarray:
+        """C [N] of beam forces p (..., r), penetration y − u, its rate, and spring force s (...)."""
         if phase.seated and (self.joined(phase) or not self.has_spring):
             return np.asarray(-(p @ self.b) / self.inverse_tip_mass)
         if self.joined(phase):
             return np.asarray((s * self.inverse_mass - p @ self.b) / (self.inverse_tip_mass + self.inverse_mass))
-        if self.two_bodies and self.compliance and phase.contact != "free":
-            return self.compliance_force(penetration)
+        if self.law.acts(phase.contact):
+            return self.law.force(penetration, rate)
         return np.zeros_like(s)
 
     def derivative(self, phase: Phase, X: np.ndarray) -> np.ndarray:
@@ -130,13 +97,13 @@ class HybridSystem:
         a, v, y, z = X[self.A], X[self.V], X[self.Y], X[self.Z]
         p = self.load - self.stiffness * (a + self.alpha_b * v)
         s = self.spring_force(y, z) if self.has_spring else y * 0.0
-        C = self._contact_force(phase, p, y - a @ self.b, s)
+        C = self._contact_force(phase, p, y - a @ self.b, z - v @ self.b, s)
         dX = np.empty_like(X)
         dX[self.A] = v
         dX[self.V] = p + self.b * C
         dX[self.Y] = 0.0 if phase.seated else z
         dX[self.Z] = 0.0 if phase.seated else (s - C) * self.inverse_mass
-        dX[self.D] = self.dissipation_rate(X) if self.dissipative else 0.0
+        dX[self.D] = self.dissipation_rate(phase, X) if self.dissipative else 0.0
         return dX
 
     def jacobian(self, phase: Phase, X: np.ndarray) -> np.ndarray:
@@ -157,20 +124,23 @@ class HybridSystem:
             C = -(b @ J[V]) / self.inverse_tip_mass
         elif self.joined(phase):
             C = (s * self.inverse_mass - b @ J[V]) / (self.inverse_tip_mass + self.inverse_mass)
-        elif self.two_bodies and self.compliance and phase.contact != "free":
-            law, depth = self.scene.contact, max(float(X[Y] - X[A] @ b), 0.0)
-            slope = law.stiffness * law.exponent * depth ** (law.exponent - 1.0)
-            C[A], C[Y] = -slope * b, slope
+        elif self.law.acts(phase.contact):
+            slope, viscous = self.law.slopes(float(X[Y] - X[A] @ b), float(X[Z] - X[V] @ b))
+            C[A], C[Y], C[V], C[Z] = -slope * b, slope, -viscous * b, viscous
         J[V] += np.outer(b, C)
         if not phase.seated:
             J[Y, Z] = 1.0
             J[Z] = (s - C) * self.inverse_mass
         return J
 
-    def dissipation_rate(self, X: np.ndarray) -> np.ndarray:
-        """α_b ȧᵀω²ȧ + α_s z² [W]."""
+    def dissipation_rate(self, phase: Phase, X: np.ndarray) -> np.ndarray:
+        """α_b ȧᵀω²ȧ + α_s z², and what the law takes [W]."""
         v, z = X[..., self.V], X[..., self.Z]
-        return np.asarray(self.alpha_b * (v**2 @ self.stiffness) + self.spring.damping * z**2)
+        rate = np.asarray(self.alpha_b * (v**2 @ self.stiffness) + self.spring.damping * z**2)
+        if not (self.law.dissipative and self.law.counts(phase.contact)):
+            return rate
+        penetration, closing = X[..., self.Y] - X[..., self.A] @ self.b, z - v @ self.b
+        return np.asarray(rate + self.law.dissipation(phase.contact, penetration, closing))
 
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """X, in place, with what rounding leaves of the phase's constraint removed: y = u, or u = φ when seated."""
@@ -187,14 +157,11 @@ class HybridSystem:
     def energies(self, X: np.ndarray, phase: Phase) -> dict[str, np.ndarray]:
         """Energies [J] of states of shape (k, 2r + 3); ``e_load`` is minus the work of the constant loads."""
         a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
-        p, law = self.spring, self.scene.contact
+        p = self.spring
         spring = (0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4) * float(
             self.has_spring
         )
-        contact = np.zeros_like(y)
-        if self.two_bodies and self.compliance and phase.contact != "free":
-            depth = np.maximum(y - a @ self.b, 0.0)
-            contact = law.stiffness * depth ** (law.exponent + 1.0) / (law.exponent + 1.0)
+        contact = self.law.potential(y - a @ self.b) if self.law.counts(phase.contact) else np.zeros_like(y)
         return {
             "e_beam": 0.5 * np.sum(v**2 + self.stiffness * a**2, axis=-1),
             "e_spring": spring,
@@ -203,11 +170,21 @@ class HybridSystem:
             "e_load": -(a @ self.load) - p.external_force * y * float(self.has_spring),
         }
 
+    def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
+        """What rounding leaves of a displacement, velocity or contact force that is exactly zero."""
+        if unit == "N":
+            return self.force_noise(X)
+        return self.displacement_noise(X) if unit == "m" else self.velocity_noise(X)
+
     def displacement_noise(self, X: np.ndarray) -> float:
         """What rounding leaves of a displacement that is exactly zero [m]."""
         stop = 0.0 if self.scene.stop is None else abs(self.scene.stop.position)
         size = float(np.abs(X[self.A]) @ np.abs(self.b)) + abs(float(X[self.Y])) + stop
         return _NOISE * size
+
+    def velocity_noise(self, X: np.ndarray) -> float:
+        """What rounding leaves of a velocity that is exactly zero [m/s]."""
+        return _NOISE * (float(np.abs(X[self.V]) @ np.abs(self.b)) + abs(float(X[self.Z])))
 
     def force_noise(self, X: np.ndarray) -> float:
         """What rounding leaves of a contact force that is exactly zero [N]."""

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853, LSODA, Radau, solve_ivp
 
-from .hybrid_system import HybridSystem, Phase, ReferenceFailure
+from .hybrid_system import HybridSystem, ReferenceFailure
+from .laws import Phase
 
 SCIPY_METHODS = {"DOP853": DOP853, "LSODA": LSODA, "Radau": Radau}
 

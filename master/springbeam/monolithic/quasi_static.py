@@ -1,4 +1,4 @@
-"""Event-driven reference for a beam without inertia, law `transmission`.
+"""Event-driven reference for a beam without inertia and a rigid law.
 
 Equilibrium, K (q + α_b q̇) = e C + F, leaves the tip's deviation w from its deflection u_F under the loads. State of
 every phase: X = (y, z, w, D), D the energy dissipated so far [J]::
@@ -7,8 +7,8 @@ every phase: X = (y, z, w, D), D the energy dissipated so far [J]::
     joined  w = y − u_F,   C = k (w + α_b z),   m ż = s − C
     seated  y = φ, z = 0, N = C − s
 
-Phases and events are those of `event_driven`. A tip that is let go undamped jumps to u_F, and ½ k w² is lost; meeting
-the spring costs nothing. Integrated by scipy's DOP853, whose root finding locates the events.
+Phases and events are those of `laws` and `transitions`. A tip that is let go undamped jumps to u_F, and ½ k w² is lost;
+meeting the spring costs nothing. Integrated by scipy's DOP853, whose root finding locates the events.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from scipy.integrate import solve_ivp
 
 from ..results.trajectory import COLUMNS, Event, Trajectory
 from ..scene import Beam, Scene
-from .hybrid_system import Phase, ReferenceFailure
+from .hybrid_system import ReferenceFailure
+from .laws import Motion, Phase, Watch, law_of
 
 _AT_ONCE = 20
 _NOISE = 64.0 * float(np.finfo(float).eps)
@@ -49,7 +50,7 @@ def simulate(
     ValueError
         If the law is another.
     """
-    if scene.contact.law != "transmission":
+    if not law_of(scene).rigid:
         raise ValueError(
             f"contact.law = {scene.contact.law!r}: with a quasi-static beam, this reference knows a tie only"
         )
@@ -88,7 +89,7 @@ class _Run:
     ) -> None:
         assert scene.beam is not None
         assert scene.spring is not None
-        self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
+        self.scene, self.beam, self.spring, self.law = scene, scene.beam, scene.spring, law_of(scene)
         self.rtol, self.atol = rtol, atol
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
         self.k, self.rest, self.stored = _statics(self.beam)
@@ -108,6 +109,8 @@ class _Run:
         if self.beam.approach == "elastic":
             self.arriving = self._tip_velocity(tip - self.rest)
         self.X = np.array([self.psi, self.spring.initial_velocity + velocity_perturbation, tip - self.rest, 0.0])
+        if self.law.start != "free" and self.arriving == self.X[1]:  # joined already
+            self.phase, self.X[2] = Phase(self.law.start), self.X[0] - self.rest
 
     # Equations ------------------------------------------------------------------------------------------------------
 
@@ -131,20 +134,21 @@ class _Run:
         lost = self.spring.damping * X[1] ** 2 + self.alpha * self.k * rate**2
         return np.array([0.0 if phase.seated else X[1], z_dot, rate, lost])
 
-    def _watched(self) -> dict[str, Callable[[np.ndarray], float]]:
+    def _motion(self, phase: Phase, X: np.ndarray) -> Motion:
+        """Interface quantities of X of shape (4, …); the beam has no modes."""
+        C, s, y, z = self._contact(phase, X), self._spring_force(X), X[0], X[1]
+        free, seated = phase.contact == "free", phase.seated
+        v = np.asarray(self._tip_velocity(X[2])) if free else z
+        N, z_dot = (C - s, np.zeros_like(y)) if seated else (np.zeros_like(y), (s - C) / self.spring.mass)
+        return Motion(self.rest + X[2], v, y, z, C, N, np.zeros(0), z_dot)
+
+    def _watched(self) -> list[Watch]:
         """Functions that are ≥ 0 as long as the phase lasts."""
-        phase, watched = self.phase, dict[str, Callable[[np.ndarray], float]]()
-        if phase.contact == "free":
-            watched["meet"] = lambda X: self.rest + X[2] - X[0]
-        elif phase.contact == "tied" and not phase.seated:
-            watched["release"] = lambda X: self.psi - X[0]
-        elif phase.contact == "touch":
-            watched["retie"] = lambda X: X[0] - self.psi
-            watched["separate"] = lambda X: float(self._contact(phase, X))
-        if phase.seated:
-            watched["unseat"] = lambda X: float(self._contact(phase, X) - self._spring_force(X))
-        elif self.phi is not None:
-            watched["stop"] = lambda X: X[0] - self.phi
+        watched = self.law.watched(self.phase)
+        if self.phase.seated:
+            return [*watched, Watch("unseat", lambda m: m.N, "N")]
+        if (phi := self.phi) is not None:
+            return [*watched, Watch("stop", lambda m: m.y - phi, "m")]
         return watched
 
     # Run ------------------------------------------------------------------------------------------------------------
@@ -160,8 +164,10 @@ class _Run:
         samples = samples[samples >= self.time]
         if every_event:
             self._record(self.time, self.X)
-        if self.rest + self.X[2] - self.X[0] <= _NOISE * abs(self.psi) and self.arriving <= self.X[1]:
-            self._meet()
+        joins = self.law.start != "free"
+        touches = self.rest + self.X[2] - self.X[0] <= _NOISE * abs(self.psi) and self.arriving <= self.X[1]
+        if self.phase.contact == "free" and (joins or touches):
+            self._go_on("meet")
         evaluations = 0
         while self.time < self.t_end:
             due = self._due()
@@ -184,83 +190,84 @@ class _Run:
     def _record(self, time: float, X: np.ndarray) -> None:
         self.rows.append((time, np.array(X), self.phase, self.loss))
 
-    def _due(self) -> str | None:
+    def _value(self, watch: Watch, X: np.ndarray) -> float:
+        return float(watch.function(self._motion(self.phase, X)))
+
+    def _due(self) -> Watch | None:
         """An event whose function is zero, but for rounding, and falling."""
         step = 1e-9 * self.t_end
-        for name, function in self._watched().items():
-            value, ahead = function(self.X), function(self.X + step * self._derivative(self.time, self.X))
-            noise = _NOISE * (1.0 if name in ("separate", "unseat") else 1.0 / self.k)
+        for watch in self._watched():
+            value = self._value(watch, self.X)
+            ahead = self._value(watch, self.X + step * self._derivative(self.time, self.X))
+            noise = _NOISE * (1.0 if watch.unit == "N" else 1.0 / self.k)
             noise *= self.k * (abs(self.X[0]) + abs(self.psi) + abs(self.rest))
             if value <= noise and ahead < min(value, -noise):
-                return name
+                return watch
         return None
 
-    def _integrate(self) -> tuple[str | None, Any]:
-        """To the first event or t_end; the name of the event, and scipy's solution."""
-        watched = self._watched()
+    def _integrate(self) -> tuple[Watch | None, Any]:
+        """To the first event or t_end; the event, and scipy's solution."""
+        # scipy takes a function that stays at zero, as those of a pair at rest at Ψ, for an event.
+        watched = self._watched() if np.any(self._derivative(self.time, self.X)) else []
         # Events are looked for at the ends of steps: none may hold two crossings of one function.
         s, rigid = self.spring, self.k + abs(self.spring.linear_stiffness)
         reach = abs(self.X[0]) + abs(self.X[1]) * np.sqrt(s.mass / rigid)
         longest = 0.1 * np.sqrt(s.mass / (rigid + 3.0 * abs(s.cubic_stiffness) * reach**2))
 
-        def event_of(function: Callable[[np.ndarray], float]) -> Callable[[float, np.ndarray], float]:
+        def event_of(watch: Watch) -> Callable[[float, np.ndarray], float]:
             def event(_: float, X: np.ndarray) -> float:
-                return function(X)
+                return self._value(watch, X)
 
             event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
             return event
 
         solution = solve_ivp(
             self._derivative, (self.time, self.t_end), self.X, method="DOP853", rtol=self.rtol, atol=self.atol,
-            dense_output=True, max_step=longest, events=[event_of(function) for function in watched.values()],
+            dense_output=True, max_step=longest, events=[event_of(watch) for watch in watched],
         )  # fmt: skip
         if solution.status < 0:
             raise ReferenceFailure(f"t = {solution.t[-1]!r} s: {solution.message}")
         self.time, self.X = float(solution.t[-1]), solution.y[:, -1].copy()
-        hit = [name for name, times in zip(watched, solution.t_events, strict=True) if len(times)]
+        hit = [watch for watch, times in zip(watched, solution.t_events, strict=True) if len(times)]
         return (hit[0] if hit else None), solution
 
     # Events ---------------------------------------------------------------------------------------------------------
 
-    def _handle(self, name: str) -> None:
+    def _handle(self, event: Watch) -> None:
         X = self.X
-        if name in ("release", "retie"):
-            X[0], X[2] = self.psi, self.psi - self.rest
-        if name == "meet":
-            self._meet()
-        elif name == "retie":
-            self.phase = Phase("tied")
-            self._emit("retie")
-        elif name == "release":
-            if self._contact(self.phase, X) > 0.0:
-                self.phase = Phase("touch")
-                self._emit("release")
-            else:
-                self._part("release")
-        elif name == "separate":
-            self._part("separation")
-        elif name == "unseat":
+        if event.level is not None:
+            X[0], X[2] = event.level, event.level - self.rest
+        if event.name == "stop":
+            self._strike()
+        elif event.name == "unseat":
             self.phase = Phase(self.phase.contact)
             self._emit("unseated")
-        elif name == "stop":
-            self._strike()
+        else:
+            self._go_on(event.name)
 
-    def _meet(self) -> None:
-        X = self.X
-        X[2] = X[0] - self.rest
-        height, rate = X[0] - self.psi, float(X[1])
-        if rate == 0.0:
-            rate = float(self._spring_force(X) - self._contact(Phase("tied"), X))
-        below = height < -_NOISE * abs(self.psi) or (abs(height) <= _NOISE * abs(self.psi) and rate <= 0.0)
-        self.phase = Phase("tied" if below else "touch", self.phase.seated)
-        self._emit("impact")
-
-    def _part(self, kind: str) -> None:
-        lost = 0.0
-        if self.alpha == 0.0:
-            lost, self.X[2] = 0.5 * self.k * self.X[2] ** 2, 0.0
-        self.phase = Phase("free", self.phase.seated)
+    def _go_on(self, happened: str) -> None:
+        """Into the phase that the law has next; what an undamped tip springs back with when it is let go is lost."""
+        X, lost = self.X, 0.0
+        if happened == "meet":
+            X[2] = X[0] - self.rest
+        contact, kind = self.law.after(happened, self)
+        if contact == "free" and self.alpha == 0.0:
+            lost, X[2] = 0.5 * self.k * X[2] ** 2, 0.0
+        self.phase = Phase(contact, self.phase.seated)
+        assert kind is not None
         self._emit(kind, energy_loss=lost)
+
+    def below(self) -> bool:
+        """Return whether the joined ends are below Ψ or about to be."""
+        height, rate = self.X[0] - self.psi, float(self.X[1])
+        if rate == 0.0:
+            rate = float(self._spring_force(self.X) - self._contact(Phase("tied"), self.X))
+        noise = _NOISE * abs(self.psi)
+        return bool(height < -noise or (abs(height) <= noise and rate <= 0.0))
+
+    def pressed(self) -> bool:
+        """Return whether C > 0 if the ends stay together."""
+        return bool(self._contact(Phase("touch"), self.X) > 0.0)
 
     def _strike(self) -> None:
         """Newton's impact law on the foundation; the joined tip follows."""
@@ -290,13 +297,13 @@ class _Run:
 
     def _trajectory(self, wall_time: float, evaluations: int) -> Trajectory:
         columns: dict[str, list[float]] = {}
-        law, s = self.scene.contact, self.spring
+        s = self.spring
         for time, X, phase, loss in self.rows:
             y, z, w, dissipated = (float(x) for x in X)
             C = float(self._contact(phase, X))
             free = phase.contact == "free"
             v, u = self._tip_velocity(w) if free else z, self.rest + w
-            inside = law.stiffness * max(self.psi - u, 0.0) ** law.exponent
+            inside = float(self.law.inside(np.float64(C), np.float64(u)))
             row = {
                 "time": time, "u_tip": u, "v_tip": v, "y": y, "z": z, "contact_force": C, "compliance_force": inside,
                 "tie_reaction": C - inside, "gap": u - y, "velocity_mismatch": 0.0 if free else v - z,

@@ -1,0 +1,128 @@
+"""What `algorithm1` reports of each step: a row, the energies, and the work that no force of its model does."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..results.trajectory import COLUMNS, Event, Trajectory
+from ..scene import Scene
+from .semi_discrete import SemiDiscreteBeam
+
+
+class StepLedger:
+    """Rows and books of Algorithm 1.
+
+    Parameters
+    ----------
+    load
+        Load vector of the beam.
+    """
+
+    def __init__(self, scene: Scene, discrete: SemiDiscreteBeam, load: np.ndarray) -> None:
+        assert scene.beam is not None
+        assert scene.spring is not None
+        self._scene, self._spring, self._alpha = scene, scene.spring, scene.beam.alpha_b
+        self._discrete, self._load = discrete, load
+        self._sampler = discrete.deflection_sampler()
+        self._rows: dict[str, list[float]] = {}
+        self._phases: list[str] = []
+        self._shapes: list[np.ndarray] = []
+        self._totals = {"e_dissipated": 0.0, "e_injected_beam": 0.0, "e_injected_spring": 0.0}
+
+    def dissipate(self, h: float, q: np.ndarray, q_new: np.ndarray, dy: float) -> None:
+        """Book what the dampers take in a step of ``h`` [s], of the beam from ``q`` and of the spring by ``dy`` [m]."""
+        rate = (q_new - q) / h
+        beam = self._alpha * float(rate @ (self._discrete.K @ rate)) if self._alpha else 0.0
+        self._totals["e_dissipated"] += h * beam + self._spring.damping * dy**2 / h
+
+    def book(
+        self,
+        h: float,
+        q: np.ndarray,
+        q_new: np.ndarray,
+        y: float,
+        z: float,
+        y_new: float,
+        z_new: float,
+        injected: float,
+        pressing: float,
+        foundation: float,
+    ) -> None:
+        """Book a step of ``h`` [s] in contact, and the work that no force of the model does.
+
+        That is the work of the overwritten tip on the beam, and of yˡ's exchange on the spring.
+
+        ``injected`` is the part of the force on the tip that no law gives, ``pressing`` the law's force on the spring,
+        ``foundation`` N; means over the step [N].
+        """
+        dy = y_new - y
+        self.dissipate(h, q, q_new, dy)
+        self._totals["e_injected_beam"] += injected * float(q_new[-1] - q[-1])
+        gained = self._spring_energy(y_new, z_new) - self._spring_energy(y, z)
+        worked = (foundation - pressing + self._spring.external_force) * dy - self._spring.damping * dy**2 / h
+        self._totals["e_injected_spring"] += gained - worked
+
+    def _spring_energy(self, y: float, z: float) -> float:
+        p = self._spring
+        return 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
+
+    def record(
+        self,
+        time: float,
+        q: np.ndarray,
+        v: np.ndarray,
+        y: float,
+        z: float,
+        phase: str,
+        on_tip: float = 0.0,
+        inside: float = 0.0,
+        foundation: float = 0.0,
+        case: int = 0,
+    ) -> None:
+        """Add a row; the forces are means over the step that ends in it [N]."""
+        d = self._discrete
+        e_beam = 0.5 * float(v @ (d.M @ v)) + 0.5 * float(np.sum((d.B @ q) ** 2))
+        e_spring = self._spring_energy(y, z)
+        e_load = -float(self._load @ q) - self._spring.external_force * y
+        row = {
+            "time": time,
+            "u_tip": float(q[-1]),
+            "v_tip": float(v[-1]),
+            "y": y,
+            "z": z,
+            "contact_force": on_tip,
+            "compliance_force": inside,
+            "tie_reaction": on_tip - inside,
+            "foundation_force": foundation,
+            "gap": float(q[-1]) - y,
+            "velocity_mismatch": float(v[-1]) - z if phase != "free" else 0.0,
+            "e_beam": e_beam,
+            "e_spring": e_spring,
+            "e_contact": 0.0,
+            "e_impact_loss": 0.0,
+            "e_load": e_load,
+            "e_total": e_beam + e_spring + e_load + self._totals["e_dissipated"],
+            "case": float(case),
+            **self._totals,
+        }
+        for name, value in row.items():
+            self._rows.setdefault(name, []).append(value)
+        self._phases.append(phase)
+        self._shapes.append(self._sampler @ q)
+
+    def trajectory(self, events: list[Event], summary: dict[str, Any]) -> Trajectory:
+        """Return the rows as a result, with what they sum up to added to ``summary``."""
+        columns: dict[str, np.ndarray] = {name: np.array(values) for name, values in self._rows.items()}
+        columns["phase"] = np.array(self._phases, dtype="<U8")
+        columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
+        if self._scene.stop is None:
+            del columns["foundation_force"]
+        ordered = {name: columns[name] for name in COLUMNS if name in columns}
+        ordered.update((name, columns[name]) for name in columns if name not in ordered)
+        after_contact = columns["case"][1:]
+        summary["steps_apart"] = int(np.sum(after_contact == 11))
+        summary["steps_joined"] = int(np.sum(after_contact == 14))
+        summary["largest_energy_residual"] = float(np.max(np.abs(columns["energy_residual"])))
+        return Trajectory(self._scene, ordered, events, (columns["time"], np.array(self._shapes)), summary)

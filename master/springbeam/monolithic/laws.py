@@ -1,0 +1,252 @@
+"""Interface laws of the references, one class each (``docs/model.md``, "Interface laws").
+
+C [N] lifts the tip and presses the spring; p = y − u is the penetration [m], ṗ = z − v its rate. A rigid law has u = y
+in every phase but `free`, and C is the multiplier of that; any other law is a force C(p, ṗ). To add one, write a class
+here and name it in `LAWS`: the equations of motion, both integrators and the event logic ask it for the rest.
+
+Phases: `free` without force; `tied` and `touch`, joined for either sign of C and while C ≥ 0; `slack`, touching without
+force (results have it as `touch`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from ..scene import Scene
+
+Contact = Literal["free", "touch", "slack", "tied"]
+
+
+class Phase(NamedTuple):
+    """Which equations hold: what joins the ends, and whether the lower one stands on the foundation."""
+
+    contact: Contact
+    seated: bool = False
+
+    @property
+    def name(self) -> str:
+        """The phase as results have it."""
+        return "seated" if self.seated else "touch" if self.contact == "slack" else self.contact
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Interface quantities of states X, each with the leading shape of X."""
+
+    u: np.ndarray  #: tip deflection [m]
+    v: np.ndarray  #: tip velocity [m/s]
+    y: np.ndarray  #: spring top [m]
+    z: np.ndarray  #: its velocity [m/s]
+    C: np.ndarray  #: contact force on the beam's tip, upward [N]
+    N: np.ndarray  #: force of the foundation, upward [N]
+    a: np.ndarray  #: modal accelerations ä
+    z_dot: np.ndarray  #: acceleration of the spring top [m/s²]
+
+
+class Watch(NamedTuple):
+    """A function of the motion that is ≥ 0 as long as its phase lasts."""
+
+    name: str  #: of what happens where it becomes negative
+    function: Callable[[Motion], np.ndarray]
+    unit: Literal["m", "m/s", "N"]  #: of its values; tells what rounding leaves of a zero
+    level: float | None = None  #: where the spring's top is when it happens [m]
+
+
+class Ends(Protocol):
+    """What a law may ask about tip and spring top at an event."""
+
+    def below(self) -> bool:
+        """Return whether, sharing one velocity, they are below Ψ or about to be."""
+
+    def pressed(self) -> bool:
+        """Return whether C > 0 if they stay together."""
+
+
+class Law:
+    """A law with one force, `force`, in phase `touch`, which begins and ends at p = 0."""
+
+    #: Whether u = y in every phase but `free`.
+    rigid = False
+    #: Where a run starts; a law that starts elsewhere than in `free` joins the ends for good.
+    start: Contact = "free"
+    #: Whether `dissipation` is ever greater than 0.
+    dissipative = False
+    #: k [N/m] and c [N·s/m] of a `force` that is k p + c ṗ; ``None`` if it is not linear.
+    linear: tuple[float, float] | None = None
+
+    def __init__(self, scene: Scene) -> None:
+        contact = scene.contact
+        self.stiffness, self.exponent, self.damping = contact.stiffness, contact.exponent, contact.damping
+        self.equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
+
+    def holds(self, contact: Contact) -> bool:
+        """Return whether u = y holds as a constraint."""
+        return self.rigid and contact != "free"
+
+    def counts(self, contact: Contact) -> bool:
+        """Return whether `potential` and `dissipation` count."""
+        return not self.rigid and contact != "free"
+
+    def acts(self, contact: Contact) -> bool:
+        """Return whether C is `force`."""
+        return self.counts(contact) and contact != "slack"
+
+    def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Return C [N] at penetrations p [m] with rates ṗ [m/s]."""
+        raise NotImplementedError
+
+    def slopes(self, p: float, rate: float) -> tuple[float, float]:
+        """Return ∂C/∂p [N/m] and ∂C/∂ṗ [N·s/m]."""
+        raise NotImplementedError
+
+    def potential(self, p: np.ndarray) -> np.ndarray:
+        """Return the energy [J] that the law stores."""
+        raise NotImplementedError
+
+    def dissipation(self, contact: Contact, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Return the power [W] that the law takes: C ṗ less the growth of `potential`."""
+        return np.zeros_like(p)
+
+    def inside(self, C: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the part of C that is normal compliance [N], at tip deflections u [m]."""
+        return C
+
+    def watched(self, phase: Phase) -> list[Watch]:
+        """Return what ends a phase, but for the foundation; nothing ends one that the ends are joined in for good."""
+        if self.start != "free":
+            return []
+        if phase.contact == "free":
+            return [Watch("meet", lambda m: m.u - m.y, "m")]
+        return [Watch("separate", lambda m: m.y - m.u, "m")]
+
+    def after(self, happened: str, ends: Ends) -> tuple[Contact, str | None]:
+        """Return the contact that follows what has happened, and the event's name in results if it is one there."""
+        return ("touch", "impact") if happened == "meet" else ("free", "separation")
+
+
+class Transmission(Law):
+    """Ends that have met are tied below Ψ, where C may have either sign, and touch with C ≥ 0 above."""
+
+    rigid = True
+
+    def inside(self, C: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return λ_nc (Ψ − u)₊^q [N]."""
+        return np.asarray(self.stiffness * np.maximum(self.equilibrium - u, 0.0) ** self.exponent)
+
+    def watched(self, phase: Phase) -> list[Watch]:
+        psi = self.equilibrium
+        if phase.contact == "free":
+            return super().watched(phase)
+        if phase.contact == "touch":
+            return [
+                Watch("retie", lambda m: m.y - psi, "m", level=psi),
+                Watch("separate", lambda m: m.C, "N"),
+            ]
+        return [] if phase.seated else [Watch("release", lambda m: psi - m.y, "m", level=psi)]
+
+    def after(self, happened: str, ends: Ends) -> tuple[Contact, str | None]:
+        if happened == "meet":
+            return "tied" if ends.below() else "touch", "impact"
+        if happened == "release":
+            return "touch" if ends.pressed() else "free", "release"
+        if happened == "retie":
+            return "tied", "retie"
+        return "free", "separation"
+
+
+class Tie(Law):
+    """Ends that are one from the start, for either sign of C."""
+
+    rigid = True
+    start = "tied"
+
+    def inside(self, C: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return zeros: nothing is compliant."""
+        return np.zeros_like(C)
+
+    def after(self, happened: str, ends: Ends) -> tuple[Contact, str | None]:
+        return "tied", "impact"
+
+
+class Link(Law):
+    """An elastic link with a damper, C = λ_nc p + c ṗ for either sign of p."""
+
+    start = "tied"
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self.linear = (self.stiffness, self.damping)
+        self.dissipative = self.damping > 0.0
+
+    def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        return np.asarray(self.stiffness * p + self.damping * rate)
+
+    def slopes(self, p: float, rate: float) -> tuple[float, float]:
+        return self.stiffness, self.damping
+
+    def potential(self, p: np.ndarray) -> np.ndarray:
+        return np.asarray(0.5 * self.stiffness * p**2)
+
+    def dissipation(self, contact: Contact, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        return np.asarray(self.damping * rate**2)
+
+
+class Compliance(Law):
+    """Normal compliance with a moving obstacle, C = F (1 + χ ṗ) with F = λ_nc p₊^q (Hunt & Crossley 1975).
+
+    C is never negative: where the ends part faster than 1/χ the contact is `slack` until they slow down or p = 0.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__(scene)
+        self.dissipative = self.damping > 0.0
+
+    def _elastic(self, p: np.ndarray) -> np.ndarray:
+        """F [N]."""
+        return np.asarray(self.stiffness * np.maximum(p, 0.0) ** self.exponent)
+
+    def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        return self._elastic(p) * (1.0 + self.damping * rate)
+
+    def slopes(self, p: float, rate: float) -> tuple[float, float]:
+        slope = self.stiffness * self.exponent * max(p, 0.0) ** (self.exponent - 1.0)
+        return slope * (1.0 + self.damping * rate), self.damping * float(self._elastic(np.float64(p)))
+
+    def potential(self, p: np.ndarray) -> np.ndarray:
+        depth, q = np.maximum(p, 0.0), self.exponent
+        return np.asarray(self.stiffness * depth ** (q + 1.0) / (q + 1.0))
+
+    def dissipation(self, contact: Contact, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        if contact == "slack":
+            return np.asarray(-self._elastic(p) * rate)
+        return np.asarray(self._elastic(p) * self.damping * rate**2)
+
+    def watched(self, phase: Phase) -> list[Watch]:
+        watched = super().watched(phase)
+        if self.damping == 0.0 or phase.contact == "free":
+            return watched
+        fastest = 1.0 / self.damping
+        if phase.contact == "slack":
+            return [*watched, Watch("press", lambda m: m.v - m.z - fastest, "m/s")]
+        return [*watched, Watch("slacken", lambda m: m.z - m.v + fastest, "m/s")]
+
+    def after(self, happened: str, ends: Ends) -> tuple[Contact, str | None]:
+        if happened == "slacken":
+            return "slack", None
+        return ("touch", None) if happened == "press" else super().after(happened, ends)
+
+
+#: By their names in a scene.
+LAWS: dict[str, type[Law]] = {"transmission": Transmission, "compliance": Compliance, "tie": Tie, "link": Link}
+
+
+def law_of(scene: Scene) -> Law:
+    """Return the law of a scene. Raises ValueError if it is none of `LAWS`."""
+    if scene.contact.law not in LAWS:
+        known = ", ".join(f"'{name}'" for name in LAWS)
+        raise ValueError(f"contact.law = {scene.contact.law!r}: this reference knows {known}")
+    return LAWS[scene.contact.law](scene)

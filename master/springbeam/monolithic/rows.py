@@ -1,0 +1,104 @@
+"""Rows of an event-driven run: states recorded with their phases, and the columns that follow from them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..results.trajectory import COLUMNS, Trajectory
+from .hybrid_system import HybridSystem
+from .laws import Phase
+from .transitions import HybridState
+
+_ENERGIES = ("e_beam", "e_spring", "e_contact", "e_dissipated", "e_impact_loss", "e_load")
+
+
+class Rows:
+    """States recorded so far, the phase each belongs to, and what impacts had lost by then."""
+
+    def __init__(self, system: HybridSystem) -> None:
+        self._system = system
+        self._times: list[float] = []
+        self._states: list[np.ndarray] = []
+        self._phases: list[Phase] = []
+        self._losses: list[float] = []
+
+    def record(self, time: float, X: np.ndarray, state: HybridState) -> None:
+        """Keep ``X`` at ``time`` [s], in the phase of ``state``."""
+        self._times.append(time)
+        self._states.append(X.copy())
+        self._phases.append(state.phase)
+        self._losses.append(state.loss)
+
+    def trajectory(self, state: HybridState, summary: dict[str, Any]) -> Trajectory:
+        """Return the result of the run that ended in ``state``, with its ledger added to ``summary``."""
+        s = self._system
+        states = np.array(self._states).reshape(len(self._times), s.size)
+        columns = self._columns(states)
+        self._derive(columns)
+        residual = columns["energy_residual"]
+        scale = max(float(np.max(np.abs(columns[c]))) for c in ("e_beam", "e_spring", "e_contact", "e_load"))
+        largest = float(np.max(np.abs(residual)))
+        summary["largest_energy_residual"] = largest
+        summary["largest_relative_energy_residual"] = largest / scale if scale > 0.0 else 0.0
+        summary["seat_height"] = None if s.scene.stop is None else state.seat_height()
+        shapes = None if s.beam is None else (columns["time"], states[:, s.A] @ s.beam.sampler.T)
+        for name in self._absent():
+            columns.pop(name, None)
+        ordered = {name: columns[name] for name in COLUMNS if name in columns}
+        return Trajectory(s.scene, ordered, state.events, shapes, summary)
+
+    def _columns(self, states: np.ndarray) -> dict[str, np.ndarray]:
+        """What the equations of each row's phase give."""
+        s, phases = self._system, self._phases
+        columns: dict[str, np.ndarray] = {
+            "time": np.array(self._times),
+            "phase": np.array([phase.name for phase in phases], dtype="<U8"),
+            "e_impact_loss": np.array(self._losses),
+        }
+        for phase in set(phases):
+            index = np.array([k for k, p in enumerate(phases) if p == phase])
+            m = s.motion(phase, states[index])
+            values = {
+                "u_tip": m.u,
+                "v_tip": m.v,
+                "y": m.y,
+                "z": m.z,
+                "contact_force": m.C,
+                "foundation_force": m.N,
+                **s.energies(states[index], phase),
+            }
+            for name, value in values.items():
+                columns.setdefault(name, np.zeros(len(phases)))[index] = value
+        return columns
+
+    def _derive(self, columns: dict[str, np.ndarray]) -> None:
+        """Add what follows from other columns."""
+        s, stop = self._system, self._system.scene.stop
+        if s.two_bodies:
+            columns["gap"] = columns["u_tip"] - columns["y"]
+            together = columns["phase"] != "free"
+            columns["velocity_mismatch"] = np.where(together, columns["v_tip"] - columns["z"], 0.0)
+            C = columns["contact_force"]
+            inside = s.law.inside(C, columns["u_tip"])
+            columns["compliance_force"], columns["tie_reaction"] = inside, C - inside
+        elif stop is not None and s.beam is not None:
+            columns["gap"] = columns["u_tip"] - stop.position
+            columns["foundation_force"] = columns["contact_force"]
+        columns["e_total"] = np.sum([columns[name] for name in _ENERGIES], axis=0)
+        columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
+
+    def _absent(self) -> tuple[str, ...]:
+        """Columns that the scene does not have."""
+        s = self._system
+        absent: tuple[str, ...] = ()
+        if s.beam is None:
+            absent += ("u_tip", "v_tip", "e_beam")
+        if not s.has_spring:
+            absent += ("y", "z", "e_spring")
+        if not s.two_bodies:
+            absent += ("contact_force", "e_contact")
+        if s.scene.stop is None:
+            absent += ("foundation_force",)
+        return absent

@@ -1,0 +1,242 @@
+"""What events do to the state of a `HybridSystem`: impacts, changes of phase, and what is booked with them.
+
+=============  ====================================================================================================
+impact         tip and spring meet: perfectly inelastic, J = (z − v)/(eᵀM⁻¹e + 1/m) on the tip, −J on the spring;
+               ``contact.impact = "tip"`` sets z = v instead (Algorithm 1, line 5). A law that is a force: no impulse
+stop_impact    y = φ with z < 0: z → −e z, and the joined tip likewise, by J = −(1+e) v/(eᵀM⁻¹e); without a spring
+               the tip on the stop
+release        tied, y rises through Ψ; goes on as `touch` if C > 0 there, else as `free`
+retie          touch, y falls through Ψ
+separation     touch, C becomes negative (a law that is a force: the penetration ends); at once where a meeting above
+               Ψ leaves C < 0
+seated         the impact after which bounces have died out: the flight would rise less than ``seat_height``
+unseated       seated, N becomes negative; without a spring this is the tip's `separation`
+=============  ====================================================================================================
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..results.trajectory import Event
+from ..scene import Stop
+from .hybrid_system import HybridSystem
+from .laws import Phase, Watch
+
+
+class HybridState:
+    """Time, state and phase of a run, what impacts have lost so far [J], and its events.
+
+    Parameters
+    ----------
+    seat_height
+        See `event_driven.simulate`.
+    """
+
+    def __init__(self, system: HybridSystem, time: float, X: np.ndarray, seat_height: float | None) -> None:
+        self.system, self.time, self.X = system, time, X
+        self.phase = Phase("free")
+        self.loss = 0.0
+        self.events: list[Event] = []
+        self._seat_height = seat_height
+        m = system.motion(self.phase, X)
+        if not (system.law.rigid and abs(float(m.v - m.z)) > system.velocity_noise(X)):
+            self.phase = Phase(system.law.start)
+            system.synchronise(self.phase, X)
+
+    # What a phase ends with -----------------------------------------------------------------------------------------
+
+    def watched(self) -> list[Watch]:
+        """Return the functions that are ≥ 0 as long as the phase lasts."""
+        s, stop = self.system, self.system.scene.stop
+        watched = s.law.watched(self.phase) if s.two_bodies else []
+        if self.phase.seated:
+            return [*watched, Watch("unseat", lambda m: m.N, "N")]
+        if stop is not None:
+            phi = stop.position
+            return [*watched, Watch("stop", (lambda m: m.y - phi) if s.has_spring else (lambda m: m.u - phi), "m")]
+        return watched
+
+    def happen(self, event: Watch) -> None:
+        """Apply what happens where a watched function has become negative."""
+        if event.level is not None:
+            self._place(event.level)
+        if event.name == "meet":
+            self._meet()
+        elif event.name == "stop":
+            self._hit_stop()
+        elif event.name == "unseat":
+            self._unseat()
+        else:
+            self._go_on(event.name)
+        self.system.synchronise(self.phase, self.X)
+
+    def start(self) -> None:
+        """First contact, and its impact, where tip and obstacle touch at the start, or are joined from there on."""
+        s, X, stop = self.system, self.X, self._stop
+        if s.law.start != "free":
+            if self.phase.contact == "free":
+                self._meet()
+            return
+        m = s.motion(self.phase, X)
+        noise = s.displacement_noise(X)
+        if s.two_bodies and float(m.u - m.y) <= noise:
+            if m.v <= m.z:
+                self._meet()
+        elif not s.has_spring and stop is not None and m.u - stop.position <= noise:
+            if m.v < 0.0:
+                self._hit_stop()
+            elif m.v == 0.0 and m.a @ s.b < 0.0:
+                self._seat()
+                self._emit("seated")
+
+    # What laws ask --------------------------------------------------------------------------------------------------
+
+    def below(self) -> bool:
+        """Whether tip and spring, together with one velocity, are (about to be) below Ψ, where the tie is bilateral."""
+        s, X = self.system, self.X
+        m = s.motion(Phase("tied"), X)
+        height = float(m.y) - s.spring.equilibrium
+        if abs(height) <= s.displacement_noise(X):
+            height = float(m.z) if m.z != 0.0 else float(m.z_dot)
+        return height < 0.0
+
+    def pressed(self) -> bool:
+        """Whether C > 0 if tip and spring stay together."""
+        return float(self.system.motion(Phase("touch"), self.X).C) > 0.0
+
+    # Contact --------------------------------------------------------------------------------------------------------
+
+    def _go_on(self, happened: str) -> None:
+        contact, kind = self.system.law.after(happened, self)
+        self.phase = Phase(contact, self.phase.seated)
+        if kind is not None:
+            self._emit(kind)
+
+    def _meet(self) -> None:
+        s, X = self.system, self.X
+        X[s.A] += s.b * ((float(X[s.Y]) - float(X[s.A] @ s.b)) / s.inverse_tip_mass)  # the gap is 0 but for rounding
+        if not s.law.rigid:
+            self._go_on("meet")
+            return
+        m = s.motion(self.phase, X)
+        before = self._mechanical_energy()
+        relative = float(m.z - m.v)
+        impulse = 0.0
+        if s.scene.contact.impact == "tip":
+            X[s.Z] = m.v
+        else:
+            impulse = relative / (s.inverse_tip_mass + s.inverse_mass)
+            X[s.V] += s.b * impulse
+            X[s.Z] -= impulse * s.inverse_mass
+        was_seated = self.phase.seated
+        contact, kind = s.law.after("meet", self)
+        self.phase = Phase(contact)
+        s.synchronise(self.phase, X)
+        assert kind is not None
+        self._emit(kind, impulse_contact=impulse, energy_loss=before - self._mechanical_energy())
+        if was_seated:  # the spring already stands on the foundation
+            self._hit_stop()
+        elif contact == "touch" and float(s.motion(self.phase, X).C) < 0.0:
+            self._go_on("separate")
+
+    # Foundation -----------------------------------------------------------------------------------------------------
+
+    @property
+    def _stop(self) -> Stop | None:
+        return self.system.scene.stop
+
+    def _hit_stop(self) -> None:
+        """Newton's impact law on the foundation, and whether it was the last bounce."""
+        s, stop = self.system, self._stop
+        assert stop is not None
+        e = stop.restitution
+        self._place(stop.position)
+        arriving = self.X.copy()
+        before = self._mechanical_energy()
+        contact_impulse, foundation_impulse, speed = self._bounce(e)
+        free_phase = Phase(self.phase.contact)
+        m = s.motion(free_phase, self.X)
+        acceleration = float(m.z_dot) if s.has_spring else float(m.a @ s.b)
+        seats = e == 0.0 or 0.5 * speed**2 <= -acceleration * self.seat_height()
+        if seats and e > 0.0:
+            self.X = arriving
+            contact_impulse, foundation_impulse, _ = self._bounce(0.0)
+        self.phase = free_phase
+        if seats:
+            self._seat()
+        self._emit(
+            "seated" if seats else "stop_impact",
+            impulse_contact=contact_impulse,
+            impulse_foundation=foundation_impulse,
+            energy_loss=before - self._mechanical_energy(),
+        )
+        if seats and s.motion(self.phase, self.X).N < 0.0:
+            self._unseat()
+
+    def _bounce(self, e: float) -> tuple[float, float, float]:
+        """Apply restitution e; impulses on the tip and of the foundation [N·s], speed afterwards [m/s]."""
+        s, X = self.system, self.X
+        on_tip = 0.0
+        if s.joined(self.phase) or not s.has_spring:
+            on_tip = -(1.0 + e) * float(X[s.V] @ s.b) / s.inverse_tip_mass
+            X[s.V] += s.b * on_tip
+            speed = float(X[s.V] @ s.b)
+        of_foundation = on_tip
+        if s.has_spring:
+            of_foundation += -(1.0 + e) * s.spring.mass * X[s.Z]
+            X[s.Z] = -e * X[s.Z]
+            speed = float(X[s.Z])
+        return on_tip, of_foundation, speed
+
+    def _seat(self) -> None:
+        s, stop = self.system, self._stop
+        assert stop is not None
+        self.phase = Phase(self.phase.contact, seated=True)
+        if s.has_spring:
+            self.X[s.Y], self.X[s.Z] = stop.position, 0.0
+        s.synchronise(self.phase, self.X)
+
+    def _unseat(self) -> None:
+        self.phase = Phase(self.phase.contact)
+        self._emit("unseated" if self.system.has_spring else "separation")
+
+    def seat_height(self) -> float:
+        """Return the height [m] below which a flight after an impact on the foundation does not take place."""
+        if self._seat_height is not None:
+            return self._seat_height
+        s, stop = self.system, self._stop
+        assert stop is not None
+        reach = abs(s.spring.equilibrium - stop.position) if s.has_spring else 0.0
+        deflection = float(np.abs(self.X[s.A]) @ np.abs(s.b))
+        return 1e-12 * max(reach, deflection, abs(stop.position), 1e-9)
+
+    # All events -----------------------------------------------------------------------------------------------------
+
+    def _place(self, level: float) -> None:
+        """The spring top, and the tip that is joined to it, exactly where the event has them but for rounding."""
+        s, X = self.system, self.X
+        if s.has_spring:
+            X[s.Y] = level
+        if s.joined(self.phase) or not s.has_spring:
+            X[s.A] += s.b * ((level - float(X[s.A] @ s.b)) / s.inverse_tip_mass)
+
+    def _mechanical_energy(self) -> float:
+        e = self.system.energies(self.X[None], self.phase)
+        return float(e["e_beam"][0] + e["e_spring"][0])
+
+    def _emit(self, kind: str, **values: float) -> None:
+        s = self.system
+        m = s.motion(self.phase, self.X)
+        self.loss += values.get("energy_loss", 0.0)
+        self.events.append(
+            Event(
+                time=self.time,
+                kind=kind,
+                y=float(m.y) if s.has_spring else None,
+                z=float(m.z) if s.has_spring else None,
+                u_tip=float(m.u) if s.beam is not None else None,
+                v_tip=float(m.v) if s.beam is not None else None,
+                **values,
+            )
+        )

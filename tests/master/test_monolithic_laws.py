@@ -1,0 +1,309 @@
+"""Interface laws of the references against exact solutions: free masses that meet, masses on a link, tied ends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, solve_ivp
+
+from springbeam.monolithic.event_driven import simulate
+from springbeam.monolithic.laws import law_of
+from springbeam.monolithic.semi_discrete import assemble
+from springbeam.results.trajectory import Trajectory
+from springbeam.scene import Scene, load_scene, with_changes
+from springbeam.studies import exact
+
+METHODS = ("exponential", "DOP853")
+TIP, TOP, STIFFNESS = 0.5, 2.0, 1e4  #: kg, kg, N/m^q
+REDUCED = TIP * TOP / (TIP + TOP)
+
+
+def soft(n_elements: int = 6, **tables: dict[str, Any] | None) -> Scene:
+    """The scene `soft` on a coarse beam and a linear spring, with changes."""
+    tables["beam"] = {"n_elements": n_elements, **(tables.get("beam") or {})}
+    tables["spring"] = {"cubic_stiffness": 0.0, **(tables.get("spring") or {})}
+    return with_changes(load_scene("soft"), **tables)
+
+
+def kinds(trajectory: Trajectory) -> list[str]:
+    return [event.kind for event in trajectory.events]
+
+
+# Normal compliance ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("q", [1.0, 1.5, 3.0])
+def test_free_masses_part_after_the_exact_time(method: str, q: float) -> None:
+    """p_max = ((q+1) μ v²/2λ)^{1/(q+1)}, duration by the beta function, velocities as of elastic balls."""
+    hit = exact.impact(REDUCED, 1.0, STIFFNESS, q)
+    assert hit.duration is not None
+    scene = exact.free_masses(TIP, TOP, 1.0, 2.0 * hit.duration, {"law": "compliance", "exponent": q}, macro_step=1e-3)
+    result = simulate(scene, method=method, sample_times=[0.5 * hit.duration])
+    assert kinds(result) == ["impact", "separation"]
+    assert result.gap[0] == pytest.approx(-hit.penetration, rel=2e-12)
+    assert result.events[1].time == pytest.approx(hit.duration, rel=2e-12)
+    common = -TIP / (TIP + TOP)
+    assert result.events[1].z == pytest.approx(2.0 * common, rel=2e-12)
+    assert result.events[1].v_tip == pytest.approx(2.0 * common + 1.0, rel=2e-12)
+
+
+def test_the_closed_forms_are_those_of_the_oscillator_and_of_the_quadrature() -> None:
+    """q = 1: half a period of √(λ/μ), damping without closed form as Hertz's in the limit; q = 1.5: ∫ dp/v."""
+    omega = np.sqrt(STIFFNESS / REDUCED)
+    linear = exact.impact(REDUCED, 3.0, STIFFNESS, 1.0)
+    assert linear.duration == pytest.approx(np.pi / omega, rel=1e-14)
+    assert linear.penetration == pytest.approx(3.0 / omega, rel=1e-14)
+    hertz = exact.impact(REDUCED, 3.0, STIFFNESS, 1.5)
+    # p = p_max (1 − s²) takes the singularity of 1/ṗ at p_max away.
+    half, _ = quad(lambda s: 2.0 * s * hertz.penetration / 3.0 / np.sqrt(1.0 - (1.0 - s * s) ** 2.5), 0.0, 1.0)
+    assert hertz.duration == pytest.approx(2.0 * half, rel=1e-9)
+    weak = exact.impact(REDUCED, 3.0, STIFFNESS, 1.5, 1e-4)
+    assert weak.penetration == pytest.approx(hertz.penetration, rel=2e-4)
+    # e = 1 − 2χv/3 + …, whatever q.
+    assert weak.rebound == pytest.approx(3.0 * (1.0 - 2e-4), rel=1e-7)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("chi", [0.1, 0.5, 3.0])
+@pytest.mark.parametrize("q", [1.0, 1.5, 3.0])
+def test_hunt_and_crossley_rebound(method: str, q: float, chi: float) -> None:
+    """χw − ln(1 + χw) is the same before and after; what the speeds lose is what is booked as dissipated."""
+    hit = exact.impact(REDUCED, 1.0, STIFFNESS, q, chi)
+    contact = {"law": "compliance", "exponent": q, "damping": chi}
+    undamped = exact.impact(REDUCED, 1.0, STIFFNESS, q).duration
+    assert undamped is not None
+    scene = exact.free_masses(TIP, TOP, 1.0, 2.0 * undamped, contact, macro_step=5e-3 * undamped)
+    result = simulate(scene, method=method)
+    assert kinds(result) == ["impact", "separation"]
+    parting = result.events[1]
+    assert parting.v_tip - parting.z == pytest.approx(hit.rebound, rel=3e-12)
+    assert TOP * parting.z + TIP * parting.v_tip == pytest.approx(-TIP, rel=1e-12)
+    assert result.e_dissipated[-1] == pytest.approx(hit.dissipated, rel=3e-12)
+    assert result.summary["largest_relative_energy_residual"] < 3e-12
+    assert np.min(result.contact_force) >= -1e-13 * np.max(result.contact_force)
+    # Two hundred rows see the largest penetration but for the curvature of p there.
+    assert hit.penetration * (1.0 - 1e-3) < -np.min(result.gap) <= hit.penetration * (1.0 + 1e-12)
+
+
+def pulled_apart(t_end: float) -> tuple[float, float, float]:
+    """When the contact slackens and ends [s], and the energy it takes [J]: a load pulls the lower mass away.
+
+    μ p̈ = −C − μ g with g = 20 m/s², p from 0 at 3 m/s; integrated apart from the package, piece by piece.
+    """
+    stiffness, q, chi, g, speed = 1e3, 1.5, 2.0, 20.0, 3.0
+
+    def slack(_: float, x: np.ndarray) -> float:
+        return float(x[1] + 1.0 / chi)
+
+    def apart(_: float, x: np.ndarray) -> float:
+        return float(x[0])
+
+    slack.terminal = apart.terminal = True  # type: ignore[attr-defined]
+    slack.direction = apart.direction = -1.0  # type: ignore[attr-defined]
+
+    def pressed(_: float, x: np.ndarray) -> list[float]:
+        force = stiffness * max(x[0], 0.0) ** q
+        return [x[1], -force * (1.0 + chi * x[1]) / REDUCED - g, force * chi * x[1] ** 2]
+
+    options = {"method": "DOP853", "rtol": 3e-14, "atol": 1e-16}
+    first = solve_ivp(pressed, (0.0, t_end), [0.0, speed, 0.0], events=slack, **options)
+    (p, rate, lost), begin = first.y[:, -1], first.t[-1]
+    # Without force: a parabola; all that is stored is lost.
+    fall = (rate + np.sqrt(rate**2 + 2.0 * g * p)) / g
+    return begin, begin + fall, lost + stiffness * p ** (q + 1.0) / (q + 1.0)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_ends_that_part_faster_than_the_contact_recovers(method: str) -> None:
+    """C stops at 0 where ṗ = −1/χ, before the penetration ends; what is stored then is lost."""
+    contact = {"law": "compliance", "stiffness": 1e3, "exponent": 1.5, "damping": 2.0}
+    scene = exact.free_masses(TIP, TOP, 3.0, 0.2, contact, macro_step=1e-3)
+    result = simulate(with_changes(scene, spring={"external_force": -20.0 * TOP}), method=method)
+    slack, end, lost = pulled_apart(0.2)
+    assert kinds(result) == ["impact", "separation"]
+    assert result.events[1].time == pytest.approx(end, rel=1e-11)
+    assert end - slack > 0.02
+    assert result.e_dissipated[-1] == pytest.approx(lost, rel=1e-10)
+    assert result.summary["largest_relative_energy_residual"] < 1e-11
+    between = (result.time > slack + 1e-12) & (result.time < end - 1e-12)
+    assert set(result.phase[between]) == {"touch"}
+    assert np.all(result.contact_force[between] == 0.0)
+    assert np.min(result.contact_force) > -1e-10
+
+
+# Links ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("damping", [0.0, 3.0])
+def test_two_masses_on_a_link_are_the_matrix_exponential(method: str, damping: float) -> None:
+    """k = 4π², 16π², 4π², unit masses, u = 1 at the start: a published pair; undamped it swings at 2π and 6π."""
+    scene = exact.linked_masses(16.0 * np.pi**2, damping, 1.0, macro_step=0.05)
+    times = np.linspace(0.05, 1.0, 20)
+    result = simulate(scene, method=method, sample_times=times)
+    M, K = np.eye(1), np.array([[4.0 * np.pi**2]])
+    expected = exact.linked(scene, M, K, np.ones(1), np.zeros(1), times)
+    if damping == 0.0:
+        slow, fast = np.cos(2.0 * np.pi * times), np.cos(6.0 * np.pi * times)
+        np.testing.assert_allclose(expected, 0.5 * np.column_stack([slow + fast, slow - fast]), atol=1e-12)
+    np.testing.assert_allclose(np.column_stack([result.u_tip, result.y]), expected, atol=2e-12)
+    assert set(result.phase) == {"tied"}
+    assert result.events == []
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("alpha", [0.0, 1e-3])
+@pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 3.0), (1e2, 0.0), (1e4, 0.0), (1e4, 3.0)])
+def test_a_beam_on_a_link_is_the_matrix_exponential(
+    method: str, stiffness: float, damping: float, alpha: float
+) -> None:
+    contact = {"law": "link", "stiffness": stiffness, "damping": damping}
+    spring = {"damping": 0.4, "external_force": -0.5}
+    scene = soft(beam={"alpha_b": alpha, "initial_deflection_slope": 0.02}, spring=spring, contact=contact, stop=None)
+    times = np.array([0.01, 0.05, 0.1, 0.2])
+    result = simulate(scene, method=method, sample_times=times, t_end=0.2)
+    d = assemble(scene.beam)  # type: ignore[arg-type]
+    expected = exact.linked(scene, d.M.toarray(), d.K.toarray(), 0.02 * d.slope_shape, -d.slope_shape, times)
+    np.testing.assert_allclose(np.column_stack([result.u_tip, result.y]), expected, atol=2e-13)
+    assert result.summary["largest_relative_energy_residual"] < 2e-12
+
+
+def test_a_stiff_link_needs_no_more_steps_than_its_motion() -> None:
+    """λ = 1e8: the link is part of the modes, the error that of their rounding, ε ω_max/ω_min."""
+    contact = {"law": "link", "stiffness": 1e8}
+    scene = soft(contact=contact, stop=None)
+    result = simulate(scene, sample_times=[0.02], t_end=0.02)
+    d = assemble(scene.beam)  # type: ignore[arg-type]
+    expected = exact.linked(scene, d.M.toarray(), d.K.toarray(), 0.0 * d.slope_shape, -d.slope_shape, np.array([0.02]))
+    np.testing.assert_allclose([[result.u_tip[0], result.y[0]]], expected, atol=1e-11)
+    assert result.summary["counts"]["steps"] < 1000
+
+
+def test_only_the_spring_strikes_the_foundation_through_a_link() -> None:
+    scene = soft(contact={"law": "link", "stiffness": 1e3}, stop={"restitution": 0.5})
+    strike = next(event for event in simulate(scene, t_end=0.1).events if event.kind == "stop_impact")
+    assert strike.impulse_contact == 0.0
+    assert strike.y == -0.015
+    assert strike.u_tip != pytest.approx(strike.y, abs=1e-4)
+    assert strike.impulse_foundation == pytest.approx(3.0 * strike.z, rel=1e-12)  # (1 + e)/e of m z
+    assert strike.energy_loss == pytest.approx(1.5 * strike.z**2, rel=1e-10)  # ½ m z² (1/e² − 1)
+
+
+# Ties -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_tie_swings_in_the_modes_of_the_joined_system(method: str) -> None:
+    """Above Ψ and below it, pressed and pulled."""
+    scene = soft(contact={"law": "tie"}, stop=None, spring={"initial_velocity": 0.2}, time={"t_end": 2.0})
+    times = np.linspace(0.05, 2.0, 40)
+    result = simulate(scene, method=method, sample_times=times)
+    d = assemble(scene.beam)  # type: ignore[arg-type]
+    expected = exact.tied(scene, d.M.toarray(), d.K.toarray(), -d.slope_shape, times)
+    np.testing.assert_allclose(result.y, expected, atol=3e-12)
+    assert np.max(result.y) > 0.01
+    assert np.min(result.y) < -0.01
+    assert np.min(result.contact_force) < -0.1
+    assert np.max(result.contact_force) > 0.1
+    assert set(result.phase) == {"tied"}
+    assert kinds(result) == ["impact"]
+    tip = 1.0 / np.linalg.inv(d.M.toarray())[-1, -1]
+    assert result.events[0].energy_loss == pytest.approx(0.5 * tip / (1.0 + tip) * 1.2**2, rel=1e-12)
+    np.testing.assert_array_equal(result.tie_reaction, result.contact_force)
+
+
+@pytest.mark.parametrize("fidelity", ["dynamic", "quasi_static"])
+def test_ends_that_move_alike_are_tied_without_an_impact(fidelity: str) -> None:
+    changes = {"fidelity": fidelity, "initial_velocity_slope": 0.5}
+    result = simulate(soft(contact={"law": "tie"}, beam=changes, spring={"initial_velocity": 0.5}, stop=None))
+    assert result.events == []
+    assert set(result.phase) == {"tied"}
+    assert np.max(np.abs(result.gap)) < 1e-15
+    assert np.max(np.abs(result.energy_residual)) < 1e-12
+
+
+def test_a_tie_without_inertia_adds_the_beams_stiffness() -> None:
+    """y = z₀/ω sin ωt, ω² = k1 + k, 1/k = L³/3EI + L/KAG = 4/300: the tip bears either sign of C."""
+    scene = soft(contact={"law": "tie"}, beam={"fidelity": "quasi_static"}, spring={"initial_velocity": 0.3}, stop=None)
+    result = simulate(scene)
+    omega = np.sqrt(3.0 + 75.0)
+    np.testing.assert_allclose(result.y, 0.3 / omega * np.sin(omega * result.time), atol=1e-12)
+    assert kinds(result) == ["impact"]
+    assert np.min(result.contact_force) < -1.0
+
+
+def test_both_ends_of_a_tie_strike_the_foundation() -> None:
+    scene = soft(contact={"law": "tie"}, stop={"restitution": 0.4})
+    strike = next(event for event in simulate(scene, t_end=0.1).events if event.kind == "stop_impact")
+    assert strike.v_tip == pytest.approx(strike.z, abs=1e-13)
+    d = assemble(scene.beam)  # type: ignore[arg-type]
+    tip = 1.0 / np.linalg.inv(d.M.toarray())[-1, -1]
+    arriving = -strike.z / 0.4
+    assert strike.impulse_foundation == pytest.approx(-1.4 * (1.0 + tip) * arriving, rel=1e-12)
+    assert strike.energy_loss == pytest.approx(0.5 * (1.0 - 0.16) * (1.0 + tip) * arriving**2, rel=1e-10)
+
+
+def test_a_pair_at_rest_without_inertia_stays_at_rest() -> None:
+    """Every function that is watched is zero, and stays so: none of them is an event."""
+    result = simulate(soft(beam={"fidelity": "quasi_static"}, stop=None))
+    assert np.all(result.y == 0.0)
+    assert kinds(result) == ["impact"]
+
+
+# All of them ------------------------------------------------------------------------------------------------------
+
+PAIRS = {
+    "tie, on a foundation": soft(
+        contact={"law": "tie"}, stop={"restitution": 0.6}, beam={"alpha_b": 1e-4}, spring={"cubic_stiffness": 50.0}
+    ),
+    "tie, seated": soft(
+        contact={"law": "tie"}, stop={"restitution": 0.0}, beam={"alpha_b": 1e-3}, spring={"external_force": -2.0}
+    ),
+    "link, seating": soft(
+        contact={"law": "link", "stiffness": 1e4, "damping": 1.0},
+        stop={"restitution": 0.3},
+        spring={"external_force": -3.0},
+        time={"t_end": 0.2},
+    ),
+    "link, damped as its modes": soft(
+        contact={"law": "link", "stiffness": 1e3, "damping": 1.0}, beam={"alpha_b": 1e-3}, stop={"restitution": 0.8}
+    ),
+    "link, unstable spring": soft(
+        contact={"law": "link"}, spring={"linear_stiffness": -3.0, "cubic_stiffness": 2000.0}
+    ),
+    "Hunt and Crossley": soft(
+        contact={"law": "compliance", "exponent": 1.5, "damping": 0.8}, beam={"alpha_b": 1e-3}, spring={"damping": 0.2}
+    ),
+    "Hunt and Crossley, seating": soft(
+        contact={"law": "compliance", "stiffness": 1e3, "exponent": 1.0, "damping": 2.0},
+        stop={"restitution": 0.3},
+        spring={"external_force": -5.0},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_two_integrators_agree_and_the_ledger_closes(name: str) -> None:
+    scene = PAIRS[name]
+    samples = np.linspace(0.02, scene.time.t_end, 20)
+    one, two = (simulate(scene, method=method, sample_times=samples) for method in METHODS)
+    assert kinds(one) == kinds(two)
+    for a, b in zip(one.events, two.events, strict=True):
+        assert a.time == pytest.approx(b.time, abs=1e-9)
+    np.testing.assert_allclose(one.y, two.y, atol=1e-10)
+    np.testing.assert_allclose(one.u_tip, two.u_tip, atol=1e-10)
+    for result in (one, two):
+        assert result.summary["largest_relative_energy_residual"] < 1e-11
+
+
+@pytest.mark.parametrize(("name", "contact"), [("compliance", "touch"), ("compliance", "slack"), ("link", "tied")])
+def test_what_a_law_stores_and_takes_is_the_power_of_its_force(name: str, contact: Any) -> None:
+    """C ṗ = dΦ/dt + dissipation, with dΦ/dt from Φ itself."""
+    law = law_of(soft(contact={"law": name, "stiffness": 30.0, "exponent": 2.5, "damping": 0.7}))
+    p, rate, h = np.array([0.1, 0.3]), np.array([-2.0, 0.5]), 1e-6
+    force = law.force(p, rate) if law.acts(contact) else np.zeros_like(p)
+    stored = (law.potential(p + h * rate) - law.potential(p - h * rate)) / (2.0 * h)
+    np.testing.assert_allclose(force * rate, stored + law.dissipation(contact, p, rate), rtol=1e-9, atol=1e-9)
