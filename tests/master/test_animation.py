@@ -18,7 +18,8 @@ from springbeam.pictures import animation
 from springbeam.pictures.animation import AnimationError, animate
 from springbeam.pictures.drawing import NOT_RESOLVED
 from springbeam.pictures.motion import motion_of
-from springbeam.results.recording import FileRecorder, RunDirectory
+from springbeam.results.directory import RunDirectory
+from springbeam.results.file_recorder import FileRecorder
 from springbeam.scene import with_changes
 
 SCENES = {

@@ -18,7 +18,8 @@ from springbeam import cli
 from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS, readable_unit
 from springbeam.pictures.motion import COIL_HEIGHTS, MOST_FRAMES, motion_of
 from springbeam.pictures.report import page, shipped_command
-from springbeam.results.recording import REPORT, FileRecorder, RunDirectory
+from springbeam.results.directory import REPORT, RunDirectory
+from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.trajectory import Event
 from springbeam.scene import load_scene, scene_from_dict, shipped_scenes, with_changes
 from springbeam.scene.statics import SHAPE_POINTS

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from springbeam.cli import app
 from springbeam.monolithic import event_driven
-from springbeam.results.recording import MemoryRecorder, load_trajectory
+from springbeam.results.reading import load_trajectory
+from springbeam.results.recording import MemoryRecorder
 from springbeam.run.runner import run
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
 from springbeam.studies.accuracy import simulate

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..bodies.fmu import FmuError
-from ..results.recording import RunDirectory
+from ..results.directory import RunDirectory
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,

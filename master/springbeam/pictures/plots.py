@@ -19,7 +19,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from ..results.recording import PICTURES
+from ..results.directory import PICTURES
 from ..results.trajectory import Trajectory
 from ..scene.statics import SHAPE_POINTS
 from .drawing import (
@@ -54,7 +54,7 @@ _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 25
 
 
 def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
-    """Draw the pictures `springbeam.results.recording.PICTURES` that the scene has something to show for.
+    """Draw the pictures `springbeam.results.directory.PICTURES` that the scene has something to show for.
 
     Parameters
     ----------
