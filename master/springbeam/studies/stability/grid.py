@@ -20,7 +20,7 @@ import csv
 import math
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -179,20 +179,19 @@ def _overlap(run: Trajectory) -> float:
 def run_cells(
     cells: Sequence[dict[str, Any]], processes: int, report: Callable[[Outcome], None] = lambda outcome: None
 ) -> list[Outcome]:
-    """Run all cells in so many processes; ``report(outcome)`` as each ends. Outcomes in the order of the cells.
+    """Run all cells in so many processes; return the outcomes in the order of the cells, each reported as it is there.
 
     Raises
     ------
     concurrent.futures.process.BrokenProcessPool
         If a worker process dies.
     """
-    outcomes: dict[int, Outcome] = {}
+    outcomes = []
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
-        futures = {pool.submit(run_cell, cell): index for index, cell in enumerate(cells)}
-        for future in as_completed(futures):
-            outcome = outcomes[futures[future]] = future.result()
+        for outcome in pool.map(run_cell, cells):
             report(outcome)
-    return [outcomes[i] for i in range(len(cells))]
+            outcomes.append(outcome)
+    return outcomes
 
 
 #: Columns of the CSV file.

@@ -52,7 +52,7 @@ def draw(study: Study, path: Path) -> None:
         color=BLACK, linewidth=6.0, alpha=0.15, zorder=0, label="Pareto front",
     )  # fmt: skip
     axes[0].set(xlabel="solve, wall time [ms]", title="coupling and integration, same model")
-    _curves(axes[1], [p for p in same if not p.configuration.monolithic], lambda p: p.beam_steps + p.spring_steps)
+    _curves(axes[1], [p for p in same if not p.configuration.monolithic], lambda p: p.do_steps)
     axes[1].set(xlabel="doStep calls of both FMUs", title="co-simulation, same model")
     if models:
         _curves(axes[2], models, lambda p: p.configuration.unknowns)
