@@ -32,7 +32,7 @@ def away_from(times: np.ndarray, events: Iterable[float], size: float) -> np.nda
 
 
 def quantities(scene: Scene) -> Iterable[tuple[str, Sample]]:
-    """Names and samples of what is compared."""
+    """Yield names and samples of what is compared."""
 
     def column(name: str) -> Sample:
         return lambda run, times: at(run, times, name)

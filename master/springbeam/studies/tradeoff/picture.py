@@ -40,7 +40,7 @@ _NOTE_WIDTH = 85  #: characters a column of the picture
 
 
 def draw(study: Study, path: Path) -> None:
-    """Error over wall time, error over doStep calls, and error of the model over its size, as a picture at ``path``."""
+    """Draw error over wall time, over doStep calls, and the model's error over its size, to ``path``."""
     same = [p for p in study.points if not p.configuration.refined and p.errors is not None]
     models = [p for p in study.points if p.configuration.refined and p.errors is not None]
     columns = 3 if models else 2

@@ -35,7 +35,7 @@ SECTIONS: tuple[tuple[str, Callable[[], list[Check]]], ...] = (
 
 
 def verify() -> Iterator[tuple[str, list[Check]]]:
-    """Each section's title and checks, as they are computed. A section that cannot be computed is a failed check.
+    """Yield each section's title and checks as they are computed; one that cannot be computed is a failed check.
 
     Raises
     ------
