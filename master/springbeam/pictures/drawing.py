@@ -252,7 +252,7 @@ def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
     return {symbol: height for symbol, height in levels(scene).items() if low - reach <= height <= high + reach}
 
 
-def first_contact(trajectory: Trajectory) -> float:
+def first_contact_time(trajectory: Trajectory) -> float:
     """Return when the tip first meets something [s]; without such an event, the start."""
     times = (event.time for event in trajectory.events if event.kind in ("impact", "stop_impact"))
     return next(times, float(trajectory["time"][0]))

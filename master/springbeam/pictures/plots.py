@@ -37,7 +37,7 @@ from .drawing import (
     Unit,
     alternates,
     decimated,
-    first_contact,
+    first_contact_time,
     gap_look,
     impulses,
     length_along,
@@ -108,7 +108,7 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     if trajectory.shapes is None:
         return None
     times, shapes = trajectory.shapes
-    first = int(np.searchsorted(times, first_contact(trajectory)))
+    first = int(np.searchsorted(times, first_contact_time(trajectory)))
     times, shapes = times[first : first + _SHAPES_EARLY], shapes[first : first + _SHAPES_EARLY]
     if len(times) < 2:
         return None
@@ -137,7 +137,7 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
     if trajectory.shapes is None:
         return None
     times, shapes = trajectory.shapes
-    first = int(np.searchsorted(times, first_contact(trajectory)))
+    first = int(np.searchsorted(times, first_contact_time(trajectory)))
     times, shapes = times[first:], shapes[first:]
     if len(times) < _SHAPES_EARLY:
         return None

@@ -230,17 +230,3 @@ def critical_step(
             return high
         H *= factor
     return None
-
-
-def bands(
-    pair: LinearPair, scheme: str, degree: int, sizes: np.ndarray, threshold: float = THRESHOLD
-) -> list[tuple[float, float]]:
-    """Return the intervals of H [s] between ``sizes``, ascending, with a spectral radius above 1 + ``threshold``."""
-    unstable = [spectral_radius(pair, scheme, degree, h) > 1.0 + threshold for h in sizes]
-    found: list[tuple[float, float]] = []
-    for i, bad in enumerate(unstable):
-        if bad and (i == 0 or not unstable[i - 1]):
-            found.append((float(sizes[i]), float(sizes[i])))
-        elif bad:
-            found[-1] = (found[-1][0], float(sizes[i]))
-    return found

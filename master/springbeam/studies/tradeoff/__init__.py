@@ -90,7 +90,6 @@ class Study:
 
     scene: Scene  #: ends with the compared window
     points: list[Point]
-    reference_time: float  #: what the reference took [s]
     notes: list[str] = field(default_factory=list)
 
     def front(self) -> list[Point]:
@@ -157,7 +156,7 @@ def study(scene: Scene, until: float | None = None, repeats: int = 3, progress: 
     runs: dict[Configuration, Trajectory | str] = {}
     timings: dict[Configuration, list[tuple[float, float]]] = {}
     given_up: dict[str, Configuration] = {}
-    reach = _reach(scene)
+    reach = _largest_displacement(scene)
     for repeat in range(repeats):
         for configuration in todo:
             done += 1
@@ -191,8 +190,8 @@ def _hopeless(configuration: Configuration) -> bool:
     return mesh_frequency(scene.beam) * (scene.time.t_end - (scene.contact_time or 0.0)) > _MOST_TURNS
 
 
-def _reach(scene: Scene) -> float:
-    """Return the size of displacements [m]; scipy's absolute tolerances are relative to it."""
+def _largest_displacement(scene: Scene) -> float:
+    """Return the largest displacement [m]; scipy's absolute tolerances are relative to it."""
     run = event_driven.simulate(scene, sample_times=np.linspace(scene.contact_time or 0.0, scene.time.t_end, 41))
     return max((float(np.abs(run[name]).max()) for name in ("u_tip", "y") if name in run.columns), default=1.0) or 1.0
 
@@ -235,10 +234,9 @@ def _judged(
     grid = np.linspace(scene.contact_time or 0.0, scene.time.t_end, 401)
     results = {c: r for c, r in runs.items() if isinstance(r, Trajectory)}
     references: dict[bool, Trajectory] = {}
-    began = perf_counter()
     for refined in (False, True):
         model = finer(scene) if refined else scene
-        times = [_compared(c, r) for c, r in results.items() if c.refined == refined and not _scipy(c)]
+        times = [_judged_times(c, r) for c, r in results.items() if c.refined == refined and not _scipy(c)]
         if model is None or not (times or not refined):
             continue
         samples = np.unique(np.concatenate([grid, *times]))
@@ -250,7 +248,6 @@ def _judged(
             if not refined:
                 raise
             notes.append(f"modes and elements not judged: on a finer mesh the reference {failed}")
-    elapsed = perf_counter() - began
     points = []
     for configuration in todo:
         run = runs.get(configuration)
@@ -260,10 +257,10 @@ def _judged(
             # Timed without rows; its errors are those of the same steps, sampled.
             run = _sampled(configuration, grid, reach)
         points.append(_point(configuration, run, references, timings[configuration]))
-    return Study(scene, points, elapsed, notes)
+    return Study(scene, points, notes)
 
 
-def _compared(configuration: Configuration, run: Trajectory) -> np.ndarray:
+def _judged_times(configuration: Configuration, run: Trajectory) -> np.ndarray:
     """Return the times of the rows that are judged: of adaptive steps some, as each costs the reference a size."""
     every = len(run) // _ADAPTIVE_ROWS + 1 if configuration.scene.coupling.adaptive else 1
     return np.asarray(run.time[::every])
