@@ -6,20 +6,15 @@ tables into docs/accuracy.md, between the lines that name the study.
 
 from __future__ import annotations
 
-import re
 import sys
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from PIL import Image
+from pages import IMAGES, shrink, table, write_section  # beside this script
 
 from springbeam import load_scene, with_changes
 from springbeam.scene.automatic import choice
 from springbeam.studies.tradeoff import Point, Study, study
 from springbeam.studies.tradeoff.picture import draw
-
-DOCS = Path(__file__).parent
-_COLOURS = 64  #: of a picture: a fifth of its size
 
 
 class Window(NamedTuple):
@@ -47,16 +42,16 @@ def cell(point: Point | None) -> str:
 
 
 def cheapest(found: Study) -> list[str]:
-    lines = ["| error | cheapest here: solve [ms] | cheapest of scipy: solve [ms] | ratio |", "|---|---|---|---|"]
-    for chosen in found.choices():
-        ratio = f"{chosen.ratio:.3g}" if chosen.ours and chosen.scipy else ""
-        lines.append(f"| {chosen.target:.0e} | {cell(chosen.ours)} | {cell(chosen.scipy)} | {ratio} |")
-    return lines
+    rows = []
+    for best in found.cheapest():
+        ratio = f"{best.ratio:.3g}" if best.ours and best.scipy else ""
+        rows.append([f"{best.target:.0e}", cell(best.ours), cell(best.scipy), ratio])
+    return table(["error", "cheapest here: solve [ms]", "cheapest of scipy: solve [ms]", "ratio"], rows)
 
 
 def side_by_side(found: Study, macro_step: float) -> list[str]:
-    """Error, time of events [s], energy residual and solve time over that of `energy` 0."""
-    lines = ["| H [s] | " + " | ".join(SCHEMES) + " | auto takes |", "|---" * (len(SCHEMES) + 2) + "|"]
+    """Compare error, time of events [s], energy residual and solve time over that of `energy` 0."""
+    rows = []
     for H in (4.0 * macro_step, macro_step):
         here = {
             p.configuration.family: p
@@ -66,34 +61,20 @@ def side_by_side(found: Study, macro_step: float) -> list[str]:
         if "energy 0" not in here:
             continue
         cells = [compared(here.get(name), here["energy 0"]) for name in SCHEMES]
-        lines.append(f"| {H:.3g} | " + " | ".join([*cells, taken(found, H)]) + " |")
-    return lines
+        rows.append([f"{H:.3g}", *cells, taken(found, H)])
+    return table(["H [s]", *SCHEMES, "auto takes"], rows)
 
 
 def compared(point: Point | None, base: Point) -> str:
     if point is None or point.errors is None:
         return "stopped" if point is not None else ""
     e = point.errors
-    event = "–" if e.event_time != e.event_time else f"{e.event_time:.0e}"
-    return f"{point.displacement:.0e}, {event}, {e.energy:.0e}, {point.solve / base.solve:.1f}"
+    return f"{point.displacement:.0e}, {e.event_time:.0e}, {e.energy:.0e}, {point.solve / base.solve:.1f}"
 
 
 def taken(found: Study, H: float) -> str:
     auto = choice(with_changes(found.scene, coupling={"macro_step": H}))
     return f"`{auto.scheme}` {auto.degree}"
-
-
-def written(name: str, lines: list[str], script: str = "accuracy.py", page_name: str = "accuracy.md") -> None:
-    """Put ``lines`` into the page, in place of what stands between the marks of ``name`` and of who writes it."""
-    page = DOCS / page_name
-    text = page.read_text(encoding="utf-8")
-    begin, end = f"<!-- {name}: docs/{script} -->\n", f"<!-- end of {name} -->"
-    new, count = re.subn(
-        re.escape(begin) + ".*?" + re.escape(end), lambda _: begin + "\n".join(lines) + "\n" + end, text, flags=re.S
-    )
-    if count != 1:
-        raise SystemExit(f"{page}: no lines {begin.strip()} … {end}")
-    page.write_text(new, encoding="utf-8")
 
 
 def main(names: list[str]) -> None:
@@ -103,12 +84,12 @@ def main(names: list[str]) -> None:
         window = WINDOWS[name]
         scene = with_changes(load_scene(window.scene), **window.changes)
         found = study(scene, window.until)
-        picture = DOCS / "images" / f"tradeoff-{name}.png"
+        picture = IMAGES / f"tradeoff-{name}.png"
         draw(found, picture)
-        Image.open(picture).quantize(_COLOURS).save(picture, optimize=True)
+        shrink(picture)
         notes = [f"* {note}" for note in found.notes]
         lines = [*cheapest(found), "", *side_by_side(found, scene.coupling.H), *([""] if notes else []), *notes]
-        written(name, lines)
+        write_section("accuracy.md", name, lines)
         print(f"{name}, up to t = {found.scene.time.t_end:.6g} s", *lines, "", sep="\n", flush=True)
 
 

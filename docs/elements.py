@@ -1,6 +1,6 @@
-"""The table "Few elements of high degree" of docs/model.md:  .venv/bin/python docs/elements.py   (a minute)
+"""Writes the table "Few elements of high degree" of docs/model.md:  .venv/bin/python docs/elements.py   (a minute)
 
-Times are the smallest of several repetitions, in one process, and printed as ratios to the first row.
+Times are the smallest of several repetitions, in one process, as ratios to the first row.
 """
 
 from __future__ import annotations
@@ -8,17 +8,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import closing
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.linalg import expm
-from scipy.optimize import brentq
+from pages import table, write_section  # beside this script
 
 from springbeam import Scene, load_scene, simulate, with_changes
 from springbeam.bodies.fmu_bodies import FmuBeam
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
+from springbeam.studies.verify.beam import clamped_free_frequencies
 
 MESHES: tuple[tuple[int, int, int], ...] = (  # elements, degree, modes
     (1000, 1, 64), (1000, 1, 250), (500, 1, 0), (100, 1, 0), (50, 1, 0), (10, 5, 0),
@@ -27,23 +26,6 @@ MESHES: tuple[tuple[int, int, int], ...] = (  # elements, degree, modes
 FINEST = (41, 12, 0)
 TIMES = np.linspace(0.001, 0.07, 70)
 MACRO_STEP = 2.5e-4
-
-
-def exact_frequencies(count: int) -> np.ndarray:
-    """Clamped–free Timoshenko beam with all constants 1: zeros of the determinant of the transfer matrix."""
-
-    def determinant(w: float) -> float:
-        X = expm(np.array([[0, 1, 0, 0], [-w * w, 0, 0, -1], [1, 0, 0, 1], [0, 0, -w * w, 0]]))
-        return float(X[1, 1] * X[3, 3] - X[1, 3] * X[3, 1])
-
-    grid = np.arange(0.5, 30.0, 0.05)
-    values = [determinant(w) for w in grid]
-    zeros = [
-        float(brentq(determinant, a, b, xtol=1e-14))
-        for (a, b), (p, q) in zip(pairwise(grid), pairwise(values), strict=True)
-        if p * q < 0.0
-    ]
-    return np.array(zeros[:count])
 
 
 def mesh(n: int, degree: int, modes: int) -> dict[str, Any]:
@@ -70,7 +52,7 @@ def shortest(action: Callable[[], object], repetitions: int) -> float:
 
 
 def times(beam: Beam) -> tuple[float, float]:
-    """(initialisation, one step) of the FMU [s]."""
+    """Return the times of initialisation and of one step of the FMU [s]."""
     initialisation = shortest(lambda: FmuBeam(beam, 0.0, 0.0).close(), 5)
     with closing(FmuBeam(beam, 0.0, 0.0)) as body:
         clock = 0.0
@@ -86,20 +68,21 @@ def times(beam: Beam) -> tuple[float, float]:
 
 
 def main() -> None:
-    exact, finest = exact_frequencies(10), spring_top(mesh(*FINEST))
-    print("| elements × degree | modes | ω₁ … ω₁₀ | y, t ≤ 0.07 s [m] | y at 0.07 s [m] | initialisation | step |")
-    print("|---|---|---|---|---|---|---|")
-    unit: tuple[float, float] | None = None
+    exact, finest = np.array(clamped_free_frequencies()[:10]), spring_top(mesh(*FINEST))
+    rows, unit = [], None
     for n, degree, modes in MESHES:
         beam = mesh(n, degree, modes)
         omega = modal_beam(Beam(**beam)).omega[:10]
         error = np.abs(spring_top(beam) - finest)
         own = times(soft(beam).beam or Beam())
         unit = unit or own
-        print(
-            f"| {n} × {degree} | {modes or f'all {2 * n * degree}'} | {np.abs(omega / exact - 1.0).max():.1e} "
-            f"| {error.max():.1e} | {error[-1]:.1e} | {own[0] / unit[0]:.2g} | {own[1] / unit[1]:.2g} |"
-        )
+        errors = (np.abs(omega / exact - 1.0).max(), error.max(), error[-1])
+        rows.append([
+            f"{n} × {degree}", f"{modes or f'all {2 * n * degree}'}", *(f"{e:.1e}" for e in errors),
+            *(f"{t / first:.2g}" for t, first in zip(own, unit, strict=True)),
+        ])  # fmt: skip
+    head = ["elements × degree", "modes", "ω₁ … ω₁₀", "y, t ≤ 0.07 s [m]", "y at 0.07 s [m]", "initialisation", "step"]
+    write_section("model.md", "elements", table(head, rows))
 
 
 if __name__ == "__main__":

@@ -1,22 +1,19 @@
 """Errors in the macro step on `soft`, before any event and through three:  .venv/bin/python docs/orders.py   (a minute)
 
-Writes the second table and the picture of docs/coupling.md, "Orders measured", and prints the errors.
+Writes the second table and the picture of docs/coupling.md, "Orders measured".
 """
 
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from accuracy import written  # beside this script
-from PIL import Image
+from pages import IMAGES, shrink, table, write_section  # beside this script
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
 
-DOCS = Path(__file__).parent
 SCHEMES = (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2))
 STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4)
 #: Ends of the phases are events; so far from them rows of all runs are of the same phase [s].
@@ -32,45 +29,41 @@ ROUNDING = 1e-13, 1e-10
 
 
 def measured() -> dict[tuple[str, int], np.ndarray]:
-    """Largest errors of y [m] and v_tip [m/s], shape (steps, phases, 2)."""
+    """Return the largest errors of y [m] and v_tip [m/s], shape (steps, phases, 2)."""
     soft = with_changes(load_scene("soft"), time={"t_end": 0.32})
     errors: dict[tuple[str, int], np.ndarray] = {}
     for scheme, degree in SCHEMES:
-        of_scheme = []
+        found = []
         for H in STEPS:
             run = simulate(with_changes(soft, coupling={"scheme": scheme, "degree": degree, "macro_step": H}))
             reference = event_driven.simulate(soft, sample_times=run.time)
             at = np.searchsorted(reference.time, run.time)
             off = np.abs([run.y - reference.y[at], run.v_tip - reference.v_tip[at]])
             inside = [(run.time > a + APART) & (run.time < b - APART) for a, b in PHASES.values()]
-            of_scheme.append([off[:, rows].max(axis=1) for rows in inside])
-        errors[scheme, degree] = np.array(of_scheme)
+            found.append([off[:, rows].max(axis=1) for rows in inside])
+        errors[scheme, degree] = np.array(found)
     return errors
 
 
 def orders(errors: np.ndarray) -> str:
-    """Of y and v_tip, errors in columns: means over the halvings of 1 ms and less, as far as above rounding."""
+    """Return the orders of y and v_tip from their errors in columns: means over halvings from 1 ms, above rounding."""
     means = []
-    for of_quantity, least in zip(errors[1:].T, ROUNDING, strict=True):
-        seen = [float(np.log2(a / b)) for a, b in pairwise(of_quantity) if b > least]
+    for column, least in zip(errors[1:].T, ROUNDING, strict=True):
+        seen = [float(np.log2(a / b)) for a, b in pairwise(column) if b > least]
         means.append(f"{np.mean(seen):.1f}" if seen else "rounding")
     return ", ".join(means)
 
 
-def table(errors: dict[tuple[str, int], np.ndarray]) -> list[str]:
-    after = list(PHASES)[1:]
-    lines = [
-        "| order of | " + " | ".join(f"{phase}: y, v" for phase in after) + " | y in the flight at 1 ms … 1/8 ms [m] |"
-    ]
-    lines.append("|---" * (len(after) + 2) + "|")
-    for (scheme, degree), values in errors.items():
-        cells = [orders(values[:, k]) for k in range(1, len(PHASES))]
-        flight = ", ".join(f"{e:.1e}" for e in values[1:, 2, 0])
-        lines.append(f"| `{scheme}` {degree} | " + " | ".join(cells) + f" | {flight} |")
-    return lines
+def rows(errors: dict[tuple[str, int], np.ndarray]) -> list[list[str]]:
+    """Return orders phase by phase, then errors of y before any event and in the flight."""
+    return [
+        [f"`{scheme}` {degree}", *(orders(values[:, k]) for k in range(1, len(PHASES))),
+         *(", ".join(f"{error:.1e}" for error in values[1:, k, 0]) for k in (0, 2))]
+        for (scheme, degree), values in errors.items()
+    ]  # fmt: skip
 
 
-def picture(errors: dict[tuple[str, int], np.ndarray], path: Path) -> None:
+def picture(errors: dict[tuple[str, int], np.ndarray]) -> None:
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.8), sharey=True, layout="constrained")
     for ax, phase in zip(axes, ("tied, before any event", "touch after second meeting"), strict=True):
         k = list(PHASES).index(phase)
@@ -82,18 +75,17 @@ def picture(errors: dict[tuple[str, int], np.ndarray], path: Path) -> None:
         ax.grid(visible=True, alpha=0.3)
     axes[0].set_ylabel("largest error of y [m]")
     axes[0].legend()
-    figure.savefig(path, dpi=110)
+    figure.savefig(IMAGES / "orders.png", dpi=110)
     plt.close(figure)
-    Image.open(path).convert("P", palette=Image.Palette.ADAPTIVE, colors=64).save(path, optimize=True)
+    shrink(IMAGES / "orders.png")
 
 
 def main() -> None:
     errors = measured()
-    for name, values in errors.items():
-        for phase, of_phase in zip(PHASES, values.swapaxes(0, 1), strict=True):
-            print(*name, phase, *(f"{y:.1e}/{v:.1e}" for y, v in of_phase))
-    picture(errors, DOCS / "images" / "orders.png")
-    written("orders", table(errors), "orders.py", "coupling.md")
+    picture(errors)
+    head = ["order of", *(f"{phase}: y, v" for phase in list(PHASES)[1:]),
+            "y before any event at 1 ms … 1/8 ms [m]", "in the flight"]  # fmt: skip
+    write_section("coupling.md", "orders", table(head, rows(errors)))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ Writes docs/images/paper-fig2.png … paper-fig5.png and prints every number tha
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -13,13 +12,13 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from pages import IMAGES  # beside this script
 from scipy.sparse.linalg import splu
 
 from springbeam import Scene, Trajectory, load_scene, simulate, with_changes
 from springbeam.monolithic import algorithm1, event_driven, semi_discrete
 from springbeam.pictures.drawing import BLACK, BLUE, GREEN, VERMILLION, decimated
 
-IMAGES = Path(__file__).resolve().parent / "images"
 FIGURES = (2, 3, 4, 5)
 #: The resolved run: a window after the contact at 0.5 s, and a macro step below 1/ω of the model's fastest mode.
 WINDOW = 4e-5
@@ -46,7 +45,7 @@ TREATMENTS = (
 
 
 def energy(run: Trajectory) -> np.ndarray:
-    """(63), with the potential of the loads."""
+    """Return the energy (63), with the potential of the loads."""
     return run.e_beam + run.e_spring + run.e_load
 
 
@@ -82,7 +81,7 @@ def treatments(number: int) -> tuple[Trajectory, ...]:
 
 
 def draw(number: int, runs: tuple[Trajectory, ...]) -> None:
-    """Rows: the four treatments; columns: tip, spring top, velocities, energy."""
+    """Draw a figure; rows: the four treatments; columns: tip, spring top, velocities, energy."""
     figure = Figure(figsize=(10.5, 8.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(4, 4)
@@ -185,7 +184,7 @@ def load_readings() -> None:
 
 
 def modes_kept() -> None:
-    """What separates Figure 3 from Figure 2 under `transmission`: a vanishing load brings the same shape of its own."""
+    """Print what separates Figure 3 from Figure 2 under `transmission`: a vanishing load brings the same shape."""
     scene = load_scene("paper-fig2")
     for load in (0.0, -6e-12, -6.0):
         run = simulate(with_changes(scene, beam={"tip_load_coefficient": load}))
@@ -193,7 +192,7 @@ def modes_kept() -> None:
 
 
 def report(label: str, scene: Scene, **choices: Any) -> None:
-    """Algorithm 1, also where it breaks down."""
+    """Print a run of Algorithm 1, also where it breaks down."""
     broke = ""
     try:
         run = algorithm1.simulate(scene, **choices)
@@ -222,7 +221,7 @@ def readings() -> None:
 
 
 def resolution(all_runs: dict[int, tuple[Trajectory, ...]]) -> None:
-    """The resolved run of Figure 2 against the monolithic reference of the same law."""
+    """Compare the resolved run of Figure 2 with the monolithic reference of the same law."""
     run = all_runs[2][3]
     reference = event_driven.simulate(run.scene, sample_times=run.time)
     sampled = {name: np.interp(run.time, reference.time, reference[name]) for name in ("y", "u_tip")}

@@ -6,29 +6,28 @@ Writes the table of docs/accuracy.md, "What the promise costs". With NUMBERs onl
 from __future__ import annotations
 
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from math import pi, sqrt
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from pages import table, write_section  # beside this script
 
 from springbeam import simulate, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.results.contact_times import apart
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import Beam, Scene, SceneError, scene_from_dict
 from springbeam.scene.resolution import fastest_frequency, slowest_frequency
 from springbeam.scene.statics import tip_compliance, tip_inertia
 from springbeam.studies.accuracy import pick
-from springbeam.studies.tradeoff import comparable_until
+from springbeam.studies.reference import comparable_until
 from springbeam.studies.tradeoff.configurations import configurations
 from springbeam.studies.tradeoff.errors import errors
 
-DOCS = Path(__file__).parent
 ACCURACIES = (1e-3, 1e-4, 1e-5)
 KINDS = ("pair", "damped pair", "pair of few modes", "pair with stop", "beam on stop", "law compliance", "spring")
 #: Families of the sweep that make the runs of others, for as many calls or more.
@@ -45,11 +44,11 @@ SEED, SCENES = 2029, 8 * len(KINDS)
 
 
 def drawn(number: int) -> Scene:
-    """Scene ``number`` of the seed. What moves is of the size that the tip's speed and the lowest frequency give it."""
+    """Draw scene ``number`` of the seed. Motions are as large as the tip's speed and the lowest frequency make them."""
     random, kind = np.random.default_rng([SEED, number]), KINDS[number % len(KINDS)]
 
     def between(low: float, high: float) -> float:
-        """Evenly over the decades."""
+        """Draw a number, evenly over the decades."""
         return float(f"{np.exp(random.uniform(np.log(low), np.log(high))):.4g}")
 
     def some(probability: float, value: float) -> float:
@@ -132,12 +131,12 @@ class Run:
 
     @property
     def compared(self) -> np.ndarray:
-        """Times of the rows that are judged: some, since every other size of a step costs the reference more."""
+        """Return the times of the rows that are judged: some, as each costs the reference a step."""
         return np.asarray(self.trajectory.time[:: len(self.trajectory) // ROWS + 1])
 
 
 class Kept(NamedTuple):
-    """Of one scene at one accuracy."""
+    """What became of one promise: a scene at one accuracy."""
 
     number: int
     accuracy: float
@@ -159,17 +158,13 @@ class Kept(NamedTuple):
         return f"{self.number} at {self.accuracy:.0e}"
 
 
-def calls(summary: dict[str, Any]) -> int:
-    return sum(int(summary.get(f"{body}_steps", 0)) for body in ("beam", "spring"))
-
-
 def promised(scene: Scene, accuracy: float) -> Run:
     found = pick(scene.model_copy(update={"accuracy": accuracy}))
-    return Run(f"--accuracy {accuracy:.0e}", found.pilot_steps + calls(found.run.summary), found.run)
+    return Run(f"--accuracy {accuracy:.0e}", found.pilot_steps + found.run.do_steps, found.run)
 
 
 def swept(scene: Scene, most: int) -> list[Run]:
-    """The configurations of `springbeam tradeoff` for the same model that make at most so many calls."""
+    """Run the configurations of `springbeam tradeoff` for the same model that make at most so many calls."""
     bodies = (scene.beam is not None) + (scene.spring is not None)
 
     def limited(time: float, phase: str, macro_steps: int) -> None:
@@ -187,12 +182,12 @@ def swept(scene: Scene, most: int) -> list[Run]:
             if stopped.cause == "too dear":
                 too_dear.add(configuration.family)
             continue
-        runs.append(Run(configuration.name, calls(run.summary), run))
+        runs.append(Run(configuration.name, run.do_steps, run))
     return runs
 
 
-def of_number(number: int) -> list[Kept]:
-    """Nothing if the reference finds no end of the events, or all accuracies are refused."""
+def judge_number(number: int) -> list[Kept]:
+    """Judge scene ``number``; nothing if the reference finds no end of the events, or all accuracies are refused."""
     try:
         return judged(drawn(number), number)
     except event_driven.ReferenceFailure:
@@ -200,7 +195,7 @@ def of_number(number: int) -> list[Kept]:
 
 
 def judged(scene: Scene, number: int = 0) -> list[Kept]:
-    """Of one scene, as far as a perturbation of it stays small; without the accuracies that are refused."""
+    """Judge a scene as far as a perturbation of it stays small; without the accuracies that are refused."""
     scene = with_changes(scene, time={"t_end": comparable_until(scene)})
     ours: dict[float, Run] = {}
     for accuracy in ACCURACIES:
@@ -211,14 +206,14 @@ def judged(scene: Scene, number: int = 0) -> list[Kept]:
     rivals = swept(scene, max(run.calls for run in ours.values()))
     every = [*ours.values(), *rivals]
     reference = event_driven.simulate(scene, sample_times=np.unique(np.concatenate([run.compared for run in every])))
-    displacements = {run.name: displacement(run, reference) for run in every}
     kept = []
     for accuracy, run in ours.items():
         span = run.trajectory.time[-1] - run.trajectory.time[0]
-        window = 2.0 * span / run.trajectory.summary["macro_steps"]
+        step = span / run.trajectory.summary["macro_steps"]
 
-        def error(of: Run, window: float = window, span: float = span) -> float:
-            return max(displacements[of.name], apart(of.trajectory, reference, window)[0] / span)
+        def error(run: Run, step: float = step, span: float = span) -> float:
+            found = errors(run.trajectory, reference, step)
+            return max(found.y_max if scene.beam is None else found.u_tip_max, found.event_time / span)
 
         good = [rival for rival in rivals if rival.calls < run.calls and error(rival) <= accuracy]
         best = min(good, key=lambda rival: rival.calls, default=run)
@@ -226,30 +221,25 @@ def judged(scene: Scene, number: int = 0) -> list[Kept]:
     return kept
 
 
-def displacement(run: Run, reference: Trajectory) -> float:
-    found = errors(run.trajectory, reference, 0.0)
-    return found.u_tip_max if reference.scene.beam is not None else found.y_max
-
-
 # -- tables -----------------------------------------------------------------------------------------------------------
 
 
-def table(kept: list[Kept]) -> list[str]:
+def costs(kept: list[Kept]) -> list[str]:
     groups = {f"{accuracy:.0e}": [k for k in kept if k.accuracy == accuracy] for accuracy in ACCURACIES}
     groups |= {kind: [k for k in kept if k.kind == kind] for kind in KINDS}
-    head = "| | median | 90 % | worst | above 3 | promise broken, by a factor of at most |"
-    return [head, "|---" * 6 + "|", *(row(name, group) for name, group in {**groups, "all": kept}.items() if group)]
+    head = ["", "median", "90 %", "worst", "above 3", "promise broken, by a factor of at most"]
+    return table(head, [row(name, group) for name, group in {**groups, "all": kept}.items() if group])
 
 
-def row(name: str, group: list[Kept]) -> str:
+def row(name: str, group: list[Kept]) -> list[str]:
     ratios, broken = [k.ratio for k in group], [k.error / k.accuracy for k in group if k.broken]
     above, factor = sum(ratio > MOST for ratio in ratios), f", {max(broken):.1f}" if broken else ""
-    values = " | ".join(f"{value:.1f}" for value in (*np.quantile(ratios, [0.5, 0.9]), max(ratios)))
-    return f"| {name} | {values} | {above} of {len(group)} | {len(broken)}{factor} |"
+    values = [f"{value:.1f}" for value in (*np.quantile(ratios, [0.5, 0.9]), max(ratios))]
+    return [name, *values, f"{above} of {len(group)}", f"{len(broken)}{factor}"]
 
 
 def named(kept: list[Kept]) -> list[str]:
-    """The dearest scenes, and all that are broken."""
+    """Name the dearest scenes, and all broken promises."""
     dear = sorted((k for k in kept if k.ratio > MOST), key=lambda k: -k.ratio)[:DEAREST]
     broken = sorted((k for k in kept if k.broken), key=lambda k: -k.error / k.accuracy)
     return [
@@ -259,24 +249,17 @@ def named(kept: list[Kept]) -> list[str]:
 
 
 def main(numbers: list[int]) -> None:
-    from accuracy import written  # beside this script
-
     todo = numbers or list(range(SCENES))
     kept: list[Kept] = []
-    with get_context("spawn").Pool(PROCESSES) as pool:
-        for done, of_scene in enumerate(pool.imap(of_number, todo), 1):
-            kept += of_scene
-            print(
-                f"{done}/{len(todo)}",
-                *(map(report, of_scene) if of_scene else ["not compared"]),
-                sep="\n  ",
-                flush=True,
-            )
-    lines = [*table(kept), "", *named(kept)]
+    with ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+        for done, found in enumerate(pool.map(judge_number, todo), 1):
+            kept += found
+            print(f"{done}/{len(todo)}", *(map(report, found) if found else ["not compared"]), sep="\n  ", flush=True)
+    lines = [*costs(kept), "", *named(kept)]
     if not numbers:
         missing = len(ACCURACIES) * SCENES - len(kept)
         unknown = f"* Not compared: {missing}, that are refused or where the reference finds no end of events"
-        written("promise", [*lines, unknown], "promise.py")
+        write_section("accuracy.md", "promise", [*lines, unknown])
     print(*lines, sep="\n")
 
 

@@ -9,6 +9,7 @@ import argparse
 import os
 import platform
 import re
+import sys
 from pathlib import Path
 
 # Before numpy is imported. Its threads spin while they have nothing to do, in processor time that is anybody's.
@@ -16,22 +17,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from rows import GROUPS, Effort, Row
 
-PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
-HEAD = "| | what | goal | measured: median (smallest – largest) | met | beside it |\n|---|---|---|---|---|---|\n"
+sys.path.append(str(Path(__file__).parents[2] / "docs"))
+from pages import table, write_section
+
+PAGE = "performance.md"
+HEAD = ("", "what", "goal", "measured: median (smallest – largest)", "met", "beside it")
 
 
-def section(text: str, name: str, content: str) -> str:
-    """``text`` with ``content`` between the marks of ``name``."""
-    begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->"
-    if begin not in text or end not in text:
-        raise SystemExit(f"{PAGE}: no place for {name}")
-    before, rest = text.split(begin, 1)
-    return before + begin + content + end + rest.split(end, 1)[1]
-
-
-def line(row: Row) -> str:
+def cells(row: Row) -> tuple[str, ...]:
     met = {True: "yes", False: "**no**", None: "–"}[row.met]
-    return f"| {row.group} | {row.what} | {row.goal or '–'} | {row.measured} | {met} | {row.against} |\n"
+    return row.group, row.what, row.goal or "–", row.measured, met, row.against
 
 
 def machine() -> str:
@@ -49,17 +44,17 @@ def main() -> None:
         parser.error(f"{', '.join(sorted(unknown))}: not one of {', '.join(GROUPS)}")
     effort = Effort(2, quick=True) if options.quick else Effort(options.rounds)
     for name in options.group or GROUPS:
-        content = ""
+        rows = []
         for row in GROUPS[name](effort):
             print(
                 f"{row.group} {row.what}\n    goal {row.goal or '–'}; measured {row.measured}; met {row.met}"
                 f"\n    {row.against}",
                 flush=True,
             )
-            content += line(row)
+            rows.append(cells(row))
         if not effort.quick:
-            text = section(PAGE.read_text(encoding="utf-8"), name, HEAD + content)
-            PAGE.write_text(section(text, "machine", f"{machine()}\n"), encoding="utf-8")
+            write_section(PAGE, name, table(HEAD, rows))
+            write_section(PAGE, "machine", [machine()])
 
 
 if __name__ == "__main__":

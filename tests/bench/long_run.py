@@ -8,7 +8,8 @@ import os
 import sys
 from time import perf_counter
 
-from springbeam.results.recording import FileRecorder, RunDirectory
+from springbeam.results.directory import RunDirectory
+from springbeam.results.file_recorder import FileRecorder
 from springbeam.run.runner import run
 from springbeam.scene import scene_from_dict
 

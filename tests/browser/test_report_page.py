@@ -17,7 +17,8 @@ import pytest
 from typer.testing import CliRunner
 
 from springbeam.cli import app
-from springbeam.results.recording import REPORT, load_trajectory
+from springbeam.results.directory import REPORT
+from springbeam.results.reading import load_trajectory
 from springbeam.results.trajectory import Trajectory
 from springbeam.scene import shipped_scenes
 

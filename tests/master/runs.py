@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from springbeam.results.recording import columns_of
-from springbeam.results.trajectory import EVENT_KINDS, Event, Trajectory
+from springbeam.results.trajectory import EVENT_KINDS, Event, Trajectory, columns_of
 from springbeam.scene import load_scene
 from springbeam.scene.statics import SHAPE_POINTS
 

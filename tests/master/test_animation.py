@@ -17,8 +17,9 @@ from springbeam import cli
 from springbeam.pictures import animation
 from springbeam.pictures.animation import AnimationError, animate
 from springbeam.pictures.drawing import NOT_RESOLVED
-from springbeam.pictures.motion import motion_of
-from springbeam.results.recording import FileRecorder, RunDirectory
+from springbeam.pictures.frames import frames_of
+from springbeam.results.directory import RunDirectory
+from springbeam.results.file_recorder import FileRecorder
 from springbeam.scene import with_changes
 
 SCENES = {
@@ -33,12 +34,12 @@ SCENES = {
 def picture():
     run = a_trajectory()
     with matplotlib.rc_context(animation.STYLE):
-        return animation._Picture(run, motion_of(run)), run
+        return animation._Picture(run, frames_of(run)), run
 
 
 def test_each_frame_is_a_recorded_one(picture):
     shown, run = picture
-    motion = motion_of(run)
+    motion = frames_of(run)
     for frame in (0, 123, 399):
         shown.show(frame)
         drawn = {part: line.get_ydata() / factor for line, part, factor in shown._moving}
@@ -56,7 +57,7 @@ def test_what_stands_still_is_drawn_as_it_was_laid_out(picture):
     frozen = pixels(shown.figure)
     with matplotlib.rc_context(animation.STYLE), pytest.MonkeyPatch.context() as patch:
         patch.setattr(animation._Picture, "_freeze", lambda self: None)
-        whole = animation._Picture(run, motion_of(run))
+        whole = animation._Picture(run, frames_of(run))
     whole.show(77)
     full = pixels(whole.figure)
     assert frozen.shape == full.shape == (500, 800, 3)
@@ -90,7 +91,7 @@ def test_a_gif_plays_as_long_as_asked(tmp_path, recwarn, scene):
 def test_a_motion_that_is_not_resolved_is_said_to_be(tmp_path):
     def titles(run):
         with matplotlib.rc_context(animation.STYLE):
-            return [ax.get_title("right") for ax in animation._Picture(run, motion_of(run)).figure.axes]
+            return [ax.get_title("right") for ax in animation._Picture(run, frames_of(run)).figure.axes]
 
     assert not any(titles(a_trajectory()))
     marked = a_trajectory()

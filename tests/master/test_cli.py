@@ -21,7 +21,8 @@ import springbeam.run.runner
 from springbeam import cli
 from springbeam.bodies.fmu import FmuError
 from springbeam.cli import common
-from springbeam.results.recording import PICTURES, load_trajectory
+from springbeam.results.directory import PICTURES
+from springbeam.results.reading import load_trajectory
 from springbeam.results.trajectory import Event
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import shipped_scenes

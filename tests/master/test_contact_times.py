@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from springbeam.results.contact_times import apart, changes_of_contact
+from springbeam.results.contact_times import contact_changes
+from springbeam.results.contact_times import contact_time_difference as difference
 from springbeam.results.trajectory import Event, Trajectory
 from springbeam.scene import scene_from_dict
 
@@ -24,22 +25,22 @@ CONTACT = run((0.1, "impact"), (0.4, "separation"))
 
 def test_a_shift_counts_in_full():
     shifted = run((0.103, "impact"), (0.395, "separation"))
-    assert apart(CONTACT, shifted, window=0.01) == (pytest.approx(0.005), 2)
-    assert apart(shifted, CONTACT, window=0.01) == (pytest.approx(0.005), 2)
+    assert difference(CONTACT, shifted, window=0.01) == (pytest.approx(0.005), 2)
+    assert difference(shifted, CONTACT, window=0.01) == (pytest.approx(0.005), 2)
 
 
 def test_a_graze_and_a_flight_shorter_than_the_window_are_no_evidence():
     graze = run((0.1, "impact"), (0.4, "separation"), (0.7, "impact"), (0.7, "separation"))
     flight = run((0.1, "impact"), (0.1, "separation"), (0.105, "impact"), (0.4, "separation"))
     for other in (graze, flight):
-        assert apart(CONTACT, other, window=0.01)[0] == 0.0
-        assert apart(other, CONTACT, window=0.01)[0] == 0.0
+        assert difference(CONTACT, other, window=0.01)[0] == 0.0
+        assert difference(other, CONTACT, window=0.01)[0] == 0.0
 
 
 def test_a_lasting_contact_that_one_run_lacks_counts():
     second = run((0.1, "impact"), (0.4, "separation"), (0.7, "impact"), (0.8, "separation"))
-    assert apart(CONTACT, second, window=0.01)[0] == pytest.approx(0.3)  # to the end of the run
-    assert apart(second, CONTACT, window=0.2)[0] == 0.0
+    assert difference(CONTACT, second, window=0.01)[0] == pytest.approx(0.3)  # to the end of the run
+    assert difference(second, CONTACT, window=0.2)[0] == 0.0
 
 
 @pytest.mark.parametrize(
@@ -48,21 +49,31 @@ def test_a_lasting_contact_that_one_run_lacks_counts():
     ids=["opens", "goes on in touch"],
 )
 def test_a_release_ends_the_contact_only_without_a_push(last, phase, distance):
-    assert apart(CONTACT, run((0.1, "impact"), last, phase=phase), window=0.01)[0] == pytest.approx(distance)
+    assert difference(CONTACT, run((0.1, "impact"), last, phase=phase), window=0.01)[0] == pytest.approx(distance)
 
 
 def test_strokes_that_die_out_are_one_however_many():
     few = run((0.2, "stop_impact"), (0.25, "stop_impact"), (0.26, "seated"), (0.5, "unseated"))
     many = run(*((0.2 + 0.06 * (1 - 0.5**k), "stop_impact") for k in range(9)), (0.26, "seated"), (0.502, "unseated"))
-    assert apart(few, many, window=0.06) == (pytest.approx(0.002), 2)
+    assert difference(few, many, window=0.06) == (pytest.approx(0.002), 2)
 
 
 def test_a_stroke_that_one_run_lacks_counts():
-    assert apart(run((0.2, "stop_impact")), run((0.2, "stop_impact"), (0.6, "stop_impact")), 0.01)[0] == pytest.approx(
-        0.4
-    )
+    assert difference(run((0.2, "stop_impact")), run((0.2, "stop_impact"), (0.6, "stop_impact")), 0.01)[
+        0
+    ] == pytest.approx(0.4)
 
 
-def test_changes_are_counted_after_the_first():
-    assert changes_of_contact(run((0.0, "impact"), phase="tied")) == 0
-    assert changes_of_contact(run((0.0, "impact"), (0.3, "stop_impact"), (0.4, "release"))) == 2
+def test_changes_of_contact_are_named_in_their_order():
+    events = run(
+        (0.0, "impact"), (0.3, "stop_impact"), (0.305, "seated"), (0.35, "unseated"), (0.4, "release"), (0.6, "impact"),
+        (0.605, "separation"),
+    )  # fmt: skip
+    expected = [("closes", 0.0), ("strikes", 0.3), ("leaves", 0.35), ("opens", 0.4)]
+    assert contact_changes(events, 0.01) == expected  # the last contact is too short
+    assert contact_changes(events, 0.004)[-2:] == [("closes", 0.6), ("opens", 0.605)]
+
+
+@pytest.mark.parametrize(("phase", "last"), [("free", [("opens", 0.4)]), ("touch", [])])
+def test_a_last_release_into_touch_opens_nothing(phase, last):
+    assert contact_changes(run((0.0, "impact"), (0.4, "release"), phase=phase), 0.01) == [("closes", 0.0), *last]

@@ -24,8 +24,8 @@ from springbeam.pictures.drawing import (
     readable_unit,
 )
 from springbeam.pictures.plots import plot_run
-from springbeam.results.recording import PICTURES, columns_of
-from springbeam.results.trajectory import Event
+from springbeam.results.directory import PICTURES
+from springbeam.results.trajectory import Event, columns_of
 from springbeam.scene import with_changes
 from springbeam.scene.statics import SHAPE_POINTS
 

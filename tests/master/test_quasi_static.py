@@ -13,13 +13,13 @@ from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.contact.phases import Joint, Phase, meeting
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble
+from springbeam.results.contact_times import contact_changes
 from springbeam.results.recording import MemoryRecorder
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.simulation import Simulation
 from springbeam.run.stepping import Pair
 from springbeam.scene import Beam, Scene, SceneError, scene_from_dict, statics, suspicions
 from springbeam.scene.statics import SHAPE_POINTS
-from springbeam.studies.crosscheck import contact_changes
 
 BEAM = Beam(
     density=2.0, area=0.5, second_moment_of_area=0.3, young_modulus=30.0, shear_modulus=50.0, shear_coefficient=0.8,
@@ -232,7 +232,7 @@ def test_the_whole_life_is_that_of_the_reference(what: str) -> None:
     run = simulate(scene(**{**LIFE[what], "time": {"t_end": 2.0}, "coupling": {"degree": 2, "macro_step": 0.01}}))
     exact = event_driven.simulate(run.scene)
     # Bounces that die out end by different rules, so what follows within 1 ms is not compared.
-    changes, expected = (contact_changes(t.events, 1e-3) for t in (run, exact))
+    changes, expected = (contact_changes(t, 1e-3) for t in (run, exact))
     assert [kind for kind, _ in changes] == [kind for kind, _ in expected]
     assert [time for _, time in changes] == pytest.approx([time for _, time in expected], abs=1e-6)
     assert run.e_impact_loss[-1] == pytest.approx(exact.e_impact_loss[-1], abs=1e-8)

@@ -17,21 +17,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springbeam.results.recording import (
-    PICTURES,
-    FileRecorder,
-    MemoryRecorder,
-    NonFiniteValue,
-    ResultsExist,
-    ResultsInUse,
-    ResultsUnreadable,
-    RunDirectory,
-    columns_of,
-    load_events,
-    load_summary,
-    load_trajectory,
-)
-from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, Event
+from springbeam.results.directory import PICTURES, ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
+from springbeam.results.file_recorder import FileRecorder
+from springbeam.results.reading import load_events, load_summary, load_trajectory
+from springbeam.results.recording import MemoryRecorder, NonFiniteValue
+from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, Event, columns_of
 from springbeam.scene import load_scene, with_changes
 
 PAIR = load_scene("soft")

@@ -16,9 +16,10 @@ from typer.testing import CliRunner
 
 from springbeam import cli
 from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS, readable_unit
-from springbeam.pictures.motion import COIL_HEIGHTS, MOST_FRAMES, motion_of
+from springbeam.pictures.frames import COIL_HEIGHTS, MOST_FRAMES, frames_of
 from springbeam.pictures.report import page, shipped_command
-from springbeam.results.recording import REPORT, FileRecorder, RunDirectory
+from springbeam.results.directory import REPORT, RunDirectory
+from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.trajectory import Event
 from springbeam.scene import load_scene, scene_from_dict, shipped_scenes, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
@@ -228,7 +229,7 @@ def test_frames_are_the_recorded_shapes_with_the_spring_of_the_same_time():
 
 
 def test_the_coil_stands_below_the_stop_and_ends_at_the_spring():
-    motion = motion_of(a_trajectory())
+    motion = frames_of(a_trajectory())
     assert motion.foot < PAIR.stop.position
     for frame in (0, 17, len(motion.time) - 1):
         heights = motion.coil(frame)
@@ -242,7 +243,7 @@ def test_frames_that_alternate_are_thinned_in_pairs():
     flips = np.where(np.arange(n) % 2, 1.0, -1.0)
     time = np.arange(n) / 2.0**14
     run = a_trajectory(n=n, time=time)
-    motion = motion_of(dataclasses.replace(run, shapes=(time, np.outer(flips, SHAPE_POINTS))))
+    motion = frames_of(dataclasses.replace(run, shapes=(time, np.outer(flips, SHAPE_POINTS))))
     assert len(motion.time) <= MOST_FRAMES
     tips = motion.deflection[:, -1]
     assert abs(np.mean(tips)) < 0.01

@@ -16,7 +16,6 @@ from springbeam.coupling.protocol import Window
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.tie import Tie
 from springbeam.scene import load_scene, with_changes
-from springbeam.studies.stability import two_mass
 from springbeam.studies.stability.critical import Preloaded
 from springbeam.studies.stability.linear import (
     LinearBody,
@@ -156,16 +155,6 @@ def test_critical_step_is_where_the_spectral_radius_passes_the_threshold(scheme,
     assert spectral_radius(p, scheme, degree, H) > 1.0 + THRESHOLD > spectral_radius(p, scheme, degree, 0.998 * H)
     half = critical_step(p, scheme, degree, THRESHOLD / 16.0)
     assert H / half == pytest.approx(4.0 if degree == 0 else 2.0, rel=0.15)
-
-
-# -- the two-mass oscillator ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("exchange", "c"), two_mass.CONSTANTS.items())
-def test_two_mass_oscillator(exchange, c):
-    """The next terms are of relative size O(H): below 0.1 % at H = 1e-3; stepped for 200 s as well."""
-    assert two_mass.predicted(exchange, 1e-3) == pytest.approx(c, rel=1e-3, abs=1e-6)
-    assert two_mass.measured(exchange, 1e-3, 200.0) == pytest.approx(c, rel=1e-3, abs=1e-6)
 
 
 # -- scenes ---------------------------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import sys
 from pathlib import Path
@@ -13,7 +12,8 @@ from typer.testing import CliRunner
 
 from springbeam.cli import app
 from springbeam.monolithic import event_driven
-from springbeam.results.recording import MemoryRecorder, load_trajectory
+from springbeam.results.reading import load_trajectory
+from springbeam.results.recording import MemoryRecorder
 from springbeam.run.runner import run
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
 from springbeam.studies.accuracy import simulate
@@ -22,9 +22,8 @@ from springbeam.studies.stability.predict import predict
 from springbeam.studies.sweep import row
 from springbeam.studies.tradeoff import study
 
-_PROMISE = importlib.util.spec_from_file_location("promise", Path(__file__).parents[2] / "docs" / "promise.py")
-promise = sys.modules["promise"] = importlib.util.module_from_spec(_PROMISE)
-_PROMISE.loader.exec_module(promise)
+sys.path.append(str(Path(__file__).parents[2] / "docs"))
+import promise
 
 STIFF_ON_SOFT = {
     "time": {"t_end": 0.25},

@@ -24,7 +24,10 @@ from springbeam import cli
 from springbeam.bodies.fmu import FmuError
 from springbeam.bodies.protocol import Motion
 from springbeam.contact.phases import Joint, Phase
-from springbeam.results.recording import FileRecorder, MemoryRecorder, ResultsUnreadable, RunDirectory, load_trajectory
+from springbeam.results.directory import ResultsUnreadable, RunDirectory
+from springbeam.results.file_recorder import FileRecorder
+from springbeam.results.reading import load_trajectory
+from springbeam.results.recording import MemoryRecorder
 from springbeam.run import runner
 from springbeam.run.checkpoint import Checkpoint, CheckpointRefused, decoded, encoded
 from springbeam.scene import load_scene, with_changes

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
-from springbeam.results.recording import load_summary
+from springbeam.results.reading import load_summary
 from springbeam.scene import load_scene, shipped_scenes
 
 COMMAND = typer.main.get_command(app)

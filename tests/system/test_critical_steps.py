@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from springbeam import load_scene, with_changes
 from springbeam.cli import app
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.studies.stability import critical, two_mass
+from springbeam.studies.stability import critical
 from springbeam.studies.stability.critical import LARGE_STEP, Comparison, comparison, comparisons, growth
 from springbeam.studies.stability.predict import THRESHOLD, linear_pair
 
@@ -78,7 +78,6 @@ def test_command(monkeypatch, agree):
     if not agree:
         some.append(Comparison("compliance", "jacobi", 0, 1e4, 1e-4, 1.1e-4, 1.5, 1.5))
     monkeypatch.setattr(critical, "comparisons", lambda: iter(some))
-    monkeypatch.setattr(two_mass, "measured", lambda exchange, H: two_mass.CONSTANTS[exchange])
     for options in ([], ["--json"], ["--quiet"]):
         result = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["stability", "--critical", *options])
         assert result.exit_code == (0 if agree else 1)
@@ -86,4 +85,3 @@ def test_command(monkeypatch, agree):
     assert result.stdout.strip() == ("agree" if agree else "disagree")
     document = json.loads(CliRunner().invoke(app, ["stability", "--critical", "--json"]).stdout)
     assert document["agree"] == agree
-    assert [c["c"] for c in document["two_mass"]] == [6.0, 10.0, 2.0, 4.0, 0.0]

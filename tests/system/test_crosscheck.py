@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from springbeam import load_scene, with_changes
 from springbeam.cli import app
-from springbeam.studies import crosscheck as module
+from springbeam.monolithic import event_driven
 from springbeam.studies.crosscheck import crosscheck, orders
 
 SHORT = {"time": {"t_end": 0.2}, "coupling": {"macro_step": 5e-4}}
@@ -60,9 +60,9 @@ WRONG = {
 @pytest.mark.parametrize("what", WRONG)
 def test_a_wrong_reference_fails(monkeypatch, what):
     """The reference is given another problem than the co-simulation: nothing in the bounds may hide that."""
-    right = module.event_driven.simulate
+    right = event_driven.simulate
     monkeypatch.setattr(
-        module.event_driven, "simulate", lambda scene, **options: right(with_changes(scene, **WRONG[what]), **options)
+        event_driven, "simulate", lambda scene, **options: right(with_changes(scene, **WRONG[what]), **options)
     )
     sharp = {
         "macro_step": 1e-3,
@@ -110,9 +110,9 @@ def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
     arguments = ["crosscheck", "duffing", "--set", "time.t_end=1", "--out", str(picture)]
     assert CliRunner().invoke(app, arguments).exit_code == 0
     assert picture.stat().st_size > 10_000
-    right = module.event_driven.simulate
+    right = event_driven.simulate
     monkeypatch.setattr(
-        module.event_driven,
+        event_driven,
         "simulate",
         lambda scene, **options: right(with_changes(scene, spring={"mass": 1.01}), **options),
     )

@@ -14,7 +14,7 @@ from faulty import NAMES, Fault, Script, installed
 from typer.testing import CliRunner
 
 from springbeam import cli
-from springbeam.results.recording import load_trajectory
+from springbeam.results.reading import load_trajectory
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 

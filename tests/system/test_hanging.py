@@ -14,7 +14,7 @@ from test_faults import FILES, SCENE
 from typer.testing import CliRunner
 
 from springbeam import cli
-from springbeam.results.recording import load_trajectory
+from springbeam.results.reading import load_trajectory
 
 pytestmark = [
     pytest.mark.skipif(os.name == "nt", reason="POSIX signals"),

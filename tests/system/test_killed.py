@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from springbeam.results.recording import load_trajectory
+from springbeam.results.reading import load_trajectory
 
 pytestmark = [
     pytest.mark.skipif(os.name == "nt", reason="POSIX processes"),

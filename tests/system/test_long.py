@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from springbeam.results.recording import load_events
+from springbeam.results.reading import load_events
 from springbeam.scene import load_scene, with_changes
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from springbeam import cli
-from springbeam.results.recording import load_trajectory
+from springbeam.results.reading import load_trajectory
 from springbeam.run.rows import Rows
 from springbeam.scene import Scene, SceneError, load_scene
 

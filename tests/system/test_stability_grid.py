@@ -19,7 +19,7 @@ from springbeam.run.ledger import APPROXIMATE, EXACT, bounds
 from springbeam.run.simulation import Simulation
 from springbeam.scene import Contact, Coupling, SceneError
 from springbeam.studies.stability import grid
-from springbeam.studies.stability.cells import AXES, COUPLINGS, SLICES, sampled_cells, scene_dict, slice_cells
+from springbeam.studies.stability.cells import COUPLINGS, PARAMETERS, SLICES, sampled_cells, scene_dict, slice_cells
 from springbeam.studies.stability.grid import CLASSES, Outcome, judged, run_cell, run_cells, write_csv
 
 SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro_step": 2e-3}}
@@ -143,7 +143,7 @@ def test_the_grid_covers_the_ranges():
     """Each stratum of the hypercube holds one cell, so the ranges are covered to 1/300 of their length."""
     cells = sampled_cells(300, 1)
     assert len(cells) + len(slice_cells(6)) >= 600
-    for axis in AXES:
+    for axis in PARAMETERS:
         if axis.choices:
             assert {cell[axis.name] for cell in cells} == set(axis.choices)
             continue
@@ -161,7 +161,7 @@ def test_the_grid_covers_the_ranges():
 
 @pytest.mark.parametrize("s", SLICES, ids=[s.name for s in SLICES])
 def test_slices_reach_both_ends(s):
-    axes = {axis.name: axis for axis in AXES}
+    axes = {p.name: p for p in PARAMETERS}
     mine = [cell for cell in slice_cells(3) if cell["slice"] == s.name]
     assert len(mine) == 9
     for name in (s.x, s.y):

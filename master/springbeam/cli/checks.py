@@ -98,6 +98,7 @@ def verify(as_json: JsonOption = False) -> None:
     Example: springbeam verify
     """
     from ..studies import verify as checks
+    from ..studies.verify.table import report
 
     try:
         if as_json:
@@ -109,7 +110,7 @@ def verify(as_json: JsonOption = False) -> None:
             ]
             print_json({"passed": passed, "sections": described})
         else:
-            passed = checks.report(console_for(silent=False))
+            passed = report(console_for(silent=False))
     except FmuError as error:
         fail(BAD_INPUT, str(error))
     if not passed:

@@ -21,7 +21,8 @@ from rich.progress import Progress, ProgressColumn
 from typer.core import TyperCommand, TyperGroup
 
 from ..bodies.fmu import FmuError
-from ..results.recording import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory, json_ready
+from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
+from ..results.file_recorder import json_ready
 from ..run.checkpoint import CheckpointRefused
 from ..scene import SceneError, scene_keys, shipped_scenes
 

@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn
 
-from ..results.recording import ANIMATIONS, REPORT, load_trajectory
+from ..results.directory import ANIMATIONS, REPORT
+from ..results.reading import load_trajectory
 from .common import BAD_INPUT, QuietOption, RunArgument, bad_input_reported, fail, progress_bar, results_directory
 
 ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace a file that is already there.")]

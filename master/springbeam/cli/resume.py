@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..results.recording import RunDirectory
+from ..results.directory import RunDirectory
 from .common import JsonOption, NoPlotsOption, QuietOption, bad_input_reported, results_directory
 from .run import carry_out
 

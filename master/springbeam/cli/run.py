@@ -17,15 +17,10 @@ from rich.table import Table
 from rich.text import Text
 
 from ..bodies.fmu import FmuError
-from ..results.recording import (
-    FileRecorder,
-    NonFiniteValue,
-    RunDirectory,
-    load_events,
-    load_summary,
-    load_trajectory,
-    replay,
-)
+from ..results.directory import RunDirectory
+from ..results.file_recorder import FileRecorder
+from ..results.reading import load_events, load_summary, load_trajectory
+from ..results.recording import NonFiniteValue, replay
 from ..results.trajectory import Event, Trajectory, rounded
 from ..run.checkpoint import Checkpoint
 from ..scene import Scene, load_scene

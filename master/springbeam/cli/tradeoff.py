@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..bodies.fmu import FmuError
-from ..results.recording import RunDirectory
+from ..results.directory import RunDirectory
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,
@@ -28,7 +28,7 @@ from .common import (
 )
 
 if TYPE_CHECKING:
-    from ..studies.tradeoff import Choice, Point, Study
+    from ..studies.tradeoff import Cheapest, Point, Study
 
 
 def tradeoff(
@@ -109,7 +109,7 @@ def _table(found: Study) -> Table:
     )
     for name in ("error", "co-simulation", "[ms]", "scipy", "[ms]", "ratio"):
         table.add_column(Text(name), justify="left" if name in ("co-simulation", "scipy") else "right", no_wrap=True)
-    for choice in found.choices():
+    for choice in found.cheapest():
         ratio = f"{choice.ratio:.1f}" if choice.ours and choice.scipy else ""
         table.add_row(f"{choice.target:.0e}", *_cells(choice.ours), *_cells(choice.scipy), ratio)
     return table
@@ -126,7 +126,7 @@ def _front_table(found: Study) -> Table:
         table.add_column(Text(name), justify="right", no_wrap=True)
     for point in found.front():
         assert point.errors is not None
-        calls = point.beam_steps + point.spring_steps
+        calls = point.do_steps
         table.add_row(
             point.configuration.name, f"{point.displacement:.1e}", f"{point.errors.event_time:.1e}",
             f"{1e3 * point.solve:.3g}", f"{1e3 * point.setup:.3g}", str(calls) if calls else "",
@@ -145,12 +145,12 @@ def _as_json(found: Study) -> dict[str, Any]:
             "setup": point.setup,
         }
 
-    def chosen(choice: Choice) -> dict[str, Any]:
+    def chosen(choice: Cheapest) -> dict[str, Any]:
         return {"error": choice.target, "co_simulation": described(choice.ours), "scipy": described(choice.scipy)}
 
     return {
         "until": found.scene.time.t_end,
-        "cheapest": [chosen(choice) for choice in found.choices()],
+        "cheapest": [chosen(choice) for choice in found.cheapest()],
         "front": [described(point) for point in found.front()],
         "notes": found.notes,
     }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -23,21 +22,23 @@ from .drawing import (
     BLACK,
     BLUE,
     GREY,
-    PHASE_SHADES,
+    LEVEL_LINES,
+    LINES,
     POSITIONS,
     STONE,
     VERMILLION,
     Unit,
     decimated,
+    length_along,
     mark,
     much_smaller,
     near_levels,
-    phase_intervals,
     present,
     readable_unit,
+    shaded_phases,
 )
-from .motion import COIL_ACROSS, COIL_WIDTH, STOP_WIDTH, Motion, motion_of
-from .timeline import LINES, STYLE
+from .frames import COIL_ACROSS, COIL_WIDTH, STOP_WIDTH, Frames, frames_of
+from .timeline import STYLE, line_style
 
 SUFFIXES = (".gif", ".mp4")
 _SIZE, _DPI = (8.0, 5.0), 100
@@ -75,17 +76,17 @@ def animate(
     AnimationError
         If there is nothing to animate, or nothing to write it with.
     """
-    motion = motion_of(trajectory)
-    if motion is None:
+    frames = frames_of(trajectory)
+    if frames is None:
         raise AnimationError("the run has no two frames at different times: there is nothing to animate")
     writer = _writer(path, fps)
-    times = np.linspace(motion.time[0], motion.time[-1], max(2, round(seconds * fps))).tolist()
+    times = np.linspace(frames.time[0], frames.time[-1], max(2, round(seconds * fps))).tolist()
     with matplotlib.rc_context(STYLE):
-        picture = _Picture(trajectory, motion)
+        picture = _Picture(trajectory, frames)
         try:
             with writer.saving(picture.figure, str(path), _DPI):
                 for time in progress(times):
-                    picture.show(motion.at(time))
+                    picture.show(frames.at(time))
                     writer.grab_frame()
         except (subprocess.CalledProcessError, BrokenPipeError) as error:
             path.unlink(missing_ok=True)
@@ -111,9 +112,9 @@ def _writer(path: Path, fps: int) -> AbstractMovieWriter:
 class _Picture:
     """The figure, and what moves in it."""
 
-    def __init__(self, trajectory: Trajectory, motion: Motion) -> None:
-        self.trajectory, self.motion = trajectory, motion
-        lost = motion.deflection is not None and "u_tip" in much_smaller(trajectory, present(trajectory, POSITIONS))
+    def __init__(self, trajectory: Trajectory, frames: Frames) -> None:
+        self.trajectory, self.frames = trajectory, frames
+        lost = frames.deflection is not None and "u_tip" in much_smaller(trajectory, present(trajectory, POSITIONS))
         self.figure = Figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
         heights = [3.0, *[1.5] * lost, 1.5]
         above, *close, below = self.figure.subplots(len(heights), 1, height_ratios=heights)
@@ -131,23 +132,23 @@ class _Picture:
         self._freeze()
 
     def show(self, frame: int) -> None:
-        motion = self.motion
+        frames = self.frames
         for line, part, factor in self._moving:
             if part == "beam":
-                assert motion.deflection is not None
-                line.set_ydata(factor * motion.deflection[frame])
+                assert frames.deflection is not None
+                line.set_ydata(factor * frames.deflection[frame])
             elif part == "coil":
-                line.set_ydata(factor * motion.coil(frame))
+                line.set_ydata(factor * frames.coil(frame))
             else:
-                assert motion.y is not None
-                line.set_ydata(factor * np.full(2, motion.y[frame]))
-        time = self._clock.factor * motion.time[frame]
+                assert frames.y is not None
+                line.set_ydata(factor * np.full(2, frames.y[frame]))
+        time = self._clock.factor * frames.time[frame]
         self._cursor.set_xdata([time, time])
-        phase = str(self.trajectory["phase"][motion.row[frame]])
+        phase = str(self.trajectory["phase"][frames.row[frame]])
         self._words.set_text(f"t = {time:.4f} {self._clock.name}  {phase:<7}")
 
     def _freeze(self) -> None:
-        """Everything that stands still becomes one image: it is drawn once, not for each frame."""
+        """Make one image of everything that stands still: it is drawn once, not for each frame."""
         moving: list[Artist] = [line for line, _, _ in self._moving]
         moving += [self._cursor, self._words]
         for artist in moving:
@@ -161,10 +162,10 @@ class _Picture:
         self.figure.figimage(still, zorder=-1.0)
 
     def _bodies(self, ax: Axes) -> None:
-        motion = self.motion
-        unit = readable_unit([np.array([motion.low, motion.high])], "m")
-        low, high = unit.factor * motion.low, unit.factor * motion.high
-        along, length = self._length()
+        frames = self.frames
+        unit = readable_unit([np.array([frames.low, frames.high])], "m")
+        low, high = unit.factor * frames.low, unit.factor * frames.high
+        along, length = length_along(self.trajectory.scene)
         if self.trajectory.scene.beam is None:
             ax.set_xlim(0.5 * length, 1.5 * length)
             ax.xaxis.set_visible(False)
@@ -173,33 +174,33 @@ class _Picture:
         self._stand(ax, length, unit, low)
         ax.set_ylim(low, high)
         ax.set_ylabel(f"height [{unit.name}]")
-        if motion.y is not None:
+        if frames.y is not None:
             half = COIL_WIDTH * length
-            (coil,) = ax.plot(length + half * COIL_ACROSS, unit.factor * motion.coil(0), color=VERMILLION, lw=1.3)
+            (coil,) = ax.plot(length + half * COIL_ACROSS, unit.factor * frames.coil(0), color=VERMILLION, lw=1.3)
             (top,) = ax.plot(
                 [length - 1.6 * half, length + 1.6 * half], [0.0, 0.0], color=VERMILLION, lw=4.0, solid_capstyle="butt"
             )
             self._moving += [(coil, "coil", unit.factor), (top, "top", unit.factor)]
-        if motion.deflection is not None:
+        if frames.deflection is not None:
             self._beam(ax, length, unit)
 
     def _stand(self, ax: Axes, length: float, unit: Unit, low: float) -> None:
-        """Ψ and φ beside the tip; the foundation as one block, or two with the spring between them."""
-        for symbol, value in self.motion.levels.items():
+        """Draw Ψ and φ beside the tip; the foundation as one block, or two with the spring between them."""
+        for symbol, value in self.frames.levels.items():
             level = unit.factor * value
             ends = length * (1.0 - STOP_WIDTH), length * (1.0 + STOP_WIDTH)
             if symbol == "φ":
-                inner = 1.2 * COIL_WIDTH * length if self.motion.y is not None else 0.0
+                inner = 1.2 * COIL_WIDTH * length if self.frames.y is not None else 0.0
                 for begin, end in ((ends[0], length - inner), (length + inner, ends[1])):
                     ax.add_patch(Rectangle((begin, low), end - begin, level - low, color=STONE, lw=0.0))
-            ax.plot(ends, [level, level], color=BLACK, lw=0.8, ls="-" if symbol == "φ" else "--")
+            ax.plot(ends, [level, level], color=BLACK, **line_style(LEVEL_LINES[symbol]))
             ax.annotate(symbol, (ends[1], level), xytext=(3.0, 0.0), textcoords="offset points", va="center")
 
     def _beam_enlarged(self, ax: Axes) -> None:
-        assert self.motion.deflection is not None
-        unit = readable_unit([self.motion.deflection], "m")
-        along, length = self._length()
-        reach = 1.1 * unit.factor * float(np.max(np.abs(self.motion.deflection)))
+        assert self.frames.deflection is not None
+        unit = readable_unit([self.frames.deflection], "m")
+        along, length = length_along(self.trajectory.scene)
+        reach = 1.1 * unit.factor * float(np.max(np.abs(self.frames.deflection)))
         self._wall(ax, along, length, -reach, reach)
         ax.set_ylim(-reach, reach)
         ax.set_ylabel(f"beam alone\nu [{unit.name}]")
@@ -208,13 +209,6 @@ class _Picture:
     def _beam(self, ax: Axes, length: float, unit: Unit) -> None:
         (beam,) = ax.plot(length * SHAPE_POINTS, np.zeros(len(SHAPE_POINTS)), color=BLUE, lw=3.5)
         self._moving.append((beam, "beam", unit.factor))
-
-    def _length(self) -> tuple[Unit, float]:
-        beam = self.trajectory.scene.beam
-        if beam is None:
-            return Unit(1.0, "m"), 1.0
-        unit = readable_unit([np.array([beam.length])], "m")
-        return unit, unit.factor * beam.length
 
     @staticmethod
     def _wall(ax: Axes, along: Unit, length: float, low: float, high: float) -> None:
@@ -228,14 +222,18 @@ class _Picture:
         time = trajectory["time"]
         names = present(trajectory, POSITIONS)
         unit = readable_unit([trajectory[name] for name in names], "m")
-        for phase, start, end in phase_intervals(time, trajectory["phase"]):
-            ax.axvspan(clock * start, clock * end, color=PHASE_SHADES.get(phase, "#FFFFFF"), lw=0.0, zorder=0)
+        for look, spans in shaded_phases(trajectory):
+            for start, end in spans:
+                ax.axvspan(clock * start, clock * end, color=look.colour, lw=0.0, zorder=0)
         for name in names:
             rows = decimated(time, trajectory[name])
-            look: dict[str, Any] = {"color": POSITIONS[name].colour, "label": POSITIONS[name].words, **LINES[name]}
-            ax.plot(clock * time[rows], unit.factor * trajectory[name][rows], **look)
-        for height in near_levels(trajectory.scene, [trajectory[name] for name in names]).values():
-            ax.axhline(unit.factor * height, color=BLACK, lw=0.6, ls="--")
+            colour, words = POSITIONS[name]
+            ax.plot(
+                clock * time[rows], unit.factor * trajectory[name][rows], color=colour, label=words,
+                **line_style(LINES[name]),
+            )  # fmt: skip
+        for symbol, height in near_levels(trajectory.scene, [trajectory[name] for name in names]).items():
+            ax.axhline(unit.factor * height, color=BLACK, **line_style(LEVEL_LINES[symbol]))
         ax.set_xlim(clock * time[0], clock * time[-1])
         ax.set_xlabel(f"time t [{self._clock.name}]")
         ax.set_ylabel(f"position [{unit.name}]")

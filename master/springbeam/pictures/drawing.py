@@ -1,11 +1,11 @@
-"""What the pictures, the report and the animation share, whatever draws them: colours, words, units, thinning.
+"""What plots, report and animation share, whatever draws them: looks and words, units, thinning, what can be seen.
 
-Colours are those of Okabe and Ito, told apart with any colour vision.
+Colours are those of Okabe and Ito, told apart with any colour vision. Widths and sizes are in points.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -44,7 +44,30 @@ EVENT_LOOKS = {
     "unseated": Look(GREY, "unseated"),
 }
 assert tuple(EVENT_LOOKS) == EVENT_KINDS
-#: Of columns of `Trajectory`, in the order in which they are drawn.
+
+
+class Marker(NamedTuple):
+    """A shape: as a character, in the words of matplotlib and of plotly; its size [pt]."""
+
+    sign: str
+    matplotlib: str
+    plotly: str
+    size: float = 4.0
+
+
+EVENT_MARKERS = {
+    "impact": Marker("▼", "v", "triangle-down"),
+    "stop_impact": Marker("▲", "^", "triangle-up"),
+    "release": Marker("●", "o", "circle"),
+    "retie": Marker("■", "s", "square"),
+    "separation": Marker("◆", "D", "diamond"),
+    "seated": Marker("◀", "<", "triangle-left"),
+    "unseated": Marker("▶", ">", "triangle-right"),
+}
+#: More events than this are not drawn through all panels.
+MANY_EVENTS = 60
+
+#: Columns of `Trajectory`, in the order in which they are drawn.
 POSITIONS = {"u_tip": Look(BLUE, "tip u(t, L)"), "y": Look(VERMILLION, "spring top y")}
 VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)"), "z": Look(VERMILLION, "spring top z")}
 FORCES = {
@@ -61,11 +84,41 @@ ENERGIES = {
     "e_impact_loss": Look(GREY, "impact losses"),
     "e_load": Look(GREEN, "loads (potential)"),
 }
-#: Of fields of `Event`.
+#: Fields of `Event`.
 IMPULSES = {
     "impulse_contact": Look(BLUE, "on the tip"),
     "impulse_foundation": Look(BLACK, "of the foundation"),
 }
+#: A beam on a stop has both, equal: one is drawn within the other.
+IMPULSE_MARKERS = {
+    "impulse_contact": Marker("○", "o", "circle-open", 5.5),
+    "impulse_foundation": Marker("▲", "^", "triangle-up", 3.0),
+}
+
+
+class Line(NamedTuple):
+    """What tells lines apart besides their colour."""
+
+    width: float = 1.1  #: [pt]
+    dashed: bool = False
+    opacity: float = 1.0
+
+
+#: By column; all others are as `Line()`.
+LINES = {
+    "u_tip": Line(2.2, opacity=0.75),
+    "y": Line(0.9),
+    "v_tip": Line(1.5),
+    "z": Line(0.8),
+    "contact_force": Line(0.7),
+    "contact_force_smoothed": Line(1.2),
+    "compliance_force": Line(1.0, dashed=True),
+    "foundation_force": Line(0.9),
+    "e_total": Line(1.4, dashed=True),
+}
+LEVEL_LINES = {"Ψ": Line(0.8, dashed=True), "φ": Line(1.3)}
+LEVEL_WORDS = {"Ψ": "rest of the spring Ψ", "φ": "foundation φ"}
+ALTERNATES = "alternates from step to step"
 #: Columns of pixels of a time axis, roughly; more points than a few per column cannot be seen.
 PIXEL_COLUMNS = 1000
 #: Forces and energies below this part of the largest one are not seen beside it.
@@ -80,7 +133,7 @@ class Unit(NamedTuple):
 
 
 def readable_unit(values: Iterable[np.ndarray], unit: str) -> Unit:
-    """The prefix with which the largest of ``values`` reads well: 0.015 m as 15 mm, 4.5e9 J as 4.5 GJ."""
+    """Return the prefix with which the largest of ``values`` reads well: 0.015 m as 15 mm, 4.5e9 J as 4.5 GJ."""
     largest = max((float(np.max(np.abs(v), initial=0.0)) for v in values), default=0.0)
     if largest == 0.0 or 0.1 <= largest < 1e4:
         return Unit(1.0, unit)
@@ -89,7 +142,7 @@ def readable_unit(values: Iterable[np.ndarray], unit: str) -> Unit:
 
 
 def decimated(time: np.ndarray, values: np.ndarray, columns: int = PIXEL_COLUMNS) -> np.ndarray:
-    """Indices of the rows to draw: of each of ``columns`` equal spans of time the first, last, lowest and highest.
+    """Return the rows to draw: the first, last, lowest and highest of each of ``columns`` equal spans of time.
 
     A line through them covers the same pixels as one through all rows. ``time`` does not decrease.
     """
@@ -105,7 +158,7 @@ def decimated(time: np.ndarray, values: np.ndarray, columns: int = PIXEL_COLUMNS
 
 
 def alternates(values: np.ndarray) -> bool:
-    """Whether ``values`` mostly jump up and down from row to row: the steps are longer than what they should show."""
+    """Tell whether ``values`` mostly jump up and down from row to row: the steps are too long for what they show."""
     if len(values) < 20:
         return False
     jumps = np.diff(values)
@@ -119,12 +172,12 @@ NOT_RESOLVED = "NOT RESOLVED by the macro step: see the warnings"
 
 
 def mark(trajectory: Trajectory) -> str:
-    """`NOT_RESOLVED`, or nothing if the run has resolved its motion."""
+    """Return `NOT_RESOLVED`, or nothing if the run has resolved its motion."""
     return "" if trajectory.summary.get("resolved", True) else NOT_RESOLVED
 
 
 def alternating(trajectory: Trajectory) -> list[str]:
-    """Words for the quantities that alternate from step to step."""
+    """Return words for the quantities that alternate from step to step."""
     looks = POSITIONS | VELOCITIES | FORCES
     return [looks[name].words for name in present(trajectory, looks) if alternates(trajectory[name])]
 
@@ -132,7 +185,7 @@ def alternating(trajectory: Trajectory) -> list[str]:
 def phase_intervals(
     time: np.ndarray, phase: np.ndarray, columns: int = PIXEL_COLUMNS
 ) -> list[tuple[str, float, float]]:
-    """``(phase, start, end)`` in turn; a row's phase holds until the next row.
+    """Return ``(phase, start, end)`` in turn; a row's phase holds until the next row.
 
     More intervals than can be seen are replaced by the phases at ``columns`` equally spaced times.
     """
@@ -145,13 +198,45 @@ def phase_intervals(
     return [(str(phase[i]), float(time[i]), float(end)) for i, end in zip(starts, ends, strict=True) if end > time[i]]
 
 
+def shaded_phases(trajectory: Trajectory) -> list[tuple[Look, list[tuple[float, float]]]]:
+    """Return shade, words and intervals [s] of each phase; none if the run is free throughout."""
+    spans: dict[str, list[tuple[float, float]]] = {}
+    for phase, start, end in phase_intervals(trajectory["time"], trajectory["phase"]):
+        spans.setdefault(phase, []).append((start, end))
+    if spans.keys() == {"free"}:
+        return []
+    others = iter(OTHER_SHADES * len(spans))
+    return [
+        (Look(PHASE_SHADES.get(phase) or next(others), PHASE_WORDS.get(phase, phase)), found)
+        for phase, found in spans.items()
+    ]
+
+
 def present(trajectory: Trajectory, names: Iterable[str]) -> list[str]:
-    """Those of ``names`` that the run has columns of."""
+    """Return those of ``names`` that the run has columns of."""
     return [name for name in names if name in trajectory.columns]
 
 
+def present_and_not_zero(trajectory: Trajectory, names: Iterable[str]) -> list[str]:
+    """Return those of ``names`` that the run has columns of with other values than 0."""
+    return [name for name in present(trajectory, names) if np.any(trajectory[name] != 0.0)]
+
+
+def gap_look(trajectory: Trajectory) -> Look:
+    """Return the look of the gap: above the spring, or above the foundation."""
+    return Look(BLUE, "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ")
+
+
+def length_along(scene: Scene) -> tuple[Unit, float]:
+    """Return the unit of positions along the beam, and its length in that unit; 1 m without a beam."""
+    if scene.beam is None:
+        return Unit(1.0, "m"), 1.0
+    unit = readable_unit([np.array([scene.beam.length])], "m")
+    return unit, unit.factor * scene.beam.length
+
+
 def levels(scene: Scene) -> dict[str, float]:
-    """Heights [m] of the spring's rest Ψ and the foundation φ, those that the scene has."""
+    """Return the heights [m] of the spring's rest Ψ and the foundation φ, those that the scene has."""
     heights = {}
     if scene.spring is not None:
         heights["Ψ"] = scene.spring.equilibrium
@@ -161,46 +246,71 @@ def levels(scene: Scene) -> dict[str, float]:
 
 
 def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
-    """Those of `levels` that do not dwarf what moves [m]: at most one and a half times its range away from it."""
+    """Return those of `levels` that do not dwarf what moves [m]: not further off than 1.5 times its range."""
     low, high = min(float(np.min(part)) for part in moving), max(float(np.max(part)) for part in moving)
     reach = 1.5 * (high - low)
     return {symbol: height for symbol, height in levels(scene).items() if low - reach <= height <= high + reach}
 
 
-def first_contact(trajectory: Trajectory) -> float:
-    """When the tip first meets something [s]; without such an event, the start."""
+def first_contact_time(trajectory: Trajectory) -> float:
+    """Return when the tip first meets something [s]; without such an event, the start."""
     times = (event.time for event in trajectory.events if event.kind in ("impact", "stop_impact"))
     return next(times, float(trajectory["time"][0]))
 
 
 def much_smaller(trajectory: Trajectory, names: list[str]) -> list[str]:
-    """The one of two whose motion cannot be seen beside the other's, if it moves at all."""
+    """Return the one of two whose motion cannot be seen beside the other's, if it moves at all."""
     ranges = {name: float(np.ptp(trajectory[name])) for name in names}
     return [name for name, size in ranges.items() if 0.0 < size < 0.02 * max(ranges.values())]
 
 
+def relative_residual(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows to draw, and |energy residual| over the largest energy in them; rows where it is 0 left out."""
+    relative = np.abs(trajectory["energy_residual"]) / energy_scale(trajectory)
+    rows = decimated(trajectory["time"], relative)
+    rows = rows[relative[rows] > 0.0]
+    return rows, relative[rows]
+
+
 def energy_scale(trajectory: Trajectory) -> float:
-    """The largest energy of the run [J], against which its residual is judged; 1 if there is none."""
+    """Return the largest energy of the run [J], against which its residual is judged; 1 if there is none."""
     columns = trajectory.columns
     stored = sum(np.abs(columns[name]) for name in ("e_beam", "e_spring", "e_contact") if name in columns)
     return float(max(np.max(stored), abs(columns["e_total"][0]))) or 1.0
 
 
 def sizes_beside_the_largest(trajectory: Trajectory, names: Iterable[str]) -> tuple[list[str], dict[str, float]]:
-    """The columns that can be seen beside the largest of them, and the largest value of each that cannot."""
+    """Return the columns that can be seen beside the largest of them, and the largest value of each that cannot."""
     sizes = {name: float(np.max(np.abs(trajectory[name]))) for name in names}
     seen = [name for name, size in sizes.items() if size >= INVISIBLE * max(sizes.values())]
     return seen, {name: size for name, size in sizes.items() if size > 0.0 and name not in seen}
 
 
+def too_small(unseen: Mapping[str, float], looks: Mapping[str, Look], unit: str) -> list[str]:
+    """Return words and sizes of what `sizes_beside_the_largest` says cannot be seen."""
+    return [f"{looks[name].words} ≤ {size:.2g} {unit}" for name, size in unseen.items()]
+
+
 def stackable(trajectory: Trajectory, parts: Iterable[str]) -> bool:
-    """Whether the energies ``parts`` can be stacked: there are some, and none is negative but by rounding."""
+    """Tell whether the energies ``parts`` can be stacked: there are some, and none is negative but by rounding."""
     least = min((float(np.min(trajectory[name])) for name in parts), default=-1.0)
     return least >= -1e-9 * float(np.max(trajectory["e_total"]))
 
 
+def impulses(trajectory: Trajectory) -> tuple[dict[str, np.ndarray], Unit, float | None]:
+    """Return time [s] and size [N·s] of the impulses of each of `IMPULSES`, shape (n, 2), their unit and their foot.
+
+    The foot is that of `stem_foot`; with one the axis is logarithmic, and no prefix is wanted.
+    """
+    points = {name: [(e.time, getattr(e, name)) for e in trajectory.events if getattr(e, name)] for name in IMPULSES}
+    found = {name: np.array(some) for name, some in points.items() if some}
+    sizes = np.concatenate([some[:, 1] for some in found.values()])
+    foot = stem_foot(sizes)
+    return found, readable_unit([sizes], "N·s") if foot is None else Unit(1.0, "N·s"), foot
+
+
 def stem_foot(sizes: np.ndarray) -> float | None:
-    """Where stems of ``sizes`` begin on a logarithmic axis; ``None`` where a linear one shows them all.
+    """Return where stems of ``sizes`` begin on a logarithmic axis; ``None`` where a linear one shows them all.
 
     Impulses of rounding size would stretch the axis over the ones that matter.
     """

@@ -19,16 +19,17 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from ..results.recording import PICTURES
+from ..results.directory import PICTURES
 from ..results.trajectory import Trajectory
 from ..scene.statics import SHAPE_POINTS
 from .drawing import (
     BLACK,
-    BLUE,
     ENERGIES,
     FORCES,
     GREY,
+    IMPULSE_MARKERS,
     IMPULSES,
+    LEVEL_LINES,
     POSITIONS,
     VELOCITIES,
     VERMILLION,
@@ -36,17 +37,21 @@ from .drawing import (
     Unit,
     alternates,
     decimated,
-    energy_scale,
-    first_contact,
+    first_contact_time,
+    gap_look,
+    impulses,
+    length_along,
     levels,
     much_smaller,
     present,
+    present_and_not_zero,
     readable_unit,
+    relative_residual,
     sizes_beside_the_largest,
     stackable,
-    stem_foot,
+    too_small,
 )
-from .timeline import DPI, IMPULSE_MARKERS, LEVEL_LINES, REMARK, STYLE, Timeline, figure_for, key, note
+from .timeline import DPI, REMARK, STYLE, Timeline, figure_for, key, line_style, note
 
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
 #: Early to late, dark to light, but not so light that a line is lost on paper.
@@ -54,7 +59,7 @@ _CLOCK = ListedColormap(matplotlib.colormaps["cividis"](np.linspace(0.0, 0.9, 25
 
 
 def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
-    """Draw the pictures `springbeam.results.recording.PICTURES` that the scene has something to show for.
+    """Draw the pictures `springbeam.results.directory.PICTURES` that the scene has something to show for.
 
     Parameters
     ----------
@@ -89,11 +94,10 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
 
 
 def _visible(ax: Axes, trajectory: Trajectory, looks: Mapping[str, Look], unit: str) -> list[str]:
-    """The columns that can be seen beside the largest; the others are named beside the panel."""
+    """Return the columns that can be seen beside the largest; the others are named beside the panel."""
     seen, unseen = sizes_beside_the_largest(trajectory, looks)
     if unseen:
-        sizes = [f"{looks[name].words} ≤ {size:.2g} {unit}" for name, size in unseen.items()]
-        note(ax, "too small to draw:\n" + "\n".join(sizes))
+        note(ax, "too small to draw:\n" + "\n".join(too_small(unseen, looks, unit)))
     return seen
 
 
@@ -104,18 +108,18 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     if trajectory.shapes is None:
         return None
     times, shapes = trajectory.shapes
-    first = int(np.searchsorted(times, first_contact(trajectory)))
+    first = int(np.searchsorted(times, first_contact_time(trajectory)))
     times, shapes = times[first : first + _SHAPES_EARLY], shapes[first : first + _SHAPES_EARLY]
     if len(times) < 2:
         return None
     figure = figure_for(trajectory, "(A) The beam right after first contact", 3.6)
     left, right = figure.subplots(1, 2)
     steps = np.diff(times)
-    apart = steps > 1e-6 * np.max(steps, initial=0.0)  # between rows of one event Δu is rounding
-    velocities = np.diff(shapes, axis=0)[apart] / steps[apart, None]
+    some = steps > 1e-6 * np.max(steps, initial=0.0)  # between rows of one event Δu is rounding
+    velocities = np.diff(shapes, axis=0)[some] / steps[some, None]
     _curves(figure, left, trajectory, times, shapes, "deflection u", "m", bar=False)
     _levels(left, trajectory, readable_unit([shapes], "m"))
-    middles = 0.5 * (times[1:] + times[:-1])[apart]
+    middles = 0.5 * (times[1:] + times[:-1])[some]
     _curves(figure, right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s", bar=True)
     seen = (trajectory["time"] >= times[0]) & (trajectory["time"] <= times[-1])
     fastest = float(np.max(np.abs(trajectory["v_tip"][seen]), initial=0.0))
@@ -133,7 +137,7 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
     if trajectory.shapes is None:
         return None
     times, shapes = trajectory.shapes
-    first = int(np.searchsorted(times, first_contact(trajectory)))
+    first = int(np.searchsorted(times, first_contact_time(trajectory)))
     times, shapes = times[first:], shapes[first:]
     if len(times) < _SHAPES_EARLY:
         return None
@@ -163,7 +167,7 @@ def _curves(
     *,
     bar: bool,
 ) -> None:
-    """Curves over x, coloured from early (dark) to late."""
+    """Draw curves over x, coloured from early (dark) to late."""
     readable, clock = readable_unit([curves], unit), readable_unit([times], "s")
     x, length = _positions_along(trajectory)
     norm = Normalize(clock.factor * times[0], clock.factor * times[-1])
@@ -180,7 +184,7 @@ def _curves(
 
 
 def _map(figure: Figure, ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray) -> None:
-    """Deflection over x and t."""
+    """Draw the deflection over x and t."""
     readable, clock = readable_unit([shapes], "m"), readable_unit([times], "s")
     x, length = _positions_along(trajectory)
     distinct = np.r_[True, np.diff(times) > 0.0]
@@ -194,21 +198,19 @@ def _map(figure: Figure, ax: Axes, trajectory: Trajectory, times: np.ndarray, sh
 
 
 def _positions_along(trajectory: Trajectory) -> tuple[np.ndarray, Unit]:
-    assert trajectory.scene.beam is not None
-    x = trajectory.scene.beam.length * SHAPE_POINTS
-    unit = readable_unit([x], "m")
-    return unit.factor * x, unit
+    unit, length = length_along(trajectory.scene)
+    return length * SHAPE_POINTS, unit
 
 
 def _levels(ax: Axes, trajectory: Trajectory, unit: Unit, *, whole_width: bool = False) -> None:
-    """Ψ and φ, across the panel or as ticks at the tip, unless what moves is tiny beside their distance."""
+    """Draw Ψ and φ, across the panel or as ticks at the tip, unless what moves is tiny beside their distance."""
     low, high = ax.get_ylim()
     reach = 1.5 * (high - low)
     for symbol, value in levels(trajectory.scene).items():
         level = unit.factor * value
         if not low - reach <= level <= high + reach:
             continue
-        ax.axhline(level, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **LEVEL_LINES[symbol])
+        ax.axhline(level, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **line_style(LEVEL_LINES[symbol]))
         place: dict[str, Any] = {"xytext": (3.0, 0.0), "va": "center"}
         if whole_width:  # beside the panel is the key
             place = {"xytext": (-2.0, 1.5), "ha": "right"}
@@ -253,11 +255,11 @@ def _velocity_panel(timeline: Timeline, ax: Axes, names: list[str]) -> None:
 
 
 def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
-    forces = [name for name in present(trajectory, FORCES) if np.any(trajectory[name] != 0.0)]
+    forces = present_and_not_zero(trajectory, FORCES)
     speeds = present(trajectory, ["z"])
-    impulses = [e for e in trajectory.events if e.impulse_contact != 0.0 or e.impulse_foundation != 0.0]
-    panels = [1.6] * bool(speeds) + [2.0] * bool(forces) + [1.2] * bool(impulses)
-    if not forces and not impulses:
+    struck = any(e.impulse_contact != 0.0 or e.impulse_foundation != 0.0 for e in trajectory.events)
+    panels = [1.6] * bool(speeds) + [2.0] * bool(forces) + [1.2] * struck
+    if not forces and not struck:
         return None
     title = "(D) Velocity of the spring's top, and forces" if speeds else "(D) Forces"
     timeline = Timeline.of(trajectory, title, panels)
@@ -266,7 +268,7 @@ def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
         _velocity_panel(timeline, next(axes), speeds)
     if forces:
         _force_panel(timeline, next(axes), forces)
-    if impulses:
+    if struck:
         _impulse_panel(timeline, next(axes))
     return timeline.figure
 
@@ -282,21 +284,19 @@ def _force_panel(timeline: Timeline, ax: Axes, names: list[str]) -> None:
 
 
 def _impulse_panel(timeline: Timeline, ax: Axes) -> None:
-    events = timeline.trajectory.events
-    sizes = np.array([getattr(e, name) for e in events for name in IMPULSES if getattr(e, name) != 0.0])
-    foot = stem_foot(sizes)
-    unit = readable_unit([sizes], "N·s") if foot is None else Unit(1.0, "N·s")
-    for name, (colour, label) in IMPULSES.items():
-        points = np.array([(e.time, getattr(e, name)) for e in events if getattr(e, name) != 0.0])
-        if len(points):
-            t, j = timeline.unit.factor * points[:, 0], unit.factor * points[:, 1]
-            ax.vlines(t, foot or 0.0, j, color=colour, lw=1.0)
-            ax.plot(t, j, color=colour, linestyle="none", label=label, **IMPULSE_MARKERS[name])
+    found, unit, foot = impulses(timeline.trajectory)
+    for name, points in found.items():
+        (colour, label), marker = IMPULSES[name], IMPULSE_MARKERS[name]
+        t, j = timeline.unit.factor * points[:, 0], unit.factor * points[:, 1]
+        ax.vlines(t, foot or 0.0, j, color=colour, lw=1.0)
+        face = "none" if marker.sign == "○" else colour
+        ax.plot(t, j, color=colour, linestyle="none", label=label, marker=marker.matplotlib, markersize=marker.size,
+                markerfacecolor=face)  # fmt: skip
     if foot is None:
         ax.axhline(0.0, color=GREY, lw=0.5)
     else:
         ax.set_yscale("log")
-        ax.set_ylim(foot, 2.0 * float(np.max(sizes)))
+        ax.set_ylim(foot, 2.0 * max(float(np.max(points[:, 1])) for points in found.values()))
     ax.set_ylabel(f"impulse [{unit.name}]")
     key(ax)
 
@@ -309,8 +309,7 @@ def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
     if gap:
         unit = readable_unit([trajectory["gap"]], "m")
         above[0].axhline(0.0, color=GREY, lw=0.5)
-        words = "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ"
-        timeline.line(above[0], unit, "gap", Look(BLUE, words))
+        timeline.line(above[0], unit, "gap", gap_look(trajectory))
         above[0].set_ylabel(f"gap [{unit.name}]")
         key(above[0])
     _energy_panel(timeline, energies)
@@ -319,9 +318,9 @@ def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
 
 
 def _energy_panel(timeline: Timeline, ax: Axes) -> None:
-    """Stacked where no part is negative, else lines."""
+    """Draw the energies stacked where no part is negative, else as lines."""
     trajectory = timeline.trajectory
-    there = {name: ENERGIES[name] for name in present(trajectory, ENERGIES) if np.any(trajectory[name] != 0.0)}
+    there = {name: ENERGIES[name] for name in present_and_not_zero(trajectory, ENERGIES)}
     parts = _visible(ax, trajectory, there, "J") if there else []
     unit = readable_unit([trajectory["e_total"], *(trajectory[name] for name in parts)], "J")
     if stackable(trajectory, parts):
@@ -343,14 +342,11 @@ def _energy_panel(timeline: Timeline, ax: Axes) -> None:
 
 
 def _residual_panel(timeline: Timeline, ax: Axes) -> None:
-    columns = timeline.trajectory.columns
-    relative = np.abs(columns["energy_residual"]) / energy_scale(timeline.trajectory)
-    rows = decimated(columns["time"], relative)
-    rows = rows[relative[rows] > 0.0]
-    ax.plot(timeline.unit.factor * columns["time"][rows], relative[rows], color=VERMILLION, lw=0.8)
+    rows, relative = relative_residual(timeline.trajectory)
+    ax.plot(timeline.unit.factor * timeline.trajectory["time"][rows], relative, color=VERMILLION, lw=0.8)
     if len(rows):
         ax.set_yscale("log")
-        ax.set_ylim(0.3 * max(float(np.min(relative[rows])), 1e-18), 5.0 * float(np.max(relative[rows])))
+        ax.set_ylim(0.3 * max(float(np.min(relative)), 1e-18), 5.0 * float(np.max(relative)))
         ax.yaxis.set_major_locator(LogLocator(numticks=6))
     else:
         note(ax, "zero throughout")

@@ -15,46 +15,24 @@ from matplotlib.patches import Patch
 
 from ..results.trajectory import Trajectory
 from .drawing import (
+    ALTERNATES,
     EVENT_LOOKS,
+    EVENT_MARKERS,
     GREY,
-    OTHER_SHADES,
-    PHASE_SHADES,
-    PHASE_WORDS,
+    LINES,
+    MANY_EVENTS,
     VERMILLION,
+    Line,
     Look,
     Unit,
     alternates,
     decimated,
     mark,
-    phase_intervals,
     readable_unit,
+    shaded_phases,
 )
 
-#: What tells lines apart besides their colour.
-LINES: dict[str, dict[str, Any]] = {
-    "u_tip": {"linewidth": 2.2, "alpha": 0.75},
-    "y": {"linewidth": 0.9},
-    "contact_force": {"linewidth": 0.7},
-    "contact_force_smoothed": {"linewidth": 1.2},
-    "compliance_force": {"linewidth": 1.0, "linestyle": "--"},
-    "foundation_force": {"linewidth": 0.9},
-    "e_total": {"linewidth": 1.4, "linestyle": (0, (4, 2))},
-}
-_EVENT_MARKERS = {
-    "impact": "v",
-    "stop_impact": "^",
-    "release": "o",
-    "retie": "s",
-    "separation": "D",
-    "seated": "<",
-    "unseated": ">",
-}
-LEVEL_LINES: dict[str, dict[str, Any]] = {"Ψ": {"lw": 0.8, "ls": (0, (4, 3))}, "φ": {"lw": 1.3}}
-#: Of a beam on a stop both are equal: one within the other.
-IMPULSE_MARKERS: dict[str, dict[str, Any]] = {
-    "impulse_contact": {"marker": "o", "markersize": 5.5, "markerfacecolor": "none"},
-    "impulse_foundation": {"marker": "^", "markersize": 3.0},
-}
+_DASHES = (0, (4, 2))
 
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -72,7 +50,6 @@ STYLE: dict[Any, Any] = {
 REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
 DPI = 160
 WIDTH = 8.2  # inches
-_MANY_EVENTS = 60
 _MARK_HEIGHT, _MARK_ROW = 1.045, 0.04
 _KEY_COLUMNS = 4
 
@@ -88,6 +65,7 @@ class Timeline:
 
     @classmethod
     def of(cls, trajectory: Trajectory, title: str, heights: Sequence[float]) -> Timeline:
+        """Make the figure with a panel of each of ``heights`` [inch], empty but for phases and events."""
         figure = figure_for(trajectory, title, 1.0 + sum(heights))
         axes = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
         unit = readable_unit([trajectory["time"]], "s")
@@ -102,45 +80,39 @@ class Timeline:
         return timeline
 
     def line(self, ax: Axes, unit: Unit, name: str, look: Look, **style: Any) -> None:
-        """A column over time; where it alternates from step to step, as dots on a faint line."""
-        style = {"color": look.colour, "label": look.words, **LINES.get(name, {}), **style}
+        """Draw a column over time; where it alternates from step to step, as dots on a faint line."""
+        style = {"color": look.colour, "label": look.words, **line_style(LINES.get(name, Line())), **style}
         values = self.trajectory[name]
         rows = decimated(self.trajectory["time"], values)
         t, v = self.unit.factor * self.trajectory["time"][rows], unit.factor * values[rows]
         if alternates(values):
             style = {**style, "linewidth": 0.25, "marker": ".", "markersize": 1.6, "markeredgewidth": 0.0}
-            note(ax, "alternates from step\nto step")
+            note(ax, ALTERNATES.replace(" to", "\nto"))
         ax.plot(t, v, **style)
 
     def _shade(self) -> list[Patch]:
-        spans: dict[str, list[tuple[float, float]]] = {}
-        for phase, start, end in phase_intervals(self.trajectory["time"], self.trajectory["phase"]):
-            spans.setdefault(phase, []).append((self.unit.factor * start, self.unit.factor * (end - start)))
-        others = iter(OTHER_SHADES * len(spans))
         patches = []
-        if spans.keys() == {"free"}:
-            return []
-        for phase, intervals in spans.items():
-            colour = PHASE_SHADES.get(phase) or next(others)
+        for look, spans in shaded_phases(self.trajectory):
+            intervals = [(self.unit.factor * start, self.unit.factor * (end - start)) for start, end in spans]
             for ax in self.axes:
                 ax.broken_barh(
-                    intervals, (0.0, 1.0), transform=ax.get_xaxis_transform(), color=colour, lw=0.0, zorder=0
+                    intervals, (0.0, 1.0), transform=ax.get_xaxis_transform(), color=look.colour, lw=0.0, zorder=0
                 )
-            patches.append(Patch(facecolor=colour, edgecolor=GREY, linewidth=0.5, label=PHASE_WORDS.get(phase, phase)))
+            patches.append(Patch(facecolor=look.colour, edgecolor=GREY, linewidth=0.5, label=look.words))
         return patches
 
     def _mark_events(self) -> list[Line2D]:
-        """Marks above the first panel and lines through all; of many events only ticks, a row for each kind."""
+        """Mark events above the first panel and by lines through all; many only by ticks, a row for each kind."""
         events = self.trajectory.events
-        many = len(events) > _MANY_EVENTS
+        many = len(events) > MANY_EVENTS
         handles: list[Line2D] = []
         for kind, (colour, words) in EVENT_LOOKS.items():
             times = self.unit.factor * np.array([event.time for event in events if event.kind == kind])
             if not len(times):
                 continue
             height = _MARK_HEIGHT + (_MARK_ROW * len(handles) if many else 0.0)
-            marker = "|" if many else _EVENT_MARKERS[kind]
-            look: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 4.0, "ls": "none"}
+            shape, size = ("|", 4.0) if many else (EVENT_MARKERS[kind].matplotlib, EVENT_MARKERS[kind].size)
+            look: dict[str, Any] = {"color": colour, "marker": shape, "markersize": size, "ls": "none"}
             visible = times[decimated(times, times)]
             first = self.axes[0]
             first.plot(
@@ -155,7 +127,13 @@ class Timeline:
         return handles
 
 
+def line_style(line: Line) -> dict[str, Any]:
+    """Return matplotlib's arguments for a line."""
+    return {"linewidth": line.width, "linestyle": _DASHES if line.dashed else "-", "alpha": line.opacity}
+
+
 def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
+    """Return an empty figure of ``height`` [inch] with title, scene and, where the motion is not resolved, its mark."""
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
     scene = trajectory.scene.title
@@ -165,11 +143,12 @@ def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
 
 
 def key(ax: Axes) -> None:
+    """Put the key beside the panel."""
     ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), frameon=False, borderaxespad=0.0, handlelength=1.6)
 
 
 def note(ax: Axes, text: str) -> None:
-    """A remark beside the panel, under its key; once, however often it is made."""
+    """Put a remark beside the panel, under its key; once, however often it is made."""
     notes = [note for note in ax.texts if note.get_gid() == "note"]
     if not notes:
         ax.text(1.012, 0.0, text, transform=ax.transAxes, va="bottom", gid="note", **REMARK)

@@ -1,4 +1,6 @@
-"""What a run leaves: columns, events, shapes and summary, in memory (``trajectory``) and in files (``recording``).
+"""What a run leaves: columns, events, shapes and summary, in memory and in files.
 
-Imports `scene` only. ``contact_times`` compares when two runs were in contact. Start at ``trajectory``.
+Imports `scene` only. Start at ``trajectory``. A run reports to a recorder: ``recording`` keeps everything in memory,
+``file_recorder`` streams into a run ``directory``, ``reading`` reads that back. ``contact_times`` tells when two runs
+were in contact, and how far they are apart in it.
 """

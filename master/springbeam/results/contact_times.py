@@ -7,6 +7,8 @@ within a macro step is decided by rounding.
 from __future__ import annotations
 
 import itertools
+from math import inf
+from typing import NamedTuple
 
 from .trajectory import Trajectory
 
@@ -14,8 +16,33 @@ from .trajectory import Trajectory
 Interval = tuple[float, float]
 
 
-def apart(first: Trajectory, second: Trajectory, window: float) -> tuple[float, int]:
-    """How far the times of two runs are apart [s], and how many of ``second`` that is about.
+class ContactChange(NamedTuple):
+    """Tip and spring meet (``closes``) or part (``opens``); the foundation is reached (``strikes``) or left after a
+    rest on it (``leaves``)."""
+
+    kind: str
+    time: float  #: [s]
+
+
+def contact_changes(run: Trajectory, window: float) -> list[ContactChange]:
+    """Return the changes of contact in their order, without contacts and flights shorter than ``window`` [s].
+
+    Strokes on the foundation that follow each other within ``window`` are one.
+    """
+    changes = []
+    for intervals, least, begin, end in (
+        (_contacts(run, inf), window, "closes", "opens"),
+        (_foundation_contacts(run, inf), 0.0, "strikes", "leaves"),
+    ):
+        for since, until in _lasting(intervals, window, least):
+            changes.append(ContactChange(begin, float(since)))
+            if until < inf and (until > since or end == "opens"):
+                changes.append(ContactChange(end, float(until)))
+    return sorted(changes, key=lambda change: change.time)
+
+
+def contact_time_difference(first: Trajectory, second: Trajectory, window: float) -> tuple[float, int]:
+    """Return how far the times of two runs are apart [s], and how many of ``second`` that is about.
 
     Each beginning and end of a contact is compared with the nearest one of the other run, or with the end of the run,
     if it is the later. Contacts closer than ``window`` [s] to each other are one, those between tip and spring that
@@ -23,7 +50,7 @@ def apart(first: Trajectory, second: Trajectory, window: float) -> tuple[float, 
     """
     end = float(second.time[-1])
     worst, number = 0.0, 0
-    for intervals, least in ((_joined, window), (_on_foundation, 0.0)):
+    for intervals, least in ((_contacts, window), (_foundation_contacts, 0.0)):
         ours, theirs = intervals(first, end), intervals(second, end)
         worst = max(worst, _furthest(_lasting(ours, window, least), theirs, end))
         lasting = _lasting(theirs, window, least)
@@ -32,14 +59,8 @@ def apart(first: Trajectory, second: Trajectory, window: float) -> tuple[float, 
     return worst, number
 
 
-def changes_of_contact(run: Trajectory) -> int:
-    """How often contact opened or closed or the foundation was struck, after the first time."""
-    times = [t for intervals in (_joined, _on_foundation) for i in intervals(run, float("inf")) for t in set(i)]
-    return max(sum(t < float("inf") for t in times) - 1, 0)
-
-
-def _joined(run: Trajectory, end: float) -> list[Interval]:
-    """Contacts of tip and spring."""
+def _contacts(run: Trajectory, end: float) -> list[Interval]:
+    """Return the contacts of tip and spring; one that goes on ends at ``end`` [s]."""
     edges: list[float] = []
     events = [e for e in run.events if e.kind in ("impact", "separation", "release", "retie")]
     for event, after in itertools.zip_longest(events, events[1:]):
@@ -54,8 +75,8 @@ def _joined(run: Trajectory, end: float) -> list[Interval]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def _on_foundation(run: Trajectory, end: float) -> list[Interval]:
-    """Impacts on the foundation, and rests on it."""
+def _foundation_contacts(run: Trajectory, end: float) -> list[Interval]:
+    """Return the impacts on the foundation, and the rests on it; a rest that goes on ends at ``end`` [s]."""
     intervals: list[Interval] = []
     since: float | None = None
     for event in run.events:
@@ -70,7 +91,7 @@ def _on_foundation(run: Trajectory, end: float) -> list[Interval]:
 
 
 def _lasting(intervals: list[Interval], window: float, least: float) -> list[Interval]:
-    """Closer than ``window`` they are one; then those of at least ``least``."""
+    """Join intervals closer than ``window``; return those that then last at least ``least`` [s]."""
     merged: list[Interval] = []
     for begin, end in intervals:
         if merged and begin - merged[-1][1] < window:
@@ -81,5 +102,5 @@ def _lasting(intervals: list[Interval], window: float, least: float) -> list[Int
 
 
 def _furthest(ours: list[Interval], theirs: list[Interval], end: float) -> float:
-    """Largest distance of a beginning or an end from the nearest one of the others."""
+    """Return the largest distance of a beginning or an end from the nearest one of the others [s]."""
     return max((min([end - i[k], *(abs(i[k] - j[k]) for j in theirs)]) for i in ours for k in (0, 1)), default=0.0)

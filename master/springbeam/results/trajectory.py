@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..scene import Scene
+from ..scene.statics import SHAPE_POINTS
 
 #: Columns of a whole pair, in file order; those of an absent body are left out.
 COLUMNS = (
@@ -45,7 +46,16 @@ EVENT_COLUMNS = (
     "energy_loss",
 )
 EVENT_KINDS = ("impact", "stop_impact", "release", "retie", "separation", "seated", "unseated")
-#: The share of a table's largest value that is a zero, rounded.
+#: Columns of the table of shapes: time [s] and deflections [m] at `SHAPE_POINTS`.
+SHAPE_COLUMNS = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
+#: Most characters of a phase's name.
+PHASE_WIDTH = 32
+_BEAM_COLUMNS = frozenset({"u_tip", "v_tip", "e_beam"})
+_SPRING_COLUMNS = frozenset({"y", "z", "e_spring"})
+_PAIR_COLUMNS = frozenset(
+    {"contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction", "velocity_mismatch", "e_contact"}
+)
+#: A number below this share of its table's largest is a zero, rounded.
 _NOISE = 1e-13
 
 
@@ -64,8 +74,28 @@ class Event:
     energy_loss: float = 0.0  #: [J]
 
 
+def columns_of(scene: Scene) -> tuple[str, ...]:
+    """Return the columns of ``scene`` in file order: `COLUMNS` without those of bodies that it does not have.
+
+    ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
+    """
+    beam, spring, stop = scene.beam is not None, scene.spring is not None, scene.stop is not None
+    absent: set[str] = set()
+    if not beam:
+        absent |= _BEAM_COLUMNS
+    if not spring:
+        absent |= _SPRING_COLUMNS
+    if not (beam and spring):
+        absent |= _PAIR_COLUMNS
+    if not stop:
+        absent.add("foundation_force")
+    if not (beam and (spring or stop)):
+        absent.add("gap")
+    return tuple(name for name in COLUMNS if name not in absent)
+
+
 def rounded(value: float, scale: float) -> str:
-    """``value`` in four digits; "0" for what rounding leaves of a zero, beside the largest of its kind, ``scale``."""
+    """Return ``value`` in four digits; "0" for a zero rounded, told by ``scale``, the largest of its kind."""
     return "0" if abs(value) <= _NOISE * scale else f"{value:.4g}"
 
 
@@ -91,6 +121,11 @@ class Trajectory:
             return columns[name]
         except KeyError:
             raise AttributeError(name) from None
+
+    @property
+    def do_steps(self) -> int:
+        """doStep calls of both FMUs, those that were rolled back included."""
+        return sum(int(self.summary.get(f"{body}_steps", 0)) for body in ("beam", "spring"))
 
     def __len__(self) -> int:
         return len(self.columns["time"])

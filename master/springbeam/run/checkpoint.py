@@ -25,7 +25,7 @@ import numpy as np
 from ..bodies.memory import Memory
 from ..bodies.protocol import Motion
 from ..contact.phases import Joint, Phase
-from ..results.recording import FileRecorder
+from ..results.file_recorder import FileRecorder
 from ..scene import Scene, scene_from_dict
 
 _FORMAT = 1
@@ -45,7 +45,7 @@ class Checkpoint:
     fmus: dict[str, str]  #: SHA-256 of each FMU's file
     seconds: float  #: between checkpoints [s]
     wall_time: float  #: so far [s]
-    results: dict[str, Any]  #: `springbeam.results.recording.FileRecorder.save`
+    results: dict[str, Any]  #: `springbeam.results.file_recorder.FileRecorder.save`
     simulation: dict[str, Any]  #: `springbeam.bodies.memory.Memory.save`
 
     def write(self, path: Path) -> None:

@@ -14,7 +14,10 @@ from ..bodies.fmu import FmuError
 from ..bodies.fmu_bodies import FmuBeam, FmuSpring
 from ..bodies.memory import Memory
 from ..bodies.quasi_static import QuasiStaticBeam
-from ..results.recording import FileRecorder, MemoryRecorder, Recorder, RunDirectory, load_summary, load_trajectory
+from ..results.directory import RunDirectory
+from ..results.file_recorder import FileRecorder
+from ..results.reading import load_summary, load_trajectory
+from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, scene_from_dict, suspicions, with_changes
 from .checkpoint import Checkpoint, CheckpointRefused, Checkpoints

@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from ..results.contact_times import apart, changes_of_contact
+from ..results.contact_times import contact_changes, contact_time_difference
 from ..results.recording import MemoryRecorder
 from ..results.trajectory import Trajectory
 from ..run import runner
@@ -172,7 +172,7 @@ class _Pilot:
     @property
     def calls(self) -> int:
         """doStep calls of both FMUs."""
-        return sum(int(self.run.summary.get(f"{body}_steps", 0)) for body in ("beam", "spring"))
+        return self.run.do_steps
 
     @property
     def spent(self) -> float:
@@ -255,7 +255,7 @@ class _EqualSteps:
     def second(self, first: _Pilot) -> float:
         growth = _LEAST_GROWTH
         if self._scheme == "hermite":
-            amplified = _AMPLIFIED if changes_of_contact(first.run) else 1.0
+            amplified = _AMPLIFIED if len({change.time for change in contact_changes(first.run, 0.0)}) > 1 else 1.0
             growth = math.pow(amplified * first.residual / self._accuracy, 1.0 / _ORDER)
         return self._grown(first, growth)
 
@@ -403,7 +403,7 @@ class _Search:
         scale = float(np.abs(values - values[0]).max()) or 1.0
         displacement = float(np.abs(self._way.difference(coarse, fine)).max(initial=0.0)) / scale
         step = coarse.run.scene.coupling.macro_step or self._span / coarse.macro_steps
-        event, events = apart(coarse.run, fine.run, 2.0 * step)
+        event, events = contact_time_difference(coarse.run, fine.run, 2.0 * step)
         event /= self._span
         better, of_event = self._way.better(coarse, fine)
         expected = displacement / (better - 1.0)

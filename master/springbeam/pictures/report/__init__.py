@@ -1,4 +1,7 @@
-"""A run as one HTML page that needs nothing else: no network, no server, no other file."""
+"""A run as one HTML page that needs nothing else: no network, no server, no other file.
+
+``over_time`` and ``moving`` make the charts, ``page.html``, ``page.js`` and ``page.css`` the page around them.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from plotly.offline import get_plotlyjs
 from ...results.trajectory import Trajectory, rounded
 from ...scene import Scene, load_scene, shipped_scenes
 from ..drawing import (
+    ALTERNATES,
     EVENT_LOOKS,
     FORCES,
     IMPULSES,
@@ -25,18 +29,10 @@ from ..drawing import (
     present,
     readable_unit,
 )
-from ..motion import Motion, motion_of
-from .figures import (
-    ALTERNATES,
-    Chart,
-    backdrop,
-    charts,
-    event_key,
-    motions,
-    moving_parts,
-    phase_key,
-    time_unit,
-)
+from ..frames import Frames, frames_of
+from .chart import Chart
+from .moving import moving_charts, moving_parts
+from .over_time import backdrop, charts, event_key, phase_key, time_unit
 
 _HERE = Path(__file__).parent
 #: Rows of the table of events.
@@ -46,7 +42,7 @@ _FORCES_READ = ("contact_force", "foundation_force")
 
 
 def page(trajectory: Trajectory) -> str:
-    """The report of a run as HTML; the same run always gives the same text.
+    """Return the report of a run as HTML; the same run always gives the same text.
 
     Parameters
     ----------
@@ -56,8 +52,8 @@ def page(trajectory: Trajectory) -> str:
     time = trajectory.columns["time"]
     drawable = len(time) > 1 and time[-1] > time[0]
     over_time = charts(trajectory) if drawable else []
-    motion = motion_of(trajectory) if drawable else None
-    moving = motions(trajectory, motion) if motion is not None else []
+    frames = frames_of(trajectory) if drawable else None
+    moving = moving_charts(trajectory, frames) if frames is not None else []
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_HERE), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
@@ -71,7 +67,7 @@ def page(trajectory: Trajectory) -> str:
         warnings=_warnings(trajectory),
         mark=mark(trajectory),
         moving=moving,
-        frames=0 if motion is None else len(motion.time),
+        frames=0 if frames is None else len(frames.time),
         charts=over_time,
         phases=phase_key(trajectory) if drawable else [],
         event_key=event_key(trajectory),
@@ -86,7 +82,7 @@ def page(trajectory: Trajectory) -> str:
         points=max((chart.points for chart in over_time), default=0),
         toml=tomli_w.dumps(scene.model_dump(exclude_none=True)),
         command=shipped_command(scene),
-        data=_as_script(_data(trajectory, over_time, moving, motion) if drawable else None),
+        data=_as_script(_data(trajectory, over_time, moving, frames) if drawable else None),
         plotly=get_plotlyjs(),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
         style=(_HERE / "page.css").read_text(encoding="utf-8"),
@@ -94,7 +90,7 @@ def page(trajectory: Trajectory) -> str:
 
 
 def shipped_command(scene: Scene) -> str | None:
-    """The command that runs ``scene`` from the shipped scene of its title; ``None`` if it is not made from one."""
+    """Return the command that runs ``scene`` from the shipped scene of its title; ``None`` if none is."""
     wanted = scene.model_dump(exclude_none=True)
     for name in shipped_scenes():
         shipped = load_scene(name).model_dump(exclude_none=True)
@@ -116,7 +112,7 @@ def _setting(value: Any) -> str:
 
 
 def _warnings(trajectory: Trajectory) -> list[str]:
-    """What a reader must know before believing a curve, the gravest first."""
+    """Return what a reader must know before believing a curve, the gravest first."""
     summary = trajectory.summary
     found = []
     status = summary.get("status", "done")
@@ -132,7 +128,7 @@ def _warnings(trajectory: Trajectory) -> list[str]:
 
 
 def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
-    """Words and values for the table of numbers."""
+    """Return words and values for the table of numbers."""
     summary, columns = trajectory.summary, trajectory.columns
     time = columns["time"]
     for key, words in (("macro_steps", "macro steps"), ("iterations", "iterations for the contact force")):
@@ -170,7 +166,7 @@ def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
             yield f"energy {words}", f"{columns[name][-1]:.6g} J"
 
 
-def _data(trajectory: Trajectory, over_time: list[Chart], moving: list[Chart], motion: Motion | None) -> dict[str, Any]:
+def _data(trajectory: Trajectory, over_time: list[Chart], moving: list[Chart], frames: Frames | None) -> dict[str, Any]:
     unit = time_unit(trajectory)
     data: dict[str, Any] = {
         "unit": {"factor": unit.factor, "name": unit.name},
@@ -178,28 +174,28 @@ def _data(trajectory: Trajectory, over_time: list[Chart], moving: list[Chart], m
         "charts": {chart.name: chart.figure.to_dict() for chart in [*moving, *over_time]},
         "overTime": [chart.name for chart in over_time],
     }
-    if motion is not None:
+    if frames is not None:
         data["motion"] = {
-            "time": motion.time,
-            "phase": trajectory["phase"][motion.row],
-            "readings": list(_readings(trajectory, motion)),
-            "deflection": motion.deflection,
-            "y": motion.y,
-            "parts": {chart.name: moving_parts(trajectory, motion, chart) for chart in moving},
+            "time": frames.time,
+            "phase": trajectory["phase"][frames.row],
+            "readings": list(_readings(trajectory, frames)),
+            "deflection": frames.deflection,
+            "y": frames.y,
+            "parts": {chart.name: moving_parts(trajectory, frames, chart) for chart in moving},
         }
     return data
 
 
-def _readings(trajectory: Trajectory, motion: Motion) -> Iterator[dict[str, Any]]:
+def _readings(trajectory: Trajectory, frames: Frames) -> Iterator[dict[str, Any]]:
     for looks, unit in ((POSITIONS, "m"), ({name: FORCES[name] for name in _FORCES_READ}, "N")):
         names = present(trajectory, looks)
         readable = readable_unit([trajectory[name] for name in names], unit)
         for name in names:
-            values = trajectory[name][motion.row]
+            values = trajectory[name][frames.row]
             yield {"words": looks[name].words, "values": values, "factor": readable.factor, "unit": readable.name}
 
 
 def _as_script(data: dict[str, Any] | None) -> str:
-    """JSON that can stand inside a script element."""
+    """Return JSON that can stand inside a script element."""
     text = json.dumps(data, default=np.ndarray.tolist, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c")

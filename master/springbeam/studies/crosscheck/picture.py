@@ -25,7 +25,7 @@ from . import Report
 
 
 def draw(report: Report, path: Path) -> None:
-    """Co-simulation and reference in one picture, and every error below its bound."""
+    """Draw co-simulation and reference, and every error below its bound."""
     trajectory, reference = report.trajectory, report.reference
     with matplotlib.rc_context(STYLE):
         timeline = Timeline.of(trajectory, "Co-simulation and reference", [2.2, 3.0])

@@ -17,7 +17,7 @@ _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
 
 
 @dataclass(frozen=True)
-class Axis:
+class Parameter:
     """A parameter of a cell and how a number in [0, 1) becomes its value.
 
     ``zero`` is the share of cells where it is 0, the rest is spread over ``low`` … ``high``, logarithmically unless
@@ -54,38 +54,38 @@ COUPLINGS = (
     ("paper", "energy", 0),
 )
 
-AXES = (
-    Axis("coupling", choices=COUPLINGS),
-    Axis("stiffness", 1.0, 3.6e10),  # √(EI·KAG)
-    Axis("shear_ratio", 1e-6, 1e6),  # KAG/EI
-    Axis("macro_step", 1e-6, 0.1),
-    Axis("mass", 1e-6, 1e6),
-    Axis("k1", 1e-2, 1e6),
-    Axis("k2_kind", choices=("hardening", "hardening", "softening", "linear")),
-    Axis("k2", 1e-2, 1e8),
-    Axis("escape", 0.3, 30.0),  # hilltop of the softening spring / the deflection that takes the beam's energy
-    Axis("contact_stiffness", 1.0, 1e12),
-    Axis("exponent", 1.0, 5.0, linear=True),
-    Axis("alpha_b", 1e-9, 1.0, zero=0.4),
-    Axis("alpha_s", 1e-3, 1e3, zero=0.4),
-    Axis("speed", 1e-6, 1e3),
-    Axis("restitution", 0.0, 1.0, linear=True),
-    Axis("elasticity", choices=("given", "plastic", "elastic")),
-    Axis("stop_depth", 1e-12, 0.1, zero=0.2),  # Ψ − φ; 0: no stop
-    Axis("equilibrium", -0.1, 0.1, linear=True),
-    Axis("clearance", 1e-9, 0.1, zero=0.6),  # tip above the spring at the start
-    Axis("approach", choices=("undeformed", "elastic")),
-    Axis("impact", choices=("inelastic", "inelastic", "rest", "tip")),
-    Axis("bodies", choices=("both", "both", "both", "both", "both", "both", "beam", "spring")),
-    Axis("fidelity", choices=("dynamic", "dynamic", "dynamic", "dynamic", "quasi_static")),
-    Axis("n_elements", choices=(1, 2, 5, 10, 20, 50)),
-    Axis("element_degree", choices=(1, 1, 1, 2, 5, 12)),
-    Axis("n_modes", choices=(0, 0, 1, 4)),
-    Axis("integrator", choices=("modal", "modal", "modal", "midpoint", "damped")),
-    Axis("reduced_integration", choices=(False, True)),
-    Axis("distributed_load", 1e-3, 1e3, zero=0.6),
-    Axis("external_force", 1e-3, 1e3, zero=0.6),
-    Axis("steps", 100, 400),
+PARAMETERS = (
+    Parameter("coupling", choices=COUPLINGS),
+    Parameter("stiffness", 1.0, 3.6e10),  # √(EI·KAG)
+    Parameter("shear_ratio", 1e-6, 1e6),  # KAG/EI
+    Parameter("macro_step", 1e-6, 0.1),
+    Parameter("mass", 1e-6, 1e6),
+    Parameter("k1", 1e-2, 1e6),
+    Parameter("k2_kind", choices=("hardening", "hardening", "softening", "linear")),
+    Parameter("k2", 1e-2, 1e8),
+    Parameter("escape", 0.3, 30.0),  # hilltop of the softening spring / the deflection that takes the beam's energy
+    Parameter("contact_stiffness", 1.0, 1e12),
+    Parameter("exponent", 1.0, 5.0, linear=True),
+    Parameter("alpha_b", 1e-9, 1.0, zero=0.4),
+    Parameter("alpha_s", 1e-3, 1e3, zero=0.4),
+    Parameter("speed", 1e-6, 1e3),
+    Parameter("restitution", 0.0, 1.0, linear=True),
+    Parameter("elasticity", choices=("given", "plastic", "elastic")),
+    Parameter("stop_depth", 1e-12, 0.1, zero=0.2),  # Ψ − φ; 0: no stop
+    Parameter("equilibrium", -0.1, 0.1, linear=True),
+    Parameter("clearance", 1e-9, 0.1, zero=0.6),  # tip above the spring at the start
+    Parameter("approach", choices=("undeformed", "elastic")),
+    Parameter("impact", choices=("inelastic", "inelastic", "rest", "tip")),
+    Parameter("bodies", choices=("both", "both", "both", "both", "both", "both", "beam", "spring")),
+    Parameter("fidelity", choices=("dynamic", "dynamic", "dynamic", "dynamic", "quasi_static")),
+    Parameter("n_elements", choices=(1, 2, 5, 10, 20, 50)),
+    Parameter("element_degree", choices=(1, 1, 1, 2, 5, 12)),
+    Parameter("n_modes", choices=(0, 0, 1, 4)),
+    Parameter("integrator", choices=("modal", "modal", "modal", "midpoint", "damped")),
+    Parameter("reduced_integration", choices=(False, True)),
+    Parameter("distributed_load", 1e-3, 1e3, zero=0.6),
+    Parameter("external_force", 1e-3, 1e3, zero=0.6),
+    Parameter("steps", 100, 400),
 )
 
 #: The cell that slices vary: the scene ``soft``, coarser.
@@ -149,34 +149,32 @@ SLICES = (
 
 
 def sampled_cells(count: int, seed: int) -> list[dict[str, Any]]:
-    """A Latin hypercube of ``count`` cells over all `AXES`."""
-    points = qmc.LatinHypercube(len(AXES), seed=seed).random(count)
-    return [
-        {"slice": "", **{axis.name: axis.value(x) for axis, x in zip(AXES, point, strict=True)}} for point in points
-    ]
+    """Return a Latin hypercube of ``count`` cells over all `PARAMETERS`."""
+    points = qmc.LatinHypercube(len(PARAMETERS), seed=seed).random(count)
+    return [{"slice": "", **{p.name: p.value(x) for p, x in zip(PARAMETERS, point, strict=True)}} for point in points]
 
 
 def slice_cells(resolution: int) -> list[dict[str, Any]]:
-    """``resolution``² cells of each of `SLICES`, both ends of the ranges included."""
-    axes = {axis.name: axis for axis in AXES}
+    """Return ``resolution``² cells of each of `SLICES`, both ends of the ranges included."""
+    by_name = {p.name: p for p in PARAMETERS}
     ends = np.linspace(0.0, 1.0, resolution)
     return [
-        {"slice": s.name, **BASE, **s.fixed, s.x: _spread(axes[s.x], i), s.y: _spread(axes[s.y], j)}
+        {"slice": s.name, **BASE, **s.fixed, s.x: _spread(by_name[s.x], i), s.y: _spread(by_name[s.y], j)}
         for s in SLICES
         for i in ends
         for j in ends
     ]
 
 
-def _spread(axis: Axis, x: float) -> Any:
-    """Over the range without the share of zeros, but 0 itself first."""
-    if axis.zero > 0.0 and x == 0.0:
+def _spread(parameter: Parameter, x: float) -> Any:
+    """Return the value at ``x`` of the range without the share of zeros, but 0 itself first."""
+    if parameter.zero > 0.0 and x == 0.0:
         return 0.0
-    return axis.value(axis.zero + (1.0 - axis.zero) * x)
+    return parameter.value(parameter.zero + (1.0 - parameter.zero) * x)
 
 
 def _spring_frequency(cell: dict[str, Any], k1: float, k2: float) -> float:
-    """An upper estimate [rad/s], at the deflection that takes all the energy and bears the loads."""
+    """Return an upper estimate [rad/s], at the deflection that takes all the energy and bears the loads."""
     if cell["bodies"] == "spring":
         energy = 0.5 * cell["mass"] * cell["speed"] ** 2
     else:
@@ -191,7 +189,7 @@ def _spring_frequency(cell: dict[str, Any], k1: float, k2: float) -> float:
 
 
 def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
-    """The scene of a cell, as `springbeam.scene.scene_from_dict` takes it."""
+    """Return the scene of a cell, as `springbeam.scene.scene_from_dict` takes it."""
     law, scheme, degree = cell["coupling"]
     H, speed, psi = cell["macro_step"], cell["speed"], cell["equilibrium"]
     steps = int(cell["steps"])

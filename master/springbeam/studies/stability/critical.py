@@ -62,7 +62,7 @@ class Preloaded(Body):
 
 
 def growth(scene: Scene) -> float:
-    """Measured spectral radius of the scene's coupling: the factor by which amplitudes grow per macro step.
+    """Return the measured spectral radius of the scene's coupling: the factor by which amplitudes grow per macro step.
 
     The scene's pair without stop and events, tied or in closed contact (``contact.exponent`` must be 1), the spring
     without its cubic term and at its equilibrium, the tip on it. The rate is that of the second half of the steps up
@@ -104,7 +104,7 @@ def growth(scene: Scene) -> float:
 
 
 def _energy(scene: Scene, pair: tuple[Body, Body]) -> float:
-    """Of the bodies, and of the contact law about its preload [J]."""
+    """Return the energy of the bodies, and of the contact law about its preload [J]."""
     energy = sum(body.energies().kinetic + body.energies().potential for body in pair)
     if scene.contact.law == "compliance":
         beam, top = (body.motion().displacement for body in pair)
@@ -113,7 +113,7 @@ def _energy(scene: Scene, pair: tuple[Body, Body]) -> float:
 
 
 def _stepper(scene: Scene, pair: tuple[Body, Body]) -> Callable[[float], None]:
-    """``step(time)`` advances both bodies by the scene's coupling."""
+    """Return ``step(time)``, which advances both bodies by the scene's coupling."""
     H, (beam, top) = scene.coupling.H, pair
     coupling = coupling_of(scene, law_of(scene.contact))
     guess = NO_FORCE
@@ -127,7 +127,7 @@ def _stepper(scene: Scene, pair: tuple[Body, Body]) -> Callable[[float], None]:
 
 
 def measured_critical_step(scene: Scene, near: float, precision: float = 0.002) -> float | None:
-    """H [s] around ``near`` at which `growth` passes 1 + `THRESHOLD`, by bisection to ``precision`` of itself.
+    """Return the H [s] near ``near`` at which `growth` passes 1 + `THRESHOLD`, to ``precision`` of itself.
 
     ``None`` if it does not within 10 % of ``near``.
     """
@@ -172,7 +172,7 @@ _FINE = 1.005
 
 
 def comparisons(n_elements: int = 10) -> Iterator[Comparison]:
-    """Every scheme on the scene ``soft`` with so many elements, linear spring and contact."""
+    """Compare every scheme on the scene ``soft`` with so many elements, linear spring and contact."""
     soft = with_changes(load_scene("soft"), stop=None, beam={"n_elements": n_elements}, spring={"cubic_stiffness": 0.0})
     assert soft.beam is not None
     modal = modal_beam(soft.beam)
@@ -187,7 +187,7 @@ def comparisons(n_elements: int = 10) -> Iterator[Comparison]:
 
 
 def comparison(scene: Scene, pair: LinearPair) -> Comparison:
-    """Of ``scene`` and its linearised ``pair``."""
+    """Compare ``scene`` with its linearised ``pair``."""
     coupling, law = scene.coupling, scene.contact.law
     scheme, degree = coupling.scheme, coupling.degree
     predicted = critical_step(pair, scheme, degree, factor=_FINE if scheme == "hermite" else None)

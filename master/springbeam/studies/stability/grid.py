@@ -20,7 +20,7 @@ import csv
 import math
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ from ...run.outcome import RunStopped
 from ...run.runner import run
 from ...scene import Scene, SceneError, scene_from_dict
 from ...scene.automatic import decided
-from .cells import AXES, scene_dict
+from .cells import PARAMETERS, scene_dict
 
 #: In the order in which pictures and tables show them; the last must stay empty.
 CLASSES = ("conserved", "dissipative", "approximate", "refused", "stopped", "garbage")
@@ -95,7 +95,7 @@ def run_cell(cell: dict[str, Any]) -> Outcome:
 
 
 def judged(run: Trajectory, cause: str = "") -> Outcome:
-    """The class of a run that is done, or has stopped for ``cause``, from what it recorded."""
+    """Return the class of a run that is done, or has stopped for ``cause``, from what it recorded."""
     summary = run.summary
     outcome = Outcome("stopped" if cause else "", cause, macro_steps=summary["macro_steps"], events=summary["events"])
     if len(run.time) == 0:
@@ -130,13 +130,13 @@ def _only_damped_numerically(scene: Scene) -> bool:
 
 
 def _energy_scale(run: Trajectory) -> np.ndarray:
-    """Largest energy until each row [J], as in `ledger.Ledger`."""
+    """Return the largest energy until each row [J], as in `ledger.Ledger`."""
     mechanical = sum(np.abs(run[name]) for name in ("e_beam", "e_spring", "e_contact") if name in run.columns)
     return np.maximum.accumulate(np.maximum(mechanical, abs(run.e_total[0])))
 
 
 def _faults(run: Trajectory, outcome: Outcome, scale: np.ndarray) -> Iterator[str]:
-    """What must not be, whatever the scene."""
+    """Yield what must not be, whatever the scene."""
     for name, values in run.columns.items():
         if name != "phase" and not np.all(np.isfinite(values)):
             yield f"{name} is not finite"
@@ -159,7 +159,7 @@ def _given_back(what: str, booked: np.ndarray, scale: np.ndarray) -> Iterator[st
 
 
 def _overlap(run: Trajectory) -> float:
-    """Largest overlap of bodies that may not, over the largest deflection or motion in a step."""
+    """Return the largest overlap of bodies that may not, over the largest deflection or motion in a step."""
     scene = run.scene
     positions = [run[name] for name in ("u_tip", "y") if name in run.columns]
     if run.shapes is not None and len(run.shapes[0]):
@@ -179,31 +179,30 @@ def _overlap(run: Trajectory) -> float:
 def run_cells(
     cells: Sequence[dict[str, Any]], processes: int, report: Callable[[Outcome], None] = lambda outcome: None
 ) -> list[Outcome]:
-    """Run all cells in so many processes; ``report(outcome)`` as each ends. Outcomes in the order of the cells.
+    """Run all cells in so many processes; return the outcomes in the order of the cells, each reported as it is there.
 
     Raises
     ------
     concurrent.futures.process.BrokenProcessPool
         If a worker process dies.
     """
-    outcomes: dict[int, Outcome] = {}
+    outcomes = []
     with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
-        futures = {pool.submit(run_cell, cell): index for index, cell in enumerate(cells)}
-        for future in as_completed(futures):
-            outcome = outcomes[futures[future]] = future.result()
+        for outcome in pool.map(run_cell, cells):
             report(outcome)
-    return [outcomes[i] for i in range(len(cells))]
+            outcomes.append(outcome)
+    return outcomes
 
 
 #: Columns of the CSV file.
 COLUMNS = (
-    *("cell", "slice", "law", "scheme", "degree"), *(axis.name for axis in AXES if axis.name != "coupling"),
+    *("cell", "slice", "law", "scheme", "degree"), *(p.name for p in PARAMETERS if p.name != "coupling"),
     *("class", "residual", "overlap", "macro_steps", "events", "reason"),
 )  # fmt: skip
 
 
 def write_csv(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], path: Path) -> None:
-    """A row per cell in their order; numbers that there are not are left empty."""
+    """Write a row per cell in their order; numbers that there are not are left empty."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
@@ -222,5 +221,5 @@ def write_csv(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], path
 
 
 def write_scene(cell: dict[str, Any], path: Path) -> None:
-    """The scene of ``cell`` as a file that `springbeam run` takes."""
+    """Write the scene of ``cell`` as a file that `springbeam run` takes."""
     path.write_text(tomli_w.dumps(scene_dict(cell)), encoding="utf-8")

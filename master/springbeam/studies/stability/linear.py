@@ -31,7 +31,7 @@ _CRITICAL = 1e-6
 
 
 def _phi(z: np.ndarray) -> list[np.ndarray]:
-    """φ_0 … φ_5 with φ_0 = e^z, φ_{j+1} = (φ_j − 1/j!)/z."""
+    """Return φ_0 … φ_5 with φ_0 = e^z, φ_{j+1} = (φ_j − 1/j!)/z."""
     near = np.abs(z) < 1.0
     small, large = np.where(near, z, 0.0), np.where(near, 1.0, z)
     values, recurred = [], np.exp(large)
@@ -44,7 +44,7 @@ def _phi(z: np.ndarray) -> list[np.ndarray]:
 
 
 def impulse_integrals(omega2: np.ndarray, c: np.ndarray, h: float) -> np.ndarray:
-    """S₋₁ … S₅ at time ``h`` [s].
+    """Return S₋₁ … S₅ at time ``h`` [s].
 
     Parameters
     ----------
@@ -107,11 +107,11 @@ class LinearBody:
         return 1.0 / float(self.b @ self.b)
 
     def displacement(self, x: np.ndarray) -> np.ndarray:
-        """w [m] of states, the columns of ``x``."""
+        """Return w [m] of states, the columns of ``x``."""
         return np.asarray(self.b @ x[: len(self.b)])
 
     def velocity(self, x: np.ndarray) -> np.ndarray:
-        """ẇ [m/s]."""
+        """Return ẇ [m/s] of states, the columns of ``x``."""
         return np.asarray(self.b @ x[len(self.b) :])
 
 
@@ -128,7 +128,7 @@ class Step:
         self._forced_integrals = [[b * S[j] for j in range(3 + row, 6 + row)] for row in (0, 1)]
 
     def __call__(self, x: np.ndarray, forces: Sequence[np.ndarray | float] = ()) -> tuple[np.ndarray, np.ndarray]:
-        """States and motions (`Motion` as rows, shape (4, columns)) after the step.
+        """Return states and motions (`Motion` as rows, shape (4, columns)) after the step.
 
         ``x`` has a state per column; ``forces`` are F, Ḟ, F̈ at the start, as many as there are, per column.
         """
@@ -147,7 +147,7 @@ class Step:
         return end, np.array([self.body.displacement(end), self.body.velocity(end), *integrals])
 
     def response(self, degree: int) -> tuple[np.ndarray, np.ndarray]:
-        """States and motions from rest under P₀ … P_degree, a column each."""
+        """Return states and motions from rest under P₀ … P_degree, a column each."""
         units = [force.derivatives(row.tolist(), self.h) for row in np.eye(degree + 1)]
         return self(np.zeros((self.body.size, degree + 1)), list(np.array(units).T))
 
@@ -161,11 +161,11 @@ class LinearPair:
     stiffness: float = 0.0
 
     def split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States of the beam and of the spring."""
+        """Return the states of the beam and of the spring."""
         return x[: self.beam.size], x[self.beam.size :]
 
     def penetration(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """y − u_tip [m] and its rate [m/s]."""
+        """Return y − u_tip [m] and its rate [m/s]."""
         a, s = self.split(x)
         return (
             self.spring.displacement(s) - self.beam.displacement(a),
@@ -178,7 +178,7 @@ CoupledStep = Callable[[np.ndarray], np.ndarray]
 
 
 def tied_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledStep:
-    """The tie by ``energy`` or ``hermite``: as `springbeam.coupling.tie.Tie` solves it, in closed form."""
+    """Return the step of the tie by ``energy`` or ``hermite``, in closed form what `coupling.tie.Tie` solves."""
     condition = SCHEMES[scheme][degree]
     T = np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
     beam, spring = Step(pair.beam, h), Step(pair.spring, h)
@@ -195,7 +195,7 @@ def tied_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledSt
 
 
 def projected_step(pair: LinearPair, degree: int, h: float) -> CoupledStep:
-    """`compliance` by ``energy``, in closed form: of a linear law, C has the first Legendre coefficients of k p̃."""
+    """Return the step of `compliance` by ``energy``: for a linear law, C has the first Legendre coefficients of k p̃."""
     k, n = pair.stiffness, degree + 1
     from_numbers, from_start = (part[:n] for part in numbers_to_legendre(degree))
     condition = SCHEMES["energy"][degree]
@@ -215,7 +215,7 @@ def projected_step(pair: LinearPair, degree: int, h: float) -> CoupledStep:
 
 
 def exchange_step(pair: LinearPair, sequential: bool, degree: int, h: float) -> CoupledStep:
-    """`compliance` by ``jacobi`` or ``gauss_seidel``: as `springbeam.coupling.exchange.Exchange` does it."""
+    """Return the step of `compliance` by ``jacobi`` or ``gauss_seidel``, what `coupling.exchange.Exchange` does."""
     beam, spring, k = Step(pair.beam, h), Step(pair.spring, h), pair.stiffness
 
     def step(x: np.ndarray) -> np.ndarray:
@@ -233,7 +233,7 @@ def exchange_step(pair: LinearPair, sequential: bool, degree: int, h: float) -> 
 
 
 def coupled_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledStep:
-    """The step of a scheme: with `compliance` where the pair has a contact stiffness, else of the tie."""
+    """Return the step of a scheme: with `compliance` where the pair has a contact stiffness, else of the tie."""
     if pair.stiffness == 0.0:
         return tied_step(pair, scheme, degree, h)
     if scheme == "energy":
@@ -242,13 +242,13 @@ def coupled_step(pair: LinearPair, scheme: str, degree: int, h: float) -> Couple
 
 
 def amplification(pair: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
-    """Matrix of one macro step of size ``h`` [s], for states (ξ, ξ̇) of the beam, then of the spring."""
+    """Return the matrix of one macro step of size ``h`` [s], for states (ξ, ξ̇) of the beam, then of the spring."""
     n = pair.beam.size + pair.spring.size
     return coupled_step(pair, scheme, degree, h)(np.eye(n))
 
 
 def spectral_radius(pair: LinearPair, scheme: str, degree: int, h: float) -> float:
-    """Largest modulus of an eigenvalue of `amplification`."""
+    """Return the largest modulus of an eigenvalue of `amplification`."""
     units = np.concatenate(
         [np.repeat(1.0, len(v)) if rate else np.maximum(np.sqrt(np.abs(v)), 1.0 / h)
          for v in (pair.beam.omega2, pair.spring.omega2) for rate in (False, True)]

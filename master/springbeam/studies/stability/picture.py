@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from ...pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
-from .cells import AXES, COUPLINGS, SLICES, Slice
+from .cells import COUPLINGS, PARAMETERS, SLICES, Slice
 from .grid import CLASSES, Outcome
 
 _COLOURS = dict(zip(CLASSES, (BLUE, SKY, GREEN, STONE, ORANGE, BLACK), strict=True))
-_LOG = {axis.name for axis in AXES if not axis.linear and not axis.choices}
+_LOG = {p.name for p in PARAMETERS if not p.linear and not p.choices}
 #: Residuals outside are drawn in the colours of the ends.
 _RESIDUALS = (1e-16, 1.0)
 
@@ -49,7 +49,7 @@ def draw(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], directory
 
 
 def _grid(s: Slice, cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome]) -> Grid:
-    """Cells of a slice: a row per value of y, a column per value of x, both ascending."""
+    """Return the cells of a slice: a row per value of y, a column per value of x, both ascending."""
     mine = [(cell, outcome) for cell, outcome in zip(cells, outcomes, strict=True) if cell["slice"] == s.name]
     rows = sorted({cell[s.y] for cell, _ in mine})
     return [sorted((c for c in mine if c[0][s.y] == y), key=lambda c: float(c[0][s.x])) for y in rows]
@@ -99,7 +99,7 @@ def _residual_legend(figure: Figure, axes: np.ndarray) -> None:
 
 
 def _samples(ax: Axes, cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], what: str) -> None:
-    """The hypercube's cells by coupling: shares of the classes, or the residuals."""
+    """Draw the hypercube's cells by coupling: shares of the classes, or the residuals."""
     mine = [(c["coupling"], o) for c, o in zip(cells, outcomes, strict=True) if not c["slice"]]
     ax.set_visible(bool(mine))
     names = [f"{scheme} {degree}" if law == "transmission" else f"{law}: {scheme} {degree}"

@@ -143,7 +143,7 @@ def _reduced(beam: Beam) -> tuple[Beam, bool]:
 
 
 def _advised(schemes: tuple[SchemePrediction, ...], H: float, resolved: int | None) -> tuple[str, int] | None:
-    """The scheme of the highest order among those that are stable here and at every smaller step.
+    """Return the scheme of the highest order among those that are stable here and at every smaller step.
 
     Where not even the lowest mode is resolved a higher degree buys nothing: ``energy`` of degree 0.
     """
@@ -159,7 +159,7 @@ def _advised(schemes: tuple[SchemePrediction, ...], H: float, resolved: int | No
 
 
 def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
-    """The beam of ``scene`` in its modes and the linearised spring; without a spring, the tip against the foundation.
+    """Return the beam's modes and the linearised spring; without a spring, the tip against the foundation.
 
     ``None`` where the scene joins no two bodies.
     """
@@ -175,7 +175,7 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
 
 
 def spring_body(scene: Scene) -> LinearBody:
-    """The spring with k1 + 3 k2 y² at its stiffest."""
+    """Return the spring with k1 + 3 k2 y² at its stiffest."""
     spring = scene.spring
     assert spring is not None
     m = spring.mass
@@ -183,7 +183,7 @@ def spring_body(scene: Scene) -> LinearBody:
 
 
 def _contact_stiffness(scene: Scene) -> float:
-    """λ p δ^{p−1} [N/m] at the penetration δ that takes all the energy."""
+    """Return λ p δ^{p−1} [N/m] at the penetration δ that takes all the energy."""
     stiffness, p = scene.contact.stiffness, scene.contact.exponent
     if p == 1.0:
         return stiffness
@@ -195,7 +195,7 @@ def _contact_stiffness(scene: Scene) -> float:
 
 
 def _frequencies(pair: LinearPair) -> tuple[float, float]:
-    """Highest and lowest frequency of the pair [rad/s]: of the bodies, and of the contact law between them."""
+    """Return the highest and lowest frequency of the pair [rad/s], of bodies and contact law."""
     omega = np.sqrt(np.abs(np.concatenate([pair.beam.omega2, pair.spring.omega2])))
     highest, lowest = float(omega.max()), float(omega[omega > 0.0].min())
     if pair.stiffness > 0.0:
@@ -206,7 +206,7 @@ def _frequencies(pair: LinearPair) -> tuple[float, float]:
 def critical_step(
     pair: LinearPair, scheme: str, degree: int, threshold: float = THRESHOLD, factor: float | None = None
 ) -> float | None:
-    """Smallest H [s] at which the spectral radius exceeds 1 + ``threshold``, to 1e-3 of itself; None if there is none.
+    """Return the smallest H [s] with a spectral radius above 1 + ``threshold``, to 1e-3 of itself; None without one.
 
     Searched upwards by factors of 1.03 (``hermite``, from 2.5/ω_max; narrower bands may be missed) or 2 (``jacobi``,
     ``gauss_seidel``, from 1e-3/ω_max), or of ``factor``, until the slowest mode turns 10 rad in a step. Not for
@@ -230,17 +230,3 @@ def critical_step(
             return high
         H *= factor
     return None
-
-
-def bands(
-    pair: LinearPair, scheme: str, degree: int, sizes: np.ndarray, threshold: float = THRESHOLD
-) -> list[tuple[float, float]]:
-    """Intervals of H between ``sizes`` [s], ascending, in which the spectral radius exceeds 1 + ``threshold``."""
-    unstable = [spectral_radius(pair, scheme, degree, h) > 1.0 + threshold for h in sizes]
-    found: list[tuple[float, float]] = []
-    for i, bad in enumerate(unstable):
-        if bad and (i == 0 or not unstable[i - 1]):
-            found.append((float(sizes[i]), float(sizes[i])))
-        elif bad:
-            found[-1] = (found[-1][0], float(sizes[i]))
-    return found

@@ -56,7 +56,7 @@ class Sweep:
         compatible(self.scene, self.axes)
 
     def description(self) -> dict[str, Any]:
-        """What tells one sweep from another, as it goes into ``sweep.json``."""
+        """Return what tells one sweep from another, as it goes into ``sweep.json``."""
         design = json.dumps(self.values)
         return {
             "scene": self.scene.model_dump(exclude_none=True),
@@ -125,7 +125,7 @@ def run(
 
 
 def rows(directory: str | Path) -> dict[str, list[Any]]:
-    """Columns of a finished sweep: ``index``, the varied keys, ``status``, ``error``, ``warnings``, the metrics."""
+    """Read a finished sweep: ``index``, the varied keys, ``status``, ``error``, ``warnings``, the metrics."""
     import pyarrow.parquet as pq
 
     columns: dict[str, list[Any]] = pq.read_table(Path(directory) / TABLE).to_pydict()
@@ -134,7 +134,7 @@ def rows(directory: str | Path) -> dict[str, list[Any]]:
 
 @contextmanager
 def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
-    """A Dask client: of the cluster at ``scheduler``, or of local worker processes that listen on loopback only.
+    """Open a Dask client: of the cluster at ``scheduler``, or of local processes that listen on loopback only.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def cluster(scheduler: str | None, workers: int | None) -> Iterator[Client]:
 
 
 def _claim(sweep: Sweep, directory: Path) -> None:
-    """The directory for this sweep: new, or one that was begun."""
+    """Claim the directory for this sweep: new, or one that was begun."""
     directory.mkdir(parents=True, exist_ok=True)
     file, description = directory / DESCRIPTION, sweep.description()
     if file.exists():
@@ -201,7 +201,7 @@ def _check_workers(client: Client) -> None:
 def _task(
     scene: dict[str, Any], axes: Sequence[Axis], several: Sequence[Sequence[Any]], metrics: Sequence[str]
 ) -> tuple[list[dict[str, Any]], float]:
-    """The rows of several runs, and the seconds that they took."""
+    """Return the rows of several runs, and the seconds that they took."""
     began = perf_counter()
     try:
         found = [row(scene_from_dict(scene), axes, values, metrics) for values in several]
@@ -306,7 +306,7 @@ class _Parts:
         self._pending.clear()
 
     def table(self) -> pa.Table:
-        """All rows in the order of the design, of each index the last one written."""
+        """Return all rows in the order of the design, of each index the last one written."""
         import pyarrow as pa
 
         last: dict[int, dict[str, Any]] = {}

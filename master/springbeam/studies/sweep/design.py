@@ -40,7 +40,7 @@ class Axis:
         return self.high != self.low
 
     def at(self, fraction: float) -> float | int:
-        """The value at a fraction in [0, 1] of the range, exactly its ends at 0 and 1."""
+        """Return the value at a fraction in [0, 1] of the range, exactly its ends at 0 and 1."""
         if self.log:
             value = self.low ** (1.0 - fraction) * self.high**fraction
         else:
@@ -49,7 +49,7 @@ class Axis:
 
 
 def parse_axis(text: str) -> Axis:
-    """``table.key=`` and a list ``1,2,5``, a grid ``low:high:count``, or a range to sample ``low:high``.
+    """Read ``table.key=`` and a list ``1,2,5``, a grid ``low:high:count``, or a range to sample ``low:high``.
 
     ``:log`` at the end spaces a grid or a range evenly in the logarithm.
 
@@ -94,7 +94,7 @@ def _wrong(text: str, why: str) -> SceneError:
 
 
 def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) -> list[tuple[Any, ...]]:
-    """Values of the axes, one tuple per run.
+    """Return the values of the axes, one tuple per run.
 
     Without sampled ranges that is the product of all lists and grids, the last axis fastest. With ``samples`` > 0 each
     axis is sampled: ranges and grids between their ends, lists by equal shares.
@@ -143,7 +143,7 @@ def _sampled(axis: Axis, fraction: float) -> Any:
 
 
 def varied(scene: Scene, axes: Sequence[Axis], values: Sequence[Any]) -> Scene:
-    """The scene of one run. Raises SceneError if it cannot be run."""
+    """Return the scene of one run. Raise SceneError if it cannot be run."""
     tables: dict[str, dict[str, Any]] = {}
     for axis, value in zip(axes, values, strict=True):
         tables.setdefault(axis.table, {})[axis.key] = value

@@ -45,7 +45,7 @@ METRICS: dict[str, Callable[[Trajectory], float | None]] = {
     **{f"first_{kind}": _first(kind) for kind in EVENT_KINDS},
     **{f"number_of_{kind}": _number(kind) for kind in EVENT_KINDS},
 }
-#: Of the metrics that have one; `z_max` is the largest |z|, impulses are those of impacts.
+#: Units of the metrics that have one; `z_max` is the largest |z|, impulses are those of impacts.
 UNITS = {
     **dict.fromkeys(("u_tip_min", "u_tip_max", "u_tip_end", "y_min", "y_max", "y_end", "gap_max"), "m"),
     "z_max": "m/s",

@@ -23,11 +23,11 @@ from ...run.outcome import RunStopped
 from ...run.runner import simulate
 from ...scene import Scene, SceneError, with_changes
 from ...scene.resolution import mesh_frequency
-from ..crosscheck import contact_changes
+from ..reference import comparable_until, refuse_without_reference
 from .configurations import ALGORITHM_1, Configuration, configurations, finer
 from .errors import Errors, errors
 
-__all__ = ["TARGETS", "Choice", "Point", "Study", "comparable_until", "study", "write_csv"]
+__all__ = ["TARGETS", "Cheapest", "Point", "Study", "study", "write_csv"]
 
 #: Relative errors for which the table names the cheapest configuration.
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
@@ -41,8 +41,6 @@ _TIMED_ONCE = 3.0
 _EXPLICIT, _MOST_TURNS = ("DOP853", "LSODA"), 1e5
 #: Rows of a run of adaptive steps that are compared, about.
 _ADAPTIVE_ROWS = 60
-#: Relative change of the initial velocity that shows how long two solutions stay together, and how far it may grow.
-_PERTURBATION, _GROWTH = 1e-7, 1e4
 
 
 @dataclass(frozen=True)
@@ -62,13 +60,18 @@ class Point:
     ida_steps: int = 0
 
     @property
+    def do_steps(self) -> int:
+        """doStep calls of both FMUs."""
+        return self.beam_steps + self.spring_steps
+
+    @property
     def displacement(self) -> float:
         return float("inf") if self.errors is None else self.errors.displacement
 
 
 @dataclass(frozen=True)
-class Choice:
-    """The cheapest ways to an error: of this package, and of scipy's solvers; ``None`` where none gets there."""
+class Cheapest:
+    """The cheapest ways to an error, by this package and by scipy's solvers; ``None`` where none gets there."""
 
     target: float
     ours: Point | None
@@ -87,12 +90,13 @@ class Study:
 
     scene: Scene  #: ends with the compared window
     points: list[Point]
-    reference_time: float  #: what the reference took [s]
     notes: list[str] = field(default_factory=list)
 
     def front(self) -> list[Point]:
-        """Pareto front, the cheapest first: no other point is both quicker and more accurate. Errors of a tenth of the
-        motion and more are no results."""
+        """Return the Pareto front, the cheapest first: no other point is both quicker and more accurate.
+
+        Errors of a tenth of the motion and more are no results.
+        """
         best, front = 0.1, []
         for point in sorted((p for p in self.points if not p.configuration.refined), key=lambda p: p.solve):
             if point.displacement < best:
@@ -100,17 +104,17 @@ class Study:
                 front.append(point)
         return front
 
-    def choices(self) -> list[Choice]:
-        """For each of `TARGETS` the cheapest configuration that has all events."""
+    def cheapest(self) -> list[Cheapest]:
+        """Return the cheapest configurations for each of `TARGETS`."""
 
-        def cheapest(points: Iterable[Point], target: float) -> Point | None:
+        def best(points: Iterable[Point], target: float) -> Point | None:
             good = [p for p in points if p.displacement <= target]
             return min(good, key=lambda p: p.solve, default=None)
 
         same = [p for p in self.points if not p.configuration.refined]
         ours = [p for p in same if not p.configuration.monolithic]
         theirs = [p for p in same if p.configuration.monolithic and p.configuration.method != ALGORITHM_1]
-        return [Choice(target, cheapest(ours, target), cheapest(theirs, target)) for target in TARGETS]
+        return [Cheapest(target, best(ours, target), best(theirs, target)) for target in TARGETS]
 
 
 #: ``progress(done, total, name)``.
@@ -118,12 +122,12 @@ Progress = Callable[[int, int, str], None]
 
 
 def study(scene: Scene, until: float | None = None, repeats: int = 3, progress: Progress | None = None) -> Study:
-    """Sweep a scene.
+    """Run ``scene`` in all its configurations, and judge and time each.
 
     Parameters
     ----------
     scene
-        Of law `transmission` or `compliance`.
+        Any but one of law `paper`.
     until
         End of the compared window [s]; default `comparable_until`.
     repeats
@@ -139,8 +143,7 @@ def study(scene: Scene, until: float | None = None, repeats: int = 3, progress: 
     if scene.contact.law == "paper":
         raise SceneError("[contact] law = \"paper\": Algorithm 1 has no exact solution to compare with; "
                          'law = "transmission" or "compliance" has')  # fmt: skip
-    if scene.contact.law == "transmission" and scene.contact.impact == "rest" and scene.beam and scene.spring:
-        raise SceneError('[contact] impact = "rest": a rigid tie has no reference there; take "inelastic" or "tip"')
+    refuse_without_reference(scene)
     window = comparable_until(scene) if until is None else min(until, scene.time.t_end)
     notes = []
     if scene.accuracy is not None:
@@ -153,7 +156,7 @@ def study(scene: Scene, until: float | None = None, repeats: int = 3, progress: 
     runs: dict[Configuration, Trajectory | str] = {}
     timings: dict[Configuration, list[tuple[float, float]]] = {}
     given_up: dict[str, Configuration] = {}
-    reach = _reach(scene)
+    reach = _largest_displacement(scene)
     for repeat in range(repeats):
         for configuration in todo:
             done += 1
@@ -179,53 +182,22 @@ def study(scene: Scene, until: float | None = None, repeats: int = 3, progress: 
     return _judged(scene, todo, runs, timings, reach, notes)
 
 
-def comparable_until(scene: Scene) -> float:
-    """End of the window in which a perturbation of the reference grows less than 1e4 times and moves no event [s]."""
-    start = scene.contact_time or 0.0
-    times = np.linspace(start, scene.time.t_end, 401)
-    speed = 1.0
-    if scene.beam is not None:
-        speed = abs(scene.beam.initial_velocity_slope) or abs(scene.beam.initial_deflection_slope) or 1.0
-    elif scene.spring is not None:
-        speed = abs(scene.spring.initial_velocity) or abs(scene.spring.equilibrium) or 1.0
-    runs = [
-        event_driven.simulate(scene, sample_times=times, velocity_perturbation=change * speed)
-        for change in (0.0, _PERTURBATION)
-    ]
-    name = "u_tip" if scene.beam is not None else "y"
-    exact, moved = runs[0][name], runs[1][name]
-    apart = np.abs(moved - exact) > _GROWTH * _PERTURBATION * np.abs(exact - exact[0]).max()
-    end = float(times[np.argmax(apart)]) if apart.any() else float(times[-1])
-    return _reach_of_events(runs[0], runs[1], end)
-
-
 def _hopeless(configuration: Configuration) -> bool:
-    """Whether an explicit method would have to follow the fastest mode of the mesh for too long."""
+    """Tell whether an explicit method would have to follow the fastest mode of the mesh for too long."""
     scene = configuration.scene
     if configuration.method not in _EXPLICIT or scene.beam is None:
         return False
     return mesh_frequency(scene.beam) * (scene.time.t_end - (scene.contact_time or 0.0)) > _MOST_TURNS
 
 
-def _reach_of_events(first: Trajectory, second: Trajectory, end: float) -> float:
-    """Up to the first change of contact that only one of the two has, or that the perturbation moves far."""
-    a, b = contact_changes(first.events, 0.0), contact_changes(second.events, 0.0)
-    for i, change in enumerate(a):
-        if change[1] >= end:
-            break
-        if i >= len(b) or b[i][0] != change[0] or abs(b[i][1] - change[1]) > 1e-3 * end:
-            return 0.5 * (change[1] + (a[i - 1][1] if i else float(first.time[0])))
-    return end
-
-
-def _reach(scene: Scene) -> float:
-    """Displacements are of this size [m]; scipy's absolute tolerances are relative to it."""
+def _largest_displacement(scene: Scene) -> float:
+    """Return the largest displacement [m]; scipy's absolute tolerances are relative to it."""
     run = event_driven.simulate(scene, sample_times=np.linspace(scene.contact_time or 0.0, scene.time.t_end, 41))
     return max((float(np.abs(run[name]).max()) for name in ("u_tip", "y") if name in run.columns), default=1.0) or 1.0
 
 
 def _run(configuration: Configuration, window: float, reach: float) -> tuple[Trajectory | str, float, float]:
-    """(result or why it stopped, solve time [s], setup time [s])."""
+    """Return the result or why it stopped, the solve time [s] and the setup time [s]."""
     scene = configuration.scene
     began = perf_counter()
 
@@ -262,10 +234,9 @@ def _judged(
     grid = np.linspace(scene.contact_time or 0.0, scene.time.t_end, 401)
     results = {c: r for c, r in runs.items() if isinstance(r, Trajectory)}
     references: dict[bool, Trajectory] = {}
-    began = perf_counter()
     for refined in (False, True):
         model = finer(scene) if refined else scene
-        times = [_compared(c, r) for c, r in results.items() if c.refined == refined and not _scipy(c)]
+        times = [_judged_times(c, r) for c, r in results.items() if c.refined == refined and not _scipy(c)]
         if model is None or not (times or not refined):
             continue
         samples = np.unique(np.concatenate([grid, *times]))
@@ -277,7 +248,6 @@ def _judged(
             if not refined:
                 raise
             notes.append(f"modes and elements not judged: on a finer mesh the reference {failed}")
-    elapsed = perf_counter() - began
     points = []
     for configuration in todo:
         run = runs.get(configuration)
@@ -287,11 +257,11 @@ def _judged(
             # Timed without rows; its errors are those of the same steps, sampled.
             run = _sampled(configuration, grid, reach)
         points.append(_point(configuration, run, references, timings[configuration]))
-    return Study(scene, points, elapsed, notes)
+    return Study(scene, points, notes)
 
 
-def _compared(configuration: Configuration, run: Trajectory) -> np.ndarray:
-    """Times of the rows that are judged: of steps of any size some, since every other size costs the reference more."""
+def _judged_times(configuration: Configuration, run: Trajectory) -> np.ndarray:
+    """Return the times of the rows that are judged: of adaptive steps some, as each costs the reference a size."""
     every = len(run) // _ADAPTIVE_ROWS + 1 if configuration.scene.coupling.adaptive else 1
     return np.asarray(run.time[::every])
 
@@ -338,7 +308,7 @@ def _point(
 
 
 def write_csv(found: Study, path: Path) -> None:
-    """One row per point; empty where a quantity does not apply."""
+    """Write one row per point; empty where a quantity does not apply."""
     names = [*Errors.__dataclass_fields__]
     costs = ["solve", "solve_spread", "setup", "macro_steps", "beam_steps", "spring_steps", "rollbacks", "ida_steps"]
     front = found.front()

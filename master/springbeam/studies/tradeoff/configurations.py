@@ -16,7 +16,7 @@ _FEWEST_STEPS, _MOST_STEPS = 4, 20_000
 _ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 #: Steps that follow from tolerances resolve the motion: with more turns of the slowest mode [rad] that takes too many.
 _MOST_TURNS = 2000.0
-#: Of IDA, where it is not the scene's own; that of the tie is a hundredth.
+#: Tolerance of IDA, where it is not the scene's own; that of the tie is a hundredth.
 _IDA_TOLERANCE = 1e-4
 _MODES = (2, 4, 8, 16, 32, 64, 128)
 _MESHES = (0.25, 0.5, 1.0, 2.0)
@@ -48,7 +48,7 @@ class Configuration:
 
     @property
     def unknowns(self) -> int:
-        """Of the beam as integrated: modes kept, or all degrees of freedom of the mesh."""
+        """Unknowns of the beam as integrated: modes kept, or all degrees of freedom of the mesh."""
         beam = self.scene.beam
         return 0 if beam is None else beam.n_modes or 2 * beam.n_elements * beam.element_degree
 
@@ -58,7 +58,7 @@ class Configuration:
 
 
 def configurations(scene: Scene) -> list[Configuration]:
-    """The sweep for a scene; settings that the scene cannot have are left out."""
+    """Return the sweep for a scene; settings that the scene cannot have are left out."""
     return [*_macro_steps(scene), *_ida(scene), *_automatic(scene), *_adaptive(scene), *_models(scene), *_rivals(scene)]
 
 
@@ -122,7 +122,7 @@ def _adaptive(scene: Scene) -> Iterator[Configuration]:
 
 
 def finer(scene: Scene) -> Scene | None:
-    """The scene with elements of higher degree, which stand for the continuum; ``None`` if that is too large."""
+    """Return the scene with elements of higher degree, which stand for the continuum; ``None`` if that is too large."""
     beam = scene.beam
     if beam is None or beam.integrator != "modal":
         return None

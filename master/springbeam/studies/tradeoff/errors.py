@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...results.contact_times import contact_time_difference
 from ...results.trajectory import Trajectory
-from ..crosscheck import contact_changes
 
 #: Contacts shorter than this many macro steps are no evidence either way.
 _SHORT = 2.0
@@ -26,18 +26,18 @@ class Errors:
     u_tip_l2: float  #: root mean square
     y_max: float
     y_l2: float
-    event_time: float  #: largest of the changes of contact that the reference has [s]; NaN if one is missed
+    event_time: float  #: largest of a change of contact, from the nearest one of the reference [s]
     impulse: float
     energy: float
 
     @property
     def displacement(self) -> float:
-        """The larger of the maximum errors of u_tip and y."""
+        """Return the larger of the maximum errors of u_tip and y."""
         return float(np.nanmax([self.u_tip_max, self.y_max]))
 
 
 def errors(run: Trajectory, reference: Trajectory, macro_step: float) -> Errors:
-    """Errors of ``run`` at those of its rows whose times the reference has.
+    """Return the errors of ``run`` at those of its rows whose times the reference has.
 
     ``macro_step`` [s] says which contacts are too short for the run to see.
     """
@@ -56,23 +56,10 @@ def errors(run: Trajectory, reference: Trajectory, macro_step: float) -> Errors:
             values[f"{name}_max"] = values[f"{name}_l2"] = float("nan")
     return Errors(
         **values,
-        event_time=_event_time(run, reference, _SHORT * macro_step),
+        event_time=contact_time_difference(run, reference, _SHORT * macro_step)[0],
         impulse=_impulse(run, reference),
         energy=_energy(run.summary),
     )
-
-
-def _event_time(run: Trajectory, reference: Trajectory, window: float) -> float:
-    end = float(run.time[-1])
-    ours = contact_changes(run.events, window)
-    theirs = [change for change in contact_changes(reference.events, window) if change[1] < end]
-    worst = 0.0
-    for i, (kind, time) in enumerate(theirs):
-        if i >= len(ours) or ours[i][0] != kind:
-            # One that the run, still on its way, may have just beyond the end.
-            return worst if i == len(theirs) - 1 and end - time <= window else float("nan")
-        worst = max(worst, abs(ours[i][1] - time))
-    return worst
 
 
 def _impulse(run: Trajectory, reference: Trajectory) -> float:

@@ -40,7 +40,7 @@ _NOTE_WIDTH = 85  #: characters a column of the picture
 
 
 def draw(study: Study, path: Path) -> None:
-    """Error over wall time, error over doStep calls, and error of the model over its size, as a picture at ``path``."""
+    """Draw error over wall time, over doStep calls, and the model's error over its size, to ``path``."""
     same = [p for p in study.points if not p.configuration.refined and p.errors is not None]
     models = [p for p in study.points if p.configuration.refined and p.errors is not None]
     columns = 3 if models else 2
@@ -52,7 +52,7 @@ def draw(study: Study, path: Path) -> None:
         color=BLACK, linewidth=6.0, alpha=0.15, zorder=0, label="Pareto front",
     )  # fmt: skip
     axes[0].set(xlabel="solve, wall time [ms]", title="coupling and integration, same model")
-    _curves(axes[1], [p for p in same if not p.configuration.monolithic], lambda p: p.beam_steps + p.spring_steps)
+    _curves(axes[1], [p for p in same if not p.configuration.monolithic], lambda p: p.do_steps)
     axes[1].set(xlabel="doStep calls of both FMUs", title="co-simulation, same model")
     if models:
         _curves(axes[2], models, lambda p: p.configuration.unknowns)

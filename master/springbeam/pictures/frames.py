@@ -22,7 +22,7 @@ COIL_HEIGHTS = np.array([0.0, 0.12, *np.linspace(0.12, 0.92, 2 * _TURNS + 2)[1:-
 
 
 @dataclass(frozen=True)
-class Motion:
+class Frames:
     """Frames at ``time`` [s], shape (n,): recorded values, nothing between them is made up.
 
     ``deflection`` [m], shape (n, 21), and ``y`` [m], shape (n,), are ``None`` for a body that is not there. ``row`` is
@@ -40,17 +40,17 @@ class Motion:
     foot: float
 
     def at(self, time: float) -> int:
-        """The last frame not after ``time`` [s]; the first, before it."""
+        """Return the last frame not after ``time`` [s]; the first, before it."""
         return max(0, int(np.searchsorted(self.time, time, side="right")) - 1)
 
     def coil(self, frame: int) -> np.ndarray:
-        """Heights [m] of the coil's corners."""
+        """Return the heights [m] of the coil's corners."""
         assert self.y is not None
         return self.foot + float(self.y[frame] - self.foot) * COIL_HEIGHTS
 
 
-def motion_of(trajectory: Trajectory) -> Motion | None:
-    """The frames of a run; ``None`` if it has fewer than two."""
+def frames_of(trajectory: Trajectory) -> Frames | None:
+    """Return the frames of a run; ``None`` if it has fewer than two."""
     rows = trajectory["time"]
     if trajectory.shapes is not None:
         time, deflection = trajectory.shapes
@@ -63,7 +63,7 @@ def motion_of(trajectory: Trajectory) -> Motion | None:
         return None
     if len(time) < 2 or time[-1] <= time[0]:
         return None
-    some = _some(time)
+    some = _thinned(time)
     time, deflection = time[some], None if deflection is None else deflection[some]
     row = np.searchsorted(rows, time, side="right") - 1
     y = trajectory["y"][row] if "y" in trajectory.columns else None
@@ -73,12 +73,12 @@ def motion_of(trajectory: Trajectory) -> Motion | None:
     low, high = float(np.min(heights)), float(np.max(heights))
     span = high - low or 1.0
     foot = low - _COIL * span if y is not None else low - 2.0 * _ROOM * span
-    return Motion(time, row, deflection, y, near, foot, high + _ROOM * span, foot)
+    return Frames(time, row, deflection, y, near, foot, high + _ROOM * span, foot)
 
 
-def _some(time: np.ndarray) -> np.ndarray:
-    """Indices of at most `MOST_FRAMES`: pairs at evenly spaced times, since of frames that alternate every second one
-    shows nothing of it."""
+def _thinned(time: np.ndarray) -> np.ndarray:
+    """Return the indices of at most `MOST_FRAMES`: pairs at evenly spaced times, since every second one of frames that
+    alternate would hide it."""
     if len(time) <= MOST_FRAMES:
         return np.arange(len(time))
     first = np.searchsorted(time, np.linspace(time[0], time[-1], MOST_FRAMES // 2))

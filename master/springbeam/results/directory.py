@@ -1,0 +1,152 @@
+"""A run directory: its files, who may write to it, and what is wrong with one that cannot be read.
+
+It holds ``trajectory.csv`` (a row per accepted step), ``events.csv``, ``shapes.csv`` (the beam's deflection at
+`SHAPE_POINTS`), ``summary.json`` and pictures. ``file_recorder`` writes it, ``reading`` reads it.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import BinaryIO
+
+try:
+    import fcntl
+except ImportError:  # Windows: two processes in one directory are not noticed
+    fcntl = None  # type: ignore[assignment]
+
+#: Pictures `springbeam.pictures.plots.plot_run` may leave in a run directory.
+PICTURES = (
+    "a_shapes_after_contact.png",
+    "b_shapes_later.png",
+    "c_positions.png",
+    "d_velocities_and_forces.png",
+    "e_gap_and_energy.png",
+)
+#: What `springbeam report` and `springbeam animate` may leave there.
+REPORT = "report.html"
+ANIMATIONS = ("animation.gif", "animation.mp4")
+TRAJECTORY, EVENTS, SHAPES = "trajectory.csv", "events.csv", "shapes.csv"
+
+
+class ResultsExist(FileExistsError):
+    """The directory already holds results, which are never overwritten unasked."""
+
+
+class ResultsInUse(RuntimeError):
+    """Another process is writing results into the directory."""
+
+
+class ResultsUnreadable(ValueError):
+    """A run directory cannot be read; the message names the file and, where known, the line."""
+
+
+@dataclass(frozen=True)
+class RunDirectory:
+    """The files of one run."""
+
+    path: Path
+
+    @property
+    def trajectory(self) -> Path:
+        return self.path / TRAJECTORY
+
+    @property
+    def events(self) -> Path:
+        return self.path / EVENTS
+
+    @property
+    def shapes(self) -> Path:
+        return self.path / SHAPES
+
+    @property
+    def summary(self) -> Path:
+        return self.path / "summary.json"
+
+    @property
+    def checkpoint(self) -> Path:
+        """The file that is there until the run is done, if it takes checkpoints (`springbeam.run.checkpoint`)."""
+        return self.path / "run.checkpoint"
+
+    @property
+    def pictures(self) -> list[Path]:
+        """The pictures that are there."""
+        return [self.path / name for name in PICTURES if (self.path / name).exists()]
+
+    def results(self) -> list[Path]:
+        """Return the result files that are there, and what was made from them."""
+        files = (self.summary, self.trajectory, self.events, self.shapes, self.checkpoint)
+        made = (self.path / name for name in (REPORT, *ANIMATIONS))
+        return [file for file in (*files, *self.pictures, *made) if file.exists()]
+
+    def discard(self) -> None:
+        """Remove the directory if nothing is in it."""
+        with suppress(OSError):
+            self.path.rmdir()
+
+    @classmethod
+    def create(cls, path: str | Path, *, replace: bool = False) -> RunDirectory:
+        """Return the directory ``path``, made if need be; its files stay until a `FileRecorder` begins to write there.
+
+        Parameters
+        ----------
+        path
+            The directory.
+        replace
+            It may hold results of an earlier run.
+
+        Raises
+        ------
+        ResultsExist
+            If it holds results and ``replace`` is false.
+        ResultsInUse
+            If another process is writing them.
+        OSError
+            If the directory cannot be made or written to.
+        """
+        directory = cls(Path(path))
+        directory.path.mkdir(parents=True, exist_ok=True)
+        results = directory.results()
+        if results and not replace:
+            raise ResultsExist(f"{directory.path} already holds results ({results[0].name})")
+        if directory.trajectory.exists():
+            with directory.trajectory.open("rb") as file:
+                lock(file)
+        try:
+            tempfile.TemporaryFile(dir=directory.path).close()
+        except OSError as error:
+            directory.discard()
+            raise OSError(error.errno, error.strerror, str(directory.path)) from error
+        return directory
+
+    @classmethod
+    def create_numbered(cls, path: str | Path) -> RunDirectory:
+        """Make a new directory: ``path``, or ``path-2``, ``path-3``, … when that exists.
+
+        Runs started at the same time get different directories.
+        """
+        first = Path(path)
+        first.parent.mkdir(parents=True, exist_ok=True)
+        for number in count(1):
+            candidate = first if number == 1 else first.with_name(f"{first.name}-{number}")
+            try:
+                candidate.mkdir()
+            except FileExistsError:
+                continue
+            return cls(candidate)
+        raise AssertionError("unreachable")
+
+
+def lock(file: BinaryIO) -> None:
+    """Hold ``file`` until it is closed or the process ends. Raises ResultsInUse if another process does."""
+    if fcntl is None:
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise ResultsInUse(f"{file.name}: another process is writing to it") from None
+    except OSError:  # a file system without locks
+        return

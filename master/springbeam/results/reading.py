@@ -1,0 +1,108 @@
+"""Results read back from a run directory, also from one whose run was stopped or killed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..scene import scene_from_dict
+from .directory import ResultsUnreadable, RunDirectory
+from .trajectory import EVENT_COLUMNS, EVENT_KINDS, PHASE_WIDTH, SHAPE_COLUMNS, Event, Trajectory
+
+
+def load_trajectory(directory: str | Path) -> Trajectory:
+    """Read a run directory, also of a run that was stopped or killed: an incomplete last line is left out.
+
+    Raises
+    ------
+    ResultsUnreadable
+        If a file is missing or is not what a run writes.
+    """
+    run = RunDirectory(Path(directory))
+    summary = load_summary(run.path)
+    header, lines = _complete_lines(run.trajectory)
+    columns = _read_table(run.trajectory, header, lines)
+    shapes = None
+    if run.shapes.exists():
+        header, lines = _complete_lines(run.shapes)
+        if header != SHAPE_COLUMNS:
+            raise ResultsUnreadable(f"{run.shapes}: line 1: not the columns of shapes.csv")
+        table = _read_table(run.shapes, header, lines)
+        shapes = (table["time"], np.column_stack([table[name] for name in header[1:]]))
+    scene = scene_from_dict(summary["scene"], source=f"{run.summary}: scene")
+    return Trajectory(scene, columns, list(load_events(run.path)), shapes, summary)
+
+
+def load_summary(directory: str | Path) -> dict[str, Any]:
+    """Read ``summary.json`` of a run directory."""
+    path = RunDirectory(Path(directory)).summary
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ResultsUnreadable(f"{path}: missing; {directory} is not a run directory") from None
+    except (OSError, ValueError) as error:
+        raise ResultsUnreadable(f"{path}: {error}") from error
+    if not isinstance(summary, dict) or not isinstance(summary.get("scene"), dict):
+        raise ResultsUnreadable(f"{path}: no scene in it")
+    return summary
+
+
+def load_events(directory: str | Path) -> Iterator[Event]:
+    """Read the events of a run directory, one at a time."""
+    path = RunDirectory(Path(directory)).events
+    header, lines = _complete_lines(path)
+    if header != EVENT_COLUMNS:
+        raise ResultsUnreadable(f"{path}: line 1: not the columns of events.csv")
+    for number, line in enumerate(lines, start=2):
+        fields = line.rstrip("\n").split(",")
+        if len(fields) != len(EVENT_COLUMNS) or fields[1] not in EVENT_KINDS:
+            raise ResultsUnreadable(f"{path}: line {number}: not an event: {line.strip()[:60]!r}")
+        named = dict(zip(EVENT_COLUMNS, fields, strict=True))
+        kind = named.pop("kind")
+        try:
+            values = {name: float(text) for name, text in named.items() if text}
+            yield Event(kind=kind, **values)
+        except (TypeError, ValueError) as error:
+            raise ResultsUnreadable(f"{path}: line {number}: {error}") from None
+
+
+def _complete_lines(path: Path) -> tuple[tuple[str, ...], Iterator[str]]:
+    """Return the header and an iterator over the lines after it that end in a newline."""
+
+    def lines() -> Iterator[str]:
+        with path.open(encoding="utf-8", newline="\n") as file:
+            yield from (line for line in file if line.endswith("\n"))
+
+    try:
+        everything = lines()
+        header = next(everything, None)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultsUnreadable(f"{path}: {error}") from error
+    if header is None:
+        raise ResultsUnreadable(f"{path}: empty")
+    return tuple(header.rstrip("\n").split(",")), everything
+
+
+def _read_table(path: Path, header: tuple[str, ...], lines: Iterator[str]) -> dict[str, np.ndarray]:
+    kinds = [(name, f"U{PHASE_WIDTH}" if name == "phase" else "f8") for name in header]
+    first = next(lines, None)
+    if first is None:
+        table = np.empty(0, dtype=kinds)
+    else:
+        try:
+            table = np.loadtxt(chain([first], lines), dtype=kinds, delimiter=",", comments=None, ndmin=1)
+        except ValueError as error:
+            raise ResultsUnreadable(f"{path}: after the header: {error}") from None
+    columns = {name: np.ascontiguousarray(table[name]) for name in header}
+    if "phase" in columns:
+        phase = columns["phase"]
+        columns["phase"] = phase.astype(f"U{max(1, int(np.char.str_len(phase).max(initial=1)))}")
+    for name, values in columns.items():
+        if name != "phase" and not np.isfinite(values).all():
+            raise ResultsUnreadable(f"{path}: {name} holds a number that is not finite")
+    return columns

@@ -1,0 +1,53 @@
+"""The monolithic reference that a scene is judged by, and how long two solutions of it stay together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..monolithic import event_driven
+from ..results.contact_times import contact_changes
+from ..results.trajectory import Trajectory
+from ..scene import Scene, SceneError
+
+#: Relative change of the initial velocity that shows how fast two solutions separate, and how far that may grow.
+PERTURBATION, _GROWTH = 1e-7, 1e4
+
+
+def refuse_without_reference(scene: Scene) -> None:
+    """Raise SceneError if `event_driven` is not defined for ``scene``; the message says what is."""
+    if scene.contact.law == "transmission" and scene.contact.impact == "rest" and scene.beam and scene.spring:
+        raise SceneError("contact.impact = 'rest': a rigid tie has no reference there; take 'inelastic' or 'tip'")
+    if scene.contact.law == "compliance" and scene.beam and scene.beam.fidelity == "quasi_static":
+        raise SceneError("beam.fidelity = 'quasi_static': has no reference with law 'compliance'; take 'dynamic'")
+
+
+def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:
+    """Return the reference at ``times`` [s], and once more from initial velocities changed by `PERTURBATION`."""
+    perturbed = event_driven.simulate(
+        scene, sample_times=times, velocity_perturbation=PERTURBATION * _initial_speed(scene)
+    )
+    return event_driven.simulate(scene, sample_times=times), perturbed
+
+
+def _initial_speed(scene: Scene) -> float:
+    if scene.beam is not None:
+        return abs(scene.beam.initial_velocity_slope) or abs(scene.beam.initial_deflection_slope) or 1.0
+    assert scene.spring is not None
+    return abs(scene.spring.initial_velocity) or abs(scene.spring.equilibrium) or 1.0
+
+
+def comparable_until(scene: Scene) -> float:
+    """Return the end of the window in which a perturbation of the reference grows less than 1e4 times and moves no
+    change of contact [s]."""
+    times = np.linspace(scene.contact_time or 0.0, scene.time.t_end, 401)
+    exact, moved = reference_and_perturbed(scene, times)
+    name = "u_tip" if scene.beam is not None else "y"
+    off = np.abs(moved[name] - exact[name]) > _GROWTH * PERTURBATION * np.abs(exact[name] - exact[name][0]).max()
+    end = float(times[np.argmax(off)]) if off.any() else float(times[-1])
+    changes, others = contact_changes(exact, 0.0), contact_changes(moved, 0.0)
+    for i, (kind, time) in enumerate(changes):
+        if time >= end:
+            break
+        if i >= len(others) or others[i].kind != kind or abs(others[i].time - time) > 1e-3 * end:
+            return 0.5 * (time + (changes[i - 1].time if i else float(exact.time[0])))
+    return end

@@ -1,0 +1,206 @@
+"""The beam FMU alone: statics, clamped–free frequencies, the mesh's order, energy.
+
+The beam has ρA = ρI = L = 1, EI = KAG = κ, unless a function says otherwise; SI units.
+"""
+
+from __future__ import annotations
+
+from contextlib import closing
+from functools import lru_cache
+from itertools import pairwise
+from math import log, sqrt
+from typing import Any
+
+import numpy as np
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from ...bodies.fmu_bodies import FmuBeam
+from ...bodies.protocol import NO_FORCE
+from ...scene import Beam
+from .check import EPS, UNIT_FORCE, Check
+
+
+def static_deflection() -> list[Check]:
+    """Tip deflection under a tip force of 1 N, of the mesh of n elements (h = L/n) and of the beam it stands for.
+
+    Full integration: (1/3EI + 1/KAG)/(1 + KAG h²/12EI), which locks; reduced: (1 − h²/4)/3EI + 1/KAG; the beam:
+    1/3EI + 1/KAG. Kelvin–Voigt damping brings the FMU to rest: its slowest rate is at least 1/2 s⁻¹ here.
+    """
+    n, h, checks = 10, 0.1, []
+    for ratio_name, kag in (("1", 1.0), ("1e6", 1e6)):
+        true = 1.0 / 3.0 + 1.0 / kag
+        full, reduced = true / (1.0 + kag * h * h / 12.0), (1.0 - h * h / 4.0) / 3.0 + 1.0 / kag
+        variants: tuple[tuple[str, float, dict[str, Any]], ...] = (
+            ("full, all modes", full, {}),
+            ("full, 1 mode", full, {"n_modes": 1}),
+            ("full, ρ∞ = 0", full, {"integrator": "generalized_alpha", "rho_inf": 0.0}),
+            ("reduced, all modes", reduced, {"reduced_integration": True}),
+            ("reduced, 1 mode", reduced, {"reduced_integration": True, "n_modes": 1}),
+        )
+        for name, exact, options in variants:
+            beam = Beam(shear_modulus=kag, n_elements=n, alpha_b=1.0, **options)
+            with closing(FmuBeam(beam, 0.0, 0.0)) as body:
+                # 200 s: what is left has decayed below e⁻¹⁰⁰, and generalized-α damps every step.
+                for step in range(200):
+                    body.advance(float(step), 1.0, UNIT_FORCE)
+                ratio = body.motion().displacement / true
+            checks.append(
+                Check(
+                    f"KAG/EI {ratio_name}: {name}",
+                    exact / true,
+                    ratio,
+                    (2 * n) ** 2 * EPS * exact / true,
+                    "tip deflection over that of the beam, 1/3EI + 1/KAG (n = 10). Rounding: ε N² in an eigenproblem "
+                    "or factorisation of N = 2n unknowns",
+                )
+            )
+    return checks
+
+
+def frequencies() -> list[Check]:
+    """Clamped–free frequencies, κ = 1, from the motion of the tip; √κ times these for any κ."""
+    n, checks = 160, []
+    measured = _measured_frequencies(Beam(n_elements=n, n_modes=6), 0.1, 300)
+    for i, w in enumerate(clamped_free_frequencies()[:6], 1):
+        bound = _mesh_error(w) / n**2 * (1.0 + (_wave_number(w) / n) ** 2)
+        reason = "P1, n = 160: leading error h²/24ω · ∫(EI θ''² + KAG u''²) of the mode, next order (kh)² of it"
+        checks.append(Check(f"ω{i} [rad/s]", w, _nearest(measured, w), bound, reason))
+    kappa, n = 3.6e10, 40
+    soft = _measured_frequencies(Beam(n_elements=n, n_modes=2), 0.1, 150)
+    stiff = Beam(n_elements=n, n_modes=2, young_modulus=kappa, shear_modulus=kappa)
+    scaled = _measured_frequencies(stiff, 0.1 / sqrt(kappa), 150) / sqrt(kappa)
+    first = _nearest(soft, clamped_free_frequencies()[0])
+    reason = "against κ = 1 on the same mesh, n = 40. Rounding: ε N², N = 2n unknowns"
+    bound = (2 * n) ** 2 * EPS * first
+    checks.append(Check("ω1/√κ at κ = 3.6e10 [rad/s]", first, _nearest(scaled, first), bound, reason))
+    return checks
+
+
+def mesh_convergence() -> list[Check]:
+    """The first frequency's error is second order in h, with the coefficient of `_mesh_error`."""
+    w = clamped_free_frequencies()[0]
+    errors = {}
+    for n in (40, 80):
+        measured = _measured_frequencies(Beam(n_elements=n, n_modes=2), 0.1, 150)
+        errors[n] = _nearest(measured, w) / w - 1.0
+    next_order = (_wave_number(w) / 80) ** 2
+    leading = _mesh_error(w) / 80**2 / w
+    reason = "next order of the P1 dispersion, (kh)² of the leading error"
+    return [
+        Check("relative error of ω1, n = 80", leading, errors[80], leading * next_order, reason),
+        # log2 of (1 + 4d)/(1 + d), |d| ≤ (kh)²
+        Check(
+            "order from n = 40 to 80", 2.0, float(np.log2(errors[40] / errors[80])), 3.0 * next_order / log(2), reason
+        ),
+    ]
+
+
+def beam_energy() -> list[Check]:
+    """E(t+H) − E(t) = C·(u_tip(t+H) − u_tip(t)) − dissipation for every step under a constant force.
+
+    At rest again, all that was there and half the work of C are dissipated: 1/6 + C²·(tip compliance)/2 for u_t⁰ = x.
+    """
+    n, kappa, size, checks = 50, 1e4, 0.02, []
+    reason = "largest in 200 steps over the largest energy, κ = 1e4, H = 0.02 s. Rounding: sums of 2n terms, 2nε"
+    for integrator in ("modal", "generalized_alpha"):
+        for alpha in (0.0, 1e-4):
+            stiff = Beam(young_modulus=kappa, shear_modulus=kappa, n_elements=n, initial_velocity_slope=1.0)
+            beam = stiff.model_copy(update={"integrator": integrator, "alpha_b": alpha})
+            violation = scale = 0.0
+            with closing(FmuBeam(beam, 0.0, 0.0)) as body:
+                for step in range(200):
+                    u, e = body.motion().displacement, body.energies()
+                    body.advance(step * size, size, UNIT_FORCE)
+                    du, after = body.motion().displacement - u, body.energies()
+                    scale = max(scale, e.kinetic + e.potential)
+                    change = after.kinetic + after.potential - e.kinetic - e.potential
+                    violation = max(violation, abs(change + after.dissipated - e.dissipated - du))
+            name = "midpoint" if integrator == "generalized_alpha" else "modal"
+            checks.append(Check(f"{name}, α_b = {alpha:g} s", 0.0, violation / scale, 2 * n * EPS, reason))
+    with closing(FmuBeam(Beam(n_elements=n, alpha_b=1.0, initial_velocity_slope=1.0), 0.0, 0.0)) as body:
+        for step in range(200):
+            body.advance(float(step), 1.0, UNIT_FORCE)
+        lost = body.energies().dissipated
+    compliance = (4.0 / 3.0) / (1.0 + 1.0 / (12.0 * n * n))
+    reason = "rounding: 2nε a step, 200 steps (κ = 1, α_b = 1 s, H = 1 s)"
+    checks.append(Check("modal: all lost at rest [J]", 1.0 / 6.0 + compliance / 2.0, lost, 200 * 2 * n * EPS, reason))
+    return checks
+
+
+@lru_cache(maxsize=1)
+def clamped_free_frequencies() -> tuple[float, ...]:
+    """Return those up to 30 rad/s of EI = KAG = ρA = ρI = L = 1: zeros of det X, X of `_free_end`."""
+
+    def determinant(w: float) -> float:
+        return float(np.linalg.det(_free_end(w)))
+
+    grid = np.arange(0.05, 30.0, 0.05)
+    values = [determinant(w) for w in grid]
+    return tuple(
+        float(brentq(determinant, a, b, xtol=1e-15))
+        for (a, b), (p, q) in zip(pairwise(grid), pairwise(values), strict=True)
+        if p * q < 0.0
+    )
+
+
+def _free_end(w: float) -> np.ndarray:
+    """Return the matrix from (M, Q) at the clamp to (M, Q) at the tip, (2, 2): singular at a natural frequency."""
+    return np.asarray(expm(_transfer_rate(w)))[np.ix_([1, 3], [1, 3])]
+
+
+def _transfer_rate(w: float) -> np.ndarray:
+    """Return A of (θ, M, u, Q)' = A (θ, M, u, Q) at the frequency ``w`` [rad/s]; EI = KAG = ρA = ρI = 1; shape (4, 4).
+
+    θ' = M/EI,  M' = −Q − ρI ω² θ,  u' = Q/KAG + θ,  Q' = −ρA ω² u.
+    """
+    return np.array([[0, 1, 0, 0], [-w * w, 0, 0, -1], [1, 0, 0, 1], [0, 0, -w * w, 0]], dtype=float)
+
+
+def _mesh_error(w: float) -> float:
+    """Return the leading error (ω_h − ω)/h² of P1 elements for the clamped–free frequency ω = ``w``.
+
+    ω_h² − ω² is the energy of what P1 cannot follow of the mode: h²/12 ∫ EI θ''² + KAG u''² over ∫ ρI θ² + ρA u².
+    """
+    start = np.zeros(4)
+    start[[1, 3]] = np.linalg.svd(_free_end(w))[2][-1]
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    curvature = mass = 0.0
+    for x, weight in zip((nodes + 1.0) / 2.0, weights, strict=True):
+        theta, moment, u, shear = expm(_transfer_rate(w) * x) @ start
+        curvature += weight * ((-shear - w * w * theta) ** 2 + (moment - w * w * u) ** 2)
+        mass += weight * (theta**2 + u**2)
+    return float(curvature / mass / 12.0 / (2.0 * w))
+
+
+def _wave_number(w: float) -> float:
+    """Return the larger k [1/m] of the unit beam at ω: (k² − ω²)² = ω²."""
+    return sqrt(w * w + w)
+
+
+def _measured_frequencies(beam: Beam, size: float, samples: int) -> np.ndarray:
+    """Return the frequencies [rad/s] in the tip's velocity after an impulse, from 2 ``samples`` rows at ``size`` [s].
+
+    The samples Σ aᵢ cos(ωᵢ k H) = Σ aᵢ T_k(xᵢ), aᵢ > 0, are the Chebyshev moments of a measure with its masses at
+    xᵢ = cos ωᵢH; with 2 T_j T_k = T_{j+k} + T_{|j−k|} they fill the Gram matrix of T_0, T_1, … and that of
+    multiplication by x, whose eigenvalues relative to it are the xᵢ.
+    """
+    with closing(FmuBeam(beam, 0.0, 0.0)) as body:
+        body.apply_impulse(1.0)
+        velocity = [body.motion().velocity]
+        for step in range(2 * samples):
+            body.advance(step * size, size, NO_FORCE)
+            velocity.append(body.motion().velocity)
+    c = np.array(velocity)
+    j, k = np.indices((samples, samples))
+    gram = (c[j + k] + c[abs(j - k)]) / 2.0
+    times_x = (c[j + 1 + k] + c[abs(j + 1 - k)] + c[abs(j - 1 + k)] + c[abs(j - 1 - k)]) / 4.0
+    masses, vectors = np.linalg.eigh(gram)
+    kept = masses > 1e-11 * masses[-1]
+    basis = vectors[:, kept] / np.sqrt(masses[kept])
+    x = np.linalg.eigvalsh(basis.T @ times_x @ basis)
+    return np.asarray(np.arccos(np.clip(x, -1.0, 1.0)) / size)
+
+
+def _nearest(values: np.ndarray, to: float) -> float:
+    return float(values[np.argmin(np.abs(values - to))])

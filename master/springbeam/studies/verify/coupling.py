@@ -1,0 +1,170 @@
+"""Both FMUs coupled: growth under ordinary exchanges, the gain of exchanging displacements, energy kept by `energy`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from math import nan, pi, sqrt
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.special import j0
+
+from ...bodies.fmu import Reals
+from ...bodies.fmu_bodies import FmuBeam, FmuSpring
+from ...bodies.protocol import NO_FORCE
+from ...run.outcome import RunStopped
+from ...run.runner import simulate
+from ...scene import Beam, Coupling, Scene, Spring, Time
+from .check import EPS, UNIT_FORCE, Check
+from .spring import IDA, ida_error
+
+
+def two_masses() -> list[Check]:
+    """m = 1, 1; k = 4π², 16π² (between them), 4π²: spectral radius ρ ≈ 1 + cπ²H² of held exchanges, exact subsystems.
+
+    Eigenfrequencies 2π and 6π. A held input arrives H/2 late on average (one step late: 3H/2; computed with the new
+    value: H/2 early); a delay τ of a stiffness k is a damping −kτ, and the mode (1, −1) grows by what it then gains.
+    """
+    k_own, k_between = 4.0 * pi**2, 16.0 * pi**2
+    sizes = (1e-3, 5e-4)
+    by_force = Spring(linear_stiffness=k_own)
+    by_displacement = Spring(linear_stiffness=k_own + k_between)
+    with closing(FmuSpring(by_force, 0.0)) as f, closing(FmuSpring(by_displacement, 0.0)) as d:
+        load = Reals(d.fmu, "external_force")
+
+        def under_force(y: float, z: float, force: float, size: float) -> tuple[float, float]:
+            f.restart(0.0, y, z)
+            f.advance(0.0, size, (-force, 0.0, 0.0))
+            return f.motion()[:2]
+
+        def beside(y: float, z: float, other: float, size: float) -> tuple[float, float]:
+            d.restart(0.0, y, z)
+            load.set([k_between * other])
+            d.advance(0.0, size, NO_FORCE)
+            return d.motion()[:2]
+
+        def fd_jacobi(s: np.ndarray, size: float) -> tuple[float, ...]:
+            y1, z1, y2, z2 = s
+            return *under_force(y1, z1, k_between * (y2 - y1), size), *beside(y2, z2, y1, size)
+
+        def fd_late(s: np.ndarray, size: float) -> tuple[float, ...]:
+            y1, z1, y2, z2, held = s
+            return *under_force(y1, z1, k_between * (y2 - held), size), *beside(y2, z2, y1, size), y1
+
+        def fd_gauss_seidel(s: np.ndarray, size: float) -> tuple[float, ...]:
+            y1, z1, y2, z2 = s
+            first = under_force(y1, z1, k_between * (y2 - y1), size)
+            return *first, *beside(y2, z2, first[0], size)
+
+        def dd_jacobi(s: np.ndarray, size: float) -> tuple[float, ...]:
+            y1, z1, y2, z2 = s
+            return *beside(y1, z1, y2, size), *beside(y2, z2, y1, size)
+
+        def dd_gauss_seidel(s: np.ndarray, size: float) -> tuple[float, ...]:
+            y1, z1, y2, z2 = s
+            first = beside(y1, z1, y2, size)
+            return *first, *beside(y2, z2, first[0], size)
+
+        exchanges: tuple[tuple[str, Callable[[np.ndarray, float], tuple[float, ...]], int, float], ...] = (
+            ("force–displ. Jacobi", fd_jacobi, 4, 6.0),
+            ("… one step late", fd_late, 5, 10.0),
+            ("… Gauss–Seidel", fd_gauss_seidel, 4, 2.0),
+            ("displ.–displ. Jacobi", dd_jacobi, 4, 4.0),
+            ("… Gauss–Seidel", dd_gauss_seidel, 4, 0.0),
+        )
+        w = 6.0 * pi
+        truncation = k_between / pi**2 * (w * sizes[0]) ** 4
+        solver = ida_error(f, w * sizes[1]) / (pi * sizes[1]) ** 2 * 4.0 / 3.0
+        checks = []
+        for name, step, states, exact in exchanges:
+            c = []
+            for size in sizes:
+                columns = np.array([step(unit, size) for unit in np.eye(states)])
+                radius = float(np.abs(np.linalg.eigvals(columns.T)).max())
+                c.append((radius - 1.0) / (pi * size) ** 2)
+            checks.append(
+                Check(
+                    f"{name}: c",
+                    exact,
+                    (4.0 * c[1] - c[0]) / 3.0,
+                    truncation + solver,
+                    "H = 1e-3 and 5e-4 s extrapolated to 0: k/π²·(6πH)⁴ left; and IDA's ωH·ε^(5/6) over π²H²",
+                )
+            )
+    return checks
+
+
+def added_mass() -> list[Check]:
+    """Fixed-point gain of the tie by displacement exchange: beam ∂u/∂C over spring −∂y/∂C, C held over a step H.
+
+    Beam as a bar (θ kept at rest by a huge ρI), no echo before 2L/c: u = C H/Z, Z = √(KAG·ρA), on a spring that
+    answers as a free mass: gain 2m/(ZH). A half-infinite P1 mesh has the tip compliance 1/(s Z √(1 + (s h/c)²/12)) in
+    the Laplace domain, so with ω_c = √12 c/h
+
+        u(H) = C/Z ∫₀ᴴ (H − σ) ω_c J₀(ω_c σ) dσ:    H/Z for ω_c H ≫ 1,    √3 H²/(ρA h) for ω_c H ≪ 1.
+    """
+    n, m, inertia = 100, 1.0, 1e8
+    cutoff = sqrt(12.0) * n
+    beam, spring = Beam(n_elements=n, second_moment_of_area=inertia), Spring(mass=m, linear_stiffness=0.0)
+
+    def gain(size: float) -> float:
+        with closing(FmuBeam(beam, 0.0, 0.0)) as upper, closing(FmuSpring(spring, 0.0)) as lower:
+            upper.advance(0.0, size, UNIT_FORCE)
+            lower.advance(0.0, size, UNIT_FORCE)
+            return -upper.motion().displacement / lower.motion().displacement
+
+    def mesh_gain(size: float) -> float:
+        value, _ = quad(lambda s: (size - s) * cutoff * j0(cutoff * s), 0.0, size, limit=1000, epsabs=1e-13)
+        return float(2.0 * m / size**2 * value)
+
+    checks = []
+    ripples = "ripples of the P1 mesh around the bar: √(2/π)(ω_c H)^(−3/2), next order 2/(ω_c H)"
+    for size in (0.1, 0.5):
+        x, exact = cutoff * size, 2.0 * m / size
+        bound = exact * sqrt(2.0 / pi) * x**-1.5 * (1.0 + 2.0 / x)
+        checks.append(Check(f"2m/(ZH), H = {size:g} s", exact, gain(size), bound, ripples))
+    limit = 2.0 * sqrt(3.0) * m * n
+    size = 1e-6
+    bound = limit * ((cutoff * size) ** 2 / 24.0 + (2 * n) ** 2 * EPS)
+    reason = "J₀'s next term, (ω_c H)²/24; rounding ε N², N = 2n"
+    checks.append(Check("H → 0: 2√3 m/(ρA h)", limit, gain(size), bound, reason))
+    for size in (0.01, 0.1):
+        exact = mesh_gain(size)
+        bound = exact * (size**2 / inertia + (2 * n) ** 2 * EPS)
+        reason = "θ moves all the same, KAG H²/ρI; rounding ε N², N = 2n"
+        checks.append(Check(f"P1 mesh, H = {size:g} s", exact, gain(size), bound, reason))
+    return checks
+
+
+def energy_scheme() -> list[Check]:
+    """Beam and nonlinear spring, tied and undamped: the `energy` scheme keeps the energy, whatever H.
+
+    A constant load pulls the spring down from rest, so that the pair swings below Ψ and stays tied.
+    """
+    checks = []
+    steps, n = 100, 50
+    reason = "relative drift in 100 steps: coupling.tolerance of each step's work, at most twice the energy; and " + IDA
+    for kappa, size in ((1.0, 0.01), (1e4, 1e-3), (1e4, 0.1)):
+        spring = Spring(linear_stiffness=3.0, cubic_stiffness=100.0, external_force=-0.1 * kappa)
+        for degree in (0, 1, 2):
+            scene = Scene(
+                time=Time(t_end=steps * size),
+                beam=Beam(young_modulus=kappa, shear_modulus=kappa, n_elements=n),
+                spring=spring,
+                coupling=Coupling(scheme="energy", degree=degree, macro_step=size),
+            )
+            name = f"degree {degree}, ω_max H = {sqrt(12.0 * kappa) * n * size:.0f}"
+            bound = 2.0 * steps * scene.coupling.tolerance
+            try:
+                run = simulate(scene)
+            except RunStopped as stopped:
+                checks.append(Check(name, 0.0, nan, bound, f"{reason}; {stopped}"))
+                continue
+            stiffness = spring.linear_stiffness + 3.0 * spring.cubic_stiffness * float(np.abs(run["y"]).max()) ** 2
+            with closing(FmuSpring(spring, 0.0)) as body:
+                solver = ida_error(body, sqrt(stiffness / spring.mass) * steps * size)
+            tied = bool(np.all(run["phase"] == "tied"))
+            drift = float(run.summary["max_energy_residual"]) if tied else nan
+            checks.append(Check(name, 0.0, drift, bound + solver, reason))
+    return checks
