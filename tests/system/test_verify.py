@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from typer.testing import CliRunner
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.bodies.protocol import StepRefused
 from springbeam.cli import app
+from springbeam.contact.laws import Compliance
 from springbeam.run import stepping
 from springbeam.studies import verify
 from springbeam.studies.verify.beam import _mesh_error, clamped_free_frequencies
@@ -86,6 +88,14 @@ def gap_left_open(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(stepping, "conditions", wrong)
 
 
+def undamped(patch: pytest.MonkeyPatch) -> None:
+    """The contact takes 1 % less than χ would."""
+    right = Compliance.resistance
+    patch.setattr(
+        Compliance, "resistance", lambda law, p, rate: right(replace(law, damping=0.99 * law.damping), p, rate)
+    )
+
+
 @pytest.mark.parametrize(
     ("section", "mistake"),
     [
@@ -103,6 +113,12 @@ def gap_left_open(patch: pytest.MonkeyPatch) -> None:
         (verify.added_mass, changed(FmuSpring, "mass", 1.01)),
         (verify.added_mass, changed(FmuBeam, "density", 1.01)),
         (verify.energy_scheme, gap_left_open),
+        (verify.compliant_impact, changed(FmuSpring, "mass", 1.01)),
+        (verify.compliant_impact, changed(FmuBeam, "density", 1.01)),
+        (verify.hunt_crossley, undamped),
+        (verify.linked_masses, changed(FmuBeam, "shear_modulus", 1.01)),
+        (verify.linked_masses, changed(FmuSpring, "linear_stiffness", 1.01)),
+        (verify.tied_masses, changed(FmuSpring, "mass", 1.01)),
     ],
     ids=lambda function: function.__name__,
 )

@@ -3,8 +3,8 @@
 Every function of `SECTIONS` computes one exact solution from its formula, has ``beam.fmu`` and ``spring.fmu`` (alone,
 or in a scene) compute the same, and returns the comparison as a list of `Check`. A bound follows from what the method
 leaves out, the discretisation's leading error, the solver's tolerance or rounding, and says which; none is fitted.
-A new exact solution is a function in ``beam``, ``spring``, ``impact`` or ``coupling``, and a line in `SECTIONS`;
-``table`` prints them.
+A new exact solution is a function in ``beam``, ``spring``, ``impact``, ``coupling`` or ``laws``, and a line in
+`SECTIONS`; ``table`` prints them.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from .beam import beam_energy, frequencies, mesh_convergence, static_deflection
 from .check import Check
 from .coupling import added_mass, energy_scheme, two_masses
 from .impact import bar_impact
+from .laws import compliant_impact, hunt_crossley, linked_masses, tied_masses
 from .spring import duffing, escape
 
 #: Title and exact solution, in the order of the table.
@@ -31,6 +32,10 @@ SECTIONS: tuple[tuple[str, Callable[[], list[Check]]], ...] = (
     ("Coupling: two masses, held exchange, ρ ≈ 1 + cπ²H²", two_masses),
     ("Coupling: gain of the tie by displacement exchange", added_mass),
     ("Coupling: energy scheme, tied, undamped", energy_scheme),
+    ("Law: free masses on normal compliance λ p^q", compliant_impact),
+    ("Law: Hunt & Crossley, χ = 0.5 s/m", hunt_crossley),
+    ("Law: two masses on a link", linked_masses),
+    ("Law: two masses tied", tied_masses),
 )
 
 

@@ -1,0 +1,172 @@
+"""Both FMUs under an interface law: free masses that meet, masses on a link, masses tied for good.
+
+`springbeam.studies.exact` has the solutions and the scenes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from math import nan, pi, sin, sqrt
+
+import numpy as np
+from scipy.special import spherical_jn
+
+from ...bodies.fmu_bodies import FmuSpring
+from ...results.trajectory import Trajectory
+from ...run.runner import simulate
+from ...scene import Scene
+from .. import exact
+from .check import Check
+from .spring import IDA, ida_error
+
+#: The masses that meet [kg], and λ_nc between them [N/m^q].
+_TIP, _TOP, _STIFFNESS = 0.5, 2.0, 1e4
+_REDUCED = _TIP * _TOP / (_TIP + _TOP)
+_HALVED = "how much the value changes when H is halved: at order 2 a triple of the error left, more at a higher one"
+_PROJECTED = (
+    "a force without its Legendre terms above the degree d shifts the phase ωT by (2n+1) j_n(ωH/2)² of it, n = d + 1; "
+    "next order (ωH)²"
+)
+
+
+def _solver(scene: Scene, radians: float) -> float:
+    """Return what IDA leaves of the motion over an angle [rad], as a share."""
+    assert scene.spring is not None
+    with closing(FmuSpring(scene.spring, 0.0)) as body:
+        return ida_error(body, radians)
+
+
+def _phase(degree: int, angle: float) -> float:
+    """Return the relative phase error of an oscillator whose force is of ``degree`` over a step of ``angle`` = ωH."""
+    n = degree + 1
+    return float((2 * n + 1) * spherical_jn(n, 0.5 * angle) ** 2 * (1.0 + angle**2))
+
+
+def _halving(
+    quantities: tuple[tuple[str, float, Callable[[Trajectory], float]], ...],
+    scene: Callable[[float], Scene],
+    size: float,
+    solver: float,
+) -> list[Check]:
+    """Return checks of what a run at H = ``size``/2 gives, bounded by its change from H = ``size``."""
+    coarse, fine = simulate(scene(size)), simulate(scene(0.5 * size))
+    checks = []
+    for name, value, of in quantities:
+        bound = abs(of(fine) - of(coarse)) + solver * abs(value)
+        checks.append(Check(name, value, of(fine), bound, f"{_HALVED}; and {IDA}"))
+    return checks
+
+
+def _parting(run: Trajectory) -> float:
+    """Return the speed [m/s] at which tip and spring part, from the last row."""
+    return float(run["v_tip"][-1] - run["z"][-1])
+
+
+def _duration(run: Trajectory) -> float:
+    """Return how long the first contact lasts [s]; NaN if it does not end."""
+    ends = [event.time for event in run.events if event.kind == "separation"]
+    return float(ends[0]) if ends else nan
+
+
+def compliant_impact() -> list[Check]:
+    """Free masses, 0.5 and 2 kg at 1 m/s, on λ_nc p₊^q: how long, and how fast they part; λ_nc = 1e4 N/m^q.
+
+    q = 1 is half a period of √(λ_nc/μ); other q by the beta function. No energy is lost.
+    """
+    checks = []
+    for q in (1.0, 1.5, 3.0):
+        hit = exact.impact(_REDUCED, 1.0, _STIFFNESS, q)
+        assert hit.duration is not None
+        whole, steps = hit.duration, 40
+        law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q}
+
+        def scene(size: float, degree: int = 2, law: dict[str, object] = law, whole: float = whole) -> Scene:
+            return exact.free_masses(_TIP, _TOP, 1.0, 1.5 * whole, law, macro_step=size, degree=degree)
+
+        solver = _solver(scene(whole / steps), pi)
+        if q == 1.0:
+            for degree in (0, 1, 2):
+                bound = whole * (_phase(degree, pi / steps) + solver)
+                lasts = _duration(simulate(scene(whole / steps, degree)))
+                checks.append(
+                    Check(f"q = 1, degree {degree}: lasts [s]", whole, lasts, bound, f"{_PROJECTED}; and {IDA}")
+                )
+        else:
+            quantity = (f"q = {q:g}, degree 2: lasts [s]", whole, _duration)
+            checks += _halving((quantity,), scene, 2.0 * whole / steps, solver)
+        run = simulate(scene(whole / 10.0))
+        tolerance = 15.0 * run.scene.coupling.tolerance
+        reason = f"H a tenth of the contact: no energy lost but coupling.tolerance of each of 15 steps; and {IDA}"
+        checks.append(Check(f"q = {q:g}: part at [m/s]", 1.0, _parting(run), tolerance + solver, reason))
+    return checks
+
+
+def hunt_crossley() -> list[Check]:
+    """C = λ_nc p₊^q (1 + χ ṗ), χ = 0.5 s/m: the masses part at w with χ w − ln(1 + χ w) as before, and w < 0."""
+    checks = []
+    for q in (1.0, 1.5, 3.0):
+        hit = exact.impact(_REDUCED, 1.0, _STIFFNESS, q, 0.5)
+        undamped = exact.impact(_REDUCED, 1.0, _STIFFNESS, q).duration
+        assert undamped is not None
+        law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q, "damping": 0.5}
+        whole = undamped
+
+        def scene(size: float, law: dict[str, object] = law, whole: float = whole) -> Scene:
+            return exact.free_masses(_TIP, _TOP, 1.0, 2.0 * whole, law, macro_step=size, degree=2)
+
+        quantities = (
+            (f"q = {q:g}: part at [m/s]", hit.rebound, _parting),
+            (f"q = {q:g}: dissipated [J]", hit.dissipated, lambda run: float(run["e_dissipated"][-1])),
+        )
+        checks += _halving(quantities, scene, whole / 20.0, _solver(scene(whole / 20.0), pi))
+    return checks
+
+
+def linked_masses() -> list[Check]:
+    """Unit masses held by 4π² each, on a link of 16π² N/m: u, y = (cos 2πt ± cos 6πt)/2; or c = 3 N·s/m as well.
+
+    The link has 8/9 of the stiffness of the fast mode and none of the slow one's.
+    """
+    checks, link, T = [], 16.0 * pi**2, 1.0
+    M, K = np.eye(1), np.full((1, 1), 4.0 * pi**2)
+
+    def error(run: Trajectory) -> float:
+        masses = exact.linked(run.scene, M, K, np.ones(1), np.zeros(1), run["time"])
+        return float(np.max(np.abs(np.column_stack([run["u_tip"], run["y"]]) - masses)))
+
+    solver = _solver(exact.linked_masses(link, 0.0, T, macro_step=0.05), 6.0 * pi * T)
+    for degree in (0, 1, 2):
+        for size in (0.025, 0.0125):
+            run = simulate(exact.linked_masses(link, 0.0, T, macro_step=size, degree=degree))
+            bound = 0.5 * 6.0 * pi * T * 8.0 / 9.0 * _phase(degree, 6.0 * pi * size) + solver
+            name = f"degree {degree}, H = {size:g}: error [m]"
+            checks.append(Check(name, 0.0, error(run), bound, f"largest error over 1 s. {_PROJECTED}; and {IDA}"))
+
+    def damped(size: float) -> Scene:
+        return exact.linked_masses(link, 3.0, T, macro_step=size, degree=2)
+
+    u, y = exact.linked(damped(0.025), M, K, np.ones(1), np.zeros(1), np.array([T]))[0]
+    ends = (
+        ("c = 3 N·s/m: u_tip(1) [m]", float(u), lambda run: float(run["u_tip"][-1])),
+        ("c = 3 N·s/m: y(1) [m]", float(y), lambda run: float(run["y"][-1])),
+    )
+    return checks + _halving(ends, damped, 0.025, solver)
+
+
+def tied_masses() -> list[Check]:
+    """Unit masses held by 4π² and 12π² N/m, tied for good: one oscillator of ω² = 8π² from ẏ = −½ m/s, ¼ J lost.
+
+    The tie pulls as much as it presses: C = (k₁ − k₂) y/2.
+    """
+    T, omega = 1.0, sqrt(8.0) * pi
+
+    def scene(size: float) -> Scene:
+        return exact.tied_masses(4.0 * pi**2, 12.0 * pi**2, T, macro_step=size, degree=2)
+
+    quantities = (
+        ("y(1) [m]", -0.5 / omega * sin(omega * T), lambda run: float(run["y"][-1])),
+        ("lost in the impact [J]", 0.25, lambda run: float(run["e_impact_loss"][-1])),
+        ("C(1) [N]", 2.0 * pi**2 / omega * sin(omega * T), lambda run: float(run["contact_force"][-1])),
+    )
+    return _halving(quantities, scene, 0.01, _solver(scene(0.01), omega * T))
