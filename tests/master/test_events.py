@@ -13,7 +13,6 @@ from springbeam.contact.events import (
     EventFunctions,
     clearance,
     cubic_crossing,
-    interpolated,
     locate,
 )
 from springbeam.contact.laws import Transmission
@@ -29,15 +28,6 @@ CUBICS = [(1.0, -3.0, 0.5, 0.2), (0.2, -2.0, 3.0, -0.7), (0.3, 1.0, -4.0, 1.5), 
 def ends(coefficients) -> tuple[Polynomial, Sample, Sample]:
     p = Polynomial(coefficients)(Polynomial((0.0, 1.0 / SIZE)))
     return p, *((float(p(t)), float(p.deriv()(t))) for t in (0.0, SIZE))
-
-
-@pytest.mark.parametrize("coefficients", CUBICS)
-def test_interpolated_is_the_cubic_and_its_rate(coefficients):
-    p, start, end = ends(coefficients)
-    for tau in (0.0, 0.003, 0.017, SIZE):
-        got = interpolated(Motion(*start, 0.0, 0.0), Motion(*end, 0.0, 0.0), SIZE, tau)
-        assert got[0] == pytest.approx(p(tau), abs=1e-14)
-        assert got[1] == pytest.approx(p.deriv()(tau), abs=1e-12)  # 1e-14/H, rounded up
 
 
 @pytest.mark.parametrize("coefficients", CUBICS)

@@ -17,7 +17,7 @@ from ..bodies.protocol import Motion
 from ..scene import Beam, Scene, Spring
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .laws import Law
-from .paths import Means, Path, Sample
+from .paths import Means, Sample
 from .phases import Joint, Phase, spring_force
 
 _EPS = float(np.finfo(float).eps)
@@ -154,14 +154,6 @@ def clearance(start: Sample, end: Sample, size: float) -> tuple[float, float]:
     (f0, d0), (f1, d1), third = start, end, size / 3.0
     points = (f0, f1, f0 + third * d0, f1 - third * d1)
     return min(points), max(points)
-
-
-def interpolated(start: Motion, end: Motion, size: float, tau: float) -> Sample:
-    """Displacement and velocity at τ of the cubic through both ends of a step."""
-    v, w = start.velocity, end.velocity
-    x, rise = tau / size, (end.displacement - start.displacement) / size
-    rate = v + x * (2.0 * (3.0 * rise - 2.0 * v - w) + 3.0 * x * (v + w - 2.0 * rise))
-    return Path.through((start.displacement, v), (end.displacement, w), size).at(x), rate
 
 
 def cubic_crossing(start: Sample, end: Sample, size: float) -> float:

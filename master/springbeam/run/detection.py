@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+from ..bodies.protocol import Motion
 from ..contact.events import (
     EventFunction,
     EventFunctions,
     clearance,
     cubic_crossing,
     gap,
-    interpolated,
     locate,
     position_tolerance,
 )
@@ -198,15 +198,22 @@ class Detector:
     def soft_change(self, step: Step) -> SoftChange | None:
         """Return where contact by a soft law has opened or closed in ``step``, ``None`` if it has not.
 
-        Nothing special happens there: the zero is that of the cubic through both ends of the step.
+        Nothing special happens there: the zero is that of the path of the gap.
         """
         before, after = gap(step.start), gap(step.end)
         touching = after[0] < 0.0
         if (before[0] < 0.0) == touching:
             return None
-        if touching:
-            at = 0.0 if before[0] == 0.0 else cubic_crossing(before, after, step.size)
-        else:  # backwards in time it closes
-            at = step.size - cubic_crossing((after[0], -after[1]), (before[0], -before[1]), step.size)
-        tip, low = (interpolated(step.start[i], step.end[i], step.size, at) for i in (0, 1))
-        return SoftChange("impact" if touching else "separation", step.time + at, tip, low)
+        sign = 1.0 if touching else -1.0  # opening, the penetration falls through zero
+        start, end, means = (
+            (sign * first, sign * second) for first, second in (before, after, gap.means(step.end, step.size))
+        )
+        at = Path.through(start, end, step.size, means).falls_through_zero()
+        tip, low = (_inside(step.start[i], step.end[i], step.size, at) for i in (0, 1))
+        return SoftChange("impact" if touching else "separation", step.time + at * step.size, tip, low)
+
+
+def _inside(start: Motion, end: Motion, size: float, s: float) -> Sample:
+    """Return displacement [m] and velocity [m/s] at the share ``s`` of a step."""
+    path = Path.through(start[:2], end[:2], size, (end.integral / size, end.integral_2 / (size * size)))
+    return path.at(s), path.slope(s) / size

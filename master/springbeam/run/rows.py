@@ -58,7 +58,7 @@ class Rows(Memory):
             inside, reaction = pair.law.force(y - u, z - v), 0.0
         else:
             self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
-            if pair.joinable:
+            if pair.joinable and not pair.law.lasting:
                 inside = self._diagnostic(self._equilibrium - u)
                 reaction = contact - inside
         self.largest_speed = max(self.largest_speed, abs(v), abs(z))

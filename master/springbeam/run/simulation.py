@@ -26,7 +26,7 @@ from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .outcome import OVERFLOW, Progress, RunStopped
 from .rows import NOT_SHOWN, Rows
-from .stepping import Pair, State
+from .stepping import Pair
 
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
@@ -84,7 +84,7 @@ class Simulation(Memory):
         scene, self._choice = decided(scene)
         self._scene, self._recorder, self._progress = scene, recorder, progress
         self._pair = Pair(scene, beam, spring)
-        self._state = State(start_time, self._pair.initial_phase)
+        self._state = self._pair.initial_state(start_time)
         self._steps: MacroGrid | AdaptiveSteps
         if scene.coupling.adaptive:
             self._steps = AdaptiveSteps(start_time, scene.time.t_end)

@@ -99,10 +99,14 @@ class Pair(Memory):
         """Whether contact opens and closes inside steps, without an event that ends them."""
         return self.law.soft and not self.law.lasting
 
-    @property
-    def initial_phase(self) -> Phase:
-        """Before anything happens; ends that a soft law joins for good are joined from the start."""
-        return Phase(Joint.TIED) if self.law.soft and self.law.lasting else Phase()
+    def initial_state(self, time: float) -> State:
+        """Return the state before anything happens; ends that a soft law joins for good are joined from the start."""
+        if not self.law.soft:
+            return State(time)
+        tip, low = self.ends()
+        at_start = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
+        phase = Phase(Joint.TIED) if self.law.lasting else Phase()
+        return State(time, phase, (at_start, 0.0, 0.0), smoothed=at_start)
 
     def coupling(self, phase: Phase) -> Coupling:
         """What couples the bodies in ``phase``: a soft law acts wherever the ends are."""
