@@ -11,7 +11,7 @@ from bodies import simulate
 
 from springbeam.bodies.protocol import StepRefused
 from springbeam.monolithic import event_driven
-from springbeam.results.trajectory import Trajectory
+from springbeam.results.trajectory import Event, Trajectory
 from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
 
 
@@ -58,7 +58,7 @@ def test_hermite_has_the_events_of_the_reference(changes):
 
 @pytest.mark.parametrize(("degree", "order"), [(0, 2.0), (2, 3.0)])
 def test_contacts_of_the_compliance_law_begin_and_end_where_the_ends_meet(degree, order):
-    """Ends are at one place there. Times converge at least with ``order``: where a contact opens the force has a kink."""
+    """Ends are at one place there. Times converge at least with ``order``: a force that opens has a kink."""
     law = {"law": "compliance", "stiffness": 2e3, "exponent": 1.5}
 
     def changes(size: float) -> list[Event]:

@@ -18,7 +18,7 @@ from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.bodies.protocol import StepRefused
 from springbeam.cli import app
 from springbeam.contact.laws import Compliance
-from springbeam.run import stepping
+from springbeam.coupling.tie import SCHEMES
 from springbeam.studies import verify
 from springbeam.studies.verify.beam import _mesh_error, clamped_free_frequencies
 from springbeam.studies.verify.check import Check
@@ -79,13 +79,12 @@ def force_off(patch: pytest.MonkeyPatch) -> None:
 
 def gap_left_open(patch: pytest.MonkeyPatch) -> None:
     """The scheme's conditions are met 1e-4 H late."""
-    right = stepping.conditions
+    for degree, right in SCHEMES["energy"].items():
 
-    def wrong(scheme, degree):
-        conditions = right(scheme, degree)
-        return lambda m, size: tuple(r + 1e-4 * size * m.velocity for r in conditions(m, size))
+        def wrong(m, size, right=right):
+            return tuple(r + 1e-4 * size * m.velocity for r in right(m, size))
 
-    patch.setattr(stepping, "conditions", wrong)
+        patch.setitem(SCHEMES["energy"], degree, wrong)
 
 
 def undamped(patch: pytest.MonkeyPatch) -> None:
