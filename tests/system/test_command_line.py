@@ -48,7 +48,8 @@ def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("place")
     script = """
 import os, sys
-from springbeam import checkpoint, cli
+from springbeam import cli
+from springbeam.run import checkpoint
 save = checkpoint.Checkpoints.take_when_due
 taken = []
 def take(self, simulation):
