@@ -570,7 +570,7 @@ def _candidate(soft: Scene, scheme: str, steps: int, tolerance: float, ida: floa
 
 
 def _cheapest(families: list[list[Candidate]], error_of: str, target: float) -> Candidate:
-    """Of those that are within the target together with all finer ones of their family: not by luck."""
+    """Return the cheapest that is within the target together with all finer ones of its family: not by luck."""
     kept = []
     for family in families:
         fine = [getattr(candidate, error_of) <= target for candidate in family]

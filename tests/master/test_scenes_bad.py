@@ -10,9 +10,8 @@ from typing import Any
 
 import pytest
 import tomli_w
-from typer.testing import CliRunner
+from commands import command
 
-from springbeam import cli
 from springbeam.scene import load_scene
 from springbeam.scene.reading import LONGEST_FILE, tomllib
 
@@ -41,7 +40,7 @@ def text_of(case: dict[str, Any]) -> str:
 def check(path: Path | str, expected: list[str], here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(here)
     before = sorted(here.rglob("*"))
-    result = CliRunner().invoke(cli.app, ["run", str(path)])
+    result = command("run", path)
     assert result.exit_code == 2, result.output
     assert result.stdout == ""
     lines = result.stderr.splitlines()
@@ -141,5 +140,5 @@ def test_what_is_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     }.items():
         check(name, [f"{what}; shipped scenes: …" if "shipped scenes:" not in what else what], tmp_path, monkeypatch)
     long = "x" * 300 + ".toml"
-    result = CliRunner().invoke(cli.app, ["run", long])
+    result = command("run", long)
     assert (result.exit_code, result.stderr) == (2, f"error: {'x' * 59}…: File name too long\n")

@@ -8,11 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from commands import command
 from scipy.special import ellipk
-from typer.testing import CliRunner
 
 from springbeam import RunStopped, load_scene, simulate
-from springbeam.cli import app
 from springbeam.monolithic import event_driven
 from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene, shipped_scenes, with_changes
@@ -282,7 +281,7 @@ def test_every_shipped_scene_is_valid():
 
 def test_run_leaves_the_promised_files(tmp_path):
     out = tmp_path / "out"
-    result = CliRunner().invoke(app, ["run", "soft", "--out", str(out), "--set", "time.t_end=0.1"])
+    result = command("run", "soft", "--out", out, "--set", "time.t_end=0.1")
     assert result.exit_code == 0, result.output
     header = next(csv.reader((out / "trajectory.csv").open()))
     promised = (
@@ -303,7 +302,7 @@ def test_run_leaves_the_promised_files(tmp_path):
 
 
 def test_bad_input_is_exit_code_2(tmp_path):
-    result = CliRunner().invoke(app, ["run", "soft", "--set", "spring.mas=1", "--out", str(tmp_path / "x")])
+    result = command("run", "soft", "--set", "spring.mas=1", "--out", tmp_path / "x")
     assert result.exit_code == 2
     assert "mas" in result.output
     assert not (tmp_path / "x").exists()
