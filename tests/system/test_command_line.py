@@ -104,12 +104,12 @@ def test_help_fits_80_columns(name):
 
 @pytest.mark.parametrize("name", COMMAND.commands)
 def test_the_help_of_a_command_has_an_example_that_it_understands(name):
-    command = COMMAND.commands[name]
-    example = re.search(r"Example: (springbeam .*)", command.help)[1]
+    described = COMMAND.commands[name]
+    example = re.search(r"Example: (springbeam .*)", described.help)[1]
     assert example in " ".join(command(name, "--help").stdout.split())
     program, first, *arguments = shlex.split(example)
     assert (program, first) == ("springbeam", name)
-    command.make_context(name, arguments)  # raises if an option or a value is wrong
+    described.make_context(name, arguments)  # raises if an option or a value is wrong
 
 
 def test_flags_are_shown_without_a_type():

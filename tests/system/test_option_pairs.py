@@ -61,7 +61,20 @@ OPTIONS = {
 }
 
 
-@pytest.mark.parametrize("pair", list(combinations(OPTIONS, 2)), ids=" + ".join)
+#: Pairs that end otherwise today, and how.
+KNOWN = {
+    ("hermite 2", "rest"): "stops: hermite closes the velocity that rest leaves open, and the energy changes by 26 %",
+    ("auto", "rest"): "takes hermite, and stops",
+    ("accuracy", "rest"): "its pilot run takes hermite, and stops",
+    ("macro step", "paper"): "1e45 m before the last, shorter step: the tip's response to a force is lost in rounding",
+}
+PAIRS = [
+    pytest.param(pair, marks=[pytest.mark.xfail(reason=KNOWN[pair])] if pair in KNOWN else [], id=" + ".join(pair))
+    for pair in combinations(OPTIONS, 2)
+]
+
+
+@pytest.mark.parametrize("pair", PAIRS)
 def test_a_pair_runs_or_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pair: tuple[str, str]) -> None:
     monkeypatch.chdir(tmp_path)
     # Composed, not painted: tests/master/test_plots.py looks at the pictures.
