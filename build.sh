@@ -141,7 +141,7 @@ case $command in
     say "C++ tests"
     $venv/bin/ctest --test-dir build --output-on-failure || failed="C++ tests"
     say "Python tests"
-    $python -m pytest -n auto -m "not slow" "$@" || failed="${failed:+$failed and }Python tests"
+    $python -m pytest -n auto --dist worksteal -m "not slow" "$@" || failed="${failed:+$failed and }Python tests"
     [ -z "$failed" ] || die "failed: $failed"
     ;;
   sources)

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import sys
 from pathlib import Path
+
+# Before numpy is imported, and for the processes that tests start. The matrices are small, and tests run on all cores:
+# more threads of OpenBLAS only wait for each other, and spin meanwhile.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
@@ -12,6 +18,9 @@ import springbeam
 from springbeam.monolithic import event_driven
 
 ROOT = Path(__file__).resolve().parents[1]
+
+# The folders of the helper modules: commands.py here, the others beside the tests that use them.
+sys.path[:0] = [str(ROOT / "tests" / folder) for folder in (".", "master", "system")]
 
 # A shell ignores it in what it runs in the background, and so would the programs that tests start and interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -26,6 +26,8 @@ from scipy.interpolate import CubicHermiteSpline
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies import fmu
+from springbeam.bodies.factory import load_bodies
+from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.monolithic import algorithm1, event_driven
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.recording import MemoryRecorder
@@ -152,8 +154,8 @@ def _initialisation(effort: Effort, found: dict[str, Any]) -> Iterator[Row]:
         one = paper.model_copy(update={"n_elements": n, "n_modes": 64})
 
         def ours(one: Any = one) -> float:
-            made: list[fmu.FmuBeam] = []
-            seconds = timed(lambda: made.append(fmu.FmuBeam(one, 0.0, 0.0)))
+            made: list[FmuBeam] = []
+            seconds = timed(lambda: made.append(FmuBeam(one, 0.0, 0.0)))
             made[0].close()
             return seconds
 
@@ -251,7 +253,7 @@ class Inside:
 def nothing(times: int = 20_000) -> float:
     """Seconds that `Inside` sees of a call that does nothing."""
     with Inside() as inside:
-        body = fmu.FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
+        body = FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
         call = body.fmu.prepared("fmi2GetReal", None, c_size_t(0), None)
         inside.seconds, inside.calls = 0.0, 0
         for _ in range(times):
@@ -274,7 +276,7 @@ def tied_phase(scene: Scene) -> tuple[float, int]:
 
 def through_fmpy(effort: Effort, calls: int = 20_000) -> Row:
     """What a call costs through FMPy's own methods: says how fast Python is on this machine."""
-    body = fmu.FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
+    body = FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
     read, references = body.fmu._slave.getReal, [body.fmu.reference("displacement", "Real")]
     costs = [1e6 * timed(lambda: [read(references) for _ in range(calls)]) / calls for _ in range(effort.rounds)]
     body.close()
@@ -337,8 +339,8 @@ class _Enough(Exception):
 def profile(effort: Effort) -> Iterator[Row]:
     """Parts of a macro step, each repeated by itself in the middle of the first tied phase of `soft`."""
     scene = load_scene("soft")
-    beam, spring = fmu.load_bodies(scene, 0.0)
-    assert isinstance(beam, fmu.FmuBeam)
+    beam, spring = load_bodies(scene, 0.0)
+    assert isinstance(beam, FmuBeam)
     assert spring is not None
 
     def progress(time: float, phase: str, macro_steps: int) -> None:
@@ -356,7 +358,7 @@ def profile(effort: Effort) -> Iterator[Row]:
     energies = pair.energies()
     simulation._rows._next_shape, simulation._rows._shapes_left = float("inf"), 0
 
-    def stepped(body: fmu.FmuBeam | fmu.FmuSpring) -> None:
+    def stepped(body: FmuBeam | FmuSpring) -> None:
         body.rewind()
         body.advance(state.time, H, step.contact)
 
@@ -568,7 +570,7 @@ def _candidate(soft: Scene, scheme: str, steps: int, tolerance: float, ida: floa
 
 
 def _cheapest(families: list[list[Candidate]], error_of: str, target: float) -> Candidate:
-    """Of those that are within the target together with all finer ones of their family: not by luck."""
+    """Return the cheapest that is within the target together with all finer ones of its family: not by luck."""
     kept = []
     for family in families:
         fine = [getattr(candidate, error_of) <= target for candidate in family]

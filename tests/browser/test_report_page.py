@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
-from springbeam.cli import app
 from springbeam.results.directory import REPORT
 from springbeam.results.reading import load_trajectory
 from springbeam.results.trajectory import Trajectory
@@ -53,9 +52,9 @@ def run_and_report(folder: Path, scene: str) -> Path:
     directory = folder / scene
     if not directory.exists():
         shorter = ["--set", f"time.t_end={T_END[scene]}"] if scene in T_END else []
-        made = CliRunner().invoke(app, ["run", scene, "--out", str(directory), "--no-plots", *shorter])
+        made = command("run", scene, "--out", directory, "--no-plots", *shorter)
         assert made.exit_code == 0, made.output
-        made = CliRunner().invoke(app, ["report", str(directory)])
+        made = command("report", directory)
         assert made.exit_code == 0, made.output
     return directory
 

@@ -9,9 +9,8 @@ from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
-from springbeam import cli
 from springbeam.bodies import archive
 from springbeam.bodies.archive import UnsafeArchive, unpack
 
@@ -123,7 +122,7 @@ def test_our_own_are_unpacked_to_the_last_byte(fmu_folder: Path, tmp_path: Path,
 
 
 def refusal(folder: Path) -> str:
-    result = CliRunner().invoke(cli.app, ["run", "soft", "--out", str(folder / "out")])
+    result = command("run", "soft", "--out", folder / "out")
     assert result.exit_code == 2
     assert "Traceback" not in result.output
     assert not (folder / "out").exists()

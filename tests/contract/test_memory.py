@@ -42,7 +42,7 @@ class MallocInfo(ct.Structure):
 
 
 def growth(cycle: Callable[[int], None], cycles: int) -> int:
-    """Of what malloc has given out and not got back [bytes], over `cycles` after those that fill caches."""
+    """Return what malloc gave out and did not get back [bytes] over `cycles`, after those that fill caches."""
     information = ct.CDLL(None).mallinfo2
     information.restype = MallocInfo
 

@@ -135,7 +135,7 @@ TEST(BeamOscillator, IsExactToRoundingForAllFrequenciesAndDampings) {
   RecordProperty("worst", std::to_string(worst * 1e16) + "e-16 at " + where);
 }
 
-// The same step by hand in quadruple precision, for the dissipation.
+// That step by hand in quadruple precision, for the dissipation.
 struct Motion {
   Quad eta, v, integral, integral_2;
 };

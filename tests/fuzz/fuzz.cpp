@@ -740,7 +740,7 @@ class Episode {
     step(k, time, any_size());
   }
 
-  /// The same step from the same state, here and in another instance: the same bits.
+  /// A step repeated from its state, here and in another instance: bit for bit.
   void repeat(Instance& k) {
     if (k.phase != complete || k.wild) return;
     Saved mark;

@@ -8,12 +8,11 @@ from itertools import pairwise
 import matplotlib
 import numpy as np
 import pytest
+from commands import command
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
 from runs import PAIR, a_trajectory
-from typer.testing import CliRunner
 
-from springbeam import cli
 from springbeam.pictures import animation
 from springbeam.pictures.animation import AnimationError, animate
 from springbeam.pictures.drawing import NOT_RESOLVED
@@ -140,16 +139,12 @@ def directory(tmp_path):
     return tmp_path / "run"
 
 
-def command(*arguments):
-    return CliRunner().invoke(cli.app, ["animate", *(str(argument) for argument in arguments)])
-
-
 def test_the_command_writes_a_gif_into_the_directory_and_says_where(directory):
-    result = command(directory, "--seconds", 0.2, "--fps", 10)
+    result = command("animate", directory, "--seconds", 0.2, "--fps", 10)
     assert (result.exit_code, result.stdout) == (0, f"{directory / 'animation.gif'}\n")
     with Image.open(directory / "animation.gif") as gif:
         assert gif.n_frames == 2
-    again = command(directory, "--seconds", 0.2)
+    again = command("animate", directory, "--seconds", 0.2)
     assert again.exit_code == 2
     assert "already exists; --force replaces it" in again.stderr
     run = a_trajectory(n=30)
@@ -171,7 +166,7 @@ def test_the_command_writes_a_gif_into_the_directory_and_says_where(directory):
 )
 def test_bad_input_is_one_clear_error(directory, monkeypatch, arguments, message):
     monkeypatch.chdir(directory.parent)
-    result = command(*arguments)
+    result = command("animate", *arguments)
     assert result.exit_code == 2
     assert message in result.stderr
     assert not list(directory.parent.rglob("*.gif"))
@@ -180,6 +175,6 @@ def test_bad_input_is_one_clear_error(directory, monkeypatch, arguments, message
 def test_a_run_of_one_row_has_nothing_to_animate(tmp_path):
     with FileRecorder(PAIR, RunDirectory.create(tmp_path / "run")) as recorder:
         recorder.finish({"status": "stopped"})
-    result = command(tmp_path / "run")
+    result = command("animate", tmp_path / "run")
     assert result.exit_code == 2
     assert "nothing to animate" in result.stderr

@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
 from springbeam import SceneError, load_scene, simulate, with_changes
-from springbeam.cli import app
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
 from springbeam.scene.automatic import STABLE, choice, decided
@@ -118,7 +117,7 @@ def test_a_degree_beside_auto_is_refused():
 
 def test_the_command_says_what_it_took(tmp_path):
     arguments = ["run", "soft", "--set", "time.t_end=0.02", "--set", "coupling.scheme=auto", "--no-plots"]
-    result = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "out")])
+    result = command(*arguments, "--out", tmp_path / "out")
     assert result.exit_code == 0
     assert "coupling  hermite 2: ω_max H = 0.433 <= 3" in result.stdout
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["coupling"]["scheme"] == "hermite"

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
 import springbeam.run.runner
 from springbeam import cli
@@ -53,10 +53,6 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def springbeam_command(*arguments):
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
-
-
 def replace_run(monkeypatch, error, after=fake_run):
     def run(scene, recorder, progress=None, **checkpoints):
         class Stop:
@@ -77,7 +73,7 @@ def replace_run(monkeypatch, error, after=fake_run):
 
 
 def test_a_run_leaves_results_and_pictures_and_says_where(here):
-    result = springbeam_command("run", "soft")
+    result = command("run", "soft")
     assert result.exit_code == 0
     assert result.stderr == ""
     assert sorted(path.name for path in (here / "results" / "soft").iterdir()) == sorted(
@@ -97,12 +93,12 @@ def test_what_rounding_leaves_of_a_zero_is_shown_as_0(here, monkeypatch):
         fake_run(scene, recorder)
 
     monkeypatch.setattr(springbeam.run.runner, "run", released)
-    (event,) = [line for line in springbeam_command("run", "soft").stdout.splitlines() if line.startswith("release")]
+    (event,) = [line for line in command("run", "soft").stdout.splitlines() if line.startswith("release")]
     assert event.split() == ["release", "0.20000000", "0", "0.25"]
 
 
 def test_no_plots(here):
-    result = springbeam_command("run", "soft", "--no-plots")
+    result = command("run", "soft", "--no-plots")
     assert result.exit_code == 0
     assert not list((here / "results" / "soft").glob("*.png"))
     assert "pictures" not in result.stdout
@@ -110,16 +106,16 @@ def test_no_plots(here):
 
 def test_settings_reach_the_run_and_the_summary(here):
     settings = ["--set", "time.t_end=2", "--set", "contact.law=compliance"]
-    assert springbeam_command("run", "soft", "--no-plots", *settings).exit_code == 0
+    assert command("run", "soft", "--no-plots", *settings).exit_code == 0
     result = load_trajectory(here / "results" / "soft")
     assert result.time[-1] == 2.0
     assert result.scene.contact.law == "compliance"
 
 
 def test_a_second_run_does_not_touch_the_first(here):
-    springbeam_command("run", "soft", "--no-plots")
+    command("run", "soft", "--no-plots")
     first = (here / "results" / "soft" / "summary.json").stat().st_mtime_ns
-    result = springbeam_command("run", "soft", "--no-plots")
+    result = command("run", "soft", "--no-plots")
     assert result.exit_code == 0
     assert "results   results/soft-2\n" in result.stdout
     assert (here / "results" / "soft" / "summary.json").stat().st_mtime_ns == first
@@ -127,19 +123,19 @@ def test_a_second_run_does_not_touch_the_first(here):
 
 def test_results_are_named_after_the_file(here):
     (here / "mine.toml").write_text(shipped_scenes()["soft"].read_text(encoding="utf-8"), encoding="utf-8")
-    assert springbeam_command("run", "mine.toml", "--no-plots").exit_code == 0
+    assert command("run", "mine.toml", "--no-plots").exit_code == 0
     assert (here / "results" / "mine" / "trajectory.csv").exists()
 
 
 def test_force_replaces(here):
-    springbeam_command("run", "soft", "--out", "here", "--set", "time.t_end=1")
-    assert springbeam_command("run", "soft", "--out", "here", "--force", "--no-plots").exit_code == 0
+    command("run", "soft", "--out", "here", "--set", "time.t_end=1")
+    assert command("run", "soft", "--out", "here", "--force", "--no-plots").exit_code == 0
     assert load_trajectory(here / "here").time[-1] == 0.6
     assert not list((here / "here").glob("*.png"))  # pictures of the earlier run would lie
 
 
 def test_quiet_prints_only_where(here):
-    result = springbeam_command("run", "soft", "--quiet", "--no-plots")
+    result = command("run", "soft", "--quiet", "--no-plots")
     assert (result.stdout, result.stderr) == ("results/soft\n", "")
 
 
@@ -150,7 +146,7 @@ def test_report_fits_80_columns_and_says_how_many_events_are_not_shown(here, mon
         fake_run(scene, recorder)
 
     monkeypatch.setattr(springbeam.run.runner, "run", many)
-    result = springbeam_command("run", "soft", "--no-plots")
+    result = command("run", "soft", "--no-plots")
     lines = result.stdout.splitlines()
     assert max(map(len, lines)) <= 80
     # Whole numbers, none cut short.
@@ -165,12 +161,12 @@ def test_warnings_are_shown_as_they_are(here, monkeypatch):
         recorder.finish({**SUMMARY, "warnings": ["[beam] is [bold]coarse[/bold]"]})
 
     monkeypatch.setattr(springbeam.run.runner, "run", warned)
-    assert "warning   [beam] is [bold]coarse[/bold]" in springbeam_command("run", "soft", "--no-plots").stdout
+    assert "warning   [beam] is [bold]coarse[/bold]" in command("run", "soft", "--no-plots").stdout
 
 
 @pytest.mark.parametrize("name", ["duffing", "beam-on-stop"])
 def test_scenes_without_a_body(here, name):
-    result = springbeam_command("run", name)
+    result = command("run", name)
     assert result.exit_code == 0
     assert "impact" in result.stdout
 
@@ -181,14 +177,14 @@ def test_scenes_without_a_body(here, name):
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="nothing is forbidden to root")
 def test_a_place_that_cannot_be_written_is_bad_input(here):
     (here / "locked").mkdir(mode=0o500)
-    result = springbeam_command("run", "soft", "--out", "locked/run")
+    result = command("run", "soft", "--out", "locked/run")
     assert result.exit_code == 2
     assert "locked" in result.stderr
 
 
 def test_a_missing_fmu_is_bad_input_and_leaves_nothing(here, monkeypatch):
     replace_run(monkeypatch, FmuError("beam.fmu: not found; ./build.sh fmus builds it"), after=None)
-    result = springbeam_command("run", "soft")
+    result = command("run", "soft")
     assert result.exit_code == 2
     assert result.stderr == "error: beam.fmu: not found; ./build.sh fmus builds it\n"
     assert list((here / "results").iterdir()) == []
@@ -208,7 +204,7 @@ def test_a_missing_fmu_is_bad_input_and_leaves_nothing(here, monkeypatch):
 )
 def test_a_run_that_stops_early(here, monkeypatch, error, status, fragments):
     replace_run(monkeypatch, error)
-    result = springbeam_command("run", "soft")
+    result = command("run", "soft")
     assert result.exit_code == 3
     for fragment in [*fragments, "what was computed is in results/soft"]:
         assert fragment in result.stderr
@@ -225,14 +221,14 @@ def test_a_value_that_is_not_finite_stops_the_run(here, monkeypatch):
         recorder.row(dict.fromkeys(recorder.columns, float("nan")) | {"time": 0.7, "phase": "free"})
 
     monkeypatch.setattr(springbeam.run.runner, "run", run)
-    result = springbeam_command("run", "soft", "--no-plots")
+    result = command("run", "soft", "--no-plots")
     assert result.exit_code == 3
     assert "u_tip = nan at t = 0.7 s" in result.stderr
 
 
 def test_an_unforeseen_error_is_not_hidden(here, monkeypatch):
     replace_run(monkeypatch, ZeroDivisionError("a bug"))
-    result = springbeam_command("run", "soft")
+    result = command("run", "soft")
     assert result.exit_code == 1
     assert isinstance(result.exception, ZeroDivisionError)
     assert load_trajectory(here / "results" / "soft").summary["cause"] == "ZeroDivisionError: a bug"
@@ -353,7 +349,7 @@ def test_no_progress_in_a_file(here):
 
 
 def test_scenes_lists_what_is_shipped_within_80_columns(here):
-    result = springbeam_command("scenes")
+    result = command("scenes")
     assert result.exit_code == 0
     *lines, where = result.stdout.splitlines()
     assert where == f"files: {shipped_scenes()['soft'].parent}"
@@ -367,19 +363,19 @@ def test_scenes_lists_what_is_shipped_within_80_columns(here):
 
 def test_version_is_that_of_the_package(here, monkeypatch):
     monkeypatch.setattr(cli.metadata, "version", lambda name: {"springbeam": "1.2.3"}[name])
-    result = springbeam_command("--version")
+    result = command("--version")
     assert (result.exit_code, result.stdout) == (0, "springbeam 1.2.3\n")
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["run", "--help"], ["scenes", "--help"]])
 def test_help(here, arguments):
-    result = springbeam_command(*arguments)
+    result = command(*arguments)
     assert result.exit_code == 0
     assert max(map(len, result.stdout.splitlines())) <= 80
 
 
 def test_help_of_run_teaches_by_an_example(here):
-    text = " ".join(springbeam_command("run", "--help").stdout.split())
+    text = " ".join(command("run", "--help").stdout.split())
     for fragment in ("springbeam run soft --set coupling.macro_step=5e-4", "--out", "--no-plots", "--force", "--quiet"):
         assert fragment in text
 
@@ -390,6 +386,6 @@ def test_completion_offers_shipped_scenes():
 
 
 def test_summary_in_the_directory_is_the_runners(here):
-    springbeam_command("run", "soft", "--no-plots")
+    command("run", "soft", "--no-plots")
     summary = json.loads((here / "results" / "soft" / "summary.json").read_text(encoding="utf-8"))
     assert {key: summary[key] for key in SUMMARY} == SUMMARY

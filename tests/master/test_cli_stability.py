@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
-from springbeam.cli import app
 from springbeam.scene import load_scene, with_changes
 from springbeam.studies.stability.predict import predict
 
@@ -17,14 +16,14 @@ COARSE = ["--set", "beam.n_elements=10"]
 @pytest.mark.parametrize("scene", ["soft", "steel-bumper", "duffing"])
 def test_prediction_fits_80_columns(scene):
     arguments = COARSE if scene == "soft" else []
-    result = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["predict", scene, *arguments])
+    result = command("predict", scene, *arguments)
     assert result.exit_code == 0
     assert max(map(len, result.stdout.splitlines())) <= 80
     assert ("critical H" in result.stdout) == (scene != "duffing")
 
 
 def test_json_is_the_prediction():
-    result = CliRunner().invoke(app, ["predict", "soft", *COARSE, "--json"])
+    result = command("predict", "soft", *COARSE, "--json")
     printed = json.loads(result.stdout)
     expected = predict(with_changes(load_scene("soft"), beam={"n_elements": 10}))
     assert printed["omega_max"] == expected.omega_max
@@ -33,6 +32,6 @@ def test_json_is_the_prediction():
 
 
 def test_a_scene_that_cannot_be_read_is_bad_input():
-    result = CliRunner().invoke(app, ["predict", "sotf"])
+    result = command("predict", "sotf")
     assert result.exit_code == 2
     assert "did you mean soft?" in result.stderr

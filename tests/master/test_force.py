@@ -11,7 +11,7 @@ from numpy.polynomial import Legendre, Polynomial
 from springbeam.bodies import force
 
 EPS = float(np.finfo(float).eps)
-#: Of degree 0, 1 and 2, with coefficients of both signs.
+#: Degrees 0, 1 and 2, with coefficients of both signs.
 COEFFICIENTS = [(0.7,), (0.7, -2.3), (0.7, -2.3, 1.9), (1e-6, 40.0, -3e3)]
 
 

@@ -48,7 +48,9 @@ A, B, C, D, E = PICTURES
     ids=["all", "no stop", "no spring", "beam", "spring and stop", "spring"],
 )
 def test_a_scene_gets_the_pictures_of_what_it_has(tmp_path, scene, expected):
+    style = dict(matplotlib.rcParams)
     written = plot_run(a_trajectory(scene), tmp_path)
+    assert dict(matplotlib.rcParams) == style  # none is left behind
     assert [path.name for path in written] == expected
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(expected)
     for path in written:
@@ -92,12 +94,6 @@ def test_odd_columns_are_drawn_without_a_warning(tmp_path, recwarn, monkeypatch,
     monkeypatch.setattr(plots, "DPI", 40)
     plot_run(a_trajectory(events=EVERY_EVENT, **columns), tmp_path)
     assert [str(warning.message) for warning in recwarn] == []
-
-
-def test_style_is_not_left_behind(tmp_path):
-    before = dict(matplotlib.rcParams)
-    plot_run(a_trajectory(), tmp_path)
-    assert dict(matplotlib.rcParams) == before
 
 
 # -- what is in them ----------------------------------------------------------------------------------------------

@@ -179,7 +179,7 @@ def test_tied_it_is_a_spring_in_parallel(degree: int, sizes: tuple[float, float]
         exact = mean + (np.exp(np.outer(run.time, roots)) @ amplitudes).real
         errors.append(np.abs(run.y - exact).max())
         assert run.summary["max_energy_residual"] < 1e-13
-        # Of the motion over a step, up to 0.5 m/s · H, the coupling's tolerance.
+        # The coupling's tolerance of the motion over a step, up to 0.5 m/s · H.
         assert np.abs(run.u_tip - run.y).max() < 1e-12 * 0.6 * size + 1e-15
         assert run.e_dissipated[-1] > 0.0 if alpha else run.e_dissipated[-1] == 0.0
     assert orders(errors, sizes)[0] == pytest.approx(order, abs=0.25)

@@ -11,10 +11,9 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from commands import command
 from runs import EVERY_EVENT, PAIR, a_trajectory
-from typer.testing import CliRunner
 
-from springbeam import cli
 from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS, readable_unit
 from springbeam.pictures.frames import COIL_HEIGHTS, MOST_FRAMES, frames_of
 from springbeam.pictures.report import page, shipped_command
@@ -374,10 +373,6 @@ def directory(tmp_path):
             recorder.event(event)
         recorder.finish({"status": "done", "warnings": []})
     return tmp_path / "run"
-
-
-def command(*arguments):
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
 def test_the_command_writes_the_page_into_the_directory_and_says_where(directory):

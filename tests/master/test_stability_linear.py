@@ -210,6 +210,6 @@ def test_what_a_scene_lacks_is_left_out(name, changes):
     assert (p.omega_1 is None) == (name == "duffing")
     assert (p.displacement_gain is None) == (name != "soft")
     assert (p.advised is None) == (name == "duffing")
-    # Of the beam on its stop only that hermite's bands may be narrow.
+    # The beam on its stop has one note: hermite's bands may be narrow.
     assert [note.split()[0] for note in p.notes if note.startswith("hermite")] == ["hermite"] * (name == "beam-on-stop")
     assert len(p.notes) >= 1

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
-from springbeam.cli import app
 from springbeam.monolithic import event_driven
 from springbeam.results.reading import load_trajectory
 from springbeam.results.recording import MemoryRecorder
@@ -147,7 +146,7 @@ def test_a_run_may_be_shorter_than_the_default_macro_step(law, tmp_path):
     assert run.time[-1] == 1e-3
     path = tmp_path / "short.toml"
     path.write_text(f'[time]\nt_end = 1e-3\n[spring]\nequilibrium = 0.1\n[contact]\nlaw = "{law}"\n')
-    result = CliRunner().invoke(app, ["run", str(path), "--accuracy", "1e-3", "--out", str(tmp_path / "out")])
+    result = command("run", path, "--accuracy", "1e-3", "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     with pytest.raises(SceneError, match=r"macro_step = 0\.004, the default: .*; give a smaller one, or an accuracy"):
         load_scene(path)
@@ -195,24 +194,24 @@ def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked(study_of, asking):
 
 def test_crosscheck_compares_the_scene_that_was_picked(asking):
     picked = simulate(load_scene(asking)).scene
-    result = CliRunner().invoke(app, ["crosscheck", str(asking), "--json"])
+    result = command("crosscheck", asking, "--json")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     assert found["scene"] == json.loads(json.dumps(picked.model_dump(exclude_none=True)))
     assert found["horizon"] == 0.05
-    assert "accuracy 0.0001 asked: hermite 2, H = " in CliRunner().invoke(app, ["crosscheck", str(asking)]).stdout
+    assert "accuracy 0.0001 asked: hermite 2, H = " in command("crosscheck", asking).stdout
 
 
 def test_orders_are_those_of_the_scheme_that_was_picked(asking):
     """`hermite` 2 has order 6 in the displacement, until rounding and IDA's looser tolerance take over."""
-    result = CliRunner().invoke(app, ["crosscheck", str(asking), "--orders", "--json"])
+    result = command("crosscheck", asking, "--orders", "--json")
     (tip,) = [row for row in json.loads(result.stdout)["orders"] if row["quantity"] == "u_tip"]
     assert 4.5 <= tip["orders"][0] <= 7.0
 
 
 def test_crosscheck_refuses_an_accuracy_that_tolerances_keep(asking):
     asking.write_text(ASKING + '[contact]\nlaw = "compliance"\n')
-    result = CliRunner().invoke(app, ["crosscheck", str(asking)])
+    result = command("crosscheck", asking)
     assert result.exit_code == 2
     assert "crosscheck needs a macro step" in result.stderr
 
@@ -246,7 +245,7 @@ def test_what_it_picks_cannot_be_given_beside_it(key, asking):
     changed = with_changes(scene, accuracy=None, coupling={"degree": 1, key: value})
     assert (changed.accuracy, getattr(changed.coupling, key)) == (None, value)
     for arguments in ([str(asking)], ["soft", "--accuracy", "1e-4"]):
-        result = CliRunner().invoke(app, ["run", *arguments, "--set", f"coupling.{key}={value}"])
+        result = command("run", *arguments, "--set", f"coupling.{key}={value}")
         assert result.exit_code == 2
         assert f"--set coupling.{key}={value}: accuracy = 0.0001 picks" in result.stderr
 
@@ -254,7 +253,7 @@ def test_what_it_picks_cannot_be_given_beside_it(key, asking):
 def test_command(tmp_path):
     out = tmp_path / "out"
     arguments = ["run", "soft", "--set", "beam.n_elements=6", "--set", "time.t_end=0.06", "--accuracy", "1e-4"]
-    result = CliRunner().invoke(app, [*arguments, "--no-plots", "--out", str(out)])
+    result = command(*arguments, "--no-plots", "--out", out)
     assert result.exit_code == 0, result.output
     assert "1e-04 asked" in result.stdout or "0.0001 asked" in result.stdout
     summary = json.loads((out / "summary.json").read_text())
@@ -267,4 +266,4 @@ def test_command(tmp_path):
         np.testing.assert_array_equal(written[name], again[name])
     assert written.events == again.events
     np.testing.assert_array_equal(written.shapes[1], again.shapes[1])
-    assert CliRunner().invoke(app, [*arguments[:-1], "2", "--out", str(tmp_path / "no")]).exit_code == 2
+    assert command(*arguments[:-1], "2", "--out", tmp_path / "no").exit_code == 2

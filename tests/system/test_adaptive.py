@@ -26,7 +26,7 @@ def exact_events() -> list[float]:
 
 
 def errors(run: Trajectory) -> tuple[float, float]:
-    """Of y up to the foundation relative to the way there, and of the times of the three events, relative."""
+    """Return the errors of y before the foundation, over the way there, and of the three event times, relative."""
     rows = (run.time > 0.0) & (run.time < 0.0712)
     reference = event_driven.simulate(run.scene, sample_times=run.time[rows], t_end=0.0713)
     y = np.abs(run.y[rows] - reference.y[: rows.sum()]).max() / 0.015

@@ -15,12 +15,11 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from commands import Interrupt, command
 from hypothesis import given
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 import springbeam
-from springbeam import cli
 from springbeam.bodies.fmu import FmuError
 from springbeam.bodies.protocol import Motion
 from springbeam.contact.phases import Joint, Phase
@@ -36,18 +35,6 @@ pytestmark = pytest.mark.usefixtures("fmu_folder")
 
 SCENE = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 2e-3})
 CHANGES = ["--set", "beam.n_elements=10", "--set", "coupling.macro_step=2e-3"]
-
-
-class Interrupt:
-    """Ctrl-C after so many steps."""
-
-    def __init__(self, steps: int) -> None:
-        self.left = steps
-
-    def __call__(self, *_: object) -> None:
-        self.left -= 1
-        if self.left == 0:
-            raise KeyboardInterrupt
 
 
 def interrupted_into(directory: Path, steps: int = 200, scene=SCENE) -> Path:
@@ -72,10 +59,6 @@ def files(directory: Path) -> dict[str, bytes]:
 
 def results(directory: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in directory.glob("*.csv")}
-
-
-def command(*arguments: object):
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 import typer
-from typer.testing import CliRunner
+from commands import command
 
 from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
@@ -37,18 +37,14 @@ TABLES = {
 }
 
 
-def springbeam(*arguments, **environment):
-    environment = {"COLUMNS": "80", "FORCE_COLOR": None, "PY_COLORS": None, "GITHUB_ACTIONS": None} | environment
-    return CliRunner(env=environment).invoke(app, [str(argument) for argument in arguments], prog_name="springbeam")
-
-
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
     """A folder with a run that is done, and one that was cut short after its first checkpoint."""
     folder = tmp_path_factory.mktemp("place")
     script = """
 import os, sys
-from springbeam import checkpoint, cli
+from springbeam import cli
+from springbeam.run import checkpoint
 save = checkpoint.Checkpoints.take_when_due
 taken = []
 def take(self, simulation):
@@ -65,7 +61,7 @@ cli.main()
     before = Path.cwd()
     os.chdir(folder)
     try:
-        assert springbeam("run", "soft", "--no-plots", "--out", "done").exit_code == 0
+        assert command("run", "soft", "--no-plots", "--out", "done").exit_code == 0
         yield folder
     finally:
         os.chdir(before)
@@ -85,7 +81,7 @@ def test_every_command_is_looked_at():
 
 @pytest.mark.parametrize("name", TABLES)
 def test_what_a_command_prints_fits_80_columns(place, name):
-    result = springbeam(name, *TABLES[name].split(), COLUMNS="80")
+    result = command(name, *TABLES[name].split())
     assert result.exit_code == 0, result.output
     assert result.stderr == ""
     assert max(map(len, lines_without_paths(result.stdout))) <= 80
@@ -93,7 +89,7 @@ def test_what_a_command_prints_fits_80_columns(place, name):
 
 
 def test_observed_orders_fit_80_columns(place):
-    result = springbeam("crosscheck", "soft", "--orders", "--set", "time.t_end=0.05")
+    result = command("crosscheck", "soft", "--orders", "--set", "time.t_end=0.05")
     assert result.exit_code == 0
     assert max(map(len, result.stdout.splitlines())) <= 80
     assert "…" not in result.stdout.split("\n", 1)[1]
@@ -101,27 +97,27 @@ def test_observed_orders_fit_80_columns(place):
 
 @pytest.mark.parametrize("name", [None, *COMMAND.commands])
 def test_help_fits_80_columns(name):
-    result = springbeam(*([] if name is None else [name]), "--help")
+    result = command(*([] if name is None else [name]), "--help")
     assert result.exit_code == 0
     assert max(map(len, result.stdout.splitlines())) <= 80
 
 
 @pytest.mark.parametrize("name", COMMAND.commands)
 def test_the_help_of_a_command_has_an_example_that_it_understands(name):
-    command = COMMAND.commands[name]
-    example = re.search(r"Example: (springbeam .*)", command.help)[1]
-    assert example in " ".join(springbeam(name, "--help").stdout.split())
+    described = COMMAND.commands[name]
+    example = re.search(r"Example: (springbeam .*)", described.help)[1]
+    assert example in " ".join(command(name, "--help").stdout.split())
     program, first, *arguments = shlex.split(example)
     assert (program, first) == ("springbeam", name)
-    command.make_context(name, arguments)  # raises if an option or a value is wrong
+    described.make_context(name, arguments)  # raises if an option or a value is wrong
 
 
 def test_flags_are_shown_without_a_type():
-    assert "bool" not in "".join(springbeam(name, "--help").stdout for name in COMMAND.commands)
+    assert "bool" not in "".join(command(name, "--help").stdout for name in COMMAND.commands)
 
 
 def test_the_command_alone_shows_how_to_start():
-    result = springbeam()
+    result = command()
     assert result.exit_code == 0
     assert max(map(len, result.stdout.splitlines())) <= 80 + len("ulation of two FMUs.") * ("FMUs" in result.stdout)
     shown = re.findall(r"^  springbeam (\w+)(.*?)   ", result.stdout, re.M)
@@ -136,7 +132,7 @@ def test_the_command_alone_shows_how_to_start():
 @pytest.mark.parametrize("name", [name for name in TABLES if name not in ("report", "animate", "resume")])
 def test_json_is_one_document_and_all_of_stdout(place, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
-    result = springbeam(name, *TABLES[name].split(), "--json")
+    result = command(name, *TABLES[name].split(), "--json")
     assert result.exit_code == 0
     assert result.stderr == ""
     document = json.loads(result.stdout)
@@ -165,14 +161,14 @@ def test_json_is_one_document_and_all_of_stdout(place, tmp_path, monkeypatch, na
 def test_json_of_a_run_that_stops_early_is_its_summary_and_the_error_is_on_stderr(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     unstable = ["contact.law=compliance", "coupling.scheme=jacobi", "contact.stiffness=1e9", "coupling.macro_step=1e-2"]
-    result = springbeam("run", "soft", "--no-plots", "--json", *[word for text in unstable for word in ("--set", text)])
+    result = command("run", "soft", "--no-plots", "--json", *[word for text in unstable for word in ("--set", text)])
     assert result.exit_code == 3
     assert json.loads(result.stdout)["status"] == "stopped"
     assert result.stderr.startswith("error: the run stopped early: ")
 
 
 def test_json_of_bad_input_is_nothing():
-    result = springbeam("run", "sotf", "--json")
+    result = command("run", "sotf", "--json")
     assert (result.exit_code, result.stdout) == (2, "")
 
 
@@ -183,7 +179,7 @@ def test_json_of_bad_input_is_nothing():
 def test_quiet_prints_only_where_the_results_are(place, tmp_path, monkeypatch, name, printed):
     (tmp_path / "done").symlink_to(place / "done")
     monkeypatch.chdir(tmp_path)
-    result = springbeam(name, *TABLES[name].split(), *(() if name == "report" else ("--quiet",)))
+    result = command(name, *TABLES[name].split(), *(() if name == "report" else ("--quiet",)))
     assert (result.exit_code, result.stdout, result.stderr) == (0, f"{printed}\n", "")
     assert Path(printed).exists()
 
@@ -333,7 +329,7 @@ def contents(folder):
 def test_a_mistake_is_one_error_with_place_and_remedy(desk, mistake):
     line, fragments = MISTAKES[mistake]
     before = contents(desk)
-    result = springbeam(*line.split())
+    result = command(*line.split())
     assert result.exit_code == 2, result.output
     said = " ".join(re.sub("[│╭╮╰╯─]", " ", result.stderr).split())
     for fragment in fragments:
@@ -347,7 +343,7 @@ def test_a_mistake_is_one_error_with_place_and_remedy(desk, mistake):
 @pytest.mark.parametrize("line", ["run soft", "verify", "crosscheck soft", "sweep soft --vary spring.mass=1,2"])
 def test_without_fmus_the_error_says_what_builds_them(desk, monkeypatch, line):
     monkeypatch.setenv("SPRINGBEAM_FMUS", str(desk / "empty"))
-    result = springbeam(*line.split(), "--workers", "1") if line.startswith("sweep") else springbeam(*line.split())
+    result = command(*line.split(), "--workers", "1") if line.startswith("sweep") else command(*line.split())
     assert result.exit_code == 2
     assert str(desk / "empty" / "beam.fmu") in result.stderr
     assert "./build.sh fmus builds it" in result.stderr
@@ -358,6 +354,6 @@ def test_without_fmus_the_error_says_what_builds_them(desk, monkeypatch, line):
 def test_a_sweep_without_its_packages_says_how_to_get_them(desk, monkeypatch):
     find = util.find_spec
     monkeypatch.setattr("springbeam.cli.sweep.find_spec", lambda name: None if name == "distributed" else find(name))
-    result = springbeam("sweep", "soft", "--vary", "spring.mass=1,2")
+    result = command("sweep", "soft", "--vary", "spring.mass=1,2")
     assert result.exit_code == 2
     assert result.stderr == "error: sweep needs the packages distributed: pip install 'springbeam[sweep]'\n"

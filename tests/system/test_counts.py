@@ -133,7 +133,7 @@ def test_event_functions_are_those_of_the_bodies_that_are_there(what):
     changes, expected = EVENTS[what]
     functions = EventFunctions(with_changes(load_scene("soft"), **changes), tip_share=0.5)
     assert {kind for phase in PHASES for kind, _ in functions.of(phase)} == expected
-    # Of each phase only what can end it, and on the foundation only what can leave it.
+    # A phase has only what can end it, and on the foundation only what can leave it.
     assert all(len(functions.of(phase)) <= 2 for phase in PHASES)
     assert all(kind != "stop_impact" for phase in PHASES if phase.seated for kind, _ in functions.of(phase))
 

@@ -6,10 +6,9 @@ import json
 from itertools import islice
 
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
 from springbeam import load_scene, with_changes
-from springbeam.cli import app
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.studies.stability import critical
 from springbeam.studies.stability.critical import LARGE_STEP, Comparison, comparison, comparisons, growth
@@ -79,9 +78,9 @@ def test_command(monkeypatch, agree):
         some.append(Comparison("compliance", "jacobi", 0, 1e4, 1e-4, 1.1e-4, 1.5, 1.5))
     monkeypatch.setattr(critical, "comparisons", lambda: iter(some))
     for options in ([], ["--json"], ["--quiet"]):
-        result = CliRunner(env={"COLUMNS": "80"}).invoke(app, ["stability", "--critical", *options])
+        result = command("stability", "--critical", *options)
         assert result.exit_code == (0 if agree else 1)
         assert options or max(map(len, result.stdout.splitlines())) <= 80
     assert result.stdout.strip() == ("agree" if agree else "disagree")
-    document = json.loads(CliRunner().invoke(app, ["stability", "--critical", "--json"]).stdout)
+    document = json.loads(command("stability", "--critical", "--json").stdout)
     assert document["agree"] == agree

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
 from springbeam import load_scene, with_changes
-from springbeam.cli import app
 from springbeam.monolithic import event_driven
 from springbeam.studies.crosscheck import crosscheck, orders
 
@@ -108,7 +107,7 @@ def test_the_paper_law_goes_up_to_t_end(t_end, steps):
 def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
     picture = tmp_path / "both.png"
     arguments = ["crosscheck", "duffing", "--set", "time.t_end=1", "--out", str(picture)]
-    assert CliRunner().invoke(app, arguments).exit_code == 0
+    assert command(*arguments).exit_code == 0
     assert picture.stat().st_size > 10_000
     right = event_driven.simulate
     monkeypatch.setattr(
@@ -116,4 +115,4 @@ def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
         "simulate",
         lambda scene, **options: right(with_changes(scene, spring={"mass": 1.01}), **options),
     )
-    assert CliRunner().invoke(app, arguments).exit_code == 1
+    assert command(*arguments).exit_code == 1

@@ -85,7 +85,7 @@ def test_all_programs_are_run():
 def desk(tmp_path_factory):
     """A folder that looks like a checkout to commands; pages are followed in turn, results stay."""
     folder = tmp_path_factory.mktemp("desk")
-    shutil.copytree(ROOT / "master/springbeam/scene/shipped", folder / "master/springbeam/scenes")
+    shutil.copytree(ROOT / "master/springbeam/scene/shipped", folder / "master/springbeam/scene/shipped")
     return folder
 
 

@@ -109,7 +109,7 @@ MASSLESS: dict[str, Any] = {
     "stop": {"position": -0.051841506787638984, "restitution": 0.015759203164818266},
     "coupling": {"scheme": "energy", "degree": 0, "macro_step": 0.00012358335348744304},
 }
-#: The same tip under a load, by other degrees, and damped.
+#: That tip under a load, with degree 2, and damped.
 MASSLESS_DAMPED: dict[str, Any] = {
     **MASSLESS,
     "beam": {**MASSLESS["beam"], "alpha_b": 1e-5, "distributed_load": -2.0},

@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
+from commands import command
 from faulty import NAMES, Fault, Script, installed
-from typer.testing import CliRunner
 
-from springbeam import cli
 from springbeam.results.reading import load_trajectory
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
@@ -66,9 +65,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
         (tmp_path / "scene.toml").write_text(tomli_w.dumps(scene))
         with monkeypatch.context() as patch:
             script = installed(patch, *faults)
-            result = CliRunner().invoke(
-                cli.app, ["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / name), "--no-plots", "-q"]
-            )
+            result = command("run", tmp_path / "scene.toml", "--out", tmp_path / name, "--no-plots", "-q")
         assert "Traceback" not in result.output
         assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
         return result.exit_code, tmp_path / name, script

@@ -11,10 +11,8 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from commands import command
 from packaging.requirements import Requirement
-from typer.testing import CliRunner
-
-from springbeam.cli import app
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -25,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_doctor_finds_and_loads_both_fmus():
-    result = CliRunner().invoke(app, ["doctor"])
+    result = command("doctor")
     assert result.exit_code == 0, result.output
     assert metadata.version("springbeam") in result.stdout
     assert len(re.findall(r"^(?:beam|spring)\.fmu +loads; binaries for linux64", result.stdout, re.M)) == 2
@@ -34,7 +32,7 @@ def test_doctor_finds_and_loads_both_fmus():
 def test_doctor_says_what_is_wrong(monkeypatch, tmp_path):
     (tmp_path / "beam.fmu").write_bytes(b"not an archive")
     monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
-    result = CliRunner().invoke(app, ["doctor"])
+    result = command("doctor")
     assert result.exit_code == 1
     assert f"{tmp_path / 'beam.fmu'}: not a usable FMU" in result.stdout
     assert f"{tmp_path / 'spring.fmu'}: not found" in result.stdout

@@ -1,6 +1,7 @@
 """SIGKILL at random moments: what is there loads, and the resumed run is, byte for byte, the one never killed.
 
-SPRINGBEAM_SEED chooses the moments, SPRINGBEAM_KILLS how many.
+SPRINGBEAM_SEED chooses the moments, SPRINGBEAM_KILLS how many. A moment is a share of the rows that the whole run
+writes, so that it does not depend on how fast the machine is.
 """
 
 from __future__ import annotations
@@ -70,19 +71,19 @@ class Nursery:
             [sys.executable, "-c", NURSERY], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
-    def run(self, *arguments: object, kill_after: float | None = None, once_there: Path | None = None) -> int:
-        """The exit code, −9 if it was killed: `kill_after` seconds after the start or after `once_there` appeared."""
+    def run(self, *arguments: object, kill_at: tuple[float, Path, int] | None = None) -> int:
+        """Return the exit code, −9 if it was killed: after some seconds, and once a file has so many bytes."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         json.dump([[str(argument) for argument in arguments], str(self._log)], self._process.stdin)
         self._process.stdin.write("\n")
         self._process.stdin.flush()
         child = int(self._process.stdout.readline())
-        if kill_after is not None:
-            if once_there is not None:
-                while not once_there.exists() and Path(f"/proc/{child}").exists():
-                    time.sleep(1e-3)
-            time.sleep(kill_after)
+        if kill_at is not None:
+            seconds, file, enough = kill_at
+            time.sleep(seconds)
+            while size_of(file) < enough and Path(f"/proc/{child}").exists():
+                time.sleep(1e-3)
             with suppress(ProcessLookupError):  # done already, or not yet a group of its own
                 os.killpg(child, signal.SIGKILL)
         return int(self._process.stdout.readline())
@@ -101,6 +102,10 @@ def nursery(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Nursery]:
     started = Nursery(tmp_path_factory.mktemp("nursery") / "log")
     yield started
     started.close()
+
+
+def size_of(file: Path) -> int:
+    return file.stat().st_size if file.exists() else 0
 
 
 def contents(directory: Path) -> dict[str, bytes]:
@@ -132,21 +137,20 @@ def test_a_run_killed_at_random_moments_goes_on_to_the_same_bytes(nursery: Nurse
         law = rng.choice(list(COMMANDS))
         reference = tmp_path / law
         if not reference.exists():
-            begin = time.monotonic()
             assert nursery.run("run", *COMMANDS[law], "--out", reference, "-q", "--no-plots") == 0, nursery.said()
-            (reference / "seconds").write_text(str(time.monotonic() - begin))
-        whole, seconds = contents(reference), float((reference / "seconds").read_text())
+        whole = contents(reference)
         directory = tmp_path / f"killed-{attempts}"
+        rows, checkpoint = directory / "trajectory.csv", directory / "run.checkpoint"
         interval = rng.choice([0.01, 0.05])
         start = ["run", *COMMANDS[law], "--out", directory, "-q", "--no-plots", "--force", "--checkpoint", interval]
         go_on = ["resume", directory, "-q", "--no-plots"]
         command = start
         for _ in range(rng.choice([1, 2, 3])):
-            # Every other kill waits for a checkpoint: how many of the others find one depends on the machine's speed.
-            awaited = directory / "run.checkpoint" if kills % 2 else None
-            code = nursery.run(
-                *command, kill_after=rng.uniform(0.0, seconds / (2 if awaited else 1)), once_there=awaited
-            )
+            # One kill in five waits for no row, and so meets the start of the run.
+            share, there = max(0.0, rng.uniform(-0.25, 1.0)), size_of(rows)
+            seconds = 0.0 if share else rng.uniform(0.0, 0.1)
+            enough = there + int(share * (len(whole[rows.name]) - there))
+            code = nursery.run(*command, kill_at=(seconds, rows, enough))
             if code != -signal.SIGKILL:
                 break
             kills += 1
@@ -154,11 +158,10 @@ def test_a_run_killed_at_random_moments_goes_on_to_the_same_bytes(nursery: Nurse
             if (directory / "summary.json").exists() and summary(directory)["status"] == "done":
                 code = 0
                 # Removed after the last word of the summary: the other order could lose both.
-                (directory / "run.checkpoint").unlink(missing_ok=True)
+                checkpoint.unlink(missing_ok=True)
                 break
-            has_checkpoint = (directory / "run.checkpoint").exists()
-            resumed += has_checkpoint
-            command = go_on if has_checkpoint else start
+            resumed += checkpoint.exists()
+            command = go_on if checkpoint.exists() else start
         if code != 0:
             nursery.said()
             code = nursery.run(*command)

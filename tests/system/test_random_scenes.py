@@ -16,11 +16,10 @@ from typing import Any
 
 import pytest
 import tomli_w
+from commands import command
 from hypothesis import HealthCheck, event, given, seed, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
-from springbeam import cli
 from springbeam.results.reading import load_trajectory
 from springbeam.run.rows import Rows
 from springbeam.scene import Scene, SceneError, load_scene
@@ -236,7 +235,7 @@ def check(text: str) -> None:
         with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
             patch.setattr(Rows, "write", interrupting(Rows.write))
             warnings.simplefilter("error")  # numpy's, of overflow
-            result = CliRunner().invoke(cli.app, ["run", str(path), "--out", str(out), "--no-plots", "-q"])
+            result = command("run", path, "--out", out, "--no-plots", "-q")
         event(f"exit code {result.exit_code}")
         assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
         assert result.exit_code in (0, 2, 3)

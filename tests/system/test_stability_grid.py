@@ -10,10 +10,9 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
 from springbeam import load_scene, simulate, with_changes
-from springbeam.cli import app
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.ledger import APPROXIMATE, EXACT, bounds
 from springbeam.run.simulation import Simulation
@@ -211,7 +210,7 @@ def test_command(tmp_path, monkeypatch, kinds, code):
     monkeypatch.setattr(grid, "run_cells", outcomes_of(kinds))
     out = tmp_path / "grid"
     arguments = ["stability", "--samples", "30", "--resolution", "3", "--out", str(out)]
-    result = CliRunner(env={"COLUMNS": "80"}).invoke(app, arguments)
+    result = command(*arguments)
     assert result.exit_code == code, result.output
     assert "garb." in result.stdout
     table = (
@@ -224,13 +223,13 @@ def test_command(tmp_path, monkeypatch, kinds, code):
     assert len(scenes) == (0 if code == 0 else (30 + 9 * len(SLICES)) // len(CLASSES))
     for path in scenes[:3]:
         assert load_scene(path).time.t_end > 0.0
-    again = CliRunner().invoke(app, arguments)
+    again = command(*arguments)
     assert again.exit_code == 2
     assert "--force" in again.stderr
 
 
 def test_command_without_cells_is_refused():
-    result = CliRunner().invoke(app, ["stability", "--samples", "0", "--resolution", "0"])
+    result = command("stability", "--samples", "0", "--resolution", "0")
     assert result.exit_code == 2
 
 

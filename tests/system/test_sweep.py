@@ -12,9 +12,8 @@ import time
 import numpy as np
 import psutil
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
-from springbeam.cli import app
 from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.studies import sweep
@@ -206,7 +205,7 @@ def test_command(tmp_path):
     out = tmp_path / "out"
     arguments = ["sweep", "duffing", "--vary", "spring.mass=0.5:2:4:log", "--vary", "spring.damping=0,0.1"]
     arguments += ["--set", "time.t_end=1.0", "--workers", "1", "--out", str(out)]
-    result = CliRunner().invoke(app, arguments)
+    result = command(*arguments)
     assert result.exit_code == 0, result.output
     assert "8 done" in result.stdout
     assert json.loads((out / "sweep.json").read_text())["runs"] == 8
@@ -224,7 +223,7 @@ def test_command(tmp_path):
     ],
 )
 def test_bad_input(tmp_path, arguments, words):
-    result = CliRunner().invoke(app, ["sweep", "duffing", *arguments, "--out", str(tmp_path / "out")])
+    result = command("sweep", "duffing", *arguments, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert words in result.stderr
 

@@ -8,9 +8,8 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from commands import command
 
-from springbeam.cli import app
 from springbeam.monolithic import event_driven
 from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.studies import tradeoff
@@ -120,7 +119,7 @@ def test_compliance_is_swept_with_the_ordinary_exchanges():
 
 def test_command(tmp_path):
     arguments = ["tradeoff", "duffing", "--until", "0.5", "--repeats", "1", "--json", "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, arguments)
+    result = command(*arguments)
     assert result.exit_code == 0, result.output
     table = json.loads(result.stdout)
     assert [row["error"] for row in table["cheapest"]] == [1e-2, 1e-4, 1e-6, 1e-8]

@@ -8,15 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from commands import command
 from rich.console import Console
 from scipy.integrate import quad
 from scipy.linalg import eigh
 from scipy.special import airy
-from typer.testing import CliRunner
 
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.bodies.protocol import StepRefused
-from springbeam.cli import app
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.tie import SCHEMES
 from springbeam.studies import verify
@@ -28,7 +27,7 @@ from springbeam.studies.verify.table import report
 
 @pytest.fixture(scope="module")
 def printed() -> str:
-    result = CliRunner().invoke(app, ["verify"], env={"COLUMNS": "80"})
+    result = command("verify")
     assert result.exit_code == 0, result.output
     return result.output
 
@@ -130,14 +129,14 @@ def test_a_mistake_of_one_percent_fails(section, mistake, monkeypatch: pytest.Mo
 def test_a_failed_check_is_exit_code_1(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(verify, "SECTIONS", (("Beam", verify.mesh_convergence),))
     changed(FmuBeam, "density", 1.01)(monkeypatch)
-    result = CliRunner().invoke(app, ["verify"])
+    result = command("verify")
     assert result.exit_code == 1
     assert "FAIL" in result.output
 
 
 def test_json_is_the_checks(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(verify, "SECTIONS", (("Mesh", verify.mesh_convergence), ("Escape", verify.escape)))
-    result = CliRunner().invoke(app, ["verify", "--json"])
+    result = command("verify", "--json")
     assert (result.exit_code, result.stderr) == (0, "")
     document = json.loads(result.stdout)
     assert document["passed"] is True
@@ -145,14 +144,14 @@ def test_json_is_the_checks(monkeypatch: pytest.MonkeyPatch):
     for printed, check in zip(document["sections"][0]["checks"], verify.mesh_convergence(), strict=True):
         assert (printed["exact"], printed["computed"], printed["passed"]) == (check.exact, check.computed, check.passed)
     changed(FmuBeam, "density", 1.01)(monkeypatch)
-    result = CliRunner().invoke(app, ["verify", "--json"])
+    result = command("verify", "--json")
     assert result.exit_code == 1
     assert json.loads(result.stdout)["passed"] is False
 
 
 def test_missing_fmus_are_bad_input(tmp_path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
-    result = CliRunner().invoke(app, ["verify"])
+    result = command("verify")
     assert result.exit_code == 2
     assert str(tmp_path / "beam.fmu") in result.output
 
