@@ -156,9 +156,9 @@ class Step {
       throw Escape("spring: y = " + number(state_.y) + " m is past the hilltop |y| = " + number(laws_.hilltop) +
                        " m of the softening spring, reached " + number(t_) + " s after the step's start",
                    t_);
+    // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
     if (laws_.stop)
-      state_.y =
-          event == Flight::Event::stop ? laws_.stop_position : laws_.stop_position + std::max(flight_.gap(), 0.0);
+      state_.y = event == Flight::Event::stop ? laws_.stop_position : std::max(state_.y, laws_.stop_position);
     meeting_ = event == Flight::Event::contact;
     if (event == Flight::Event::none) t_ = size_;
   }
