@@ -140,7 +140,7 @@ Flight::Event Flight::run(const FlightStart& start) {
     if (laws_.compliance && event == Event::none && solver_.fell(contact, contact + 1)) event = Event::contact;
   }
   finish();
-  if (event == Event::none && std::abs(y_) > laws_.hilltop) event = Event::hilltop;
+  if (event == Event::none && laws_.to_hilltop(y_) < 0.0) event = Event::hilltop;
   if (event == Event::none && laws_.stop && gap_ < -solver_.absolute_tolerance()[q])
     throw IdaError("the top passed the stop unnoticed");
   return event;
@@ -205,7 +205,7 @@ void Flight::jacobian(double s, double c, const double* Y, const double*, double
 void Flight::events(double s, const double* Y, double* g) const noexcept {
   const double H = start_.size, t = H * s;
   const double rise = R_.rise(t) + Y[q], z = R_.rate(t) + Y[p] / H;
-  if (std::isfinite(laws_.hilltop)) *g++ = laws_.hilltop - std::abs(start_.y + rise);
+  if (std::isfinite(laws_.hilltop)) *g++ = laws_.to_hilltop(start_.y + rise);
   if (laws_.stop) {
     *g++ = stop_watch_.distance(start_.gap + rise, t);
     *g++ = stop_watch_.rate(z, t);

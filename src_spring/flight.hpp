@@ -11,6 +11,7 @@
 // steps is noticed. See watch.hpp for gaps that start at 0.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "ida_solver.hpp"
@@ -27,6 +28,9 @@ struct Laws {
   double stop_position;
   bool compliance;
   double relative_tolerance, absolute_tolerance;
+
+  /// How far the top is from escaping [m]; a stop at the lower hilltop or above keeps it from that one.
+  double to_hilltop(double y) const { return hilltop - (stop && stop_position >= -hilltop ? y : std::abs(y)); }
 };
 
 /// Where a segment starts, and what may be known better than by subtraction.
@@ -53,7 +57,6 @@ class Flight final : public ImplicitSystem {
   double elapsed() const;  ///< τ
   double displacement() const { return y_; }
   double velocity() const { return z_; }
-  double gap() const { return gap_; }
   double integral() const { return integral_; }
   double integral_2() const { return integral_2_; }
   double dissipated() const { return dissipated_; }

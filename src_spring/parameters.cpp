@@ -38,7 +38,6 @@ void check(const Parameters& p) {
   require(p.damping >= 0.0 && std::isfinite(p.damping), "damping", p.damping, ">= 0 and finite");
   require_finite("linear_stiffness", p.linear_stiffness);
   require_finite("cubic_stiffness", p.cubic_stiffness);
-  require_finite("equilibrium", p.equilibrium);
   require_finite("displacement", p.displacement);
   require_finite("velocity", p.velocity);
   if (p.cubic_stiffness < 0.0 && p.linear_stiffness <= 0.0)

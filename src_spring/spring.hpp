@@ -21,7 +21,6 @@ struct Parameters {
   double damping = 0.0;           ///< α_s [N·s/m]
   double linear_stiffness = 1.0;  ///< k1 [N/m]
   double cubic_stiffness = 0.0;   ///< k2 [N/m³]
-  double equilibrium = 0.0;       ///< Ψ [m], where the top is met; (6) has its spring force 0 at y = 0 all the same
   double displacement = 0.0;      ///< y at the start [m]
   double velocity = 0.0;          ///< ẏ at the start [m/s]
   ContactLaw contact_law = ContactLaw::external;

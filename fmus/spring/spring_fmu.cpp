@@ -19,8 +19,9 @@ namespace {
 using spring::Parameters;
 using spring::Spring;
 
-/// The spring's parameters and what exchange between steps adds to them.
+/// The spring's parameters, where its top rests, and what exchange between steps adds to them.
 struct FmuParameters : Parameters {
+  double equilibrium = 0.0;  ///< Ψ [m]; in (6) the spring's force is 0 at y = 0 all the same
   double communication_step = 0.0, tip_response = 0.0, tip_response_2 = 0.0;
 };
 
@@ -35,6 +36,8 @@ struct SpringModel final : fmi::Model {
 
   void build(double tolerance) override {
     Parameters p = parameters;
+    // A start of 0 is what tools send that set every start value: it does not count as chosen.
+    if (p.displacement == 0.0) p.displacement = parameters.equilibrium;
     if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
     held.reset();
     if (p.contact_law == spring::ContactLaw::normal_compliance && parameters.communication_step > 0.0) {
@@ -178,7 +181,10 @@ fmi::Table make_table() {
   parameter("damping", "N.s/m", &Parameters::damping, "viscous damping alpha_s").at_least(0);
   parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
   parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness, "cubic stiffness k2; < 0 softens");
-  parameter("equilibrium", "m", &Parameters::equilibrium, "position Psi where the top rests");
+  parameter(
+      "equilibrium", "m", &FmuParameters::equilibrium,
+      "position Psi where the top rests: it starts there, unless displacement has a start value other than 0. The "
+      "spring's force is 0 at y = 0 all the same");
   parameter("contact_law", "", &Parameters::contact_law, "1 = external, 2 = normal compliance inside")
       .range(1, 2)
       .choice = "ContactLaw";
@@ -249,17 +255,21 @@ fmi::Table make_table() {
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement",
              // with communication_step > 0, of which the first is foreseen:
              "communication_step", "tip_response", "tip_velocity", "velocity", "mass", "damping", "linear_stiffness",
-             "cubic_stiffness", "external_force", "foundation_force", "stop_enabled", "stop_position", "restitution"});
+             "cubic_stiffness", "external_force", "foundation_force", "stop_enabled", "stop_position", "restitution",
+             "equilibrium"});
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});
   add.output("potential_energy", "J", "potential energy of the spring", of(&Spring::potential_energy))
-      .from({"linear_stiffness", "cubic_stiffness", "displacement"});
+      .from({"linear_stiffness", "cubic_stiffness", "displacement", "equilibrium"});
   add.output("contact_energy", "J", "energy stored in the contact law inside",
              [](const SpringModel& m) { return m.contact_energy(); })
       .follows({"tip_displacement"})
-      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
+      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "equilibrium",
+             "tip_displacement"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Spring::dissipated_energy));
+  add.output("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
+             of(&Spring::impact_loss));
   add.output("internal_steps", "", "steps that IDA took since the start",
              [](const SpringModel& m) { return static_cast<double>(m.spring->ida_steps()); });
   return t;

@@ -19,9 +19,11 @@ BASES: dict[str, list[dict[str, float]]] = {
     "spring": [
         {},
         {"contact_law": 2},
+        {"contact_law": 2, "displacement": 0.0, "equilibrium": 0.3},
         AHEAD,
         {**AHEAD, "stop_enabled": False},
         {**AHEAD, "stop_position": 0.2995},  # met within the step
+        {**AHEAD, "displacement": 0.0, "equilibrium": 0.3},
     ],
 }
 COMMON: dict[str, dict[str, float]] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
@@ -138,3 +139,25 @@ def test_output_derivatives_that_are_not_there_are_refused(case: Any) -> None:
     k = case.running()
     assert k.derivative("kinetic_energy")[0] == ERROR
     assert "kinetic_energy" in k.message
+
+
+def test_the_top_starts_at_its_equilibrium_or_at_the_displacement_that_is_set(spring: Any) -> None:
+    assert spring.running(equilibrium=0.1).get("displacement") == 0.1
+    assert spring.running(equilibrium=0.1, displacement=0.3).get("displacement") == 0.3
+    # Some tools set every start value, changed or not.
+    assert spring.running(equilibrium=0.1, displacement=0.0).get("displacement") == 0.1
+    k = spring.running(equilibrium=0.1, linear_stiffness=2.0)
+    assert k.get("potential_energy") == pytest.approx(0.01, rel=1e-15)  # ½ k1 y²: the force is 0 at y = 0
+    k.step(0.0, 0.5)
+    assert k.get("displacement") == pytest.approx(0.1 * math.cos(math.sqrt(2.0) * 0.5), rel=1e-12)
+
+
+def test_energy_of_the_spring_closes_through_lossy_impacts(spring: Any) -> None:
+    k = spring.running(
+        linear_stiffness=30.0, damping=0.2, velocity=-2.0, stop_enabled=True, stop_position=-0.05, restitution=0.6
+    )
+    for i in range(60):
+        k.step(i * 0.02, 0.02)
+        total = sum(k.get("kinetic_energy", "potential_energy", "dissipated_energy", "impact_loss"))
+        assert total == pytest.approx(2.0, rel=1e-11), i
+    assert k.get("impact_loss") > 1.0

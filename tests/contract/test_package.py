@@ -108,7 +108,9 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
             ("output", "m/s"): ["velocity"],
             ("output", "N"): ["reaction", "stop_force"],
             ("output", "N.s"): ["stop_impulse"],
-            ("output", "J"): ["kinetic_energy", "potential_energy", "contact_energy", "dissipated_energy"],
+            ("output", "J"): [
+                *("kinetic_energy", "potential_energy", "contact_energy", "dissipated_energy", "impact_loss")
+            ],
             ("parameter", "kg"): ["mass"],
             ("parameter", "N.s/m"): ["damping"],
             ("parameter", "N/m"): ["linear_stiffness"],
