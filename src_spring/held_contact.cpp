@@ -1,5 +1,6 @@
 #include "held_contact.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -34,10 +35,20 @@ void HeldContact::begin(const TipMessage& seen, double y, const Top& top) {
 }
 
 void HeldContact::advance(const TipMessage& seen, double y, const Top& top) {
-  const TipMessage& from = started_ ? seen : first_;
-  started_ = true;
+  const TipMessage& from = started() ? seen : first_;
+  if (steps_ == 2.0) compare(seen);  // before, the first step's mean velocity was a guess
+  steps_ = std::min(steps_ + 1.0, 2.0);
   tip_ = next_;
   choose(y, from.displacement + 2.0 * size_ * from.velocity + force_ * response_[1], top);
+}
+
+void HeldContact::compare(const TipMessage& seen) {
+  constexpr double noticeable = 0.05;  // of the way in a step
+  reach_ = std::max({reach_, size_ * std::abs(seen.velocity), response_[0] * force_});
+  const double off = std::abs(seen.displacement - tip_);
+  if (off <= noticeable * reach_) return;
+  ++missed_;
+  farthest_ = std::max(farthest_, off);
 }
 
 void HeldContact::choose(double y, double free, const Top& top) {
@@ -89,7 +100,7 @@ double HeldContact::mean(double start, double end) const {
 }
 
 std::array<double, HeldContact::state_length> HeldContact::state() const {
-  return {tip_, next_, force_, first_.displacement, first_.velocity, started_ ? 1.0 : 0.0};
+  return {tip_, next_, force_, first_.displacement, first_.velocity, steps_};
 }
 
 void HeldContact::restore(const double* state) {
@@ -98,8 +109,7 @@ void HeldContact::restore(const double* state) {
   if (!finite(0) || !finite(3) || !finite(4) || !finite(5) || (finite(2) && !finite(1))) {
     throw std::invalid_argument("spring: a saved state has numbers that are not finite");
   }
-  for (double* member : {&tip_, &next_, &force_, &first_.displacement, &first_.velocity}) *member = *state++;
-  started_ = *state != 0.0;
+  for (double* member : {&tip_, &next_, &force_, &first_.displacement, &first_.velocity, &steps_}) *member = *state++;
 }
 
 }  // namespace spring

@@ -44,7 +44,12 @@ class HeldContact {
   double energy(double y) const { return law_.energy(y - tip_); }  ///< Φ [J]
   double tip() const { return tip_; }                              ///< u_tip now [m], as foreseen
   double size() const { return size_; }                            ///< H [s]
-  bool started() const { return started_; }                        ///< a step was made
+  bool started() const { return steps_ > 0.0; }                    ///< a step was made
+
+  /// Steps so far that the tip began elsewhere than foreseen, and by how much at most [m]. With the connections right
+  /// that is rounding, but in the two steps that a sudden load on the beam takes to be known. No part of the state.
+  int missed() const { return missed_; }
+  double farthest() const { return farthest_; }
 
   static constexpr std::size_t state_length = 6;
   std::array<double, state_length> state() const;
@@ -52,6 +57,7 @@ class HeldContact {
   void restore(const double* state);
 
  private:
+  void compare(const TipMessage& seen);
   void choose(double y, double free, const Top& top);
   void send(double force, double free);  ///< the force over the next step; where the tip goes without one
   double root(double start, double free, double yielding) const;
@@ -62,8 +68,11 @@ class HeldContact {
   std::array<double, 2> response_;
   double tip_ = 0.0, next_ = 0.0;  ///< u_tip now and after the coming step [m]
   double force_ = 0.0;
-  TipMessage first_;  ///< seen before the first step
-  bool started_ = false;
+  TipMessage first_;    ///< seen before the first step
+  double steps_ = 0.0;  ///< made, 2 for more
+  int missed_ = 0;
+  double farthest_ = 0.0;
+  double reach_ = 0.0;  ///< longest way of the tip in a step so far [m]
 };
 
 }  // namespace spring

@@ -365,6 +365,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
                       fmi2Boolean) {
   const fmi2Status status = guard(c, "fmi2DoStep", fmi::step_complete, [&](Component& k) {
     k.instance.step(currentCommunicationPoint, communicationStepSize);
+    // Only told: the step is done, and some masters stop at any status but fmi2OK.
+    const std::string warning = k.instance.take_warning();
+    if (!warning.empty()) k.log(fmi2Warning, "logStatusWarning", "fmi2DoStep: " + warning);
   });
   if (c) static_cast<Component*>(c)->instance.last_status = status;
   return status;

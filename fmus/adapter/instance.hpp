@@ -6,6 +6,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "snapshot.hpp"
@@ -51,6 +52,8 @@ class Instance {
   /// @throws StepDiscarded (nothing changed), std::invalid_argument
   void step(double time, double size);
   double time() const { return time_; }
+  /// What the model has to say after a step; empty if nothing.
+  std::string take_warning() { return std::exchange(model_->warning, {}); }
 
   /// Into a snapshot that may hold an earlier state: its memory is used again.
   void save(Snapshot& snapshot) const;

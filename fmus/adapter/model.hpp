@@ -37,6 +37,9 @@ class Model {
   /// Called for every saved state; the vector is flat and holds everything that build() does not make.
   virtual void save(std::vector<double>& state) const = 0;
   virtual void restore(const std::vector<double>& state) = 0;
+
+  /// Set by step() where the user should be told something that is no error; cleared by whoever tells it.
+  std::string warning;
 };
 
 }  // namespace fmi

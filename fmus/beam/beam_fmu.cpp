@@ -25,34 +25,34 @@ struct BeamModel final : fmi::Model {
   double tip_impulse = 0.0;
   double distributed_load = 0.0;
   std::optional<Beam> beam;
-  std::optional<Beam::Forecast> forecast;  ///< with communication_step > 0; not finite if it leaves the range
+  Beam::Forecast forecast{};  ///< with communication_step > 0; not finite if it leaves the range
   std::array<double, 2> tip_response{};
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
     beam.emplace(parameters);
     moved();
-    forecast.reset();
+    forecast = {};
     tip_response = {};
     distributed_load = 0.0;  // inputs are set after this
-    if (parameters.communication_step == 0.0) return;
+    if (!forecasts()) return;
     tip_response = beam->tip_response(parameters.communication_step);
     look_ahead();
   }
 
   void observe() override {
-    if (forecast && distributed_load != foreseen_load_) look_ahead();
+    if (forecasts() && distributed_load != foreseen_load_) look_ahead();
     beam->set_distributed_load(distributed_load);
   }
 
   void step(double size) override {
     moved();
     std::vector<double> before;
-    if (tip_impulse != 0.0 || forecast) beam->save(before);
+    if (tip_impulse != 0.0 || forecasts()) beam->save(before);
     try {
       if (tip_impulse != 0.0) beam->apply_tip_impulse(tip_impulse);
       beam->step(size, tip_force, distributed_load);
-      if (forecast) foresee();
+      if (forecasts()) foresee();
     } catch (const std::domain_error& e) {
       if (!before.empty()) beam->restore(before);
       throw fmi::StepDiscarded(e.what());
@@ -64,11 +64,8 @@ struct BeamModel final : fmi::Model {
   void restore(const std::vector<double>& state) override {
     beam->restore(state);
     moved();
-    if (forecast) look_ahead();
+    if (forecasts()) look_ahead();
   }
-
-  double tip_velocity() const { return forecast ? forecast->velocity : beam->tip_velocity(); }
-  double tip_acceleration() const { return forecast ? forecast->acceleration : beam->tip_acceleration(); }
 
   // At point `i` of the shape.
   double deflection(std::size_t i) const { return at(i, deflection_, &Beam::deflection); }
@@ -76,6 +73,8 @@ struct BeamModel final : fmi::Model {
 
  private:
   double foreseen_load_ = 0.0;
+
+  bool forecasts() const { return parameters.communication_step > 0.0; }
 
   /// @throws std::domain_error
   void foresee() {
@@ -163,7 +162,7 @@ fmi::Table make_table() {
   parameter(
       "communication_step", "s", &FmuParameters::communication_step,
       "size H of the communication steps, for a partner that foresees the tip (communication_step of the spring). "
-      "If > 0, tip_velocity looks ahead and tip_response is known")
+      "If > 0, tip_velocity_forecast, tip_response and tip_response_2 are known")
       .at_least(0)
       .scale(1e-3);
 
@@ -192,12 +191,8 @@ fmi::Table make_table() {
   std::vector<std::string> free_motion = motion;
   free_motion.insert(free_motion.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient",
                                          "distributed_load"});
-  add.output(
-         "tip_velocity", "m/s",
-         "velocity of the tip; if communication_step = H > 0 its mean over the next 2H were there no tip_force",
-         [](const BeamModel& m) { return m.tip_velocity(); }, [](const BeamModel& m) { return m.tip_acceleration(); })
-      .from(free_motion)
-      .follows({"distributed_load"});
+  add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
+      .from({"initial_velocity_slope", "length"});
   add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation))
       .from(start_shape);
   add.output("tip_displacement_integral", "m.s", "integral of tip_displacement over the last step",
@@ -214,6 +209,14 @@ fmi::Table make_table() {
       .follows({"distributed_load"});
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
       .from(basis);
+  add.output(
+         "tip_velocity_forecast", "m/s",
+         "mean velocity of the tip over the next two steps of communication_step were there no tip_force; 0 if that is "
+         "0",
+         [](const BeamModel& m) { return m.forecast.velocity; },
+         [](const BeamModel& m) { return m.forecast.acceleration; })
+      .from(free_motion)
+      .follows({"distributed_load"});
   add.output("tip_response", "m/N",
              "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
              [](const BeamModel& m) { return m.tip_response[0]; })

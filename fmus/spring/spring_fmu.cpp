@@ -28,7 +28,7 @@ struct FmuParameters : Parameters {
 struct SpringModel final : fmi::Model {
   FmuParameters parameters;
   spring::Inputs inputs;
-  double impulse = 0.0;
+  double impulse = 0.0, forecast = 0.0;
   std::optional<Spring> spring;
   std::optional<spring::HeldContact> held;
   /// Whether tip_displacement was set since the last step; if not, extrapolation is better.
@@ -62,7 +62,9 @@ struct SpringModel final : fmi::Model {
   }
 
   void step(double size) override {
-    if (held && std::abs(size - held->size()) > 1e-6 * held->size()) {
+    // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
+    const bool goes_on = held && size > rounding * held->size();
+    if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
       throw fmi::StepDiscarded("a step of " + fmi::text(size) + " s, but communication_step = " +
                                fmi::text(held->size()) + " s: steps must have that size, or the parameter be 0");
     }
@@ -86,11 +88,12 @@ struct SpringModel final : fmi::Model {
       discard(e.what());
     }
     tip_is_current = false;
-    if (held) {
+    if (goes_on) {
       held->advance(message(), spring->displacement(), trial());
       if (!std::isfinite(held->force())) discard(no_force);
-      show_force();
     }
+    if (held) show_force();
+    check_wiring();
   }
 
   double reaction() const { return held ? held->force() : spring->reaction(); }
@@ -118,10 +121,33 @@ struct SpringModel final : fmi::Model {
 
  private:
   static constexpr long most_trial_work = 100'000;  ///< of IDA's steps for one force
+  static constexpr double rounding = 1e-6;          ///< of communication_step
+  static constexpr int most_missed = 10;            ///< steps; a sudden load takes 2, a harmonic one from rest up to 8
   static constexpr const char* no_force =
       "spring: the contact force leaves the range of floating-point numbers; the tip is too far or too fast";
 
-  spring::TipMessage message() const { return {inputs.tip_displacement[0], inputs.tip_velocity}; }
+  bool warned_ = false;
+
+  /// A pair that is wired wrongly gains energy without a sign: say so, once.
+  void check_wiring() {
+    if (warned_) return;
+    if (held && held->missed() >= most_missed) {
+      warning = "the tip was not where it was foreseen in " + std::to_string(held->missed()) + " steps, by up to " +
+                fmi::text(held->farthest()) +
+                " m, so the contact gains or loses energy. Connect tip_displacement and tip_velocity_forecast of the "
+                "beam to the inputs of these names and reaction to its tip_force; set communication_step in both to "
+                "the step size, tip_response and tip_response_2 to the beam's; pass values on between the steps only, "
+                "for both FMUs alike (Jacobi). Loads on the beam that change much within a step show here, too";
+    } else if (!held && forecast != 0.0 && parameters.contact_law == spring::ContactLaw::normal_compliance) {
+      warning =
+          "tip_velocity_forecast arrives but is not used, as communication_step = 0: a contact that the steps do not "
+          "resolve gains energy. Set communication_step, tip_response and tip_response_2 to those of the beam, or "
+          "communication_step of the beam to 0";
+    }
+    warned_ = !warning.empty();
+  }
+
+  spring::TipMessage message() const { return {inputs.tip_displacement[0], forecast}; }
 
   /// Where the top would be after the next step, other inputs staying as they are; the spring is left as it was.
   spring::HeldContact::Top trial() {
@@ -237,9 +263,10 @@ fmi::Table make_table() {
                    m.tip_is_current = true;
                    return m.inputs.tip_displacement;
                  });
-  input(
-      "tip_velocity", "m/s", &Inputs::tip_velocity,
-      "velocity of the beam's tip, read by contact_law = 2; looks ahead if communication_step > 0, as the beam's does");
+  input("tip_velocity", "m/s", &Inputs::tip_velocity,
+        "velocity of the beam's tip, read by contact_law = 2 where tip_displacement carries no derivatives");
+  add.input("tip_velocity_forecast", "m/s", "for communication_step > 0: tip_velocity_forecast of the beam",
+            [](SpringModel& m) -> double& { return m.forecast; });
 
   add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
   add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
@@ -254,9 +281,9 @@ fmi::Table make_table() {
       .follows({"tip_displacement"})
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement",
              // with communication_step > 0, of which the first is foreseen:
-             "communication_step", "tip_response", "tip_velocity", "velocity", "mass", "damping", "linear_stiffness",
-             "cubic_stiffness", "external_force", "foundation_force", "stop_enabled", "stop_position", "restitution",
-             "equilibrium"});
+             "communication_step", "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping",
+             "linear_stiffness", "cubic_stiffness", "external_force", "foundation_force", "stop_enabled",
+             "stop_position", "restitution", "equilibrium"});
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});

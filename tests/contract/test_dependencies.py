@@ -46,6 +46,7 @@ COMMON: dict[str, dict[str, float]] = {
         "velocity": -1.0,
         "tip_displacement": 0.1,
         "tip_velocity": 0.2,
+        "tip_velocity_forecast": 0.2,
         "contact_force": 0.3,
         "stop_enabled": True,
         "tip_response": 1e-4,
