@@ -11,6 +11,7 @@ BASES: dict[str, list[dict[str, float]]] = {
     "beam": [
         {},
         {"n_modes": 3},
+        {"n_modes": 3, "tip_load_coefficient": 0.0, "initial_deflection_slope": 0.0, "initial_velocity_slope": 0.0},
         {"integrator": 2},
         {"integrator": 2, "reduced_integration": True},
         {"communication_step": 1e-3},
@@ -90,7 +91,7 @@ def declared(case: Any, section: str) -> dict[str, set[str]]:
 
 
 def differ(a: float, b: float) -> bool:
-    return abs(a - b) > 1e-9 * max(abs(a), abs(b), 1e-9)  # rounding is no dependence
+    return abs(a - b) > 1e-9 * max(abs(a), abs(b), 1e-3)  # rounding is no dependence
 
 
 def test_initial_unknowns(case: Any) -> None:

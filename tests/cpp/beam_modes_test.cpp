@@ -133,6 +133,43 @@ TEST(BeamModes, ReducedBasisKeepsTheInitialState) {
   }
 }
 
+// Basis, tip mass and responses are properties of the mesh and n_modes: no load and no start changes them.
+TEST(BeamModes, LoadsAndStartsDoNotChangeTheBasis) {
+  for (const int n_modes : {1, 7, 64}) {
+    Parameters p = unit_beam(1000, 3.6e10);
+    p.n_modes = n_modes;
+    Beam plain(p);
+    for (double Parameters::*const field :
+         {&Parameters::tip_load_coefficient, &Parameters::initial_deflection_slope, &Parameters::initial_velocity_slope}) {
+      for (const double value : {1e-300, -6.0}) {
+        Parameters q = p;
+        q.*field = value;
+        Beam other(q);
+        EXPECT_EQ(other.frequencies(), plain.frequencies()) << n_modes;
+        EXPECT_EQ(other.tip_mass(), plain.tip_mass()) << n_modes;
+        const std::array<double, 2> found = other.tip_response(1e-4), expected = plain.tip_response(1e-4);
+        for (std::size_t i = 0; i < 2; ++i) EXPECT_NEAR(found[i], expected[i], 1e-12 * expected[i]) << n_modes;
+      }
+    }
+  }
+}
+
+// K⁻¹e is in the basis, so u(L) at rest under the hat load is the mesh's, F'K⁻¹e, though the basis has no shape of it.
+TEST(BeamModes, TheStaticTipUnderAHatLoadIsThatOfTheMesh) {
+  for (const int n_modes : {1, 5, 20}) {
+    Parameters p = general_beam(60);
+    p.alpha_b = 1.0;
+    p.tip_load_coefficient = -6.0;
+    p.n_modes = n_modes;
+    const Timoshenko mesh(p);
+    const double exact = p.tip_load_coefficient / mesh.mass_per_length() *
+                         mesh.hat_load().dot(mesh.flexibility_times(mesh.unit_tip_force()));
+    Beam b(p);
+    b.step(1000.0, {0.0, 0.0, 0.0}, 0.0);
+    EXPECT_NEAR(b.tip_displacement(), exact, 1e-12 * std::abs(exact)) << n_modes;
+  }
+}
+
 TEST(BeamModes, NearlyAllModesLeaveLittleToAdd) {
   for (const int n : {1, 2, 3, 6}) {
     for (int n_modes = std::max(1, 2 * n - 5); n_modes <= 2 * n; ++n_modes) {
@@ -160,7 +197,7 @@ TEST(BeamModes, AThousandElementsInitialiseQuickly) {
   const std::clock_t start = std::clock();
   const Beam b(p);
   EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 0.5);
-  EXPECT_EQ(b.frequencies().size(), 66U);  // 64 modes, the tip force's and the uniform load's shape
+  EXPECT_EQ(b.frequencies().size(), 67U);  // 64 modes, the shapes of tip force, uniform load and start
 }
 
 }  // namespace

@@ -196,8 +196,8 @@ class ModalBeam:
 def modal_beam(beam: Beam) -> ModalBeam:
     """Diagonalise the scene's beam: all modes, or the lowest ``n_modes`` with modal truncation augmentation.
 
-    The augmented space is spanned by the lowest modes, the static shapes K⁻¹e and K⁻¹(uniform load), K⁻¹(hat load)
-    if ``tip_load_coefficient`` is not zero, and u = x, θ = 0 if an initial slope is not zero; Rayleigh–Ritz in it.
+    The augmented space is spanned by the lowest modes, the static shapes K⁻¹e and K⁻¹(uniform load), and the start
+    u = x, θ = 0, whatever the loads and starts are; Rayleigh–Ritz in it.
     """
     discrete = assemble(beam)
     if 0 < beam.n_modes < discrete.size:
@@ -240,11 +240,7 @@ def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
         modes = _all_modes(discrete)[1][:, : beam.n_modes]
     else:
         _, modes = spla.eigsh(discrete.K, k=beam.n_modes, M=discrete.M, sigma=0.0, v0=np.ones(discrete.size))
-    extra = [solve(discrete.tip_vector), solve(discrete.uniform_load)]
-    if beam.tip_load_coefficient != 0.0:
-        extra.append(solve(discrete.hat_load))
-    if beam.initial_deflection_slope != 0.0 or beam.initial_velocity_slope != 0.0:
-        extra.append(discrete.slope_shape)
+    extra = [solve(discrete.tip_vector), solve(discrete.uniform_load), discrete.slope_shape]
     space = [column / np.sqrt(column @ (discrete.M @ column)) for column in modes.T]
     for shape in extra:
         residual = shape / np.sqrt(shape @ (discrete.M @ shape))
