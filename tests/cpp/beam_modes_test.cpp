@@ -139,8 +139,8 @@ TEST(BeamModes, LoadsAndStartsDoNotChangeTheBasis) {
     Parameters p = unit_beam(1000, 3.6e10);
     p.n_modes = n_modes;
     Beam plain(p);
-    for (double Parameters::*const field :
-         {&Parameters::tip_load_coefficient, &Parameters::initial_deflection_slope, &Parameters::initial_velocity_slope}) {
+    for (double Parameters::*const field : {&Parameters::tip_load_coefficient, &Parameters::initial_deflection_slope,
+                                            &Parameters::initial_velocity_slope}) {
       for (const double value : {1e-300, -6.0}) {
         Parameters q = p;
         q.*field = value;
