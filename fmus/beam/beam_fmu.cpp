@@ -1,7 +1,7 @@
 // The beam FMU: its table of variables, bound to beam::Beam.
 #include <array>
 #include <limits>
-#include <optional>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -24,13 +24,13 @@ struct BeamModel final : fmi::Model {
   fmi::Polynomial tip_force{};
   double tip_impulse = 0.0;
   double distributed_load = 0.0;
-  std::optional<Beam> beam;
+  std::unique_ptr<Beam> beam;
   Beam::Forecast forecast{};  ///< with communication_step > 0; not finite if it leaves the range
   std::array<double, 2> tip_response{};
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
-    beam.emplace(parameters);
+    beam = beam::make_beam(parameters);
     moved();
     forecast = {};
     tip_response = {};
@@ -42,7 +42,7 @@ struct BeamModel final : fmi::Model {
 
   void observe() override {
     if (forecasts() && distributed_load != foreseen_load_) look_ahead();
-    beam->set_distributed_load(distributed_load);
+    beam->observe(tip_force[0], distributed_load);
   }
 
   void step(double size) override {
@@ -91,14 +91,13 @@ struct BeamModel final : fmi::Model {
     }
   }
 
-  using Points = std::array<double, beam::shape_points>;
   /// A field of the shape, found for all points at once.
   struct Field {
     bool current = false;
-    Points values{};
+    beam::Shape values{};
   };
 
-  double at(std::size_t i, Field& field, void (Beam::*fill)(Points&) const) const {
+  double at(std::size_t i, Field& field, void (Beam::*fill)(beam::Shape&) const) const {
     if (!field.current) ((*beam).*fill)(field.values);
     field.current = true;
     return field.values[i];
