@@ -103,17 +103,18 @@ class Beam::Trial {
   std::vector<double> state_;
 };
 
-Beam::Forecast Beam::forecast(double size, double distributed_load) {
+Beam::Forecast Beam::forecast(double size) {
   const Trial trial(*this);
   const double u = tip_displacement(), v = tip_velocity();
-  for (int i = 0; i < 2; ++i) step(size, {}, distributed_load);
+  for (int i = 0; i < 2; ++i) step(size, {}, now_.distributed_load);
   return {(tip_displacement() - u) / (2.0 * size), (tip_velocity() - v) / (2.0 * size)};
 }
 
 Beam::Forecast Beam::forecast_per_load(double size) {
   Trial trial(*this);
   trial.clear();
-  return forecast(size, 1.0);
+  observe(0.0, 1.0);
+  return forecast(size);
 }
 
 std::array<double, 2> Beam::tip_response(double size) {

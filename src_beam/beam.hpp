@@ -12,6 +12,15 @@ namespace beam {
 
 // An int, so that whatever an FMU parameter says reaches the check.
 enum class Integrator : int { modal = 1, generalized_alpha = 2 };  // NOLINT(performance-enum-size)
+inline constexpr std::array<const char*, 2> integrator_names{"modal", "generalized_alpha"};  ///< numbered from 1
+
+/// Highest polynomial degree of an element.
+inline constexpr int max_element_degree = 12;
+/// Most elements times their degree that a beam may have; bounds memory, not the mathematics.
+inline constexpr int max_elements = 1000000;
+/// Most unknowns of a dense eigenproblem: of the mesh (two per element and degree) where all modes are wanted, of the
+/// reduced basis where some are.
+inline constexpr int max_dense_unknowns = 1000;
 
 /// All in SI units; defaults are the unit beam of the paper's section 3.
 struct Parameters {
@@ -68,6 +77,7 @@ class Beam {
   /// Take C [N] and f_b [N/m] as acting now, for tip_acceleration() and load_potential(), which otherwise refer to the
   /// end of the last step. The motion does not depend on it.
   void observe(double tip_force, double distributed_load);
+  double distributed_load() const { return now_.distributed_load; }  ///< f_b acting now [N/m]
 
   virtual double tip_displacement() const = 0;                            ///< u(L) [m]
   virtual double tip_velocity() const = 0;                                ///< u_t(L) [m/s]
@@ -91,10 +101,10 @@ class Beam {
     double velocity;      ///< w = [u(t + 2·size) − u(t)]/(2·size) [m/s]
     double acceleration;  ///< its rate, [u_t(t + 2·size) − u_t(t)]/(2·size) [m/s²]
   };
-  /// By two trial steps, which leave no trace.
+  /// Under the load that load_potential() refers to, by two trial steps, which leave no trace.
   /// @throws as step()
-  Forecast forecast(double size, double distributed_load);
-  /// What 1 N/m of distributed_load adds to the forecast; it is linear in it.
+  Forecast forecast(double size);
+  /// What 1 N/m of that load adds to the forecast, which is linear in it.
   Forecast forecast_per_load(double size);
 
   /// What 1 N held over a step of `size` [s] adds to u(L) at that step's end, and at the end of another step without a

@@ -75,7 +75,8 @@ void validate(const Parameters& p) {
       if (!(p.rho_inf >= 0.0 && p.rho_inf <= 1.0)) reject("rho_inf", p.rho_inf, "between 0 and 1");
       break;
     default:
-      reject("integrator", static_cast<int>(p.integrator), "1 (modal) or 2 (generalized_alpha)");
+      reject("integrator", static_cast<int>(p.integrator),
+             std::string("1 (") + integrator_names[0] + ") or 2 (" + integrator_names[1] + ")");
   }
 }
 

@@ -17,54 +17,57 @@ using beam::Parameters;
 /// The beam's parameters and what exchange between steps adds to them.
 struct FmuParameters : Parameters {
   double communication_step = 0.0;
+  FmuParameters() { initial_velocity_slope = -1.0; }  // so that a first try shows a motion
 };
 
 struct BeamModel final : fmi::Model {
   FmuParameters parameters;
-  fmi::Polynomial tip_force{};
+  fmi::Polynomial tip_force{}, distributed_load{};
   double tip_impulse = 0.0;
-  double distributed_load = 0.0;
   std::unique_ptr<Beam> beam;
-  Beam::Forecast forecast{};  ///< with communication_step > 0; not finite if it leaves the range
+  /// With communication_step > 0, otherwise 0. A forecast that leaves the range of numbers is not finite.
+  Beam::Forecast forecast{}, forecast_per_load{};
   std::array<double, 2> tip_response{};
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
     beam = beam::make_beam(parameters);
-    moved();
-    forecast = {};
+    forecast = forecast_per_load = {};
     tip_response = {};
-    distributed_load = 0.0;  // inputs are set after this
-    if (!forecasts()) return;
-    tip_response = beam->tip_response(parameters.communication_step);
+    if (forecasts()) {
+      tip_response = beam->tip_response(parameters.communication_step);
+      forecast_per_load = beam->forecast_per_load(parameters.communication_step);
+    }
+    deflection_.current = rotation_.current = false;
     look_ahead();
   }
 
   void observe() override {
-    if (forecasts() && distributed_load != foreseen_load_) look_ahead();
-    beam->observe(tip_force[0], distributed_load);
+    const bool same_load = distributed_load[0] == beam->distributed_load();
+    beam->observe(tip_force[0], distributed_load[0]);
+    if (!same_load) look_ahead();
   }
 
   void step(double size) override {
-    moved();
     std::vector<double> before;
     if (tip_impulse != 0.0 || forecasts()) beam->save(before);
     try {
       if (tip_impulse != 0.0) beam->apply_tip_impulse(tip_impulse);
       beam->step(size, tip_force, distributed_load);
-      if (forecasts()) foresee();
+      foresee();
     } catch (const std::domain_error& e) {
-      if (!before.empty()) beam->restore(before);
+      if (!before.empty()) restore(before);
       throw fmi::StepDiscarded(e.what());
     }
+    deflection_.current = rotation_.current = false;
   }
 
   void save(std::vector<double>& state) const override { beam->save(state); }
-
+  void require_state(const std::vector<double>& state) const override { beam->require_state(state); }
   void restore(const std::vector<double>& state) override {
     beam->restore(state);
-    moved();
-    if (forecasts()) look_ahead();
+    deflection_.current = rotation_.current = false;
+    look_ahead();
   }
 
   // At point `i` of the shape.
@@ -72,14 +75,11 @@ struct BeamModel final : fmi::Model {
   double rotation(std::size_t i) const { return at(i, rotation_, &Beam::rotation); }
 
  private:
-  double foreseen_load_ = 0.0;
-
   bool forecasts() const { return parameters.communication_step > 0.0; }
 
   /// @throws std::domain_error
   void foresee() {
-    foreseen_load_ = distributed_load;
-    forecast = beam->forecast(parameters.communication_step, distributed_load);
+    if (forecasts()) forecast = beam->forecast(parameters.communication_step);
   }
 
   void look_ahead() {
@@ -102,7 +102,6 @@ struct BeamModel final : fmi::Model {
     field.current = true;
     return field.values[i];
   }
-  void moved() { deflection_.current = rotation_.current = false; }
 
   mutable Field deflection_, rotation_;
 };
@@ -120,30 +119,31 @@ fmi::Table make_table() {
       "Viscoelastic (Kelvin-Voigt) Timoshenko beam, clamped at x = 0, loaded at its tip x = L by a contact force";
   t.stop_time = 0.6;
   t.step_size = 1e-3;
+  t.tolerance = 1e-6;  // for the tool's own use
   t.choices.push_back({"Integrator",
                        "time integration of the beam",
-                       {"modal, the exact step of each mode under a polynomial force",
-                        "generalized_alpha, with rho_inf = 1 the midpoint rule"}});
+                       {std::string(beam::integrator_names[0]) + ", the exact step of each mode under polynomial loads",
+                        std::string(beam::integrator_names[1]) + ", with rho_inf = 1 the midpoint rule"}});
 
   fmi::TableBuilder<BeamModel> add(t);
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
     return add.parameter(name, unit, &BeamModel::parameters, field, text);
   };
-  parameter("density", "kg/m3", &Parameters::density, "mass density rho, > 0").at_least(0);
-  parameter("area", "m2", &Parameters::area, "area of the cross-section A, > 0").at_least(0);
-  parameter("second_moment_of_area", "m4", &Parameters::second_moment_of_area, "second moment of area I, > 0")
-      .at_least(0);
-  parameter("young_modulus", "Pa", &Parameters::young_modulus, "Young's modulus E, > 0").at_least(0);
-  parameter("shear_modulus", "Pa", &Parameters::shear_modulus, "shear modulus G, > 0").at_least(0);
-  parameter("shear_coefficient", "", &Parameters::shear_coefficient, "shear coefficient K, > 0").at_least(0);
-  parameter("length", "m", &Parameters::length, "length L, > 0").at_least(0);
+  parameter("density", "kg/m3", &Parameters::density, "mass density rho").positive();
+  parameter("area", "m2", &Parameters::area, "area of the cross-section A").positive();
+  parameter("second_moment_of_area", "m4", &Parameters::second_moment_of_area, "second moment of area I").positive();
+  parameter("young_modulus", "Pa", &Parameters::young_modulus, "Young's modulus E").positive();
+  parameter("shear_modulus", "Pa", &Parameters::shear_modulus, "shear modulus G").positive();
+  parameter("shear_coefficient", "", &Parameters::shear_coefficient, "shear coefficient K").positive();
+  parameter("length", "m", &Parameters::length, "length L").positive();
   parameter("alpha_b", "s", &Parameters::alpha_b, "Kelvin-Voigt retardation time: damping = alpha_b * stiffness")
       .at_least(0);
-  parameter("n_elements", "", &Parameters::n_elements, "uniform elements").range(1, 1000000);
+  parameter("n_elements", "", &Parameters::n_elements, "uniform elements").range(1, beam::max_elements);
   parameter("element_degree", "", &Parameters::element_degree,
             "polynomial degree of deflection and rotation in an element; 1 = linear elements")
-      .range(1, 12);
-  parameter("n_modes", "", &Parameters::n_modes, "lowest modes kept by the modal integrator; 0 = all").at_least(0);
+      .range(1, beam::max_element_degree);
+  parameter("n_modes", "", &Parameters::n_modes, "lowest modes kept by the modal integrator; 0 = all")
+      .range(0, beam::max_dense_unknowns);
   parameter(
       "reduced_integration", "", &Parameters::reduced_integration,
       "as many Gauss points for the shear term as element_degree; false = exact integration, which locks for slender "
@@ -163,16 +163,18 @@ fmi::Table make_table() {
       "size H of the communication steps, for a partner that foresees the tip (communication_step of the spring). "
       "If > 0, tip_velocity_forecast, tip_response and tip_response_2 are known")
       .at_least(0)
-      .scale(1e-3);
+      .typical(1e-3);
 
-  add.polynomial("tip_force", "N",
-                 "contact force C on the tip, positive upward; its derivatives of order 1 and 2 hold for the next "
-                 "step only: C(tau) = C + C' tau + C'' tau^2/2",
-                 [](BeamModel& m) -> fmi::Polynomial& { return m.tip_force; });
+  add.input(
+      "tip_force", "N",
+      "contact force C on the tip, positive upward; its derivatives of order 1 and 2 hold for the next step only: "
+      "C(tau) = C + C' tau + C'' tau^2/2. generalized_alpha sees their mean over the step",
+      [](BeamModel& m) -> fmi::Polynomial& { return m.tip_force; });
   add.impulse("tip_impulse", "N.s", "upward impulse on the tip, applied at the start of the next step, then 0 again",
               [](BeamModel& m) -> double& { return m.tip_impulse; });
-  add.input("distributed_load", "N/m", "distributed load f_b, uniform in x, positive upward",
-            [](BeamModel& m) -> double& { return m.distributed_load; });
+  add.input("distributed_load", "N/m",
+            "distributed load f_b, uniform in x, positive upward; derivatives as for tip_force",
+            [](BeamModel& m) -> fmi::Polynomial& { return m.distributed_load; });
 
   const std::vector<std::string> start_u{"initial_deflection_slope", "length"};
   // What the modal basis depends on. Every start is in it: u = s*x without a rotation, for any number of modes.
@@ -201,8 +203,8 @@ fmi::Table make_table() {
       .from({"area", "shear_modulus", "shear_coefficient", "length", "initial_deflection_slope"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy));
   add.output("load_potential", "J", "potential of the distributed load", of(&Beam::load_potential))
-      .from({"length", "n_elements", "initial_deflection_slope", "tip_load_coefficient", "distributed_load"})
-      .follows({"distributed_load"});
+      .from({"length", "n_elements", "initial_deflection_slope", "tip_load_coefficient", "distributed_load"});
+  add.depends("distributed_load", [](const BeamModel& m) { return -m.beam->deflection_integral(); });
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
       .from(basis);
   add.output(
@@ -211,8 +213,8 @@ fmi::Table make_table() {
          "0",
          [](const BeamModel& m) { return m.forecast.velocity; },
          [](const BeamModel& m) { return m.forecast.acceleration; })
-      .from(free_motion)
-      .follows({"distributed_load"});
+      .from(free_motion);
+  add.depends("distributed_load", [](const BeamModel& m) { return m.forecast_per_load.velocity; });
   add.output("tip_response", "m/N",
              "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
              [](const BeamModel& m) { return m.tip_response[0]; })

@@ -11,8 +11,8 @@
 #include "../../src_spring/compliance.hpp"
 #include "../../src_spring/held_contact.hpp"
 #include "../../src_spring/spring.hpp"
-#include "../adapter/description.hpp"
 #include "../adapter/table.hpp"
+#include "../adapter/text.hpp"
 
 namespace {
 
@@ -27,12 +27,11 @@ struct FmuParameters : Parameters {
 
 struct SpringModel final : fmi::Model {
   FmuParameters parameters;
-  spring::Inputs inputs;
-  double impulse = 0.0, forecast = 0.0;
+  fmi::Polynomial contact_force{}, foundation_force{}, external_force{}, tip_velocity{}, forecast{};
+  fmi::Polynomial tip_displacement{};  ///< as last set; after a step where it was extrapolated to
+  double impulse = 0.0;
   std::optional<Spring> spring;
   std::optional<spring::HeldContact> held;
-  /// Whether tip_displacement was set since the last step; if not, extrapolation is better.
-  bool tip_is_current = true;
 
   void build(double tolerance) override {
     Parameters p = parameters;
@@ -49,15 +48,14 @@ struct SpringModel final : fmi::Model {
     } else {
       spring.emplace(p);
     }
-    tip_is_current = true;
   }
 
   void observe() override {
     if (held) {
       if (!held->started()) held->begin(message(), spring->displacement(), trial());
       show_force();
-    } else if (parameters.contact_law == spring::ContactLaw::external || tip_is_current) {
-      spring->observe(inputs);
+    } else {
+      spring->observe(acting());
     }
   }
 
@@ -74,20 +72,18 @@ struct SpringModel final : fmi::Model {
       if (!before.empty()) restore(before);
       throw fmi::StepDiscarded(why);
     };
-    spring::Inputs acting = inputs;
-    if (held) {
-      if (!std::isfinite(held->force())) discard(no_force);
-      acting.contact_force = {held->force(), 0.0, 0.0};
-    }
+    if (held && !std::isfinite(held->force())) discard(no_force);
+    const spring::Inputs inputs = acting();
     try {
       if (impulse != 0.0) spring->apply_impulse(impulse);
-      spring->step(size, acting);
+      spring->step(size, inputs);
     } catch (const spring::StepFailure& e) {
       discard(e.what());
     } catch (const std::domain_error& e) {
       discard(e.what());
     }
-    tip_is_current = false;
+    const fmi::Polynomial& u = inputs.tip_displacement;
+    if (!held) tip_displacement = {u[0] + size * (u[1] + 0.5 * size * u[2]), u[1] + size * u[2], u[2]};
     if (goes_on) {
       held->advance(message(), spring->displacement(), trial());
       if (!std::isfinite(held->force())) discard(no_force);
@@ -97,11 +93,21 @@ struct SpringModel final : fmi::Model {
   }
 
   double reaction() const { return held ? held->force() : spring->reaction(); }
+  double stiffness() const {  ///< of the law inside [N/m]
+    if (parameters.contact_law == spring::ContactLaw::external) return 0.0;
+    const spring::Compliance law(parameters.compliance_stiffness, parameters.compliance_exponent);
+    return law.slope(spring->displacement() - tip_displacement[0]);
+  }
+  double reaction_rate() const {
+    return held ? 0.0 : stiffness() * (spring->velocity() - acting().tip_displacement[1]);
+  }
+  /// Of what the held force follows before its first step only the value is known, later it follows nothing.
+  double by_tip(double slope) const { return !held ? slope : held->started() ? 0.0 : unknown; }
   double contact_energy() const { return held ? held->energy(spring->displacement()) : spring->contact_energy(); }
 
   void save(std::vector<double>& state) const override {
     spring->save(state);
-    state.push_back(tip_is_current ? 1.0 : 0.0);
+    state.insert(state.end(), tip_displacement.begin(), tip_displacement.end());
     if (held) {
       const auto more = held->state();
       state.insert(state.end(), more.begin(), more.end());
@@ -109,20 +115,24 @@ struct SpringModel final : fmi::Model {
   }
 
   void restore(const std::vector<double>& state) override {
-    const std::size_t own = 1 + (held ? spring::HeldContact::state_length : 0);
+    const std::size_t own = tip_displacement.size() + (held ? spring::HeldContact::state_length : 0);
     if (state.size() < own) throw std::invalid_argument("spring: a saved state is too short");
     const auto mine = state.end() - static_cast<std::ptrdiff_t>(own);
     std::optional<spring::HeldContact> restored = held;
-    if (restored) restored->restore(&mine[1]);
+    if (!std::isfinite(mine[0]) || !std::isfinite(mine[1]) || !std::isfinite(mine[2])) {
+      throw std::invalid_argument("spring: the tip of a saved state is not finite");
+    }
+    if (restored) restored->restore(&mine[3]);
     spring->restore({state.begin(), mine});
     held = restored;
-    tip_is_current = mine[0] != 0.0;
+    tip_displacement = {mine[0], mine[1], mine[2]};
   }
 
  private:
   static constexpr long most_trial_work = 100'000;  ///< of IDA's steps for one force
   static constexpr double rounding = 1e-6;          ///< of communication_step
   static constexpr int most_missed = 10;            ///< steps; a sudden load takes 2, a harmonic one from rest up to 8
+  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   static constexpr const char* no_force =
       "spring: the contact force leaves the range of floating-point numbers; the tip is too far or too fast";
 
@@ -138,7 +148,7 @@ struct SpringModel final : fmi::Model {
                 "beam to the inputs of these names and reaction to its tip_force; set communication_step in both to "
                 "the step size, tip_response and tip_response_2 to the beam's; pass values on between the steps only, "
                 "for both FMUs alike (Jacobi). Loads on the beam that change much within a step show here, too";
-    } else if (!held && forecast != 0.0 && parameters.contact_law == spring::ContactLaw::normal_compliance) {
+    } else if (!held && forecast[0] != 0.0 && parameters.contact_law == spring::ContactLaw::normal_compliance) {
       warning =
           "tip_velocity_forecast arrives but is not used, as communication_step = 0: a contact that the steps do not "
           "resolve gains energy. Set communication_step, tip_response and tip_response_2 to those of the beam, or "
@@ -147,21 +157,39 @@ struct SpringModel final : fmi::Model {
     warned_ = !warning.empty();
   }
 
-  spring::TipMessage message() const { return {inputs.tip_displacement[0], forecast}; }
+  spring::TipMessage message() const { return {tip_displacement[0], forecast[0]}; }
+
+  /// What acts from now on, but for what the contact law does not read.
+  spring::Inputs acting() const {
+    spring::Inputs inputs;
+    if (held) {
+      inputs.contact_force[0] = held->force();
+    } else if (parameters.contact_law == spring::ContactLaw::external) {
+      inputs.contact_force = contact_force;
+    }
+    inputs.foundation_force = foundation_force;
+    inputs.external_force = external_force[0];
+    for (std::size_t i = 1; i < 3; ++i) inputs.contact_force[i] -= external_force[i];  // both act on the top alone
+    inputs.tip_displacement = tip_displacement;
+    if (tip_displacement[1] == 0.0 && tip_displacement[2] == 0.0) {
+      inputs.tip_displacement[1] = tip_velocity[0];
+      inputs.tip_displacement[2] = tip_velocity[1];
+    }
+    return inputs;
+  }
 
   /// Where the top would be after the next step, other inputs staying as they are; the spring is left as it was.
   spring::HeldContact::Top trial() {
     std::vector<double> present;
     spring->save(present);
-    spring::Inputs acting = inputs;
-    for (auto* input : {&acting.contact_force, &acting.foundation_force}) (*input)[1] = (*input)[2] = 0.0;
-    return [this, present, acting, work = 0L](double force) mutable {
-      constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    spring::Inputs inputs = acting();
+    for (auto* input : {&inputs.contact_force, &inputs.foundation_force}) (*input)[1] = (*input)[2] = 0.0;
+    return [this, present, inputs, work = 0L](double force) mutable {
       if (work > most_trial_work) return unknown;
-      acting.contact_force[0] = force;
+      inputs.contact_force[0] = force;
       const long before = spring->ida_steps();
       try {
-        spring->step(held->size(), acting);
+        spring->step(held->size(), inputs);
       } catch (const spring::StepFailure&) {
         return unknown;  // the step itself will tell
       }
@@ -174,9 +202,7 @@ struct SpringModel final : fmi::Model {
 
   /// To the acceleration. Without a finite force `reaction` has no value, and the next step is refused.
   void show_force() {
-    spring::Inputs acting = inputs;
-    acting.contact_force = {held->force(), 0.0, 0.0};
-    if (std::isfinite(held->force())) spring->observe(acting);
+    if (std::isfinite(held->force())) spring->observe(acting());
   }
 };
 
@@ -194,6 +220,7 @@ fmi::Table make_table() {
       "foundation";
   t.stop_time = 0.6;
   t.step_size = 1e-3;
+  t.tolerance = 1e-6;  // for the tool's own use: what it hands on never loosens relative_tolerance
   t.choices.push_back({"ContactLaw",
                        "where the contact force comes from",
                        {"external, the input contact_force",
@@ -203,7 +230,7 @@ fmi::Table make_table() {
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
     return add.parameter(name, unit, &SpringModel::parameters, field, text);
   };
-  parameter("mass", "kg", &Parameters::mass, "mass m, > 0").at_least(0);
+  parameter("mass", "kg", &Parameters::mass, "mass m").positive();
   parameter("damping", "N.s/m", &Parameters::damping, "viscous damping alpha_s").at_least(0);
   parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
   parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness, "cubic stiffness k2; < 0 softens");
@@ -217,15 +244,15 @@ fmi::Table make_table() {
   parameter("compliance_stiffness", "", &Parameters::compliance_stiffness,
             "lambda in C = lambda*max(0, y - u_tip)^p [N/m^p]")
       .at_least(0)
-      .scale(1e4);
-  parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").at_least(1);
+      .typical(1e4);
+  parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").range(1, 100);
   parameter(
       "communication_step", "s", &FmuParameters::communication_step,
       "for contact_law = 2 beside a beam with the same communication_step: size of all communication steps. If > 0, "
       "reaction is held over each step at the value that does the law's work, the tip being foreseen: no energy is "
       "gained at any step size. 0: the law under the extrapolated tip")
       .at_least(0)
-      .scale(1e-3);
+      .typical(1e-3);
   parameter("tip_response", "m/N", &FmuParameters::tip_response, "for communication_step > 0: tip_response of the beam")
       .at_least(0);
   parameter("tip_response_2", "m/N", &FmuParameters::tip_response_2,
@@ -235,38 +262,33 @@ fmi::Table make_table() {
   parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation").range(0, 1);
   parameter("relative_tolerance", "", &Parameters::relative_tolerance,
             "relative tolerance of IDA; an importer's tolerance can tighten, never loosen it")
-      .range(0, 1)
-      .scale(1e-12);
+      .range(std::numeric_limits<double>::min(), 1e-2)
+      .typical(1e-12);
   parameter("absolute_tolerance", "", &Parameters::absolute_tolerance, "absolute tolerance of IDA")
-      .at_least(0)
-      .scale(1e-14);
+      .range(std::numeric_limits<double>::min(), 1e-2)
+      .typical(1e-14);
 
-  using spring::Inputs;
-  const auto polynomial = [&](const char* name, const char* unit, auto Inputs::*field, const char* text) {
-    add.polynomial(name, unit, text, [field](SpringModel& m) -> fmi::Polynomial& { return m.inputs.*field; });
+  const auto input = [&](const char* name, const char* unit, fmi::Polynomial SpringModel::*field, const char* text) {
+    add.input(name, unit, text, [field](SpringModel& m) -> fmi::Polynomial& { return m.*field; });
   };
-  const auto input = [&](const char* name, const char* unit, auto Inputs::*field, const char* text) {
-    add.input(name, unit, text, [field](SpringModel& m) -> double& { return m.inputs.*field; });
-  };
-  polynomial("contact_force", "N", &Inputs::contact_force,
-             "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next "
-             "step only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2");
-  polynomial("foundation_force", "N", &Inputs::foundation_force,
-             "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled");
+  input("contact_force", "N", &SpringModel::contact_force,
+        "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next step "
+        "only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2");
+  input("foundation_force", "N", &SpringModel::foundation_force,
+        "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled");
   add.impulse("impulse", "N.s", "upward impulse, applied at the start of the next step, then 0 again",
               [](SpringModel& m) -> double& { return m.impulse; });
-  input("external_force", "N", &Inputs::external_force, "external force f_s, positive upward");
-  add.polynomial("tip_displacement", "m",
-                 "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its "
-                 "derivatives or else by tip_velocity",
-                 [](SpringModel& m) -> fmi::Polynomial& {
-                   m.tip_is_current = true;
-                   return m.inputs.tip_displacement;
-                 });
-  input("tip_velocity", "m/s", &Inputs::tip_velocity,
-        "velocity of the beam's tip, read by contact_law = 2 where tip_displacement carries no derivatives");
-  add.input("tip_velocity_forecast", "m/s", "for communication_step > 0: tip_velocity_forecast of the beam",
-            [](SpringModel& m) -> double& { return m.forecast; });
+  input("external_force", "N", &SpringModel::external_force,
+        "external force f_s, positive upward; derivatives as for contact_force");
+  input(
+      "tip_displacement", "m", &SpringModel::tip_displacement,
+      "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives or else "
+      "by tip_velocity");
+  input("tip_velocity", "m/s", &SpringModel::tip_velocity,
+        "velocity of the beam's tip, read by contact_law = 2 where tip_displacement carries no derivatives; its "
+        "derivative of order 1 is the tip's acceleration, that of order 2 is not used");
+  input("tip_velocity_forecast", "m/s", &SpringModel::forecast,
+        "for communication_step > 0: tip_velocity_forecast of the beam; its derivatives are not used");
 
   add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
   add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
@@ -276,14 +298,15 @@ fmi::Table make_table() {
              of(&Spring::displacement_integral), of(&Spring::displacement));
   add.output("displacement_integral_2", "m.s2", "double integral of displacement over the last step",
              of(&Spring::displacement_integral_2), of(&Spring::displacement_integral));
-  add.output("reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
-             [](const SpringModel& m) { return m.reaction(); })
-      .follows({"tip_displacement"})
+  add.output(
+         "reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
+         [](const SpringModel& m) { return m.reaction(); }, [](const SpringModel& m) { return m.reaction_rate(); })
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement",
              // with communication_step > 0, of which the first is foreseen:
              "communication_step", "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping",
              "linear_stiffness", "cubic_stiffness", "external_force", "foundation_force", "stop_enabled",
              "stop_position", "restitution", "equilibrium"});
+  add.depends("tip_displacement", [](const SpringModel& m) { return m.by_tip(-m.stiffness()); });
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});
@@ -291,9 +314,9 @@ fmi::Table make_table() {
       .from({"linear_stiffness", "cubic_stiffness", "displacement", "equilibrium"});
   add.output("contact_energy", "J", "energy stored in the contact law inside",
              [](const SpringModel& m) { return m.contact_energy(); })
-      .follows({"tip_displacement"})
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "equilibrium",
              "tip_displacement"});
+  add.depends("tip_displacement", [](const SpringModel& m) { return m.by_tip(-m.reaction()); });
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Spring::dissipated_energy));
   add.output("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
              of(&Spring::impact_loss));

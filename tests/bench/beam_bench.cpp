@@ -96,12 +96,18 @@ class Fmu {
     instance_.step(instance_.time(), h);
   }
   void step() { instance_.step(instance_.time(), h); }
+  void keep() { instance_.save(start_); }
+  void repeat() {
+    instance_.restore(start_);
+    step();
+  }
 
  private:
   void set(const char* name, fmi::Type type, double value) {
     instance_.set(static_cast<unsigned>(fmi::table().index(name)), type, value);
   }
   fmi::Instance instance_;
+  fmi::Snapshot start_;
 };
 
 /// A line of /proc/self/status [bytes].
@@ -182,6 +188,8 @@ int main(int argc, char** argv) {
     double force = 1.0;
     bench::compare("modal", o, [&] { direct->step(h, {force += 1e-3, 0.0, 0.0}, 0.0); }, [&] { bare.step(force); });
     bench::compare("modal fmu", o, [&] { fmu.step(); }, [&] { bare.step(force); });
+    fmu.keep();
+    bench::compare("modal fmu repeated", o, [&] { fmu.repeat(); }, [&] { bare.step(force); });
   }
   scaling(o);
   return 0;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes as ct
 import xml.etree.ElementTree as ET
 from typing import Any
 
@@ -81,6 +82,10 @@ def started(case: Any, values: dict[str, float]) -> dict[str, float]:
     return outputs
 
 
+def references(fmu: Any, names: list[str]) -> Any:
+    return (ct.c_uint * len(names))(*[fmu.variables[name].valueReference for name in names])
+
+
 def declared(case: Any, section: str) -> dict[str, set[str]]:
     root = ET.parse(case.fmu.folder / "modelDescription.xml").getroot()
     names = [v.get("name", "") for v in root.iter("ScalarVariable")]
@@ -124,3 +129,44 @@ def test_outputs_follow_between_steps_what_is_declared(case: Any) -> None:
                     found[output].add(name)
             k.free()
     assert found == declared(case, "Outputs")
+
+
+def test_directional_derivatives_are_those_of_the_outputs(case: Any) -> None:
+    """Of every output by every continuous input, against the difference over a small change of it."""
+    inputs = [v.name for v in case.fmu.description.modelVariables if v.causality == "input"]
+    inputs = [name for name in inputs if case.fmu.variables[name].variability == "continuous"]
+    outputs = case.fmu.outputs
+    known, unknown = references(case.fmu, inputs), references(case.fmu, outputs)
+    found = 0
+    for base in BASES[case.name]:
+        k = case.fmu.running(**{**COMMON[case.name], **base})
+        k.step(0.0, 1e-3)
+        for i, name in enumerate(inputs):
+            value, change = k.get(name), 1e-6
+            k.set(name, value)
+            direction = (ct.c_double * len(inputs))(*[float(i == j) for j in range(len(inputs))])
+            derivatives = (ct.c_double * len(outputs))(*[float("nan")] * len(outputs))
+            arguments = (unknown, ct.c_size_t(len(outputs)), known, ct.c_size_t(len(inputs)), direction, derivatives)
+            assert k.call("fmi2GetDirectionalDerivative", *arguments) == 0, k.message
+            ends = []
+            for sign in (1.0, -1.0):
+                k.set(name, value + sign * change)
+                ends.append(k.outputs())
+            k.set(name, value)
+            for output, up, down, derivative in zip(outputs, *ends, derivatives, strict=True):
+                difference = (up - down) / (2.0 * change)
+                scale = max(abs(difference), 1e-9 * abs(up) / change, 1e-9)
+                assert abs(derivative - difference) <= 1e-5 * scale, (base, output, name)
+                found += derivative != 0.0
+        k.free()
+    assert found >= {"beam": 8, "spring": 2}[case.name]
+
+
+def test_a_directional_derivative_that_is_not_known_is_discarded(spring: Any) -> None:
+    """The held force before its first step follows the tip by a search with trial steps."""
+    k = spring.running(**{**COMMON["spring"], **AHEAD})
+    value = (ct.c_double * 1)()
+    one = (references(spring, ["reaction"]), ct.c_size_t(1), references(spring, ["tip_displacement"]), ct.c_size_t(1))
+    assert k.call("fmi2GetDirectionalDerivative", *one, (ct.c_double * 1)(1.0), value) == 2
+    assert "reaction" in k.message
+    k.step(0.0, 1e-3)

@@ -667,7 +667,7 @@ class Episode {
   void derive(Instance& k, Reference r) {
     const int order = absurd() ? random_.any_int() : 1 + static_cast<int>(random_.below(2));
     const double value = absurd() ? random_.anything() : random_.spread(-2.0, 2.0);
-    const bool known = r < variables().size() && variables()[r].interpolated;
+    const bool known = r < variables().size() && variables()[r].continuous_input();
     const bool right = known && order >= 1 && order <= 2 && std::isfinite(value);
     k.call("fmi2SetRealInputDerivatives", settable, right ? ok : error_status, format("%u, %d, %g", r, order, value),
            [&] { return fmi2SetRealInputDerivatives(k.c, &r, 1, &order, &value); });
@@ -677,8 +677,9 @@ class Episode {
     const Reference r = any_reference();
     const int order = absurd() ? random_.any_int() : 1;
     double value = 0.0;
-    const bool known = r < variables().size() && variables()[r].derivative && order == 1;
-    unsigned expected = known ? ok | discard : error_status;
+    const bool real = r < variables().size() && variables()[r].type == fmi::Type::real && order >= 1;
+    const bool known = real && variables()[r].derivative && order == 1;
+    unsigned expected = known ? ok | discard : real ? discard : error_status;
     if (known && (k.phase & (error | terminated)) != 0) expected |= error_status;
     const fmi2Status status = k.call("fmi2GetRealOutputDerivatives", stepped, expected, format("%u, %d", r, order),
                                      [&] { return fmi2GetRealOutputDerivatives(k.c, &r, 1, &order, &value); });
@@ -1016,8 +1017,17 @@ class Episode {
   }
 
   void directional(Instance& k) {
-    k.call("fmi2GetDirectionalDerivative", any_phase & ~instantiated, error_status, "",
-           [&] { return fmi2GetDirectionalDerivative(k.c, nullptr, 0, nullptr, 0, nullptr, nullptr); });
+    const Reference of = any_reference(), by = any_reference();
+    const double direction = random_.spread(-2.0, 2.0);
+    double value = 0.0;
+    const bool right = of < variables().size() && by < variables().size() && variables()[by].continuous_input() &&
+                       variables()[of].type == fmi::Type::real && variables()[of].causality == fmi::Causality::output;
+    unsigned expected = right ? ok | discard : error_status;
+    if (right && (k.phase & (initialization | error | terminated)) != 0) expected |= error_status;
+    const fmi2Status status =
+        k.call("fmi2GetDirectionalDerivative", any_phase & ~instantiated, expected, format("%u, %u", of, by),
+               [&] { return fmi2GetDirectionalDerivative(k.c, &of, 1, &by, 1, &direction, &value); });
+    if (status == fmi2OK) promise(std::isfinite(value), format("fmi2GetDirectionalDerivative delivered %g", value));
   }
 
   void null_component(Instance&) {
