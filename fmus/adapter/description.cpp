@@ -114,17 +114,14 @@ void write_types(std::ostream& out, const Table& t, const std::set<std::string>&
 }
 
 void write_variable(std::ostream& out, const Variable& v, std::size_t reference) {
-  const bool is_output = v.causality == Causality::output;
+  constexpr const char* causalities[] = {"parameter", "input", "output", "local"};
   const bool is_parameter = v.causality == Causality::parameter;
   out << "    <ScalarVariable" << attribute("name", v.name) << attribute("valueReference", std::to_string(reference))
-      << attribute("description", v.description)
-      << attribute("causality", is_output      ? "output"
-                                : is_parameter ? "parameter"
-                                               : "input")
+      << attribute("description", v.description) << attribute("causality", causalities[static_cast<int>(v.causality)])
       << attribute("variability", is_parameter                         ? "fixed"
                                   : v.consumed || v.type != Type::real ? "discrete"
                                                                        : "continuous");
-  if (is_parameter || is_output) out << attribute("initial", is_parameter || v.exact ? "exact" : "calculated");
+  if (v.causality != Causality::input) out << attribute("initial", is_parameter || v.exact ? "exact" : "calculated");
   out << ">\n      <";
   switch (v.type) {
     case Type::real:
@@ -147,7 +144,7 @@ void write_variable(std::ostream& out, const Variable& v, std::size_t reference)
     if (std::isfinite(v.max)) out << attribute("max", value_text(v, v.max));
   }
   if (v.type == Type::real && v.nominal != 1.0) out << attribute("nominal", text(v.nominal));
-  if (!is_output || v.exact) out << attribute("start", value_text(v, v.start));
+  if (!v.get || v.exact) out << attribute("start", value_text(v, v.start));
   out << "/>\n    </ScalarVariable>\n";
 }
 

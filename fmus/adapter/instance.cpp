@@ -60,7 +60,7 @@ bool is_setting(const Variable& v) { return v.causality == Causality::parameter 
 Instance::Instance() : table_(table()), place_(table_.variables.size()) {
   for (std::size_t i = 0; i < place_.size(); ++i) {
     const Variable& v = table_.variables[i];
-    if (!is_setting(v) && v.causality == Causality::output) continue;
+    if (v.get && !v.exact) continue;
     std::vector<const Variable*>& among = is_setting(v) ? fixed_ : inputs_;
     place_[i] = among.size();
     among.push_back(&v);
@@ -149,8 +149,8 @@ double Instance::get(unsigned reference, Type type) {
 
 void Instance::set(unsigned reference, Type type, double value) {
   const Variable& v = variable(reference, type, "set");
-  if (v.causality == Causality::output && !v.exact) {
-    throw std::invalid_argument("'" + v.name + "' is a calculated output and cannot be set");
+  if (v.get && !v.exact) {
+    throw std::invalid_argument("'" + v.name + "' is calculated and cannot be set");
   }
   if (is_setting(v) && (phase & ~(instantiated | initialization)) != 0) {
     throw std::invalid_argument("'" + v.name + "' can only be set before fmi2ExitInitializationMode");

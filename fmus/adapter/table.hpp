@@ -16,7 +16,7 @@
 namespace fmi {
 
 enum class Type { real, integer, boolean };
-enum class Causality { parameter, input, output };
+enum class Causality { parameter, input, output, local };
 
 /// An input that an output follows without a step.
 struct Dependency {
@@ -117,6 +117,14 @@ class TableBuilder {
   Variable& output(const std::string& name, const std::string& unit, const std::string& description, Get get) {
     Variable& v = add(name, unit, description, Causality::output);
     v.get = [get](const Model& m) { return static_cast<double>(get(static_cast<const M&>(m))); };
+    return v;
+  }
+
+  /// What can be read as an output, but is none: tools record and plot every output.
+  template <class Get>
+  Variable& local(const std::string& name, const std::string& unit, const std::string& description, Get get) {
+    Variable& v = output(name, unit, description, get);
+    v.causality = Causality::local;
     return v;
   }
 

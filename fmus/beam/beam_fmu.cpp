@@ -222,16 +222,16 @@ fmi::Table make_table() {
   add.output("tip_response_2", "m/N", "the same at the end of the step after, without a force meanwhile",
              [](const BeamModel& m) { return m.tip_response[1]; })
       .from(motion);
-  for (std::size_t i = 0; i < beam::shape_points; ++i) {
-    const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
-    add.output("deflection[" + std::to_string(i + 1) + "]", "m", "deflection" + x,
-               [i](const BeamModel& m) { return m.deflection(i); })
-        .from(i == 0 ? std::vector<std::string>{} : start_u);
-  }
-  for (std::size_t i = 0; i < beam::shape_points; ++i) {
-    const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
-    add.output("rotation[" + std::to_string(i + 1) + "]", "rad", "rotation of the cross-section" + x,
-               [i](const BeamModel& m) { return m.rotation(i); });
+  for (const bool rotation : {false, true}) {
+    for (std::size_t i = 0; i < beam::shape_points; ++i) {
+      const std::string index = "[" + std::to_string(i + 1) + "]", x = " at x = L*" + std::to_string(i) + "/20";
+      if (rotation) {
+        add.local("rotation" + index, "rad", "rotation of the cross-section" + x,
+                  [i](const BeamModel& m) { return m.rotation(i); });
+      } else {
+        add.local("deflection" + index, "m", "deflection" + x, [i](const BeamModel& m) { return m.deflection(i); });
+      }
+    }
   }
   return t;
 }

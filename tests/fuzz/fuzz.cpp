@@ -289,8 +289,7 @@ class Instance {
 std::vector<Reference> outputs_of_type(fmi::Type type) {
   std::vector<Reference> found;
   for (std::size_t i = 0; i < variables().size(); ++i)
-    if (variables()[i].causality == fmi::Causality::output && variables()[i].type == type)
-      found.push_back(static_cast<Reference>(i));
+    if (variables()[i].get && variables()[i].type == type) found.push_back(static_cast<Reference>(i));
   return found;
 }
 const std::vector<Reference>& outputs() {
@@ -519,7 +518,7 @@ class Episode {
       values.push_back(Value{});
       const bool known = r < variables().size() && variables()[r].type == type;
       right = right && known;
-      const bool output = known && variables()[r].causality == fmi::Causality::output;
+      const bool output = known && variables()[r].get != nullptr;
       right = right && !(output && k.phase == instantiated && !variables()[r].exact);
       calculated = calculated || output;
     }
@@ -554,7 +553,7 @@ class Episode {
   bool can_be_set(const Instance& k, Reference r, fmi::Type type, double value) const {
     if (r >= variables().size()) return false;
     const fmi::Variable& v = variables()[r];
-    if (v.type != type || (v.causality == fmi::Causality::output && !v.exact)) return false;
+    if (v.type != type || (v.get && !v.exact)) return false;
     const bool fixed = v.causality == fmi::Causality::parameter || v.exact;
     if (fixed && (k.phase & (instantiated | initialization)) == 0) return false;
     return std::isfinite(value) && value >= v.min && value <= v.max;
