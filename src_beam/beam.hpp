@@ -14,6 +14,9 @@ namespace beam {
 enum class Integrator : int { modal = 1, generalized_alpha = 2 };  // NOLINT(performance-enum-size)
 inline constexpr std::array<const char*, 2> integrator_names{"modal", "generalized_alpha"};  ///< numbered from 1
 
+enum class MassMatrix : int { consistent = 1, averaged = 2 };  // NOLINT(performance-enum-size)
+inline constexpr std::array<const char*, 2> mass_matrix_names{"consistent", "averaged"};  ///< numbered from 1
+
 /// Highest polynomial degree of an element.
 inline constexpr int max_element_degree = 12;
 /// Most elements times their degree that a beam may have; bounds memory, not the mathematics.
@@ -24,18 +27,19 @@ inline constexpr int max_dense_unknowns = 1000;
 
 /// All in SI units; defaults are the unit beam of the paper's section 3.
 struct Parameters {
-  double density = 1.0;                ///< ρ [kg/m³]
-  double area = 1.0;                   ///< A [m²]
-  double second_moment_of_area = 1.0;  ///< I [m⁴]
-  double young_modulus = 1.0;          ///< E [Pa]
-  double shear_modulus = 1.0;          ///< G [Pa]
-  double shear_coefficient = 1.0;      ///< K [–]
-  double length = 1.0;                 ///< L [m]
-  double alpha_b = 0.0;                ///< Kelvin–Voigt retardation time [s]
-  int n_elements = 50;                 ///< uniform elements
-  int element_degree = 1;              ///< polynomial degree of u and θ in an element, 1 … 12; 1 = P1
-  int n_modes = 0;                     ///< lowest modes kept by `modal`; 0 = all
-  bool reduced_integration = false;    ///< p-point Gauss rule for the shear; false = exact (59)
+  double density = 1.0;                             ///< ρ [kg/m³]
+  double area = 1.0;                                ///< A [m²]
+  double second_moment_of_area = 1.0;               ///< I [m⁴]
+  double young_modulus = 1.0;                       ///< E [Pa]
+  double shear_modulus = 1.0;                       ///< G [Pa]
+  double shear_coefficient = 1.0;                   ///< K [–]
+  double length = 1.0;                              ///< L [m]
+  double alpha_b = 0.0;                             ///< Kelvin–Voigt retardation time [s]
+  int n_elements = 50;                              ///< uniform elements
+  int element_degree = 1;                           ///< polynomial degree of u and θ in an element, 1 … 12; 1 = P1
+  int n_modes = 0;                                  ///< lowest modes kept by `modal`; 0 = all
+  bool reduced_integration = false;                 ///< p-point Gauss rule for the shear; false = exact (59)
+  MassMatrix mass_matrix = MassMatrix::consistent;  ///< see timoshenko.hpp
   Integrator integrator = Integrator::modal;
   double rho_inf = 1.0;                   ///< spectral radius at infinity of generalized-α; 1 = midpoint rule (62)
   double initial_deflection_slope = 0.0;  ///< s in u⁰ = s·x [–]

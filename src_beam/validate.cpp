@@ -55,6 +55,10 @@ void validate(const Parameters& p) {
            "between 1 and " + std::to_string(max_elements / p.element_degree) + " (" + std::to_string(max_elements) +
                " over element_degree)");
   }
+  if (p.mass_matrix != MassMatrix::consistent && p.mass_matrix != MassMatrix::averaged) {
+    reject("mass_matrix", static_cast<int>(p.mass_matrix),
+           std::string("1 (") + mass_matrix_names[0] + ") or 2 (" + mass_matrix_names[1] + ")");
+  }
   switch (p.integrator) {
     case Integrator::modal: {
       const int unknowns = 2 * p.n_elements * p.element_degree;

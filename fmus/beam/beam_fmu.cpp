@@ -120,6 +120,11 @@ fmi::Table make_table() {
   t.stop_time = 0.6;
   t.step_size = 1e-3;
   t.tolerance = 1e-6;  // for the tool's own use
+  t.choices.push_back({"MassMatrix",
+                       "mass of an element",
+                       {std::string(beam::mass_matrix_names[0]) + ", its kinetic energy exact",
+                        std::string(beam::mass_matrix_names[1]) +
+                            " with the lumped one, so that short waves travel at the right speed"}});
   t.choices.push_back({"Integrator",
                        "time integration of the beam",
                        {std::string(beam::integrator_names[0]) + ", the exact step of each mode under polynomial loads",
@@ -148,6 +153,8 @@ fmi::Table make_table() {
       "reduced_integration", "", &Parameters::reduced_integration,
       "as many Gauss points for the shear term as element_degree; false = exact integration, which locks for slender "
       "beams of degree 1");
+  parameter("mass_matrix", "", &Parameters::mass_matrix, "1 = consistent, 2 = averaged").range(1, 2).choice =
+      "MassMatrix";
   fmi::Variable& integrator = parameter("integrator", "", &Parameters::integrator, "1 = modal, 2 = generalized_alpha");
   integrator.range(1, 2).choice = "Integrator";
   parameter("rho_inf", "", &Parameters::rho_inf, "spectral radius at infinity of generalized_alpha; 1 = midpoint rule")
@@ -180,7 +187,8 @@ fmi::Table make_table() {
   // What the modal basis depends on. Every start is in it: u = s*x without a rotation, for any number of modes.
   const std::vector<std::string> basis{"density",        "area",    "second_moment_of_area", "young_modulus",
                                        "shear_modulus",  "length",  "shear_coefficient",     "n_elements",
-                                       "element_degree", "n_modes", "reduced_integration",   "integrator"};
+                                       "element_degree", "n_modes", "reduced_integration",   "integrator",
+                                       "mass_matrix"};
   add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),
              of(&Beam::tip_velocity))
       .from(start_u);
@@ -198,7 +206,7 @@ fmi::Table make_table() {
   add.output("tip_displacement_integral_2", "m.s2", "double integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral_2), of(&Beam::tip_displacement_integral));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy))
-      .from({"density", "area", "length", "initial_velocity_slope"});
+      .from({"density", "area", "length", "initial_velocity_slope", "mass_matrix", "n_elements", "element_degree"});
   add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy))
       .from({"area", "shear_modulus", "shear_coefficient", "length", "initial_deflection_slope"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy));

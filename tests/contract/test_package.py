@@ -99,7 +99,8 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
             ("parameter", "s"): ["alpha_b"],
             ("parameter", "N/m"): ["tip_load_coefficient"],
             ("parameter", None): [
-                *("shear_coefficient", "n_elements", "n_modes", "reduced_integration", "integrator", "rho_inf"),
+                *("shear_coefficient", "n_elements", "n_modes", "reduced_integration", "mass_matrix", "integrator"),
+                "rho_inf",
                 "initial_deflection_slope",
             ],
         },

@@ -36,6 +36,56 @@ TEST(BeamModes, FrequenciesConvergeToTheExactOnesInSecondOrder) {
   }
 }
 
+// A beam too stiff to bend is a bar in shear: ω_k = (k − ½)π c/L. The averaged mass gains two orders.
+TEST(BeamModes, TheAveragedMassRaisesTheOrderOfABarsFrequenciesByTwo) {
+  for (const int degree : {1, 2, 3, 4}) {
+    for (const MassMatrix mass : {MassMatrix::consistent, MassMatrix::averaged}) {
+      Parameters p = unit_beam(0);
+      p.young_modulus = 1e13;
+      p.element_degree = degree;
+      p.mass_matrix = mass;
+      const double exact = 3.5 * std::acos(-1.0);
+      std::vector<double> errors;
+      for (const int refined : {1, 2}) {
+        p.n_elements = refined * (degree == 1 ? 16 : degree == 4 ? 4 : 8);
+        errors.push_back(make_beam(p)->frequencies()[3] / exact - 1.0);
+      }
+      const double order = std::log2(errors[0] / errors[1]);
+      EXPECT_NEAR(order, 2 * degree + (mass == MassMatrix::averaged ? 2 : 0), 0.25) << degree << " " << errors[1];
+    }
+  }
+}
+
+// Against quadrature: 1/(p+1) of the p+1 point Gauss rule, p/(p+1) of Gauss–Lobatto, here for p = 1 and 2 by hand.
+TEST(BeamModes, TheAveragedMassIsTheBlendOfTheTwoRules) {
+  for (const int degree : {1, 2}) {
+    Parameters p = general_beam(1, degree);
+    const double h = p.length;
+    const Eigen::MatrixXd consistent = Timoshenko(p).mass();
+    p.mass_matrix = MassMatrix::averaged;
+    const Timoshenko mesh(p);
+    const Eigen::MatrixXd averaged = mesh.mass();
+    // The tip's hat function ψ is 1 at the last node, ½ in the middle; N₂ = (P₂ − P₀)/3 is −½ there, 0 at the ends.
+    const Eigen::Index tip = mesh.tip_index();
+    const double lumped_tip = degree == 1 ? h / 2 : h / 6 + h * 4 / 6 * 0.25;
+    const double share = 1.0 / (degree + 1);
+    EXPECT_NEAR(averaged(tip, tip), share * consistent(tip, tip) + (1 - share) * lumped_tip, 1e-15);
+    if (degree == 2) {
+      EXPECT_NEAR(averaged(1, 1), share * consistent(1, 1) + (1 - share) * h * 4 / 6 * 0.25, 1e-15);
+      EXPECT_NEAR(averaged(3, 1), share * consistent(3, 1) - (1 - share) * h * 4 / 6 * 0.25, 1e-15);
+    }
+    // Products and norms are those of the matrix.
+    Eigen::VectorXd x(mesh.size());
+    for (Eigen::Index i = 0; i < x.size(); ++i) x[i] = std::cos(3.0 * static_cast<double>(i) + 1.0);
+    const Eigen::VectorXd Mx = mesh.mass().selfadjointView<Eigen::Lower>() * x;
+    EXPECT_NEAR((mesh.mass_times(x) - Mx).norm(), 0.0, 1e-15);
+    EXPECT_NEAR(mesh.mass_norm2(x), x.dot(Mx), 1e-14);
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(x.size());
+    mesh.add_products(1.0, x, 0.0, x, y);
+    EXPECT_NEAR((y - Mx).norm(), 0.0, 1e-15);
+  }
+}
+
 TEST(BeamModes, FrequenciesScaleWithTheRootOfTheStiffness) {
   Parameters p = unit_beam(300);
   p.n_modes = 20;

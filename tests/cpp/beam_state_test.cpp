@@ -176,6 +176,7 @@ TEST(BeamState, ParametersAreChecked) {
       {[](Parameters& p) { p.n_modes = 101; }, {"n_modes", "= 101 ", "100"}},
       {[](Parameters& p) { p.n_elements = 501; }, {"n_modes", "= 0 ", "generalized_alpha", "fewer n_modes"}},
       {[](Parameters& p) { p.n_elements = 501, p.n_modes = 502; }, {"n_modes", "= 502 ", "501"}},
+      {[](Parameters& p) { p.mass_matrix = static_cast<MassMatrix>(3); }, {"mass_matrix", "= 3 ", "averaged"}},
       {[](Parameters& p) { p.integrator = static_cast<Integrator>(3); }, {"integrator", "= 3 ", "modal"}},
       {[](Parameters& p) { p.integrator = Integrator::generalized_alpha, p.rho_inf = 1.1; },
        {"rho_inf", "between 0 and 1"}},
