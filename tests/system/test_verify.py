@@ -200,8 +200,8 @@ def test_the_overshoot_of_a_dispersed_step_is_the_integral_of_airy():
 
 def test_the_averaged_mass_keeps_the_force_between_the_fronts():
     """1 % with 50 elements, where the consistent mass rings by 17 %; by prototypes of others 24 % and 1.1 % with 25."""
-    shown = [check for check in verify.bar_impact() if "between the fronts" in check.quantity]
+    shown = [check for check in verify.bar_impact() if "ringing" in check.quantity]
     (consistent,) = [check for check in shown if "consistent" in check.quantity]
     (averaged,) = [check for check in shown if "averaged" in check.quantity]
-    assert consistent.error is not None and 0.1 < consistent.error < 0.3
-    assert averaged.error is not None and averaged.error < 0.01
+    assert 0.1 < (consistent.error or 0.0) < 0.3
+    assert 0.0 < (averaged.error or 0.0) < 0.01
