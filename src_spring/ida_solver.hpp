@@ -20,7 +20,7 @@ class ImplicitSystem {
   virtual void events(double s, const double* Y, double* g) const noexcept = 0;
 };
 
-/// IDA gave up; the message is IDA's.
+/// IDA gave up; the message names the flag.
 class IdaError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -162,7 +162,7 @@ TEST(IdaSolver, StepsAreCountedFromTheStart) {
   EXPECT_THROW(finish(), TooMuchWork);
 }
 
-TEST(IdaSolver, FailureCarriesIdasMessage) {
+TEST(IdaSolver, FailureCarriesIdasFlag) {
   class Nowhere final : public ImplicitSystem {
     bool residual(double, const double*, const double*, double*) const noexcept override { return false; }
     void jacobian(double, double, const double*, const double*, double*) const noexcept override {}
