@@ -82,6 +82,12 @@ int events(sunrealtype s, N_Vector Y, N_Vector, sunrealtype* g, void* user_data)
 
 }  // namespace
 
+int add_events(std::vector<Crossing>& list, bool wanted, std::initializer_list<Crossing> added) {
+  if (!wanted) return -1;
+  list.insert(list.end(), added);
+  return static_cast<int>(list.size() - added.size());
+}
+
 struct IdaSolver::Impl {
   // Order matters: the context outlives everything made in it.
   Owned<SUNContext, ContextDeleter> context;
@@ -192,9 +198,9 @@ double IdaSolver::s() const { return impl_->s; }
 const double* IdaSolver::value() const { return data(impl_->Y.get()); }
 bool IdaSolver::occurred(int event) const { return impl_->occurred[static_cast<std::size_t>(event)] != 0; }
 
-bool IdaSolver::fell(int distance, int rate) {
+bool IdaSolver::fell(int distance) {
   const bool passed = occurred(distance);
-  if (!passed && (!occurred(rate) || event_value(distance) >= 0.0)) return false;
+  if (!passed && (!occurred(distance + 1) || event_value(distance) >= 0.0)) return false;
   // IDA's own bracket is 100 ulp wide: narrow it, on the same interpolant.
   const double first = last_step_start();
   double below = s(), above = first;

@@ -30,6 +30,7 @@ constexpr Unit units[] = {
     {"m.s2", "Absity", 0, 1, 2, 0},
     {"s", "Time", 0, 0, 1, 0},
     {"1/s", "Rate", 0, 0, -1, 0},
+    {"s/m", "InverseVelocity", 0, -1, 1, 0},
     {"rad", "Angle", 0, 0, 0, 1},
     {"Pa", "Pressure", 1, -1, -2, 0},
     {"N", "Force", 1, 1, -2, 0},

@@ -48,7 +48,10 @@ void require_allowed(const Variable& v, const Polynomial& p) {
   if ((v.type == Type::integer && !whole) || (v.type == Type::boolean && p[0] != 0.0 && p[0] != 1.0)) {
     throw std::invalid_argument("'" + v.name + "' = " + text(p[0]) + " is not of its type, " + name(v.type));
   }
-  if (!std::isfinite(p[1]) || !std::isfinite(p[2]) || (!v.continuous_input() && (p[1] != 0.0 || p[2] != 0.0))) {
+  const auto possible = [&v](double derivative) {
+    return std::isnan(derivative) || (v.continuous_input() && std::isfinite(derivative));
+  };
+  if (!possible(p[1]) || !possible(p[2])) {
     throw std::invalid_argument("'" + v.name + "' has impossible derivatives");
   }
 }
@@ -75,7 +78,7 @@ void Instance::reset() {
   for (const Variable* v : fixed_) starts.push_back(v->start);
   settings_ = std::make_shared<const std::vector<double>>(std::move(starts));
   values_.clear();
-  for (const Variable* v : inputs_) values_.push_back({v->start, 0.0, 0.0});
+  for (const Variable* v : inputs_) values_.push_back({v->start, unset, unset});
   time_ = 0.0;
   stop_time_ = std::numeric_limits<double>::infinity();
   tolerance_ = 0.0;
@@ -227,7 +230,8 @@ void Instance::step(double time, double size) {
   ensure_built();
   push_inputs();
   model_->step(size);
-  for (std::size_t i = 0; i < inputs_.size(); ++i) values_[i] = {inputs_[i]->consumed ? 0.0 : values_[i][0], 0.0, 0.0};
+  for (std::size_t i = 0; i < inputs_.size(); ++i)
+    values_[i] = {inputs_[i]->consumed ? 0.0 : values_[i][0], unset, unset};
   time_ = time + size;
 }
 
@@ -247,7 +251,7 @@ void Instance::save(Snapshot& s) const {
 
 void Instance::restore(Snapshot& s) {
   if (s.foreign) {
-    for (std::size_t i = 0; i < fixed_.size(); ++i) require_allowed(*fixed_[i], {(*s.settings)[i], 0.0, 0.0});
+    for (std::size_t i = 0; i < fixed_.size(); ++i) require_allowed(*fixed_[i], {(*s.settings)[i], unset, unset});
     for (std::size_t i = 0; i < inputs_.size(); ++i) require_allowed(*inputs_[i], s.inputs[i]);
   }
   built_ = built_ && s.built && tolerance_ == s.tolerance && (settings_ == s.settings || *settings_ == *s.settings);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -11,6 +12,8 @@ namespace fmi {
 
 /// A value and its first and second time derivative at the start of a step.
 using Polynomial = std::array<double, 3>;
+/// In place of a derivative that the importer has not set.
+inline constexpr double unset = std::numeric_limits<double>::quiet_NaN();
 
 /// The step could not be completed and the model is as before it: becomes fmi2Discard.
 class StepDiscarded : public std::runtime_error {

@@ -2,6 +2,7 @@
 // every fmi2Get/Set go by it. A value reference is the variable's position in the table.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
@@ -96,11 +97,15 @@ class TableBuilder {
     return v;
   }
 
-  /// An input that is a polynomial over the step.
+  /// An input that is a polynomial over the step, with 0 for derivatives that are unset.
   template <class Access>
   Variable& input(const std::string& name, const std::string& unit, const std::string& description, Access access) {
     Variable& v = add(name, unit, description, Causality::input);
-    v.set = [access](Model& m, const Polynomial& value) { access(static_cast<M&>(m)) = value; };
+    v.set = [access](Model& m, const Polynomial& value) {
+      Polynomial& input = access(static_cast<M&>(m)) = value;
+      for (double& derivative : input)
+        if (std::isnan(derivative)) derivative = 0.0;
+    };
     return v;
   }
 

@@ -9,10 +9,11 @@
 #include <vector>
 
 #include "../../src_spring/compliance.hpp"
+#include "../../src_spring/flat.hpp"
 #include "../../src_spring/held_contact.hpp"
+#include "../../src_spring/parameters.hpp"
 #include "../../src_spring/spring.hpp"
 #include "../adapter/table.hpp"
-#include "../adapter/text.hpp"
 
 namespace {
 
@@ -28,7 +29,7 @@ struct FmuParameters : Parameters {
 struct SpringModel final : fmi::Model {
   FmuParameters parameters;
   fmi::Polynomial contact_force{}, foundation_force{}, external_force{}, tip_velocity{}, forecast{};
-  fmi::Polynomial tip_displacement{};  ///< as last set; after a step where it was extrapolated to
+  fmi::Polynomial tip_displacement{0.0, fmi::unset, fmi::unset};  ///< as set; after a step, as extrapolated
   double impulse = 0.0;
   std::optional<Spring> spring;
   std::optional<spring::HeldContact> held;
@@ -42,8 +43,7 @@ struct SpringModel final : fmi::Model {
     if (p.contact_law == spring::ContactLaw::normal_compliance && parameters.communication_step > 0.0) {
       p.contact_law = spring::ContactLaw::external;
       spring.emplace(p);  // checks the parameters
-      held.emplace(spring::Compliance(p.compliance_stiffness, p.compliance_exponent), p.mass,
-                   parameters.communication_step,
+      held.emplace(law(), p.mass, parameters.communication_step,
                    std::array<double, 2>{parameters.tip_response, parameters.tip_response_2});
     } else {
       spring.emplace(p);
@@ -63,8 +63,8 @@ struct SpringModel final : fmi::Model {
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
     const bool goes_on = held && size > rounding * held->size();
     if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
-      throw fmi::StepDiscarded("a step of " + fmi::text(size) + " s, but communication_step = " +
-                               fmi::text(held->size()) + " s: steps must have that size, or the parameter be 0");
+      throw fmi::StepDiscarded("a step of " + spring::number(size) + " s, but communication_step = " +
+                               spring::number(held->size()) + " s: steps must have that size, or the parameter be 0");
     }
     std::vector<double> before;
     if (impulse != 0.0 || held) save(before);
@@ -82,8 +82,7 @@ struct SpringModel final : fmi::Model {
     } catch (const std::domain_error& e) {
       discard(e.what());
     }
-    const fmi::Polynomial& u = inputs.tip_displacement;
-    if (!held) tip_displacement = {u[0] + size * (u[1] + 0.5 * size * u[2]), u[1] + size * u[2], u[2]};
+    keep_tip();
     if (goes_on) {
       held->advance(message(), spring->displacement(), trial());
       if (!std::isfinite(held->force())) discard(no_force);
@@ -93,39 +92,37 @@ struct SpringModel final : fmi::Model {
   }
 
   double reaction() const { return held ? held->force() : spring->reaction(); }
-  double stiffness() const {  ///< of the law inside [N/m]
-    if (parameters.contact_law == spring::ContactLaw::external) return 0.0;
-    const spring::Compliance law(parameters.compliance_stiffness, parameters.compliance_exponent);
-    return law.slope(spring->displacement() - tip_displacement[0]);
-  }
-  double reaction_rate() const {
-    return held ? 0.0 : stiffness() * (spring->velocity() - acting().tip_displacement[1]);
-  }
-  /// Of what the held force follows before its first step only the value is known, later it follows nothing.
-  double by_tip(double slope) const { return !held ? slope : held->started() ? 0.0 : unknown; }
   double contact_energy() const { return held ? held->energy(spring->displacement()) : spring->contact_energy(); }
+  double reaction_rate() const {
+    const auto slopes = law_slopes();
+    return slopes.force_by_depth * (spring->velocity() - spring->tip()[1]) +
+           slopes.force_by_rate * (spring->acceleration() - tip()[2]);
+  }
+  // Of what the held force follows before its first step only the value is known, later it follows nothing.
+  double reaction_by_tip_displacement() const { return by_tip(-law_slopes().force_by_depth); }
+  double reaction_by_tip_velocity() const {
+    return by_tip(is_set(tip_displacement[1]) ? 0.0 : -law_slopes().force_by_rate);
+  }
+  double contact_energy_by_tip_displacement() const { return by_tip(-law().elastic(depth())); }
+  double dissipated_energy() const { return spring->dissipated_energy() + (held ? held->dissipated() : 0.0); }
 
   void save(std::vector<double>& state) const override {
     spring->save(state);
-    state.insert(state.end(), tip_displacement.begin(), tip_displacement.end());
-    if (held) {
-      const auto more = held->state();
-      state.insert(state.end(), more.begin(), more.end());
-    }
+    if (!held) return;
+    const auto more = spring::flat(held->state());
+    state.insert(state.end(), more.begin(), more.end());
   }
 
   void restore(const std::vector<double>& state) override {
-    const std::size_t own = tip_displacement.size() + (held ? spring::HeldContact::state_length : 0);
+    using Held = spring::HeldContact::State;
+    const std::size_t own = held ? spring::Flat<Held>{}.size() : 0;
     if (state.size() < own) throw std::invalid_argument("spring: a saved state is too short");
     const auto mine = state.end() - static_cast<std::ptrdiff_t>(own);
     std::optional<spring::HeldContact> restored = held;
-    if (!std::isfinite(mine[0]) || !std::isfinite(mine[1]) || !std::isfinite(mine[2])) {
-      throw std::invalid_argument("spring: the tip of a saved state is not finite");
-    }
-    if (restored) restored->restore(&mine[3]);
+    if (restored) restored->restore(spring::from_flat<Held>(&*mine));
     spring->restore({state.begin(), mine});
     held = restored;
-    tip_displacement = {mine[0], mine[1], mine[2]};
+    keep_tip();
   }
 
  private:
@@ -138,12 +135,41 @@ struct SpringModel final : fmi::Model {
 
   bool warned_ = false;
 
+  spring::Compliance law() const {
+    return {parameters.compliance_stiffness, parameters.compliance_exponent, parameters.compliance_damping};
+  }
+  /// y − u_tip [m]; negative without a law inside
+  double depth() const {
+    const bool inside = !held && parameters.contact_law == spring::ContactLaw::normal_compliance;
+    return inside ? spring->displacement() - spring->tip()[0] : -1.0;
+  }
+  spring::Compliance::Slopes law_slopes() const {
+    return depth() > 0.0 ? law().slopes(depth(), spring->velocity() - spring->tip()[1]) : spring::Compliance::Slopes{};
+  }
+  double by_tip(double partial) const { return !held ? partial : held->started() ? 0.0 : unknown; }
+
+  static bool is_set(double derivative) { return !std::isnan(derivative); }
+
+  /// The tip from now on: tip_velocity is its rate where tip_displacement has no derivative.
+  spring::Quadratic tip() const {
+    const auto& [u, rate, curvature] = tip_displacement;
+    if (!is_set(rate)) return {u, tip_velocity[0], is_set(curvature) ? curvature : tip_velocity[1]};
+    return {u, rate, is_set(curvature) ? curvature : 0.0};
+  }
+
+  /// Until tip_displacement is set again it is what it was extrapolated to.
+  void keep_tip() {
+    if (held) return;
+    const spring::Quadratic reached = spring->tip();
+    tip_displacement = {reached[0], reached[1] == tip_velocity[0] ? fmi::unset : reached[1], fmi::unset};
+  }
+
   /// A pair that is wired wrongly gains energy without a sign: say so, once.
   void check_wiring() {
     if (warned_) return;
     if (held && held->missed() >= most_missed) {
       warning = "the tip was not where it was foreseen in " + std::to_string(held->missed()) + " steps, by up to " +
-                fmi::text(held->farthest()) +
+                spring::number(held->farthest()) +
                 " m, so the contact gains or loses energy. Connect tip_displacement and tip_velocity_forecast of the "
                 "beam to the inputs of these names and reaction to its tip_force; set communication_step in both to "
                 "the step size, tip_response and tip_response_2 to the beam's; pass values on between the steps only, "
@@ -170,11 +196,7 @@ struct SpringModel final : fmi::Model {
     inputs.foundation_force = foundation_force;
     inputs.external_force = external_force[0];
     for (std::size_t i = 1; i < 3; ++i) inputs.contact_force[i] -= external_force[i];  // both act on the top alone
-    inputs.tip_displacement = tip_displacement;
-    if (tip_displacement[1] == 0.0 && tip_displacement[2] == 0.0) {
-      inputs.tip_displacement[1] = tip_velocity[0];
-      inputs.tip_displacement[2] = tip_velocity[1];
-    }
+    inputs.tip_displacement = tip();
     return inputs;
   }
 
@@ -242,10 +264,13 @@ fmi::Table make_table() {
       .range(1, 2)
       .choice = "ContactLaw";
   parameter("compliance_stiffness", "", &Parameters::compliance_stiffness,
-            "lambda in C = lambda*max(0, y - u_tip)^p [N/m^p]")
+            "lambda in C = lambda*max(0, d)^p*max(0, 1 + chi*d') [N/m^p], d = y - u_tip")
       .at_least(0)
       .typical(1e4);
   parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").range(1, 100);
+  parameter("compliance_damping", "s/m", &Parameters::compliance_damping,
+            "damping chi of the contact law (Hunt and Crossley); what it takes is in dissipated_energy")
+      .at_least(0);
   parameter(
       "communication_step", "s", &FmuParameters::communication_step,
       "for contact_law = 2 beside a beam with the same communication_step: size of all communication steps. If > 0, "
@@ -268,8 +293,9 @@ fmi::Table make_table() {
       .range(std::numeric_limits<double>::min(), 1e-2)
       .typical(1e-14);
 
-  const auto input = [&](const char* name, const char* unit, fmi::Polynomial SpringModel::*field, const char* text) {
-    add.input(name, unit, text, [field](SpringModel& m) -> fmi::Polynomial& { return m.*field; });
+  const auto input = [&](const char* name, const char* unit, fmi::Polynomial SpringModel::*field,
+                         const char* text) -> fmi::Variable& {
+    return add.input(name, unit, text, [field](SpringModel& m) -> fmi::Polynomial& { return m.*field; });
   };
   input("contact_force", "N", &SpringModel::contact_force,
         "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next step "
@@ -280,12 +306,14 @@ fmi::Table make_table() {
               [](SpringModel& m) -> double& { return m.impulse; });
   input("external_force", "N", &SpringModel::external_force,
         "external force f_s, positive upward; derivatives as for contact_force");
-  input(
-      "tip_displacement", "m", &SpringModel::tip_displacement,
-      "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives or else "
-      "by tip_velocity");
+  input("tip_displacement", "m", &SpringModel::tip_displacement,
+        "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives or "
+        "else by tip_velocity")
+      .set = [](fmi::Model& m, const fmi::Polynomial& value) {
+    static_cast<SpringModel&>(m).tip_displacement = value;  // with what is unset
+  };
   input("tip_velocity", "m/s", &SpringModel::tip_velocity,
-        "velocity of the beam's tip, read by contact_law = 2 where tip_displacement carries no derivatives; its "
+        "velocity of the beam's tip, read by contact_law = 2 where no derivative of tip_displacement is set; its "
         "derivative of order 1 is the tip's acceleration, that of order 2 is not used");
   input("tip_velocity_forecast", "m/s", &SpringModel::forecast,
         "for communication_step > 0: tip_velocity_forecast of the beam; its derivatives are not used");
@@ -301,12 +329,14 @@ fmi::Table make_table() {
   add.output(
          "reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
          [](const SpringModel& m) { return m.reaction(); }, [](const SpringModel& m) { return m.reaction_rate(); })
-      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement",
+      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "compliance_damping", "displacement",
+             "tip_displacement", "tip_velocity",
              // with communication_step > 0, of which the first is foreseen:
              "communication_step", "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping",
              "linear_stiffness", "cubic_stiffness", "external_force", "foundation_force", "stop_enabled",
              "stop_position", "restitution", "equilibrium"});
-  add.depends("tip_displacement", [](const SpringModel& m) { return m.by_tip(-m.stiffness()); });
+  add.depends("tip_displacement", [](const SpringModel& m) { return m.reaction_by_tip_displacement(); });
+  add.depends("tip_velocity", [](const SpringModel& m) { return m.reaction_by_tip_velocity(); });
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});
@@ -316,8 +346,9 @@ fmi::Table make_table() {
              [](const SpringModel& m) { return m.contact_energy(); })
       .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "equilibrium",
              "tip_displacement"});
-  add.depends("tip_displacement", [](const SpringModel& m) { return m.by_tip(-m.reaction()); });
-  add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Spring::dissipated_energy));
+  add.depends("tip_displacement", [](const SpringModel& m) { return m.contact_energy_by_tip_displacement(); });
+  add.output("dissipated_energy", "J", "work of the damping force and of the contact's damping since the start",
+             [](const SpringModel& m) { return m.dissipated_energy(); });
   add.output("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
              of(&Spring::impact_loss));
   add.output("internal_steps", "", "steps that IDA took since the start",

@@ -22,6 +22,8 @@ BASES: dict[str, list[dict[str, float]]] = {
     "spring": [
         {},
         {"contact_law": 2},
+        {"contact_law": 2, "compliance_damping": 0.2},
+        {**AHEAD, "compliance_damping": 0.2},
         {"contact_law": 2, "displacement": 0.0, "equilibrium": 0.3},
         AHEAD,
         {**AHEAD, "stop_enabled": False},

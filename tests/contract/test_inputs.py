@@ -262,3 +262,21 @@ def test_energy_of_the_spring_closes_through_lossy_impacts(spring: Any) -> None:
         total = sum(k.get("kinetic_energy", "potential_energy", "dissipated_energy", "impact_loss"))
         assert total == pytest.approx(2.0, rel=1e-11), i
     assert k.get("impact_loss") > 1.0
+
+
+def test_a_derivative_of_the_tip_that_is_set_counts_even_if_it_is_zero(spring: Any) -> None:
+    law = {"contact_law": 2, "mass": 1e9, "linear_stiffness": 0.0, "compliance_stiffness": 1e3}
+    reactions = []
+    for derivatives in ((), (0.0,), (0.25,), (0.0, 2.0)):
+        k = spring.running(**law, compliance_exponent=1.0)
+        k.set("tip_displacement", -0.1)
+        k.set("tip_velocity", -0.2)
+        token = k.state()
+        for order, value in enumerate(derivatives, 1):
+            assert k.derive("tip_displacement", order, value) == OK
+        copied = k.try_deserialize(k.serialized())[1]  # what is set belongs to the state
+        k.restore(token)
+        k.restore(copied)
+        k.step(0.0, 0.1)
+        reactions.append(k.get("reaction"))
+    assert reactions == pytest.approx([120.0, 100.0, 75.0, 90.0], rel=1e-6)

@@ -121,6 +121,7 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
             ("parameter", "N/m"): ["linear_stiffness"],
             ("parameter", "N/m3"): ["cubic_stiffness"],
             ("parameter", "m"): ["equilibrium", "stop_position"],
+            ("parameter", "s/m"): ["compliance_damping"],
             ("parameter", None): [
                 *("contact_law", "compliance_stiffness", "compliance_exponent", "stop_enabled", "restitution"),
                 *("relative_tolerance", "absolute_tolerance"),

@@ -25,6 +25,8 @@ SPRING |= {"stop_position": -0.015, **LAW}
 #: Connected by name, whether the pair looks ahead or not; `reaction` goes to `tip_force`.
 BY_NAME = ["tip_displacement", "tip_velocity", "tip_velocity_forecast"]
 
+STORED = ["kinetic_energy", "potential_energy", "contact_energy"]
+
 
 class Pair:
     """Both FMUs and their connections. `late`: all outputs are read before inputs are set."""
@@ -64,7 +66,7 @@ class Pair:
     def energy(self) -> float:
         names = ["kinetic_energy", "strain_energy", "dissipated_energy", "load_potential"]
         total = sum(self.beam.get(*names))
-        return float(total + sum(self.spring.get("kinetic_energy", "potential_energy", "contact_energy")))
+        return float(total + sum(self.spring.get(*STORED, "dissipated_energy", "impact_loss")))
 
     def run(self, end: float) -> np.ndarray:
         """Rows (time, y, total energy), from the next step on."""
@@ -111,6 +113,7 @@ def test_pair_that_looks_ahead_does_not_depend_on_the_order_of_reading(beam: Any
         {"integrator": 2},
         {"distributed_load": -0.7, "tip_load_coefficient": -0.3},
         {"external_force": -2.0},
+        {"compliance_damping": 0.5},
     ],
     ids=str,
 )
@@ -168,7 +171,7 @@ def test_spring_that_looks_ahead_refuses_steps_of_another_size(spring: Any) -> N
     k.step(0.0, 1e-3 * (1 + 1e-9))  # rounding of a tool's times
     before = k.outputs()
     assert k.try_step(1e-3 * (1 + 1e-9), 5e-4) == 2
-    assert "a step of 5e-04 s, but communication_step = 0.001 s" in k.message
+    assert "a step of 0.0005 s, but communication_step = 0.001 s" in k.message
     assert k.outputs() == before
 
 
@@ -278,6 +281,57 @@ def test_reaction_follows_the_tip_without_a_step(spring: Any) -> None:
     assert k.get("contact_energy") == pytest.approx(1e6 * 4e-4**2.5 / 2.5, rel=1e-14)
     k.set("tip_displacement", 1e-4)
     assert k.get("reaction") == 0.0
+
+
+def hunt_crossley(chi: float, tip: float, speed: float, end: float, steps: int) -> tuple[float, float, float]:
+    """y, velocity and what was dissipated of a mass of 1 kg at 0 under a tip at ``tip + speed t``, by Runge-Kutta."""
+    stiffness, exponent = LAW["compliance_stiffness"], LAW["compliance_exponent"]
+
+    def slope(t: float, state: np.ndarray) -> np.ndarray:
+        depth, rate = state[0] - tip - speed * t, state[1] - speed
+        elastic = stiffness * max(depth, 0.0) ** exponent
+        force = elastic * max(0.0, 1.0 + chi * rate)
+        return np.array([state[1], -3.0 * state[0] - force, (force - elastic) * rate])
+
+    state, h = np.zeros(3), end / steps
+    for i in range(steps):
+        t = i * h
+        a = slope(t, state)
+        b = slope(t + h / 2, state + h / 2 * a)
+        c = slope(t + h / 2, state + h / 2 * b)
+        state = state + h / 6 * (a + 2 * b + 2 * c + slope(t + h, state + h * c))
+    return float(state[0]), float(state[1]), float(state[2])
+
+
+@pytest.mark.parametrize("chi", [0.0, 0.3, 4.0])
+def test_damped_law_inside_follows_an_independent_integration(spring: Any, chi: float) -> None:
+    k = spring.running(contact_law=2, linear_stiffness=3.0, compliance_damping=chi, **LAW)
+    size, speed = 1e-3, -0.5
+    for i in range(20):
+        k.set("tip_displacement", i * size * speed)
+        k.set("tip_velocity", speed)
+        k.step(i * size, size)
+    y, velocity, dissipated = hunt_crossley(chi, 0.0, speed, 20 * size, 20_000)
+    assert k.get("displacement") == pytest.approx(y, rel=1e-9)
+    assert k.get("velocity") == pytest.approx(velocity, rel=1e-8)
+    assert k.get("dissipated_energy") == pytest.approx(dissipated, rel=1e-7, abs=1e-18)
+    # At the tip as it is set next.
+    k.set("tip_displacement", y - 1e-3)
+    k.set("tip_velocity", 0.0)
+    assert k.get("reaction") == pytest.approx(1e6 * 1e-3**1.5 * max(0.0, 1.0 + chi * velocity), rel=1e-6)
+    k.set("tip_velocity", 1e3)  # away, faster than 1/chi
+    assert k.get("reaction") == (0.0 if chi else pytest.approx(1e6 * 1e-3**1.5, rel=1e-6))
+
+
+def test_damped_pair_loses_what_it_says_at_any_step_and_the_same_at_small_ones(beam: Any, spring: Any) -> None:
+    lost = []
+    for size in (5e-4, 2.5e-4, 1.25e-4):
+        pair = Pair(beam, spring, size).start(compliance_damping=0.5, compliance_stiffness=1e4, restitution=0.9)
+        energy = pair.run(0.1)[2]
+        assert energy[2:] == pytest.approx(energy[2], abs=2e-12)
+        lost.append(pair.spring.get("dissipated_energy"))
+    assert lost[0] > 1e-3
+    assert abs(lost[2] - lost[1]) < 0.5 * abs(lost[1] - lost[0])
 
 
 def test_looking_ahead_belongs_to_the_state(beam: Any, spring: Any) -> None:

@@ -138,7 +138,6 @@ TEST(SpringState, RepeatedStepsAreBitIdentical) {
     Inputs inputs;
     inputs.contact_force = {0.3, -2.0, 11.0};
     inputs.tip_displacement = {-0.012, 0.05, 0.0};
-    inputs.tip_velocity = 0.05;
     s.step(1e-3, inputs);
     s.apply_impulse(-0.01);
     const auto start = saved(s);

@@ -238,7 +238,7 @@ TEST(SpringStop, SeatedUnderTheTip) {
   Spring s(p);
   Inputs inputs;
   inputs.tip_displacement[0] = -0.02;
-  inputs.tip_velocity = 0.04;
+  inputs.tip_displacement[1] = 0.04;
   s.observe(inputs);
   EXPECT_NEAR(s.reaction(), 1e5 * std::pow(0.01, 1.5), 1e-10);
   s.step(0.1, inputs);
