@@ -11,7 +11,7 @@ inline double value(const Quadratic& c, double t) { return c[0] + t * (c[1] + t 
 inline double rate(const Quadratic& c, double t) { return c[1] + t * c[2]; }
 /// ∫₀ᵗ p
 inline double integral(const Quadratic& c, double t) { return t * (c[0] + t * (c[1] / 2 + t * c[2] / 6)); }
-/// The same quantity with time counted from `t`.
+/// p with time counted from `t`.
 inline Quadratic shifted(const Quadratic& c, double t) { return {value(c, t), rate(c, t), c[2]}; }
 
 }  // namespace spring
