@@ -8,7 +8,6 @@ usage() {
 ./build.sh run [SCENE] [OPTION]…   set up, build, and simulate a scene (default: soft)
 ./build.sh test [PYTEST OPTION]…   set up, build, and run all tests (C++, then Python)
 ./build.sh fmus                    set up and build fmus/beam.fmu, spring.fmu and spring_beam.ssp
-./build.sh sources                 also get the source of SUNDIALS: spring.fmu can then be compiled from its own sources/
 ./build.sh win64                   also cross-compile for 64-bit Windows; the FMUs then carry both
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
 ./build.sh bench [GROUP]…          measure the speed and write the tables of docs/performance.md (minutes)
@@ -22,6 +21,8 @@ missing (Debian, Ubuntu), otherwise it names them. Variables:
   PYTHON             the Python to start from, 3.10 or later (default: python3)
   CXX                the C++17 compiler
   SPRINGBEAM_PREFIX  where Eigen, Spectra, SUNDIALS and GoogleTest are if not in the system (also: CMAKE_PREFIX_PATH)
+  SPRINGBEAM_SUNDIALS_SOURCE  source of SUNDIALS 6 or 7 (default: Debian's source package, fetched into build/source);
+                     empty: take the installed SUNDIALS
   SPRINGBEAM_CACHE   where `interop` puts the importers (default: ~/.cache/springbeam)
   CHROMIUM           the browser for `browser` (default: chromium, chromium-browser or google-chrome)
   JOBS               parallel compilations (default: all processors)
@@ -36,6 +37,7 @@ die() {
 
 readonly venv=.venv
 readonly python=$venv/bin/python
+readonly sundials=${SPRINGBEAM_SUNDIALS_SOURCE-fetched}
 
 # install_packages WHAT PACKAGE… — with apt as root; otherwise say what is missing.
 apt_updated=
@@ -90,12 +92,21 @@ has_header() {
   echo "#include <$1>" | "${CXX:-c++}" -std=c++17 -fsyntax-only "${flags[@]}" -x c++ - 2>/dev/null
 }
 
+# get_sundials — names the source of SUNDIALS in SPRINGBEAM_SUNDIALS_SOURCE, unless that is set.
+get_sundials() {
+  if [ -z "${SPRINGBEAM_SUNDIALS_SOURCE+set}" ]; then
+    SPRINGBEAM_SUNDIALS_SOURCE=$(fmus/sundials_source.sh build/source) || say "the installed SUNDIALS is used instead"
+  fi
+  export SPRINGBEAM_SUNDIALS_SOURCE
+  [ -n "$SPRINGBEAM_SUNDIALS_SOURCE" ]
+}
+
 set_up_system() {
   local missing=()
   command -v "${CXX:-c++}" >/dev/null || install_packages "a C++ compiler is" g++
   has_header Eigen/SparseCore || missing+=(libeigen3-dev)
   has_header Spectra/SymGEigsShiftSolver.h || missing+=(libspectra-dev)
-  has_header ida/ida.h || missing+=(libsundials-dev)
+  get_sundials || has_header ida/ida.h || missing+=(libsundials-dev)
   has_header gtest/gtest.h || missing+=(libgtest-dev)
   [ ${#missing[@]} = 0 ] || install_packages "libraries are" "${missing[@]}"
 }
@@ -106,11 +117,11 @@ build() {
   command -v flock >/dev/null && { flock -n 9 || { say "waiting for another build"; flock 9; }; }
   set_up_python dev
   local configured
-  configured="$PWD ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-} ${CXX:-}"
+  configured="$PWD ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-} ${CXX:-} $sundials"
   if [ "$(cat build/.configured 2>/dev/null)" != "$configured" ]; then
+    rm -rf build
     set_up_system
     say "configuring"
-    rm -rf build
     $venv/bin/cmake -S . -B build -G Ninja -DCMAKE_MAKE_PROGRAM="$PWD/$venv/bin/ninja" \
       -DPython3_EXECUTABLE="$PWD/$python" >build.log 2>&1 || {
       cat build.log >&2
@@ -118,10 +129,11 @@ build() {
       die "CMake stopped, see above"
     }
     mv build.log build/configure.log
+    say "$(grep -o 'SUNDIALS [0-9].*' build/configure.log)"
     printf '%s' "$configured" >build/.configured
   fi
   # Once asked for, Windows is kept up to date with the rest.
-  [ ! -f build/win64/beam.dll ] || fmus/win64/build.sh build/win64 $python
+  [ ! -f build/win64/beam.dll ] || { get_sundials && fmus/win64/build.sh build/win64 $python; }
   say "building"
   $venv/bin/ninja -C build ${JOBS:+-j "$JOBS"} --quiet "$@" >&2 || die "the build stopped, see above"
   exec 9<&-
@@ -144,14 +156,9 @@ case $command in
     $python -m pytest -n auto --dist worksteal -m "not slow" "$@" || failed="${failed:+$failed and }Python tests"
     [ -z "$failed" ] || die "failed: $failed"
     ;;
-  sources)
-    build fmus
-    fmus/sundials_source.sh build/source >/dev/null
-    build fmus
-    ls -l fmus/*.fmu
-    ;;
   win64)
     build fmus
+    get_sundials || true
     fmus/win64/build.sh build/win64 $python
     if ! command -v wine64 wine >/dev/null && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
       say "installing wine64, to test them"
@@ -163,7 +170,6 @@ case $command in
     ;;
   interop)
     build fmus
-    fmus/sundials_source.sh build/source >/dev/null && build fmus || say "spring.fmu cannot be compiled from its sources/"
     cache=${SPRINGBEAM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/springbeam}
     tests/interop/install.sh "$cache" "$python"
     SPRINGBEAM_CACHE=$cache exec $python -m pytest tests/interop "$@"
@@ -180,6 +186,7 @@ case $command in
     ;;
   wheel)
     build fmus
+    get_sundials || true
     $python -m pip install --quiet --disable-pip-version-check build
     rm -rf dist
     $python -m build --outdir dist .
@@ -198,6 +205,7 @@ case $command in
         -DPython3_EXECUTABLE="$PWD/$python" -DSPRINGBEAM_SANITIZE="$2" >/dev/null || die "CMake stopped, see above"
       $venv/bin/ninja -C build/$1 ${JOBS:+-j "$JOBS"} --quiet fuzz_beam fuzz_spring >&2 || die "the build stopped, see above"
     }
+    get_sundials || true
     say "building with sanitizers"
     sanitized memory address,undefined,float-cast-overflow
     sanitized thread thread

@@ -11,7 +11,8 @@ TARGET = ROOT / "docs" / "fmu_variables.md"
 HEAD = """# Variables of the FMUs
 
 Made from the FMUs by `python docs/fmu_variables.py`. Everything is SI, up is positive; what the symbols mean is in
-[model.md](model.md). A polynomial input is continued over a step by its FMI input derivatives of order 1 and 2.
+[model.md](model.md). Every input but an impulse is continued over a step by its FMI input derivatives of order 1 and 2.
+What is local can be read like an output; tools that record or plot every output leave it alone.
 """
 
 
@@ -21,7 +22,7 @@ def table(name: str) -> str:
     shown: set[str] = set()
     for variable in description.modelVariables:
         stem = variable.name.split("[")[0]
-        if variable.causality not in ("input", "output", "parameter") or stem in shown:
+        if stem in shown:
             continue
         label = variable.name
         if stem != variable.name:

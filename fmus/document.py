@@ -15,7 +15,7 @@ STYLE = (
     "table{border-collapse:collapse;width:100%}td,th{border:1px solid #ccc;padding:.2em .5em;text-align:left;"
     "vertical-align:top}code{white-space:nowrap}"
 )
-HEADINGS = {"parameter": "Parameters", "input": "Inputs", "output": "Outputs"}
+HEADINGS = {"parameter": "Parameters", "input": "Inputs", "output": "Outputs", "local": "Shape"}
 
 
 def row(variable: ET.Element) -> str:
@@ -43,6 +43,8 @@ def document(description: ET.Element, equations: str) -> str:
     ]
     variables = list(description.iter("ScalarVariable"))
     for causality, heading in HEADINGS.items():
+        if causality not in {v.get("causality") for v in variables}:
+            continue
         parts.append(f"<h2>{heading}</h2><table>")
         parts.append(
             "<tr>" + "".join(f"<th>{h}</th>" for h in ("Name", "Type", "Unit", "Start", "Range", "")) + "</tr>"

@@ -1,6 +1,6 @@
 """Gather what an FMU can be compiled from: its C++ files, all headers they include, and SUNDIALS if it is at hand.
 
-Usage: sources.py OUT [--sundials FOLDER | --without NAME] [--headers PREFIX=FOLDER]… FILE…
+Usage: sources.py OUT [--sundials FOLDER | --without NAME] [--headers PREFIX=FOLDER]… [FILE…]
 
 OUT/sources is filled as the FMU's sources/: files of this project where they are in its tree, other headers by the
 name they are included under, so that sources/ itself is the one include folder. OUT/list has the names to compile, one
@@ -149,8 +149,8 @@ def gather(arguments: argparse.Namespace) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(usage=__doc__)
     parser.add_argument("out", type=Path)
-    parser.add_argument("files", type=Path, nargs="+")
+    parser.add_argument("files", type=Path, nargs="*")
     parser.add_argument("--headers", action="append", default=[])
     parser.add_argument("--sundials", type=Path)
     parser.add_argument("--without")
-    gather(parser.parse_args())
+    gather(parser.parse_intermixed_args())

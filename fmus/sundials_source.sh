@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# sundials_source.sh OUT — puts the source of SUNDIALS into OUT/sundials… once and prints that folder: a link to the one
-# that SPRINGBEAM_SUNDIALS_SOURCE names, otherwise Debian's source package.
+# sundials_source.sh OUT — puts the source of SUNDIALS, Debian's source package, into OUT/sundials… once and prints that
+# folder.
 set -euo pipefail
 mkdir -p "$1/lists/partial" "$1/parts"
 out=$(cd "$1" && pwd)
@@ -9,14 +9,10 @@ die() {
   printf '\nsundials_source: %s\n' "$*" >&2
   exit 1
 }
-found() { find "$out" -maxdepth 1 -name 'sundials*' \( -type d -o -type l \) | sort | head -n 1; }
+found() { find "$out" -mindepth 1 -maxdepth 1 -name 'sundials*' -type d | sort | head -n 1; }
 
-if [ -n "${SPRINGBEAM_SUNDIALS_SOURCE:-}" ]; then
-  [ -f "$SPRINGBEAM_SUNDIALS_SOURCE/src/ida/ida.c" ] ||
-    die "SPRINGBEAM_SUNDIALS_SOURCE=$SPRINGBEAM_SUNDIALS_SOURCE has no src/ida/ida.c"
-  ln -sfn "$(cd "$SPRINGBEAM_SUNDIALS_SOURCE" && pwd)" "$out/sundials"
-elif [ -z "$(found)" ]; then
-  command -v apt-get >/dev/null || die "name a folder with the source of SUNDIALS 6 or 7: SPRINGBEAM_SUNDIALS_SOURCE=…"
+if [ -z "$(found)" ]; then
+  command -v apt-get >/dev/null || die "there is no apt-get to fetch the source of SUNDIALS with"
   printf "== fetching Debian's source package of SUNDIALS\n" >&2
   # The machine's own package sources, asked for sources: most systems have only the binaries enabled.
   sed -n 's/^deb /deb-src /p' /etc/apt/sources.list >"$out/sources.list" 2>/dev/null || true
@@ -28,6 +24,6 @@ elif [ -z "$(found)" ]; then
     -o "Dir::State::lists=$out/lists" -o APT::Sandbox::User=root)
   (cd "$out" && "${apt[@]}" update && "${apt[@]}" source --download-only sundials &&
     tar xf sundials_*.orig.tar.*) >"$out/fetch.log" 2>&1 ||
-    die "could not fetch it (see $out/fetch.log); name a folder: SPRINGBEAM_SUNDIALS_SOURCE=…"
+    die "could not fetch it, see $out/fetch.log"
 fi
 found

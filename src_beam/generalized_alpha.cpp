@@ -2,12 +2,15 @@
 
 #include <Eigen/SparseCholesky>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include "step_cache.hpp"
 #include "timoshenko.hpp"
 
 namespace beam {
@@ -122,19 +125,20 @@ struct StepMatrix {
 /// The midpoint rule's w without tip force. It is linear in that force: a coupling that repeats a step from one state
 /// with other forces solves once.
 struct FreeStep {
-  double size = 0.0, distributed_load = 0.0;  // size 0: none
+  double size = 0.0, load = 0.0, hat = 0.0;  // size 0: none
   VectorXd q, v, w;
 
-  bool holds(double h, double load, const VectorXd& q_now, const VectorXd& v_now) const {
-    return h == size && load == distributed_load && q_now == q && v_now == v;
+  bool holds(double h, double mean_load, double hat_load, const VectorXd& q_now, const VectorXd& v_now) const {
+    return h == size && mean_load == load && hat_load == hat && q_now == q && v_now == v;
   }
 };
 
-class GeneralizedAlphaBeam final : public BeamIntegrator {
+class GeneralizedAlphaBeam final : public Beam {
  public:
-  explicit GeneralizedAlphaBeam(const Parameters& p)
-      : mesh_(p),
-        mu_(p.density * p.area),
+  GeneralizedAlphaBeam(const Parameters& p, Timoshenko mesh)
+      : Beam(p, static_cast<std::size_t>((p.rho_inf == 1.0 ? 2 : 3) * mesh.size()) + remembered),
+        mesh_(std::move(mesh)),
+        mu_(mesh_.mass_per_length()),
         alpha_(p.alpha_b),
         midpoint_(p.rho_inf == 1.0),
         linear_(p.element_degree == 1),
@@ -144,105 +148,101 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
         gamma_(0.5 - alpha_m_ + alpha_f_),
         K_(mesh_.stiffness()),
         M_(mesh_.mass()),
-        uniform_load_(mesh_.uniform_load() / mu_),
-        hat_load_(p.tip_load_coefficient / mu_ * mesh_.hat_load()),
+        uniform_load_(mesh_.uniform_load()),
+        hat_load_(mesh_.hat_load()),
         tip_response_(mesh_.mass_solve(mesh_.unit_tip_force()) / mu_),
-        compliance_(mesh_.flexibility_times(mesh_.unit_tip_force())[mesh_.tip_index()] / mu_),
         q_(p.initial_deflection_slope * mesh_.linear_shape()),
         v_(p.initial_velocity_slope * mesh_.linear_shape()),
         a_(VectorXd::Zero(midpoint_ ? 0 : mesh_.size())),
-        rhs_(mesh_.size()),
-        w_(mesh_.size()),
-        work_(mesh_.size()),
-        work2_(mesh_.size()) {
+        q0_(mesh_.size()),
+        v0_(mesh_.size()),
+        a0_(a_),
+        rhs_(mesh_.size()) {
     const auto largest = [](const auto& values) { return values.cwiseAbs().maxCoeff(); };
     ordinary_ = true;
-    for (const double value : {largest(K_.coeffs()), largest(uniform_load_), largest(hat_load_), largest(tip_response_),
-                               mu_, 1.0 / mu_, alpha_, 1.0 / mesh_.radius_of_gyration()}) {
+    for (const double value : {largest(K_.coeffs()), largest(uniform_load_), std::abs(hat_) * largest(hat_load_),
+                               largest(tip_response_), mu_, 1.0 / mu_, alpha_, 1.0 / mesh_.radius_of_gyration()}) {
       ordinary_ = ordinary_ && value < ordinary;
     }
-    find_load();
-  }
-
-  void step(double size, const TipForce& c, double distributed_load) override {
-    const StepMatrix& S = cache_.get(size, [this](double h, StepMatrix& matrix) { factorise(h, matrix); });
-    if (midpoint_) {
-      midpoint_step(S, size, c, distributed_load);
-    } else {
-      alpha_step(S, size, c, distributed_load);
-    }
-  }
-
-  void apply_tip_impulse(double impulse) override {
-    w_ = v_ + impulse * tip_response_;
-    if (!w_.allFinite()) throw_not_finite(0.0, {impulse, 0.0, 0.0}, now_.distributed_load);
-    v_.swap(w_);
-    if (!midpoint_) now_.pending_impulse += impulse;
-  }
-
-  void set_distributed_load(double distributed_load) override {
-    if (distributed_load == now_.distributed_load) return;
-    if (!midpoint_ && now_.started) now_.pending_load += distributed_load - now_.distributed_load;
-    now_.distributed_load = distributed_load;
-    find_load();
   }
 
   double tip_displacement() const override { return q_[mesh_.tip_index()]; }
   double tip_velocity() const override { return v_[mesh_.tip_index()]; }
-  double tip_acceleration() const override { return mu_ * tip_response_.dot(residual_force()); }
+  double tip_acceleration() const override {
+    VectorXd force = -mu_ * mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
+    force += now_.distributed_load * uniform_load_ + hat_ * hat_load_;
+    force[mesh_.tip_index()] += now_.tip_force;
+    return tip_response_.dot(force);
+  }
   double tip_rotation() const override { return q_[mesh_.tip_rotation_index()] / mesh_.radius_of_gyration(); }
-  double tip_displacement_integral() const override { return now_.integral; }
-  double tip_displacement_integral_2() const override { return now_.integral_2; }
   double kinetic_energy() const override { return 0.5 * mu_ * mesh_.mass_norm2(v_); }
   double strain_energy() const override { return 0.5 * mu_ * mesh_.stiffness_norm2(q_); }
-  double dissipated_energy() const override { return now_.dissipated; }
-  double load_potential() const override { return -mu_ * load_.dot(q_); }
+  double deflection_integral() const override { return uniform_load_.dot(q_); }
   double tip_mass() const override { return 1.0 / tip_response_[mesh_.tip_index()]; }
-  double static_tip_compliance() const override { return compliance_; }
-  void deflection(std::array<double, shape_points>& u) const override { mesh_.sample_deflection(q_.data(), u.data()); }
-  void rotation(std::array<double, shape_points>& theta) const override {
+  double static_tip_compliance() const override {
+    return mesh_.flexibility_times(mesh_.unit_tip_force())[mesh_.tip_index()] / mu_;
+  }
+  void deflection(Shape& u) const override { mesh_.sample_deflection(q_.data(), u.data()); }
+  void rotation(Shape& theta) const override {
     mesh_.sample_scaled_rotation(q_.data(), theta.data());
     for (double& value : theta) value /= mesh_.radius_of_gyration();
   }
-  std::vector<double> frequencies() const override { return {}; }
-
-  void save(std::vector<double>& state) const override {
-    state.clear();
-    state.reserve(static_cast<std::size_t>(q_.size() + v_.size() + a_.size()) + 8);
-    for (const VectorXd* x : {&q_, &v_, &a_}) state.insert(state.end(), x->data(), x->data() + x->size());
-    for (const double value : {now_.integral, now_.integral_2, now_.dissipated, now_.end_force, now_.distributed_load,
-                               now_.pending_impulse, now_.pending_load, now_.started ? 1.0 : 0.0}) {
-      state.push_back(value);
-    }
-  }
-
-  void restore(const std::vector<double>& state) override {
-    const double* from = state.data();
-    for (VectorXd* x : {&q_, &v_, &a_}) {
-      *x = Eigen::Map<const VectorXd>(from, x->size());
-      from += x->size();
-    }
-    const double distributed_load = from[4];
-    set_distributed_load(distributed_load);
-    now_.integral = from[0];
-    now_.integral_2 = from[1];
-    now_.dissipated = from[2];
-    now_.end_force = from[3];
-    now_.pending_impulse = from[5];
-    now_.pending_load = from[6];
-    now_.started = from[7] != 0.0;
-  }
 
  private:
-  void midpoint_step(const StepMatrix& S, double h, const TipForce& c, double distributed_load) {
-    if (!free_.holds(h, distributed_load, q_, v_)) {
-      start_with_load(0.5 * h, 0.0, distributed_load);
-      mesh_.add_products(1.0, v_, -0.5 * h, q_, rhs_);
+  double advance(double h, const Polynomial& c, const Polynomial& f) override {
+    const StepMatrix& S = cache_.get(h, [this](double size, StepMatrix& matrix) { factorise(size, matrix); });
+    q0_.swap(q_);
+    v0_.swap(v_);
+    a0_.swap(a_);
+    before_ = last_;
+    const double loss = midpoint_ ? midpoint_step(S, h, mean_over(c, h), mean_over(f, h)) : alpha_step(S, h, c, f);
+    const double u0 = q0_[mesh_.tip_index()], u1 = q_[mesh_.tip_index()];
+    now_.integral = 0.5 * h * (u0 + u1);
+    now_.integral_2 = h * h * (2.0 * u0 + u1) / 6.0;
+    now_.dissipated += loss;
+    last_ = {value_at(c, h), value_at(f, h), 0.0, 1.0};
+    return q_.squaredNorm() + v_.squaredNorm() + a_.squaredNorm();
+  }
+
+  void undo() override {
+    q_.swap(q0_);
+    v_.swap(v0_);
+    a_.swap(a0_);
+    last_ = before_;
+  }
+
+  void strike(double impulse) override {
+    v_ += impulse * tip_response_;
+    last_.impulse += impulse;
+  }
+
+  double hat_work() const override { return hat_load_.dot(q_); }
+
+  void save_motion(double* numbers) const override {
+    for (const VectorXd* x : {&q_, &v_, &a_}) numbers = std::copy_n(x->data(), x->size(), numbers);
+    for (const double value : {last_.tip_force, last_.load, last_.impulse, last_.started}) *numbers++ = value;
+  }
+
+  void restore_motion(const double* numbers) override {
+    for (VectorXd* x : {&q_, &v_, &a_}) {
+      *x = Eigen::Map<const VectorXd>(numbers, x->size());
+      numbers += x->size();
+    }
+    last_ = {numbers[0], numbers[1], numbers[2], numbers[3]};
+  }
+
+  /// Makes q_ and v_ from q0_ and v0_; returns the loss.
+  double midpoint_step(const StepMatrix& S, double h, double force, double load) {
+    const VectorXd &q = q0_, &v = v0_;
+    if (!free_.holds(h, load, hat_, q, v)) {
       free_.size = 0.0;
+      rhs_ = (0.5 * h / mu_) * (load * uniform_load_ + hat_ * hat_load_);
+      mesh_.add_products(1.0, v, -0.5 * h, q, rhs_);
       solve(S, free_.w);
-      free_.q = q_;
-      free_.v = v_;
-      free_.distributed_load = distributed_load;
+      free_.q = q;
+      free_.v = v;
+      free_.load = load;
+      free_.hat = hat_;
       free_.size = h;
     }
     if (response_size_ != h) {
@@ -251,52 +251,46 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
       solve(S, response_);
       response_size_ = h;
     }
-    w_ = free_.w + mean_force(c, h) * response_;
-
-    work_ = q_ + h * w_;
-    work2_ = 2.0 * w_ - v_;
-    const double loss = alpha_ > 0.0 ? mu_ * h * alpha_ * mesh_.stiffness_norm2(w_) : 0.0;
-    finish(h, c, distributed_load, loss, nullptr);
+    w_ = free_.w + force * response_;
+    q_ = q + h * w_;
+    v_ = 2.0 * w_ - v;
+    return alpha_ > 0.0 ? mu_ * h * alpha_ * mesh_.stiffness_norm2(w_) : 0.0;
   }
 
-  void alpha_step(const StepMatrix& S, double h, const TipForce& c, double distributed_load) {
-    VectorXd a = a_;
-    if (add_missing_force(c[0], distributed_load)) {
+  /// Makes q_, v_ and a_ from q0_, v0_ and a0_; returns the loss.
+  double alpha_step(const StepMatrix& S, double h, const Polynomial& c, const Polynomial& load) {
+    const VectorXd &q = q0_, &v = v0_;
+    VectorXd a = a0_;
+    if (add_missing_force(c[0], load[0])) {
       solve(S, w_);
       a += (1.0 - alpha_m_) * w_;
     }
     const double f = 1.0 - alpha_f_;
-    start_with_load(1.0, force_at(c, f * h), distributed_load);
-    work2_ = alpha_ * (v_ + (f * (1.0 - gamma_) * h) * a) + q_ + (f * h) * (v_ + ((0.5 - beta_) * h) * a);
-    mesh_.add_products(-alpha_m_, a, -1.0, work2_, rhs_);
-    VectorXd a1(mesh_.size());
-    solve(S, a1);
-
-    work_ = q_ + h * (v_ + h * ((0.5 - beta_) * a + beta_ * a1));
-    work2_ = v_ + h * ((1.0 - gamma_) * a + gamma_ * a1);
-    double loss = 0.0;
-    if (alpha_ > 0.0) {
-      w_ = f * work2_ + alpha_f_ * v_;
-      mesh_.stiffness_times(w_.data(), rhs_.data());
-      loss = mu_ * alpha_ * (work_ - q_).dot(rhs_);
-    }
-    finish(h, c, distributed_load, loss, &a1);
+    rhs_ = (value_at(load, f * h) * uniform_load_ + hat_ * hat_load_) / mu_;
+    rhs_[mesh_.tip_index()] += value_at(c, f * h) / mu_;
+    w_ = alpha_ * (v + (f * (1.0 - gamma_) * h) * a) + q + (f * h) * (v + ((0.5 - beta_) * h) * a);
+    mesh_.add_products(-alpha_m_, a, -1.0, w_, rhs_);
+    solve(S, a_);
+    q_ = q + h * (v + h * ((0.5 - beta_) * a + beta_ * a_));
+    v_ = v + h * ((1.0 - gamma_) * a + gamma_ * a_);
+    if (alpha_ == 0.0) return 0.0;
+    w_ = f * v_ + alpha_f_ * v;
+    return mu_ * alpha_ * (q_ - q).dot(mesh_.stiffness_times(w_));
   }
 
-  /// rhs_ = the force that a_ does not know of yet; false if there is none.
-  bool add_missing_force(double tip_force, double distributed_load) {
-    if (!now_.started) {
-      rhs_ = hat_load_ - mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
-      rhs_ += distributed_load * uniform_load_;
+  /// rhs_ = the force that the acceleration at the step's start does not know of yet; false if there is none.
+  bool add_missing_force(double tip_force, double load) {
+    if (last_.started == 0.0) {
+      rhs_ = (load * uniform_load_ + hat_ * hat_load_) / mu_ - mesh_.stiffness_times(VectorXd(q0_ + alpha_ * v0_));
       rhs_[mesh_.tip_index()] += tip_force / mu_;
       return true;
     }
-    const double load = distributed_load - now_.distributed_load + now_.pending_load,
-                 force = tip_force - now_.end_force;
-    if (load == 0.0 && force == 0.0 && now_.pending_impulse == 0.0) return false;
-    rhs_ = load * uniform_load_;
-    rhs_[mesh_.tip_index()] += force / mu_;
-    if (now_.pending_impulse != 0.0) rhs_ -= (alpha_ * now_.pending_impulse) * mesh_.stiffness_times(tip_response_);
+    load -= last_.load;
+    tip_force -= last_.tip_force;
+    if (load == 0.0 && tip_force == 0.0 && last_.impulse == 0.0) return false;
+    rhs_ = (load / mu_) * uniform_load_;
+    rhs_[mesh_.tip_index()] += tip_force / mu_;
+    if (last_.impulse != 0.0) rhs_ -= (alpha_ * last_.impulse) * mesh_.stiffness_times(tip_response_);
     return true;
   }
 
@@ -312,49 +306,8 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   void solve(const StepMatrix& S, VectorXd& x) {
     solve_once(S, x);
     mesh_.add_products(-S.mass, x, -S.stiffness, x, rhs_);
-    solve_once(S, work_);
-    x += work_;
-  }
-
-  // Accepts work_ and work2_ as the new q and v, or throws.
-  void finish(double h, const TipForce& c, double distributed_load, double loss, VectorXd* a1) {
-    const double u0 = q_[mesh_.tip_index()], u1 = work_[mesh_.tip_index()];
-    const Scalars before = now_;
-    q_.swap(work_);
-    v_.swap(work2_);
-    if (a1 != nullptr) a_.swap(*a1);
-    now_.integral = 0.5 * h * (u0 + u1);
-    now_.integral_2 = h * h * (2.0 * u0 + u1) / 6.0;
-    now_.dissipated += loss;
-    now_.end_force = force_at(c, h);
-    if (distributed_load != before.distributed_load) set_distributed_load(distributed_load);
-    now_.pending_impulse = 0.0;
-    now_.pending_load = 0.0;
-    now_.started = true;
-    const bool harmless = ordinary_ && q_.squaredNorm() < ordinary && v_.squaredNorm() < ordinary &&
-                          ordinary_inputs(h, c, distributed_load);
-    if (!harmless && !(outputs_finite(*this) && a_.allFinite())) {
-      q_.swap(work_);
-      v_.swap(work2_);
-      if (a1 != nullptr) a_.swap(*a1);
-      set_distributed_load(before.distributed_load);
-      now_ = before;
-      throw_not_finite(h, c, distributed_load);
-    }
-  }
-
-  void find_load() { load_ = now_.distributed_load * uniform_load_ + hat_load_; }
-
-  void start_with_load(double factor, double tip_force, double distributed_load) {
-    rhs_ = (factor * distributed_load) * uniform_load_ + factor * hat_load_;
-    rhs_[mesh_.tip_index()] += factor * tip_force / mu_;
-  }
-
-  /// (F − K q − α_b K v)/ρA under the loads of the last step's end.
-  VectorXd residual_force() const {
-    VectorXd force = load_ - mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
-    force[mesh_.tip_index()] += now_.end_force / mu_;
-    return force;
+    solve_once(S, correction_);
+    x += correction_;
   }
 
   void factorise(double h, StepMatrix& S) const {
@@ -379,39 +332,35 @@ class GeneralizedAlphaBeam final : public BeamIntegrator {
   }
 
   Timoshenko mesh_;
-  double mu_;     // ρA [kg/m]: all below is per ρA
+  double mu_;     // ρA [kg/m]: matrices and what is solved for them are per ρA
   double alpha_;  // α_b [s]
   bool midpoint_, linear_;
-  bool ordinary_;  // no coefficient is so large that an output could overflow, see integrator.hpp
   double alpha_m_, alpha_f_, beta_, gamma_;
   Eigen::SparseMatrix<double> K_, M_;  // with the same pattern
   VectorXd uniform_load_, hat_load_;
   VectorXd tip_response_;  // M⁻¹e/ρA [1/kg], the velocity that a unit impulse leaves
-  double compliance_;
 
   VectorXd q_, v_, a_;  // state [m, m/s, m/s²]; a only for ρ∞ < 1
-  VectorXd load_;
-  struct Scalars {
-    double distributed_load = 0.0, end_force = 0.0;
-    double integral = 0.0, integral_2 = 0.0;
-    double dissipated = 0.0;
-    // What a_ does not know of yet, besides the jump of C [N·s, N/m]; all of it before the first step.
-    double pending_impulse = 0.0, pending_load = 0.0;
-    bool started = false;
+  struct Last {
+    double tip_force, load;  // at the end of the last step: what a_ knows of
+    double impulse;          // since then [N·s]
+    double started;          // 0 before the first step, when a_ knows of nothing
   };
-  Scalars now_;
+  static constexpr std::size_t remembered = sizeof(Last) / sizeof(double);
+  Last last_{}, before_{};
 
   FreeStep free_;
   VectorXd response_;  // w of a unit tip force, for steps of response_size_
   double response_size_ = 0.0;
-  VectorXd rhs_, w_, work_, work2_;  // work space
+  VectorXd q0_, v0_, a0_;          // those of the last step's start
+  VectorXd rhs_, w_, correction_;  // work space
   StepCache<StepMatrix> cache_;
 };
 
 }  // namespace
 
-std::unique_ptr<BeamIntegrator> make_generalized_alpha_beam(const Parameters& parameters) {
-  return std::make_unique<GeneralizedAlphaBeam>(parameters);
+std::unique_ptr<Beam> make_generalized_alpha_beam(const Parameters& parameters) {
+  return std::make_unique<GeneralizedAlphaBeam>(parameters, Timoshenko(parameters));
 }
 
 }  // namespace beam

@@ -8,9 +8,10 @@
 //
 // For ρ∞ = 1 the acceleration drops out, and the step is, with the mean velocity w = (q₁ − q₀)/h,
 //   [M + (h²/4 + α_b h/2) K] w = M v₀ + (h/2)(F̄/ρA − K q₀),   q₁ = q₀ + h w,   v₁ = 2w − v₀,
-// F̄ the mean of F over the step. Then E₁ − E₀ = F̄ᵀ(q₁ − q₀) − h α_b wᵀK w holds to rounding, whatever happened to F
-// or v between the steps. One step of iterative refinement, with K applied element by element, makes that rounding
-// relative to the strain energy instead of to ‖K‖‖w‖² (1e-13 instead of 1e-7 at EI = KAG = 3.6e10, n = 1000).
+// F̄ the mean of F over the step (for ρ∞ < 1 F is taken at t + (1−α_f)h). Then E₁ − E₀ = F̄ᵀ(q₁ − q₀) − h α_b wᵀK w holds
+// to rounding, whatever happened to F or v between the steps. One step of iterative refinement, with K applied element
+// by element, makes that rounding relative to the strain energy instead of to ‖K‖‖w‖² (1e-13 instead of 1e-7 at EI =
+// KAG = 3.6e10, n = 1000).
 //
 // For ρ∞ < 1 the stored a₀ lacks what happened since the last step: a jump of C or f_b, an impulse that changed the
 // damping force, or at the start everything. Left out, it would cost the order: an error h (½−α_f) Δa in v.
@@ -25,10 +26,10 @@
 
 #include <memory>
 
-#include "integrator.hpp"
+#include "beam.hpp"
 
 namespace beam {
 
-std::unique_ptr<BeamIntegrator> make_generalized_alpha_beam(const Parameters& parameters);
+std::unique_ptr<Beam> make_generalized_alpha_beam(const Parameters& parameters);
 
 }  // namespace beam

@@ -207,7 +207,7 @@ Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
   const bool dense = size <= 40 || (size <= max_dense_unknowns && count > size / 4);
 
   Index columns = count;
-  MatrixXd basis(size, std::min(size, count + 4));
+  MatrixXd basis(size, std::min(size, count + 3));
   basis.leftCols(count) = dense ? dense_modes(mesh, count) : lanczos_modes(mesh, count);
 
   Modes modes;
@@ -227,13 +227,10 @@ Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
   }
 
   if (count < size) {
-    const auto add = [&](const VectorXd& shape) {
+    for (const VectorXd& shape : {mesh.flexibility_times(mesh.unit_tip_force()),
+                                  mesh.flexibility_times(mesh.uniform_load()), mesh.linear_shape()}) {
       if (columns < basis.cols()) augment(mesh, shape, basis, columns);
-    };
-    add(mesh.flexibility_times(mesh.unit_tip_force()));
-    add(mesh.flexibility_times(mesh.uniform_load()));
-    if (p.tip_load_coefficient != 0.0) add(mesh.flexibility_times(mesh.hat_load()));
-    if (p.initial_deflection_slope != 0.0 || p.initial_velocity_slope != 0.0) add(mesh.linear_shape());
+    }
     basis.conservativeResize(Eigen::NoChange, columns);
   }
 

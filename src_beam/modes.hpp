@@ -3,10 +3,15 @@
 // Modes are the lowest n of K φ = ω² M φ. Kept alone they would be too stiff at the tip, so the basis is augmented
 // by the M-orthogonal residuals of static shapes (modal truncation augmentation: Dickens, Nakagawa & Wittbrodt,
 // "A critique of mode acceleration and modal truncation augmentation methods for modal response analysis",
-// Computers & Structures 62, 1997, 985–998): K⁻¹e of the tip force, K⁻¹F of the uniform load, of the hat load if there
-// is one, and u = x if the beam starts from it. A Rayleigh–Ritz step diagonalises all of them together; what is added
-// behaves as a few more modes of high frequency. So the static tip compliance and the initial state are those of the
-// full mesh for any n ≥ 1, and everything stays a linear mechanical system with a mass and a continuous state.
+// Computers & Structures 62, 1997, 985–998): K⁻¹e of the tip force, K⁻¹F of the uniform load, and u = x, the shape of
+// every start. A Rayleigh–Ritz step diagonalises all of them together; what is added behaves as three more modes of
+// high frequency. So the static tip compliance and the initial state are those of the full mesh for any n ≥ 1, and
+// everything stays a linear mechanical system with a mass and a continuous state.
+//
+// These three are always there: the basis follows from the mesh and n alone, not from what the beam is loaded with.
+// The hat load has no shape of its own. With K⁻¹e in the basis the static u(L) is exact under any load (it is the
+// work of that load on K⁻¹e), and outside the last elements a hat load acts as a tip force. Its shape would add a mode
+// as fast as the mesh's fastest, and with it a tip mass of the order ρA h.
 //
 // The alternative, adding the missing compliance as a massless spring in series (static or residual-flexibility
 // correction), would let u(L) jump whenever C does: the tip's velocity, its work and a gap kept closed would have no

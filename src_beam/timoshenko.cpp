@@ -17,7 +17,7 @@ struct Timoshenko::Strains {
 };
 
 /// One field of an element: the end values of its linear part P_0, P_1, and its coefficients f_j of P_j, 2 ≤ j ≤ p.
-/// ∫f² dx = h/6 (l² + r² + (l + r)²) + Σ h/(2j+1) f_j².
+/// ∫f² dx = h/6 (l² + r² + (l + r)²) + Σ h/(2j+1) f_j², its consistent mass.
 struct Timoshenko::Field {
   double left, right;
   std::array<double, max_element_degree + 1> f;
@@ -27,6 +27,9 @@ Timoshenko::Timoshenko(const Parameters& p)
     : n_(p.n_elements),
       p_(p.element_degree),
       h_(p.length / p.n_elements),
+      top_(p.mass_matrix == MassMatrix::averaged ? 2.0 : 1.0),
+      end_(p_ == 1 && top_ == 2.0 ? h_ / 12.0 : h_ / 6.0),
+      ratio_(p_ == 1 && top_ == 2.0 ? 5.0 : 2.0),
       mu_(p.density * p.area),
       r_(std::sqrt(p.second_moment_of_area / p.area)),
       b_(p.young_modulus / p.density),
@@ -86,7 +89,6 @@ Timoshenko::Field Timoshenko::field(Degree p, double left, const double* q) cons
 
 template <typename Degree>
 void Timoshenko::multiply_mass(Degree p, const double* x, double* __restrict y) const {
-  const double m = h_ / 6.0;
   const Index block = 2 * p;
   for (Index f = 0; f < 2; ++f) {
     double node = 0.0;        // value at the left end; the clamp to begin with
@@ -95,20 +97,20 @@ void Timoshenko::multiply_mass(Degree p, const double* x, double* __restrict y) 
       const double* q = x + e * block + f;
       double* out = y + e * block + f;
       const Field v = field(p, node, q);
-      if (e > 0) *(out - 2) = m * (l + 2.0 * (r + v.left) + v.right);
+      if (e > 0) *(out - 2) = end_ * (l + ratio_ * (r + v.left) + v.right);
       l = v.left;
       r = v.right;
       node = q[block - 2];
       // Moments of the field with P_j: with P_0 and P_1 from the ends, with the others h f_j/(2j+1).
       std::array<double, max_element_degree + 1> moment;
-      moment[0] = 3.0 * m * (l + r);
-      moment[1] = m * (r - l);
+      moment[0] = 3.0 * end_ * (l + r);
+      moment[1] = end_ * (r - l);
       for (Index k = 2; k <= p; ++k) {
-        moment[k] = h_ * v.f[k] / static_cast<double>(2 * k + 1);
+        moment[k] = (k < p ? h_ : h_ * top_) * v.f[k] / static_cast<double>(2 * k + 1);
         out[2 * k - 4] = (moment[k] - moment[k - 2]) / static_cast<double>(2 * k - 1);
       }
     }
-    y[(n_ - 1) * block + f + block - 2] = m * (l + 2.0 * r);
+    y[(n_ - 1) * block + f + block - 2] = end_ * (l + ratio_ * r);
   }
 }
 
@@ -147,7 +149,7 @@ void Timoshenko::multiply_stiffness(Degree p, const double* x, double* __restric
 }
 
 void Timoshenko::add_linear_products(double a, const double* x, double c, const double* z, double* __restrict y) const {
-  const double m = a * h_ / 6.0, lever = 0.5 * h_ / r_, bend = c * b_top_ / h_, slide = c * s_;
+  const double m = a * end_, lever = 0.5 * h_ / r_, bend = c * b_top_ / h_, slide = c * s_;
   double theta0 = 0.0, u0 = 0.0;                      // of z, at the left node
   double moment = 0.0, shear = 0.0;                   // of the element to the left
   double left[2] = {0.0, 0.0}, here[2] = {0.0, 0.0};  // x at the nodes before the left one and there
@@ -155,8 +157,8 @@ void Timoshenko::add_linear_products(double a, const double* x, double c, const 
     const Strains s = strains(Linear(), theta0, u0, z + i);
     const double moment1 = bend * s.h_kappa[0], shear1 = slide * s.gamma[0];
     if (i > 0) {
-      y[i - 2] += m * (left[0] + 4.0 * here[0] + x[i]) + ((moment - moment1) - lever * (shear + shear1));
-      y[i - 1] += m * (left[1] + 4.0 * here[1] + x[i + 1]) + (shear - shear1);
+      y[i - 2] += m * (left[0] + 2.0 * ratio_ * here[0] + x[i]) + ((moment - moment1) - lever * (shear + shear1));
+      y[i - 1] += m * (left[1] + 2.0 * ratio_ * here[1] + x[i + 1]) + (shear - shear1);
     }
     for (Index f = 0; f < 2; ++f) {
       left[f] = here[f];
@@ -167,8 +169,8 @@ void Timoshenko::add_linear_products(double a, const double* x, double c, const 
     theta0 = z[i];
     u0 = z[i + 1];
   }
-  y[tip_rotation_index()] += m * (left[0] + 2.0 * here[0]) + (moment - lever * shear);
-  y[tip_index()] += m * (left[1] + 2.0 * here[1]) + shear;
+  y[tip_rotation_index()] += m * (left[0] + ratio_ * here[0]) + (moment - lever * shear);
+  y[tip_index()] += m * (left[1] + ratio_ * here[1]) + shear;
 }
 
 void Timoshenko::add_products(double a, const Eigen::VectorXd& x, double c, const Eigen::VectorXd& z,
@@ -284,13 +286,16 @@ double Timoshenko::sum_mass(Degree p, const double* x) const {
   for (Index i = 0; i < size(); i += 2 * p) {
     const double* q = x + i;
     const Field t = field(p, theta0, q), u = field(p, u0, q + 1);
-    linear += (t.left * t.left + t.right * t.right + (t.left + t.right) * (t.left + t.right)) +
-              (u.left * u.left + u.right * u.right + (u.left + u.right) * (u.left + u.right));
-    for (Index j = 2; j <= p; ++j) rest += (t.f[j] * t.f[j] + u.f[j] * u.f[j]) / static_cast<double>(2 * j + 1);
+    for (const Field& f : {t, u}) {
+      linear += (ratio_ - 1.0) * (f.left * f.left + f.right * f.right) + (f.left + f.right) * (f.left + f.right);
+    }
+    for (Index j = 2; j <= p; ++j) {
+      rest += (j < p ? 1.0 : top_) * (t.f[j] * t.f[j] + u.f[j] * u.f[j]) / static_cast<double>(2 * j + 1);
+    }
     theta0 = q[2 * p - 2];
     u0 = q[2 * p - 1];
   }
-  return linear * h_ / 6.0 + h_ * rest;
+  return linear * end_ + h_ * rest;
 }
 
 template <typename Degree>
@@ -345,12 +350,11 @@ Eigen::SparseMatrix<double> Timoshenko::mass() const {
     Eigen::VectorXd unit = Eigen::VectorXd::Zero(2 * p_);
     if (j > 0) unit[2 * j - 2] = 1.0;
     const Field v = field(p_, j == 0 ? 1.0 : 0.0, unit.data());
-    const double m = h_ / 6.0;
-    element(0, j) = m * (2.0 * v.left + v.right);
-    element(p_, j) = m * (v.left + 2.0 * v.right);
-    double below[2] = {3.0 * m * (v.left + v.right), m * (v.right - v.left)};
+    element(0, j) = end_ * (ratio_ * v.left + v.right);
+    element(p_, j) = end_ * (v.left + ratio_ * v.right);
+    double below[2] = {3.0 * end_ * (v.left + v.right), end_ * (v.right - v.left)};
     for (Index k = 2; k <= p_; ++k) {
-      const double moment = h_ * v.f[k] / static_cast<double>(2 * k + 1);
+      const double moment = (k < p_ ? h_ : h_ * top_) * v.f[k] / static_cast<double>(2 * k + 1);
       element(k - 1, j) = (moment - below[k % 2]) / static_cast<double>(2 * k - 1);
       below[k % 2] = moment;
     }

@@ -55,6 +55,10 @@ void validate(const Parameters& p) {
            "between 1 and " + std::to_string(max_elements / p.element_degree) + " (" + std::to_string(max_elements) +
                " over element_degree)");
   }
+  if (p.mass_matrix != MassMatrix::consistent && p.mass_matrix != MassMatrix::averaged) {
+    reject("mass_matrix", static_cast<int>(p.mass_matrix),
+           std::string("1 (") + mass_matrix_names[0] + ") or 2 (" + mass_matrix_names[1] + ")");
+  }
   switch (p.integrator) {
     case Integrator::modal: {
       const int unknowns = 2 * p.n_elements * p.element_degree;
@@ -75,7 +79,8 @@ void validate(const Parameters& p) {
       if (!(p.rho_inf >= 0.0 && p.rho_inf <= 1.0)) reject("rho_inf", p.rho_inf, "between 0 and 1");
       break;
     default:
-      reject("integrator", static_cast<int>(p.integrator), "1 (modal) or 2 (generalized_alpha)");
+      reject("integrator", static_cast<int>(p.integrator),
+             std::string("1 (") + integrator_names[0] + ") or 2 (" + integrator_names[1] + ")");
   }
 }
 

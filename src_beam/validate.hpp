@@ -7,16 +7,6 @@
 
 namespace beam {
 
-/// Highest polynomial degree of an element.
-inline constexpr int max_element_degree = 12;
-
-/// Most elements times their degree that a beam may have; bounds memory, not the mathematics.
-inline constexpr int max_elements = 1000000;
-
-/// Most unknowns of a dense eigenproblem: of the mesh (two per element and degree) where all modes are wanted, of the
-/// reduced basis where some are.
-inline constexpr int max_dense_unknowns = 1000;
-
 /// @throws std::invalid_argument for the first parameter that is not allowed
 void validate(const Parameters& parameters);
 

@@ -26,16 +26,13 @@ enum Unknown { q, p, A, B, e, unknowns };
 
 }  // namespace
 
-std::vector<Crossing> Flight::crossings(const Laws& laws) {
-  std::vector<Crossing> list;
-  if (std::isfinite(laws.hilltop)) list.push_back(Crossing::falling);
-  for (bool active : {laws.stop, laws.compliance})
-    if (active) list.insert(list.end(), {Crossing::falling, Crossing::rising});
-  return list;
-}
-
 Flight::Flight(const Motion& motion, const Laws& laws)
-    : motion_(motion), laws_(laws), solver_(unknowns, crossings(laws)) {}
+    : motion_(motion),
+      laws_(laws),
+      hilltop_(add_events(crossings_, std::isfinite(laws.hilltop), {Crossing::falling})),
+      stop_(add_events(crossings_, laws.stop, {Crossing::falling, Crossing::rising})),
+      contact_(add_events(crossings_, laws.compliance, {Crossing::falling, Crossing::rising})),
+      solver_(unknowns, crossings_) {}
 
 void Flight::prepare(const FlightStart& start) {
   start_ = start;
@@ -44,17 +41,17 @@ void Flight::prepare(const FlightStart& start) {
 
   auto d = motion_.derivatives(y, z, start.loads, false, 0.0);
   touching_ = false;
-  std::array<double, 4> depth{};
+  Compliance::Depth depth{};
   if (laws_.compliance) {
     const auto depths = [&] {
-      const auto& u = start.loads.tip.c;
-      return std::array<double, 5>{start.depth, z - u[1], d[2] - u[2], d[3], d[4]};
+      const auto& u = start.loads.tip;
+      return Compliance::Depth{start.depth, z - u[1], d[2] - u[2], d[3], d[4]};
     };
     touching_ = Watch::direction(depths()) > 0.0;
     contact_sign_ = touching_ ? 1.0 : -1.0;
     if (touching_) d = motion_.derivatives(y, z, start.loads, true, start.depth);
-    auto distance = depths();
-    depth = {distance[0], distance[1], distance[2], distance[3]};
+    depth = depths();
+    auto distance = depth;
     for (double& value : distance) value *= contact_sign_;
     contact_watch_ = Watch(distance);
   }
@@ -63,18 +60,24 @@ void Flight::prepare(const FlightStart& start) {
 
   const double travel = std::abs(z) * H + std::abs(d[2]) * H * H / 2;
   const double depth_travel = std::abs(depth[1]) * H + std::abs(depth[2]) * H * H / 2;
-  const double force = touching_ ? contact.force(start.depth) : 0.0;
-  const double rate = motion_.rate(std::abs(y) + travel, touching_ ? contact.slope(start.depth + depth_travel) : 0.0);
+  const double deepest = start.depth + depth_travel;
+  const double force = touching_ ? contact.force(start.depth, depth[1]) : 0.0;
+  const double rate =
+      motion_.rate(std::abs(y) + travel, touching_ ? contact.slopes(deepest, depth[1]) : Compliance::Slopes{});
   const bool resolved = H * rate <= resolved_limit;
   const bool smooth = !touching_ || contact.analytic() || start.depth > 2.0 * depth_travel;
   const int order = !resolved ? 0 : smooth ? 4 : 2;
   R_ = Taylor({d[0], d[1], d[2], d[3], d[4]}, order);
 
   remainder_ = motion_.remainder(R_, start.loads);
-  contact_taylor_ = {};
+  contact_taylor_ = dissipation_taylor_ = {};
   if (touching_ && order >= 2) {
-    const auto c = contact.rates({start.depth, depth[1], depth[2], 0.0});
-    for (std::size_t k = 0; k <= static_cast<std::size_t>(order - 2); ++k) contact_taylor_[k] = c[k];
+    const auto c = contact.rates(depth);
+    const auto lost = contact.dissipation(depth);
+    for (std::size_t k = 0; k <= static_cast<std::size_t>(order - 2); ++k) {
+      contact_taylor_[k] = c[k];
+      dissipation_taylor_[k] = lost[k];
+    }
   }
 
   // Tolerances: of y and z by what they and their change over the step (or over 1/rate) are, then scaled.
@@ -92,7 +95,9 @@ void Flight::prepare(const FlightStart& start) {
   double* tolerance = solver_.absolute_tolerance();
   tolerance[q] = tolerance[A] = tolerance[B] = tolerance_y;
   tolerance[p] = H * tolerance_z;
-  tolerance[e] = motion_.mass() * (velocity + tolerance_z) * tolerance_z;
+  const double lost = touching_ ? contact.continued(start.depth, depth[1]).dissipation : 0.0;
+  tolerance[e] =
+      motion_.mass() * (velocity + tolerance_z) * tolerance_z + noise_margin * epsilon * span * std::abs(lost);
 
   // First step: the error of the low orders that IDA begins with, from the first derivative that R leaves out.
   double h = H;
@@ -113,7 +118,7 @@ void Flight::prepare(const FlightStart& start) {
     // The power law has no second derivative or outgrows its rates at the start: the velocity from its growth instead.
     const auto growth = [&](double t) {
       const double deeper = start.depth + t * (std::abs(depth[1]) + t * std::abs(depth[2]) / 2);
-      return t * (contact.force(deeper) - force) / motion_.mass();
+      return t * (contact.force(deeper, depth[1]) - force) / motion_.mass();
     };
     while (halvings < most_halvings && growth(std::ldexp(H, -halvings)) > tolerance_z) ++halvings;
   }
@@ -125,23 +130,24 @@ void Flight::prepare(const FlightStart& start) {
   std::fill(Yp, Yp + unknowns, 0.0);
   Y[p] = Yp[q] = H * (z - R_.rate(0.0));
   Yp[p] = H * H * (order == 0 ? d[2] : 0.0);
-  Yp[e] = order == 0 ? H * motion_.damping() * z * z : 0.0;
+  if (order == 0) Yp[e] = H * (motion_.damping() * z * z + contact.dissipation(depth)[0]);
 }
 
 Flight::Event Flight::run(const FlightStart& start) {
   prepare(start);
   solver_.start(*this, relative_, h0_, start.most_steps);
-  const int first = std::isfinite(laws_.hilltop) ? 1 : 0;
-  const int stop = first, contact = first + (laws_.stop ? 2 : 0);
   Event event = Event::none;
   while (event == Event::none && solver_.advance() == IdaSolver::Outcome::event) {
-    if (first == 1 && solver_.occurred(0)) event = Event::hilltop;
-    if (laws_.stop && event == Event::none && solver_.fell(stop, stop + 1)) event = Event::stop;
-    if (laws_.compliance && event == Event::none && solver_.fell(contact, contact + 1)) event = Event::contact;
+    if (hilltop_ >= 0 && solver_.occurred(hilltop_))
+      event = Event::hilltop;
+    else if (stop_ >= 0 && solver_.fell(stop_))
+      event = Event::stop;
+    else if (contact_ >= 0 && solver_.fell(contact_))
+      event = Event::contact;
   }
   finish();
-  if (event == Event::none && std::abs(y_) > laws_.hilltop) event = Event::hilltop;
-  if (event == Event::none && laws_.stop && gap_ < -solver_.absolute_tolerance()[q])
+  if (event == Event::none && laws_.to_hilltop(y_) < 0.0) event = Event::hilltop;
+  if (event == Event::none && laws_.stop && start.gap + (y_ - start.y) < -solver_.absolute_tolerance()[q])
     throw IdaError("the top passed the stop unnoticed");
   return event;
 }
@@ -153,11 +159,10 @@ void Flight::finish() {
   const double* Y = solver_.value();
   const double rise = R_.rise(t) + Y[q];
   y_ = start_.y + rise;
-  gap_ = start_.gap + rise;
   z_ = R_.rate(t) + Y[p] / H;
   integral_ = R_.integral(t) + H * Y[A];
   integral_2_ = R_.integral_2(t) + H * H * Y[B];
-  dissipated_ = motion_.damping() * R_.squared_rate_integral(t) + Y[e];
+  dissipated_ = motion_.damping() * R_.squared_rate_integral(t) + spring::integral(dissipation_taylor_, t) + Y[e];
 }
 
 double Flight::remainder(double t) const {
@@ -167,52 +172,54 @@ double Flight::remainder(double t) const {
 }
 
 double Flight::contact_depth(double rise, double t) const {
-  const auto& u = start_.loads.tip.c;
+  const auto& u = start_.loads.tip;
   return start_.depth + rise - t * (u[1] + t * u[2] / 2);
 }
 
 bool Flight::residual(double s, const double* Y, const double* Yp, double* F) const noexcept {
   const double H = start_.size, t = H * s;
-  const double w = Y[p] / H;
-  double contact = 0.0;
+  const double w = Y[p] / H, z = R_.rate(t) + w;
+  Compliance::Effect contact{};  // in excess of the Taylor terms
   if (touching_) {
-    const auto& c = contact_taylor_;
-    contact =
-        motion_.compliance().continued_force(contact_depth(R_.rise(t) + Y[q], t)) - (c[0] + t * (c[1] + t * c[2] / 2));
+    contact = motion_.compliance().continued(contact_depth(R_.rise(t) + Y[q], t), contact_rate(z, t));
+    contact.force -= spring::value(contact_taylor_, t);
+    contact.dissipation -= spring::value(dissipation_taylor_, t);
   }
   F[q] = Yp[q] - Y[p];
-  F[p] = Yp[p] - H * H * motion_.excess_acceleration(R_(t), Y[q], w, remainder(t), contact);
+  F[p] = Yp[p] - H * H * motion_.excess_acceleration(R_(t), Y[q], w, remainder(t), contact.force);
   F[A] = Yp[A] - Y[q];
   F[B] = Yp[B] - Y[A];
-  F[e] = Yp[e] - H * motion_.damping() * w * (2.0 * R_.rate(t) + w);
+  F[e] = Yp[e] - H * (motion_.damping() * w * (R_.rate(t) + z) + contact.dissipation);
   return std::isfinite(F[p]) && std::isfinite(F[e]);
 }
 
 void Flight::jacobian(double s, double c, const double* Y, const double*, double* J) const noexcept {
   const double H = start_.size, t = H * s;
-  const double rise = R_.rise(t) + Y[q];
-  const double slope = touching_ ? motion_.compliance().continued_slope(contact_depth(rise, t)) : 0.0;
+  const double rise = R_.rise(t) + Y[q], z = R_.rate(t) + Y[p] / H;
+  Compliance::Slopes contact{};
+  if (touching_) contact = motion_.compliance().slopes(contact_depth(rise, t), contact_rate(z, t));
   const auto at = [J](int row, int column) -> double& { return J[column * unknowns + row]; };
   for (int i = 0; i < unknowns; ++i) at(i, i) = c;
   at(q, p) = -1.0;
-  at(p, q) = -H * H * motion_.acceleration_by_displacement(start_.y + rise, slope);
-  at(p, p) = c - H * motion_.acceleration_by_velocity();
+  at(p, q) = -H * H * motion_.acceleration_by_displacement(start_.y + rise, contact.force_by_depth);
+  at(p, p) = c - H * motion_.acceleration_by_velocity(contact.force_by_rate);
   at(A, q) = -1.0;
   at(B, A) = -1.0;
-  at(e, p) = -2.0 * motion_.damping() * (R_.rate(t) + Y[p] / H);
+  at(e, q) = -H * contact.dissipation_by_depth;
+  at(e, p) = -2.0 * motion_.damping() * z - contact.dissipation_by_rate;
 }
 
 void Flight::events(double s, const double* Y, double* g) const noexcept {
   const double H = start_.size, t = H * s;
   const double rise = R_.rise(t) + Y[q], z = R_.rate(t) + Y[p] / H;
-  if (std::isfinite(laws_.hilltop)) *g++ = laws_.hilltop - std::abs(start_.y + rise);
-  if (laws_.stop) {
-    *g++ = stop_watch_.distance(start_.gap + rise, t);
-    *g++ = stop_watch_.rate(z, t);
+  if (hilltop_ >= 0) g[hilltop_] = laws_.to_hilltop(start_.y + rise);
+  if (stop_ >= 0) {
+    g[stop_] = stop_watch_.distance(start_.gap + rise, t);
+    g[stop_ + 1] = stop_watch_.rate(z, t);
   }
-  if (laws_.compliance) {
-    *g++ = contact_watch_.distance(contact_sign_ * contact_depth(rise, t), t);
-    *g++ = contact_watch_.rate(contact_sign_ * (z - start_.loads.tip.rate(t)), t);
+  if (contact_ >= 0) {
+    g[contact_] = contact_watch_.distance(contact_sign_ * contact_depth(rise, t), t);
+    g[contact_ + 1] = contact_watch_.rate(contact_sign_ * contact_rate(z, t), t);
   }
 }
 

@@ -1,16 +1,18 @@
 // Free motion of the spring's top over one segment of a step, as an implicit system for IDA.
 //
 // With R the Taylor polynomial of the start (taylor.hpp), scaled time s = τ/H, w = ẏ − Ṙ:
-//     q = y − R,   p = H w,   A = ∫₀ˢ q,   B = ∫₀ˢ A,   e = D − ∫ α_s Ṙ² dτ        (D: dissipated energy)
-//     F = ( q' − p,   p' − H²[ÿ(y, ẏ, τ) − R̈],   A' − q,   B' − A,   e' − H α_s w (2Ṙ + w) ) = 0,
-// where ÿ − R̈ is evaluated without cancellation (motion.hpp). q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H²
-// B. All unknowns are under error control, see tolerances in flight.cpp.
+//     q = y − R,   p = H w,   A = ∫₀ˢ q,   B = ∫₀ˢ A,   e = D − ∫ (α_s Ṙ² + d_R) dτ
+//     F = ( q' − p,   p' − H²[ÿ(y, ẏ, τ) − R̈],   A' − q,   B' − A,   e' − H [α_s w (2Ṙ + w) + d − d_R] ) = 0,
+// D the dissipated energy, d what the contact dissipates and d_R its Taylor polynomial. ÿ − R̈ is evaluated without
+// cancellation (motion.hpp). q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H² B. All unknowns are under error
+// control, see tolerances in flight.cpp.
 //
 // Events: [hilltop] |y| reaches the hilltop; [stop] y − φ falls to 0; [contact] y − u_tip changes sign. A rate (ẏ,
 // ẏ − u̇_tip) that rises through 0 marks a minimum of the gap, so that a gap that dips below 0 between two internal
 // steps is noticed. See watch.hpp for gaps that start at 0.
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "ida_solver.hpp"
@@ -27,6 +29,9 @@ struct Laws {
   double stop_position;
   bool compliance;
   double relative_tolerance, absolute_tolerance;
+
+  /// How far the top is from escaping [m]; a stop at the lower hilltop or above keeps it from that one.
+  double to_hilltop(double y) const { return hilltop - (stop && stop_position >= -hilltop ? y : std::abs(y)); }
 };
 
 /// Where a segment starts, and what may be known better than by subtraction.
@@ -53,7 +58,6 @@ class Flight final : public ImplicitSystem {
   double elapsed() const;  ///< τ
   double displacement() const { return y_; }
   double velocity() const { return z_; }
-  double gap() const { return gap_; }
   double integral() const { return integral_; }
   double integral_2() const { return integral_2_; }
   double dissipated() const { return dissipated_; }
@@ -64,25 +68,29 @@ class Flight final : public ImplicitSystem {
   void events(double s, const double* Y, double* g) const noexcept override;
 
  private:
-  static std::vector<Crossing> crossings(const Laws& laws);
   void prepare(const FlightStart& start);
   double remainder(double t) const;
   double contact_depth(double rise, double t) const;
+  double contact_rate(double z, double t) const { return z - rate(start_.loads.tip, t); }
   void finish();
 
   const Motion& motion_;
   const Laws laws_;
+  // Event functions: where each begins, −1 if there is none. A distance is followed by its rate.
+  std::vector<Crossing> crossings_;
+  const int hilltop_, stop_, contact_;
   IdaSolver solver_;
   // The segment.
   FlightStart start_{};
   Taylor R_;
-  std::array<double, 13> remainder_{};      ///< of the equation of motion along R
-  std::array<double, 3> contact_taylor_{};  ///< contact force terms that R accounts for
+  std::array<double, 13> remainder_{};  ///< of the equation of motion along R
+  Quadratic contact_taylor_{};          ///< of the contact force, as far as R accounts for it
+  Quadratic dissipation_taylor_{};      ///< d_R
   bool touching_ = false;
   double contact_sign_ = 1.0;
   Watch stop_watch_, contact_watch_;
   double relative_ = 0.0, h0_ = 1.0;
-  double y_ = 0.0, z_ = 0.0, gap_ = 0.0, integral_ = 0.0, integral_2_ = 0.0, dissipated_ = 0.0;
+  double y_ = 0.0, z_ = 0.0, integral_ = 0.0, integral_2_ = 0.0, dissipated_ = 0.0;
 };
 
 }  // namespace spring

@@ -2,6 +2,7 @@
 // Memory is allocated once; every start() re-initialises IDA completely, so the result depends on the arguments alone.
 #pragma once
 
+#include <initializer_list>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -20,7 +21,7 @@ class ImplicitSystem {
   virtual void events(double s, const double* Y, double* g) const noexcept = 0;
 };
 
-/// IDA gave up; the message is IDA's.
+/// IDA gave up; the message names the flag.
 class IdaError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -34,6 +35,9 @@ class TooMuchWork : public IdaError {
 
 /// Which sign changes of an event function count.
 enum class Crossing { falling = -1, rising = 1 };
+
+/// Append `added` to the list of event functions if they are `wanted`. @return the number of the first, −1 if not
+int add_events(std::vector<Crossing>& list, bool wanted, std::initializer_list<Crossing> added);
 
 class IdaSolver {
  public:
@@ -58,9 +62,9 @@ class IdaSolver {
   double s() const;                ///< reached
   const double* value() const;     ///< Y(s)
   bool occurred(int event) const;  ///< after Outcome::event
-  /// After Outcome::event, for a distance and its rate among the event functions: the distance passed 0, or is found
-  /// below 0 at its minimum; s() and value() are then moved back to where it passed 0.
-  bool fell(int distance, int rate);
+  /// After Outcome::event, for a distance among the event functions, followed by its rate: the distance passed 0, or is
+  /// found below 0 at its minimum; s() and value() are then moved back to where it passed 0.
+  bool fell(int distance);
   long steps() const;  ///< internal steps since start()
 
  private:

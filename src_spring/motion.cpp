@@ -7,12 +7,11 @@ namespace spring {
 Loads Loads::from(const Parameters& parameters, const Inputs& inputs) {
   Loads loads;
   for (std::size_t i = 0; i < 3; ++i) {
-    loads.force.c[i] = -inputs.contact_force[i];
-    if (!parameters.stop_enabled) loads.force.c[i] += inputs.foundation_force[i];
+    loads.force[i] = -inputs.contact_force[i];
+    if (!parameters.stop_enabled) loads.force[i] += inputs.foundation_force[i];
   }
-  loads.force.c[0] += inputs.external_force;
-  loads.tip.c = inputs.tip_displacement;
-  if (loads.tip.c[1] == 0.0 && loads.tip.c[2] == 0.0) loads.tip.c[1] = inputs.tip_velocity;
+  loads.force[0] += inputs.external_force;
+  loads.tip = inputs.tip_displacement;
   return loads;
 }
 
@@ -21,7 +20,7 @@ Motion::Motion(const Parameters& parameters)
       damping_(parameters.damping),
       k1_(parameters.linear_stiffness),
       k2_(parameters.cubic_stiffness),
-      compliance_(parameters.compliance_stiffness, parameters.compliance_exponent) {}
+      compliance_(parameters.compliance_stiffness, parameters.compliance_exponent, parameters.compliance_damping) {}
 
 double Motion::acceleration(double y, double z, double force, double contact) const {
   return (force - damping_ * z - (k1_ + k2_ * y * y) * y - contact) / mass_;
@@ -33,20 +32,19 @@ double Motion::acceleration_by_displacement(double y, double contact_slope) cons
 
 std::array<double, 6> Motion::derivatives(double y, double z, const Loads& loads, bool touching, double depth) const {
   const double k = k1_ + 3.0 * k2_ * y * y;  // tangent stiffness
-  std::array<double, 4> contact{};
-  const auto& F = loads.force.c;
-  const auto& u = loads.tip.c;
-  const double a = acceleration(y, z, F[0], touching ? compliance_.force(depth) : 0.0);
-  // The contact's n-th derivative needs δ's n-th: each is known when it is its turn.
-  const auto contact_rates = [&](double jerk) {
-    if (touching) contact = compliance_.rates({depth, z - u[1], a - u[2], jerk});
+  const auto& F = loads.force;
+  const auto& u = loads.tip;
+  std::array<double, 6> d{y, z};
+  double &a = d[2], &j = d[3], &s = d[4];
+  // The contact's n-th derivative needs the motion's (n+1)-th: each is known when it is its turn.
+  const auto contact = [&](std::size_t n) {
+    return touching ? compliance_.rates({depth, z - u[1], a - u[2], j, s})[n] : 0.0;
   };
-  contact_rates(0.0);
-  const double j = (F[1] - damping_ * a - k * z - contact[1]) / mass_;
-  const double s = (F[2] - damping_ * j - k * a - 6.0 * k2_ * y * z * z - contact[2]) / mass_;
-  contact_rates(j);
-  const double c = (-damping_ * s - k * j - 18.0 * k2_ * y * z * a - 6.0 * k2_ * z * z * z - contact[3]) / mass_;
-  return {y, z, a, j, s, c};
+  a = acceleration(y, z, F[0], contact(0));
+  j = (F[1] - damping_ * a - k * z - contact(1)) / mass_;
+  s = (F[2] - damping_ * j - k * a - 6.0 * k2_ * y * z * z - contact(2)) / mass_;
+  d[5] = (-damping_ * s - k * j - 18.0 * k2_ * y * z * a - 6.0 * k2_ * z * z * z - contact(3)) / mass_;
+  return d;
 }
 
 std::array<double, 13> Motion::remainder(const Taylor& R, const Loads& loads) const {
@@ -61,7 +59,7 @@ std::array<double, 13> Motion::remainder(const Taylor& R, const Loads& loads) co
   for (std::size_t k = 0; k < n; ++k) r[k] -= k1_ * c[k];
   for (std::size_t k = 1; k < n; ++k) r[k - 1] -= damping_ * static_cast<double>(k) * c[k];
   for (std::size_t k = 2; k < n; ++k) r[k - 2] -= mass_ * static_cast<double>(k * (k - 1)) * c[k];
-  const auto& F = loads.force.c;
+  const auto& F = loads.force;
   r[0] += F[0];
   r[1] += F[1];
   r[2] += F[2] / 2;
@@ -75,16 +73,16 @@ double Motion::acceleration_scale(double y, double z, double force, double conta
          mass_;
 }
 
-double Motion::rate(double reach, double contact_slope) const {
-  const double stiffness = std::abs(k1_) + 3.0 * std::abs(k2_) * reach * reach + contact_slope;
-  return std::sqrt(stiffness / mass_) + damping_ / mass_;
+double Motion::rate(double reach, const Compliance::Slopes& contact) const {
+  const double stiffness = std::abs(k1_) + 3.0 * std::abs(k2_) * reach * reach + contact.force_by_depth;
+  return std::sqrt(stiffness / mass_) + (damping_ + contact.force_by_rate) / mass_;
 }
 
-std::array<double, 3> Motion::holding_force(double y, const Loads& loads, bool touching, double depth) const {
+Quadratic Motion::holding_force(double y, const Loads& loads, bool touching, double depth) const {
   std::array<double, 4> contact{};
-  if (touching) contact = compliance_.rates({depth, -loads.tip.c[1], -loads.tip.c[2], 0.0});
-  return {(k1_ + k2_ * y * y) * y + contact[0] - loads.force.c[0], contact[1] - loads.force.c[1],
-          contact[2] - loads.force.c[2]};
+  if (touching) contact = compliance_.rates({depth, -loads.tip[1], -loads.tip[2], 0.0, 0.0});
+  return {(k1_ + k2_ * y * y) * y + contact[0] - loads.force[0], contact[1] - loads.force[1],
+          contact[2] - loads.force[2]};
 }
 
 double Motion::potential_energy(double y) const { return (k1_ / 2 + k2_ / 4 * y * y) * y * y; }

@@ -1,5 +1,5 @@
 // The spring's equation of motion while its top is free,
-//     m ÿ = F(τ) − α_s ẏ − k1 y − k2 y³ − [touching] λ_nc (y − u_tip(τ))₊^p,      F = −C + N + f_s,
+//     m ÿ = F(τ) − α_s ẏ − k1 y − k2 y³ − [touching] C(y − u_tip(τ), ẏ − u̇_tip(τ)),      F = −C + N + f_s,
 // with its Jacobian and, for the start of a segment, its time derivatives.
 #pragma once
 
@@ -18,7 +18,7 @@ struct Loads {
   Quadratic tip;    ///< u_tip [m]
 
   static Loads from(const Parameters& parameters, const Inputs& inputs);
-  Loads shifted(double t) const { return {force.shifted(t), tip.shifted(t)}; }
+  Loads from_time(double t) const { return {shifted(force, t), shifted(tip, t)}; }
 };
 
 class Motion {
@@ -28,7 +28,9 @@ class Motion {
   /// ÿ under F and the contact force C of the law inside. [m/s²]
   double acceleration(double y, double z, double force, double contact) const;
   double acceleration_by_displacement(double y, double contact_slope) const;  ///< ∂ÿ/∂y
-  double acceleration_by_velocity() const { return -damping_ / mass_; }
+  double acceleration_by_velocity(double contact_slope) const {
+    return -(damping_ + contact_slope) / mass_;
+  }  ///< ∂ÿ/∂ẏ
 
   /// y and its first five derivatives at a segment's start; `depth` = y − u_tip ≥ 0 matters when touching.
   /// Where the power law has no derivative they may be infinite or NaN.
@@ -46,11 +48,11 @@ class Motion {
 
   /// Σ|forces|/m: what rounding in acceleration() is relative to.
   double acceleration_scale(double y, double z, double force, double contact) const;
-  /// Bound of the rates with which the solution can change, √(stiffness/m) + α_s/m [1/s], for |y| ≤ `reach`.
-  double rate(double reach, double contact_slope) const;
+  /// Bound of the rates with which the solution can change, √(stiffness/m) + damping/m [1/s], for |y| ≤ `reach`.
+  double rate(double reach, const Compliance::Slopes& contact) const;
 
   /// Force that would hold the top at y, at rest, with its first two derivatives: −F + k1 y + k2 y³ + C. [N, N/s, N/s²]
-  std::array<double, 3> holding_force(double y, const Loads& loads, bool touching, double depth) const;
+  Quadratic holding_force(double y, const Loads& loads, bool touching, double depth) const;
 
   double potential_energy(double y) const;
   const Compliance& compliance() const { return compliance_; }

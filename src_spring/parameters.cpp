@@ -1,8 +1,8 @@
 #include "parameters.hpp"
 
+#include <charconv>
 #include <cmath>
 #include <limits>
-#include <sstream>
 
 namespace spring {
 namespace {
@@ -14,18 +14,15 @@ void require(bool condition, const char* name, double value, const char* allowed
 
 void require_finite(const char* name, double value) { require(std::isfinite(value), name, value, "finite"); }
 
-void require_finite(const char* name, const std::array<double, 3>& values) {
+void require_finite(const char* name, const Quadratic& values) {
   for (double value : values) require_finite(name, value);
 }
 
 }  // namespace
 
 std::string number(double value) {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text.precision(12);
-  text << value;
-  return text.str();
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, 12).ptr};
 }
 
 double hilltop(const Parameters& p) {
@@ -38,7 +35,6 @@ void check(const Parameters& p) {
   require(p.damping >= 0.0 && std::isfinite(p.damping), "damping", p.damping, ">= 0 and finite");
   require_finite("linear_stiffness", p.linear_stiffness);
   require_finite("cubic_stiffness", p.cubic_stiffness);
-  require_finite("equilibrium", p.equilibrium);
   require_finite("displacement", p.displacement);
   require_finite("velocity", p.velocity);
   if (p.cubic_stiffness < 0.0 && p.linear_stiffness <= 0.0)
@@ -58,6 +54,8 @@ void check(const Parameters& p) {
           p.compliance_stiffness, ">= 0 and finite");
   require(p.compliance_exponent >= 1.0 && p.compliance_exponent <= 100.0, "compliance_exponent", p.compliance_exponent,
           "in [1, 100]");
+  require(p.compliance_damping >= 0.0 && std::isfinite(p.compliance_damping), "compliance_damping",
+          p.compliance_damping, ">= 0 and finite");
   require_finite("stop_position", p.stop_position);
   require(p.restitution >= 0.0 && p.restitution <= 1.0, "restitution", p.restitution, "in [0, 1]");
   require(p.relative_tolerance > 0.0 && p.relative_tolerance <= 1e-2, "relative_tolerance", p.relative_tolerance,
@@ -74,7 +72,6 @@ void check(const Inputs& inputs) {
   require_finite("foundation_force", inputs.foundation_force);
   require_finite("external_force", inputs.external_force);
   require_finite("tip_displacement", inputs.tip_displacement);
-  require_finite("tip_velocity", inputs.tip_velocity);
 }
 
 }  // namespace spring

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "flat.hpp"
 #include "flight.hpp"
 #include "motion.hpp"
 #include "parameters.hpp"
@@ -19,24 +20,16 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr long most_work = 1'000'000, work_of_start = 20;
 constexpr long most_stalled = 100;  ///< events without progress
 
-/// Everything that a step changes. All members are doubles, so that the flat vector is this struct.
+/// Everything that a step changes; doubles only, see flat.hpp.
 struct State {
   double y, z;
   double integral = 0.0, integral_2 = 0.0;
   double dissipated = 0.0, impact_loss = 0.0;
   double stop_force = 0.0, stop_impulse = 0.0;
-  double seated = 0.0;            ///< 1 on the foundation
-  double force = 0.0, tip = 0.0;  ///< F and u_tip where the step ended
-  double steps = 0.0;             ///< IDA's, since the start
+  double seated = 0.0;                            ///< 1 on the foundation
+  double force = 0.0, tip = 0.0, tip_rate = 0.0;  ///< F, u_tip and its rate where the step ended
+  double steps = 0.0;                             ///< IDA's, since the start
 };
-
-template <class Visit>
-void for_each(State& s, Visit visit) {
-  for (double* value : {&s.y, &s.z, &s.integral, &s.integral_2, &s.dissipated, &s.impact_loss, &s.stop_force,
-                        &s.stop_impulse, &s.seated, &s.force, &s.tip, &s.steps})
-    visit(*value);
-}
-constexpr std::size_t state_length = 12;
 
 }  // namespace
 
@@ -59,12 +52,21 @@ struct Spring::Impl {
   }
 
   double depth(const State& s) const { return laws.compliance ? s.y - s.tip : -1.0; }
-  double contact(const State& s) const { return laws.compliance ? motion.compliance().force(depth(s)) : 0.0; }
+  double contact(const State& s) const {
+    return laws.compliance ? motion.compliance().force(depth(s), s.z - s.tip_rate) : 0.0;
+  }
 
   State advanced(double size, const Inputs& inputs);
 };
 
 namespace {
+
+/// What acts at `t` is what accelerations and reactions refer to.
+void see(State& state, const Loads& loads, double t) {
+  state.force = value(loads.force, t);
+  state.tip = value(loads.tip, t);
+  state.tip_rate = rate(loads.tip, t);
+}
 
 /// One step: a sequence of segments, each smooth, joined by events.
 class Step {
@@ -91,8 +93,8 @@ class Step {
         throw StepFailure("spring: " + std::to_string(most_stalled) + " contact events at once, " + number(t_) +
                               " s after the step's start",
                           t_);
-      now_ = loads_.shifted(t_);
-      depth_ = !laws_.compliance ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip.c[0];
+      now_ = loads_.from_time(t_);
+      depth_ = !laws_.compliance ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
       if (laws_.stop) land();
       if (seat_ != nullptr && state_.seated != 0.0)
         held += sit(*seat_);
@@ -100,8 +102,7 @@ class Step {
         fly();
     }
     state_.stop_force = held / size_;
-    state_.force = loads_.force(size_);
-    state_.tip = loads_.tip(size_);
+    see(state_, loads_, size_);
     return state_;
   }
 
@@ -113,7 +114,7 @@ class Step {
   }
 
   bool touching() const {
-    const auto& u = now_.tip.c;
+    const auto& u = now_.tip;
     return laws_.compliance && Watch::direction({depth_, state_.z - u[1], -u[2], 0.0, 0.0}) > 0.0;
   }
 
@@ -156,9 +157,9 @@ class Step {
       throw Escape("spring: y = " + number(state_.y) + " m is past the hilltop |y| = " + number(laws_.hilltop) +
                        " m of the softening spring, reached " + number(t_) + " s after the step's start",
                    t_);
+    // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
     if (laws_.stop)
-      state_.y =
-          event == Flight::Event::stop ? laws_.stop_position : laws_.stop_position + std::max(flight_.gap(), 0.0);
+      state_.y = event == Flight::Event::stop ? laws_.stop_position : std::max(state_.y, laws_.stop_position);
     meeting_ = event == Flight::Event::contact;
     if (event == Flight::Event::none) t_ = size_;
   }
@@ -169,6 +170,7 @@ class Step {
     const double t = seat.elapsed();
     state_.integral_2 += state_.integral * t + state_.y * t * t / 2;
     state_.integral += state_.y * t;
+    state_.dissipated += seat.dissipated();
     t_ += t;
     released_ = event == Seated::Event::release;
     if (released_) state_.seated = 0.0;
@@ -248,15 +250,13 @@ void Spring::step(double size, const Inputs& inputs) {
 bool Spring::finite() const {
   bool all = std::isfinite(acceleration()) && std::isfinite(reaction()) && std::isfinite(kinetic_energy()) &&
              std::isfinite(potential_energy()) && std::isfinite(contact_energy());
-  for_each(impl_->state, [&all](double value) { all = all && std::isfinite(value); });
+  for (double value : flat(impl_->state)) all = all && std::isfinite(value);
   return all;
 }
 
 void Spring::observe(const Inputs& inputs) {
   check(inputs);
-  const Loads loads = Loads::from(impl_->parameters, inputs);
-  impl_->state.force = loads.force(0.0);
-  impl_->state.tip = loads.tip(0.0);
+  see(impl_->state, Loads::from(impl_->parameters, inputs), 0.0);
 }
 
 void Spring::apply_impulse(double impulse) {
@@ -274,6 +274,7 @@ double Spring::acceleration() const {
 double Spring::displacement_integral() const { return impl_->state.integral; }
 double Spring::displacement_integral_2() const { return impl_->state.integral_2; }
 double Spring::reaction() const { return impl_->contact(impl_->state); }
+Quadratic Spring::tip() const { return {impl_->state.tip, impl_->state.tip_rate, 0.0}; }
 double Spring::stop_force() const { return impl_->state.stop_force; }
 double Spring::stop_impulse() const { return impl_->state.stop_impulse; }
 double Spring::kinetic_energy() const { return impl_->parameters.mass / 2 * impl_->state.z * impl_->state.z; }
@@ -287,21 +288,18 @@ bool Spring::seated() const { return impl_->state.seated != 0.0; }
 long Spring::ida_steps() const { return static_cast<long>(impl_->state.steps); }
 
 void Spring::save(std::vector<double>& state) const {
-  state.clear();
-  state.reserve(state_length);
-  for_each(impl_->state, [&state](double value) { state.push_back(value); });
+  const auto numbers = flat(impl_->state);
+  state.assign(numbers.begin(), numbers.end());
 }
 
 void Spring::restore(const std::vector<double>& state) {
-  if (state.size() != state_length)
-    throw std::invalid_argument("spring: a saved state has " + std::to_string(state_length) + " numbers, not " +
+  if (state.size() != Flat<State>{}.size())
+    throw std::invalid_argument("spring: a saved state has " + std::to_string(Flat<State>{}.size()) + " numbers, not " +
                                 std::to_string(state.size()));
   for (double value : state)
     if (!std::isfinite(value))
       throw std::invalid_argument("spring: a saved state holds " + number(value) + ": must be finite");
-  auto restored = impl_->state;
-  std::size_t i = 0;
-  for_each(restored, [&](double& value) { value = state[i++]; });
+  const auto restored = from_flat<State>(state.data());
   if (!(restored.steps >= 0.0 && restored.steps < 0x1p53))
     throw std::invalid_argument("spring: a saved state counts " + number(restored.steps) + " internal steps");
   impl_->state = restored;

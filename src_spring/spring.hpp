@@ -1,15 +1,17 @@
 // The Duffing spring with its foundation, integrated by SUNDIALS IDA as an implicit system F(t, Y, Ẏ) = 0.
 //     m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s        (Ahn & Tate, eq. (6)),      up is positive.
-// C comes from outside (contact_law external) or from the normal compliance C = λ_nc (y − u_tip)₊^p inside;
+// C comes from outside (contact_law external) or from the normal compliance inside, C = λ_nc δ₊^p (1 + χ δ̇)₊,
+// δ = y − u_tip;
 // N comes from outside or, with the stop enabled, from Signorini's condition (8) with restitution:
 //     0 ≤ N ⊥ y − φ ≥ 0,   z⁺ = −e z⁻ at an impact. Impacts that die out end seated, y = φ, until N would be < 0.
 #pragma once
 
-#include <array>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "polynomial.hpp"
 
 namespace spring {
 
@@ -21,12 +23,12 @@ struct Parameters {
   double damping = 0.0;           ///< α_s [N·s/m]
   double linear_stiffness = 1.0;  ///< k1 [N/m]
   double cubic_stiffness = 0.0;   ///< k2 [N/m³]
-  double equilibrium = 0.0;       ///< Ψ [m], where the top is met; (6) has its spring force 0 at y = 0 all the same
   double displacement = 0.0;      ///< y at the start [m]
   double velocity = 0.0;          ///< ẏ at the start [m/s]
   ContactLaw contact_law = ContactLaw::external;
   double compliance_stiffness = 1.0e4;  ///< λ_nc [N/m^p]
   double compliance_exponent = 3.0;     ///< p [–] ≥ 1
+  double compliance_damping = 0.0;      ///< χ [s/m]
   bool stop_enabled = false;
   double stop_position = -1.0;  ///< φ [m]
   double restitution = 1.0;     ///< e in [0, 1]
@@ -36,11 +38,10 @@ struct Parameters {
 
 /// Held or polynomial over one step; τ from its start.
 struct Inputs {
-  std::array<double, 3> contact_force{};  ///< C, Ċ, C̈ : C(τ) = c₀ + c₁τ + c₂τ²/2; positive presses the spring down
-  std::array<double, 3> foundation_force{};  ///< N, Ṅ, N̈ ≥ 0, upward; used when the stop inside is not enabled
-  double external_force = 0.0;               ///< f_s [N]
-  std::array<double, 3> tip_displacement{};  ///< u_tip and its derivatives; read by normal_compliance only
-  double tip_velocity = 0.0;                 ///< [m/s]; slope of u_tip when tip_displacement carries no derivative
+  Quadratic contact_force{};     ///< C [N], positive presses the spring down
+  Quadratic foundation_force{};  ///< N ≥ 0 [N], upward; used when the stop inside is not enabled
+  double external_force = 0.0;   ///< f_s [N]
+  Quadratic tip_displacement{};  ///< u_tip [m]; read by normal_compliance only
 };
 
 /// The step could not be completed: the state is as before the step, `reached` tells how far it came.
@@ -81,12 +82,13 @@ class Spring {
   double displacement_integral() const;    ///< ∫ y dτ over the last step [m·s]
   double displacement_integral_2() const;  ///< ∫∫ y dτ dτ over the last step [m·s²]
   double reaction() const;                 ///< C of the law inside, at the end of the last step [N]; 0 for external
+  Quadratic tip() const;                   ///< u_tip [m] and its rate there, as observed or extrapolated; no curvature
   double stop_force() const;               ///< mean of N over the last step, law inside [N]
   double stop_impulse() const;             ///< sum of stop impulses over the last step [N·s]
   double kinetic_energy() const;           ///< ½ m z² [J]
   double potential_energy() const;         ///< ½ k1 y² + ¼ k2 y⁴ [J]
   double contact_energy() const;           ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
-  double dissipated_energy() const;        ///< ∫ α_s z² dt since the start, an integrated unknown [J]
+  double dissipated_energy() const;        ///< by α_s and χ since the start, an integrated unknown [J]
   double impact_loss() const;              ///< energy lost in stop impacts since the start [J]
   bool seated() const;                     ///< held on the foundation by the law inside
   long ida_steps() const;                  ///< internal IDA steps since the start

@@ -1,13 +1,12 @@
 #include "description.hpp"
 
-#include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <set>
 #include <sstream>
 #include <stdexcept>
 
+#include "text.hpp"
 #include "version.hpp"
 
 namespace fmi {
@@ -31,6 +30,7 @@ constexpr Unit units[] = {
     {"m.s2", "Absity", 0, 1, 2, 0},
     {"s", "Time", 0, 0, 1, 0},
     {"1/s", "Rate", 0, 0, -1, 0},
+    {"s/m", "InverseVelocity", 0, -1, 1, 0},
     {"rad", "Angle", 0, 0, 0, 1},
     {"Pa", "Pressure", 1, -1, -2, 0},
     {"N", "Force", 1, 1, -2, 0},
@@ -115,17 +115,14 @@ void write_types(std::ostream& out, const Table& t, const std::set<std::string>&
 }
 
 void write_variable(std::ostream& out, const Variable& v, std::size_t reference) {
-  const bool is_output = v.causality == Causality::output;
+  constexpr const char* causalities[] = {"parameter", "input", "output", "local"};
   const bool is_parameter = v.causality == Causality::parameter;
   out << "    <ScalarVariable" << attribute("name", v.name) << attribute("valueReference", std::to_string(reference))
-      << attribute("description", v.description)
-      << attribute("causality", is_output      ? "output"
-                                : is_parameter ? "parameter"
-                                               : "input")
+      << attribute("description", v.description) << attribute("causality", causalities[static_cast<int>(v.causality)])
       << attribute("variability", is_parameter                         ? "fixed"
                                   : v.consumed || v.type != Type::real ? "discrete"
                                                                        : "continuous");
-  if (is_parameter || is_output) out << attribute("initial", is_parameter || v.exact ? "exact" : "calculated");
+  if (v.causality != Causality::input) out << attribute("initial", is_parameter || v.exact ? "exact" : "calculated");
   out << ">\n      <";
   switch (v.type) {
     case Type::real:
@@ -148,15 +145,13 @@ void write_variable(std::ostream& out, const Variable& v, std::size_t reference)
     if (std::isfinite(v.max)) out << attribute("max", value_text(v, v.max));
   }
   if (v.type == Type::real && v.nominal != 1.0) out << attribute("nominal", text(v.nominal));
-  if (!is_output || v.exact) out << attribute("start", value_text(v, v.start));
+  if (!v.get || v.exact) out << attribute("start", value_text(v, v.start));
   out << "/>\n    </ScalarVariable>\n";
 }
 
 void write_unknown(std::ostream& out, const Table& t, std::size_t i, const std::vector<std::string>& names) {
-  std::vector<std::size_t> dependencies;
-  dependencies.reserve(names.size());
-  for (const std::string& name : names) dependencies.push_back(t.index(name) + 1);
-  std::sort(dependencies.begin(), dependencies.end());
+  std::set<std::size_t> dependencies;
+  for (const std::string& name : names) dependencies.insert(t.index(name) + 1);
   std::string list;
   for (std::size_t d : dependencies) list += (list.empty() ? "" : " ") + std::to_string(d);
   out << "      <Unknown" << attribute("index", std::to_string(i + 1)) << attribute("dependencies", list) << "/>\n";
@@ -165,12 +160,15 @@ void write_unknown(std::ostream& out, const Table& t, std::size_t i, const std::
 void write_structure(std::ostream& out, const Table& t) {
   out << "  <ModelStructure>\n    <Outputs>\n";
   for (std::size_t i = 0; i < t.variables.size(); ++i) {
-    if (t.variables[i].causality == Causality::output) write_unknown(out, t, i, t.variables[i].depends_on);
+    if (t.variables[i].causality != Causality::output) continue;
+    std::vector<std::string> inputs;
+    for (const Dependency& d : t.variables[i].dependencies) inputs.push_back(d.input);
+    write_unknown(out, t, i, inputs);
   }
   out << "    </Outputs>\n    <InitialUnknowns>\n";
   for (std::size_t i = 0; i < t.variables.size(); ++i) {
     const Variable& v = t.variables[i];
-    if (v.causality == Causality::output && !v.exact) write_unknown(out, t, i, v.starts_from);
+    if (v.causality == Causality::output && !v.exact) write_unknown(out, t, i, v.initial_dependencies);
   }
   out << "    </InitialUnknowns>\n  </ModelStructure>\n";
 }
@@ -191,7 +189,7 @@ std::string document(const Table& t, const std::string& identity, const std::str
       << attribute("maxOutputDerivativeOrder", std::to_string(max_output_derivative_order))
       << attribute("canRunAsynchronuously", "false") << attribute("canBeInstantiatedOnlyOncePerProcess", "false")
       << attribute("canNotUseMemoryManagementFunctions", "true") << attribute("canGetAndSetFMUstate", "true")
-      << attribute("canSerializeFMUstate", "true") << attribute("providesDirectionalDerivative", "false");
+      << attribute("canSerializeFMUstate", "true") << attribute("providesDirectionalDerivative", "true");
   if (source_files.empty()) {
     out << "/>\n";
   } else {
@@ -207,6 +205,7 @@ std::string document(const Table& t, const std::string& identity, const std::str
     out << "    <Category" << attribute("name", name) << attribute("description", text) << "/>\n";
   }
   out << "  </LogCategories>\n  <DefaultExperiment startTime=\"0\"" << attribute("stopTime", text(t.stop_time))
+      << (t.tolerance > 0.0 ? attribute("tolerance", text(t.tolerance)) : "")
       << attribute("stepSize", text(t.step_size)) << "/>\n  <ModelVariables>\n";
   for (std::size_t i = 0; i < t.variables.size(); ++i) {
     out << "    <!-- index " << i + 1 << " -->\n";
@@ -218,38 +217,21 @@ std::string document(const Table& t, const std::string& identity, const std::str
   return out.str();
 }
 
-// FNV-1a; two differently seeded halves make the 128 bits of a GUID.
-std::uint64_t fnv(const std::string& s, std::uint64_t hash) {
-  for (unsigned char c : s) hash = (hash ^ c) * 0x100000001b3ULL;
-  return hash;
-}
-
 }  // namespace
 
-std::string text(double value) {
-  char buffer[32];
-  const auto end = std::to_chars(buffer, buffer + sizeof buffer, value).ptr;
-  return std::string(buffer, end);
-}
-
-const Variable* Table::find(const std::string& name) const {
-  for (const Variable& v : variables) {
-    if (v.name == name) return &v;
-  }
-  return nullptr;
-}
-
 std::size_t Table::index(const std::string& name) const {
-  const Variable* v = find(name);
-  if (!v) throw std::logic_error("no variable '" + name + "'");
-  return static_cast<std::size_t>(v - variables.data());
+  for (std::size_t i = 0; i < variables.size(); ++i) {
+    if (variables[i].name == name) return i;
+  }
+  throw std::logic_error("no variable '" + name + "'");
 }
 
 std::string guid(const Table& table) {
   const std::string content = document(table, "", "");
-  std::ostringstream hex;
+  std::ostringstream hex;  // two differently seeded halves make the 128 bits of a GUID
   hex << std::hex;
-  const std::uint64_t halves[] = {fnv(content, 0xcbf29ce484222325ULL), fnv(content, 0x9ae16a3b2f90404fULL)};
+  const std::uint64_t halves[] = {hash(content.data(), content.size()),
+                                  hash(content.data(), content.size(), 0x9ae16a3b2f90404fULL)};
   for (std::uint64_t half : halves) {
     hex.width(16);
     hex.fill('0');

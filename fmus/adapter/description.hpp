@@ -13,9 +13,6 @@ std::string guid(const Table& table);
 /// `source_files`: names in sources/, one per line, empty if the FMU carries none.
 std::string description(const Table& table, const std::string& source_files = "");
 
-/// The shortest decimal that reads back as the same double, for the XML and for messages.
-std::string text(double value);
-
 struct LogCategory {
   const char *name, *description;
 };

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "description.hpp"
+#include "text.hpp"
 
 namespace fmi {
 namespace {
@@ -31,20 +32,26 @@ double finite(const Variable& v, double value) {
 
 void require_allowed(const Variable& v, double value) {
   if (!std::isfinite(value)) throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not finite");
+  if (value <= 0.0 && v.min == std::numeric_limits<double>::min()) {
+    throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not > 0");
+  }
   if (value < v.min || value > v.max) {
     throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not in [" + text(v.min) + ", " +
                                 text(v.max) + "]");
   }
 }
 
-/// Of a saved state, which may have been tampered with.
+/// Of a state that came from outside.
 void require_allowed(const Variable& v, const Polynomial& p) {
   require_allowed(v, p[0]);
   const bool whole = p[0] == std::floor(p[0]) && std::abs(p[0]) <= std::numeric_limits<int>::max();
   if ((v.type == Type::integer && !whole) || (v.type == Type::boolean && p[0] != 0.0 && p[0] != 1.0)) {
     throw std::invalid_argument("'" + v.name + "' = " + text(p[0]) + " is not of its type, " + name(v.type));
   }
-  if (!std::isfinite(p[1]) || !std::isfinite(p[2]) || (!v.interpolated && (p[1] != 0.0 || p[2] != 0.0))) {
+  const auto possible = [&v](double derivative) {
+    return std::isnan(derivative) || (v.continuous_input() && std::isfinite(derivative));
+  };
+  if (!possible(p[1]) || !possible(p[2])) {
     throw std::invalid_argument("'" + v.name + "' has impossible derivatives");
   }
 }
@@ -53,10 +60,13 @@ bool is_setting(const Variable& v) { return v.causality == Causality::parameter 
 
 }  // namespace
 
-Instance::Instance() : table_(table()) {
-  for (std::size_t i = 0; i < table_.variables.size(); ++i) {
-    if (is_setting(table_.variables[i])) fixed_.push_back(i);
-    if (table_.variables[i].causality == Causality::input) inputs_.push_back(i);
+Instance::Instance() : table_(table()), place_(table_.variables.size()) {
+  for (std::size_t i = 0; i < place_.size(); ++i) {
+    const Variable& v = table_.variables[i];
+    if (v.get && !v.exact) continue;
+    std::vector<const Variable*>& among = is_setting(v) ? fixed_ : inputs_;
+    place_[i] = among.size();
+    among.push_back(&v);
   }
   reset();
 }
@@ -64,8 +74,11 @@ Instance::Instance() : table_(table()) {
 void Instance::reset() {
   model_ = make_model();
   built_ = false;
-  settings_.clear();
-  for (const Variable& v : table_.variables) settings_.push_back({v.start, 0.0, 0.0});
+  std::vector<double> starts;
+  for (const Variable* v : fixed_) starts.push_back(v->start);
+  settings_ = std::make_shared<const std::vector<double>>(std::move(starts));
+  values_.clear();
+  for (const Variable* v : inputs_) values_.push_back({v->start, unset, unset});
   time_ = 0.0;
   stop_time_ = std::numeric_limits<double>::infinity();
   tolerance_ = 0.0;
@@ -95,7 +108,7 @@ void Instance::terminate() { phase = terminated; }
 
 void Instance::ensure_built() {
   if (built_) return;
-  for (const std::size_t i : fixed_) table_.variables[i].set(*model_, settings_[i]);
+  for (std::size_t i = 0; i < fixed_.size(); ++i) fixed_[i]->set(*model_, {(*settings_)[i], 0.0, 0.0});
   model_->build(tolerance_);
   for (const Variable& v : table_.variables) {
     const double value = v.get ? v.get(*model_) : 0.0;
@@ -110,7 +123,7 @@ void Instance::ensure_built() {
 }
 
 void Instance::push_inputs() {
-  for (const std::size_t i : inputs_) table_.variables[i].set(*model_, settings_[i]);
+  for (std::size_t i = 0; i < inputs_.size(); ++i) inputs_[i]->set(*model_, values_[i]);
 }
 
 const Variable& Instance::variable(unsigned reference, Type type, const char* what) const {
@@ -128,36 +141,42 @@ const Variable& Instance::variable(unsigned reference, Type type, const char* wh
 
 double Instance::get(unsigned reference, Type type) {
   const Variable& v = variable(reference, type, "get");
-  if (v.causality != Causality::output) return settings_[reference][0];
-  if (phase == instantiated && !v.exact) {
+  if (v.causality == Causality::input) return values_[place_[reference]][0];
+  if (v.causality == Causality::parameter || (phase == instantiated && v.exact)) return (*settings_)[place_[reference]];
+  if (phase == instantiated) {
     throw std::invalid_argument("'" + v.name + "' is not known before fmi2EnterInitializationMode");
   }
-  if (phase == instantiated) return settings_[reference][0];
   ensure_built();
   return finite(v, v.get(*model_));
 }
 
 void Instance::set(unsigned reference, Type type, double value) {
   const Variable& v = variable(reference, type, "set");
-  if (v.causality == Causality::output && !v.exact) {
-    throw std::invalid_argument("'" + v.name + "' is a calculated output and cannot be set");
+  if (v.get && !v.exact) {
+    throw std::invalid_argument("'" + v.name + "' is calculated and cannot be set");
   }
   if (is_setting(v) && (phase & ~(instantiated | initialization)) != 0) {
     throw std::invalid_argument("'" + v.name + "' can only be set before fmi2ExitInitializationMode");
   }
   require_allowed(v, value);
-  settings_[reference][0] = value;
+  const std::size_t place = place_[reference];
   if (is_setting(v)) {
+    auto changed = std::make_shared<std::vector<double>>(*settings_);
+    (*changed)[place] = value;
+    settings_ = std::move(changed);
     built_ = false;
-  } else if (built_) {
-    v.set(*model_, settings_[reference]);
+    return;
+  }
+  values_[place][0] = value;
+  if (built_) {
+    v.set(*model_, values_[place]);
     model_->observe();
   }
 }
 
 void Instance::set_derivative(unsigned reference, int order, double value) {
   const Variable& v = variable(reference, Type::real, "set a derivative of");
-  if (!v.interpolated) throw std::invalid_argument("'" + v.name + "' is not an input that takes derivatives");
+  if (!v.continuous_input()) throw std::invalid_argument("'" + v.name + "' is not an input that takes derivatives");
   if (order < 1 || order > 2) {
     throw std::invalid_argument("derivative order " + std::to_string(order) + " of '" + v.name +
                                 "': orders 1 and 2 are possible");
@@ -165,17 +184,33 @@ void Instance::set_derivative(unsigned reference, int order, double value) {
   if (!std::isfinite(value)) {
     throw std::invalid_argument("derivative of '" + v.name + "' = " + text(value) + " is not finite");
   }
-  settings_[reference][static_cast<std::size_t>(order)] = value;
+  values_[place_[reference]][static_cast<std::size_t>(order)] = value;
 }
 
 double Instance::output_derivative(unsigned reference, int order) {
   const Variable& v = variable(reference, Type::real, "get a derivative of");
-  if (order < 1 || order > max_output_derivative_order || !v.derivative) {
-    throw std::invalid_argument("derivative of order " + std::to_string(order) + " of '" + v.name +
-                                "' is not available");
+  if (order < 1) throw std::invalid_argument("derivative order " + std::to_string(order) + ": they begin with 1");
+  if (order > max_output_derivative_order || !v.derivative) {
+    throw Unavailable("derivative of order " + std::to_string(order) + " of '" + v.name + "' is not available");
   }
   ensure_built();
   return finite(v, v.derivative(*model_));
+}
+
+double Instance::partial_derivative(unsigned unknown, unsigned known) {
+  const Variable& of = variable(unknown, Type::real, "differentiate");
+  const Variable& by = variable(known, Type::real, "differentiate by");
+  if (of.causality != Causality::output) throw std::invalid_argument("'" + of.name + "' is not an output");
+  if (!by.continuous_input()) throw std::invalid_argument("'" + by.name + "' is not a continuous input");
+  ensure_built();
+  for (const Dependency& d : of.dependencies) {
+    if (d.input != by.name) continue;
+    const double partial = d.partial(*model_);
+    if (!std::isfinite(partial))
+      throw Unavailable("the derivative of '" + of.name + "' by '" + by.name + "' is not known");
+    return partial;
+  }
+  return 0.0;
 }
 
 void Instance::step(double time, double size) {
@@ -195,9 +230,8 @@ void Instance::step(double time, double size) {
   ensure_built();
   push_inputs();
   model_->step(size);
-  for (const std::size_t i : inputs_) {
-    settings_[i] = {table_.variables[i].consumed ? 0.0 : settings_[i][0], 0.0, 0.0};
-  }
+  for (std::size_t i = 0; i < inputs_.size(); ++i)
+    values_[i] = {inputs_[i]->consumed ? 0.0 : values_[i][0], unset, unset};
   time_ = time + size;
 }
 
@@ -208,25 +242,29 @@ void Instance::save(Snapshot& s) const {
   s.stop_time = stop_time_;
   s.tolerance = tolerance_;
   s.settings = settings_;
+  s.inputs = values_;
   s.built = built_;
+  s.foreign = false;
   s.numerics.clear();
   if (built_) model_->save(s.numerics);
 }
 
-void Instance::restore(const Snapshot& s) {
-  for (std::size_t i = 0; i < settings_.size(); ++i) require_allowed(table_.variables[i], s.settings[i]);
-  bool same = tolerance_ == s.tolerance;
-  for (const std::size_t i : fixed_) same = same && settings_[i][0] == s.settings[i][0];
+void Instance::restore(Snapshot& s) {
+  if (s.foreign) {
+    for (std::size_t i = 0; i < fixed_.size(); ++i) require_allowed(*fixed_[i], {(*s.settings)[i], unset, unset});
+    for (std::size_t i = 0; i < inputs_.size(); ++i) require_allowed(*inputs_[i], s.inputs[i]);
+  }
+  built_ = built_ && s.built && tolerance_ == s.tolerance && (settings_ == s.settings || *settings_ == *s.settings);
   settings_ = s.settings;
+  values_ = s.inputs;
   tolerance_ = s.tolerance;
-  built_ = built_ && same;
   if (s.built) {
     ensure_built();
     push_inputs();
+    if (s.foreign) model_->require_state(s.numerics);
     model_->restore(s.numerics);
-  } else {
-    built_ = false;
   }
+  s.foreign = false;
   time_ = s.time;
   stop_time_ = s.stop_time;
   last_status = s.last_status;

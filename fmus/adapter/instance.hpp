@@ -6,6 +6,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "snapshot.hpp"
@@ -46,15 +47,25 @@ class Instance {
   double get(unsigned reference, Type type);
   void set(unsigned reference, Type type, double value);
   void set_derivative(unsigned reference, int order, double value);
+  /// @throws Unavailable if it is not known
   double output_derivative(unsigned reference, int order);
+  /// ∂unknown/∂known, of an output by a continuous input, at the present instant.
+  /// @throws Unavailable if it is not known
+  double partial_derivative(unsigned unknown, unsigned known);
 
   /// @throws StepDiscarded (nothing changed), std::invalid_argument
   void step(double time, double size);
   double time() const { return time_; }
+  /// What the model has to say after a step; empty if nothing.
+  std::string take_warning() { return std::exchange(model_->warning, {}); }
 
   /// Into a snapshot that may hold an earlier state: its memory is used again.
   void save(Snapshot& snapshot) const;
-  void restore(const Snapshot& snapshot);
+  /// A foreign snapshot is checked, and then no longer foreign. @throws std::invalid_argument if it is no state
+  void restore(Snapshot& snapshot);
+
+  std::size_t n_settings() const { return fixed_.size(); }
+  std::size_t n_inputs() const { return inputs_.size(); }
 
  private:
   const Variable& variable(unsigned reference, Type type, const char* what) const;
@@ -63,8 +74,10 @@ class Instance {
 
   const Table& table_;
   std::unique_ptr<Model> model_;
-  std::vector<std::size_t> inputs_, fixed_;  ///< positions of inputs, and of what is set before the start
-  std::vector<Polynomial> settings_;         ///< of every variable; unused for calculated outputs
+  std::vector<const Variable*> inputs_, fixed_;          ///< fixed: what is set before the start
+  std::vector<std::size_t> place_;                       ///< of every variable, among the inputs or the fixed
+  std::shared_ptr<const std::vector<double>> settings_;  ///< of the fixed; saved states share it
+  std::vector<Polynomial> values_;                       ///< of the inputs
   bool built_ = false;
   double time_ = 0.0;
   double stop_time_ = std::numeric_limits<double>::infinity();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -11,6 +12,8 @@ namespace fmi {
 
 /// A value and its first and second time derivative at the start of a step.
 using Polynomial = std::array<double, 3>;
+/// In place of a derivative that the importer has not set.
+inline constexpr double unset = std::numeric_limits<double>::quiet_NaN();
 
 /// The step could not be completed and the model is as before it: becomes fmi2Discard.
 class StepDiscarded : public std::runtime_error {
@@ -36,7 +39,13 @@ class Model {
 
   /// Called for every saved state; the vector is flat and holds everything that build() does not make.
   virtual void save(std::vector<double>& state) const = 0;
+  /// Called before restore() for a state that came as bytes from outside, if restore() does not check it anyway.
+  /// @throws std::invalid_argument unless it is a state that a model with these parameters could have saved
+  virtual void require_state(const std::vector<double>& /*state*/) const {}
   virtual void restore(const std::vector<double>& state) = 0;
+
+  /// Set by step() where the user should be told something that is no error; cleared by whoever tells it.
+  std::string warning;
 };
 
 }  // namespace fmi

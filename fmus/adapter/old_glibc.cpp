@@ -2,7 +2,8 @@
 // machine would ask of a new glibc is defined here, hidden, with what every glibc since 2.14 has: each block names the
 // version that brought the symbol. Names that old programs use too keep their old version in a new glibc, so on a yet
 // newer one only new names can be missing here; then tests/contract/test_package.py, which states the version that is
-// left, fails with the name. Only for x86-64.
+// left, fails with the name. Only for x86-64. (g++ cannot be told to link for an older glibc; a compiler that can would
+// have to come with the project.)
 // NOLINTBEGIN(bugprone-reserved-identifier,performance-no-int-to-ptr)
 #include <features.h>
 

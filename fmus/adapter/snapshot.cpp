@@ -7,11 +7,13 @@
 #include <initializer_list>
 #include <stdexcept>
 
+#include "text.hpp"
+
 namespace fmi {
 namespace {
 
 constexpr char magic[8] = {'s', 'p', 'r', 'i', 'n', 'g', 'b', 'm'};
-constexpr std::uint32_t format = 1;
+constexpr std::uint32_t format = 2;
 constexpr std::uint32_t byte_order = 0x01020304;
 constexpr std::size_t guid_length = 38;
 
@@ -25,15 +27,11 @@ struct Header {
 };
 static_assert(sizeof(Header) == 72, "the header has no padding");
 
-constexpr std::size_t fixed_count = 7;  ///< doubles before settings
+constexpr std::size_t fixed_count = 7;  ///< doubles before the settings
 
-std::uint64_t checksum(const char* bytes, std::size_t size) {
-  std::uint64_t hash = 0xcbf29ce484222325ULL;
-  for (std::size_t i = 0; i < size; ++i) hash = (hash ^ static_cast<unsigned char>(bytes[i])) * 0x100000001b3ULL;
-  return hash;
+std::size_t count(const Snapshot& s) {
+  return fixed_count + s.settings->size() + 3 * s.inputs.size() + s.numerics.size();
 }
-
-std::size_t count(const Snapshot& s) { return fixed_count + 3 * s.settings.size() + s.numerics.size(); }
 
 [[noreturn]] void refuse(const std::string& why) {
   throw std::invalid_argument("the bytes are not a saved state of this FMU: " + why);
@@ -47,7 +45,8 @@ void serialize(const Snapshot& s, const std::string& guid, char* bytes) {
   std::vector<double> values{
       static_cast<double>(s.phase), static_cast<double>(s.last_status),    s.time, s.stop_time, s.tolerance,
       s.built ? 1.0 : 0.0,          static_cast<double>(s.numerics.size())};
-  for (const Polynomial& p : s.settings) values.insert(values.end(), p.begin(), p.end());
+  values.insert(values.end(), s.settings->begin(), s.settings->end());
+  for (const Polynomial& p : s.inputs) values.insert(values.end(), p.begin(), p.end());
   values.insert(values.end(), s.numerics.begin(), s.numerics.end());
 
   Header header{};
@@ -58,11 +57,12 @@ void serialize(const Snapshot& s, const std::string& guid, char* bytes) {
   header.count = values.size();
   const std::size_t payload = values.size() * sizeof(double);
   std::memcpy(bytes + sizeof header, values.data(), payload);
-  header.checksum = checksum(bytes + sizeof header, payload);
+  header.checksum = hash(bytes + sizeof header, payload);
   std::memcpy(bytes, &header, sizeof header);
 }
 
-Snapshot deserialize(const char* bytes, std::size_t size, const std::string& guid, std::size_t n_settings) {
+Snapshot deserialize(const char* bytes, std::size_t size, const std::string& guid, std::size_t n_settings,
+                     std::size_t n_inputs) {
   Header header{};
   if (size < sizeof header) refuse(std::to_string(size) + " bytes are fewer than its header has");
   std::memcpy(&header, bytes, sizeof header);
@@ -78,13 +78,13 @@ Snapshot deserialize(const char* bytes, std::size_t size, const std::string& gui
     refuse(std::to_string(size) + " bytes, its header announces " +
            std::to_string(sizeof header + header.count * sizeof(double)));
   }
-  if (checksum(bytes + sizeof header, payload) != header.checksum) refuse("the checksum is wrong");
+  if (hash(bytes + sizeof header, payload) != header.checksum) refuse("the checksum is wrong");
 
-  const std::size_t settings_end = fixed_count + 3 * n_settings;
-  if (header.count < settings_end) refuse("its parts do not add up");
+  const std::size_t inputs_begin = fixed_count + n_settings, numerics_begin = inputs_begin + 3 * n_inputs;
+  if (header.count < numerics_begin) refuse("its parts do not add up");
   std::vector<double> values(header.count);
   std::memcpy(values.data(), bytes + sizeof header, payload);
-  if (static_cast<double>(values.size() - settings_end) != values[6]) refuse("its parts do not add up");
+  if (static_cast<double>(values.size() - numerics_begin) != values[6]) refuse("its parts do not add up");
   // A checksum is no signature: what the numbers mean is checked too, here and in Instance::restore.
   const auto known = [&values](std::size_t i, std::initializer_list<double> allowed) {
     return std::find(allowed.begin(), allowed.end(), values[i]) != allowed.end();
@@ -100,11 +100,12 @@ Snapshot deserialize(const char* bytes, std::size_t size, const std::string& gui
   s.stop_time = values[3];
   s.tolerance = values[4];
   s.built = values[5] != 0.0;
-  for (std::size_t i = 0; i < n_settings; ++i) {
-    const double* p = &values[fixed_count + 3 * i];
-    s.settings.push_back({p[0], p[1], p[2]});
-  }
-  s.numerics.assign(values.begin() + static_cast<std::ptrdiff_t>(settings_end), values.end());
+  s.foreign = true;
+  const double* from = values.data();
+  s.settings = std::make_shared<const std::vector<double>>(from + fixed_count, from + inputs_begin);
+  for (const double* p = from + inputs_begin; p != from + numerics_begin; p += 3)
+    s.inputs.push_back({p[0], p[1], p[2]});
+  s.numerics.assign(from + numerics_begin, from + values.size());
   return s;
 }
 

@@ -2,6 +2,7 @@
 // every fmi2Get/Set go by it. A value reference is the variable's position in the table.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
@@ -16,7 +17,13 @@
 namespace fmi {
 
 enum class Type { real, integer, boolean };
-enum class Causality { parameter, input, output };
+enum class Causality { parameter, input, output, local };
+
+/// An input that an output follows without a step.
+struct Dependency {
+  std::string input;
+  std::function<double(const Model&)> partial;  ///< ∂output/∂input, not finite where it is not known
+};
 
 /// Values of every type are held as double, which represents all of them exactly.
 struct Variable {
@@ -36,16 +43,18 @@ struct Variable {
   std::function<void(Model&, const Polynomial&)> set;  ///< parameters, inputs, exact outputs
   std::function<double(const Model&)> get;             ///< outputs
   std::function<double(const Model&)> derivative;      ///< outputs that know their time derivative
-  bool interpolated = false;                           ///< an input that takes derivatives
-  std::vector<std::string> depends_on;                 ///< inputs that an output follows without a step
-  std::vector<std::string> starts_from;                ///< what an output depends on at initialization
+  std::vector<Dependency> dependencies;                ///< of an output between steps
+  std::vector<std::string> initial_dependencies;       ///< of an output at initialization
+
+  /// Whether it is an input that is a polynomial over the step.
+  bool continuous_input() const { return causality == Causality::input && !consumed; }
 
   // Named arguments.
   Variable& range(double low, double high) { return min = low, max = high, *this; }
   Variable& at_least(double low) { return min = low, *this; }
-  Variable& scale(double value) { return nominal = value, *this; }
-  Variable& from(std::vector<std::string> names) { return starts_from = std::move(names), *this; }
-  Variable& follows(std::vector<std::string> names) { return depends_on = std::move(names), *this; }
+  Variable& positive() { return min = std::numeric_limits<double>::min(), *this; }
+  Variable& typical(double value) { return nominal = value, *this; }
+  Variable& from(std::vector<std::string> names) { return initial_dependencies = std::move(names), *this; }
 };
 
 /// Named alternatives, numbered from 1. Described as an Integer type and not as an Enumeration: libcosim leaves such
@@ -58,11 +67,10 @@ struct Choice {
 struct Table {
   std::string identifier;  ///< modelIdentifier
   std::string title, description;
-  double stop_time = 1.0, step_size = 1e-3;  ///< DefaultExperiment
+  double stop_time = 1.0, step_size = 1e-3, tolerance = 0.0;  ///< DefaultExperiment; tolerance 0: none
   std::vector<Choice> choices;
   std::vector<Variable> variables;
 
-  const Variable* find(const std::string& name) const;
   std::size_t index(const std::string& name) const;  ///< @throws std::logic_error
 };
 
@@ -89,28 +97,23 @@ class TableBuilder {
     return v;
   }
 
-  /// An input that is held over the step.
+  /// An input that is a polynomial over the step, with 0 for derivatives that are unset.
   template <class Access>
   Variable& input(const std::string& name, const std::string& unit, const std::string& description, Access access) {
     Variable& v = add(name, unit, description, Causality::input);
-    v.set = [access](Model& m, const Polynomial& value) { access(static_cast<M&>(m)) = value[0]; };
-    return v;
-  }
-
-  /// An input that is a polynomial over the step.
-  template <class Access>
-  Variable& polynomial(const std::string& name, const std::string& unit, const std::string& description,
-                       Access access) {
-    Variable& v = add(name, unit, description, Causality::input);
-    v.set = [access](Model& m, const Polynomial& value) { access(static_cast<M&>(m)) = value; };
-    v.interpolated = true;
+    v.set = [access](Model& m, const Polynomial& value) {
+      Polynomial& input = access(static_cast<M&>(m)) = value;
+      for (double& derivative : input)
+        if (std::isnan(derivative)) derivative = 0.0;
+    };
     return v;
   }
 
   /// An input that acts at the start of the next step and is then 0 again.
   template <class Access>
   Variable& impulse(const std::string& name, const std::string& unit, const std::string& description, Access access) {
-    Variable& v = input(name, unit, description, access);
+    Variable& v = add(name, unit, description, Causality::input);
+    v.set = [access](Model& m, const Polynomial& value) { access(static_cast<M&>(m)) = value[0]; };
     v.consumed = true;
     return v;
   }
@@ -122,12 +125,27 @@ class TableBuilder {
     return v;
   }
 
+  /// What can be read as an output, but is none: tools record and plot every output.
+  template <class Get>
+  Variable& local(const std::string& name, const std::string& unit, const std::string& description, Get get) {
+    Variable& v = output(name, unit, description, get);
+    v.causality = Causality::local;
+    return v;
+  }
+
   template <class Get, class Derivative>
   Variable& output(const std::string& name, const std::string& unit, const std::string& description, Get get,
                    Derivative derivative) {
     Variable& v = output(name, unit, description, get);
     v.derivative = [derivative](const Model& m) { return derivative(static_cast<const M&>(m)); };
     return v;
+  }
+
+  /// Says that the last output follows `input` between steps, and with which derivative.
+  template <class Partial>
+  void depends(const std::string& input, Partial partial) {
+    table_.variables.back().dependencies.push_back(
+        {input, [partial](const Model& m) { return static_cast<double>(partial(static_cast<const M&>(m))); }});
   }
 
   /// Makes the last output's start value settable: it is a field of the parameters.

@@ -1,7 +1,7 @@
 // The beam FMU: its table of variables, bound to beam::Beam.
 #include <array>
 #include <limits>
-#include <optional>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -17,70 +17,69 @@ using beam::Parameters;
 /// The beam's parameters and what exchange between steps adds to them.
 struct FmuParameters : Parameters {
   double communication_step = 0.0;
+  FmuParameters() { initial_velocity_slope = -1.0; }  // so that a first try shows a motion
 };
 
 struct BeamModel final : fmi::Model {
   FmuParameters parameters;
-  fmi::Polynomial tip_force{};
+  fmi::Polynomial tip_force{}, distributed_load{};
   double tip_impulse = 0.0;
-  double distributed_load = 0.0;
-  std::optional<Beam> beam;
-  std::optional<Beam::Forecast> forecast;  ///< with communication_step > 0; not finite if it leaves the range
+  std::unique_ptr<Beam> beam;
+  /// With communication_step > 0, otherwise 0. A forecast that leaves the range of numbers is not finite.
+  Beam::Forecast forecast{}, forecast_per_load{};
   std::array<double, 2> tip_response{};
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
-    beam.emplace(parameters);
-    moved();
-    forecast.reset();
+    beam = beam::make_beam(parameters);
+    forecast = forecast_per_load = {};
     tip_response = {};
-    distributed_load = 0.0;  // inputs are set after this
-    if (parameters.communication_step == 0.0) return;
-    tip_response = beam->tip_response(parameters.communication_step);
+    if (forecasts()) {
+      tip_response = beam->tip_response(parameters.communication_step);
+      forecast_per_load = beam->forecast_per_load(parameters.communication_step);
+    }
+    deflection_.current = rotation_.current = false;
     look_ahead();
   }
 
   void observe() override {
-    if (forecast && distributed_load != foreseen_load_) look_ahead();
-    beam->set_distributed_load(distributed_load);
+    const bool same_load = distributed_load[0] == beam->distributed_load();
+    beam->observe(tip_force[0], distributed_load[0]);
+    if (!same_load) look_ahead();
   }
 
   void step(double size) override {
-    moved();
     std::vector<double> before;
-    if (tip_impulse != 0.0 || forecast) beam->save(before);
+    if (tip_impulse != 0.0 || forecasts()) beam->save(before);
     try {
       if (tip_impulse != 0.0) beam->apply_tip_impulse(tip_impulse);
       beam->step(size, tip_force, distributed_load);
-      if (forecast) foresee();
+      foresee();
     } catch (const std::domain_error& e) {
-      if (!before.empty()) beam->restore(before);
+      if (!before.empty()) restore(before);
       throw fmi::StepDiscarded(e.what());
     }
+    deflection_.current = rotation_.current = false;
   }
 
   void save(std::vector<double>& state) const override { beam->save(state); }
-
+  void require_state(const std::vector<double>& state) const override { beam->require_state(state); }
   void restore(const std::vector<double>& state) override {
     beam->restore(state);
-    moved();
-    if (forecast) look_ahead();
+    deflection_.current = rotation_.current = false;
+    look_ahead();
   }
-
-  double tip_velocity() const { return forecast ? forecast->velocity : beam->tip_velocity(); }
-  double tip_acceleration() const { return forecast ? forecast->acceleration : beam->tip_acceleration(); }
 
   // At point `i` of the shape.
   double deflection(std::size_t i) const { return at(i, deflection_, &Beam::deflection); }
   double rotation(std::size_t i) const { return at(i, rotation_, &Beam::rotation); }
 
  private:
-  double foreseen_load_ = 0.0;
+  bool forecasts() const { return parameters.communication_step > 0.0; }
 
   /// @throws std::domain_error
   void foresee() {
-    foreseen_load_ = distributed_load;
-    forecast = beam->forecast(parameters.communication_step, distributed_load);
+    if (forecasts()) forecast = beam->forecast(parameters.communication_step);
   }
 
   void look_ahead() {
@@ -92,19 +91,17 @@ struct BeamModel final : fmi::Model {
     }
   }
 
-  using Points = std::array<double, beam::shape_points>;
   /// A field of the shape, found for all points at once.
   struct Field {
     bool current = false;
-    Points values{};
+    beam::Shape values{};
   };
 
-  double at(std::size_t i, Field& field, void (Beam::*fill)(Points&) const) const {
+  double at(std::size_t i, Field& field, void (Beam::*fill)(beam::Shape&) const) const {
     if (!field.current) ((*beam).*fill)(field.values);
     field.current = true;
     return field.values[i];
   }
-  void moved() { deflection_.current = rotation_.current = false; }
 
   mutable Field deflection_, rotation_;
 };
@@ -122,34 +119,42 @@ fmi::Table make_table() {
       "Viscoelastic (Kelvin-Voigt) Timoshenko beam, clamped at x = 0, loaded at its tip x = L by a contact force";
   t.stop_time = 0.6;
   t.step_size = 1e-3;
+  t.tolerance = 1e-6;  // for the tool's own use
+  t.choices.push_back({"MassMatrix",
+                       "mass of an element",
+                       {std::string(beam::mass_matrix_names[0]) + ", its kinetic energy exact",
+                        std::string(beam::mass_matrix_names[1]) +
+                            " with the lumped one, so that short waves travel at the right speed"}});
   t.choices.push_back({"Integrator",
                        "time integration of the beam",
-                       {"modal, the exact step of each mode under a polynomial force",
-                        "generalized_alpha, with rho_inf = 1 the midpoint rule"}});
+                       {std::string(beam::integrator_names[0]) + ", the exact step of each mode under polynomial loads",
+                        std::string(beam::integrator_names[1]) + ", with rho_inf = 1 the midpoint rule"}});
 
   fmi::TableBuilder<BeamModel> add(t);
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
     return add.parameter(name, unit, &BeamModel::parameters, field, text);
   };
-  parameter("density", "kg/m3", &Parameters::density, "mass density rho, > 0").at_least(0);
-  parameter("area", "m2", &Parameters::area, "area of the cross-section A, > 0").at_least(0);
-  parameter("second_moment_of_area", "m4", &Parameters::second_moment_of_area, "second moment of area I, > 0")
-      .at_least(0);
-  parameter("young_modulus", "Pa", &Parameters::young_modulus, "Young's modulus E, > 0").at_least(0);
-  parameter("shear_modulus", "Pa", &Parameters::shear_modulus, "shear modulus G, > 0").at_least(0);
-  parameter("shear_coefficient", "", &Parameters::shear_coefficient, "shear coefficient K, > 0").at_least(0);
-  parameter("length", "m", &Parameters::length, "length L, > 0").at_least(0);
+  parameter("density", "kg/m3", &Parameters::density, "mass density rho").positive();
+  parameter("area", "m2", &Parameters::area, "area of the cross-section A").positive();
+  parameter("second_moment_of_area", "m4", &Parameters::second_moment_of_area, "second moment of area I").positive();
+  parameter("young_modulus", "Pa", &Parameters::young_modulus, "Young's modulus E").positive();
+  parameter("shear_modulus", "Pa", &Parameters::shear_modulus, "shear modulus G").positive();
+  parameter("shear_coefficient", "", &Parameters::shear_coefficient, "shear coefficient K").positive();
+  parameter("length", "m", &Parameters::length, "length L").positive();
   parameter("alpha_b", "s", &Parameters::alpha_b, "Kelvin-Voigt retardation time: damping = alpha_b * stiffness")
       .at_least(0);
-  parameter("n_elements", "", &Parameters::n_elements, "uniform elements").range(1, 1000000);
+  parameter("n_elements", "", &Parameters::n_elements, "uniform elements").range(1, beam::max_elements);
   parameter("element_degree", "", &Parameters::element_degree,
             "polynomial degree of deflection and rotation in an element; 1 = linear elements")
-      .range(1, 12);
-  parameter("n_modes", "", &Parameters::n_modes, "lowest modes kept by the modal integrator; 0 = all").at_least(0);
+      .range(1, beam::max_element_degree);
+  parameter("n_modes", "", &Parameters::n_modes, "lowest modes kept by the modal integrator; 0 = all")
+      .range(0, beam::max_dense_unknowns);
   parameter(
       "reduced_integration", "", &Parameters::reduced_integration,
       "as many Gauss points for the shear term as element_degree; false = exact integration, which locks for slender "
       "beams of degree 1");
+  parameter("mass_matrix", "", &Parameters::mass_matrix, "1 = consistent, 2 = averaged").range(1, 2).choice =
+      "MassMatrix";
   fmi::Variable& integrator = parameter("integrator", "", &Parameters::integrator, "1 = modal, 2 = generalized_alpha");
   integrator.range(1, 2).choice = "Integrator";
   parameter("rho_inf", "", &Parameters::rho_inf, "spectral radius at infinity of generalized_alpha; 1 = midpoint rule")
@@ -163,26 +168,27 @@ fmi::Table make_table() {
   parameter(
       "communication_step", "s", &FmuParameters::communication_step,
       "size H of the communication steps, for a partner that foresees the tip (communication_step of the spring). "
-      "If > 0, tip_velocity looks ahead and tip_response is known")
+      "If > 0, tip_velocity_forecast, tip_response and tip_response_2 are known")
       .at_least(0)
-      .scale(1e-3);
+      .typical(1e-3);
 
-  add.polynomial("tip_force", "N",
-                 "contact force C on the tip, positive upward; its derivatives of order 1 and 2 hold for the next "
-                 "step only: C(tau) = C + C' tau + C'' tau^2/2",
-                 [](BeamModel& m) -> fmi::Polynomial& { return m.tip_force; });
+  add.input(
+      "tip_force", "N",
+      "contact force C on the tip, positive upward; its derivatives of order 1 and 2 hold for the next step only: "
+      "C(tau) = C + C' tau + C'' tau^2/2. generalized_alpha sees their mean over the step",
+      [](BeamModel& m) -> fmi::Polynomial& { return m.tip_force; });
   add.impulse("tip_impulse", "N.s", "upward impulse on the tip, applied at the start of the next step, then 0 again",
               [](BeamModel& m) -> double& { return m.tip_impulse; });
-  add.input("distributed_load", "N/m", "distributed load f_b, uniform in x, positive upward",
-            [](BeamModel& m) -> double& { return m.distributed_load; });
+  add.input("distributed_load", "N/m",
+            "distributed load f_b, uniform in x, positive upward; derivatives as for tip_force",
+            [](BeamModel& m) -> fmi::Polynomial& { return m.distributed_load; });
 
   const std::vector<std::string> start_u{"initial_deflection_slope", "length"};
-  // What the modal basis depends on: the start is projected onto the modes that are kept.
+  // What the modal basis depends on. Every start is in it: u = s*x without a rotation, for any number of modes.
   const std::vector<std::string> basis{"density",        "area",    "second_moment_of_area", "young_modulus",
                                        "shear_modulus",  "length",  "shear_coefficient",     "n_elements",
-                                       "element_degree", "n_modes", "reduced_integration",   "integrator"};
-  std::vector<std::string> start_shape = basis;
-  start_shape.push_back("initial_deflection_slope");
+                                       "element_degree", "n_modes", "reduced_integration",   "integrator",
+                                       "mass_matrix"};
   add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),
              of(&Beam::tip_velocity))
       .from(start_u);
@@ -192,28 +198,31 @@ fmi::Table make_table() {
   std::vector<std::string> free_motion = motion;
   free_motion.insert(free_motion.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient",
                                          "distributed_load"});
-  add.output(
-         "tip_velocity", "m/s",
-         "velocity of the tip; if communication_step = H > 0 its mean over the next 2H were there no tip_force",
-         [](const BeamModel& m) { return m.tip_velocity(); }, [](const BeamModel& m) { return m.tip_acceleration(); })
-      .from(free_motion)
-      .follows({"distributed_load"});
-  add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation))
-      .from(start_shape);
+  add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
+      .from({"initial_velocity_slope", "length"});
+  add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation));
   add.output("tip_displacement_integral", "m.s", "integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral), of(&Beam::tip_displacement));
   add.output("tip_displacement_integral_2", "m.s2", "double integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral_2), of(&Beam::tip_displacement_integral));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy))
-      .from({"density", "area", "length", "initial_velocity_slope"});
+      .from({"density", "area", "length", "initial_velocity_slope", "mass_matrix", "n_elements", "element_degree"});
   add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy))
       .from({"area", "shear_modulus", "shear_coefficient", "length", "initial_deflection_slope"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy));
   add.output("load_potential", "J", "potential of the distributed load", of(&Beam::load_potential))
-      .from({"length", "n_elements", "initial_deflection_slope", "tip_load_coefficient", "distributed_load"})
-      .follows({"distributed_load"});
+      .from({"length", "n_elements", "initial_deflection_slope", "tip_load_coefficient", "distributed_load"});
+  add.depends("distributed_load", [](const BeamModel& m) { return -m.beam->deflection_integral(); });
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
       .from(basis);
+  add.output(
+         "tip_velocity_forecast", "m/s",
+         "mean velocity of the tip over the next two steps of communication_step were there no tip_force; 0 if that is "
+         "0",
+         [](const BeamModel& m) { return m.forecast.velocity; },
+         [](const BeamModel& m) { return m.forecast.acceleration; })
+      .from(free_motion);
+  add.depends("distributed_load", [](const BeamModel& m) { return m.forecast_per_load.velocity; });
   add.output("tip_response", "m/N",
              "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
              [](const BeamModel& m) { return m.tip_response[0]; })
@@ -221,17 +230,16 @@ fmi::Table make_table() {
   add.output("tip_response_2", "m/N", "the same at the end of the step after, without a force meanwhile",
              [](const BeamModel& m) { return m.tip_response[1]; })
       .from(motion);
-  for (std::size_t i = 0; i < beam::shape_points; ++i) {
-    const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
-    add.output("deflection[" + std::to_string(i + 1) + "]", "m", "deflection" + x,
-               [i](const BeamModel& m) { return m.deflection(i); })
-        .from(i == 0 ? std::vector<std::string>{} : start_u);
-  }
-  for (std::size_t i = 0; i < beam::shape_points; ++i) {
-    const std::string x = " at x = L*" + std::to_string(i) + "/" + std::to_string(beam::shape_points - 1);
-    add.output("rotation[" + std::to_string(i + 1) + "]", "rad", "rotation of the cross-section" + x,
-               [i](const BeamModel& m) { return m.rotation(i); })
-        .from(i == 0 ? std::vector<std::string>{} : start_shape);
+  for (const bool rotation : {false, true}) {
+    for (std::size_t i = 0; i < beam::shape_points; ++i) {
+      const std::string index = "[" + std::to_string(i + 1) + "]", x = " at x = L*" + std::to_string(i) + "/20";
+      if (rotation) {
+        add.local("rotation" + index, "rad", "rotation of the cross-section" + x,
+                  [i](const BeamModel& m) { return m.rotation(i); });
+      } else {
+        add.local("deflection" + index, "m", "deflection" + x, [i](const BeamModel& m) { return m.deflection(i); });
+      }
+    }
   }
   return t;
 }

@@ -9,9 +9,10 @@
 #include <vector>
 
 #include "../../src_spring/compliance.hpp"
+#include "../../src_spring/flat.hpp"
 #include "../../src_spring/held_contact.hpp"
+#include "../../src_spring/parameters.hpp"
 #include "../../src_spring/spring.hpp"
-#include "../adapter/description.hpp"
 #include "../adapter/table.hpp"
 
 namespace {
@@ -19,49 +20,51 @@ namespace {
 using spring::Parameters;
 using spring::Spring;
 
-/// The spring's parameters and what exchange between steps adds to them.
+/// The spring's parameters, where its top rests, and what exchange between steps adds to them.
 struct FmuParameters : Parameters {
+  double equilibrium = 0.0;  ///< Ψ [m]; in (6) the spring's force is 0 at y = 0 all the same
   double communication_step = 0.0, tip_response = 0.0, tip_response_2 = 0.0;
 };
 
 struct SpringModel final : fmi::Model {
   FmuParameters parameters;
-  spring::Inputs inputs;
+  fmi::Polynomial contact_force{}, foundation_force{}, external_force{}, tip_velocity{}, forecast{};
+  fmi::Polynomial tip_displacement{0.0, fmi::unset, fmi::unset};  ///< as set; after a step, as extrapolated
   double impulse = 0.0;
   std::optional<Spring> spring;
   std::optional<spring::HeldContact> held;
-  /// Whether tip_displacement was set since the last step; if not, extrapolation is better.
-  bool tip_is_current = true;
 
   void build(double tolerance) override {
     Parameters p = parameters;
+    // A start of 0 is what tools send that set every start value: it does not count as chosen.
+    if (p.displacement == 0.0) p.displacement = parameters.equilibrium;
     if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
     held.reset();
     if (p.contact_law == spring::ContactLaw::normal_compliance && parameters.communication_step > 0.0) {
       p.contact_law = spring::ContactLaw::external;
       spring.emplace(p);  // checks the parameters
-      held.emplace(spring::Compliance(p.compliance_stiffness, p.compliance_exponent), p.mass,
-                   parameters.communication_step,
+      held.emplace(law(), p.mass, parameters.communication_step,
                    std::array<double, 2>{parameters.tip_response, parameters.tip_response_2});
     } else {
       spring.emplace(p);
     }
-    tip_is_current = true;
   }
 
   void observe() override {
     if (held) {
       if (!held->started()) held->begin(message(), spring->displacement(), trial());
       show_force();
-    } else if (parameters.contact_law == spring::ContactLaw::external || tip_is_current) {
-      spring->observe(inputs);
+    } else {
+      spring->observe(acting());
     }
   }
 
   void step(double size) override {
-    if (held && std::abs(size - held->size()) > 1e-6 * held->size()) {
-      throw fmi::StepDiscarded("a step of " + fmi::text(size) + " s, but communication_step = " +
-                               fmi::text(held->size()) + " s: steps must have that size, or the parameter be 0");
+    // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
+    const bool goes_on = held && size > rounding * held->size();
+    if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
+      throw fmi::StepDiscarded("a step of " + spring::number(size) + " s, but communication_step = " +
+                               spring::number(held->size()) + " s: steps must have that size, or the parameter be 0");
     }
     std::vector<double> before;
     if (impulse != 0.0 || held) save(before);
@@ -69,70 +72,146 @@ struct SpringModel final : fmi::Model {
       if (!before.empty()) restore(before);
       throw fmi::StepDiscarded(why);
     };
-    spring::Inputs acting = inputs;
-    if (held) {
-      if (!std::isfinite(held->force())) discard(no_force);
-      acting.contact_force = {held->force(), 0.0, 0.0};
-    }
+    if (held && !std::isfinite(held->force())) discard(no_force);
+    const spring::Inputs inputs = acting();
     try {
       if (impulse != 0.0) spring->apply_impulse(impulse);
-      spring->step(size, acting);
+      spring->step(size, inputs);
     } catch (const spring::StepFailure& e) {
       discard(e.what());
     } catch (const std::domain_error& e) {
       discard(e.what());
     }
-    tip_is_current = false;
-    if (held) {
+    keep_tip();
+    if (goes_on) {
       held->advance(message(), spring->displacement(), trial());
       if (!std::isfinite(held->force())) discard(no_force);
-      show_force();
     }
+    if (held) show_force();
+    check_wiring();
   }
 
   double reaction() const { return held ? held->force() : spring->reaction(); }
   double contact_energy() const { return held ? held->energy(spring->displacement()) : spring->contact_energy(); }
+  double reaction_rate() const {
+    const auto slopes = law_slopes();
+    return slopes.force_by_depth * (spring->velocity() - spring->tip()[1]) +
+           slopes.force_by_rate * (spring->acceleration() - tip()[2]);
+  }
+  // Of what the held force follows before its first step only the value is known, later it follows nothing.
+  double reaction_by_tip_displacement() const { return by_tip(-law_slopes().force_by_depth); }
+  double reaction_by_tip_velocity() const {
+    return by_tip(is_set(tip_displacement[1]) ? 0.0 : -law_slopes().force_by_rate);
+  }
+  double contact_energy_by_tip_displacement() const { return by_tip(-law().elastic(depth())); }
+  double dissipated_energy() const { return spring->dissipated_energy() + (held ? held->dissipated() : 0.0); }
 
   void save(std::vector<double>& state) const override {
     spring->save(state);
-    state.push_back(tip_is_current ? 1.0 : 0.0);
-    if (held) {
-      const auto more = held->state();
-      state.insert(state.end(), more.begin(), more.end());
-    }
+    if (!held) return;
+    const auto more = spring::flat(held->state());
+    state.insert(state.end(), more.begin(), more.end());
   }
 
   void restore(const std::vector<double>& state) override {
-    const std::size_t own = 1 + (held ? spring::HeldContact::state_length : 0);
+    using Held = spring::HeldContact::State;
+    const std::size_t own = held ? spring::Flat<Held>{}.size() : 0;
     if (state.size() < own) throw std::invalid_argument("spring: a saved state is too short");
     const auto mine = state.end() - static_cast<std::ptrdiff_t>(own);
     std::optional<spring::HeldContact> restored = held;
-    if (restored) restored->restore(&mine[1]);
+    if (restored) restored->restore(spring::from_flat<Held>(&*mine));
     spring->restore({state.begin(), mine});
     held = restored;
-    tip_is_current = mine[0] != 0.0;
+    keep_tip();
   }
 
  private:
   static constexpr long most_trial_work = 100'000;  ///< of IDA's steps for one force
+  static constexpr double rounding = 1e-6;          ///< of communication_step
+  static constexpr int most_missed = 10;            ///< steps; a sudden load takes 2, a harmonic one from rest up to 8
+  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   static constexpr const char* no_force =
       "spring: the contact force leaves the range of floating-point numbers; the tip is too far or too fast";
 
-  spring::TipMessage message() const { return {inputs.tip_displacement[0], inputs.tip_velocity}; }
+  bool warned_ = false;
+
+  spring::Compliance law() const {
+    return {parameters.compliance_stiffness, parameters.compliance_exponent, parameters.compliance_damping};
+  }
+  /// y − u_tip [m]; negative without a law inside
+  double depth() const {
+    const bool inside = !held && parameters.contact_law == spring::ContactLaw::normal_compliance;
+    return inside ? spring->displacement() - spring->tip()[0] : -1.0;
+  }
+  spring::Compliance::Slopes law_slopes() const {
+    return depth() > 0.0 ? law().slopes(depth(), spring->velocity() - spring->tip()[1]) : spring::Compliance::Slopes{};
+  }
+  double by_tip(double partial) const { return !held ? partial : held->started() ? 0.0 : unknown; }
+
+  static bool is_set(double derivative) { return !std::isnan(derivative); }
+
+  /// The tip from now on: tip_velocity is its rate where tip_displacement has no derivative.
+  spring::Quadratic tip() const {
+    const auto& [u, rate, curvature] = tip_displacement;
+    if (!is_set(rate)) return {u, tip_velocity[0], is_set(curvature) ? curvature : tip_velocity[1]};
+    return {u, rate, is_set(curvature) ? curvature : 0.0};
+  }
+
+  /// Until tip_displacement is set again it is what it was extrapolated to.
+  void keep_tip() {
+    if (held) return;
+    const spring::Quadratic reached = spring->tip();
+    tip_displacement = {reached[0], reached[1] == tip_velocity[0] ? fmi::unset : reached[1], fmi::unset};
+  }
+
+  /// A pair that is wired wrongly gains energy without a sign: say so, once.
+  void check_wiring() {
+    if (warned_) return;
+    if (held && held->missed() >= most_missed) {
+      warning = "the tip was not where it was foreseen in " + std::to_string(held->missed()) + " steps, by up to " +
+                spring::number(held->farthest()) +
+                " m, so the contact gains or loses energy. Connect tip_displacement and tip_velocity_forecast of the "
+                "beam to the inputs of these names and reaction to its tip_force; set communication_step in both to "
+                "the step size, tip_response and tip_response_2 to the beam's; pass values on between the steps only, "
+                "for both FMUs alike (Jacobi). Loads on the beam that change much within a step show here, too";
+    } else if (!held && forecast[0] != 0.0 && parameters.contact_law == spring::ContactLaw::normal_compliance) {
+      warning =
+          "tip_velocity_forecast arrives but is not used, as communication_step = 0: a contact that the steps do not "
+          "resolve gains energy. Set communication_step, tip_response and tip_response_2 to those of the beam, or "
+          "communication_step of the beam to 0";
+    }
+    warned_ = !warning.empty();
+  }
+
+  spring::TipMessage message() const { return {tip_displacement[0], forecast[0]}; }
+
+  /// What acts from now on, but for what the contact law does not read.
+  spring::Inputs acting() const {
+    spring::Inputs inputs;
+    if (held) {
+      inputs.contact_force[0] = held->force();
+    } else if (parameters.contact_law == spring::ContactLaw::external) {
+      inputs.contact_force = contact_force;
+    }
+    inputs.foundation_force = foundation_force;
+    inputs.external_force = external_force[0];
+    for (std::size_t i = 1; i < 3; ++i) inputs.contact_force[i] -= external_force[i];  // both act on the top alone
+    inputs.tip_displacement = tip();
+    return inputs;
+  }
 
   /// Where the top would be after the next step, other inputs staying as they are; the spring is left as it was.
   spring::HeldContact::Top trial() {
     std::vector<double> present;
     spring->save(present);
-    spring::Inputs acting = inputs;
-    for (auto* input : {&acting.contact_force, &acting.foundation_force}) (*input)[1] = (*input)[2] = 0.0;
-    return [this, present, acting, work = 0L](double force) mutable {
-      constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    spring::Inputs inputs = acting();
+    for (auto* input : {&inputs.contact_force, &inputs.foundation_force}) (*input)[1] = (*input)[2] = 0.0;
+    return [this, present, inputs, work = 0L](double force) mutable {
       if (work > most_trial_work) return unknown;
-      acting.contact_force[0] = force;
+      inputs.contact_force[0] = force;
       const long before = spring->ida_steps();
       try {
-        spring->step(held->size(), acting);
+        spring->step(held->size(), inputs);
       } catch (const spring::StepFailure&) {
         return unknown;  // the step itself will tell
       }
@@ -145,9 +224,7 @@ struct SpringModel final : fmi::Model {
 
   /// To the acceleration. Without a finite force `reaction` has no value, and the next step is refused.
   void show_force() {
-    spring::Inputs acting = inputs;
-    acting.contact_force = {held->force(), 0.0, 0.0};
-    if (std::isfinite(held->force())) spring->observe(acting);
+    if (std::isfinite(held->force())) spring->observe(acting());
   }
 };
 
@@ -165,6 +242,7 @@ fmi::Table make_table() {
       "foundation";
   t.stop_time = 0.6;
   t.step_size = 1e-3;
+  t.tolerance = 1e-6;  // for the tool's own use: what it hands on never loosens relative_tolerance
   t.choices.push_back({"ContactLaw",
                        "where the contact force comes from",
                        {"external, the input contact_force",
@@ -174,26 +252,32 @@ fmi::Table make_table() {
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {
     return add.parameter(name, unit, &SpringModel::parameters, field, text);
   };
-  parameter("mass", "kg", &Parameters::mass, "mass m, > 0").at_least(0);
+  parameter("mass", "kg", &Parameters::mass, "mass m").positive();
   parameter("damping", "N.s/m", &Parameters::damping, "viscous damping alpha_s").at_least(0);
   parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
   parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness, "cubic stiffness k2; < 0 softens");
-  parameter("equilibrium", "m", &Parameters::equilibrium, "position Psi where the top rests");
+  parameter(
+      "equilibrium", "m", &FmuParameters::equilibrium,
+      "position Psi where the top rests: it starts there, unless displacement has a start value other than 0. The "
+      "spring's force is 0 at y = 0 all the same");
   parameter("contact_law", "", &Parameters::contact_law, "1 = external, 2 = normal compliance inside")
       .range(1, 2)
       .choice = "ContactLaw";
   parameter("compliance_stiffness", "", &Parameters::compliance_stiffness,
-            "lambda in C = lambda*max(0, y - u_tip)^p [N/m^p]")
+            "lambda in C = lambda*max(0, d)^p*max(0, 1 + chi*d') [N/m^p], d = y - u_tip")
       .at_least(0)
-      .scale(1e4);
-  parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").at_least(1);
+      .typical(1e4);
+  parameter("compliance_exponent", "", &Parameters::compliance_exponent, "exponent p in the contact law").range(1, 100);
+  parameter("compliance_damping", "s/m", &Parameters::compliance_damping,
+            "damping chi of the contact law (Hunt and Crossley); what it takes is in dissipated_energy")
+      .at_least(0);
   parameter(
       "communication_step", "s", &FmuParameters::communication_step,
       "for contact_law = 2 beside a beam with the same communication_step: size of all communication steps. If > 0, "
       "reaction is held over each step at the value that does the law's work, the tip being foreseen: no energy is "
       "gained at any step size. 0: the law under the extrapolated tip")
       .at_least(0)
-      .scale(1e-3);
+      .typical(1e-3);
   parameter("tip_response", "m/N", &FmuParameters::tip_response, "for communication_step > 0: tip_response of the beam")
       .at_least(0);
   parameter("tip_response_2", "m/N", &FmuParameters::tip_response_2,
@@ -203,37 +287,36 @@ fmi::Table make_table() {
   parameter("restitution", "", &Parameters::restitution, "coefficient of restitution at the foundation").range(0, 1);
   parameter("relative_tolerance", "", &Parameters::relative_tolerance,
             "relative tolerance of IDA; an importer's tolerance can tighten, never loosen it")
-      .range(0, 1)
-      .scale(1e-12);
+      .range(std::numeric_limits<double>::min(), 1e-2)
+      .typical(1e-12);
   parameter("absolute_tolerance", "", &Parameters::absolute_tolerance, "absolute tolerance of IDA")
-      .at_least(0)
-      .scale(1e-14);
+      .range(std::numeric_limits<double>::min(), 1e-2)
+      .typical(1e-14);
 
-  using spring::Inputs;
-  const auto polynomial = [&](const char* name, const char* unit, auto Inputs::*field, const char* text) {
-    add.polynomial(name, unit, text, [field](SpringModel& m) -> fmi::Polynomial& { return m.inputs.*field; });
+  const auto input = [&](const char* name, const char* unit, fmi::Polynomial SpringModel::*field,
+                         const char* text) -> fmi::Variable& {
+    return add.input(name, unit, text, [field](SpringModel& m) -> fmi::Polynomial& { return m.*field; });
   };
-  const auto input = [&](const char* name, const char* unit, auto Inputs::*field, const char* text) {
-    add.input(name, unit, text, [field](SpringModel& m) -> double& { return m.inputs.*field; });
-  };
-  polynomial("contact_force", "N", &Inputs::contact_force,
-             "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next "
-             "step only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2");
-  polynomial("foundation_force", "N", &Inputs::foundation_force,
-             "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled");
+  input("contact_force", "N", &SpringModel::contact_force,
+        "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next step "
+        "only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2");
+  input("foundation_force", "N", &SpringModel::foundation_force,
+        "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled");
   add.impulse("impulse", "N.s", "upward impulse, applied at the start of the next step, then 0 again",
               [](SpringModel& m) -> double& { return m.impulse; });
-  input("external_force", "N", &Inputs::external_force, "external force f_s, positive upward");
-  add.polynomial("tip_displacement", "m",
-                 "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its "
-                 "derivatives or else by tip_velocity",
-                 [](SpringModel& m) -> fmi::Polynomial& {
-                   m.tip_is_current = true;
-                   return m.inputs.tip_displacement;
-                 });
-  input(
-      "tip_velocity", "m/s", &Inputs::tip_velocity,
-      "velocity of the beam's tip, read by contact_law = 2; looks ahead if communication_step > 0, as the beam's does");
+  input("external_force", "N", &SpringModel::external_force,
+        "external force f_s, positive upward; derivatives as for contact_force");
+  input("tip_displacement", "m", &SpringModel::tip_displacement,
+        "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives or "
+        "else by tip_velocity")
+      .set = [](fmi::Model& m, const fmi::Polynomial& value) {
+    static_cast<SpringModel&>(m).tip_displacement = value;  // with what is unset
+  };
+  input("tip_velocity", "m/s", &SpringModel::tip_velocity,
+        "velocity of the beam's tip, read by contact_law = 2 where no derivative of tip_displacement is set; its "
+        "derivative of order 1 is the tip's acceleration, that of order 2 is not used");
+  input("tip_velocity_forecast", "m/s", &SpringModel::forecast,
+        "for communication_step > 0: tip_velocity_forecast of the beam; its derivatives are not used");
 
   add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
   add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
@@ -243,23 +326,31 @@ fmi::Table make_table() {
              of(&Spring::displacement_integral), of(&Spring::displacement));
   add.output("displacement_integral_2", "m.s2", "double integral of displacement over the last step",
              of(&Spring::displacement_integral_2), of(&Spring::displacement_integral));
-  add.output("reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
-             [](const SpringModel& m) { return m.reaction(); })
-      .follows({"tip_displacement"})
-      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement",
+  add.output(
+         "reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
+         [](const SpringModel& m) { return m.reaction(); }, [](const SpringModel& m) { return m.reaction_rate(); })
+      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "compliance_damping", "displacement",
+             "tip_displacement", "tip_velocity",
              // with communication_step > 0, of which the first is foreseen:
-             "communication_step", "tip_response", "tip_velocity", "velocity", "mass", "damping", "linear_stiffness",
-             "cubic_stiffness", "external_force", "foundation_force", "stop_enabled", "stop_position", "restitution"});
+             "communication_step", "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping",
+             "linear_stiffness", "cubic_stiffness", "external_force", "foundation_force", "stop_enabled",
+             "stop_position", "restitution", "equilibrium"});
+  add.depends("tip_displacement", [](const SpringModel& m) { return m.reaction_by_tip_displacement(); });
+  add.depends("tip_velocity", [](const SpringModel& m) { return m.reaction_by_tip_velocity(); });
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});
   add.output("potential_energy", "J", "potential energy of the spring", of(&Spring::potential_energy))
-      .from({"linear_stiffness", "cubic_stiffness", "displacement"});
+      .from({"linear_stiffness", "cubic_stiffness", "displacement", "equilibrium"});
   add.output("contact_energy", "J", "energy stored in the contact law inside",
              [](const SpringModel& m) { return m.contact_energy(); })
-      .follows({"tip_displacement"})
-      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
-  add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Spring::dissipated_energy));
+      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "equilibrium",
+             "tip_displacement"});
+  add.depends("tip_displacement", [](const SpringModel& m) { return m.contact_energy_by_tip_displacement(); });
+  add.output("dissipated_energy", "J", "work of the damping force and of the contact's damping since the start",
+             [](const SpringModel& m) { return m.dissipated_energy(); });
+  add.output("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
+             of(&Spring::impact_loss));
   add.output("internal_steps", "", "steps that IDA took since the start",
              [](const SpringModel& m) { return static_cast<double>(m.spring->ida_steps()); });
   return t;

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # build.sh OUT PYTHON — cross-compiles beam.dll and spring.dll for 64-bit Windows into OUT, with zig from PyPI, self-
-# contained but for what Windows 10 has. SUNDIALS is built from source (fmus/sundials_source.sh); Eigen and Spectra are
-# the system's or those of SPRINGBEAM_PREFIX.
+# contained but for what Windows 10 has. SUNDIALS is compiled from SPRINGBEAM_SUNDIALS_SOURCE; Eigen and Spectra are the
+# system's or those of SPRINGBEAM_PREFIX.
 set -euo pipefail
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
@@ -45,17 +45,7 @@ TEXT
 cross=(-G Ninja "-DCMAKE_MAKE_PROGRAM=$tools/ninja" "-DCMAKE_TOOLCHAIN_FILE=$out/toolchain.cmake"
   -DCMAKE_BUILD_TYPE=Release)
 
-if ! [ -f "$out/prefix/lib/libsundials_ida.a" ]; then
-  source=$("$root/fmus/sundials_source.sh" "$out/../source")
-  say "building SUNDIALS for win64"
-  off=()
-  for part in ARKODE CVODE CVODES IDAS KINSOL; do off+=("-DBUILD_$part=OFF"); done
-  quietly sundials-configure "$tools/cmake" -S "$source" -B "$out/sundials" "${cross[@]}" "${off[@]}" \
-    "-DCMAKE_INSTALL_PREFIX=$out/prefix" -DBUILD_SHARED_LIBS=OFF -DEXAMPLES_ENABLE_C=OFF -DEXAMPLES_INSTALL=OFF \
-    -DCMAKE_C_FLAGS=-ffp-contract=off
-  quietly sundials "$tools/ninja" -C "$out/sundials" install
-fi
-
+[ -n "${SPRINGBEAM_SUNDIALS_SOURCE:-}" ] || die "the source of SUNDIALS is missing: SPRINGBEAM_SUNDIALS_SOURCE=…"
 # The headers alone: the system's include folder would bring Linux' own with them.
 mkdir -p "$out/include"
 for prefix in "${SPRINGBEAM_PREFIX:-}" /usr /usr/local; do
@@ -63,7 +53,7 @@ for prefix in "${SPRINGBEAM_PREFIX:-}" /usr /usr/local; do
 done
 if ! [ -f "$out/project/build.ninja" ]; then
   quietly configure "$tools/cmake" -S "$root" -B "$out/project" "${cross[@]}" "-DPython3_EXECUTABLE=$python" \
-    -DSPRINGBEAM_TESTS=OFF "-DCMAKE_PREFIX_PATH=$out/prefix;${SPRINGBEAM_PREFIX:-}" \
+    -DSPRINGBEAM_TESTS=OFF "-DCMAKE_PREFIX_PATH=${SPRINGBEAM_PREFIX:-}" \
     "-DSPECTRA_INCLUDE_DIR=$out/include" -DEigen3_ROOT=/usr -DEigen3_DIR="${Eigen3_DIR:-/usr/share/eigen3/cmake}"
 fi
 say "building for win64"

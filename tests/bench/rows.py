@@ -106,16 +106,17 @@ def beam(effort: Effort) -> Iterator[Row]:
     yield ratio_row(
         "1", "the same from the same state under another force", _of(found["generalized_alpha repeated"]), 1.5, bare
     )
-    modal = _of(found["modal fmu"])
-    microseconds = [1e6 * s for s in modal.ours]
-    yield Row(
-        "1",
-        "beam step of the FMU, 64 modes, called from C",
-        "≤ 1 µs",
-        f"{median_and_spread(microseconds)} µs",
-        statistics.median(microseconds) <= 1.0,
-        f"64 products of 2 × 2 matrices: {_time(statistics.median(modal.rival))}",
-    )
+    for key, what, goal in (("", "", 1.0), (" repeated", " and the state set back before", 0.35)):
+        modal = _of(found["modal fmu" + key])
+        microseconds = [1e6 * s for s in modal.ours]
+        yield Row(
+            "1",
+            f"beam step of the FMU, 64 modes{what}, called from C",
+            f"≤ {goal:g} µs",
+            f"{median_and_spread(microseconds)} µs",
+            statistics.median(microseconds) <= goal,
+            f"64 products of 2 × 2 matrices: {_time(statistics.median(modal.rival))}",
+        )
     yield from _initialisation(effort, found)
     for modes, name in ((0, "generalized-α"), (64, "64 modes")):
         line = found[f"scaling {modes}"]

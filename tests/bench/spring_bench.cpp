@@ -11,8 +11,11 @@
 
 #include "../../fmus/adapter/instance.hpp"
 #include "../../src_spring/spring.hpp"
-#include "../../src_spring/sundials_compat.hpp"
 #include "paired.hpp"
+
+#ifndef SUN_COMM_NULL  // before SUNDIALS 7
+#define SUN_COMM_NULL nullptr
+#endif
 
 namespace {
 
@@ -25,7 +28,7 @@ struct Problem {
 class BareIda {
  public:
   BareIda(const Problem& problem, double relative, double absolute) : p_(problem) {
-    check(spring::compat::create_context(&context_));
+    check(SUNContext_Create(SUN_COMM_NULL, &context_));
     Y_ = N_VNew_Serial(4, context_);
     Yp_ = N_VNew_Serial(4, context_);
     J_ = SUNDenseMatrix(4, 4, context_);

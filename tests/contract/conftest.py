@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 import math
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -266,7 +266,3 @@ def case(request: pytest.FixtureRequest, loaded: Callable[[str], Fmu]) -> Iterat
     name: str = request.param
     for fmu in _lend(loaded(name)):
         yield Case(name, fmu)
-
-
-def references(fmu: Fmu, names: Sequence[str]) -> Any:
-    return (ct.c_uint * len(names))(*[fmu.variables[n].valueReference for n in names])

@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
@@ -187,7 +188,11 @@ def test_types_platform_and_version(case: Any) -> None:
         ("fmi2GetStatus", (0, None), "value is NULL"),
         ("fmi2GetRealOutputDerivatives", ((ct.c_uint * 1)(0), 1, None, (ct.c_double * 1)()), "order is NULL"),
         ("fmi2SetRealInputDerivatives", ((ct.c_uint * 1)(0), 1, (ct.c_int * 1)(1), None), "value is NULL"),
-        ("fmi2GetDirectionalDerivative", (None, 0, None, 0, None, None), "not provided"),
+        (
+            "fmi2GetDirectionalDerivative",
+            ((ct.c_uint * 1)(0), ct.c_size_t(1), None, ct.c_size_t(0), None, None),
+            "dvUnknown is NULL",
+        ),
     ],
 )
 def test_bad_argument_is_an_error_with_a_message(
@@ -216,12 +221,47 @@ def test_parameter_out_of_range_is_refused_by_name(case: Any) -> None:
 
 def test_impossible_parameter_is_refused_at_initialization_by_name(case: Any) -> None:
     k = case.fmu.instance()
-    name = {"beam": "density", "spring": "mass"}[case.name]
+    name = {"beam": "n_modes", "spring": "cubic_stiffness"}[case.name]  # only beside the others impossible
     k.setup()
-    k.set(name, 0.0)
+    if case.name == "spring":
+        k.set("linear_stiffness", 0.0)
+    k.set(name, {"beam": 101, "spring": -1.0}[case.name])
     assert k.call("fmi2EnterInitializationMode") == OK
     assert k.call("fmi2ExitInitializationMode") == ERROR
     assert name in k.message
+
+
+def test_limits_of_the_description_are_the_true_ones(case: Any) -> None:
+    """At a limit that the XML gives the instance comes up; beyond it the value is refused when it is set."""
+    # Limits of numbers that go together are reached only beside others that allow them.
+    beside: dict[str, dict[str, float]] = {
+        "n_elements": {"n_modes": 1},
+        "element_degree": {"n_elements": 1},
+        "n_modes": {"n_elements": 500},
+        "compliance_exponent": {"contact_law": 2},
+    }
+    tried = 0
+    for v in case.fmu.description.modelVariables:
+        if v.causality != "parameter" or v.type == "Boolean":
+            continue
+        for limit, away in ((v.min, -1.0), (v.max, 1.0)):
+            if limit is None or float(limit) == 1e6:  # a million elements take their time
+                continue
+            tried += 1
+            k = case.fmu.instance()
+            k.setup()
+            positive = 0.0 < float(limit) < 1e-300  # itself no beam, beside numbers of ordinary size
+            for name, value in {**beside.get(v.name, {}), v.name: 1e-3 if positive else float(limit)}.items():
+                k.set(name, value)
+            assert k.call("fmi2EnterInitializationMode") == OK
+            assert k.call("fmi2ExitInitializationMode") == OK, (v.name, k.message)
+            k.free()
+            k = case.fmu.instance()
+            outside = float(limit) + away if v.type == "Integer" else np.nextafter(float(limit), away * np.inf)
+            assert k.try_set(v.name, 0.0 if positive else outside) == ERROR, v.name
+            assert v.name in k.message
+            k.free()
+    assert tried >= 15
 
 
 def test_parameters_are_fixed_after_initialization(case: Any) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 import subprocess
+import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from fmpy import simulate_fmu
-from fmpy.util import read_csv
+from fmpy.util import create_plotly_figure, read_csv
 from fmpy.validation import validate_fmu
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -85,9 +87,11 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
             ("input", "N"): ["tip_force"],
             ("input", "N.s"): ["tip_impulse"],
             ("input", "N/m"): ["distributed_load"],
-            ("output", "m"): ["tip_displacement", *(f"deflection[{i}]" for i in range(1, 22))],
-            ("output", "m/s"): ["tip_velocity"],
-            ("output", "rad"): ["tip_rotation", *(f"rotation[{i}]" for i in range(1, 22))],
+            ("output", "m"): ["tip_displacement"],
+            ("local", "m"): [f"deflection[{i}]" for i in range(1, 22)],
+            ("output", "m/s"): ["tip_velocity", "tip_velocity_forecast"],
+            ("output", "rad"): ["tip_rotation"],
+            ("local", "rad"): [f"rotation[{i}]" for i in range(1, 22)],
             ("output", "m.s"): ["tip_displacement_integral"],
             ("output", "m.s2"): ["tip_displacement_integral_2"],
             ("output", "J"): ["kinetic_energy", "strain_energy", "dissipated_energy", "load_potential"],
@@ -95,7 +99,8 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
             ("parameter", "s"): ["alpha_b"],
             ("parameter", "N/m"): ["tip_load_coefficient"],
             ("parameter", None): [
-                *("shear_coefficient", "n_elements", "n_modes", "reduced_integration", "integrator", "rho_inf"),
+                *("shear_coefficient", "n_elements", "n_modes", "reduced_integration", "mass_matrix", "integrator"),
+                "rho_inf",
                 "initial_deflection_slope",
             ],
         },
@@ -103,17 +108,20 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
             ("input", "N"): ["contact_force", "foundation_force", "external_force"],
             ("input", "N.s"): ["impulse"],
             ("input", "m"): ["tip_displacement"],
-            ("input", "m/s"): ["tip_velocity"],
+            ("input", "m/s"): ["tip_velocity", "tip_velocity_forecast"],
             ("output", "m"): ["displacement"],
             ("output", "m/s"): ["velocity"],
             ("output", "N"): ["reaction", "stop_force"],
             ("output", "N.s"): ["stop_impulse"],
-            ("output", "J"): ["kinetic_energy", "potential_energy", "contact_energy", "dissipated_energy"],
+            ("output", "J"): [
+                *("kinetic_energy", "potential_energy", "contact_energy", "dissipated_energy", "impact_loss")
+            ],
             ("parameter", "kg"): ["mass"],
             ("parameter", "N.s/m"): ["damping"],
             ("parameter", "N/m"): ["linear_stiffness"],
             ("parameter", "N/m3"): ["cubic_stiffness"],
             ("parameter", "m"): ["equilibrium", "stop_position"],
+            ("parameter", "s/m"): ["compliance_damping"],
             ("parameter", None): [
                 *("contact_law", "compliance_stiffness", "compliance_exponent", "stop_enabled", "restitution"),
                 *("relative_tolerance", "absolute_tolerance"),
@@ -162,6 +170,37 @@ def test_reference_result_is_reproduced(case: Any) -> None:
     for name in names:
         # 12 digits are written; the beam's modes differ by rounding between compilers.
         assert result[name] == pytest.approx(expected[name], rel=1e-9, abs=1e-11)
+
+
+def test_reference_files_are_announced_as_the_layered_standard_asks(case: Any) -> None:
+    """FMI-LS-REF 1.0.0-alpha.1: a manifest of that name and folder, whose sources are files relative to itself."""
+    folder = case.fmu.folder / "extra" / "org.fmi-standard.fmi-ls-ref"
+    root = ET.parse(folder / "fmi-ls-manifest.xml").getroot()
+    prefix = "{http://fmi-standard.org/fmi-ls-manifest}"
+    assert (root.tag, root.get(prefix + "fmi-ls-name")) == ("fmiReferences", "org.fmi-standard.fmi-ls-ref")
+    assert root.get(prefix + "fmi-ls-version") == "1.0.0-alpha.1"
+    assert root.get(prefix + "fmi-ls-description") == (
+        "Layered Standard providing information on related files included in an FMU."
+    )
+    related = {(folder / item.get("source", "")).resolve(): item.get("role") for item in root.iter("Related")}
+    assert all(path.is_file() for path in related)
+    assert sorted(related.values()) == ["experiment/smoke-test", "result", "testcase"]
+    experiment = ET.parse(folder / "experiments.xml").getroot().find("Experiment")
+    assert experiment is not None
+    named = {(folder / item.get("source", "")).resolve() for item in experiment}
+    assert named == {path for path, role in related.items() if role != "experiment/smoke-test"}
+
+
+def test_outputs_fit_a_plot_of_all_of_them(case: Any) -> None:
+    """FMPy draws a row for every output, of which 17 fit; the shape's 42 values are there to be asked for."""
+    result = simulate_fmu(str(case.fmu.path))
+    names = result.dtype.names[1:]
+    assert list(names) == case.fmu.outputs
+    assert len(create_plotly_figure(result, names=names).data) == len(names)
+    assert case.name == "spring" or np.ptp(result["tip_displacement"]) > 0.1  # a first try shows a motion
+    if case.name == "beam":
+        shape = simulate_fmu(str(case.fmu.path), output=["tip_displacement", "deflection[21]", "rotation[21]"])
+        assert shape["deflection[21]"] == pytest.approx(shape["tip_displacement"], rel=1e-12, abs=1e-15)
 
 
 def test_documentation_names_every_variable(case: Any) -> None:

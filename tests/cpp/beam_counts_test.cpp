@@ -32,9 +32,9 @@ int counted(double alpha_b, void (*run)(Beam&)) {
   Parameters p = general_beam(7);
   p.alpha_b = alpha_b;
   p.initial_velocity_slope = 1.0;
-  Beam b(p);
+  const auto b = make_beam(p);
   dissipations = 0;
-  run(b);
+  run(*b);
   return dissipations;
 }
 

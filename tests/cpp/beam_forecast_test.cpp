@@ -24,55 +24,72 @@ void stir(Beam& b) {
 TEST(BeamForecast, WithTheResponsesItIsWhereTheTipGoesUnderAnyForces) {
   for (const Parameters& p : variants()) {
     for (const double H : {1e-3, 0.05, 2.0}) {
-      Beam b(p);
-      stir(b);
-      const std::array<double, 2> r = b.tip_response(H);
-      const Beam::Forecast ahead = b.forecast(H, 0.3);
-      const double u = b.tip_displacement(), v = b.tip_velocity(), C1 = 3.0, C2 = -1.7;
+      const auto b = make_beam(p);
+      stir(*b);
+      const std::array<double, 2> r = b->tip_response(H);
+      const Beam::Forecast ahead = b->forecast(H);
+      const double u = b->tip_displacement(), v = b->tip_velocity(), C1 = 3.0, C2 = -1.7;
       const double largest = std::abs(u) + std::abs(2 * H * ahead.velocity) + std::abs(r[0]) + std::abs(r[1]);
-      b.step(H, {C1, 0.0, 0.0}, 0.3);
-      b.step(H, {C2, 0.0, 0.0}, 0.3);
-      EXPECT_NEAR(b.tip_displacement(), u + 2 * H * ahead.velocity + C1 * r[1] + C2 * r[0], 1e-12 * largest) << H;
-      Beam free(p);
-      stir(free);
-      for (int i = 0; i < 2; ++i) free.step(H, {}, 0.3);
-      EXPECT_NEAR(free.tip_velocity(), v + 2 * H * ahead.acceleration,
-                  1e-13 * (std::abs(v) + std::abs(free.tip_velocity())));
+      b->step(H, {C1, 0.0, 0.0}, 0.3);
+      b->step(H, {C2, 0.0, 0.0}, 0.3);
+      EXPECT_NEAR(b->tip_displacement(), u + 2 * H * ahead.velocity + C1 * r[1] + C2 * r[0], 1e-12 * largest) << H;
+      const auto free = make_beam(p);
+      stir(*free);
+      for (int i = 0; i < 2; ++i) free->step(H, {}, 0.3);
+      EXPECT_NEAR(free->tip_velocity(), v + 2 * H * ahead.acceleration,
+                  1e-13 * (std::abs(v) + std::abs(free->tip_velocity())));
     }
+  }
+}
+
+// It is linear in the load, exactly.
+TEST(BeamForecast, DependsOnTheLoadAsItSays) {
+  for (const Parameters& p : variants()) {
+    const double H = 0.05;
+    const auto b = make_beam(p);
+    stir(*b);
+    const Beam::Forecast per_load = b->forecast_per_load(H);
+    b->observe(0.0, -0.7);
+    const Beam::Forecast one = b->forecast(H);
+    b->observe(0.0, 2.3);
+    const Beam::Forecast other = b->forecast(H);
+    EXPECT_NEAR(other.velocity - one.velocity, 3.0 * per_load.velocity, 1e-12 * std::abs(other.velocity));
+    EXPECT_NEAR(other.acceleration - one.acceleration, 3.0 * per_load.acceleration,
+                1e-12 * (std::abs(one.acceleration) + std::abs(other.acceleration)));
   }
 }
 
 // Short steps see the tip's mass alone: r = H²/2m, 3H²/2m up to (ωH)².
 TEST(BeamForecast, ResponsesToShortStepsAreThoseOfTheTipMass) {
-  Beam b(general_beam(25));
-  const double H = 1e-3 / b.frequencies().back();
-  const std::array<double, 2> r = b.tip_response(H);
-  EXPECT_NEAR(r[0] * 2 * b.tip_mass() / (H * H), 1.0, 1e-6);
-  EXPECT_NEAR(r[1] * 2 * b.tip_mass() / (3 * H * H), 1.0, 1e-6);
+  const auto b = make_beam(general_beam(25));
+  const double H = 1e-3 / b->frequencies().back();
+  const std::array<double, 2> r = b->tip_response(H);
+  EXPECT_NEAR(r[0] * 2 * b->tip_mass() / (H * H), 1.0, 1e-6);
+  EXPECT_NEAR(r[1] * 2 * b->tip_mass() / (3 * H * H), 1.0, 1e-6);
 }
 
 TEST(BeamForecast, LeavesNoTrace) {
   for (const Parameters& p : variants()) {
-    Beam b(p), untouched(p);
-    stir(b);
-    stir(untouched);
-    b.forecast(0.02, -0.4);
-    b.tip_response(0.03);
-    EXPECT_EQ(outputs(b), outputs(untouched));
-    stir(b);
-    stir(untouched);
-    EXPECT_EQ(outputs(b), outputs(untouched));
+    const auto b = make_beam(p), untouched = make_beam(p);
+    stir(*b);
+    stir(*untouched);
+    b->forecast(0.02);
+    b->forecast_per_load(0.02);
+    b->tip_response(0.03);
+    EXPECT_EQ(outputs(*b), outputs(*untouched));
+    stir(*b);
+    stir(*untouched);
+    EXPECT_EQ(outputs(*b), outputs(*untouched));
   }
 }
 
 TEST(BeamForecast, RefusesWhatAStepRefusesAndLeavesNoTrace) {
-  Beam b(general_beam(5));
-  stir(b);
-  const std::vector<double> before = outputs(b);
-  EXPECT_THROW(b.forecast(0.0, 0.0), std::invalid_argument);
-  EXPECT_THROW(b.tip_response(-1.0), std::invalid_argument);
-  EXPECT_THROW(b.forecast(1.0, 1e308), std::domain_error);
-  EXPECT_EQ(outputs(b), before);
+  const auto b = make_beam(general_beam(5));
+  stir(*b);
+  const std::vector<double> before = outputs(*b);
+  EXPECT_THROW(b->forecast(0.0), std::invalid_argument);
+  EXPECT_THROW(b->tip_response(-1.0), std::invalid_argument);
+  EXPECT_EQ(outputs(*b), before);
 }
 
 }  // namespace

@@ -56,6 +56,10 @@ inline std::vector<Parameters> variants() {
       }
       for (const double rho_inf : {1.0, 0.7, 0.0})
         all.push_back(with_integrator(p, Integrator::generalized_alpha, rho_inf));
+      p.mass_matrix = MassMatrix::averaged;
+      all.push_back(p);
+      all.push_back(with_integrator(p, Integrator::generalized_alpha));
+      p.mass_matrix = MassMatrix::consistent;
     }
   }
   return all;

@@ -1,6 +1,8 @@
 // Normal compliance inside: C = λ (y − u_tip)₊^p against closed forms.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <tuple>
 
@@ -41,7 +43,7 @@ TEST(SpringCompliance, LinearLawIsASecondSpring) {
     for (int i = 1; i * H <= 0.04 + 1e-9; ++i) {
       Inputs inputs;
       inputs.tip_displacement[0] = u0 + v * (i - 1) * H;
-      inputs.tip_velocity = v;
+      inputs.tip_displacement[1] = v;
       s.step(H, inputs);
       const double t = i * H;
       const double y = p0 + p1 * t + a * std::cos(w * t) + b * std::sin(w * t);
@@ -53,20 +55,18 @@ TEST(SpringCompliance, LinearLawIsASecondSpring) {
   }
 }
 
-// Derivatives of the tip displacement, where given, are used instead of the tip velocity.
 TEST(SpringCompliance, TipIsExtrapolated) {
   Parameters p = compliant(1e3, 1.0);
   p.linear_stiffness = 0.0;
   p.mass = 1e9;  // stays
-  for (const bool derivatives : {false, true}) {
+  for (const bool curved : {false, true}) {
     Spring s(p);
     Inputs inputs;
-    inputs.tip_displacement = {-0.1, derivatives ? 0.3 : 0.0, derivatives ? 2.0 : 0.0};
-    inputs.tip_velocity = -0.2;
+    inputs.tip_displacement = {-0.1, curved ? 0.3 : -0.2, curved ? 2.0 : 0.0};
     s.observe(inputs);
     EXPECT_NEAR(s.reaction(), 100.0, 1e-12);
     s.step(0.1, inputs);
-    EXPECT_NEAR(s.reaction(), derivatives ? 1e3 * (0.1 - 0.03 - 0.01) : 1e3 * (0.1 + 0.02),
+    EXPECT_NEAR(s.reaction(), curved ? 1e3 * (0.1 - 0.03 - 0.01) : 1e3 * (0.1 + 0.02),
                 1e3 * 1e-9);  // the mass has moved by λδt²/2m
   }
 }
@@ -154,4 +154,112 @@ TEST(SpringCompliance, EnergyIsConserved) {
   }
   EXPECT_GE(contacts, 90);
   EXPECT_LT(worst, 26000 * 6e-14 * before);  // IDA is asked for 3e-14 of z per internal step
+}
+
+// A free mass against a tip at rest, m δ̈ = −λ δ^p (1 + χ δ̇): v dv/(1 + χv) = −(λ/m) δ^p dδ, so that
+// v/χ − ln(1 + χv)/χ² is the same on arrival and on leaving, whatever λ and p.
+class DampedRebound : public testing::TestWithParam<std::tuple<double, double, double>> {};
+
+TEST_P(DampedRebound, SpeedAndDissipation) {
+  const auto [lambda, exponent, chi] = GetParam();
+  const double v = 0.5, gap = 0.013, mass = 1.3;
+  Parameters p = compliant(lambda, exponent);
+  p.compliance_damping = chi;
+  p.linear_stiffness = 0.0;
+  p.mass = mass;
+  p.displacement = -gap;
+  p.velocity = v;
+  const auto invariant = [chi](double speed) { return speed / chi - std::log1p(chi * speed) / (chi * chi); };
+  double slow = -std::min(v, (1.0 - 1e-15) / chi), fast = 0.0;  // of the leaving speed
+  for (int i = 0; i < 200; ++i) {
+    const double middle = (slow + fast) / 2;
+    (invariant(middle) > invariant(v) ? slow : fast) = middle;
+  }
+  const double depth = std::pow((exponent + 1.0) * mass * v * v / (2 * lambda), 1.0 / (exponent + 1.0));
+  const double end = gap / v + 40.0 * depth / v * (1.0 + chi * v);
+  for (const int steps : {1, 10, 777}) {
+    Spring s(p);
+    for (int i = 0; i < steps; ++i) {
+      s.step(end / steps, Inputs{});
+      ASSERT_NEAR(energy(s) + s.dissipated_energy(), mass / 2 * v * v,
+                  1e-11 * mass * v * v);  // as the speed of Rebound
+    }
+    EXPECT_EQ(s.reaction(), 0.0);
+    EXPECT_NEAR(s.velocity(), slow, 1e-10 * v) << steps;
+    EXPECT_GT(s.dissipated_energy(), 0.0);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Laws, DampedRebound,
+                         testing::Combine(testing::Values(1e2, 1e6), testing::Values(1.0, 1.5, 2.2, 3.0),
+                                          testing::Values(0.01, 0.5, 20.0)));
+
+// The tip leaves, faster than 1/χ from some time on: no force then, though they overlap, and never an adhesion. Against
+// classical Runge–Kutta steps in extended precision.
+TEST(SpringCompliance, DampingNeverPulls) {
+  const double lambda = 1e4, chi = 2.0, k = 30.0;
+  Parameters p = compliant(lambda, 1.5);
+  p.compliance_damping = chi;
+  p.linear_stiffness = k;
+  p.displacement = 0.02;
+  const std::array<double, 3> tip{0.0, 0.3, 40.0};  // δ̇ = −1/χ soon after the start
+  Inputs inputs;
+  inputs.tip_displacement = tip;
+  long double y = p.displacement, z = 0.0, lost = 0.0;
+  constexpr int n = 400'000;
+  const long double H = 0.03, h = H / n;
+  struct Rates {
+    long double z, a, power;
+  };
+  const auto rates = [&](long double t, long double u, long double w) -> Rates {
+    const long double depth = u - (tip[0] + t * (tip[1] + t * tip[2] / 2)), rate = w - (tip[1] + t * tip[2]);
+    const long double elastic = depth > 0 ? lambda * depth * std::sqrt(depth) : 0.0L;
+    const long double force = elastic * std::max(0.0L, 1 + chi * rate);
+    return {w, -k * u - force, (force - elastic) * rate};
+  };
+  bool slack = false;
+  for (int i = 0; i < n; ++i) {
+    const long double t = i * h;
+    const Rates a = rates(t, y, z), b = rates(t + h / 2, y + h / 2 * a.z, z + h / 2 * a.a);
+    const Rates c = rates(t + h / 2, y + h / 2 * b.z, z + h / 2 * b.a), d = rates(t + h, y + h * c.z, z + h * c.a);
+    y += h / 6 * (a.z + 2 * b.z + 2 * c.z + d.z);
+    z += h / 6 * (a.a + 2 * b.a + 2 * c.a + d.a);
+    lost += h / 6 * (a.power + 2 * b.power + 2 * c.power + d.power);
+    slack = slack || (z - tip[1] - t * tip[2] < -1 / chi && y > tip[0] + t * (tip[1] + t * tip[2] / 2));
+  }
+  EXPECT_TRUE(slack);
+  for (const int steps : {1, 30}) {
+    Spring s(p);
+    for (int i = 0; i < steps; ++i) {
+      const double t = 0.03 / steps * i;
+      inputs.tip_displacement = {tip[0] + t * (tip[1] + t * tip[2] / 2), tip[1] + t * tip[2], tip[2]};
+      s.step(0.03 / steps, inputs);
+      EXPECT_GE(s.reaction(), 0.0);
+    }
+    EXPECT_NEAR(s.displacement(), static_cast<double>(y), 1e-12 * 0.02);
+    EXPECT_NEAR(s.velocity(), static_cast<double>(z), 1e-11);
+    EXPECT_NEAR(s.dissipated_energy(), static_cast<double>(lost), 1e-10 * static_cast<double>(lost));
+  }
+}
+
+// Seated under a tip that comes down at v: C = λ δ^p (1 + χ v), which takes χ v λ δ^{p+1}/(p+1).
+TEST(SpringCompliance, DampingOfASeatedTop) {
+  Parameters p = compliant(1e5, 1.5);
+  p.compliance_damping = 3.0;
+  p.stop_enabled = true;
+  p.stop_position = 0.0;
+  const double v = 0.2, depth = v * 0.05;
+  for (const int steps : {1, 20}) {
+    Spring s(p);
+    Inputs inputs;
+    inputs.tip_displacement[1] = -v;
+    for (int i = 0; i < steps; ++i) {
+      inputs.tip_displacement[0] = -depth * i / steps;
+      s.step(0.05 / steps, inputs);
+    }
+    EXPECT_TRUE(s.seated());
+    EXPECT_NEAR(s.reaction(), 1e5 * std::pow(depth, 1.5) * (1 + 3.0 * v), 1e-11);
+    const double lost = 3.0 * v * 1e5 * std::pow(depth, 2.5) / 2.5;
+    EXPECT_NEAR(s.dissipated_energy(), lost, 1e-11 * lost);
+  }
 }

@@ -138,7 +138,6 @@ TEST(SpringState, RepeatedStepsAreBitIdentical) {
     Inputs inputs;
     inputs.contact_force = {0.3, -2.0, 11.0};
     inputs.tip_displacement = {-0.012, 0.05, 0.0};
-    inputs.tip_velocity = 0.05;
     s.step(1e-3, inputs);
     s.apply_impulse(-0.01);
     const auto start = saved(s);
@@ -296,6 +295,35 @@ TEST(SpringEscape, AForceCanPushItOver) {
   p.cubic_stiffness = 0.2;
   Spring hardening(p);
   EXPECT_NO_THROW(hardening.step(1.0, inputs));
+}
+
+// A stop at the lower hilltop is met before the spring can fall over it; the upper hilltop stays open.
+TEST(SpringEscape, AStopAtTheHilltopHoldsTheTop) {
+  Parameters p = softening();
+  p.stop_enabled = true;
+  p.stop_position = -hilltop;
+  p.velocity = -1.1 * std::sqrt(2.0 * hilltop_energy);
+  p.restitution = 0.5;
+  Spring s(p);
+  const double before = energy(s);
+  double impulses = 0.0;
+  for (int i = 0; i < 40 && s.velocity() < 0.0; ++i) {
+    s.step(0.1, Inputs{});
+    impulses += s.stop_impulse();
+  }
+  EXPECT_GT(impulses, 0.0);
+  EXPECT_NEAR(energy(s) + s.impact_loss(), before, 1e-11 * before);
+  p.displacement = -hilltop;  // rests there: unstable, but held
+  p.velocity = 0.0;
+  Inputs weight;
+  weight.external_force = -1.0;
+  Spring resting(p);
+  resting.step(1.0, weight);
+  EXPECT_TRUE(resting.seated());
+  p.displacement = 0.0;
+  p.velocity = 1.1 * std::sqrt(2.0 * hilltop_energy);
+  Spring upward(p);
+  EXPECT_THROW(upward.step(4.0, Inputs{}), Escape);
 }
 
 // ω = 1e6 rad/s over 1000 s is 1.6e8 periods, hours of internal steps; over 0.1 ms it is 16.

@@ -238,7 +238,7 @@ TEST(SpringStop, SeatedUnderTheTip) {
   Spring s(p);
   Inputs inputs;
   inputs.tip_displacement[0] = -0.02;
-  inputs.tip_velocity = 0.04;
+  inputs.tip_displacement[1] = 0.04;
   s.observe(inputs);
   EXPECT_NEAR(s.reaction(), 1e5 * std::pow(0.01, 1.5), 1e-10);
   s.step(0.1, inputs);
@@ -255,4 +255,25 @@ TEST(SpringStop, SeatedUnderTheTip) {
   s.step(0.02, inputs);
   EXPECT_FALSE(s.seated());
   EXPECT_GT(s.displacement(), -0.01);
+}
+
+// y is what the motion says, whatever the distance of a stop that is never reached.
+TEST(SpringStop, ADistantStopDoesNotQuantiseTheDisplacement) {
+  for (const double amplitude : {1e-3, 1e-9}) {
+    Parameters p;
+    p.displacement = amplitude;
+    for (const double stop : {-1.0, -1e9, -1e20}) {
+      p.stop_enabled = false;
+      Spring alone(p);
+      p.stop_enabled = true;
+      p.stop_position = stop;
+      Spring above(p);
+      for (int i = 0; i < 20; ++i) {
+        alone.step(0.1, Inputs{});
+        above.step(0.1, Inputs{});
+        EXPECT_NEAR(above.displacement(), alone.displacement(), 1e-14 * amplitude) << stop;
+        EXPECT_NEAR(above.displacement_integral(), alone.displacement_integral(), 1e-14 * amplitude) << stop;
+      }
+    }
+  }
 }

@@ -1,4 +1,4 @@
-"""The FMUs in importers that others wrote, single and coupled by three connections; compared with our own numbers.
+"""The FMUs in importers that others wrote, single and coupled by their connections; compared with our own numbers.
 
 `./build.sh interop` installs them into a cache folder; those that are not there are skipped, with the reason.
 """
@@ -26,6 +26,7 @@ SIZE = 1e-3
 CONNECTIONS = [
     ("beam.tip_displacement", "spring.tip_displacement"),
     ("beam.tip_velocity", "spring.tip_velocity"),
+    ("beam.tip_velocity_forecast", "spring.tip_velocity_forecast"),
     ("spring.reaction", "beam.tip_force"),
 ]
 KINDS: dict[str, Callable[[str], float | int | bool]] = {"Real": float, "Integer": int, "Boolean": "true".__eq__}

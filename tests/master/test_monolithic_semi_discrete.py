@@ -168,18 +168,42 @@ def test_all_modes_reproduce_the_matrices() -> None:
 
 @pytest.mark.parametrize("n_modes", [1, 3, 8])
 def test_truncated_beam_keeps_static_answers_and_its_start(n_modes: int) -> None:
-    """Modal truncation augmentation: tip force, loads and u = x lie in the space, however few the modes."""
+    """Tip force, uniform load and u = x lie in the space, however few the modes; the tip is exact under any load."""
     b = beam(
         4.0, 9.0, n_elements=30, n_modes=n_modes, distributed_load=-2.0, tip_load_coefficient=-6.0,
         initial_velocity_slope=-1.0,
     )  # fmt: skip
     d, m = assemble(b), modal_beam(b)
-    assert len(m.omega) == n_modes + 4
+    assert len(m.omega) == n_modes + 3
     assert m.tip**2 @ m.omega**-2.0 == pytest.approx(static_compliance(4.0, 9.0, 30, False), rel=1e-11)
     full = spsolve(d.K, -2.0 * d.uniform_load - 6.0 * d.hat_load)
-    np.testing.assert_allclose(m.basis @ (m.load / m.omega**2), full, atol=1e-11 * abs(full).max())
+    assert m.tip @ (m.load / m.omega**2) == pytest.approx(full[d.tip], rel=1e-11)
+    uniform = spsolve(d.K, d.uniform_load)
+    found = m.basis @ (m.basis.T @ d.uniform_load / m.omega**2)
+    np.testing.assert_allclose(found, uniform, atol=1e-11 * abs(uniform).max())
     np.testing.assert_allclose(m.basis @ m.slope_shape, d.slope_shape, atol=1e-12)
     np.testing.assert_allclose(m.omega[:n_modes], modal_beam(b.model_copy(update={"n_modes": 0})).omega[:n_modes])
+
+
+@pytest.mark.parametrize("key", ["tip_load_coefficient", "initial_deflection_slope", "initial_velocity_slope"])
+@pytest.mark.parametrize("value", [1e-300, -6.0])
+def test_loads_and_starts_do_not_change_the_basis(key: str, value: float) -> None:
+    b = beam(4.0, 9.0, n_elements=30, n_modes=4).model_copy(
+        update={"tip_load_coefficient": 0.0, "initial_deflection_slope": 0.0, "initial_velocity_slope": 0.0}
+    )
+    plain, other = modal_beam(b), modal_beam(b.model_copy(update={key: value}))
+    np.testing.assert_array_equal(other.basis, plain.basis)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_averaged_mass_gains_two_orders_on_a_bar(degree: int) -> None:
+    """EI so large that only shear waves are left: ω = 3.5 π; order 2p of the consistent mass, 2p + 2 averaged."""
+    for mass_matrix, order in (("consistent", 2 * degree), ("averaged", 2 * degree + 2)):
+        errors = []
+        for n in (16, 32) if degree == 1 else (8, 16):
+            bar = beam(1e13, 1.0, n_elements=n, element_degree=degree, mass_matrix=mass_matrix)
+            errors.append(abs(modal_beam(bar).omega[3] / (3.5 * np.pi) - 1.0))
+        assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.25)
 
 
 def test_sparse_and_dense_modes_span_the_same_space() -> None:

@@ -29,6 +29,8 @@ def test_the_same_problem_passes(scheme, degree):
     [
         {"n_elements": 2, "element_degree": 6},
         {"n_elements": 6, "element_degree": 2, "reduced_integration": True, "tip_load_coefficient": -6.0},
+        {"n_elements": 12, "mass_matrix": "averaged"},
+        {"n_elements": 4, "element_degree": 3, "n_modes": 6, "mass_matrix": "averaged", "alpha_b": 1e-3},
         {"n_elements": 30, "element_degree": 10, "n_modes": 8, "distributed_load": -2.0, "alpha_b": 1e-3},
     ],
 )

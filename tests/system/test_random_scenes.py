@@ -74,6 +74,7 @@ def scenes(draw: st.DrawFn) -> Tables:
             "element_degree": degree,
             "n_modes": draw(st.sampled_from([0, 0, 1, elements])),
             "reduced_integration": draw(st.booleans()),
+            "mass_matrix": draw(st.sampled_from(["consistent", "averaged"])),
             "integrator": draw(st.sampled_from(["modal", "modal", "generalized_alpha"])),
             "rho_inf": draw(st.sampled_from([1.0, 0.8, 0.0])),
             "distributed_load": draw(signed(decades(-2, 3))),

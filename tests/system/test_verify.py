@@ -21,7 +21,7 @@ from springbeam.coupling.tie import SCHEMES
 from springbeam.studies import verify
 from springbeam.studies.verify.beam import _mesh_error, clamped_free_frequencies
 from springbeam.studies.verify.check import Check
-from springbeam.studies.verify.impact import _airy_overshoot
+from springbeam.studies.verify.impact import _airy_overshoot, bar_impact
 from springbeam.studies.verify.table import report
 
 
@@ -213,3 +213,12 @@ def test_the_overshoot_of_a_dispersed_step_is_the_integral_of_airy():
     first_zero = -2.338107410459767
     value, _ = quad(lambda x: airy(x)[0], first_zero, 20.0, epsabs=1e-12)
     assert _airy_overshoot() == pytest.approx(value, abs=1e-7)
+
+
+def test_the_averaged_mass_keeps_the_force_between_the_fronts():
+    """1 % with 50 elements, where the consistent mass rings by 17 %; by prototypes of others 24 % and 1.1 % with 25."""
+    shown = [check for check in bar_impact() if "ringing" in check.quantity]
+    (consistent,) = [check for check in shown if "consistent" in check.quantity]
+    (averaged,) = [check for check in shown if "averaged" in check.quantity]
+    assert 0.1 < (consistent.error or 0.0) < 0.3
+    assert 0.0 < (averaged.error or 0.0) < 0.01

@@ -15,8 +15,9 @@ from .archive import fmu_directory
 from .fmu import WARNING, Fmu, FmuError, Reals
 from .protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion, StepRefused
 
-#: The numbers by which the beam FMU knows its integrators.
+#: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
+_MASS_MATRICES = {"consistent": 1, "averaged": 2}
 #: ``Motion(*values)`` and ``Energies(*values)`` in a third of the time.
 _motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
 _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
@@ -152,6 +153,7 @@ class FmuBeam(_FmuBody, BeamBody):
         """At ``start_time`` [s], with u = ``deflection_slope``·x."""
         parameters: dict[str, float | int | bool] = beam.model_dump(exclude={"approach", "fidelity"})
         parameters["integrator"] = _INTEGRATORS[beam.integrator]
+        parameters["mass_matrix"] = _MASS_MATRICES[beam.mass_matrix]
         parameters["initial_deflection_slope"] = deflection_slope
         super().__init__(Fmu("beam", fmu_directory() / "beam.fmu", parameters, start_time))
 

@@ -121,8 +121,13 @@ def shear_frequency(beam: Beam) -> float:
 
 
 def _gradient(beam: Beam) -> float:
-    """Return the largest ∫v'²/∫v² on an element [1/m²]: 12/h² for p = 1, 60/h² for p = 2, then a little more."""
+    """Return max ∫v'²/∫v² over polynomials on an element: 12/h² for p = 1, 60/h² for p = 2, then a little more [1/m²].
+
+    With the averaged mass it is 6/h² for p = 1, and less than this for higher degrees.
+    """
     h, p = beam.length / beam.n_elements, beam.element_degree
+    if p == 1 and beam.mass_matrix == "averaged":
+        return 6.0 / h**2
     return p * (p + 1) * (p + 2) * (p + 3) / (2.0 * h**2)
 
 

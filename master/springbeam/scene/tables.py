@@ -58,6 +58,8 @@ class Beam(Table):
     element_degree: Annotated[int, Field(ge=1, le=12)] = 1  #: of u and θ in an element; 1 is the paper's
     n_modes: Annotated[int, Field(ge=0)] = 0  #: lowest modes kept; 0 = all
     reduced_integration: bool = False
+    #: "averaged" with the lumped one, so that short waves travel at the right speed; the paper's is consistent.
+    mass_matrix: Literal["consistent", "averaged"] = "consistent"
     integrator: Literal["modal", "generalized_alpha"] = "modal"
     rho_inf: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0  #: generalized-α only; 1 = midpoint rule (62)
     distributed_load: float = 0.0  #: f_b, uniform [N/m]

@@ -1,0 +1,53 @@
+# Provides springbeam::sundials_ida. With SPRINGBEAM_SUNDIALS_SOURCE, which ./build.sh sets: compiled here, from the files
+# that spring.fmu is packed with, too. Without: the installed one, 6.x or 7.x, found in CMAKE_PREFIX_PATH or the system. It
+# is slower where it was built without optimisation, as Debian's.
+set(SPRINGBEAM_SUNDIALS_SOURCE "$ENV{SPRINGBEAM_SUNDIALS_SOURCE}" CACHE PATH "source of SUNDIALS 6 or 7")
+
+if(SPRINGBEAM_SUNDIALS_SOURCE)
+  set(gathered ${PROJECT_BINARY_DIR}/sundials)
+  execute_process(COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/sources.py ${gathered}
+    --sundials ${SPRINGBEAM_SUNDIALS_SOURCE} RESULT_VARIABLE failed)
+  if(failed)
+    message(FATAL_ERROR "SPRINGBEAM_SUNDIALS_SOURCE = ${SPRINGBEAM_SUNDIALS_SOURCE} is no source of SUNDIALS 6 or 7")
+  endif()
+  file(STRINGS ${gathered}/list units)
+  list(TRANSFORM units PREPEND ${gathered}/sources/)
+  add_library(sundials_ida STATIC ${units})
+  target_include_directories(sundials_ida SYSTEM PUBLIC ${gathered}/sources)
+  target_compile_options(sundials_ida PRIVATE $<$<NOT:$<C_COMPILER_ID:MSVC>>:-O2 -w>)
+  set(config ${gathered}/sources/sundials/sundials_config.h)
+  set(origin "compiled here")
+else()
+  find_path(SUNDIALS_INCLUDE_DIR ida/ida.h)
+  find_library(SUNDIALS_IDA NAMES libsundials_ida.a sundials_ida_static sundials_ida)
+  if(NOT SUNDIALS_INCLUDE_DIR OR NOT SUNDIALS_IDA)
+    message(FATAL_ERROR "SUNDIALS is missing: name the folder of its source, -DSPRINGBEAM_SUNDIALS_SOURCE=…, or install "
+      "it (Debian/Ubuntu: libsundials-dev), or name a prefix that has it, -DCMAKE_PREFIX_PATH=…")
+  endif()
+  add_library(sundials_ida INTERFACE)
+  target_include_directories(sundials_ida SYSTEM INTERFACE ${SUNDIALS_INCLUDE_DIR})
+  target_link_libraries(sundials_ida INTERFACE ${SUNDIALS_IDA})
+  # 6.x: IDA's archive holds all it needs. 7.x: the core is an archive of its own.
+  find_library(SUNDIALS_CORE NAMES libsundials_core.a sundials_core_static sundials_core)
+  if(SUNDIALS_CORE)
+    target_link_libraries(sundials_ida INTERFACE ${SUNDIALS_CORE})
+  endif()
+  set(config ${SUNDIALS_INCLUDE_DIR}/sundials/sundials_config.h)
+  file(STRINGS ${config} mpi REGEX "^#define SUNDIALS_MPI_ENABLED 1")
+  if(mpi)  # the headers of 7.x then include mpi.h; nothing of MPI is linked
+    find_package(MPI COMPONENTS C)
+    target_include_directories(sundials_ida SYSTEM INTERFACE ${MPI_C_INCLUDE_DIRS})
+  endif()
+  set(origin "installed, ${SUNDIALS_IDA}")
+endif()
+if(UNIX)
+  target_link_libraries(sundials_ida INTERFACE m)
+endif()
+
+file(STRINGS ${config} version REGEX "^#define SUNDIALS_VERSION \"")
+string(REGEX REPLACE ".*\"([0-9.]+).*" "\\1" version "${version}")
+message(STATUS "SUNDIALS ${version}, ${origin}")
+if(version VERSION_LESS 6 OR NOT version VERSION_LESS 8)
+  message(FATAL_ERROR "SUNDIALS ${version} cannot be used: accepted are 6.x and 7.x")
+endif()
+add_library(springbeam::sundials_ida ALIAS sundials_ida)
