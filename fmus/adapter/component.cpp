@@ -56,21 +56,13 @@ void Component::free_state(void* key) {
 }
 
 const char* Component::phase_text() const {
-  switch (instance.phase) {
-    case instantiated:
-      return "before initialization";
-    case initialization:
-      return "in initialization mode";
-    case step_complete:
-      return "between steps";
-    case step_failed:
-      return "after a discarded step (restore a state or reset first)";
-    case terminated:
-      return "after termination";
-    case error:
-      return "after an error (restore a state or reset first)";
-  }
-  return "?";
+  const Phase p = instance.phase;
+  return p == instantiated     ? "before initialization"
+         : p == initialization ? "in initialization mode"
+         : p == step_complete  ? "between steps"
+         : p == step_failed    ? "after a discarded step (restore a state or reset first)"
+         : p == terminated     ? "after termination"
+                               : "after an error (restore a state or reset first)";
 }
 
 Status Component::discard(const char* function, const char* why) const {

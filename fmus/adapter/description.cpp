@@ -51,23 +51,8 @@ const Unit& unit(const std::string& name) {
 
 std::string escaped(const std::string& s) {
   std::string out;
-  for (char c : s) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
+  for (const char c : s) {
+    out += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '"' ? "&quot;" : std::string(1, c);
   }
   return out;
 }
@@ -124,22 +109,12 @@ void write_variable(std::ostream& out, const Variable& v, std::size_t reference)
                                                                        : "continuous");
   if (v.causality != Causality::input) out << attribute("initial", is_parameter || v.exact ? "exact" : "calculated");
   out << ">\n      <";
-  switch (v.type) {
-    case Type::real:
-      out << "Real";
-      if (!v.unit.empty()) {
-        const Unit& u = unit(v.unit);
-        out << attribute("declaredType", u.quantity) << attribute("quantity", u.quantity) << attribute("unit", u.name);
-      }
-      break;
-    case Type::integer:
-      out << "Integer";
-      if (!v.choice.empty()) out << attribute("declaredType", v.choice);
-      break;
-    case Type::boolean:
-      out << "Boolean";
-      break;
+  out << type_names[static_cast<int>(v.type)];
+  if (!v.unit.empty()) {
+    const Unit& u = unit(v.unit);
+    out << attribute("declaredType", u.quantity) << attribute("quantity", u.quantity) << attribute("unit", u.name);
   }
+  if (!v.choice.empty()) out << attribute("declaredType", v.choice);
   if (v.type != Type::boolean) {
     if (std::isfinite(v.min)) out << attribute("min", value_text(v, v.min));
     if (std::isfinite(v.max)) out << attribute("max", value_text(v, v.max));

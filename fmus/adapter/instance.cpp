@@ -11,17 +11,7 @@
 namespace fmi {
 namespace {
 
-const char* name(Type type) {
-  switch (type) {
-    case Type::real:
-      return "Real";
-    case Type::integer:
-      return "Integer";
-    case Type::boolean:
-      return "Boolean";
-  }
-  return "?";
-}
+const char* name(Type type) { return type_names[static_cast<int>(type)]; }
 
 double finite(const Variable& v, double value) {
   if (!std::isfinite(value)) {

@@ -17,6 +17,7 @@
 namespace fmi {
 
 enum class Type { real, integer, boolean };
+inline constexpr const char* type_names[] = {"Real", "Integer", "Boolean"};
 enum class Causality { parameter, input, output, local };
 
 /// An input that an output follows without a step.
