@@ -6,12 +6,13 @@ has no force of its own: it holds the ends together, and C is whatever that take
 
     C = F(p) + D(p, ṗ),     F = Φ′,     D ṗ ≥ 0,
 
-so that Φ is what it stores and ∫ D ṗ dt what it dissipates. To add a law, write its class here, name it in `law_of`,
-and write it again, independently, in `springbeam.monolithic.laws`.
+so that Φ is what it stores and ∫ D ṗ dt what it dissipates. To add a law, write its class here, name it in `LAWS`,
+and write it again, independently, in `springbeam.monolithic.laws` (``docs/contributing.md``).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal, Protocol
 
@@ -156,16 +157,15 @@ class Link:
 
 Law = RigidLaw | SoftLaw
 
+#: How a scene's table ``[contact]`` names the laws; ``paper`` is an algorithm of its own, `springbeam.run.paper_law`.
+LAWS: dict[str, Callable[[Contact], Law]] = {
+    "transmission": lambda contact: Transmission(),
+    "tie": lambda contact: Tie(),
+    "compliance": lambda contact: Compliance(contact.stiffness, contact.exponent, contact.damping),
+    "link": lambda contact: Link(contact.stiffness, contact.damping),
+}
+
 
 def law_of(contact: Contact) -> Law:
-    """Return the law that a scene's table ``[contact]`` names; law ``paper`` is `springbeam.run.paper_law`."""
-    match contact.law:
-        case "transmission":
-            return Transmission()
-        case "tie":
-            return Tie()
-        case "compliance":
-            return Compliance(contact.stiffness, contact.exponent, contact.damping)
-        case "link":
-            return Link(contact.stiffness, contact.damping)
-    raise ValueError(f"contact.law = {contact.law!r}: not a law of the master's")
+    """Return the law that ``contact`` names."""
+    return LAWS[contact.law](contact)
