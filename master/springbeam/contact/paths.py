@@ -58,12 +58,14 @@ class Path(NamedTuple):
         return a1 + s * (2.0 * a2 + 3.0 * a3 * s) - 2.0 * bubble * tilt * turning + 2.0 * bubble * bubble * self.odd
 
     def falls_through_zero(self) -> float:
-        """Return s in (0, 1] where f, below zero at the end, last was above it, by bisection; 0 if it starts below."""
+        """Return s in [0, 1] where f, below zero at the end, last was above it, by bisection."""
+        if self.at(0.0) <= 0.0 and self.slope(0.0) <= 0.0:
+            return 0.0
         low, high = 0.0, 1.0
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.at(middle) >= 0.0 else (low, middle)
-        return high if self.at(0.0) >= 0.0 else 0.0
+        return high
 
     def lowest_inside(self) -> float | None:
         """Return s in (0, 1) of the lowest minimum, ``None`` if there is none inside."""
