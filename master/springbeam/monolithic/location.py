@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from .hybrid_system import HybridSystem
 from .laws import Phase, Watch
@@ -51,7 +51,27 @@ class EventLocator:
                 if k == len(values) - 1 and values[k] >= -noise:
                     return float(high)
                 return _root(g, low, high)
+            elif 0 < k < len(values) - 1:
+                bottom = _dip(g, segment.nodes[k - 1 : k + 2], values[k - 1 : k + 2], noise)
+                if bottom is not None:
+                    return _root(g, segment.nodes[k - 1], bottom)
         return None
+
+
+def _dip(g: Callable[[float], float], nodes: np.ndarray, values: np.ndarray, noise: float) -> float | None:
+    """Return where ``g`` is lowest if it dips below zero between three nodes at which it is not; else ``None``.
+
+    The parabola through them tells whether to look: it misses a smooth minimum by less than it varies.
+    """
+    if values.min() < 0.0:
+        return None
+    parabola = np.polynomial.Polynomial.fit(nodes, values, 2)
+    low, high = float(nodes[0]), float(nodes[-1])
+    turns = parabola.deriv().roots()
+    if len(turns) != 1 or not low < float(turns[0].real) < high or float(parabola(turns[0].real)) > np.ptp(values):
+        return None
+    found = minimize_scalar(g, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * (high - low)})
+    return float(found.x) if found.fun < -noise else None
 
 
 def _root(g: Callable[[float], float], low: float, high: float) -> float:
