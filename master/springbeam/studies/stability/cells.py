@@ -208,15 +208,16 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
     clearance = cell["clearance"]
     if elastic:
         clearance = min(clearance, 0.1 * speed * steps * H)  # else most would never meet
-    if law in ("tie", "link"):
-        clearance = 0.0  # joined from the start
+    impact = cell["impact"]
+    if law in ("tie", "link"):  # joined from the start, a tie by the inelastic impact
+        clearance, impact = 0.0, "inelastic"
     # What takes the beam's kinetic energy v²/6.
     reach = abs(psi) + speed / np.sqrt(3.0 * k1)
     k2 = {"hardening": k2, "softening": -k1 / (cell["escape"] * reach) ** 2, "linear": 0.0}[cell["k2_kind"]]
     scene: dict[str, Any] = {
         "contact": {
             "law": law,
-            "impact": cell["impact"],
+            "impact": impact,
             "stiffness": cell["contact_stiffness"],
             "exponent": cell["exponent"],
         },

@@ -119,6 +119,6 @@ def _samples(ax: Axes, cells: Sequence[dict[str, Any]], outcomes: Sequence[Outco
             ax.plot(x, [place] * len(x), "|", color=BLUE)
         ax.set(xscale="log", xlabel="energy residual")
     ax.set_title(f"hypercube, {len(mine)} cells", fontsize="medium")
-    ax.set_yticks(list(places), names, fontsize="small")
+    ax.set_yticks(list(places), names, fontsize="xx-small")
     ax.yaxis.tick_right()  # at the edge of the picture: on the left they would part all columns
     ax.invert_yaxis()
