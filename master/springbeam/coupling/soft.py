@@ -14,6 +14,8 @@ from __future__ import annotations
 
 from operator import sub
 
+import numpy as np
+
 from ..bodies import force
 from ..bodies.protocol import Body, Force
 from ..contact.laws import SoftLaw
@@ -51,7 +53,7 @@ class SoftSolver(Coupling):
         self.law, self.degree = law, degree
         self._solver = _Crossing(law, degree, tolerance)
         self._simpler = _Crossing(law, 0, tolerance) if degree > 0 else None
-        self.reduced = 0  #: steps made at degree 0 instead
+        self.reduced = 0
         self.dissipated = 0.0  #: by the law since the start [J]
 
     @property
@@ -128,7 +130,10 @@ class _Line:
         """Raises NotConverged."""
         if self._projection.degree == 0:
             return self._bracketed()
-        found = self._newton(self._x, 1.0) or self._stiffened()
+        try:
+            found = self._newton(self._x, 1.0) or self._stiffened()
+        except np.linalg.LinAlgError:
+            found = None
         if found is None:
             raise NotConverged(max(map(abs, self._x)), _MAX_NEWTON)
         return found

@@ -311,6 +311,12 @@ class Simulation(Memory):
         warnings, rows = [], self._rows
         if self._ledger.relative > self._energy_warns:
             warnings.append(self._energy_cause())
+        if reduced := self._pair.joined.reduced:
+            warnings.append(
+                f"the contact force of {reduced} of {self._macro_steps} macro steps was not found at coupling.degree = "
+                f"{self._pair.joined.degree}; they were made at degree 0, which keeps the energy but has order 2. The "
+                "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
+            )
         unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed)
         if unresolved is not None:
             warnings.append(unresolved)
@@ -328,6 +334,7 @@ class Simulation(Memory):
             "halved_steps": self._halvings,
             **({"rejected_steps": self._steps.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
             "iterations": self._pair.iterations,
+            **({"reduced_steps": reduced} if reduced else {}),
             "max_energy_residual": self._ledger.relative,
             "max_energy_residual_joule": self._ledger.largest_residual,
             "max_velocity_mismatch": rows.largest_mismatch,
