@@ -11,6 +11,7 @@ import pytest
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies import fmu
 from springbeam.contact.events import EventFunctions
+from springbeam.contact.laws import law_of
 from springbeam.contact.phases import Joint, Phase
 from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene, shipped_scenes
@@ -131,7 +132,8 @@ EVENTS: dict[str, tuple[dict[str, Any], set[str]]] = {
 @pytest.mark.parametrize("what", EVENTS)
 def test_event_functions_are_those_of_the_bodies_that_are_there(what):
     changes, expected = EVENTS[what]
-    functions = EventFunctions(with_changes(load_scene("soft"), **changes), tip_share=0.5)
+    scene = with_changes(load_scene("soft"), **changes)
+    functions = EventFunctions(scene, law_of(scene.contact), tip_share=0.5)
     assert {kind for phase in PHASES for kind, _ in functions.of(phase)} == expected
     # A phase has only what can end it, and on the foundation only what can leave it.
     assert all(len(functions.of(phase)) <= 2 for phase in PHASES)

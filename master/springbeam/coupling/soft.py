@@ -110,6 +110,13 @@ class _Crossing(StepSolver):
         super().__init__(energy.CONDITIONS[degree], degree, tolerance)
         self.projection = Projection(law, degree)
 
+    def apart(self, gap: Vector, a: Vector, window: Window) -> bool:
+        if any(a):
+            return False
+        tip, low = window.ends
+        start = low.displacement - tip.displacement
+        return not any(self.projection(start, [-g for g in gap], window.size).a)
+
     def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> tuple[Vector, Vector]:
         tip, low = window.ends
         line = _Line(self.projection, low.displacement - tip.displacement, window.size, [-g for g in gap], a, descent)

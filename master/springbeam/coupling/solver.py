@@ -106,6 +106,10 @@ class StepSolver(Coupling):
         super().restore(saved)
         self._sizes = {size: _Response(*known) for size, known in saved["_sizes"].items()}
 
+    def apart(self, gap: Vector, a: Vector, window: Window) -> bool:
+        """Return whether nothing acts between the bodies under ``a``, nor should; parameters as of `aim`."""
+        return False
+
     def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> tuple[Vector, Vector] | None:
         """Return what the conditions should be, and the coefficients that would make them so; ``None``: zero.
 
@@ -132,6 +136,12 @@ class StepSolver(Coupling):
         upper.rewind()
         upper_end = upper.advance(time, size, acting)
         r_upper: Sequence[float] = conditions(upper_end, size)
+        lower.rewind()
+        lower_end = lower.advance(time, size, acting)
+        r_lower = conditions(lower_end, size)
+        gap = list(map(sub, r_upper, r_lower))
+        if self.apart(gap, a, window):
+            return acting
         tried: Vector | None = a  # at the upper body in earnest; elsewhere its end is predicted
         known = self._sizes.get(size)
         if known is None:
@@ -143,12 +153,8 @@ class StepSolver(Coupling):
         kind = type(lower).__name__
         first = kind not in known.descents
         descent, measured = known.descents.get(kind) or (_descent(B, self._free_response(lower, size)), False)
-        lower.rewind()
-        lower_end = lower.advance(time, size, acting)
-        r_lower = conditions(lower_end, size)
         # Rounding at least. What is asked is known once the motion is; that under the guess may be far from it.
         enough = _Enough(_ROUNDING * max(self._reach, abs(start.displacement)), self._expected)
-        gap = list(map(sub, r_upper, r_lower))
         aim = self.aim(gap, a, descent, window)
         residual = gap if aim is None else list(map(sub, gap, aim[0]))
         norm = max(map(abs, residual))
