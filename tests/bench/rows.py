@@ -356,7 +356,8 @@ def profile(effort: Effort) -> Iterator[Row]:
     start, H = pair.ends(), scene.coupling.H
     pair.mark()
     step = pair.attempt(state, H, start)
-    energies = pair.energies()
+    end = pair.ends()
+    energies = pair.energies(end)
     simulation._rows._next_shape, simulation._rows._shapes_left = float("inf"), 0
 
     def stepped(body: FmuBeam | FmuSpring) -> None:
@@ -371,7 +372,7 @@ def profile(effort: Effort) -> Iterator[Row]:
         lambda: detector.at_start(state, start),
         lambda: detector.first(state, step),
         lambda: simulation._rows.write(state),
-        pair.energies,
+        lambda: pair.energies(end),
         lambda: simulation._ledger.book(*energies),
         lambda: recorder.shape(1.0, beam.shape()),
     ]
