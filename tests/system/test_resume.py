@@ -144,7 +144,7 @@ def test_the_scenes_pass_every_phase_and_event():
 SET_ANEW = {
     *(f"{body}.{name}" for body in ("FmuBeam", "FmuSpring") for name in ("_marked_pending", "_marked_motion")),
     *(f"Fmu.{name}" for name in ("moved", "_time", "_size", "_start_time", "_messages")),
-    *(f"EventFunctions.{name}" for name in ("_phase", "_ends", "_samples")),
+    *(f"EventFunctions.{name}" for name in ("_phase", "_functions", "_ends", "_samples")),
     "Pair._last",
 }
 
