@@ -23,7 +23,7 @@ from ..scene import Scene
 from .directory import EVENTS, SHAPES, STEPS, TRAJECTORY, ResultsUnreadable, RunDirectory, lock
 from .reading import load_events, load_trajectory
 from .recording import CheckedRecorder, replay, with_scene
-from .steps import STEP, packed, steps_of
+from .steps import STEP, steps_of
 from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
 
 #: Bytes kept free for the last summary; longer ones are written if the disk has room.
@@ -86,10 +86,10 @@ class FileRecorder(CheckedRecorder):
         """Whether the directory holds results of this run."""
         return bool(self._files)
 
-    def row(self, values: Mapping[str, Any] | Sequence[Any], step: Sequence[float] | None = None) -> None:
+    def row(self, values: Mapping[str, Any] | Sequence[Any], step: bytes | None = None) -> None:
         row, phase = self._checked_row(values)
         if step is not None:
-            self._waiting += packed(*step)
+            self._waiting += step
         fields: list[float | str] = [*row]
         if self._phase_at >= 0:
             fields.insert(self._phase_at, phase)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..scene import Scene
 from ..scene.statics import SHAPE_POINTS
-from .steps import packed, steps_of
+from .steps import steps_of
 from .trajectory import (
     EVENT_COLUMNS,
     EVENT_KINDS,
@@ -41,11 +41,11 @@ class Recorder(Protocol):
 
     columns: tuple[str, ...]
 
-    def row(self, values: Mapping[str, Any] | Sequence[Any], step: Sequence[float] | None = None) -> None:
+    def row(self, values: Mapping[str, Any] | Sequence[Any], step: bytes | None = None) -> None:
         """Record an accepted step: a value per column, by name (further names are ignored) or in column order.
 
-        ``step`` holds the numbers of `springbeam.results.steps.STEP_COLUMNS`; a run gives them with every row or with
-        none. They are looked at later, many at a time.
+        ``step`` is `springbeam.results.steps.packed`; a run gives it with every row or with none. Its numbers are
+        looked at later, many at a time.
 
         Raises
         ------
@@ -154,10 +154,10 @@ class MemoryRecorder(CheckedRecorder):
         self._shapes, self._steps = bytearray(), bytearray()
         self._summary: dict[str, Any] = {}
 
-    def row(self, values: Mapping[str, Any] | Sequence[Any], step: Sequence[float] | None = None) -> None:
+    def row(self, values: Mapping[str, Any] | Sequence[Any], step: bytes | None = None) -> None:
         row, phase = self._checked_row(values)
         if step is not None:
-            self._steps += packed(*step)
+            self._steps += step
         self._rows += self._packed(*row)
         self._phase_of_row.append(phase)
 
@@ -193,7 +193,7 @@ def replay(trajectory: Trajectory, recorder: Recorder) -> None:
     """Record a finished run, row by row, event by event, as if it were made now."""
     steps = trajectory.steps
     for i in range(len(trajectory)):
-        step = None if steps is None else steps[i].tolist()
+        step = None if steps is None else steps[i].tobytes()
         recorder.row({name: values[i] for name, values in trajectory.columns.items()}, step)
     for event in trajectory.events:
         recorder.event(event)

@@ -11,6 +11,7 @@ from ..contact.laws import Compliance
 from ..contact.phases import Joint
 from ..coupling.protocol import Step
 from ..results.recording import Recorder
+from ..results.steps import packed
 from ..results.trajectory import COLUMNS
 from ..scene import Scene
 from .ledger import Ledger
@@ -66,9 +67,10 @@ class Rows(Memory):
         forces = (contact, smoothed, inside, reaction, state.foundation[0])
         row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *self._ledger.book(*pair.energies(ends)))
         if step is None or step.size == 0.0:
-            kept = (time, 0.0, *ends[0], *ends[1], *NO_FORCE, 0.0)
+            kept = packed(time, 0.0, *ends[0], *ends[1], *NO_FORCE, 0.0)
         else:
-            kept = (time, step.size, *step.end[0], *step.end[1], *step.contact, step.foundation[0])
+            tip, low = step.end
+            kept = packed(time, step.size, *tip, *low, *step.contact, step.foundation[0])
         self._recorder.row(self._present(row), kept)
         if isinstance(pair.beam, BeamBody):
             early = joined and self._shapes_left > 0
