@@ -5,19 +5,27 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+__version__: str
+
 if TYPE_CHECKING:
-    from .api import simulate
+    from .api import load, simulate
+    from .bodies.protocol import Body, Energies, Motion
     from .results.trajectory import Event, Trajectory
     from .run.outcome import RunStopped
     from .run.runner import resume
     from .scene import Scene, SceneError, load_scene, with_changes
 
 __all__ = [
+    "Body",
+    "Energies",
     "Event",
+    "Motion",
     "RunStopped",
     "Scene",
     "SceneError",
     "Trajectory",
+    "__version__",
+    "load",
     "load_scene",
     "resume",
     "simulate",
@@ -25,6 +33,10 @@ __all__ = [
 ]
 
 _HOME = {
+    "Body": "bodies.protocol",
+    "Energies": "bodies.protocol",
+    "Motion": "bodies.protocol",
+    "load": "api",
     "Event": "results.trajectory",
     "RunStopped": "run.outcome",
     "Scene": "scene",
@@ -41,4 +53,12 @@ def __getattr__(name: str) -> Any:
     # FMPy and scipy take a second to load: only for what needs them.
     if name in _HOME:
         return getattr(import_module(f".{_HOME[name]}", __name__), name)
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("springbeam")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .results.reading import load_trajectory as load
 from .studies.accuracy import simulate
 
-__all__ = ["simulate"]
+__all__ = ["load", "simulate"]

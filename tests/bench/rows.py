@@ -371,7 +371,7 @@ def profile(effort: Effort) -> Iterator[Row]:
         lambda: stepped(spring),
         lambda: detector.at_start(state, start),
         lambda: detector.first(state, step),
-        lambda: simulation._rows.write(state),
+        lambda: simulation._rows.write(state, step),
         lambda: pair.energies(end),
         lambda: simulation._ledger.book(*energies),
         lambda: recorder.shape(1.0, beam.shape()),

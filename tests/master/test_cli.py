@@ -77,7 +77,7 @@ def test_a_run_leaves_results_and_pictures_and_says_where(here):
     assert result.exit_code == 0
     assert result.stderr == ""
     assert sorted(path.name for path in (here / "results" / "soft").iterdir()) == sorted(
-        ["trajectory.csv", "events.csv", "shapes.csv", "summary.json", *PICTURES]
+        ["trajectory.csv", "events.csv", "shapes.csv", "steps.bin", "summary.json", *PICTURES]
     )
     assert "results   results/soft\n" in result.stdout
     assert "pictures  results/soft/*.png (5)" in result.stdout

@@ -16,8 +16,8 @@ from springbeam.contact.events import (
     locate,
 )
 from springbeam.contact.laws import Transmission
-from springbeam.contact.paths import Sample
 from springbeam.contact.phases import Joint, Phase, common_velocity
+from springbeam.results.paths import Sample
 from springbeam.scene import load_scene
 
 SIZE = 0.02

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from springbeam.contact.paths import Path
+from springbeam.results.paths import Path
 
 SIZE = 0.02
 #: Coefficients in s = τ/H, ascending: minima inside, at neither end, two of them, none.

@@ -234,7 +234,7 @@ def test_files_are_plain_csv_and_json(tmp_path):
     assert summary["macro_steps"] == 3
     assert summary["scene"]["spring"]["cubic_stiffness"] == -0.2
     assert sorted(p.name for p in (tmp_path / "run").iterdir()) == [
-        "events.csv", "shapes.csv", "summary.json", "trajectory.csv",
+        "events.csv", "shapes.csv", "steps.bin", "summary.json", "trajectory.csv",
     ]  # fmt: skip
 
 
@@ -382,7 +382,15 @@ def test_events_are_read_one_at_a_time(tmp_path):
 # -- directories --------------------------------------------------------------------------------------------------
 
 
-RESULT_FILES = ["trajectory.csv", "events.csv", "shapes.csv", "summary.json", "run.checkpoint", PICTURES[2]]
+RESULT_FILES = [
+    "trajectory.csv",
+    "events.csv",
+    "shapes.csv",
+    "steps.bin",
+    "summary.json",
+    "run.checkpoint",
+    PICTURES[2],
+]
 
 
 @pytest.mark.parametrize("name", RESULT_FILES)
@@ -405,7 +413,7 @@ def test_replaced_results_stay_until_there_is_something_to_record(tmp_path):
     assert recorder.begun
     recorder.finish({"status": "done"})
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
-        ["trajectory.csv", "events.csv", "shapes.csv", "summary.json", "notes.txt"]
+        ["trajectory.csv", "events.csv", "shapes.csv", "steps.bin", "summary.json", "notes.txt"]
     )
     assert len(load_trajectory(tmp_path)) == 3
 

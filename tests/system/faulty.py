@@ -190,9 +190,9 @@ def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
         with script.at("rollback"):
             rewind(self)
 
-    def written(self: Rows, state: Any) -> None:
+    def written(self: Rows, *arguments: Any) -> None:
         with script.at("row"):
-            write(self, state)
+            write(self, *arguments)
 
     def located(*arguments: Any) -> float:
         with script.at("location"):

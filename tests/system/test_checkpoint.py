@@ -294,9 +294,10 @@ def test_rows_reach_the_disk_before_the_checkpoint_that_counts_them(tmp_path, mo
     with recorder, pytest.raises(KeyboardInterrupt):
         runner.run(SCENE, recorder, Interrupt(2), seconds=0.0)
     at = calls.index(("fsync", "trajectory.csv"))
-    assert calls[at : at + 6] == [
+    assert calls[at : at + 7] == [
         ("fsync", "trajectory.csv"),
         ("fsync", "events.csv"),
+        ("fsync", "steps.bin"),
         ("fsync", "shapes.csv"),
         ("fsync", "run.checkpoint.part"),
         ("replace", "run.checkpoint.part"),

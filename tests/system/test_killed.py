@@ -29,7 +29,7 @@ pytestmark = [
 
 SEED = int(os.environ.get("SPRINGBEAM_SEED", "20240607"))
 KILLS = int(os.environ.get("SPRINGBEAM_KILLS", "20"))
-FILES = ("trajectory.csv", "events.csv", "shapes.csv")
+FILES = ("trajectory.csv", "events.csv", "shapes.csv", "steps.bin")
 #: Beside wall times, all that may differ.
 TIMES = ("setup_time", "wall_time")
 

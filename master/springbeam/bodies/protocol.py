@@ -84,8 +84,11 @@ class Body(Memory):
         raise NotImplementedError
 
     def holding_force(self, displacement: float, velocity: float) -> float:
-        """Return the upward force [N] that keeps the end at ``displacement`` [m] and ``velocity`` [m/s]."""
-        raise NotImplementedError
+        """Return the upward force [N] that keeps the end at ``displacement`` [m] and ``velocity`` [m/s].
+
+        The force on a spring seated on a stop comes from here.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no holding_force, which a body seated on a stop needs")
 
     def join(self, velocity: float) -> None:
         """Let a massless end take the velocity [m/s] of what it is joined to; other ends keep theirs."""

@@ -6,6 +6,7 @@ from collections import Counter, deque
 from collections.abc import Mapping
 from contextlib import suppress
 from itertools import islice
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Annotated, Any
@@ -18,7 +19,7 @@ from rich.text import Text
 
 from ..bodies.fmu import FmuError
 from ..results.directory import RunDirectory
-from ..results.file_recorder import FileRecorder
+from ..results.file_recorder import FileRecorder, leave_rows_at_multiples
 from ..results.reading import load_events, load_summary, load_trajectory
 from ..results.recording import NonFiniteValue, replay
 from ..results.trajectory import Event, Trajectory, rounded
@@ -38,9 +39,12 @@ from .common import (
     print_json,
     progress_bar,
 )
+from .totals import totals_in_words
 from .watchdog import watched
 
 _FIRST_EVENTS, _LAST_EVENTS = 10, 3
+#: Most rows that --output-interval may ask for.
+_MOST_ROWS = 10_000_000
 _REFRESH_SECONDS = 0.1
 
 
@@ -70,6 +74,14 @@ def run(
             help="Save every so many seconds what springbeam resume needs. Not beside an accuracy.",
         ),
     ] = None,
+    interval: Annotated[
+        float | None,
+        typer.Option(
+            "--output-interval",
+            metavar="DT",
+            help="Leave rows at multiples of DT [s] in trajectory.csv, not one per step. Not beside --checkpoint.",
+        ),
+    ] = None,
     no_plots: NoPlotsOption = False,
     force: Annotated[bool, typer.Option("--force", "-f", help="Replace results that are already there.")] = False,
     quiet: QuietOption = False,
@@ -89,10 +101,35 @@ def run(
                 f"--checkpoint {checkpoint:g}: a run with accuracy = {what.accuracy:g} is written when it is done, and "
                 "has nothing to resume before; leave one of the two out",
             )
+        if interval is not None:
+            _check_interval(interval, what, checkpoint)
         made = picked(what)
         what = what if made is None else made.scene
         directory = _run_directory(scene, out, force)
-    carry_out(what, directory, seconds=checkpoint, no_plots=no_plots, quiet=quiet, as_json=as_json, made=made)
+    carry_out(
+        what,
+        directory,
+        seconds=checkpoint,
+        no_plots=no_plots,
+        quiet=quiet,
+        as_json=as_json,
+        made=made,
+        interval=interval,
+    )
+
+
+def _check_interval(interval: float, scene: Scene, checkpoint: float | None) -> None:
+    cause = None
+    if not 0.0 < interval < inf:
+        cause = "must be a time above 0 s, as in --output-interval 1e-3"
+    elif checkpoint is not None:
+        cause = "--checkpoint goes on from rows at every step; leave one of the two out"
+    elif scene.contact.law == "paper":
+        cause = 'contact.law = "paper" tells nothing of what lies between its steps; leave one of the two out'
+    elif scene.time.t_end / interval > _MOST_ROWS:
+        cause = f"more than {_MOST_ROWS:,} rows up to time.t_end = {scene.time.t_end:g} s; take a longer one"
+    if cause is not None:
+        fail(BAD_INPUT, f"--output-interval {interval:g}: {cause}")
 
 
 def picked(scene: Scene) -> Trajectory | None:
@@ -119,10 +156,12 @@ def carry_out(
     quiet: bool,
     as_json: bool,
     made: Trajectory | None = None,
+    interval: float | None = None,
 ) -> None:
     """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.run.runner.run`.
 
-    A run that is already ``made`` is only written.
+    A run that is already ``made`` is only written. With an ``interval`` [s] the rows at its multiples take the place of
+    those of the steps, when all else is done.
     """
     console = console_for(silent=quiet or as_json)
     recorder = FileRecorder(scene, directory)
@@ -135,6 +174,8 @@ def carry_out(
     _report(console, directory, scene)
     if not no_plots:
         error = _draw(console, directory) or error
+    if interval is not None:
+        error = _thin_out(directory, interval) or error
     if as_json:
         print_json({"directory": directory.path, **load_summary(directory.path)})
     elif quiet:
@@ -155,6 +196,15 @@ def _draw(console: Console, directory: RunDirectory) -> str | None:
         return f"no pictures: {error.filename or directory.path}: {error.strerror or error}"
     if pictures:
         console.print(Text(f"pictures  {directory.path / '*.png'} ({len(pictures)})"), soft_wrap=True)
+    return None
+
+
+def _thin_out(directory: RunDirectory, interval: float) -> str | None:
+    """Leave the rows at multiples of ``interval`` [s]; return why they could not be written, or ``None``."""
+    try:
+        leave_rows_at_multiples(directory, interval)
+    except OSError as error:
+        return f"rows of every step: {error.filename or directory.path}: {error.strerror or error}"
     return None
 
 
@@ -273,6 +323,9 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         console.print(_event_table(first, list(last), kinds.total() - len(first) - len(last), scene))
         counts = ", ".join(f"{number} {kind}" for kind, number in kinds.most_common())
         console.print(f"events    {counts}")
+        console.print("          (on the tip, of the stop: impulses, upward; lost: energy that the event takes)")
+    for line in totals_in_words(summary):
+        console.print(Text(line))
     if "macro_steps" in summary and "wall_time" in summary:
         console.print(f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s")
     if "coupling" in summary:
@@ -303,7 +356,7 @@ def _event_table(first: list[Event], last: list[Event], between: int, scene: Sce
     position, speed = ("u_tip", "v_tip") if scene.spring is None else ("y", "z")
     table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
     table.add_column("event", no_wrap=True)
-    units = {"t": "s", position: "m", speed: "m/s", "J_contact": "N·s", "J_stop": "N·s", "loss": "J"}
+    units = {"time": "s", position: "m", speed: "m/s", "on the tip": "N·s", "of the stop": "N·s", "lost": "J"}
     for name, unit in units.items():
         table.add_column(Text(f"{name}\n[{unit}]"), justify="right", no_wrap=True)
     shown = [*first, *last]

@@ -1,7 +1,7 @@
 """Event functions, and where inside a step one of them vanishes.
 
 An event function f is positive while nothing happens and falls through zero at the event. A step knows f and ḟ at
-both ends and the means of f; `springbeam.contact.paths` tells from them where to look, also for a contact that closes
+both ends and the means of f; `springbeam.results.paths` tells from them where to look, also for a contact that closes
 and opens again inside the step.
 """
 
@@ -14,10 +14,10 @@ from typing import Protocol
 import numpy as np
 
 from ..bodies.protocol import Motion
+from ..results.paths import Means, Sample
 from ..scene import Beam, Scene, Spring
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .laws import Law
-from .paths import Means, Sample
 from .phases import Joint, Phase, spring_force
 
 _EPS = float(np.finfo(float).eps)

@@ -73,24 +73,43 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
     list of Path
         The files written.
     """
-    if len(trajectory) < 2 or trajectory["time"][-1] <= trajectory["time"][0]:
-        return []
-    drawings: tuple[Callable[[Trajectory], Figure | None], ...] = (
-        _shapes_after_contact,
-        _shapes_later,
-        _positions,
-        _velocities_and_forces,
-        _gap_and_energy,
-    )
     written = []
     with matplotlib.rc_context(STYLE):
-        for name, draw in zip(PICTURES, drawings, strict=True):
-            figure = draw(trajectory)
+        for name, file in zip(_drawings(), PICTURES, strict=True):
+            figure = _drawn(trajectory, name)
             if figure is not None:
-                path = Path(directory) / name
+                path = Path(directory) / file
                 figure.savefig(path, dpi=DPI)
                 written.append(path)
     return written
+
+
+def figure_of(trajectory: Trajectory, picture: str) -> Figure:
+    """Return the picture of that name; see `springbeam.Trajectory.plot`."""
+    if picture not in _drawings():
+        raise ValueError(f"no picture {picture!r}; there are {', '.join(_drawings())}")
+    with matplotlib.rc_context(STYLE):
+        figure = _drawn(trajectory, picture)
+    if figure is None:
+        raise ValueError(f"the run has nothing to show of {picture!r}")
+    return figure
+
+
+def _drawings() -> dict[str, Callable[[Trajectory], Figure | None]]:
+    """Return what draws each picture, in the order of `PICTURES`."""
+    return {
+        "shapes_after_contact": _shapes_after_contact,
+        "shapes_later": _shapes_later,
+        "positions": _positions,
+        "velocities_and_forces": _velocities_and_forces,
+        "gap_and_energy": _gap_and_energy,
+    }
+
+
+def _drawn(trajectory: Trajectory, picture: str) -> Figure | None:
+    if len(trajectory) < 2 or trajectory["time"][-1] <= trajectory["time"][0]:
+        return None
+    return _drawings()[picture](trajectory)
 
 
 def _visible(ax: Axes, trajectory: Trajectory, looks: Mapping[str, Look], unit: str) -> list[str]:

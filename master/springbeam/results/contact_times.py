@@ -7,10 +7,11 @@ within a macro step is decided by rounding.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from math import inf
 from typing import NamedTuple
 
-from .trajectory import Trajectory
+from .trajectory import Event, Trajectory
 
 #: From when to when something is touched [s]; an impact that lets go at once has no length.
 Interval = tuple[float, float]
@@ -60,12 +61,16 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
 
 
 def _contacts(run: Trajectory, end: float) -> list[Interval]:
+    return tip_contacts(run.events, end, free_at_end=run.phase[-1] == "free")
+
+
+def tip_contacts(events: Iterable[Event], end: float, *, free_at_end: bool) -> list[Interval]:
     """Return the contacts of tip and spring; one that goes on ends at ``end`` [s]."""
     edges: list[float] = []
-    events = [e for e in run.events if e.kind in ("impact", "separation", "release", "retie")]
+    events = [e for e in events if e.kind in ("impact", "separation", "release", "retie")]
     for event, after in itertools.zip_longest(events, events[1:]):
         if event.kind == "release":  # to `touch`, or to `free`
-            joined = run.phase[-1] != "free" if after is None else after.kind != "impact"
+            joined = not free_at_end if after is None else after.kind != "impact"
         else:
             joined = event.kind != "separation"
         if joined == (len(edges) % 2 == 0):
@@ -76,10 +81,14 @@ def _contacts(run: Trajectory, end: float) -> list[Interval]:
 
 
 def _foundation_contacts(run: Trajectory, end: float) -> list[Interval]:
+    return foundation_contacts(run.events, end)
+
+
+def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
     """Return the impacts on the foundation, and the rests on it; a rest that goes on ends at ``end`` [s]."""
     intervals: list[Interval] = []
     since: float | None = None
-    for event in run.events:
+    for event in events:
         if event.kind == "stop_impact":
             intervals.append((event.time, event.time))
         elif event.kind == "seated":

@@ -1,7 +1,8 @@
 """A run directory: its files, who may write to it, and what is wrong with one that cannot be read.
 
 It holds ``trajectory.csv`` (a row per accepted step), ``events.csv``, ``shapes.csv`` (the beam's deflection at
-`SHAPE_POINTS`), ``summary.json`` and pictures. ``file_recorder`` writes it, ``reading`` reads it.
+`SHAPE_POINTS`), ``steps.bin`` (what lies between rows), ``summary.json`` and pictures. ``file_recorder`` writes it,
+``reading`` reads it.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ PICTURES = (
 #: What `springbeam report` and `springbeam animate` may leave there.
 REPORT = "report.html"
 ANIMATIONS = ("animation.gif", "animation.mp4")
-TRAJECTORY, EVENTS, SHAPES = "trajectory.csv", "events.csv", "shapes.csv"
+TRAJECTORY, EVENTS, SHAPES, STEPS = "trajectory.csv", "events.csv", "shapes.csv", "steps.bin"
 
 
 class ResultsExist(FileExistsError):
@@ -63,6 +64,11 @@ class RunDirectory:
         return self.path / SHAPES
 
     @property
+    def steps(self) -> Path:
+        """What `springbeam.results.steps` says of each step, as doubles."""
+        return self.path / STEPS
+
+    @property
     def summary(self) -> Path:
         return self.path / "summary.json"
 
@@ -78,7 +84,7 @@ class RunDirectory:
 
     def results(self) -> list[Path]:
         """Return the result files that are there, and what was made from them."""
-        files = (self.summary, self.trajectory, self.events, self.shapes, self.checkpoint)
+        files = (self.summary, self.trajectory, self.events, self.shapes, self.steps, self.checkpoint)
         made = (self.path / name for name in (REPORT, *ANIMATIONS))
         return [file for file in (*files, *self.pictures, *made) if file.exists()]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from math import isfinite
 from pathlib import Path
@@ -20,12 +20,18 @@ import numpy as np
 from pydantic_core import to_json
 
 from ..scene import Scene
-from .directory import EVENTS, SHAPES, TRAJECTORY, ResultsUnreadable, RunDirectory, lock
-from .recording import CheckedRecorder, with_scene
-from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event
+from .directory import EVENTS, SHAPES, STEPS, TRAJECTORY, ResultsUnreadable, RunDirectory, lock
+from .reading import load_events, load_trajectory
+from .recording import CheckedRecorder, replay, with_scene
+from .steps import STEP, steps_of
+from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
 
 #: Bytes kept free for the last summary; longer ones are written if the disk has room.
 _SUMMARY_ROOM = 16384
+#: Bytes of steps that are written together.
+_STEPS_TOGETHER = 8192
+#: Times closer than this share are one.
+_SAME = 1e-12
 _PLAIN: tuple[tuple[type, Callable[[Any], Any]], ...] = (
     (np.bool_, bool),
     (np.integer, int),
@@ -38,7 +44,8 @@ _PLAIN: tuple[tuple[type, Callable[[Any], Any]], ...] = (
 class FileRecorder(CheckedRecorder):
     """Streams into a `RunDirectory` and keeps nothing, so that memory does not grow with the run.
 
-    A row is in its file when `row` returns, and ``summary.json`` says from the start which scene it belongs to: the
+    A row is in its file when `row` returns (what `springbeam.results.steps` keeps of its step, some rows later), and
+    ``summary.json`` says from the start which scene it belongs to: the
     results of a run that was killed can be loaded. Results of an earlier run stay until this one has something to
     record, and are gone then.
 
@@ -58,7 +65,8 @@ class FileRecorder(CheckedRecorder):
         self.finished = False
         #: Time of the last row [s]; ``None`` before the first.
         self.time: float | None = None
-        self._headers = {TRAJECTORY: self.columns, EVENTS: EVENT_COLUMNS}
+        self._headers: dict[str, Sequence[str]] = {TRAJECTORY: self.columns, EVENTS: EVENT_COLUMNS, STEPS: ()}
+        self._waiting = bytearray()  #: steps that are not in their file yet
         if scene.beam is not None:
             self._headers[SHAPES] = SHAPE_COLUMNS
         self._files: dict[str, _Lines] = {}
@@ -78,13 +86,32 @@ class FileRecorder(CheckedRecorder):
         """Whether the directory holds results of this run."""
         return bool(self._files)
 
-    def row(self, values: Mapping[str, Any] | Sequence[Any]) -> None:
+    def row(self, values: Mapping[str, Any] | Sequence[Any], step: bytes | None = None) -> None:
         row, phase = self._checked_row(values)
+        if step is not None:
+            self._waiting += step
         fields: list[float | str] = [*row]
         if self._phase_at >= 0:
             fields.insert(self._phase_at, phase)
         self._file(TRAJECTORY).write(_line(fields))
         self.time = row[0]
+        if len(self._waiting) >= _STEPS_TOGETHER:
+            self._write_steps()
+
+    def _write_steps(self) -> None:
+        waiting, self._waiting = self._waiting, bytearray()
+        if waiting:
+            steps_of(waiting)
+            self._file(STEPS).write(waiting)
+
+    def steps(self) -> np.ndarray | None:
+        self._write_steps()
+        path = self.directory.steps
+        whole = path.stat().st_size // STEP.itemsize if self.begun else 0
+        return np.memmap(path, STEP, mode="r", shape=whole) if whole else None
+
+    def events(self) -> Iterable[Event]:
+        return load_events(self.directory.path) if self.begun else iter(())
 
     def event(self, event: Event) -> None:
         values = [getattr(self._checked_event(event), name) for name in EVENT_COLUMNS]
@@ -99,6 +126,7 @@ class FileRecorder(CheckedRecorder):
 
     def finish(self, summary: Mapping[str, Any]) -> None:
         self._begin()
+        self._write_steps()
         self.close()
         self._write_summary(summary)
         if summary.get("status") == "done":
@@ -113,6 +141,7 @@ class FileRecorder(CheckedRecorder):
     def save(self) -> dict[str, Any]:
         """Put what was recorded on the disk, and return what `restore` needs."""
         self._begin()
+        self._write_steps()
         for lines in self._files.values():
             os.fsync(lines.file.fileno())
         return {"time": self.time, "files": {name: (f.size, f.crc) for name, f in self._files.items()}}
@@ -152,7 +181,7 @@ class FileRecorder(CheckedRecorder):
         """Write the files with their headers, which then replace earlier results."""
         if self._files:
             return
-        headers = {name: (",".join(columns) + "\n").encode() for name, columns in self._headers.items()}
+        headers = {name: (",".join(names) + "\n").encode() if names else b"" for name, names in self._headers.items()}
         parts = {name: self.directory.path / f"{name}.part" for name in headers}
         try:
             for name, header in headers.items():
@@ -191,6 +220,38 @@ class FileRecorder(CheckedRecorder):
         os.replace(self._summary_part, self.directory.summary)
 
 
+def save(run: Trajectory, directory: str | Path, *, replace: bool) -> Path:
+    """Write the files of a finished run; see `Trajectory.save`."""
+    target = RunDirectory.create(directory, replace=replace)
+    with FileRecorder(run.scene, target, tuple(run.columns)) as recorder:
+        replay(run, recorder)
+    return target.path
+
+
+def leave_rows_at_multiples(directory: RunDirectory, interval: float) -> None:
+    """Replace the rows of a finished run by those at the multiples of ``interval`` [s] from its first to its last row.
+
+    Events and shapes stay; nothing is left that tells what lies between the rows. Raises OSError; the directory is then
+    as before.
+    """
+    run = load_trajectory(directory.path)
+    if run.steps is None:  # it stopped before its first row
+        return
+    first, last = (run.time[i] / interval for i in (0, -1))
+    times = interval * np.arange(np.ceil(first * (1.0 - _SAME)), np.floor(last * (1.0 + _SAME)) + 1.0)
+    rows = run.at(np.clip(times, run.time[0], run.time[-1]))
+    table = ",".join(run.columns).encode() + b"\n"
+    table += b"".join(map(_line, zip(*(values.tolist() for values in rows.columns.values()), strict=True)))
+    part = directory.trajectory.with_suffix(".csv.part")
+    try:
+        part.write_bytes(table)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+    directory.steps.unlink()
+    os.replace(part, directory.trajectory)
+
+
 class _Lines:
     """A result file that grows line by line; each is handed to the system at once, so a killed run loses none."""
 
@@ -216,7 +277,7 @@ class _Lines:
         """Remove what follows the lines written."""
         self.file.truncate(self.size)
 
-    def write(self, line: bytes) -> None:
+    def write(self, line: bytes | bytearray) -> None:
         written = self.file.write(line)
         while written < len(line):  # a disk that is almost full takes a part, and then refuses
             written += self.file.write(line[written:])
@@ -224,7 +285,7 @@ class _Lines:
         self.crc = crc32(line, self.crc)
 
 
-def _line(fields: list[Any]) -> bytes:
+def _line(fields: Sequence[Any]) -> bytes:
     """Return numbers and plain words as a line of CSV; JSON writes numbers alike, seven times faster than repr."""
     return to_json(fields)[1:-1].replace(b'"', b"") + b"\n"
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..scene import scene_from_dict
 from .directory import ResultsUnreadable, RunDirectory
+from .steps import steps_of
 from .trajectory import EVENT_COLUMNS, EVENT_KINDS, PHASE_WIDTH, SHAPE_COLUMNS, Event, Trajectory
 
 
@@ -35,7 +36,21 @@ def load_trajectory(directory: str | Path) -> Trajectory:
         table = _read_table(run.shapes, header, lines)
         shapes = (table["time"], np.column_stack([table[name] for name in header[1:]]))
     scene = scene_from_dict(summary["scene"], source=f"{run.summary}: scene")
-    return Trajectory(scene, columns, list(load_events(run.path)), shapes, summary)
+    return Trajectory(scene, columns, list(load_events(run.path)), shapes, summary, _read_steps(run, columns["time"]))
+
+
+def _read_steps(run: RunDirectory, times: np.ndarray) -> np.ndarray | None:
+    """Return the steps, of a killed run maybe fewer than its rows; ``None`` for a run that leaves none."""
+    try:
+        steps = steps_of(run.steps.read_bytes()) if run.steps.exists() else None
+    except (OSError, ValueError) as error:
+        raise ResultsUnreadable(f"{run.steps}: {error}") from error
+    if steps is None:
+        return None
+    steps = steps[: len(times)]
+    if not np.array_equal(steps["time"], times[: len(steps)]):
+        raise ResultsUnreadable(f"{run.steps}: not the steps of {run.trajectory.name}")
+    return steps
 
 
 def load_summary(directory: str | Path) -> dict[str, Any]:

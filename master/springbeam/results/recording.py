@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from struct import Struct
 from typing import Any, Protocol
@@ -14,6 +14,7 @@ import numpy as np
 
 from ..scene import Scene
 from ..scene.statics import SHAPE_POINTS
+from .steps import steps_of
 from .trajectory import (
     EVENT_COLUMNS,
     EVENT_KINDS,
@@ -40,8 +41,11 @@ class Recorder(Protocol):
 
     columns: tuple[str, ...]
 
-    def row(self, values: Mapping[str, Any] | Sequence[Any]) -> None:
+    def row(self, values: Mapping[str, Any] | Sequence[Any], step: bytes | None = None) -> None:
         """Record an accepted step: a value per column, by name (further names are ignored) or in column order.
+
+        ``step`` is `springbeam.results.steps.packed`; a run gives it with every row or with none. Its numbers are
+        looked at later, many at a time.
 
         Raises
         ------
@@ -54,6 +58,12 @@ class Recorder(Protocol):
 
     def shape(self, time: float, deflection: np.ndarray) -> None:
         """Record the beam's deflection [m] at `SHAPE_POINTS`, shape (21,), at ``time`` [s]."""
+
+    def steps(self) -> np.ndarray | None:
+        """Return the steps recorded so far, of dtype `springbeam.results.steps.STEP`; ``None`` if there are none."""
+
+    def events(self) -> Iterable[Event]:
+        """Return the events recorded so far."""
 
     def finish(self, summary: Mapping[str, Any]) -> None:
         """End the record with ``summary``, which is JSON-like; the scene as run is added.
@@ -141,11 +151,13 @@ class MemoryRecorder(CheckedRecorder):
         self._packed = Struct(f"{len(self._numbers)}d").pack
         self._phase_of_row: list[str] = []
         self._events: list[Event] = []
-        self._shapes = bytearray()
+        self._shapes, self._steps = bytearray(), bytearray()
         self._summary: dict[str, Any] = {}
 
-    def row(self, values: Mapping[str, Any] | Sequence[Any]) -> None:
+    def row(self, values: Mapping[str, Any] | Sequence[Any], step: bytes | None = None) -> None:
         row, phase = self._checked_row(values)
+        if step is not None:
+            self._steps += step
         self._rows += self._packed(*row)
         self._phase_of_row.append(phase)
 
@@ -155,6 +167,12 @@ class MemoryRecorder(CheckedRecorder):
     def shape(self, time: float, deflection: np.ndarray) -> None:
         shape = self._checked_shape(time, deflection)
         self._shapes += np.float64(time).tobytes() + shape.tobytes()
+
+    def steps(self) -> np.ndarray | None:
+        return steps_of(self._steps)
+
+    def events(self) -> Iterable[Event]:
+        return iter(self._events)
 
     def finish(self, summary: Mapping[str, Any]) -> None:
         self._summary = with_scene(summary, self.scene)
@@ -168,13 +186,15 @@ class MemoryRecorder(CheckedRecorder):
         if self.scene.beam is not None:
             time, *deflection = _columns(self._shapes, len(SHAPE_COLUMNS))
             shapes = (time, np.column_stack(deflection))
-        return Trajectory(self.scene, columns, list(self._events), shapes, dict(self._summary))
+        return Trajectory(self.scene, columns, list(self._events), shapes, dict(self._summary), self.steps())
 
 
 def replay(trajectory: Trajectory, recorder: Recorder) -> None:
     """Record a finished run, row by row, event by event, as if it were made now."""
+    steps = trajectory.steps
     for i in range(len(trajectory)):
-        recorder.row({name: values[i] for name, values in trajectory.columns.items()})
+        step = None if steps is None else steps[i].tobytes()
+        recorder.row({name: values[i] for name, values in trajectory.columns.items()}, step)
     for event in trajectory.events:
         recorder.event(event)
     for time, deflection in zip(*(trajectory.shapes or ((), ())), strict=True):

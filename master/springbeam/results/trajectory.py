@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..scene import Scene
 from ..scene.statics import SHAPE_POINTS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+    from xarray import Dataset
 
 #: Columns of a whole pair, in file order; those of an absent body are left out.
 COLUMNS = (
@@ -34,6 +41,15 @@ COLUMNS = (
     "e_total",
     "energy_residual",
 )
+#: Units of the columns; ``phase`` has none.
+COLUMN_UNITS = {
+    "time": "s",
+    **dict.fromkeys(("u_tip", "y", "gap"), "m"),
+    **dict.fromkeys(("v_tip", "z", "velocity_mismatch"), "m/s"),
+    **{name: "N" for name in COLUMNS if name.startswith("contact_force")},
+    **dict.fromkeys(("compliance_force", "tie_reaction", "foundation_force"), "N"),
+    **{name: "J" for name in COLUMNS if name.startswith("e")},
+}
 EVENT_COLUMNS = (
     "time",
     "kind",
@@ -99,7 +115,7 @@ def rounded(value: float, scale: float) -> str:
     return "0" if abs(value) <= _NOISE * scale else f"{value:.4g}"
 
 
-@dataclass
+@dataclass(repr=False)
 class Trajectory:
     """Columns as numpy arrays under the names of `COLUMNS`: ``trajectory["y"]`` or ``trajectory.y``.
 
@@ -111,6 +127,8 @@ class Trajectory:
     events: list[Event] = field(default_factory=list)
     shapes: tuple[np.ndarray, np.ndarray] | None = None
     summary: dict[str, Any] = field(default_factory=dict)
+    #: What lies between the rows, a step per row (`springbeam.results.steps.STEP`); ``None`` where nothing tells.
+    steps: np.ndarray | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -129,3 +147,62 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.columns["time"])
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self.columns]
+
+    def __repr__(self) -> str:
+        status = self.summary.get("status", "no summary")
+        span = f"t = {self.time[0]:g} … {self.time[-1]:g} s, " if len(self) else ""
+        return f"<Trajectory {self.scene.title!r}: {len(self)} rows, {span}{len(self.events)} events, {status}>"
+
+    def _repr_html_(self) -> str:
+        """Show in a notebook what the run amounts to."""
+        from .export import as_html
+
+        return as_html(self)
+
+    def at(self, times: Any) -> Trajectory:
+        """Return the run at any ``times`` [s], shape (n,), with the same columns (`springbeam.results.dense`).
+
+        Between rows y and u_tip follow the polynomial of order 6 that has the step's ends and moments, the contact
+        force is the polynomial applied, energies are linear. Raises ValueError for times outside of the run, and for a
+        run that left no steps.
+        """
+        from .dense import at
+
+        return at(self, times)
+
+    def to_pandas(self) -> DataFrame:
+        """Return the columns as a pandas DataFrame, a row per row; needs the extra ``data``."""
+        from .export import to_pandas
+
+        return to_pandas(self)
+
+    def to_xarray(self) -> Dataset:
+        """Return columns and shapes as an xarray Dataset with units, over ``time``; needs the extra ``data``."""
+        from .export import to_xarray
+
+        return to_xarray(self)
+
+    def plot(self, picture: str = "positions") -> Figure:
+        """Return a matplotlib Figure: ``shapes_after_contact``, ``shapes_later``, ``positions``,
+        ``velocities_and_forces`` or ``gap_and_energy``.
+
+        Raises ValueError for another name, and where the run has nothing of it to show.
+        """
+        figure: Figure = _at_call("pictures.plots").figure_of(self, picture)
+        return figure
+
+    def save(self, directory: str | Path, *, replace: bool = False) -> Path:
+        """Write the files of a run directory, as `springbeam run` does, and return its path.
+
+        Raises ResultsExist if there are results and ``replace`` is false, OSError if it cannot be written to.
+        """
+        path: Path = _at_call("results.file_recorder").save(self, directory, replace=replace)
+        return path
+
+
+def _at_call(module: str) -> Any:
+    """Return a module that what a trajectory is does not depend on: references return trajectories as well."""
+    return import_module(f"springbeam.{module}")

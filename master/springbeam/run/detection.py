@@ -18,9 +18,9 @@ from ..contact.events import (
     locate,
     position_tolerance,
 )
-from ..contact.paths import Path, Sample
 from ..contact.phases import common_velocity
 from ..coupling.protocol import Ends, Step
+from ..results.paths import Path, Sample
 from ..scene import Scene
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .separation import Separation

@@ -53,6 +53,7 @@ class Ledger(Memory):
     largest_residual: float = 0.0  #: [J]
     relative: float = 0.0  #: the largest residual over the scale at its time
     gain: float = 0.0  #: the same of the residuals that are positive
+    dissipated: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: by the beam, the spring, the contact law [J]
 
     def book(self, beam: Energies, spring: Energies, between: Booking) -> Booked:
         """Return the next row; ``between`` is what the coupling adds.
@@ -62,6 +63,7 @@ class Ledger(Memory):
         (kinetic, potential, dissipated, load), (kinetic_2, potential_2, dissipated_2, load_2) = beam, spring
         e_beam, e_spring = kinetic + potential, kinetic_2 + potential_2
         contact, law_dissipated, unfelt = between
+        lost_in = (dissipated, dissipated_2, law_dissipated)
         dissipated, load = dissipated + dissipated_2 + law_dissipated, load + unfelt + load_2
         lost = self.impact_loss
         total = e_beam + e_spring + contact + dissipated + lost + load
@@ -69,6 +71,7 @@ class Ledger(Memory):
             self.initial = initial = total
         residual = total - initial
         if isfinite(residual):
+            self.dissipated = lost_in
             self.scale = scale = max(self.scale, abs(initial), e_beam + abs(e_spring) + contact)
             self.largest_residual = max(self.largest_residual, abs(residual))
             if scale > 0.0:

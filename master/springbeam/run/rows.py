@@ -6,10 +6,12 @@ from math import inf
 from operator import itemgetter
 
 from ..bodies.memory import Memory
-from ..bodies.protocol import BeamBody
+from ..bodies.protocol import NO_FORCE, BeamBody
 from ..contact.laws import Compliance
 from ..contact.phases import Joint
+from ..coupling.protocol import Step
 from ..results.recording import Recorder
+from ..results.steps import packed
 from ..results.trajectory import COLUMNS
 from ..scene import Scene
 from .ledger import Ledger
@@ -46,8 +48,8 @@ class Rows(Memory):
         self.largest_speed = 0.0  #: of tip and lower end [m/s]
         self.not_shown = False  #: whether a compliance force was too large for its column
 
-    def write(self, state: State) -> None:
-        """The row of the present state. Raises NonFiniteValue."""
+    def write(self, state: State, step: Step | None) -> None:
+        """The row of the present state, at the end of ``step`` or of none. Raises NonFiniteValue."""
         pair, time, phase = self._pair, state.time, state.phase
         (u, v, _, _), (y, z, _, _) = ends = pair.ends()
         joined = phase.joint is not Joint.FREE
@@ -64,8 +66,13 @@ class Rows(Memory):
         self.largest_speed = max(self.largest_speed, abs(v), abs(z))
         forces = (contact, smoothed, inside, reaction, state.foundation[0])
         row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *self._ledger.book(*pair.energies(ends)))
-        self._recorder.row(self._present(row))
-        if pair.beam is not None:
+        if step is None or step.size == 0.0:
+            kept = packed(time, 0.0, *ends[0], *ends[1], *NO_FORCE, 0.0)
+        else:
+            tip, low = step.end
+            kept = packed(time, step.size, *tip, *low, *step.contact, step.foundation[0])
+        self._recorder.row(self._present(row), kept)
+        if isinstance(pair.beam, BeamBody):
             early = joined and self._shapes_left > 0
             if early or time >= self._next_shape:
                 self._shape(pair.beam, time, early)

@@ -13,13 +13,16 @@ from ..bodies.factory import fingerprints, load_bodies
 from ..bodies.fmu import FmuError
 from ..bodies.fmu_bodies import FmuBeam, FmuSpring
 from ..bodies.memory import Memory
+from ..bodies.protocol import Body
 from ..bodies.quasi_static import QuasiStaticBeam
 from ..results.directory import RunDirectory
 from ..results.file_recorder import FileRecorder
 from ..results.reading import load_summary, load_trajectory
 from ..results.recording import MemoryRecorder, Recorder
+from ..results.totals import totals
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, scene_from_dict, suspicions, with_changes
+from ..scene.resolution import force_window
 from .checkpoint import Checkpoint, CheckpointRefused, Checkpoints
 from .outcome import Progress, RunStopped
 from .paper_law import PaperLaw
@@ -33,6 +36,8 @@ def run(
     *,
     seconds: float | None = None,
     start: Checkpoint | None = None,
+    upper: Body | None = None,
+    lower: Body | None = None,
 ) -> dict[str, Any]:
     """Co-simulate ``scene`` into ``recorder`` and return the summary.
 
@@ -49,6 +54,9 @@ def run(
         whenever so much time of the clock has passed [s].
     start
         Go on from here, `last_checkpoint` of the directory of ``recorder``, instead of from the start.
+    upper, lower
+        Bodies that take the places of the beam and the spring, which the scene then describes as far as the master
+        asks; they are the caller's to close.
 
     Raises
     ------
@@ -63,6 +71,11 @@ def run(
     ResultsUnreadable, ResultsInUse
         If the results do not belong to ``start``, or another process is writing them.
     """
+    if scene.accuracy is not None and (upper or lower) is not None:
+        raise SceneError(
+            f"accuracy = {scene.accuracy:g}: is kept by pilot runs, and a body of your own can be run once; give "
+            "coupling.scheme, degree and macro_step instead"
+        )
     if scene.accuracy is not None:
         raise SceneError(
             f"accuracy = {scene.accuracy:g}: the settings that keep it are not picked yet; run "
@@ -81,9 +94,10 @@ def run(
                 progress(time, phase, macro_steps)
             checkpoints.take_when_due(simulation)
 
-    start_time = scene.contact_time or 0.0
+    of_scene = _without_own(scene, beam=upper, spring=lower)
+    start_time = 0.0 if upper is not None else scene.contact_time or 0.0
     paper = scene.contact.law == "paper"
-    beam, spring = load_bodies(_as_in_paper(scene) if paper else scene, start_time)
+    beam, spring = load_bodies(_as_in_paper(scene) if paper else of_scene, start_time)
     try:
         simulation: Simulation | PaperLaw
         if paper:
@@ -91,7 +105,7 @@ def run(
             assert spring is not None
             simulation = PaperLaw(scene, start_time, beam, spring, recorder, after_step)
         else:
-            simulation = Simulation(scene, start_time, beam, spring, recorder, after_step)
+            simulation = Simulation(scene, start_time, upper or beam, lower or spring, recorder, after_step)
         if start is not None:
             _go_on(simulation, recorder, start)
         loaded = perf_counter()
@@ -117,6 +131,7 @@ def run(
                 **status,
                 "version": version("springbeam"),
                 **simulation.summary(),
+                **_totals(simulation, scene, recorder),
                 **_calls(beam=beam, spring=spring),
                 "setup_time": loaded - began,
                 "wall_time": before + ended - loaded,
@@ -185,16 +200,45 @@ def resume(directory: str | Path, progress: Progress | None = None) -> Trajector
     return load_trajectory(directory)
 
 
-def simulate(scene: Scene, progress: Progress | None = None) -> Trajectory:
-    """Co-simulate ``scene``, which asks for no accuracy, and return the trajectory. Raises as `run` does."""
+def simulate(
+    scene: Scene, progress: Progress | None = None, *, upper: Body | None = None, lower: Body | None = None
+) -> Trajectory:
+    """Co-simulate ``scene``, which asks for no accuracy, and return the trajectory; see `run`."""
     recorder = MemoryRecorder(scene)
-    run(scene, recorder, progress)
+    run(scene, recorder, progress, upper=upper, lower=lower)
     return recorder.trajectory()
+
+
+def _without_own(scene: Scene, **own: Body | None) -> Scene:
+    """Return ``scene`` without the tables whose places bodies of the caller's take; see `run`."""
+    given = [name for name, body in own.items() if body is not None]
+    if not given:
+        return scene
+    for name in given:
+        if not isinstance(own[name], Body):
+            raise TypeError(f"the body in place of the {name} is a {type(own[name]).__name__}, not a springbeam.Body")
+        if getattr(scene, name) is None:
+            raise SceneError(f"[{name}]: missing; a body of your own takes the place of one that the scene has")
+    asked = {
+        'contact.law = "paper"': scene.contact.law == "paper",
+        'coupling.scheme = "auto"': scene.coupling.scheme == "auto",
+        'beam.fidelity = "quasi_static"': scene.beam is not None and scene.beam.fidelity == "quasi_static",
+    }
+    for what in (what for what, is_so in asked.items() if is_so):
+        raise SceneError(f"{what}: takes the bodies from the scene, and cannot be used with a body of your own")
+    return scene.model_copy(update=dict.fromkeys(given))
 
 
 def _as_in_paper(scene: Scene) -> Scene:
     """The scene with the beam on its full mesh, stepped by the midpoint rule (62)."""
     return with_changes(scene, beam={"integrator": "generalized_alpha", "rho_inf": 1.0, "n_modes": 0})
+
+
+def _totals(simulation: Simulation | PaperLaw, scene: Scene, recorder: Recorder) -> dict[str, float | int]:
+    steps = recorder.steps()
+    if steps is None or isinstance(simulation, PaperLaw):
+        return {}
+    return totals(scene, steps, recorder.events(), force_window(scene), free_at_end=simulation.apart)
 
 
 def _calls(**bodies: FmuBeam | FmuSpring | QuasiStaticBeam | None) -> dict[str, int]:

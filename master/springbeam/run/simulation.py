@@ -8,10 +8,11 @@ the run goes on from there. Every row closes the ledger (`springbeam.run.rows`, 
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 from ..bodies.memory import Memory
-from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, StepRefused
+from ..bodies.protocol import NO_FORCE, Body, BodyFailed, StepRefused
 from ..contact.events import gap
 from ..contact.phases import Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
@@ -48,7 +49,7 @@ class Simulation(Memory):
     start_time
         Where the run starts [s], `springbeam.scene.Scene.contact_time` or 0.
     beam, spring
-        The bodies at the start time; ``None`` where the scene has none.
+        The bodies at the start time; ``None`` where the scene has none. A beam that is no `BeamBody` leaves no shapes.
     recorder
         Receives rows, events and shapes.
     progress
@@ -76,7 +77,7 @@ class Simulation(Memory):
         self,
         scene: Scene,
         start_time: float,
-        beam: BeamBody | None,
+        beam: Body | None,
         spring: Body | None,
         recorder: Recorder,
         progress: Progress | None = None,
@@ -101,6 +102,10 @@ class Simulation(Memory):
         )
         self._ledger = Ledger()
         self._energy_warns, self._energy_stops = bounds(scene)
+        #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
+        self._untold = any(body is not None and type(body).energies is Body.energies for body in (beam, spring))
+        if self._untold:
+            self._energy_warns = self._energy_stops = inf
         self._numerically_damped = scene.beam is not None and scene.beam.damped_numerically
         self._rows = Rows(scene, self._pair, self._ledger, recorder, start_time)
         self._begun = False
@@ -134,7 +139,7 @@ class Simulation(Memory):
         state, steps, t_end = self._state, self._steps, self._scene.time.t_end
         if not self._begun:
             self._settle_start()
-            self._record()
+            self._record(None)
             self._begun = True
         while state.time < t_end:
             target, size = steps.next(state.time)
@@ -153,7 +158,7 @@ class Simulation(Memory):
             steps.reached(state.time)
             if event is not None:
                 self._act(event, step)
-            self._record()
+            self._record(step)
             if self._progress is not None:
                 self._progress(state.time, state.phase.name, self._macro_steps)
 
@@ -273,8 +278,8 @@ class Simulation(Memory):
 
     # -- what is reported -------------------------------------------------------------------------------------------
 
-    def _record(self) -> None:
-        self._rows.write(self._state)
+    def _record(self, step: Step | None) -> None:
+        self._rows.write(self._state, step)
         # What numerical damping takes is not an error; what it brings is.
         if (self._ledger.gain if self._numerically_damped else self._ledger.relative) > self._energy_stops:
             raise RunStopped(self._energy_cause(), self._state.time)
@@ -320,6 +325,8 @@ class Simulation(Memory):
         unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed)
         if unresolved is not None:
             warnings.append(unresolved)
+        if self._untold:
+            warnings.append("a body tells no energies: nothing says whether the energy is kept")
         if rows.not_shown:
             warnings.append(NOT_SHOWN)
         left_out = self._pair.joined.neglected()
@@ -339,5 +346,21 @@ class Simulation(Memory):
             "max_energy_residual_joule": self._ledger.largest_residual,
             "max_velocity_mismatch": rows.largest_mismatch,
             "resolved": unresolved is None,
+            **self._losses(),
             "warnings": warnings,
         }
+
+    def _losses(self) -> dict[str, float]:
+        """Return what the bodies and the contact law have dissipated [J]."""
+        beam, spring, contact = self._ledger.dissipated
+        here = {
+            "loss_beam": (beam, self._pair.beam is not None),
+            "loss_spring": (spring, self._pair.spring is not None),
+            "loss_contact": (contact, self._pair.law.soft),
+        }
+        return {name: lost for name, (lost, present) in here.items() if present}
+
+    @property
+    def apart(self) -> bool:
+        """Whether tip and lower end are apart."""
+        return self._state.phase.joint is Joint.FREE

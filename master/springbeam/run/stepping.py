@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from ..bodies import force
 from ..bodies.memory import Memory
-from ..bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Held
+from ..bodies.protocol import NO_FORCE, Body, Energies, Force, Held
 from ..contact.laws import Transmission, law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
@@ -77,7 +77,7 @@ class Pair(Memory):
 
     REMEMBERED = ("beam", "spring", "_held", "_joined")
 
-    def __init__(self, scene: Scene, beam: BeamBody | None, spring: Body | None) -> None:
+    def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self.beam, self.spring = beam, spring
         self.stop = None if scene.stop is None else scene.stop.position
         self._held = None if self.stop is None else Held(self.stop)

@@ -13,15 +13,17 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
-from .linearised import spring_frequency
+from .linearised import spring_frequency, spring_stiffness
 from .scene import Scene
-from .statics import bending_stiffness, locking, lowest_frequency, shear_stiffness
+from .statics import bending_stiffness, locking, lowest_frequency, shear_stiffness, tip_compliance
 from .tables import Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
 TURN = 1.0
 #: Velocity mismatch of tip and spring top, relative to their speed, above which the motion is called unresolved.
 MISMATCH = 0.2
+#: Share of the slowest period over which the contact force is averaged.
+WINDOW = 0.02
 
 
 def not_resolved(scene: Scene, mismatch: float, speed: float) -> str | None:
@@ -49,6 +51,24 @@ def not_resolved(scene: Scene, mismatch: float, speed: float) -> str | None:
         f"not resolved: the joined ends' velocities differ by up to {mismatch:.3g} m/s of {speed:.3g} m/s; velocities "
         f"and forces alternate from step to step. {_remedy(scene)}"
     )
+
+
+def force_window(scene: Scene) -> float:
+    """Return over which time the contact force is averaged before its peak is taken [s].
+
+    It is ``contact.force_window``, or `WINDOW` of the slowest period of the beam alone; of spring and beam together
+    where the beam has no inertia, of the run where nothing oscillates.
+    """
+    beam, spring = scene.beam, scene.spring
+    if scene.contact.force_window is not None:
+        return scene.contact.force_window
+    if beam is not None and beam.fidelity == "dynamic":
+        return WINDOW * 2.0 * pi / slowest_frequency(beam)
+    if beam is not None and spring is not None:
+        together = spring_stiffness(scene) + 1.0 / tip_compliance(beam)
+        if together > 0.0:
+            return WINDOW * 2.0 * pi * sqrt(spring.mass / together)
+    return WINDOW * scene.time.t_end
 
 
 def _slowest(scene: Scene) -> list[tuple[str, float, str]]:

@@ -133,6 +133,8 @@ class Contact(Table):
     stiffness: NonNegative = 1.0e4  #: λ_nc [N/m^p], of "link" [N/m]
     exponent: Annotated[float, Field(ge=1.0, le=100.0)] = 3.0  #: p; "link" has none
     damping: NonNegative = 0.0  #: "compliance": χ [s/m] (Hunt & Crossley 1975); "link": c [N·s/m]
+    #: Over which the force is averaged before its peak is taken [s]; `springbeam.scene.resolution.force_window`.
+    force_window: Annotated[float | None, Field(gt=0.0)] = None
 
     @property
     def rigid(self) -> bool:

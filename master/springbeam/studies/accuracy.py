@@ -20,6 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from ..bodies.protocol import Body
 from ..results.contact_times import contact_changes, contact_time_difference
 from ..results.recording import MemoryRecorder
 from ..results.trajectory import Trajectory
@@ -115,7 +116,9 @@ class Picked:
         }
 
 
-def simulate(scene: Scene, progress: Progress | None = None) -> Trajectory:
+def simulate(
+    scene: Scene, progress: Progress | None = None, *, upper: Body | None = None, lower: Body | None = None
+) -> Trajectory:
     """Co-simulate ``scene``, with settings that keep its ``accuracy`` if it asks for one, and return the trajectory.
 
     Parameters
@@ -124,17 +127,23 @@ def simulate(scene: Scene, progress: Progress | None = None) -> Trajectory:
         What is simulated.
     progress
         Called with time [s], phase and number of macro steps once per accepted step; not while settings are searched.
+    upper, lower
+        Bodies of one's own at the start of the run, in place of the beam and of the spring: `springbeam.Body`.
 
     Raises
     ------
     RunStopped
         If the run ends early.
     SceneError
-        If the accuracy cannot be reached.
+        If the accuracy cannot be reached, or the scene asks for what is known of its own bodies alone.
+    TypeError
+        If ``upper`` or ``lower`` is no `springbeam.Body`.
     FmuError
         If an FMU cannot be found or loaded.
     """
-    return runner.simulate(scene, progress) if scene.accuracy is None else pick(scene).trajectory()
+    if scene.accuracy is None or upper is not None or lower is not None:
+        return runner.simulate(scene, progress, upper=upper, lower=lower)
+    return pick(scene).trajectory()
 
 
 def pick(scene: Scene) -> Picked:

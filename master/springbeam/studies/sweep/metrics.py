@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...results.totals import LOSS_NAMES, TOTAL_UNITS
 from ...results.trajectory import EVENT_KINDS, Trajectory
 
 
@@ -25,6 +26,10 @@ def _number(kind: str) -> Callable[[Trajectory], float | None]:
     return lambda run: float(sum(event.kind == kind for event in run.events))
 
 
+def _total(name: str) -> Callable[[Trajectory], float | None]:
+    return lambda run: float(run.summary[name]) if name in run.summary else None
+
+
 #: Name → value of a run; ``None`` where the scene has no such thing, or it did not happen.
 METRICS: dict[str, Callable[[Trajectory], float | None]] = {
     "u_tip_min": _extreme("u_tip", np.min),
@@ -34,10 +39,8 @@ METRICS: dict[str, Callable[[Trajectory], float | None]] = {
     "y_max": _extreme("y", np.max),
     "y_end": _last("y"),
     "z_max": _extreme("z", lambda z: np.max(np.abs(z))),
-    "contact_force_max": _extreme("contact_force", np.max),
     "gap_max": _extreme("gap", np.max),
-    "contact_impulse": lambda run: float(sum(event.impulse_contact for event in run.events)),
-    "foundation_impulse": lambda run: float(sum(event.impulse_foundation for event in run.events)),
+    **{name: _total(name) for name in (*TOTAL_UNITS, *LOSS_NAMES)},
     "dissipated": _last("e_dissipated"),
     "impact_loss": _last("e_impact_loss"),
     "energy_residual": lambda run: float(run.summary["max_energy_residual"]),
@@ -45,12 +48,12 @@ METRICS: dict[str, Callable[[Trajectory], float | None]] = {
     **{f"first_{kind}": _first(kind) for kind in EVENT_KINDS},
     **{f"number_of_{kind}": _number(kind) for kind in EVENT_KINDS},
 }
-#: Units of the metrics that have one; `z_max` is the largest |z|, impulses are those of impacts.
+#: Units of the metrics that have one; `z_max` is the largest |z|.
 UNITS = {
     **dict.fromkeys(("u_tip_min", "u_tip_max", "u_tip_end", "y_min", "y_max", "y_end", "gap_max"), "m"),
     "z_max": "m/s",
-    "contact_force_max": "N",
-    **dict.fromkeys(("contact_impulse", "foundation_impulse"), "N·s"),
+    **{name: unit for name, unit in TOTAL_UNITS.items() if unit},
+    **dict.fromkeys(LOSS_NAMES, "J"),
     **dict.fromkeys(("dissipated", "impact_loss"), "J"),
     **{f"first_{kind}": "s" for kind in EVENT_KINDS},
 }

@@ -1,0 +1,151 @@
+"""A run at any times: what lies between its rows, by the dense output of each step.
+
+Steps end on events and on changes of phase, so that no polynomial reaches across one. Between two rows
+
+* ``y``, ``z`` and, of ends that move apart, ``u_tip``, ``v_tip`` follow the path of order 6 through both ends of the
+  step with its two moments (`springbeam.results.paths`), velocities its slope (order 5);
+* ends that a rigid law joins move together: ``u_tip`` takes the path of y, whose own is smoother, ``v_tip`` its slope,
+  each with what the rows say of the gap and of the mismatch, linear between them;
+* ``contact_force``, ``foundation_force`` are the polynomials applied; ``gap``, ``velocity_mismatch``, ``tie_reaction``,
+  ``e_total`` and ``energy_residual`` follow from the other columns as in a row;
+* ``compliance_force``, ``contact_force_smoothed`` and the energies are linear between the rows (order 2; the smoothed
+  force, which belongs to the start of its row's step, 1); what an event takes is taken at its row.
+
+At the time of a row they are the row's, at the time of an event those after it. Orders are those of the polynomials:
+nothing between the rows is better than the rows are.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .paths import Path
+from .steps import contact_force
+from .trajectory import Trajectory
+
+#: Columns that are linear between rows, and do not change with an event.
+_LINEAR = ("compliance_force", "e_contact", "e_dissipated", "e_load")
+
+
+def at(run: Trajectory, times: Any) -> Trajectory:
+    """Return ``run`` at ``times`` [s], in any order, shape (n,): the same columns, events, shapes and summary.
+
+    Raises ValueError for times outside of those that are known, and for a run that has no steps.
+    """
+    wanted = np.atleast_1d(np.asarray(times, dtype=float))
+    if wanted.ndim != 1:
+        raise ValueError(f"times of shape {wanted.shape}: one number, or a sequence of them")
+    steps = run.steps
+    if steps is None:
+        raise ValueError(
+            "nothing tells what lies between the rows of this run: it is by a reference, by contact.law = 'paper', or "
+            "its rows were written at an output interval"
+        )
+    known = run.columns["time"][: len(steps)]
+    outside = ~((wanted >= known[0]) & (wanted <= known[-1]))
+    if outside.any():
+        raise ValueError(f"time {wanted[outside][0]:g} s: the run is known from {known[0]!s} s to {known[-1]!s} s")
+    row = np.searchsorted(known, wanted, side="right") - 1
+    columns = {name: values[row] for name, values in run.columns.items()}
+    columns["time"] = wanted
+    between = np.flatnonzero(wanted > known[row])
+    if between.size:
+        for name, values in _Between(run, steps, row[between], wanted[between]).columns().items():
+            columns[name][between] = values
+    return Trajectory(run.scene, columns, list(run.events), run.shapes, dict(run.summary))
+
+
+class _Between:
+    """Columns at times strictly between a row and the one after it; ``row`` is the row before each time."""
+
+    def __init__(self, run: Trajectory, steps: np.ndarray, row: np.ndarray, times: np.ndarray) -> None:
+        self._run, self._row, self._steps = run, row, steps[row + 1]
+        start, end = run.columns["time"][row], run.columns["time"][row + 1]
+        self._share = (times - start) / (end - start)
+        self._tau = self._share * self._steps["size"]
+        self._seated = run.columns["phase"][row] == "seated"
+
+    def columns(self) -> dict[str, np.ndarray]:
+        run, steps = self._run, self._steps
+        contact = run.scene.contact
+        found: dict[str, np.ndarray] = {}
+        for position, velocity in (("u_tip", "v_tip"), ("y", "z")):
+            if position in run.columns:
+                found[position], found[velocity] = self._path(position, velocity)
+        pair = "u_tip" in found and "y" in found
+        phase = run.columns["phase"][self._row]
+        if pair and contact.rigid:
+            joined = (phase == "tied") | (phase == "touch")
+            for of_tip, of_low, apart in (("u_tip", "y", "gap"), ("v_tip", "z", "velocity_mismatch")):
+                together = found[of_low] + self._linear(apart, steps[of_tip] - steps[of_low])
+                found[of_tip] = np.where(joined, together, found[of_tip])
+        found |= {name: self._linear(name, run.columns[name][self._row + 1]) for name in _LINEAR if name in run.columns}
+        found |= self._mechanical()
+        if "contact_force_smoothed" in run.columns:
+            smoothed = run.columns["contact_force_smoothed"]
+            same = run.columns["phase"][self._row + 1] == phase
+            after = np.where(same, smoothed[self._row + 1], smoothed[self._row])
+            found["contact_force_smoothed"] = self._linear("contact_force_smoothed", after)
+        force = contact_force(steps, self._tau)
+        if "contact_force" in run.columns:
+            found["contact_force"] = force
+        if "tie_reaction" in run.columns:
+            found["tie_reaction"] = force - found["compliance_force"] if contact.rigid else np.zeros_like(force)
+        if "foundation_force" in run.columns:
+            held = steps["foundation_force"]
+            found["foundation_force"] = np.where(held != 0.0, held + force - steps["contact_force"], 0.0)
+        if pair:
+            found["gap"] = found["u_tip"] - found["y"]
+            if not (contact.rigid or contact.lasting):
+                phase = np.where(self._seated, phase, np.where(found["gap"] < 0.0, "touch", "free"))
+                found["phase"] = phase
+            found["velocity_mismatch"] = np.where(phase == "free", 0.0, found["v_tip"] - found["z"])
+        elif "gap" in run.columns:
+            assert run.scene.stop is not None
+            found["gap"] = found["u_tip"] - run.scene.stop.position
+        energies = [name for name in run.columns if name.startswith("e_") and name != "e_total"]
+        found["e_impact_loss"] = run.columns["e_impact_loss"][self._row]
+        found["e_total"] = sum((found[name] for name in energies), np.zeros_like(force))
+        found["energy_residual"] = found["e_total"] - (run.columns["e_total"][0] - run.columns["energy_residual"][0])
+        return found
+
+    def _path(self, position: str, velocity: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return displacement [m] and velocity [m/s] of an end."""
+        steps, size = self._steps, self._steps["size"]
+        start: Any = (self._run.columns[position][self._row], self._run.columns[velocity][self._row])
+        end: Any = (steps[position], steps[velocity])
+        means: Any = (steps[f"{position}_integral"] / size, steps[f"{position}_integral_2"] / size**2)
+        path: Any = Path.through(start, end, size, means)
+        return path.at(self._share), path.slope(self._share) / size
+
+    def _linear(self, name: str, end: np.ndarray) -> np.ndarray:
+        """Return what goes from the row's value to ``end``, which is reached before the event of the next row."""
+        return np.asarray((1.0 - self._share) * self._run.columns[name][self._row] + self._share * end)
+
+    def _mechanical(self) -> dict[str, np.ndarray]:
+        """Return the energies of the bodies [J], without what the event of the next row moves and takes."""
+        columns, after = self._run.columns, self._row + 1
+        lost = columns["e_impact_loss"][after] - columns["e_impact_loss"][self._row]
+        of_spring = np.zeros_like(lost)
+        if "z" in columns:
+            struck = columns["z"][after] != self._steps["z"]
+            of_beam = np.zeros_like(lost)
+            if "v_tip" in columns:
+                of_beam = self._impulses() * 0.5 * (self._steps["v_tip"] + columns["v_tip"][after])
+            of_spring = np.where(struck, -lost - of_beam, 0.0)
+        jumps = {"e_beam": -lost - of_spring, "e_spring": of_spring}
+        return {
+            name: self._linear(name, columns[name][after] - jump) for name, jump in jumps.items() if name in columns
+        }
+
+    def _impulses(self) -> np.ndarray:
+        """Return the impulse on the tip at the end of each step [N·s]: of the first event there."""
+        times = np.array([event.time for event in self._run.events])
+        on_tip = np.array([event.impulse_contact for event in self._run.events])
+        end = self._steps["time"]
+        if not times.size:
+            return np.zeros_like(end)
+        first = np.minimum(np.searchsorted(times, end), len(times) - 1)
+        return np.where(times[first] == end, on_tip[first], 0.0)

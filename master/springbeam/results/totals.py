@@ -1,0 +1,166 @@
+"""The numbers of a run that engineers ask for: how hard, how long, how fast back, and where the energy went.
+
+They go into ``summary.json``, and each is a metric of sweeps. The contact force C between the steps' ends is the
+polynomial that was applied, so its integral, and its mean over any window, are those of the run, to rounding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..scene import Scene
+from .contact_times import foundation_contacts, tip_contacts
+from .paths import Path
+from .steps import impulse
+from .trajectory import Event
+
+#: Units of `totals`, in the order in which they are shown.
+TOTAL_UNITS = {
+    "contact_impulse": "N·s",
+    "contact_force_max": "N",
+    "contact_force_window": "s",
+    "contact_duration": "s",
+    "contact_duration_total": "s",
+    "rebound_velocity": "m/s",
+    "deepest_tip": "m",
+    "deepest_tip_time": "s",
+    "stop_strokes": "",
+    "foundation_impulse": "N·s",
+}
+#: Where energy is lost, by summary key [J].
+LOSS_NAMES = {
+    "loss_beam": "damping of the beam",
+    "loss_spring": "damping of the spring",
+    "loss_contact": "the contact law",
+    "loss_impact": "impacts of tip and spring",
+    "loss_stop": "impacts on the stop",
+}
+#: Windows that are looked at together.
+_CHUNK = 65536
+
+
+def totals(
+    scene: Scene, steps: np.ndarray, events: Iterable[Event], window: float, *, free_at_end: bool
+) -> dict[str, float | int]:
+    """Return the numbers of `TOTAL_UNITS` that the scene has, and the energies lost in impacts [J].
+
+    Parameters
+    ----------
+    scene
+        As run.
+    steps
+        Of the whole run, of dtype `springbeam.results.steps.STEP`.
+    events
+        Of the whole run.
+    window
+        Over which the contact force is averaged [s]; the run may be shorter.
+    free_at_end
+        Whether tip and spring are apart when the run ends.
+    """
+    events = list(events)
+    found: dict[str, float | int] = {}
+    beam, spring, stop = scene.beam is not None, scene.spring is not None, scene.stop is not None
+    if beam and (spring or stop):
+        found |= _contact(scene, steps, events, window, free_at_end)
+    if beam:
+        found["deepest_tip"], found["deepest_tip_time"] = _deepest(steps, {event.time for event in events})
+    if stop:
+        found["stop_strokes"] = sum(event.kind in ("stop_impact", "seated") for event in events)
+        found["foundation_impulse"] = _of_foundation(steps) + sum(event.impulse_foundation for event in events)
+        found["loss_stop"] = sum(event.energy_loss for event in events if event.kind in ("stop_impact", "seated"))
+    if beam and spring:
+        found["loss_impact"] = sum(e.energy_loss for e in events if e.kind not in ("stop_impact", "seated"))
+    return {name: value if name == "stop_strokes" else float(value) for name, value in found.items()}
+
+
+def _contact(
+    scene: Scene, steps: np.ndarray, events: list[Event], window: float, free_at_end: bool
+) -> dict[str, float | int]:
+    before, after = _cumulative(steps, events)
+    found: dict[str, float | int] = {
+        "contact_impulse": after[-1],
+        "contact_force_max": _largest_mean(steps, before, after, window),
+        "contact_force_window": window,
+    }
+    if scene.contact.lasting and scene.spring is not None:
+        return found
+    end = float(steps["time"][-1])
+    if scene.spring is None:
+        intervals = foundation_contacts(events, end)
+    else:
+        intervals = tip_contacts(events, end, free_at_end=free_at_end)
+    lengths = [until - since for since, until in intervals]
+    found |= {"contact_duration": max(lengths, default=0.0), "contact_duration_total": sum(lengths)}
+    opened = [until for _, until in intervals if until < end]
+    if opened:
+        left = [event.v_tip for event in events if event.time == opened[-1] and event.v_tip is not None]
+        if left:
+            found["rebound_velocity"] = left[-1]
+    return found
+
+
+def _cumulative(steps: np.ndarray, events: list[Event]) -> tuple[np.ndarray, np.ndarray]:
+    """Return ∫ C dt with the impulses [N·s] up to each row, without and with those that act at its own time.
+
+    Impulses at one time, as of the rows of one event, all act at its last row.
+    """
+    time = steps["time"]
+    kicks = np.zeros(len(steps))
+    for event in events:
+        if event.impulse_contact != 0.0:
+            kicks[np.searchsorted(time, event.time, side="right") - 1] += event.impulse_contact
+    over_steps = np.cumsum(impulse(steps, steps["size"]))
+    after = over_steps + np.cumsum(kicks)
+    return after - kicks, after
+
+
+def _largest_mean(steps: np.ndarray, before: np.ndarray, after: np.ndarray, window: float) -> float:
+    """Return the largest mean of C [N] over windows of ``window`` [s] that begin or end at a row.
+
+    An impulse at the edge of a window belongs to it if that makes the mean larger.
+    """
+    time = steps["time"]
+    highest, lowest = np.maximum(before, after), np.minimum(before, after)
+    largest = 0.0
+    for first in range(0, len(steps), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        ending = highest[part] - _impulse_until(steps, time, after, time[part] - window)
+        beginning = _impulse_until(steps, time, after, time[part] + window) - lowest[part]
+        largest = max(largest, float(ending.max()), float(beginning.max()))
+    return largest / window
+
+
+def _impulse_until(steps: np.ndarray, time: np.ndarray, after: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return ∫ C dt with the impulses [N·s] up to ``times`` [s]: 0 before the first row, all of it after the last."""
+    row = np.searchsorted(time, times, side="right") - 1
+    into = np.minimum(row + 1, len(steps) - 1)
+    tau = np.clip(times - time[row], 0.0, steps["size"][into])
+    found = after[row] + np.where(into > row, impulse(steps, tau, into), 0.0)
+    return np.where(row < 0, 0.0, found)
+
+
+def _of_foundation(steps: np.ndarray) -> float:
+    """Return ∫ N dt [N·s]: N is C of the step and a constant, 0 unless the lower end is seated."""
+    size, force = steps["size"], steps["foundation_force"]
+    seated = np.where(force != 0.0, impulse(steps, size) + (force - steps["contact_force"]) * size, 0.0)
+    return float(seated.sum())
+
+
+def _deepest(steps: np.ndarray, struck: set[float]) -> tuple[float, float]:
+    """Return the tip's lowest place [m] and its time [s], also between the rows; not past an event's kink."""
+    time, u = steps["time"], steps["u_tip"]
+    row = int(np.argmin(u))
+    found, at = float(u[row]), float(time[row])
+    for end in (row, row + 1):
+        if not 0 < end < len(steps) or steps["size"][end] == 0.0 or float(time[end - 1]) in struck:
+            continue
+        names = ["u_tip", "v_tip", "u_tip_integral", "u_tip_integral_2"]
+        (u0, v0, _, _), (u1, v1, once, twice) = (steps[names][i].item() for i in (end - 1, end))
+        size = float(steps["size"][end])
+        path = Path.through((u0, v0), (u1, v1), size, (once / size, twice / size**2))
+        bottom = path.lowest_inside()
+        if bottom is not None and path.at(bottom) < found:
+            found, at = path.at(bottom), float(time[end - 1]) + bottom * size
+    return found, at

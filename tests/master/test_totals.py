@@ -1,0 +1,138 @@
+"""What a run amounts to, on steps made by hand: each number against its integral in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from springbeam.results import totals as module
+from springbeam.results.steps import STEP
+from springbeam.results.totals import totals
+from springbeam.results.trajectory import Event
+from springbeam.scene import load_scene, with_changes
+from springbeam.scene.resolution import force_window, slowest_frequency
+
+SCENE = load_scene("soft")
+
+
+def steps_with(force, ends, tip=lambda t: -t, rate=lambda t: -1.0, once=None):
+    """Steps between ``ends``; ``force(t)`` is (C, Ċ, C̈) of the step that starts at t, the tip moves as told."""
+    steps = np.zeros(len(ends), STEP)
+    steps["time"], steps["u_tip"], steps["v_tip"] = ends, [tip(t) for t in ends], [rate(t) for t in ends]
+    for k, start in enumerate(ends[:-1], start=1):
+        steps["size"][k] = ends[k] - start
+        for name, value in zip(
+            ("contact_force", "contact_force_rate", "contact_force_rate_2"), force(start), strict=True
+        ):
+            steps[name][k] = value
+        if once is not None:
+            steps["u_tip_integral"][k], steps["u_tip_integral_2"][k] = once(start, ends[k])
+    return steps
+
+
+def found(steps, *events, window=0.1, scene=SCENE, apart=True):
+    return totals(scene, steps, events, window, free_at_end=apart)
+
+
+def test_impulse_and_peak_of_a_polynomial_force():
+    """C = 12 t (1 − t) on [0, 1] in uneven steps: ∫ C = 2; the mean over a window w around ½ is 3 − w²."""
+    ends = np.sort(np.append(np.linspace(0.0, 1.0, 41), [0.0123, 0.77]))
+    steps = steps_with(lambda t: (12.0 * t * (1.0 - t), 12.0 - 24.0 * t, -24.0), ends)
+    numbers = found(steps, window=0.2)
+    assert numbers["contact_impulse"] == pytest.approx(2.0, rel=1e-14)
+    assert numbers["contact_force_max"] == pytest.approx(3.0 - 0.2**2, rel=1e-13)  # a window ends on 0.6, a row
+    # Longer than the run: all of it, spread over the window.
+    assert found(steps, window=4.0)["contact_force_max"] == pytest.approx(0.5, rel=1e-14)
+
+
+def test_an_impulse_counts_in_the_impulse_and_in_every_window_that_holds_it():
+    """C = 2 N throughout, and 0.3 N·s at 0.5 s: a window of 0.1 s has 0.2 + 0.3 N·s, whichever edge it touches."""
+    steps = steps_with(lambda t: (2.0, 0.0, 0.0), np.linspace(0.0, 1.0, 9))
+    numbers = found(steps, Event(0.5, "stop_impact", impulse_contact=0.3, impulse_foundation=1.0))
+    assert numbers["contact_impulse"] == pytest.approx(2.3, rel=1e-14)
+    assert numbers["contact_force_max"] == pytest.approx(5.0, rel=1e-13)
+    assert numbers["foundation_impulse"] == 1.0
+    assert numbers["stop_strokes"] == 1
+
+
+def test_windows_are_looked_at_in_parts(monkeypatch):
+    rng = np.random.default_rng(3)
+    ends = np.cumsum(np.append(0.0, rng.uniform(1e-3, 2e-2, 400)))
+    table = dict(zip(ends.tolist(), rng.normal(size=(401, 3)).tolist(), strict=True))
+    steps = steps_with(lambda t: table[float(t)], ends)
+    whole = found(steps)["contact_force_max"]
+    monkeypatch.setattr(module, "_CHUNK", 7)
+    assert found(steps)["contact_force_max"] == whole
+    # By sums over a grid of windows, none of which may exceed it.
+    fine = np.linspace(0.0, ends[-1], 20001)
+    row = np.minimum(np.searchsorted(ends, fine, side="right") - 1, len(ends) - 2)
+    tau = fine - ends[row]
+    c, dc, ddc = (steps[name][row + 1] for name in STEP.names[10:13])
+    force = c + tau * (dc + 0.5 * tau * ddc)
+    total = np.append(0.0, np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(fine)))
+    means = (total - np.interp(fine - 0.1, fine, total, left=0.0)) / 0.1
+    assert means.max() == pytest.approx(whole, rel=1e-2)
+
+
+def test_durations_and_rebound():
+    steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11))
+    events = (
+        Event(0.1, "impact"),
+        Event(0.3, "separation", v_tip=0.5),
+        Event(0.4, "impact"),
+        Event(0.5, "release", v_tip=0.25),
+        Event(0.9, "impact"),
+    )
+    numbers = found(steps, *events, apart=False)
+    assert numbers["contact_duration"] == pytest.approx(0.2, rel=1e-15)
+    assert numbers["contact_duration_total"] == pytest.approx(0.2 + 0.1 + 0.1, rel=1e-14)
+    assert numbers["rebound_velocity"] == 0.25  # of the last contact that has opened
+    assert "rebound_velocity" not in found(steps, events[0], apart=False)
+
+
+def test_a_tie_has_neither_duration_nor_rebound():
+    scene = with_changes(SCENE, contact={"law": "tie"}, stop=None, beam={"approach": "elastic"})
+    numbers = found(steps_with(lambda t: (1.0, 0.0, 0.0), [0.0, 1.0]), scene=scene)
+    assert set(numbers) & {"contact_duration", "rebound_velocity", "stop_strokes"} == set()
+    assert numbers["contact_impulse"] == 1.0
+
+
+def test_a_tip_that_strikes_the_stop_itself():
+    scene = with_changes(SCENE, spring=None)
+    steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11))
+    steps["foundation_force"][5:7] = steps["contact_force"][5:7] = 3.0
+    numbers = found(
+        steps, Event(0.2, "stop_impact", v_tip=0.7, impulse_contact=0.5, impulse_foundation=0.5), scene=scene
+    )
+    assert numbers["foundation_impulse"] == pytest.approx(0.5 + 3.0 * 0.2, rel=1e-14)
+    assert numbers["contact_impulse"] == numbers["foundation_impulse"]
+    assert numbers["rebound_velocity"] == 0.7
+
+
+@pytest.mark.parametrize("struck", [False, True])
+def test_the_deepest_place_is_between_the_rows_unless_something_is_struck_there(struck):
+    """u = −1 + (t − 0.46)² by steps of 0.1 s, of which the polynomial of a step keeps everything."""
+    ends = np.linspace(0.0, 1.0, 11)
+    primitive = np.polynomial.Polynomial([-1.0 + 0.46**2, -0.92, 1.0])
+
+    def integrals(a, b):
+        once = primitive.integ(lbnd=a)
+        return once(b), once.integ(lbnd=a)(b)
+
+    steps = steps_with(lambda t: (0.0, 0.0, 0.0), ends, primitive, primitive.deriv(), integrals)
+    events = [Event(float(ends[k]), "impact") for k in (4, 5)] if struck else []
+    numbers = found(steps, *events)
+    if struck:
+        assert (numbers["deepest_tip"], numbers["deepest_tip_time"]) == (pytest.approx(-1.0 + 0.04**2), 0.5)
+    else:
+        assert numbers["deepest_tip"] == pytest.approx(-1.0, abs=1e-14)
+        assert numbers["deepest_tip_time"] == pytest.approx(0.46, abs=1e-7)
+
+
+def test_the_window_is_a_fiftieth_of_the_slowest_period():
+    assert force_window(SCENE) == pytest.approx(2.0 * np.pi / slowest_frequency(SCENE.beam) / 50.0, rel=1e-15)
+    assert force_window(with_changes(SCENE, contact={"force_window": 0.25})) == 0.25
+    # 1/k of the beam is 3.3e-3 + 1e-2 m/N: with the spring's 3 N/m it holds 1 kg.
+    massless = with_changes(SCENE, beam={"fidelity": "quasi_static"})
+    stiffness = 3.0 + 1.0 / (1.0 / 300.0 + 1.0 / 100.0)
+    assert force_window(massless) == pytest.approx(2.0 * np.pi / np.sqrt(stiffness) / 50.0, rel=1e-12)

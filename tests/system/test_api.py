@@ -1,0 +1,266 @@
+"""What Python programs call: results loaded, saved and handed on, and bodies of one's own."""
+
+from __future__ import annotations
+
+import builtins
+import importlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bodies import DuffingBody, beam_body
+from commands import command
+
+import springbeam
+from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam.monolithic import event_driven
+from springbeam.results.totals import LOSS_NAMES, TOTAL_UNITS
+from springbeam.studies.sweep.metrics import METRICS
+
+pytestmark = pytest.mark.usefixtures("fmu_folder")
+
+SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"macro_step": 1e-3, "degree": 2})
+
+
+@pytest.fixture(scope="module")
+def run():
+    return simulate(SOFT)
+
+
+# -- what a run amounts to ------------------------------------------------------------------------------------------
+
+
+def test_totals_are_those_of_the_motion(run):
+    """The spring's momentum: m Δz = −∫C dt + ∫N dt + J − ∫ (k1 y + k2 y³) dt, the last by Simpson's rule."""
+    spring, summary = SOFT.spring, run.summary
+    ends = run.steps["size"] > 0.0
+    size, end = run.steps["size"][ends], run.steps["time"][ends]
+    start = run.time[np.flatnonzero(ends) - 1]
+    force = [spring.linear_stiffness * y + spring.cubic_stiffness * y**3 for y in (
+        run.y[np.flatnonzero(ends) - 1], run.at(start + 0.5 * (end - start)).y, run.steps["y"][ends]
+    )]  # fmt: skip
+    held = float((size * (force[0] + 4.0 * force[1] + force[2]) / 6.0).sum())
+    gained = spring.mass * (run.z[-1] - spring.initial_velocity)
+    # Impulses on the tip that come from the stop are no part of what the spring feels of the stop: they go through it.
+    assert gained == pytest.approx(-summary["contact_impulse"] + summary["foundation_impulse"] - held, abs=1e-10)
+    assert summary["loss_impact"] + summary["loss_stop"] == pytest.approx(run.e_impact_loss[-1], rel=1e-12)
+    assert summary["stop_strokes"] == 1
+    assert summary["deepest_tip"] == pytest.approx(SOFT.stop.position, abs=1e-12)
+
+
+def test_losses_add_up_by_where():
+    scene = with_changes(
+        SOFT,
+        beam={"alpha_b": 1e-5},
+        spring={"damping": 0.1},
+        stop={"restitution": 0.5},
+        contact={"law": "compliance", "stiffness": 1e4, "exponent": 1.5, "damping": 0.5},
+    )
+    run = simulate(scene)
+    lost = {name: run.summary[name] for name in LOSS_NAMES}
+    assert min(lost[name] for name in ("loss_beam", "loss_spring", "loss_contact", "loss_stop")) > 1e-5
+    assert lost["loss_impact"] == 0.0
+    total = run.e_dissipated[-1] + run.e_impact_loss[-1]
+    assert sum(lost.values()) == pytest.approx(total, rel=1e-12)
+    # The contact force applied, summed up, is what the law's own rows come to.
+    rows = np.trapezoid(run.compliance_force, run.time)
+    assert run.summary["contact_impulse"] == pytest.approx(rows, rel=1e-3)
+
+
+def test_the_peak_of_the_mean_does_not_grow_with_the_mesh():
+    """The peak of the force itself does, by 2; over a fiftieth of the slowest period it is the motion's."""
+    scene = with_changes(load_scene("steel-bumper"), time={"t_end": 0.02}, coupling={"degree": 2, "macro_step": 5e-5})
+    runs = [simulate(with_changes(scene, beam={"n_elements": n, "n_modes": 0})) for n in (20, 40)]
+    means = [run.summary["contact_force_max"] for run in runs]
+    peaks = [float(run.contact_force.max()) for run in runs]
+    assert peaks[1] > 1.8 * peaks[0]
+    assert means[1] == pytest.approx(means[0], rel=5e-3)
+
+
+def test_metrics_are_the_totals(run):
+    for name in (*TOTAL_UNITS, *LOSS_NAMES):
+        assert METRICS[name](run) == run.summary.get(name)
+    paper = simulate(
+        with_changes(
+            load_scene("paper-fig4"),
+            beam={"n_elements": 4, "n_modes": 0},
+            contact={"law": "paper"},
+            time={"t_end": 0.52},
+        )
+    )
+    assert paper.steps is None
+    assert METRICS["contact_force_max"](paper) is None
+
+
+# -- handed on ------------------------------------------------------------------------------------------------------
+
+
+def test_saved_and_loaded_it_is_the_same(run, tmp_path):
+    assert run.save(tmp_path / "run") == tmp_path / "run"
+    again = springbeam.load(tmp_path / "run")
+    for name, values in run.columns.items():
+        assert np.array_equal(again[name], values)
+    assert np.array_equal(again.steps, run.steps)
+    assert again.events == run.events
+    assert again.summary == run.summary
+    times = np.linspace(0.0, 0.2, 77)
+    assert np.array_equal(again.at(times).u_tip, run.at(times).u_tip)
+    with pytest.raises(FileExistsError):
+        run.save(tmp_path / "run")
+    run.save(tmp_path / "run", replace=True)
+
+
+def test_rows_at_an_interval_are_those_of_at(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = command("run", "soft", "--set=time.t_end=0.1", "--out=rows", "--no-plots", "--output-interval=3e-3")
+    assert said.exit_code == 0, said.output
+    assert command("run", "soft", "--set=time.t_end=0.1", "--out=all", "--no-plots").exit_code == 0
+    rows, every = springbeam.load("rows"), springbeam.load("all")
+    assert np.array_equal(rows.time, 3e-3 * np.arange(34))
+    expected = every.at(rows.time)
+    for name in every.columns:
+        assert np.array_equal(rows[name], expected[name]), name
+    assert rows.events == every.events
+    with pytest.raises(ValueError, match="output interval"):
+        rows.at(0.01)
+    said = command("run", "soft", "--out=none", "--output-interval=-1")
+    assert said.exit_code == 2
+    assert "--output-interval -1: must be a time above 0 s" in said.stderr
+    assert not Path("none").exists()
+
+
+def test_to_pandas_and_xarray(run):
+    pandas, _ = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    table = run.to_pandas()
+    assert list(table.columns) == list(run.columns)
+    assert np.array_equal(table["y"].to_numpy(), run.y)
+    assert isinstance(table, pandas.DataFrame)
+    assert table.attrs["units"]["z"] == "m/s"
+    dataset = run.to_xarray()
+    assert dataset["u_tip"].attrs == {"units": "m"}
+    assert np.array_equal(dataset["deflection"].sel(x=1.0).values, run.shapes[1][:, -1])
+    assert np.array_equal(dataset["phase"].values, run.phase)
+
+
+def test_without_the_extra_the_error_names_it(run, monkeypatch):
+    found = builtins.__import__
+
+    def missing(name, *arguments):
+        if name.partition(".")[0] in ("pandas", "xarray"):
+            raise ModuleNotFoundError(f"No module named {name!r}")
+        return found(name, *arguments)
+
+    monkeypatch.setattr("springbeam.results.export.import_module", missing)
+    for hand_on in (run.to_pandas, run.to_xarray):
+        with pytest.raises(ImportError, match=r"the extra 'data' brings it: pip install -e '\.\[data\]'"):
+            hand_on()
+
+
+def test_pictures_of_a_run(run):
+    figure = run.plot()
+    assert [ax.get_ylabel() != "" for ax in figure.axes]
+    assert len(run.plot("velocities_and_forces").axes) >= 2
+    with pytest.raises(ValueError, match=r"no picture 'colours'; there are shapes_after_contact, .*gap_and_energy"):
+        run.plot("colours")
+    alone = simulate(with_changes(SOFT, beam=None, stop=None, time={"t_end": 0.01}))
+    with pytest.raises(ValueError, match="nothing to show of 'shapes_later'"):
+        alone.plot("shapes_later")
+
+
+def test_a_run_shows_itself(run):
+    assert len(repr(run)) < 120
+    assert f"{len(run)} rows, t = 0 … 0.2 s, 3 events, done" in repr(run)
+    html = run._repr_html_()
+    assert f"<th>contact_impulse</th><td>{run.summary['contact_impulse']:.4g} N·s</td>" in html
+    titled = with_changes(SOFT, time={"t_end": 0.01}).model_copy(update={"title": "<b>"})
+    assert "&lt;b&gt;" in simulate(titled)._repr_html_()
+    assert {"u_tip", "at", "to_pandas"} <= set(dir(run))
+
+
+def test_the_package_says_what_it_has():
+    assert springbeam.__version__ == importlib.metadata.version("springbeam")
+    assert set(dir(springbeam)) == set(springbeam.__all__)
+    assert all(hasattr(springbeam, name) for name in dir(springbeam))
+    assert (Path(springbeam.__file__).parent / "py.typed").exists()
+
+
+# -- bodies of one's own --------------------------------------------------------------------------------------------
+
+HITS = with_changes(
+    load_scene("soft"), coupling={"scheme": "hermite", "degree": 2, "macro_step": 5e-4}, time={"t_end": 0.14}
+)
+
+
+@pytest.mark.parametrize("place", ["upper", "lower", "both"])
+def test_bodies_of_ones_own_move_like_the_fmus(place):
+    """The test doubles are exact: tie, impact on the stop and rebound come out as with the FMUs."""
+    own = {}
+    if place != "lower":
+        own["upper"] = beam_body(HITS.beam, 0.0)
+    if place != "upper":
+        own["lower"] = DuffingBody()
+    ours, theirs = simulate(HITS, **own), simulate(HITS)
+    assert [event.kind for event in ours.events] == [event.kind for event in theirs.events]
+    assert np.abs(ours.at(np.linspace(0.0, 0.14, 99)).y - theirs.at(np.linspace(0.0, 0.14, 99)).y).max() < 1e-9
+    assert ours.summary["contact_impulse"] == pytest.approx(theirs.summary["contact_impulse"], rel=1e-8)
+
+
+def test_what_holds_a_seated_spring_is_told_by_the_body():
+    """A spring twice as stiff as the scene's is held by its own force: N − C = k1 φ of the body."""
+    scene = with_changes(
+        load_scene("soft"), stop={"restitution": 0.0}, beam={"distributed_load": -4.0}, time={"t_end": 0.15}
+    )
+    run = simulate(scene, lower=DuffingBody(k1=6.0, k2=0.0))
+    seated = np.append(False, run.phase[1:] == "seated") & np.append(False, run.phase[:-1] == "seated")
+    assert seated.sum() > 10
+    static = run.foundation_force[seated] - run.contact_force[seated]
+    assert np.abs(static - 6.0 * scene.stop.position).max() < 1e-12
+
+
+class Silent(springbeam.Body):
+    """Nothing but what a body must do: no shape, no energies, no force that holds it."""
+
+    def __init__(self, body):
+        self.body, self.mass = body, body.mass
+        self.mark, self.rewind, self.advance = body.mark, body.rewind, body.advance
+        self.motion, self.apply_impulse = body.motion, body.apply_impulse
+
+
+def test_a_body_need_not_tell_its_shape_or_energies():
+    scene = with_changes(HITS, time={"t_end": 0.05})
+    run = simulate(scene, upper=Silent(beam_body(scene.beam, 0.0)))
+    assert np.abs(run.y - simulate(scene).y).max() < 1e-9
+    assert len(run.shapes[0]) == 0
+    assert np.array_equal(run.e_beam, np.zeros(len(run)))
+    assert "a body tells no energies: nothing says whether the energy is kept" in run.summary["warnings"]
+
+
+def test_what_a_body_cannot_do_is_said():
+    scene = with_changes(HITS, stop={"restitution": 0.0})
+    with pytest.raises(springbeam.RunStopped, match="Silent has no holding_force, which a body seated on a stop needs"):
+        simulate(scene, lower=Silent(DuffingBody()))
+    with pytest.raises(TypeError, match=r"in place of the spring is a float, not a springbeam\.Body"):
+        simulate(scene, lower=1.0)
+    with pytest.raises(SceneError, match=r"\[spring\]: missing"):
+        simulate(with_changes(scene, spring=None), lower=DuffingBody())
+    for change, message in (
+        ({"contact": {"law": "paper"}, "coupling": {"scheme": "energy", "degree": 0}}, 'contact.law = "paper"'),
+        ({"coupling": {"scheme": "auto", "degree": 0}}, 'coupling.scheme = "auto"'),
+        ({"beam": {"fidelity": "quasi_static"}, "coupling": {"scheme": "energy"}}, 'beam.fidelity = "quasi_static"'),
+    ):
+        with pytest.raises(SceneError, match=message):
+            simulate(with_changes(scene, **change), lower=DuffingBody())
+    with pytest.raises(SceneError, match="a body of your own can be run once"):
+        simulate(scene.model_copy(update={"accuracy": 1e-3}), lower=DuffingBody())
+
+
+def test_references_have_no_steps_and_can_be_saved(tmp_path):
+    exact = event_driven.simulate(with_changes(SOFT, time={"t_end": 0.02}))
+    exact.save(tmp_path / "exact")
+    again = springbeam.load(tmp_path / "exact")
+    assert again.steps is None
+    assert np.array_equal(again.u_tip, exact.u_tip)
+    assert (
+        json.loads((tmp_path / "exact" / "summary.json").read_text(encoding="utf-8"))["scene"]["time"]["t_end"] == 0.02
+    )

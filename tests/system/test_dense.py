@@ -1,0 +1,124 @@
+"""A run between its rows: the order of its dense output from both sides, and every column at its place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from springbeam import load_scene, simulate, with_changes
+from springbeam.monolithic import event_driven
+
+pytestmark = pytest.mark.usefixtures("fmu_folder")
+
+SOFT = with_changes(load_scene("soft"), time={"t_end": 0.2})
+#: Parts of `soft` without an event: tied before and after the foundation is struck, apart after the release.
+TIED, FREE = ((0.005, 0.068), (0.075, 0.14)), ((0.15, 0.17),)
+
+
+@pytest.fixture(scope="module")
+def fine():
+    return simulate(with_changes(SOFT, coupling={"scheme": "hermite", "degree": 2, "macro_step": 6.25e-5}))
+
+
+def run_with(scheme, degree, size):
+    return simulate(with_changes(SOFT, coupling={"scheme": scheme, "degree": degree, "macro_step": size}))
+
+
+def error(run, fine, column, parts):
+    """The largest between rows: no time is a multiple of a macro step."""
+    times = np.concatenate([np.linspace(*part, 1001) + 0.37e-4 for part in parts])
+    return float(np.abs(run.at(times)[column] - fine.at(times)[column]).max())
+
+
+@pytest.mark.parametrize(("scheme", "degree"), [("hermite", 2), ("energy", 2)])
+def test_the_order_between_rows(fine, scheme, degree):
+    """In flight u and y are of order 6; tied, where waves of the beam kink the force at each step, of order 5."""
+    coarse, finer = (run_with(scheme, degree, size) for size in (1e-3, 5e-4))
+    for column, parts, low, high, allowed in (
+        ("y", TIED, 4.0, 6.5, 1e-11),
+        ("u_tip", TIED, 4.0, 6.5, 1e-11),
+        ("u_tip", FREE, 5.0, 6.5, 5e-10),
+        ("contact_force", TIED, 2.0, 4.0, 1e-2),
+    ):
+        at_coarse, at_fine = (error(run, fine, column, parts) for run in (coarse, finer))
+        assert at_fine < allowed, column
+        assert low < np.log2(at_coarse / at_fine) < high, column
+
+
+def test_the_fine_run_is_right_between_its_rows(fine):
+    """By the reference, which shares nothing with the co-simulation."""
+    times = np.linspace(0.005, 0.14, 301) + 1.7e-5
+    exact = event_driven.simulate(SOFT, sample_times=times)
+    assert np.isin(times, exact.time).all()
+    known = np.searchsorted(exact.time, times)
+    assert np.abs(fine.at(times).y - exact.y[known]).max() < 1e-10
+    assert np.abs(fine.at(times).u_tip - exact.u_tip[known]).max() < 1e-10
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"coupling": {"degree": 2}},
+        {"contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5, "damping": 0.5}},
+        {"contact": {"law": "link", "stiffness": 1e3, "damping": 0.1}, "stop": None},
+        {"stop": {"restitution": 0.5}, "spring": {"damping": 0.1}},
+        {"spring": None},
+        {"beam": None, "stop": {"position": -0.02, "restitution": 0.5}, "spring": {"initial_velocity": -1.0}},
+    ],
+    ids=["energy", "energy 2", "compliance", "link", "losses", "no spring", "no beam"],
+)
+def test_rows_are_themselves_and_between_them_every_column_holds(changes):
+    run = simulate(with_changes(SOFT, **changes))
+    last = np.append(run.time[1:] != run.time[:-1], True)  # of rows at one time: after the events
+    again = run.at(run.time[last])
+    for name in run.columns:
+        assert np.array_equal(again[name], run[name][last]), name
+
+    steps = run.steps[run.steps["size"] > 0.0]
+    middles = run.at(steps["time"] - 0.5 * steps["size"])
+    assert list(middles.columns) == list(run.columns)
+    kept = sum(middles[name] for name in run.columns if name.startswith("e_") and name != "e_total")
+    assert np.array_equal(middles.e_total, kept)
+    # Energies go straight between rows, so that their sum is kept between them as it is at them.
+    scale = np.abs(run.e_total).max()
+    assert np.abs(middles.energy_residual).max() <= 2.0 * np.abs(run.energy_residual).max() + 1e-14 * scale
+    if "y" in run.columns and "u_tip" in run.columns:
+        assert np.array_equal(middles.gap, middles.u_tip - middles.y)
+        joined = (middles.phase == "tied") | (middles.phase == "touch")
+        if run.scene.contact.rigid:
+            assert np.abs(middles.gap[joined]).max() < 1e-12
+    # Just before an event it has not happened yet.
+    for event in run.events:
+        if event.energy_loss > 1e-6 and event.time > run.time[0]:
+            step = run.steps[np.searchsorted(run.time, event.time)]
+            before = run.at(event.time - 1e-6 * step["size"])
+            assert before.e_impact_loss[0] == pytest.approx(run.at(event.time).e_impact_loss[0] - event.energy_loss)
+            jump = run.at(event.time).e_total[0] - before.e_total[0]
+            assert abs(jump) < 1e-8 * scale
+
+
+def test_soft_contact_opens_where_the_ends_part():
+    run = simulate(with_changes(SOFT, contact={"law": "compliance", "stiffness": 1e4, "exponent": 1.5}))
+    times = np.linspace(run.time[0], run.time[-1], 5003)[1:-1]
+    there = run.at(times)
+    between = ~np.isin(times, run.time)
+    assert np.array_equal((there.phase == "touch")[between], (there.gap < 0.0)[between])
+    opened = next(event.time for event in run.events if event.kind == "separation")
+    around = run.at([opened - 1e-5, opened + 1e-5])
+    assert around.phase.tolist() == ["touch", "free"]
+
+
+def test_times_that_are_not_known_are_refused(tmp_path):
+    run = simulate(with_changes(SOFT, time={"t_end": 0.05}))
+    with pytest.raises(ValueError, match=r"time 0\.06 s: the run is known from 0\.0 s to 0\.05 s"):
+        run.at([0.01, 0.06])
+    with pytest.raises(ValueError, match="time nan s"):
+        run.at(np.nan)
+    with pytest.raises(ValueError, match=r"shape \(1, 2\)"):
+        run.at([[0.01, 0.02]])
+    reference = event_driven.simulate(run.scene)
+    with pytest.raises(ValueError, match="nothing tells what lies between the rows"):
+        reference.at(0.01)
+    assert run.at([0.02, 0.01]).time.tolist() == [0.02, 0.01]
+    assert len(run.at([])) == 0
