@@ -113,14 +113,15 @@ class Detector:
         found: str | None = None
         functions = self._functions.of(state.phase)
         for _ in range(2 * len(functions) + 1):
-            candidates, tolerance = [], self.tolerance(step.end)
+            candidates, tolerance, third = [], self.tolerance(step.end), step.size / 3.0
             starts = self._functions.samples(state.phase, step.start)
             ends = self._functions.samples(state.phase, step.end)
             for (kind, function), start, end in zip(functions, starts, ends, strict=True):
                 # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
                 floor = min(start[0], 0.0) - tolerance
-                lowest, highest = clearance(start, end, step.size)
-                if lowest - floor > highest - lowest:  # no dip is as deep as the whole change
+                (f0, d0), (f1, d1) = start, end
+                change = abs(f1 - f0) + third * (abs(d0) + abs(d1))
+                if (f0 if f0 < f1 else f1) - floor > change:  # no dip is deeper than all that changes in the step
                     continue
                 bracket = self._bracket(state, function, step, floor, start, end)
                 if bracket is None or (kind == found and bracket is step):

@@ -283,6 +283,11 @@ class Simulation(Memory):
         # What numerical damping takes is not an error; what it brings is.
         if (self._ledger.gain if self._numerically_damped else self._ledger.relative) > self._energy_stops:
             raise RunStopped(self._energy_cause(), self._state.time)
+        if self._scene.coupling.feedback != "two_way":
+            self._refuse_neglect()
+
+    def _refuse_neglect(self) -> None:
+        """Raise RunStopped where a one-way coupling neglects more than the scene allows."""
         neglected, allowed = self._pair.joined.neglected(), self._scene.coupling.feedback_tolerance
         if neglected is not None and neglected.share > allowed:
             raise RunStopped(

@@ -91,13 +91,10 @@ class Pair(Memory):
         self.joinable = beam is not None and spring is not None
         #: Between tip and spring top; a tip alone is tied to the foundation while it rests there.
         self.law = law_of(scene.contact) if self.joinable else Transmission()
+        #: Whether contact opens and closes inside steps, without an event that ends them.
+        self.opens_softly = self.law.soft and not self.law.lasting
         self._joined = coupling_of(scene, self.law)
         self._apart = self._joined if self.law.soft else Uncoupled()
-
-    @property
-    def opens_softly(self) -> bool:
-        """Whether contact opens and closes inside steps, without an event that ends them."""
-        return self.law.soft and not self.law.lasting
 
     def initial_state(self, time: float) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start."""
