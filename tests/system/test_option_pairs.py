@@ -64,9 +64,6 @@ OPTIONS = {
 
 #: Pairs that end otherwise today, and how.
 KNOWN = {
-    ("hermite 2", "rest"): "stops: hermite closes the velocity that rest leaves open, and the energy changes by 26 %",
-    ("auto", "rest"): "takes hermite, and stops",
-    ("accuracy", "rest"): "its pilot run takes hermite, and stops",
     ("macro step", "paper"): "1e45 m before the last, shorter step: the tip's response to a force is lost in rounding",
 }
 PAIRS = [

@@ -36,6 +36,8 @@ def choice(scene: Scene) -> Choice:
         return Choice("energy", 0, f'beam.integrator = "{beam.integrator}"')
     if beam.fidelity == "quasi_static":
         return Choice("energy", 2, 'beam.fidelity = "quasi_static"')
+    if scene.contact.impact == "rest" and scene.spring is not None:
+        return Choice("energy", 2, 'contact.impact = "rest"')
     if coupling.macro_step is None:
         return Choice("hermite", 2, "the steps follow from tolerances")
     H = coupling.macro_step

@@ -189,6 +189,12 @@ def _law_applies(scene: Scene) -> Iterator[str]:
             f'[coupling] scheme = "hermite": holds rigid ties; [contact] law = "{contact.law}" needs '
             'scheme = "energy", "gauss_seidel" or "jacobi"'
         )
+    joinable = beam is not None and scene.spring is not None
+    if coupling.scheme == "hermite" and contact.impact == "rest" and contact.rigid and joinable:
+        yield (
+            '[coupling] scheme = "hermite": gives both ends one velocity, [contact] impact = "rest" leaves them two; use '
+            'scheme = "energy" or impact = "inelastic"'
+        )
 
 
 def _feedback_negligible(scene: Scene) -> Iterator[str]:
