@@ -192,8 +192,8 @@ def _law_applies(scene: Scene) -> Iterator[str]:
     joinable = beam is not None and scene.spring is not None
     if coupling.scheme == "hermite" and contact.impact == "rest" and contact.rigid and joinable:
         yield (
-            '[coupling] scheme = "hermite": gives both ends one velocity, [contact] impact = "rest" leaves them two; use '
-            'scheme = "energy" or impact = "inelastic"'
+            '[coupling] scheme = "hermite": gives both ends one velocity, [contact] impact = "rest" leaves them two; '
+            'use scheme = "energy" or impact = "inelastic"'
         )
 
 
