@@ -8,7 +8,14 @@ import pytest
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import scene_from_dict, shipped_scenes
-from springbeam.scene.resolution import MISMATCH, fastest_frequency, modes_below, not_resolved, slowest_frequency
+from springbeam.scene.resolution import (
+    CONTACT_TURN,
+    MISMATCH,
+    fastest_frequency,
+    modes_below,
+    not_resolved,
+    slowest_frequency,
+)
 
 BEAMS = [name for name in shipped_scenes() if load_scene(name).beam is not None]
 PAIR = load_scene("soft")
@@ -96,3 +103,67 @@ def test_shipped_scenes_both_ways(scene, law, resolved):
         assert "turns 967 rad" in told[0]
         assert "macro_step <= 3.9e-06 s" in told[0]
     assert np.isfinite(run.u_tip).all()
+
+
+# -- soft contacts --------------------------------------------------------------------------------------------------
+
+STIFF = with_changes(
+    PAIR,
+    time={"t_end": 0.1},
+    beam={"n_elements": 10},
+    contact={"law": "compliance", "stiffness": 1e8, "exponent": 1.0},
+    coupling={"macro_step": 1e-3},
+)
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
+def test_the_limit_of_a_contact_depends_on_the_degree(degree, share, resolved):
+    scene = with_changes(STIFF, coupling={"degree": degree})
+    turn = share * CONTACT_TURN[degree]
+    assert (not_resolved(scene, 0.0, 1.0, turn / 1e-3) is None) is resolved
+
+
+@pytest.mark.parametrize(("size", "degree"), [(1e-3, 0), (1e-3, 2), (7.8125e-4, 2)])
+def test_a_contact_that_is_not_resolved_is_said(size, degree):
+    """60 rad a step (u_tip 11 % off); with 128 steps of degree 2 no row is in contact, only what lies between them."""
+    run = simulate(with_changes(STIFF, coupling={"macro_step": size, "degree": degree}))
+    assert run.summary["resolved"] is False
+    (warning,) = run.summary["warnings"]
+    assert "tip and lower end turn" in warning
+    named = float(warning.split("macro_step <= ")[1].split()[0])
+    omega = np.sqrt(1e8 * (modal_beam(STIFF.beam).inverse_tip_mass + 1.0))
+    assert named == pytest.approx(CONTACT_TURN[degree] / omega, rel=0.15)
+
+
+def test_the_step_that_is_named_resolves_the_contact():
+    """λ = 1e6: velocities are then a fifth of the fastest off at most, from one that takes a quarter of the step."""
+    scene = with_changes(STIFF, time={"t_end": 0.02}, contact={"stiffness": 1e6})
+    (warning,) = simulate(scene).summary["warnings"]
+    named = float(warning.split("macro_step <= ")[1].split()[0])
+    runs = [simulate(with_changes(scene, coupling={"macro_step": 0.02 / n})) for n in (4 * 64, 16 * 64)]
+    assert 0.02 / 256 <= named <= 0.02 / 128
+    assert all(run.summary["resolved"] and run.summary["warnings"] == [] for run in runs)
+    ends = [run.v_tip[np.isin(np.round(run.time / 0.02 * 256, 6), np.arange(257))] for run in runs]
+    assert np.abs(ends[0] - ends[1]).max() <= MISMATCH * np.abs(ends[1]).max()
+
+
+def test_a_stiff_link_that_does_not_swing_has_nothing_to_resolve():
+    """From rest under a load: as the tie, though the link turns 90 rad a step; met at speed it swings."""
+    link = with_changes(STIFF, stop=None, contact={"law": "link"}, coupling={"degree": 2, "macro_step": 1.5e-3})
+    still = {"beam": {"initial_velocity_slope": 0.0, "approach": "elastic"}, "spring": {"external_force": -1.0}}
+    assert simulate(with_changes(link, **still)).summary["resolved"] is True
+    assert simulate(link).summary["resolved"] is False
+
+
+@pytest.mark.parametrize("law", ["compliance", "link"])
+def test_the_force_that_acted_is_in_its_column(law):
+    """m Δz = −∫C dt − k1 ∫y dt, k1 = 1e-9 N/m, also where the contact is not resolved (the law at the rows is 19 times
+    the impulse): degree 0 holds C over a step, so that the sum over the rows is the impulse to rounding."""
+    scene = with_changes(
+        STIFF, stop=None, contact={"law": law}, spring={"linear_stiffness": 1e-9, "cubic_stiffness": 0.0}
+    )
+    run = simulate(scene)
+    impulse = float(np.sum(run.contact_force[1:] * np.diff(run.time)))
+    assert impulse == pytest.approx(run.z[0] - run.z[-1], rel=1e-8)
+    assert abs(impulse) > 0.01

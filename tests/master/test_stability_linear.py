@@ -10,7 +10,7 @@ from bodies import DuffingBody, ModalBody, modal_beam
 from scipy.linalg import expm
 
 from springbeam.bodies.protocol import NO_FORCE
-from springbeam.contact.laws import Compliance
+from springbeam.contact.laws import Compliance, Link
 from springbeam.coupling.exchange import Exchange
 from springbeam.coupling.protocol import Window
 from springbeam.coupling.soft import SoftSolver
@@ -26,16 +26,18 @@ from springbeam.studies.stability.linear import (
 )
 from springbeam.studies.stability.predict import THRESHOLD, critical_step, predict
 
-TIES = [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
+ENERGY = [("energy", 0), ("energy", 1), ("energy", 2)]
+TIES = [*ENERGY, ("hermite", 1), ("hermite", 2)]
 EXCHANGES = [("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
 
 
 @lru_cache(maxsize=8)
-def pair(n: int = 4, mass: float = 1.0, stiffness: float = 0.0, k: float = 3.0) -> LinearPair:
+def pair(n: int = 4, mass: float = 1.0, stiffness: float = 0.0, k: float = 3.0, damping: float = 0.0) -> LinearPair:
     """An undamped unit beam, EI = KAG = 100, and a linear spring."""
     beam = modal_beam(n)
     modes = LinearBody(beam.omega**2, np.zeros_like(beam.omega), beam.b)
-    return LinearPair(modes, LinearBody(np.array([k / mass]), np.zeros(1), np.array([mass**-0.5])), stiffness)
+    spring = LinearBody(np.array([k / mass]), np.zeros(1), np.array([mass**-0.5]))
+    return LinearPair(modes, spring, stiffness, damping)
 
 
 def omega_max(p: LinearPair) -> float:
@@ -80,7 +82,7 @@ def test_a_spring_that_pushes_away_grows_as_cosh():
 def solved(p: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
     """The amplification matrix column by column, by the solvers of a run on bodies exact to rounding.
 
-    A preload of 1e4 m of penetration keeps the one-sided contact closed under motions of 1 m.
+    A preload of 1e4 m of penetration keeps the one-sided contact closed under motions of 1 m; a damped law is a link.
     """
     r, mass, depth = len(p.beam.b), p.spring.mass, 1e4
     columns = []
@@ -88,14 +90,14 @@ def solved(p: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
         beam = ModalBody(np.sqrt(p.beam.omega2), p.beam.b, unit[:r], unit[r : 2 * r])
         spring = DuffingBody(mass, float(p.spring.omega2[0]) * mass, 0.0, *(unit[2 * r :] * mass**-0.5))
         ends = (beam, spring)
-        if p.stiffness > 0.0:
+        if p.stiffness > 0.0 == p.damping:
             preload = p.stiffness * depth
             ends = (Preloaded(beam, -0.5 * depth, preload), Preloaded(spring, 0.5 * depth, preload))
         for body in ends:
             body.mark()
         motions = (ends[0].motion(), ends[1].motion())
-        law = Compliance(p.stiffness, 1.0)
-        if p.stiffness == 0.0:
+        law = Link(p.stiffness, p.damping) if p.damping > 0.0 else Compliance(p.stiffness, 1.0)
+        if not p.soft:
             coupling = Tie(scheme, degree, 1e-13)
         elif scheme == "energy":
             coupling = SoftSolver(law, degree, 1e-14)
@@ -120,6 +122,21 @@ def test_the_matrix_is_that_of_the_solvers(scheme, degree, stiffness, mass):
     assert np.abs(ours).max() > 0.5
 
 
+@pytest.mark.parametrize(("scheme", "degree"), [*ENERGY, *EXCHANGES])
+@pytest.mark.parametrize("stiffness", [0.0, 1e4])
+def test_the_matrix_of_a_damped_link_is_that_of_the_solvers(scheme, degree, stiffness):
+    """C = k p + c ṗ, also without k. What the link takes is not given back: volumes of states shrink, as exp(−cH/μ)
+    where the step resolves the link (√(k/μ) H is 2.4, or 0)."""
+    p = pair(2, 1.0, stiffness, damping=2.0)
+    h = 0.5 / omega_max(p)
+    ours, theirs = amplification(p, scheme, degree, h), solved(p, scheme, degree, h)
+    assert np.abs(ours - theirs).max() < 1e-9 * np.abs(ours).max()
+    if scheme == "energy":
+        assert spectral_radius(p, scheme, degree, h) < 1.0 + 1e-12
+        shrinks = np.exp(-2.0 * h * (1.0 / p.beam.mass + 1.0 / p.spring.mass))
+        assert abs(np.linalg.det(ours)) == pytest.approx(shrinks, rel=0.1 / (1 + degree) ** 2)
+
+
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize("mass", [0.01, 1.0, 100.0])
 @pytest.mark.parametrize("frequency", [0.5, 3.3, 50.0, 1000.0])
@@ -129,11 +146,12 @@ def test_energy_has_spectral_radius_one(degree, mass, frequency):
     assert spectral_radius(p, "energy", degree, frequency / omega_max(p)) == pytest.approx(1.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize("stiffness", [1e2, 1e8])
 @pytest.mark.parametrize("frequency", [0.5, 1000.0])
-def test_the_discrete_gradient_has_spectral_radius_one(stiffness, frequency):
+def test_projected_laws_have_spectral_radius_one(degree, stiffness, frequency):
     p = pair(10, 1.0, stiffness)
-    assert spectral_radius(p, "energy", 0, frequency / omega_max(p)) == pytest.approx(1.0, abs=1e-12)
+    assert spectral_radius(p, "energy", degree, frequency / omega_max(p)) == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("degree", [1, 2])
@@ -193,8 +211,22 @@ def test_compliance_is_predicted_where_it_is_stiffest():
     cubic = predict(with_changes(soft, contact={"exponent": 3.0}))
     depth2 = (4.0 / 6.0 / 1e4) ** 0.5
     assert cubic.contact_frequency == pytest.approx((3e4 * depth2 * inverse) ** 0.5)
-    assert [(s.scheme, s.degree) for s in cubic.schemes] == [("energy", 0), *EXCHANGES]
-    assert cubic.advised == ("energy", 0)
+    assert [(s.scheme, s.degree) for s in cubic.schemes] == [*ENERGY, *EXCHANGES]
+    assert cubic.advised == ("energy", 2)
+
+
+def test_ties_and_links_are_predicted():
+    """A tie as the transmission's; a link by its own stiffness whatever the exponent, and its damping."""
+    soft = with_changes(load_scene("soft"), beam={"n_elements": 5})
+    tied, joined = predict(with_changes(soft, contact={"law": "tie"})), predict(soft)
+    assert tied.schemes == joined.schemes
+    link = predict(with_changes(soft, contact={"law": "link", "stiffness": 2e4}))
+    assert link.contact_frequency == pytest.approx((2e4 * (1.0 / link.tip_mass + 1.0)) ** 0.5)
+    assert [(s.scheme, s.degree) for s in link.schemes] == [*ENERGY, *EXCHANGES]
+    assert all(s.spectral_radius == pytest.approx(1.0, abs=1e-11) for s in link.schemes[:3])
+    damper = predict(with_changes(soft, contact={"law": "link", "stiffness": 0.0, "damping": 1.0}))
+    assert [(s.scheme, s.degree) for s in damper.schemes] == [*ENERGY, *EXCHANGES]
+    assert damper.contact_frequency == 0.0
 
 
 @pytest.mark.parametrize(

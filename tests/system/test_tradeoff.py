@@ -113,8 +113,17 @@ def test_a_scene_without_a_reference_is_refused(tables, word):
 def test_compliance_is_swept_with_the_ordinary_exchanges():
     scene = with_changes(load_scene("soft"), contact={"law": "compliance"}, time={"t_end": 0.05})
     families = {c.family for c in configurations(scene)}
-    assert {"energy 0", "jacobi 0", "jacobi 1", "gauss_seidel 0", "gauss_seidel 1"} <= families
-    assert not families & {"energy 1", "hermite 2"}
+    assert {f"energy {degree}" for degree in (0, 1, 2)} | {"energy 2 adaptive", "energy 2, IDA 1e-04"} <= families
+    assert {"jacobi 0", "jacobi 1", "gauss_seidel 0", "gauss_seidel 1", "Algorithm 1"} <= families
+    assert "hermite 2" not in families
+
+
+@pytest.mark.parametrize(("law", "scheme"), [("tie", "hermite 2"), ("link", "jacobi 1")])
+def test_what_is_joined_for_good_is_swept_without_algorithm_1_which_lets_go(law, scheme):
+    scene = with_changes(load_scene("soft"), contact={"law": law}, time={"t_end": 0.05})
+    families = {c.family for c in configurations(scene)}
+    assert {"energy 0", "energy 1", "energy 2", scheme} <= families
+    assert "Algorithm 1" not in families
 
 
 def test_command(tmp_path):

@@ -59,8 +59,6 @@ def crosscheck(
         if made is not None:
             what, how = made.scene, picked_in_words(made.summary["accuracy"])
             console.print(Text(f"accuracy {how}"))
-            if what.coupling.adaptive:
-                fail(BAD_INPUT, f"accuracy {how}; crosscheck needs a macro step: take accuracy out of {scene}")
         try:
             if with_orders:
                 found = orders(what)

@@ -347,9 +347,7 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
 def picked_in_words(accuracy: Mapping[str, Any]) -> str:
     """Return what was asked for and what was picked, from ``accuracy`` of a summary."""
     found = accuracy["picked"]
-    step = "macro_step" in found
-    how = f"H = {found['macro_step']:.3g} s" if step else f"tolerance {found['relative_tolerance']:.3g}"
-    return f"{accuracy['asked']:g} asked: {found['scheme']} {found['degree']}, {how}"
+    return f"{accuracy['asked']:g} asked: {found['scheme']} {found['degree']}, H = {found['macro_step']:.3g} s"
 
 
 def _event_table(first: list[Event], last: list[Event], between: int, scene: Scene) -> Table:

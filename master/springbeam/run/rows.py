@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, sqrt
 from operator import itemgetter
 
 from ..bodies.memory import Memory
 from ..bodies.protocol import NO_FORCE, BeamBody
+from ..contact.events import gap
 from ..contact.laws import Compliance
 from ..contact.phases import Joint
 from ..coupling.protocol import Step
+from ..results.paths import Path
 from ..results.recording import Recorder
 from ..results.steps import packed
 from ..results.trajectory import COLUMNS
 from ..scene import Scene
+from ..scene.resolution import MISMATCH
 from .ledger import Ledger
 from .stepping import Pair, State
 
@@ -31,7 +34,10 @@ NOT_SHOWN = (
 class Rows(Memory):
     """Writes rows and shapes of a pair into a recorder, and keeps their extremes."""
 
-    REMEMBERED = ("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed", "not_shown")
+    REMEMBERED = (
+        *("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed", "_relative_speed", "_stiffest"),
+        "not_shown",
+    )
 
     def __init__(self, scene: Scene, pair: Pair, ledger: Ledger, recorder: Recorder, start_time: float) -> None:
         self._pair, self._ledger, self._recorder = pair, ledger, recorder
@@ -45,6 +51,10 @@ class Rows(Memory):
         #: The columns of the scene, out of all.
         self._present = itemgetter(*(COLUMNS.index(name) for name in recorder.columns))
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
+        self._relative_speed = 0.0  #: |v_tip − z| of ends that a soft law couples [m/s]
+        self._stiffest = 0.0  #: slope of a soft law at the deepest penetration [N/m]
+        #: [1/kg] of what a contact force moves.
+        self._inverse_mass = sum(1.0 / body.mass for body in (pair.upper, pair.lower) if body.mass > 0.0)
         self.largest_speed = 0.0  #: of tip and lower end [m/s]
         self.not_shown = False  #: whether a compliance force was too large for its column
 
@@ -58,6 +68,7 @@ class Rows(Memory):
         inside, reaction, mismatch = 0.0, contact, v - z if joined else 0.0
         if pair.law.soft:
             inside, reaction = pair.law.force(y - u, z - v), 0.0
+            self._relative_speed = max(self._relative_speed, abs(z - v))
         else:
             self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
             if pair.joinable and not pair.law.lasting:
@@ -76,6 +87,26 @@ class Rows(Memory):
             early = joined and self._shapes_left > 0
             if early or time >= self._next_shape:
                 self._shape(pair.beam, time, early)
+
+    def reached(self, step: Step) -> None:
+        """Note how deep the ends of a soft law have sunk into each other on ``step``, also inside it."""
+        assert self._pair.law.soft
+        start, end = gap(step.start), gap(step.end)
+        deepest = -min(start[0], end[0])
+        if deepest <= 0.0 and any(step.contact):
+            path = Path.through(start, end, step.size, gap.means(step.end, step.size))
+            inside = path.lowest_inside()
+            deepest = 0.0 if inside is None else -path.at(inside)
+        self._stiffest = max(self._stiffest, self._pair.law.slope(deepest))
+
+    @property
+    def contact_frequency(self) -> float:
+        """Return √(k (1/m_tip + 1/m)) of a soft contact at its stiffest so far [rad/s], 0 without one.
+
+        It is 0 as well of a link whose ends move as one: however stiff, it does not swing.
+        """
+        still = self._pair.law.lasting and self._relative_speed <= MISMATCH * self.largest_speed
+        return 0.0 if still or self._stiffest <= 0.0 else sqrt(self._stiffest * self._inverse_mass)
 
     def _diagnostic(self, p: float) -> float:
         """Return the normal-compliance part of a tied contact [N] at a penetration ``p`` [m]; it drives nothing."""

@@ -153,6 +153,8 @@ class Simulation(Memory):
                 self._pair.coupling(state.phase).accept(step)
                 state.accept(step, end)
                 self._macro_steps += 1
+                if self._pair.law.soft:
+                    self._rows.reached(step)
                 if self._pair.opens_softly:
                     self._note_soft_contact(step)
             steps.reached(state.time)
@@ -327,7 +329,7 @@ class Simulation(Memory):
                 f"{self._pair.joined.degree}; they were made at degree 0, which keeps the energy but has order 2. The "
                 "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
             )
-        unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed)
+        unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed, rows.contact_frequency)
         if unresolved is not None:
             warnings.append(unresolved)
         if self._untold:

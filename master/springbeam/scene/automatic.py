@@ -28,14 +28,16 @@ class Choice(NamedTuple):
 def choice(scene: Scene) -> Choice:
     """Return the scheme and degree that fit ``scene``, whatever it asks for."""
     beam, coupling = scene.beam, scene.coupling
-    if not scene.contact.rigid:
-        return Choice("energy", 0, f'contact.law = "{scene.contact.law}"')
+    if scene.contact.law == "paper":
+        return Choice("energy", 0, 'contact.law = "paper"')
     if beam is None:
         return Choice("energy", 0, "one body")
     if beam.integrator != "modal":
         return Choice("energy", 0, f'beam.integrator = "{beam.integrator}"')
     if beam.fidelity == "quasi_static":
         return Choice("energy", 2, 'beam.fidelity = "quasi_static"')
+    if not scene.contact.rigid:
+        return Choice("energy", 2, f'contact.law = "{scene.contact.law}"')
     if scene.contact.impact == "rest" and scene.spring is not None:
         return Choice("energy", 2, 'contact.impact = "rest"')
     if coupling.macro_step is None:

@@ -24,6 +24,12 @@ def contact_energy(scene: Scene) -> float:
     return max(energy, 0.0)
 
 
+def contact_depth(scene: Scene) -> float:
+    """Return the penetration [m] at which normal compliance has taken all the energy at first contact."""
+    p = scene.contact.exponent + 1.0
+    return float((p * contact_energy(scene) / scene.contact.stiffness) ** (1.0 / p))
+
+
 def spring_stiffness(scene: Scene) -> float:
     """Return k1 + 3 k2 y² of the spring at its stiffest [N/m].
 

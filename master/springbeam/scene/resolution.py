@@ -2,7 +2,8 @@
 
 A run is called *not resolved* if (``docs/coupling.md``, "Is the motion resolved?")
 
-* the slowest oscillation of a body turns more than `TURN` in a macro step: its rows are aliased; or
+* the slowest oscillation of a body turns more than `TURN` in a macro step: its rows are aliased;
+* tip and lower end turn more than `CONTACT_TURN` against each other on a soft contact law; or
 * the velocities of the joined ends differ by more than `MISMATCH` of their largest speed.
 
 Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
@@ -20,13 +21,16 @@ from .tables import Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
 TURN = 1.0
+#: Largest angle [rad] that a soft contact may turn in a macro step, where its force is of degree 0, 1, 2 in time: there
+#: velocities are up to a fifth off (docs/coupling.md has them).
+CONTACT_TURN = (0.5, 2.0, 4.0)
 #: Velocity mismatch of tip and spring top, relative to their speed, above which the motion is called unresolved.
 MISMATCH = 0.2
 #: Share of the slowest period over which the contact force is averaged.
 WINDOW = 0.02
 
 
-def not_resolved(scene: Scene, mismatch: float, speed: float) -> str | None:
+def not_resolved(scene: Scene, mismatch: float, speed: float, contact_frequency: float = 0.0) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
     Parameters
@@ -35,6 +39,8 @@ def not_resolved(scene: Scene, mismatch: float, speed: float) -> str | None:
         The scene as run.
     mismatch, speed
         The largest difference of the joined ends' velocities, and the largest speed of an end [m/s].
+    contact_frequency
+        Of tip and lower end on a soft contact law at the deepest penetration reached [rad/s], 0 without one.
     """
     H = scene.coupling.macro_step
     if H is not None:  # steps that follow from tolerances are judged by their error
@@ -45,6 +51,15 @@ def not_resolved(scene: Scene, mismatch: float, speed: float) -> str | None:
                     f"Velocities, forces and times of events are samples of a faster motion; coupling.macro_step <= "
                     f"{_rounded_down(TURN / omega)} resolves it{else_}"
                 )
+        projected = scene.coupling.scheme == "energy"
+        turn = CONTACT_TURN[scene.coupling.degree if projected else 0]
+        if contact_frequency * H > turn:
+            higher = ", a higher coupling.degree allows longer ones" if projected and turn < CONTACT_TURN[-1] else ""
+            return (
+                f"not resolved: tip and lower end turn {contact_frequency * H:.3g} rad in a macro step on the contact "
+                f"law at its deepest penetration. Velocities, forces and times of contact are samples of a faster "
+                f"motion; coupling.macro_step <= {_rounded_down(turn / contact_frequency)} resolves it{higher}"
+            )
     if mismatch <= MISMATCH * speed:
         return None
     return (

@@ -3,22 +3,21 @@
 The error is that of the coupling and the time integration, for the scene's own mesh and modes: these are the model.
 (Impacts on the foundation converge only slowly with the mesh, since what they meet is the mass of its tip.)
 
-Two runs are compared: if the finer one is q times as accurate, its error is their difference over q − 1. With equal
-macro steps, ρ times as many, q is ρᵖ; `hermite` tells p itself: its energy residual is an error of the same order,
-summed up over the run, so ρᵖ is the ratio of the two residuals. With steps from a tolerance the error follows that
-(law "compliance", whose contacts are short beside the flights between them). A first run is as fine as the fastest
-waves at the tip or the accuracy ask for, each one after it as fine as those before let expect, until two agree
-(``docs/accuracy.md``).
+Two runs of equal macro steps are compared: if the finer one is q times as accurate, its error is their difference over
+q − 1. With ρ times as many steps q is ρᵖ; `hermite` tells p itself: its energy residual is an error of the same order,
+summed up over the run, so ρᵖ is the ratio of the two residuals. Soft laws are coupled by `energy` 2, whose order is 6
+while the contact lasts and lower where it opens and closes inside steps; of that, 2 is relied on. A first run is as
+fine as the fastest waves at the tip, or the contact itself, or the accuracy ask for, each one after it as fine as those
+before let expect, until two agree (``docs/accuracy.md``).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from ..bodies.protocol import Body
 from ..results.contact_times import contact_changes, contact_time_difference
@@ -31,6 +30,7 @@ from ..scene.automatic import choice
 from ..scene.linearised import spring_frequency
 from ..scene.resolution import fastest_frequency, shear_frequency
 from ..scene.statics import tip_compliance
+from .stability.predict import contact_frequency
 
 #: Most macro steps of a run; pilot runs in a row that may stop early.
 _MOST, _MOST_STOPPED = 50_000, 6
@@ -45,8 +45,7 @@ _COUPLING_SHARE, _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-4, 1e-12, 1e-8
 #: IDA's absolute tolerance over its relative one and the range of the spring top.
 _IDA_ABSOLUTE = 1e-2
 
-# Equal macro steps.
-#: Fewest, where bodies are coupled and where not.
+#: Fewest macro steps, where bodies are coupled and where not.
 _FEWEST, _UNCOUPLED = 8, 4
 #: Growth of their number from run to run: at least, at most, after a run that gained energy, and after one that
 #: stopped for another reason, which may be gone at the next size.
@@ -65,11 +64,10 @@ _AMPLIFIED = 10.0
 #: doStep calls per macro step of a run that pays for its events rather than its steps: more steps cost hardly more.
 _CALLS_PER_STEP = 8.0
 
-# Steps from a tolerance.
-#: Tolerance of the first run over the accuracy; how much finer the second is, one after a stop, and any other.
-_LOOSE, _FINER, _FINER_AFTER_STOP, _FINER_LEAST, _FINER_MOST = 5.0, 15.0, 10.0, 5.0, 30.0
-#: The number of steps goes as this power of 1/tolerance.
-_STEPS_PER_TOLERANCE = 0.5
+# Soft laws, by `energy` 2.
+#: What the first macro step turns the contact by [rad], over accuracy^(1/4); growth to the second run; and the order
+#: that is relied on (docs/accuracy.md has those measured).
+_CONTACT_TURN, _SECOND, _SOFT_ORDER = 16.0, 2.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -97,11 +95,7 @@ class Picked:
     def summary(self) -> dict[str, Any]:
         """Return what goes into ``summary.json``."""
         coupling, spring = self.scene.coupling, self.scene.spring
-        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree}
-        if coupling.adaptive:
-            picked["relative_tolerance"] = coupling.relative_tolerance
-        else:
-            picked["macro_step"] = coupling.H
+        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree, "macro_step": coupling.H}
         if spring is not None:
             picked["ida_relative_tolerance"] = spring.relative_tolerance
         return {
@@ -165,18 +159,14 @@ def pick(scene: Scene) -> Picked:
 
 @dataclass(frozen=True)
 class _Pilot:
-    """A run, and how fine it is: its macro steps where no event cuts them, or 1/tolerance."""
+    """A run, and its number of macro steps where no event cuts them."""
 
-    fineness: float
+    steps: float
     run: Trajectory
 
     @property
     def residual(self) -> float:
         return float(self.run.summary["max_energy_residual"])
-
-    @property
-    def macro_steps(self) -> int:
-        return int(self.run.summary["macro_steps"])
 
     @property
     def calls(self) -> int:
@@ -189,14 +179,14 @@ class _Pilot:
         return float(self.run.summary["wall_time"])
 
     @property
-    def displacement(self) -> np.ndarray:
-        """Displacement of the tip, without a beam that of the spring top [m]."""
-        return self.run["u_tip" if "u_tip" in self.run.columns else "y"]
+    def displacements(self) -> list[str]:
+        """Columns of tip and spring top."""
+        return [name for name in ("u_tip", "y") if name in self.run.columns]
 
 
 @dataclass(frozen=True)
 class _Estimate:
-    """Errors of the finer one of two runs, over the largest change of the tip and over the time that is run."""
+    """Errors of the finer one of two runs, over the largest change of tip or spring top and the time that is run."""
 
     displacement: float
     expected: float  #: ``displacement`` if the order of convergence holds
@@ -205,161 +195,28 @@ class _Estimate:
     apart: float  #: by how much the two differ in the larger of both
 
 
-class _Way(Protocol):
-    """A way to make runs finer."""
-
-    def first(self) -> float:
-        """Return how fine the first run is."""
-
-    def coupling(self, fineness: float) -> dict[str, Any]:
-        """Return the keys of ``[coupling]`` for a run so fine."""
-
-    def second(self, first: _Pilot) -> float:
-        """Return how fine the second run is."""
-
-    def next(self, fine: _Pilot, estimate: _Estimate) -> float:
-        """Return how fine a run is whose estimate, after ``estimate``, is expected to hold."""
-
-    def after_stop(self, stopped: _Pilot) -> float:
-        """Return how fine the run after one that has stopped early is."""
-
-    def steps(self, fineness: float, last: _Pilot | None) -> float:
-        """Return how many macro steps a run so fine is expected to take."""
-
-    def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
-        """Return how many times as accurate ``fine`` is, in displacements and in times of events."""
-
-    def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
-        """Return the difference of the displacements [m] where they are compared."""
-
-
-class _EqualSteps:
-    """Fineness is the number of macro steps."""
-
-    def __init__(self, scene: Scene, accuracy: float, span: float) -> None:
-        self._scene, self._accuracy, self._span = scene, accuracy, span
-        fine = with_changes(scene, accuracy=None, coupling={"scheme": "auto", "degree": 0, "macro_step": 1e-9 * span})
-        taken = choice(fine)  # of schemes, the one where everything is resolved
-        self._scheme, self._degree = taken.scheme, taken.degree
-
-    def first(self) -> float:
-        beam, spring = self._scene.beam, self._scene.spring
-        if (beam is None or spring is None) and self._scene.stop is None:
-            return _UNCOUPLED  # exact but for IDA
-        of_spring = 0.0 if spring is None else spring_frequency(self._scene)
-        if beam is None:
-            return _rung(of_spring * self._span / _SPRING_ALONE)
-        if beam.fidelity == "quasi_static":
-            assert spring is not None
-            return _rung(math.hypot(of_spring, 1.0 / math.sqrt(tip_compliance(beam) * spring.mass)) * self._span)
-        waves = min(shear_frequency(beam), fastest_frequency(beam))
-        if beam.alpha_b > 0.0:
-            waves = min(waves, _DIES_OUT / beam.alpha_b)
-        turn = _BEAM_ALONE if spring is None else _TURN * self._accuracy ** (1.0 / _ORDER)
-        return _rung(max(waves, of_spring) * self._span / turn)
-
-    def coupling(self, fineness: float) -> dict[str, Any]:
-        return {"scheme": self._scheme, "degree": self._degree, "macro_step": self._span / fineness}
-
-    def second(self, first: _Pilot) -> float:
-        growth = _LEAST_GROWTH
-        if self._scheme == "hermite":
-            amplified = _AMPLIFIED if len({change.time for change in contact_changes(first.run, 0.0)}) > 1 else 1.0
-            growth = math.pow(amplified * first.residual / self._accuracy, 1.0 / _ORDER)
-        return self._grown(first, growth)
-
-    def next(self, fine: _Pilot, estimate: _Estimate) -> float:
-        margin = _MARGIN * _SAFETY / self._accuracy
-        displacement = math.pow(margin * estimate.expected, 1.0 / _EXPECTED)
-        return self._grown(fine, max(displacement, math.pow(margin * estimate.event, 1.0 / _EXPECTED_OF_EVENTS)))
-
-    def after_stop(self, stopped: _Pilot) -> float:
-        return _rung(stopped.fineness * (_AFTER_GAIN if stopped.residual > _GAIN else _AFTER_STOP))
-
-    def steps(self, fineness: float, last: _Pilot | None) -> float:
-        return fineness
-
-    def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
-        ratio, order = fine.fineness / coarse.fineness, _LOWEST
-        if self._scheme == "hermite" and fine.residual > 0.0 < coarse.residual:
-            seen = math.log(coarse.residual / fine.residual) / math.log(ratio)
-            order = min(max(seen, _LOWEST), _ORDER)
-        return ratio**order, ratio ** min(order, _OF_EVENTS)
-
-    def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
-        """Return the difference at the times that are rows of both, but for rounding."""
-        times, wanted = fine.run.time, coarse.run.time
-        index = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-        index -= np.abs(times[index - 1] - wanted) < np.abs(times[index] - wanted)
-        common = np.abs(times[index] - wanted) <= 1e-9 * self._span
-        return np.asarray(coarse.displacement[common] - fine.displacement[index[common]])
-
-    def _grown(self, last: _Pilot, growth: float) -> float:
-        return _rung(max(last.fineness * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH), last.calls / _CALLS_PER_STEP))
-
-
-class _Tolerances:
-    """Fineness is 1/tolerance, of scheme `energy` 0 with steps from that tolerance, where no velocity ever jumps."""
-
-    def __init__(self, accuracy: float) -> None:
-        self._accuracy = accuracy
-
-    def first(self) -> float:
-        return 1.0 / (_LOOSE * self._accuracy)
-
-    def coupling(self, fineness: float) -> dict[str, Any]:
-        tolerances = {"relative_tolerance": 1.0 / fineness, "absolute_tolerance": None}
-        return {"scheme": "energy", "degree": 0, **tolerances}
-
-    def second(self, first: _Pilot) -> float:
-        return _FINER * first.fineness
-
-    def next(self, fine: _Pilot, estimate: _Estimate) -> float:
-        wanted = _SAFETY * max(estimate.expected, estimate.event) / self._accuracy
-        return fine.fineness * min(max(math.pow(wanted, 1.2), _FINER_LEAST), _FINER_MOST)
-
-    def after_stop(self, stopped: _Pilot) -> float:
-        return _FINER_AFTER_STOP * stopped.fineness
-
-    def steps(self, fineness: float, last: _Pilot | None) -> float:
-        if last is None:
-            return 0.0
-        return float(last.macro_steps * (fineness / last.fineness) ** _STEPS_PER_TOLERANCE)
-
-    def better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
-        ratio = fine.fineness / coarse.fineness
-        return ratio, ratio
-
-    def difference(self, coarse: _Pilot, fine: _Pilot) -> np.ndarray:
-        """Return the difference at all rows of the coarser run; between its rows the finer one follows its velocity."""
-        times, rows = np.unique(fine.run.time, return_index=True)
-        between = CubicHermiteSpline(times, fine.displacement[rows], fine.run.v_tip[rows])
-        return np.asarray(coarse.displacement - between(coarse.run.time))
-
-
 class _Search:
     def __init__(self, scene: Scene, accuracy: float) -> None:
         self._scene, self._accuracy = scene, accuracy
         self._span = scene.time.t_end - (scene.contact_time or 0.0)
-        compliant = scene.contact.law == "compliance" and scene.coupling.feedback == "two_way"
-        self._way: _Way
-        if compliant and scene.spring is not None and scene.beam is not None and scene.beam.integrator == "modal":
-            self._way = _Tolerances(accuracy)
-        else:
-            self._way = _EqualSteps(scene, accuracy, self._span)
+        changes = {"scheme": "auto", "degree": 0, "macro_step": 1e-9 * self._span}
+        taken = choice(with_changes(scene, accuracy=None, coupling=changes))  # where everything is resolved
+        self._scheme, self._degree = taken.scheme, taken.degree
+        both = scene.beam is not None and scene.spring is not None
+        self._softly = both and not scene.contact.rigid and self._degree == 2
         self._runs, self._calls, self._spent, self._stopped = 0, 0, 0.0, 0
         self._range = 0.0  #: of the spring top in the run before [m]
 
     def run(self) -> Picked:
-        way, coarse, estimate = self._way, None, None
-        fineness = way.first()
-        while way.steps(fineness, coarse) <= _MOST:
-            fine = self._pilot(fineness)
+        coarse, estimate = None, None
+        steps = self._first()
+        while steps <= _MOST:
+            fine = self._pilot(steps)
             if fine.run.summary["status"] != "done":
-                fineness = way.after_stop(fine)
+                steps = _rung(steps * (_AFTER_GAIN if fine.residual > _GAIN else _AFTER_STOP))
                 continue
             if coarse is None:
-                fineness = way.second(fine)
+                steps = self._second(fine)
             else:
                 estimate = self._estimate(coarse, fine)
                 worst = _SAFETY * max(estimate.displacement, estimate.event)
@@ -368,10 +225,10 @@ class _Search:
                         self._accuracy, fine.run, estimate.displacement, estimate.event, estimate.events,
                         self._runs - 1, self._calls - fine.calls, self._spent - fine.spent,
                     )  # fmt: skip
-                fineness = way.next(fine, estimate)
+                steps = self._next(fine, estimate)
             coarse = fine
         if estimate is None:
-            found = f"a run that may do takes some {way.steps(fineness, coarse):.1g}"
+            found = f"a run that may do takes some {steps:.1g}"
         else:
             found = f"runs still differ by {estimate.apart:.1e}"
         raise SceneError(
@@ -379,13 +236,50 @@ class _Search:
             "t_end, or take a coarser mesh"
         )
 
-    def _pilot(self, fineness: float) -> _Pilot:
+    # -- how many steps ---------------------------------------------------------------------------------------------
+
+    def _first(self) -> float:
+        """Return the number of macro steps of the first run."""
+        beam, spring, span = self._scene.beam, self._scene.spring, self._span
+        if (beam is None or spring is None) and self._scene.stop is None:
+            return _UNCOUPLED  # exact but for IDA
+        of_spring = 0.0 if spring is None else spring_frequency(self._scene)
+        if beam is None:
+            return _rung(of_spring * span / _SPRING_ALONE)
+        if self._softly:
+            return _rung(max(contact_frequency(self._scene), of_spring) * span / (_CONTACT_TURN * self._accuracy**0.25))
+        if beam.fidelity == "quasi_static":
+            assert spring is not None
+            return _rung(math.hypot(of_spring, 1.0 / math.sqrt(tip_compliance(beam) * spring.mass)) * span)
+        waves = min(shear_frequency(beam), fastest_frequency(beam))
+        if beam.alpha_b > 0.0:
+            waves = min(waves, _DIES_OUT / beam.alpha_b)
+        turn = _BEAM_ALONE if spring is None else _TURN * self._accuracy ** (1.0 / _ORDER)
+        return _rung(max(waves, of_spring) * span / turn)
+
+    def _second(self, first: _Pilot) -> float:
+        growth = _SECOND if self._softly else _LEAST_GROWTH
+        if self._scheme == "hermite":
+            amplified = _AMPLIFIED if len({change.time for change in contact_changes(first.run, 0.0)}) > 1 else 1.0
+            growth = math.pow(amplified * first.residual / self._accuracy, 1.0 / _ORDER)
+        return self._grown(first, growth)
+
+    def _next(self, fine: _Pilot, estimate: _Estimate) -> float:
+        """Return the number of steps of a run whose estimate, after ``estimate``, is expected to hold."""
+        margin = _MARGIN * _SAFETY / self._accuracy
+        displacement = math.pow(margin * estimate.expected, 1.0 / _EXPECTED)
+        return self._grown(fine, max(displacement, math.pow(margin * estimate.event, 1.0 / _EXPECTED_OF_EVENTS)))
+
+    def _grown(self, last: _Pilot, growth: float) -> float:
+        return _rung(max(last.steps * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH), last.calls / _CALLS_PER_STEP))
+
+    # -- runs ---------------------------------------------------------------------------------------------------------
+
+    def _pilot(self, steps: float) -> _Pilot:
         """Run once. A pilot may stop early, since a finer one may not; raises RunStopped if that goes on."""
-        coupling = {
-            **self._way.coupling(fineness),
-            "tolerance": max(_COUPLING_SHARE * self._accuracy, _TIGHTEST),
-        }
-        tables: dict[str, dict[str, Any]] = {"coupling": coupling}
+        coupling = {"scheme": self._scheme, "degree": self._degree, "macro_step": self._span / steps}
+        tolerance = max(_COUPLING_SHARE * self._accuracy, _TIGHTEST)
+        tables: dict[str, dict[str, Any]] = {"coupling": {**coupling, "tolerance": tolerance}}
         if self._scene.spring is not None:
             tolerance = min(max(_IDA_SHARE * self._accuracy, _TIGHTEST), _LOOSEST)
             tables["spring"] = {"relative_tolerance": tolerance}
@@ -401,25 +295,51 @@ class _Search:
             self._stopped += 1
             if self._stopped == _MOST_STOPPED:
                 raise
-        pilot = _Pilot(fineness, recorder.trajectory())
+        pilot = _Pilot(steps, recorder.trajectory())
         if "y" in pilot.run.columns:
             self._range = float(np.ptp(pilot.run["y"]))
         self._runs, self._calls, self._spent = self._runs + 1, self._calls + pilot.calls, self._spent + pilot.spent
         return pilot
 
+    # -- how accurate they are ----------------------------------------------------------------------------------------
+
     def _estimate(self, coarse: _Pilot, fine: _Pilot) -> _Estimate:
-        values = fine.displacement
-        scale = float(np.abs(values - values[0]).max()) or 1.0
-        displacement = float(np.abs(self._way.difference(coarse, fine)).max(initial=0.0)) / scale
-        step = coarse.run.scene.coupling.macro_step or self._span / coarse.macro_steps
-        event, events = contact_time_difference(coarse.run, fine.run, 2.0 * step)
+        displacement = self._difference(coarse, fine)
+        event, events = contact_time_difference(coarse.run, fine.run, 2.0 * self._span / coarse.steps)
         event /= self._span
-        better, of_event = self._way.better(coarse, fine)
+        better, of_event = self._better(coarse, fine)
         expected = displacement / (better - 1.0)
         kinds, others = ([e.kind for e in pilot.run.events] for pilot in (coarse, fine))
-        # No order holds through an event that only one of the two has.
-        doubted = expected if kinds == others else max(expected, displacement / _DOUBTED)
+        doubted = expected
+        if kinds != others:  # no order holds through an event that only one of the two has
+            lowest = fine.steps / coarse.steps - 1.0 if self._softly else _DOUBTED
+            doubted = max(expected, displacement / lowest)
         return _Estimate(doubted, expected, event / (of_event - 1.0), events, max(displacement, event))
+
+    def _better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
+        """Return how many times as accurate ``fine`` is, in displacements and in times of events."""
+        ratio, order = fine.steps / coarse.steps, _SOFT_ORDER if self._softly else _LOWEST
+        if self._scheme == "hermite" and fine.residual > 0.0 < coarse.residual:
+            seen = math.log(coarse.residual / fine.residual) / math.log(ratio)
+            order = min(max(seen, _LOWEST), _ORDER)
+        return ratio**order, ratio ** min(order, _OF_EVENTS)
+
+    def _difference(self, coarse: _Pilot, fine: _Pilot) -> float:
+        """Return the largest difference of tip or spring top at the times that are rows of both, but for rounding.
+
+        Each is relative to its own largest change.
+        """
+        times, wanted = fine.run.time, coarse.run.time
+        index = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
+        index -= np.abs(times[index - 1] - wanted) < np.abs(times[index] - wanted)
+        common = np.abs(times[index] - wanted) <= 1e-9 * self._span
+        worst = 0.0
+        for name in fine.displacements:
+            values = fine.run[name]
+            scale = float(np.abs(values - values[0]).max()) or 1.0
+            difference = np.abs(coarse.run[name][common] - values[index[common]])
+            worst = max(worst, float(difference.max(initial=0.0)) / scale)
+        return worst
 
 
 def _rung(steps: float) -> float:

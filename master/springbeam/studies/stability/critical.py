@@ -20,7 +20,7 @@ from ...coupling.protocol import Window
 from ...monolithic.semi_discrete import modal_beam
 from ...scene import Scene, load_scene, with_changes
 from .linear import LinearPair, spectral_radius
-from .predict import SCHEMES, THRESHOLD, critical_step, linear_pair
+from .predict import RIGID, SOFT, THRESHOLD, critical_step, linear_pair
 
 #: Penetration in equilibrium [m], and first amplitude of the motion [m]: it may grow 1e6-fold before contact opens.
 _PRELOAD, _AMPLITUDE = 1e4, 1e-3
@@ -69,7 +69,7 @@ def growth(scene: Scene) -> float:
     to `_GROWN`.
     """
     coupling, contact = scene.coupling, scene.contact
-    H, compliant = coupling.H, contact.law == "compliance"
+    H, soft = coupling.H, not contact.rigid
     spring = {"cubic_stiffness": 0.0, "equilibrium": 0.0, "external_force": 0.0, "initial_velocity": 0.0}
     at_rest = {"distributed_load": 0.0, "initial_deflection_slope": 0.0, "initial_velocity_slope": 0.0}
     linear = with_changes(scene, stop=None, spring=spring, beam={**at_rest, "approach": "elastic"})
@@ -78,7 +78,7 @@ def growth(scene: Scene) -> float:
     assert top is not None
     pair: tuple[Body, Body] = (beam, top)
     frequency = 1.0 / H
-    if compliant:
+    if soft:
         preload = contact.stiffness * _PRELOAD
         pair = (Preloaded(beam, -0.5 * _PRELOAD, preload), Preloaded(top, 0.5 * _PRELOAD, preload))
         frequency = math.sqrt(contact.stiffness * (1.0 / beam.mass + 1.0 / top.mass))
@@ -87,7 +87,7 @@ def growth(scene: Scene) -> float:
         # Tied ends start with one velocity; in contact it is their relative motion that grows.
         speed = _AMPLITUDE * frequency
         reduced = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
-        impulses = (-reduced * speed, reduced * speed) if compliant else (beam.mass * speed, top.mass * speed)
+        impulses = (-reduced * speed, reduced * speed) if soft else (beam.mass * speed, top.mass * speed)
         for body, impulse in zip(pair, impulses, strict=True):
             body.apply_impulse(impulse)
         energies = [_energy(linear, pair)]
@@ -106,7 +106,7 @@ def growth(scene: Scene) -> float:
 def _energy(scene: Scene, pair: tuple[Body, Body]) -> float:
     """Return the energy of the bodies, and of the contact law about its preload [J]."""
     energy = sum(body.energies().kinetic + body.energies().potential for body in pair)
-    if scene.contact.law == "compliance":
+    if not scene.contact.rigid:
         beam, top = (body.motion().displacement for body in pair)
         energy += 0.5 * scene.contact.stiffness * (top - beam - _PRELOAD) ** 2
     return energy
@@ -177,7 +177,7 @@ def comparisons(n_elements: int = 10) -> Iterator[Comparison]:
     assert soft.beam is not None
     modal = modal_beam(soft.beam)
     for law, stiffness in (*(("compliance", value) for value in STIFFNESSES), ("transmission", 0.0)):
-        for scheme, degree in SCHEMES[law]:
+        for scheme, degree in SOFT if stiffness else RIGID:
             contact = {"law": law, "stiffness": stiffness or 1.0, "exponent": 1.0}
             coupling = {"scheme": scheme, "degree": degree, "macro_step": LARGE_STEP}
             scene = with_changes(soft, contact=contact, coupling=coupling)

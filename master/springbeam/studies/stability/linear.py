@@ -14,9 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import factorial
+from math import factorial, sqrt
 
 import numpy as np
+from numpy.polynomial import legendre
 
 from ...bodies import force
 from ...bodies.protocol import Motion
@@ -154,11 +155,22 @@ class Step:
 
 @dataclass(frozen=True)
 class LinearPair:
-    """Beam and spring; the spring takes −C. ``stiffness`` [N/m] is that of the contact law, for `compliance`."""
+    """Beam and spring; the spring takes −C: ``stiffness`` p + ``damping`` ṗ of a soft law, a tie's if both are 0."""
 
     beam: LinearBody
     spring: LinearBody
-    stiffness: float = 0.0
+    stiffness: float = 0.0  #: [N/m]
+    damping: float = 0.0  #: [N·s/m]
+
+    @property
+    def soft(self) -> bool:
+        """Return whether a soft law joins the ends."""
+        return self.stiffness > 0.0 or self.damping > 0.0
+
+    @property
+    def contact_frequency(self) -> float:
+        """Return √(k (1/m_tip + 1/m)) of a soft law [rad/s], 0 of a tie."""
+        return sqrt(self.stiffness * (1.0 / self.beam.mass + 1.0 / self.spring.mass)) if self.soft else 0.0
 
     def split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the states of the beam and of the spring."""
@@ -195,14 +207,15 @@ def tied_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledSt
 
 
 def projected_step(pair: LinearPair, degree: int, h: float) -> CoupledStep:
-    """Return the step of `compliance` by ``energy``: for a linear law, C has the first Legendre coefficients of k p̃."""
-    k, n = pair.stiffness, degree + 1
-    from_numbers, from_start = (part[:n] for part in numbers_to_legendre(degree))
+    """Return the step of a soft law by ``energy``: C has the first Legendre coefficients of k p̃ + c p̃′."""
+    n = degree + 1
+    law = pair.stiffness * np.eye(n, n + 1) + pair.damping * 2.0 / h * legendre.legder(np.eye(n + 1))
+    from_numbers, from_start = (law @ part for part in numbers_to_legendre(degree))
     condition = SCHEMES["energy"][degree]
     T = np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
     beam, spring = Step(pair.beam, h), Step(pair.spring, h)
     (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(degree), spring.response(degree)
-    inverse = np.linalg.inv(np.eye(n) / k + from_numbers @ T @ (beam_motions + spring_motions))
+    inverse = np.linalg.inv(np.eye(n) + from_numbers @ T @ (beam_motions + spring_motions))
 
     def step(x: np.ndarray) -> np.ndarray:
         p, _ = pair.penetration(x)
@@ -215,26 +228,27 @@ def projected_step(pair: LinearPair, degree: int, h: float) -> CoupledStep:
 
 
 def exchange_step(pair: LinearPair, sequential: bool, degree: int, h: float) -> CoupledStep:
-    """Return the step of `compliance` by ``jacobi`` or ``gauss_seidel``, what `coupling.exchange.Exchange` does."""
-    beam, spring, k = Step(pair.beam, h), Step(pair.spring, h), pair.stiffness
+    """Return the step of a soft law by ``jacobi`` or ``gauss_seidel``, what `coupling.exchange.Exchange` does."""
+    beam, spring, k, c = Step(pair.beam, h), Step(pair.spring, h), pair.stiffness, pair.damping
 
     def step(x: np.ndarray) -> np.ndarray:
         p, rate = pair.penetration(x)
         a, s = pair.split(x)
-        forces = [k * p, k * rate][: degree + 1]
+        at_start = k * p + c * rate
+        forces = [at_start, k * rate][: degree + 1]
         end, u = beam(a, forces)
         if sequential:
             moved = pair.spring.displacement(s) + degree * h * pair.spring.velocity(s)
-            at_end = k * (moved - u[0])
-            forces = [k * p, (at_end - k * p) / h] if degree else [at_end]
+            at_end = k * (moved - u[0]) + c * (pair.spring.velocity(s) - u[1])
+            forces = [at_start, (at_end - at_start) / h] if degree else [at_end]
         return np.vstack([end, spring(s, [-f for f in forces])[0]])
 
     return step
 
 
 def coupled_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledStep:
-    """Return the step of a scheme: with `compliance` where the pair has a contact stiffness, else of the tie."""
-    if pair.stiffness == 0.0:
+    """Return the step of a scheme."""
+    if not pair.soft:
         return tied_step(pair, scheme, degree, h)
     if scheme == "energy":
         return projected_step(pair, degree, h)

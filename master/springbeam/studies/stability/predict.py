@@ -11,10 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...contact.laws import law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene
 from ...scene.automatic import STABLE, Choice, choice
-from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
+from ...scene.linearised import contact_depth, spring_frequency, spring_stiffness
 from ...scene.statics import shear_stiffness
 from .linear import LinearBody, LinearPair, spectral_radius
 
@@ -29,11 +30,10 @@ RESOLVED = 1.0
 #: The search for a critical macro step begins here, in units of 1/(highest frequency), and goes up by these factors.
 _SEARCH = {"hermite": (STABLE / 1.2, 1.03), "jacobi": (1e-3, 2.0), "gauss_seidel": (1e-3, 2.0)}
 
-#: (scheme, degree) that a law can be coupled by.
-SCHEMES = {
-    "transmission": (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)),
-    "compliance": (("energy", 0), ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)),
-}
+_ENERGY = (("energy", 0), ("energy", 1), ("energy", 2))
+#: (scheme, degree) that ends can be coupled by, rigidly and softly.
+RIGID = (*_ENERGY, ("hermite", 1), ("hermite", 2))
+SOFT = (*_ENERGY, ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1))
 
 
 @dataclass(frozen=True)
@@ -90,11 +90,10 @@ def predict(scene: Scene) -> Prediction:
     elif pair is None and not notes:
         notes.append("nothing to couple: a scene with one body and no stop under its tip")
     elif pair is not None:
-        law = "compliance" if pair.stiffness > 0.0 else "transmission"
         schemes = tuple(
             SchemePrediction(scheme, degree, spectral_radius(pair, scheme, degree, H),
                              critical_step(pair, scheme, degree))
-            for scheme, degree in SCHEMES[law]
+            for scheme, degree in (SOFT if pair.soft else RIGID)
             if scene.beam is None or scene.beam.integrator == "modal" or degree == 0
         )  # fmt: skip
     if any(s.scheme == "hermite" and s.critical_step is not None for s in schemes):
@@ -111,16 +110,13 @@ def predict(scene: Scene) -> Prediction:
             f"the motion is not resolved: the beam's lowest mode turns {modal.omega[0] * H:.3g} rad in a macro step; "
             f"H <= {RESOLVED / modal.omega[0]:.3g} s resolves it"
         )
-    contact = None
-    if pair is not None and pair.stiffness > 0.0:
-        contact = math.sqrt(pair.stiffness * (1.0 / pair.beam.mass + 1.0 / pair.spring.mass))
     return Prediction(
         macro_step=H,
         threshold=THRESHOLD,
         omega_1=None if modal is None else float(modal.omega[0]),
         omega_max=None if modal is None else float(modal.omega[-1]),
         spring_frequency=None if scene.spring is None else spring_frequency(scene),
-        contact_frequency=contact,
+        contact_frequency=None if pair is None or not pair.soft else pair.contact_frequency,
         tip_mass=None if modal is None else 1.0 / modal.inverse_tip_mass,
         impedance=Z,
         displacement_gain=None if mass is None or Z is None else 2.0 * mass / (Z * H),
@@ -170,8 +166,20 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
     beam = LinearBody(omega2, modal.alpha * omega2, modal.tip[moved])
     if scene.spring is None:
         return LinearPair(beam, LinearBody(np.zeros(0), np.zeros(0), np.zeros(0)))
-    stiffness = _contact_stiffness(scene) if scene.contact.law == "compliance" else 0.0
-    return LinearPair(beam, spring_body(scene), stiffness)
+    law = law_of(scene.contact)
+    if not law.soft:
+        return LinearPair(beam, spring_body(scene))
+    depth = contact_depth(scene) if law.one_sided else 0.0
+    damping = law.resistance(np.array([depth]), np.zeros(1))[2]
+    return LinearPair(beam, spring_body(scene), law.slope(depth), float(damping[0]))
+
+
+def contact_frequency(scene: Scene) -> float:
+    """Return √(k (1/m_tip + 1/m)) of beam and spring on a soft law [rad/s], where it is stiffest."""
+    assert scene.beam is not None
+    pair = linear_pair(scene, modal_beam(_reduced(scene.beam)[0]))
+    assert pair is not None
+    return pair.contact_frequency
 
 
 def spring_body(scene: Scene) -> LinearBody:
@@ -182,15 +190,6 @@ def spring_body(scene: Scene) -> LinearBody:
     return LinearBody(np.array([spring_stiffness(scene) / m]), np.array([spring.damping / m]), np.array([m**-0.5]))
 
 
-def _contact_stiffness(scene: Scene) -> float:
-    """Return λ p δ^{p−1} [N/m] at the penetration δ that takes all the energy."""
-    stiffness, p = scene.contact.stiffness, scene.contact.exponent
-    if p == 1.0:
-        return stiffness
-    depth = ((p + 1.0) * contact_energy(scene) / stiffness) ** (1.0 / (p + 1.0))
-    return float(stiffness * p * depth ** (p - 1.0))
-
-
 # -- critical steps -------------------------------------------------------------------------------------------------
 
 
@@ -198,9 +197,7 @@ def _frequencies(pair: LinearPair) -> tuple[float, float]:
     """Return the highest and lowest frequency of the pair [rad/s], of bodies and contact law."""
     omega = np.sqrt(np.abs(np.concatenate([pair.beam.omega2, pair.spring.omega2])))
     highest, lowest = float(omega.max()), float(omega[omega > 0.0].min())
-    if pair.stiffness > 0.0:
-        highest = max(highest, math.sqrt(pair.stiffness * (1.0 / pair.beam.mass + 1.0 / pair.spring.mass)))
-    return highest, lowest
+    return max(highest, pair.contact_frequency), lowest
 
 
 def critical_step(

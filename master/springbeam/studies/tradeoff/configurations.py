@@ -70,9 +70,10 @@ def _changed(scene: Scene, **tables: Any) -> Iterator[Scene]:
 
 
 def _schemes(scene: Scene) -> list[tuple[str, int]]:
-    if scene.contact.law == "compliance":
-        return [("energy", 0), ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
-    return [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
+    energy = [("energy", 0), ("energy", 1), ("energy", 2)]
+    if scene.contact.rigid:
+        return [*energy, ("hermite", 1), ("hermite", 2)]
+    return [*energy, ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
 
 
 def _sizes(scene: Scene) -> list[float]:
@@ -90,7 +91,7 @@ def _macro_steps(scene: Scene) -> Iterator[Configuration]:
 
 
 def _best_schemes(scene: Scene) -> list[tuple[str, int]]:
-    return [("energy", 0)] if scene.contact.law == "compliance" else [("energy", 2), ("hermite", 2)]
+    return [("energy", 2), ("hermite", 2)] if scene.contact.rigid else [("energy", 2)]
 
 
 def _ida(scene: Scene) -> Iterator[Configuration]:
@@ -156,7 +157,8 @@ def _rivals(scene: Scene) -> Iterator[Configuration]:
     for method, tolerances in SCIPY_TOLERANCES.items():
         for rtol in tolerances:
             yield Configuration(method, f"rtol {rtol:.0e}", scene, method, rtol)
-    if scene.beam is not None and scene.spring is not None and scene.stop is not None:
+    joined_for_good = scene.contact.law in ("tie", "link")  # Algorithm 1 lets go
+    if scene.beam is not None and scene.spring is not None and scene.stop is not None and not joined_for_good:
         for H in _sizes(scene):
             paper = {"contact": {"law": "paper"}, "coupling": {"scheme": "energy", "degree": 0, "macro_step": H}}
             for changed in _changed(scene, beam={"n_modes": 0}, **paper):
