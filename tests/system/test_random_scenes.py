@@ -213,12 +213,12 @@ def interrupting(write: Callable[..., None]) -> Callable[..., None]:
     """Ctrl-C for a run of many rows: adaptive steps may be small, and bouncing without end."""
     rows = 0
 
-    def written(self: Rows, state: Any) -> None:
+    def written(self: Rows, state: Any, step: Any) -> None:
         nonlocal rows
         rows += 1
         if rows > MOST_ROWS:
             raise KeyboardInterrupt
-        write(self, state)
+        write(self, state, step)
 
     return written
 
