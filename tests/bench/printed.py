@@ -16,7 +16,7 @@ from springbeam.scene import Scene
 
 
 def simulate(scene: Scene) -> Trajectory:
-    """As `springbeam.monolithic.algorithm1.simulate`, with its defaults."""
+    """Run Algorithm 1 as printed; arguments are the defaults of `springbeam.monolithic.algorithm1.simulate`."""
     start_velocity: algorithm1.StartVelocity = "tip" if scene.contact.impact == "tip" else "rest"
     return _AsPrinted(scene, start_velocity, "equation", 1e-12).run()
 

@@ -136,7 +136,7 @@ def test_outputs_follow_between_steps_what_is_declared(case: Any) -> None:
 
 
 def test_directional_derivatives_are_those_of_the_outputs(case: Any) -> None:
-    """Of every output by every continuous input, against the difference over a small change of it."""
+    """Derivatives of every output by every continuous input, against the difference over a small change of it."""
     inputs = [v.name for v in case.fmu.description.modelVariables if v.causality == "input"]
     inputs = [name for name in inputs if case.fmu.variables[name].variability == "continuous"]
     outputs = case.fmu.outputs

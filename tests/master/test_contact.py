@@ -115,7 +115,7 @@ def test_a_meeting_at_the_equilibrium_is_told_by_the_velocity(y, speed, joint):
     """Within rounding of Ψ: tied while rising it would be released at once, and meet again, for ever."""
     transitions = Transitions(load_scene("soft"), Transmission(), tip_mass=0.01, mass=1.0, fastest=lambda: 0.3)
     end = Motion(y, speed, 0.0, 0.0)
-    _, phase, impact = transitions.happens("impact", Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
+    _, phase, impact = transitions.after("impact", Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
     assert phase.joint is joint
     assert impact.energy_loss == 0.0
 
@@ -127,7 +127,7 @@ def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, 
     z, tip_mass, mass = 0.5, 0.01, 1.0
     transitions = Transitions(load_scene("soft"), Transmission(), tip_mass, mass, fastest=lambda: 1.0)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0)
-    _, phase, impact = transitions.happens(kind, Phase(Joint.TIED), ends, 0.0, ends, -1.0, 1e-17)
+    _, phase, impact = transitions.after(kind, Phase(Joint.TIED), ends, 0.0, ends, -1.0, 1e-17)
     assert phase.joint is Joint.FREE
     v_after, z_after = after(impact, v, z, tip_mass, mass)
     if one_velocity:

@@ -36,14 +36,14 @@ def test_the_step_after_an_impact_is_short_and_the_next_one_back_on_the_grid():
     grid = MacroGrid(1.0, 2.0, H)
     for struck, ends in [(1.0, (1.0125, 1.1)), (1.15, (1.1625, 1.2)), (1.28, (1.2925, 1.4)), (1.495, (1.5075, 1.6))]:
         grid.reached(struck)
-        grid.struck()
+        grid.shorten_after_impact()
         for start, end in pairwise((struck, *ends)):
             target, size = grid.next(start)
             assert target == pytest.approx(end, abs=1e-12)
             assert size == pytest.approx(end - start, abs=1e-12)
             grid.reached(target)
     grid.reached(1.99)
-    grid.struck()
+    grid.shorten_after_impact()
     assert grid.next(1.99) == (2.0, 2.0 - 1.99)
 
 

@@ -46,7 +46,7 @@ class Fault:
     skip: int = 3
     happened: int = 0
 
-    def happens(self, fmu: str, function: str, where: str) -> bool:
+    def after(self, fmu: str, function: str, where: str) -> bool:
         if (fmu, function) != (self.fmu, self.function) or (self.once and self.happened):
             return False
         if not self.happened:
@@ -128,7 +128,7 @@ class Function:
 
     def __call__(self, *arguments: Any) -> Any:
         script = self._script
-        fault = next((f for f in script.faults if f.happens(self._fmu, self._name, script.where)), None)
+        fault = next((f for f in script.faults if f.after(self._fmu, self._name, script.where)), None)
         if fault is None:
             result = self._function(*arguments)
         elif fault.kind == "raise":

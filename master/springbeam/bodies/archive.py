@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
-#: Of all members together, and members, of an archive.
+#: Largest size of all members of an archive together, and largest number of them.
 MOST_BYTES, MOST_MEMBERS = 1 << 28, 10_000
 _ENCRYPTED = 0x1
 

@@ -71,7 +71,7 @@ def sign_changes(force: Force, size: float) -> list[float]:
 
 
 def shifted(force: Force, tau: float) -> Force:
-    """The same polynomial, seen from τ on."""
+    """Return the polynomial in the time from τ on."""
     if force[1] == 0.0 == force[2]:
         return force
     return (value(force, tau), force[1] + tau * force[2], force[2])

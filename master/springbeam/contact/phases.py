@@ -38,7 +38,7 @@ class Phase:
 
     @cached_property
     def name(self) -> str:
-        """As in the column ``phase``."""
+        """Name in the column ``phase``."""
         return "seated" if self.seated else self.joint.value
 
     def __str__(self) -> str:
@@ -118,7 +118,7 @@ class Transitions(Memory):
         self._scene, self._tip_mass, self._mass, self._fastest = scene, tip_mass, mass, fastest
         self._fastest_impact = 0.0
 
-    def happens(
+    def after(
         self,
         kind: str,
         phase: Phase,

@@ -190,7 +190,7 @@ class StepSolver(Coupling):
             if tried is not a:  # below, the difference is rounding and would spoil what is known
                 descent = broyden(descent, step, residual)
             stagnates = norm > _STAGNATES * previous
-            # Of a size that comes again S is measured once: it then saves a step of the lower body in most.
+            # S is measured once, when a size comes again: it then saves a step of the lower body in most.
             if (stagnates and not fresh) or not (first or measured):
                 length = 1e-4 * max(abs(lower_end.displacement), size * abs(lower_end.velocity))
                 S = self._measure(lower, time, size, a, r_lower, length)

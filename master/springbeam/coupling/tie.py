@@ -39,7 +39,7 @@ class Tie(StepSolver):
             work = abs(force.work(step.contact, gaps[1], size))
             of_energy = work / scales.energy if work > 0.0 else 0.0
             return [(of_length, order), (of_energy, order + 1)]
-        # Of the motion's energy, and of its length (all that a massless tip has).
+        # Relative to the motion's energy, and to its length (all that a massless tip has).
         created, order = energy.created_mismatch(gaps[0], gaps[1], degree), energy.ORDER_CREATED[degree]
         of_energy = created * sqrt(0.5 * scales.reduced_mass / scales.energy) if scales.energy > 0.0 else 0.0
         return [(of_energy, order), (size * created / (6.0 * scales.span), order + 1)]

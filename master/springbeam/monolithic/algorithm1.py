@@ -243,7 +243,7 @@ class _Algorithm:
         return Event(self.time, "impact", y, z, float(q[-1]), float(v[-1]))
 
     def _right_side(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Of (62), without a force on the tip."""
+        """Return the right side of (62) without a force on the tip."""
         right: np.ndarray = self.B @ q + 4.0 * self.h * (self.discrete.M @ v) + 2.0 * self.h**2 * self.load
         return right
 

@@ -176,7 +176,7 @@ def _convolve(s: np.ndarray, size: float) -> np.ndarray:
 
 
 def _polynomial_response(s: np.ndarray, size: float) -> np.ndarray:
-    """The same for fast roots: with the polynomial p of p'/h − s p = ℓ_k it is p(τ) − e^{sτ} p(0)."""
+    """Return the weights of fast roots: with the polynomial p of p'/h − s p = ℓ_k it is p(τ) − e^{sτ} p(0)."""
     operators = _DERIVATIVE / size - s[:, None, None] * np.eye(STAGES)
     p = np.linalg.solve(operators, np.broadcast_to(GAUSS.transform, operators.shape))  # (len(s), legendre, k)
     decay = np.exp(s[:, None] * TARGETS * size)

@@ -30,7 +30,7 @@ from .stepping import Pair, State
 _UNSURE, _MAX_DIP_TRIALS = 0.25, 4
 #: An event closer to the start of a step than this fraction of H happens at the start.
 _NO_TIME = 1e-9
-#: Of a velocity, relative to the largest so far.
+#: Rounding of a velocity, relative to the largest so far.
 _VELOCITY_ROUNDING = 16.0 * 2.0**-52
 
 
@@ -66,8 +66,8 @@ class Detector:
         """What positions can be told apart to [m]."""
         return position_tolerance(ends, self._level, self._steps.size)
 
-    def passed_at_once(self, ends: Ends) -> float:
-        """The same, or what the ends pass in no time [m]: an event there is at once with what is there."""
+    def simultaneity_tolerance(self, ends: Ends) -> float:
+        """Position tolerance plus the distance covered in `_NO_TIME`·H [m]; events within it are simultaneous."""
         speed = max(abs(end.velocity) for end in ends)
         return self.tolerance(ends) + _NO_TIME * self._steps.size * speed
 
@@ -99,14 +99,14 @@ class Detector:
             return step, found
         unilateral = self._separation.first(state, step, self._steps.size)
         if unilateral is None:
-            return self._pair.settled(state, step), found
+            return self._pair.repeated(state, step), found
         cut, kind = unilateral
         if 0.0 < cut.size < step.size:
             # Under the force of the shorter step the ends move differently: they may strike something before.
             cut, found = self._first_by_position(state, cut)
             if found is not None:
-                return cut if cut.size == 0.0 else self._pair.settled(state, cut), found
-        return self._pair.settled(state, cut) if cut.size > 0.0 else cut, kind
+                return cut if cut.size == 0.0 else self._pair.repeated(state, cut), found
+        return self._pair.repeated(state, cut) if cut.size > 0.0 else cut, kind
 
     def _first_by_position(self, state: State, step: Step) -> tuple[Step, str | None]:
         """The step, cut to the first event that positions tell of, and its kind; of size 0 if it is at the start."""

@@ -14,9 +14,9 @@ from ..scene.tables import ORDINARY_SCHEMES
 
 #: Relative energy residual up to which a coupling that creates no energy is exact: rounding and solvers' tolerances.
 EXACT = 1e-8
-#: The same where a scheme, an integrator or Algorithm 1 changes the energy itself.
+#: Largest such residual where a scheme, an integrator or Algorithm 1 changes the energy itself.
 APPROXIMATE = 1e-3
-#: A solver's tolerance counts so often: 1e-12 is `EXACT`.
+#: Energy-error allowance per unit of solver tolerance: 1e-12 gives `EXACT`.
 _TOLERANCES = EXACT / 1e-12
 
 

@@ -58,8 +58,8 @@ class MacroGrid(Memory):
         while start + (self._index + 1) * H <= latest:
             self._index += 1
 
-    def struck(self) -> None:
-        """An impact has just changed velocities."""
+    def shorten_after_impact(self) -> None:
+        """Let the next step be short: an impact has just changed velocities, and ends that have met may part again."""
         self._struck = True
 
 
@@ -95,10 +95,10 @@ class AdaptiveSteps(Memory):
         return (self._end, left) if left <= (1.0 + _SHORT_REMAINDER) * size else (time + size, size)
 
     def reached(self, time: float) -> None:
-        """Events shift what follows."""
+        """Do nothing: events shift what follows."""
 
-    def struck(self) -> None:
-        """Error estimates tell by themselves."""
+    def shorten_after_impact(self) -> None:
+        """Do nothing: error estimates tell how long steps may be."""
 
     def judge(self, size: float, error: float, order: int) -> bool:
         """Whether a step of ``size`` [s] with ``error`` (1 is the tolerance) holds; `size` is then that of the next.

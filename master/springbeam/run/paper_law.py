@@ -250,7 +250,7 @@ class PaperLaw(Memory):
         self.recorder.shape(self.time, self._beam.shape())
 
     def summary(self) -> dict[str, Any]:
-        """As of `springbeam.run.simulation.Simulation`, with what the algorithm injected [J]."""
+        """Return what `springbeam.run.simulation.Simulation` does, with what the algorithm injected [J]."""
         warnings = ["contact.law = 'paper' overwrites the tip's position: the energy residual is what that injects"]
         unresolved = not_resolved(self.scene, 0.0, 0.0)
         if unresolved is not None:

@@ -44,7 +44,7 @@ class Rows(Memory):
         self._shapes_left = _SHAPES_AFTER_CONTACT
         self._next_shape = start_time
         self._equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
-        #: Of the two forces that the paper adds up, the one inside a rigid contact.
+        #: The normal-compliance part of a rigid contact's force, as the paper has it.
         self._inside = Compliance(scene.contact.stiffness, scene.contact.exponent)
         length = scene.time.t_end - start_time or 1.0  # 0 where contact is at t_end: the one shape is that of the start
         self._shape_every = length / _SHAPES_OVER_RUN

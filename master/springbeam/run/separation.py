@@ -64,7 +64,7 @@ class Separation:
             # The sign at the start may be a false alarm: it is one if the ends, let go, close.
             if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, push.event):
                 return self.no_step(step), push.event
-            step = self._pair.settled(state, step)
+            step = self._pair.repeated(state, step)
         if not falling:
             return None
         # The polynomial tells where the force of the step vanishes; the step is repeated until it ends there.
@@ -92,7 +92,7 @@ class Separation:
         if zero <= self._no_time * macro_step:
             return self.no_step(step), push.event
         if zero >= step.size:
-            return self._pair.settled(state, step), push.event
+            return self._pair.repeated(state, step), push.event
         return self._pair.attempt(state, zero, step.start), push.event
 
     def _opens(self, state: State, step: Step, event: str) -> bool:

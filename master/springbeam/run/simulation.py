@@ -202,7 +202,7 @@ class Simulation(Memory):
     # -- events -----------------------------------------------------------------------------------------------------
 
     def _count_events(self, end: float, size: float) -> None:
-        """Of a step that ends at ``end`` [s] after ``size`` [s], maybe on an event. Raises RunStopped."""
+        """Count a step that ends at ``end`` [s] after ``size`` [s]. Raises RunStopped if events crowd."""
         H = self._steps.size
         if size >= H:
             self._at_once = self._in_step = (1, end)
@@ -243,12 +243,12 @@ class Simulation(Memory):
         if kind == "impact":
             state.reclosed = state.time - self._last_opening <= _AT_ONCE * self._steps.size
         ends = pair.ends()
-        tolerance = self._detector.passed_at_once(ends) if kind == "impact" else self._detector.tolerance(ends)
-        kind, phase, impact = self._transitions.happens(
+        tolerance = self._detector.simultaneity_tolerance(ends) if kind == "impact" else self._detector.tolerance(ends)
+        kind, phase, impact = self._transitions.after(
             kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
         )
         if kind in ("impact", "stop_impact"):
-            self._steps.struck()
+            self._steps.shorten_after_impact()
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.follow_phase(phase)
         self._ledger.impact_loss += lost

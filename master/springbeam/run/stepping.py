@@ -152,8 +152,8 @@ class Pair(Memory):
         self.spring.advance(time, size, NO_FORCE, (static, 0.0, 0.0))
         return (contact[0] + static, contact[1], contact[2])
 
-    def settled(self, state: State, step: Step) -> Step:
-        """Leave the bodies at the end of ``step`` (a look inside it may have moved them)."""
+    def repeated(self, state: State, step: Step) -> Step:
+        """Leave the bodies at the end of ``step``, repeating it if a look inside it has moved them."""
         return step if step is self._last else self.attempt(state, step.size, step.start)
 
     def apply_impulses(self, on_beam: float, on_spring: float) -> None:
