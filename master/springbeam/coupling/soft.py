@@ -22,7 +22,7 @@ from ..contact.laws import SoftLaw
 from . import energy
 from .projection import Projected, Projection
 from .protocol import Booking, Coupling, Ends, ErrorEstimate, NotConverged, Scales, Step, Window
-from .small import Matrix, Vector, inverse, times
+from .small import Matrix, Vector, inverse, inverse_by_minors, times
 from .solver import StepSolver
 
 _MAX_NEWTON, _MAX_DAMPING = 60, 8
@@ -153,13 +153,14 @@ class _Line:
         moved = times(self._descent, list(map(sub, x, self._x)))
         return [m - softness * new + old for m, new, old in zip(moved, a, self._a, strict=True)]
 
-    def _correction(self, slope: Matrix, residual: Vector, softness: float) -> Vector:
-        """Return (E + A′)⁻¹ times ``residual``."""
-        stiffness = [
-            [softness * s - d for s, d in zip(row, line, strict=True)]
-            for row, line in zip(slope, self._descent, strict=True)
-        ]
-        return times(inverse(stiffness), residual)
+    def _flexibility(self, slope: Matrix, softness: float) -> Matrix:
+        """Return (E + A′)⁻¹ [m/N], of the law times ``softness``."""
+        return inverse_by_minors(
+            [
+                [softness * s - d for s, d in zip(row, line, strict=True)]
+                for row, line in zip(slope, self._descent, strict=True)
+            ]
+        )
 
     def _bracketed(self) -> tuple[Vector, Projected]:
         """Degree 0: Newton's method, kept between bounds that f's sign tells."""
@@ -183,7 +184,8 @@ class _Line:
         projected = self._law(x)
         residual = self._residual(x, projected.a, softness)
         for _ in range(_MAX_NEWTON):
-            change = self._correction(projected.slope, residual, softness)
+            flexibility = self._flexibility(projected.slope, softness)
+            change = times(flexibility, residual)
             length = max(map(abs, change))
             scale = max(abs(self._start), *map(abs, x))
             share = 1.0
@@ -193,7 +195,7 @@ class _Line:
                 left = self._residual(tried, there.a, softness)
                 if length <= _LAST_STEP * scale:
                     return tried, there
-                following = max(map(abs, self._correction(projected.slope, left, softness)))
+                following = max(map(abs, times(flexibility, left)))
                 if following <= (1.0 - 0.25 * share) * length:
                     break
                 share *= 0.5
