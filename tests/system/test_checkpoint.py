@@ -193,7 +193,8 @@ def test_a_run_without_checkpoints_says_how_to_take_them(interrupted):
     assert "no checkpoint; springbeam run --checkpoint SECONDS takes them" in result.stderr
 
 
-def test_a_folder_that_is_no_run(tmp_path):
+def test_a_folder_that_is_no_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # elsewhere there may be runs, which the message would name
     result = command("resume", tmp_path)
     assert result.exit_code == 2
     assert "holds no run; springbeam run SCENE --out DIR makes one" in result.stderr
