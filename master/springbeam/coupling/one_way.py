@@ -52,6 +52,10 @@ class OneWay(Coupling):
     def iterations(self) -> int:
         return self._solver.iterations
 
+    @property
+    def reduced(self) -> int:
+        return self._solver.reduced
+
     def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
         driver, driven = (upper, lower) if self._upper_drives else (lower, upper)
         driver.rewind()

@@ -47,33 +47,40 @@ class SoftSolver(Coupling):
         Tolerance as of `StepSolver`.
     """
 
-    REMEMBERED = ("_solver", "_simpler", "reduced", "dissipated")
+    REMEMBERED = ("_solver", "_simpler", "_simplified", "_reduced", "dissipated")
 
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
         self.law, self.degree = law, degree
         self._solver = _Crossing(law, degree, tolerance)
         self._simpler = _Crossing(law, 0, tolerance) if degree > 0 else None
-        self.reduced = 0
+        self._simplified, self._reduced = False, 0  #: the last step tried, and the steps made
         self.dissipated = 0.0  #: by the law since the start [J]
 
     @property
     def iterations(self) -> int:
         return self._solver.iterations + (0 if self._simpler is None else self._simpler.iterations)
 
+    @property
+    def reduced(self) -> int:
+        return self._reduced
+
     def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
+        self._simplified = False
         try:
             return self._solver.solve(upper, lower, window, guess)
         except NotConverged:
             if self._simpler is None:
                 raise
-        found = self._simpler.solve(upper, lower, window, (guess[0], 0.0, 0.0))
-        self.reduced += 1
-        return found
+        self._simplified = True
+        return self._simpler.solve(upper, lower, window, (guess[0], 0.0, 0.0))
 
     def accept(self, step: Step) -> None:
+        self._reduced += self._simplified
         if self.law.damped:
-            work, stored = self._work(step)
-            self.dissipated += work - stored
+            start, x = penetration(step, self.degree)
+            a = force.legendre(step.contact, step.size, self.degree)
+            stored = self.law.potential(x[0]) - self.law.potential(start)
+            self.dissipated += self._solver.projection.work(a, start, x) - stored
 
     def booking(self, ends: Ends) -> Booking:
         tip, low = ends
@@ -86,13 +93,6 @@ class SoftSolver(Coupling):
         if left_out == 0.0 or scales.reduced_mass == 0.0:
             return []
         return [(step.size * left_out / (6.0 * scales.reduced_mass * scales.speed), self.degree + 2)]
-
-    def _work(self, step: Step) -> tuple[float, float]:
-        """Return the work of C on the law over ``step``, and what the law has stored of it [J]."""
-        start, x = penetration(step, self.degree)
-        a = force.legendre(step.contact, step.size, self.degree)
-        stored = self.law.potential(x[0]) - self.law.potential(start)
-        return self._solver.projection.work(a, start, x), stored
 
 
 def penetration(step: Step, degree: int) -> tuple[float, Vector]:
