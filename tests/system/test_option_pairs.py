@@ -62,17 +62,7 @@ OPTIONS = {
 }
 
 
-#: Pairs that end otherwise today, and how.
-KNOWN = {
-    ("macro step", "paper"): "1e45 m before the last, shorter step: the tip's response to a force is lost in rounding",
-}
-PAIRS = [
-    pytest.param(pair, marks=[pytest.mark.xfail(reason=KNOWN[pair])] if pair in KNOWN else [], id=" + ".join(pair))
-    for pair in combinations(OPTIONS, 2)
-]
-
-
-@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("pair", combinations(OPTIONS, 2), ids=" + ".join)
 def test_a_pair_runs_or_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pair: tuple[str, str]) -> None:
     monkeypatch.chdir(tmp_path)
     # Composed, not painted: tests/master/test_plots.py looks at the pictures.
