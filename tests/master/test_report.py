@@ -107,7 +107,7 @@ def test_every_scene_has_one_valid_page_that_loads_nothing(scene, expected):
     assert "url(" not in found.texts["<style>"]
     assert expected | {"motion", "slider", "play", "numbers", "scene", "reproduce", "about"} <= set(found.ids)
     data = found.data
-    assert {"motion", *data["overTime"]} == set(data["charts"])
+    assert {*data["motion"]["parts"], *data["overTime"]} == set(data["charts"])
     assert set(data["charts"]) <= set(found.ids)
     absent = {"u_tip": scene.beam, "y": scene.spring, "foundation_force": scene.stop}
     assert not [name for name, body in absent.items() if body is None and name in curves(data)]
@@ -205,6 +205,28 @@ def test_many_events_are_not_drawn_through_the_charts_nor_all_listed():
     assert "100 more are in events.csv" in many.texts["events"]
 
 
+def test_a_cascade_of_impacts_is_one_line_that_opens():
+    bounces = [Event(0.1 + 0.01 * i, "stop_impact", 0, 0, 0, 0, 0.0, 0.5**i, 0.25**i) for i in range(5)]
+    text = page(
+        a_trajectory(
+            events=[Event(0.05, "impact", 0, 0, 0, 0), *bounces, dataclasses.replace(bounces[0], kind="seated")]
+        )
+    )
+    assert text.count('class="fold"') == text.count('class="members"') == 1
+    line = Page(text).texts["events"].split("5 × ")[1]
+    numbers = line.split("…")[1].split()
+    assert [float(number) for number in numbers[:2]] == [1.938, 1.332]  # Σ 2⁻ⁱ and Σ 4⁻ⁱ
+
+
+def test_the_page_opens_with_the_scene_the_motion_and_the_results():
+    run = dataclasses.replace(a_trajectory(), summary={"contact_force_max": 83.2, "contact_force_window": 1e-3})
+    found = Page(page(run))
+    assert found.ids[:2] == ["described", "animation"]
+    assert found.headings[1:3] == ["Motion", "Results"]
+    assert "peak contact force, mean over 0.001 s" in found.texts["results"]
+    assert "83.2 N" in found.texts["results"]
+
+
 def test_phases_are_shaded_where_they_hold():
     run = a_trajectory(phase=np.where(np.linspace(0.0, 0.6, 400) < 0.3, "tied", "free"))
     tied, free = Page(page(run)).data["backdrop"]
@@ -258,7 +280,20 @@ def test_a_beam_lost_beside_the_spring_is_drawn_once_more_enlarged():
     assert data["motion"]["parts"].keys() == {"motion", "motion-beam"}
     assert data["motion"]["parts"]["motion-beam"]["factor"] == pytest.approx(1e6)
     assert "position-u_tip" in data["overTime"]
-    assert Page(page(a_trajectory())).data["motion"]["parts"].keys() == {"motion"}
+    assert "motion-beam" not in Page(page(a_trajectory())).data["motion"]["parts"]
+
+
+def test_a_contact_lost_in_the_motion_is_drawn_once_more_enlarged():
+    t = np.linspace(0.0, 0.6, 400)
+    tip, joined = 0.07 * np.sin(9.0 * t), t > 0.5
+    place = 1e-3 * (t - 0.5)
+    run = a_trajectory(u_tip=np.where(joined, place, tip), y=place, phase=np.where(joined, "tied", "free"))
+    chart = Page(page(run)).data["charts"]["motion-contact"]["layout"]
+    room = 0.3 * float(np.ptp(place[joined]))
+    assert chart["yaxis"]["range"] == pytest.approx([1e6 * (place[joined][0] - room), 1e6 * (1e-4 + room)])
+    assert chart["yaxis"]["title"]["text"] == "height [µm]"
+    whole = a_trajectory(phase=np.full(400, "tied"), y=0.4 * np.sin(9.0 * t), u_tip=0.4 * np.sin(9.0 * t))
+    assert "motion-contact" not in Page(page(whole)).data["motion"]["parts"]
 
 
 # -- what is wrong with them --------------------------------------------------------------------------------------

@@ -7,22 +7,23 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jinja2
 import numpy as np
 import tomli_w
 from plotly.offline import get_plotlyjs
 
-from ...results.trajectory import Trajectory, rounded
+from ...results.totals import LOSS_NAMES
+from ...results.trajectory import Event, Trajectory, rounded
 from ...scene import Scene, load_scene, shipped_scenes
 from ..drawing import (
     ALTERNATES,
     EVENT_LOOKS,
     FORCES,
-    IMPULSES,
     POSITIONS,
     alternating,
     mark,
@@ -31,7 +32,8 @@ from ..drawing import (
 )
 from ..frames import Frames, frames_of
 from .chart import Chart
-from .moving import moving_charts, moving_parts
+from .described import described
+from .moving import MovingChart, moving_charts, moving_parts
 from .over_time import backdrop, charts, event_key, phase_key, time_unit
 
 _HERE = Path(__file__).parent
@@ -39,6 +41,18 @@ _HERE = Path(__file__).parent
 _EVENTS_SHOWN = 200
 _EVENT_UNITS = {"y": "m", "z": "m/s", "u_tip": "m", "v_tip": "m/s"}
 _FORCES_READ = ("contact_force", "foundation_force")
+#: So many events of a kind in succession are a cascade.
+_CASCADE = 4
+_RESULT_WORDS = {
+    "contact_force_max": ("peak contact force", "N"),
+    "contact_impulse": ("impulse of the contact, ∫ C dt and impacts", "N·s"),
+    "contact_duration": ("longest contact", "s"),
+    "contact_duration_total": ("all contacts together", "s"),
+    "rebound_velocity": ("velocity of the tip when it last leaves", "m/s"),
+    "deepest_tip": ("lowest place of the tip", "m"),
+    "stop_strokes": ("strokes on the foundation", ""),
+    "foundation_impulse": ("impulse of the foundation", "N·s"),
+}
 
 
 def page(trajectory: Trajectory) -> str:
@@ -72,7 +86,9 @@ def page(trajectory: Trajectory) -> str:
         phases=phase_key(trajectory) if drawable else [],
         event_key=event_key(trajectory),
         numbers=list(_numbers(trajectory)),
-        events=events,
+        described=list(described(scene)),
+        results=list(_results(trajectory.summary)),
+        events=list(_folded(events)),
         event_values=values,
         event_scales={name: max((abs(getattr(e, name) or 0.0) for e in events), default=0.0) for name in values},
         rounded=rounded,
@@ -127,6 +143,37 @@ def _warnings(trajectory: Trajectory) -> list[str]:
     return found
 
 
+def _results(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Return words and values of what the run amounts to (`springbeam.results.totals`)."""
+    for name, (words, unit) in _RESULT_WORDS.items():
+        if name in summary and (summary[name] or not unit):
+            window = f", mean over {summary['contact_force_window']:.4g} s" if name == "contact_force_max" else ""
+            yield words + window, f"{summary[name]:.5g} {unit}".rstrip()
+    for name, words in LOSS_NAMES.items():
+        if summary.get(name):
+            yield f"energy lost by {words}", f"{summary[name]:.4g} J"
+
+
+class _Folded(NamedTuple):
+    """Events that the table shows as one line, which opens."""
+
+    kind: str
+    events: list[Event]
+    impulse_contact: float
+    impulse_foundation: float
+    energy_loss: float
+
+
+def _folded(events: list[Event]) -> Iterator[_Folded]:
+    """Return the events, cascades of a kind together and all others alone."""
+    for kind, some in groupby(events, key=lambda event: event.kind):
+        same = list(some)
+        parts = [same] if len(same) >= _CASCADE else [[event] for event in same]
+        for part in parts:
+            sums = (sum(getattr(e, name) for e in part) for name in _Folded._fields[2:])
+            yield _Folded(kind, part, *sums)
+
+
 def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
     """Return words and values for the table of numbers."""
     summary, columns = trajectory.summary, trajectory.columns
@@ -155,18 +202,11 @@ def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
         if name in columns:
             yield extreme(name, f"lowest {look.words}", "m", np.argmin)
             yield extreme(name, f"highest {look.words}", "m", np.argmax)
-    for name, words in (("contact_force", "largest contact force"), ("foundation_force", "largest foundation force")):
-        if name in columns and np.any(columns[name] != 0.0):
-            yield extreme(name, words, "N", np.argmax)
-    for name, look in IMPULSES.items():
-        if total := sum(getattr(event, name) for event in trajectory.events):
-            yield f"sum of impulses {look.words}", f"{total:.6g} N·s"
-    for name, words in (("e_dissipated", "dissipated by damping"), ("e_impact_loss", "lost in impacts")):
-        if columns[name][-1] != 0.0:
-            yield f"energy {words}", f"{columns[name][-1]:.6g} J"
 
 
-def _data(trajectory: Trajectory, over_time: list[Chart], moving: list[Chart], frames: Frames | None) -> dict[str, Any]:
+def _data(
+    trajectory: Trajectory, over_time: list[Chart], moving: list[MovingChart], frames: Frames | None
+) -> dict[str, Any]:
     unit = time_unit(trajectory)
     data: dict[str, Any] = {
         "unit": {"factor": unit.factor, "name": unit.name},
@@ -181,7 +221,7 @@ def _data(trajectory: Trajectory, over_time: list[Chart], moving: list[Chart], f
             "readings": list(_readings(trajectory, frames)),
             "deflection": frames.deflection,
             "y": frames.y,
-            "parts": {chart.name: moving_parts(trajectory, frames, chart) for chart in moving},
+            "parts": {chart.name: moving_parts(frames, chart) for chart in moving},
         }
     return data
 

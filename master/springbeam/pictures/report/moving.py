@@ -1,7 +1,8 @@
-"""The charts of the report over x, which the page's script moves: beam and spring, and the beam enlarged."""
+"""The charts of the report over x, which the page's script moves: beam and spring, and what of them is small."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,31 +27,52 @@ from ..drawing import (
 from ..frames import COIL_ACROSS, COIL_HEIGHTS, COIL_WIDTH, STOP_WIDTH, Frames
 from .chart import Chart, layout, line_style
 
+#: The contact is drawn once more where its heights are a smaller part than this of the whole picture's, with as much
+#: room around; from so far along the beam.
+_SMALL, _ROOM, _NEAR_TIP = 0.2, 0.3, 0.8
 
-def moving_charts(trajectory: Trajectory, frames: Frames) -> list[Chart]:
-    """Draw beam and spring at the first frame; the beam once more, enlarged, if it is lost beside the spring's."""
-    found = [_whole(trajectory, frames)]
+
+@dataclass
+class MovingChart(Chart):
+    """A chart that the page's script moves."""
+
+    factor: float = 1.0  #: from metres to the unit of its heights
+
+
+def moving_charts(trajectory: Trajectory, frames: Frames) -> list[MovingChart]:
+    """Draw beam and spring at the first frame; once more, enlarged, what is too small to be seen in that picture."""
+    found = [_bodies("motion", "Motion", trajectory, frames, frames.low, frames.high, -0.02)]
+    if contact := _contact_heights(trajectory, frames):
+        found.append(_bodies("motion-contact", "The contact, enlarged", trajectory, frames, *contact, _NEAR_TIP))
     if frames.deflection is not None and "u_tip" in much_smaller(trajectory, present(trajectory, POSITIONS)):
         found.append(_beam_enlarged(trajectory, frames))
     return found
 
 
-def _height_units(trajectory: Trajectory, frames: Frames) -> list[Unit]:
-    """Return the units of the heights in `moving_charts`."""
-    whole = readable_unit([np.array([frames.low, frames.high])], "m")
-    return [whole] if frames.deflection is None else [whole, readable_unit([frames.deflection], "m")]
+def _contact_heights(trajectory: Trajectory, frames: Frames) -> tuple[float, float] | None:
+    """Return the heights [m] between which tip and spring touch, with room; ``None`` if the whole picture shows it."""
+    touching = trajectory["phase"] != "free"
+    heights = [trajectory[name][touching] for name in present(trajectory, POSITIONS)]
+    if len(heights) < 2 or not touching.any():
+        return None
+    low, high = min(float(part.min()) for part in heights), max(float(part.max()) for part in heights)
+    room = _ROOM * (high - low)
+    return (low - room, high + room) if 0.0 < high - low < _SMALL * (frames.high - frames.low) else None
 
 
-def _whole(trajectory: Trajectory, frames: Frames) -> Chart:
-    unit = _height_units(trajectory, frames)[0]
+def _bodies(
+    name: str, heading: str, trajectory: Trajectory, frames: Frames, low: float, high: float, begin: float
+) -> MovingChart:
+    """Draw both bodies between the heights ``low`` and ``high`` [m], from ``begin`` (a part of its length) on."""
+    unit = readable_unit([np.array([low, high])], "m")
     beam = trajectory.scene.beam
     along, length = length_along(trajectory.scene)
-    chart = Chart("motion", "Motion", go.Figure(layout=layout(380)))
+    chart = MovingChart(name, heading, go.Figure(layout=layout(380)), factor=unit.factor)
     figure = chart.figure
-    low, high = unit.factor * frames.low, unit.factor * frames.high
+    low, high = unit.factor * low, unit.factor * high
     figure.update_layout(hovermode="closest", margin_r=30)
     figure.update_yaxes(title_text=f"height [{unit.name}]", range=[low, high], zeroline=False)
-    figure.update_xaxes(range=[-0.02 * length, 1.12 * length], title_text=f"position along the beam x [{along.name}]")
+    figure.update_xaxes(range=[begin * length, 1.12 * length], title_text=f"position along the beam x [{along.name}]")
     if beam is None:
         figure.update_xaxes(visible=False, range=[0.5 * length, 1.5 * length])
     solid = {"type": "rect", "line": {"width": 0.0}, "fillcolor": STONE, "layer": "below"}
@@ -61,6 +83,8 @@ def _whole(trajectory: Trajectory, frames: Frames) -> Chart:
         )
     for symbol, value in frames.levels.items():
         level = unit.factor * value
+        if not low <= level <= high:
+            continue
         line = {"color": BLACK, **line_style(LEVEL_LINES[symbol])}
         ends = {"x0": length * (1.0 - STOP_WIDTH), "x1": length * (1.0 + STOP_WIDTH)}
         if symbol == "φ":
@@ -86,19 +110,17 @@ def _whole(trajectory: Trajectory, frames: Frames) -> Chart:
     return chart
 
 
-def _beam_enlarged(trajectory: Trajectory, frames: Frames) -> Chart:
-    unit = _height_units(trajectory, frames)[1]
+def _beam_enlarged(trajectory: Trajectory, frames: Frames) -> MovingChart:
     assert frames.deflection is not None
+    unit = readable_unit([frames.deflection], "m")
     along, length = length_along(trajectory.scene)
-    chart = Chart("motion-beam", "The beam alone, enlarged", go.Figure(layout=layout(240)))
+    figure = go.Figure(layout=layout(240))
     reach = 1.1 * unit.factor * float(np.max(np.abs(frames.deflection)))
-    chart.figure.update_layout(hovermode="closest", margin_r=30, showlegend=False)
-    chart.figure.update_xaxes(
-        range=[-0.02 * length, 1.12 * length], title_text=f"position along the beam x [{along.name}]"
-    )
-    chart.figure.update_yaxes(title_text=f"deflection u [{unit.name}]", range=[-reach, reach])
-    _add_beam(chart.figure, frames, length, unit)
-    return chart
+    figure.update_layout(hovermode="closest", margin_r=30, showlegend=False)
+    figure.update_xaxes(range=[-0.02 * length, 1.12 * length], title_text=f"position along the beam x [{along.name}]")
+    figure.update_yaxes(title_text=f"deflection u [{unit.name}]", range=[-reach, reach])
+    _add_beam(figure, frames, length, unit)
+    return MovingChart("motion-beam", "The beam alone, enlarged", figure, factor=unit.factor)
 
 
 def _add_beam(figure: go.Figure, frames: Frames, length: float, unit: Unit) -> None:
@@ -109,14 +131,11 @@ def _add_beam(figure: go.Figure, frames: Frames, length: float, unit: Unit) -> N
     )  # fmt: skip
 
 
-def moving_parts(trajectory: Trajectory, frames: Frames, chart: Chart) -> dict[str, Any]:
-    """Return what the page's script needs to move a chart of `moving_charts`: its traces by part, factor of heights."""
-    units = _height_units(trajectory, frames)
-    unit = units[0] if chart.name == "motion" else units[1]
-    parts = [trace.meta for trace in chart.figure.data]
+def moving_parts(frames: Frames, chart: MovingChart) -> dict[str, Any]:
+    """Return what the page's script needs to move ``chart``: its traces by part, factor of heights."""
     return {
-        "factor": unit.factor,
-        "traces": parts,
+        "factor": chart.factor,
+        "traces": [trace.meta for trace in chart.figure.data],
         "foot": frames.foot,
         "heights": COIL_HEIGHTS.tolist(),
     }

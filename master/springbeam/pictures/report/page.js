@@ -1,6 +1,14 @@
 "use strict";
 // Draws the charts of #data, moves the bodies with the slider, and keeps the time axes alike.
 (() => {
+  for (const button of document.querySelectorAll(".fold")) {
+    const members = button.closest("tbody").nextElementSibling;
+    members.hidden = true; // by the script: without one all events show
+    button.addEventListener("click", () => {
+      members.hidden = !members.hidden;
+      button.setAttribute("aria-expanded", String(!members.hidden));
+    });
+  }
   const page = JSON.parse(document.getElementById("data").textContent);
   if (!page) return;
   const PRINT_WIDTH = 680; // of A4 between its margins, in CSS pixels

@@ -1,0 +1,45 @@
+"""A scene in a few lines of words and numbers, for the head of its report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...scene import Scene
+from ...scene.statics import bending_stiffness, shear_stiffness
+
+_LAWS = {
+    "transmission": "the tip and the spring move together while they touch",
+    "tie": "tied for good",
+}
+
+
+def described(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Return what each part of the scene is, in the order of the drawing from above."""
+    beam, spring, stop, contact = scene.beam, scene.spring, scene.stop, scene.contact
+    if beam is not None:
+        mesh = "no inertia" if beam.fidelity == "quasi_static" else f"{beam.n_elements} elements"
+        if beam.fidelity != "quasi_static" and beam.n_modes:
+            mesh += f", {beam.n_modes} modes"
+        mass = beam.density * beam.area * beam.length
+        stiffness = f"EI = {bending_stiffness(beam):.4g} N·m², KAG = {shear_stiffness(beam):.4g} N"
+        yield "beam", f"length {beam.length:.4g} m, mass {mass:.4g} kg, stiffness {stiffness}; {mesh}"
+    if spring is not None:
+        cubic = f", cubic stiffness {spring.cubic_stiffness:.4g} N/m³" if spring.cubic_stiffness else ""
+        yield (
+            "spring",
+            (
+                f"mass {spring.mass:.4g} kg, stiffness {spring.linear_stiffness:.4g} N/m{cubic}, its top at rest at "
+                f"Ψ = {spring.equilibrium:.4g} m"
+            ),
+        )
+    if beam is not None and spring is not None:
+        soft = f"λ = {contact.stiffness:.4g}, exponent {contact.exponent:.4g}"
+        words = {"link": f"stiffness {contact.stiffness:.4g} N/m", "compliance": soft, "paper": soft}
+        yield "contact", f"{contact.law}: {(_LAWS | words)[contact.law]}"
+    if stop is not None:
+        yield "foundation", f"at φ = {stop.position:.4g} m, restitution {stop.restitution:.4g}"
+    coupling = scene.coupling
+    yield (
+        "steps",
+        f"{coupling.scheme} of degree {coupling.degree}, macro step {coupling.H:.4g} s, to {scene.time.t_end:.4g} s",
+    )
