@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <sstream>
 #include <stdexcept>
 
@@ -14,12 +15,15 @@
 namespace beam {
 namespace {
 
-[[noreturn]] void throw_not_finite(double size, const Polynomial& c, const Polynomial& f) {
+[[noreturn]] void throw_not_finite(double size, const Polynomial& c, const Loads& loads) {
   std::ostringstream message;
   message.precision(17);
   message << "beam: the result is not finite after a step of " << size << " s under the tip force " << c[0] << " N, "
-          << c[1] << " N/s, " << c[2] << " N/s2 and the load " << f[0] << " N/m, " << f[1] << " N/m/s, " << f[2]
-          << " N/m/s2; the state is unchanged, use a smaller step or smaller inputs";
+          << c[1] << " N/s, " << c[2] << " N/s2";
+  loads.for_each([&message](std::size_t i, const Polynomial& f) {
+    message << ", " << Loads::names[i] << " = " << f[0] << " and its derivatives " << f[1] << ", " << f[2];
+  });
+  message << "; the state is unchanged, use a smaller step or smaller inputs";
   throw std::domain_error(message.str());
 }
 
@@ -32,51 +36,71 @@ std::unique_ptr<Beam> make_beam(const Parameters& parameters) {
 }
 
 Beam::Beam(const Parameters& parameters, std::size_t motion_size)
-    : hat_(parameters.tip_load_coefficient), motion_size_(motion_size) {}
+    : hat_(parameters.tip_load_coefficient), motion_size_(motion_size) {
+  now_.loads[Loads::tip_load_coefficient] = hat_;
+}
 
-void Beam::step(double size, const Polynomial& c, const Polynomial& f) {
+void Beam::step(double size, const Polynomial& c, const Loads& loads) {
+  if (hat_ == 0.0) return step_under(size, c, loads);
+  Loads all = loads;
+  all.set(Loads::tip_load_coefficient, {hat_, 0.0, 0.0});
+  step_under(size, c, all);
+}
+
+void Beam::step_under(double size, const Polynomial& c, const Loads& loads) {
   require_step_size(size);
   double inputs = 0.0;
-  for (std::size_t i = 0; i < c.size(); ++i) inputs += std::abs(c[i]) + std::abs(f[i]);
+  for (const double value : c) inputs += std::abs(value);
+  loads.for_each([&inputs](std::size_t, const Polynomial& f) {
+    for (const double value : f) inputs += std::abs(value);
+  });
   if (!(inputs < ordinary)) {
     for (const double value : c) require_finite("tip_force and its derivatives", value);
-    for (const double value : f) require_finite("distributed_load and its derivatives", value);
+    loads.for_each([](std::size_t i, const Polynomial& f) {
+      for (const double value : f) require_finite(Loads::names[i], value);
+    });
   }
-  now_.dissipated = dissipated_energy();
+  book();
   const Scalars before = now_;
-  const double squares = advance(size, c, f);
+  const double squares = advance(size, c, loads);
   now_.tip_force = value_at(c, size);
-  now_.distributed_load = value_at(f, size);
+  now_.loads = {};
+  loads.for_each([&](std::size_t i, const Polynomial& f) { now_.loads[i] = value_at(f, size); });
   const bool harmless = ordinary_ && squares < ordinary && inputs < ordinary && size < ordinary_size;
   if (harmless || outputs_finite()) return;
   undo();
   now_ = before;
-  throw_not_finite(size, c, f);
+  throw_not_finite(size, c, loads);
 }
 
 void Beam::apply_tip_impulse(double impulse) {
   require_finite("tip_impulse [N.s]", impulse);
   if (!std::isfinite(tip_velocity() + impulse / tip_mass())) throw_not_finite(0.0, {impulse, 0.0, 0.0}, {});
+  book();
   strike(impulse);
 }
 
-void Beam::observe(double tip_force, double distributed_load) {
+void Beam::observe(double tip_force, const Loads& loads) {
   require_finite("tip_force [N]", tip_force);
-  require_finite("distributed_load [N/m]", distributed_load);
+  loads.for_each([](std::size_t i, const Polynomial& f) { require_finite(Loads::names[i], f[0]); });
   now_.tip_force = tip_force;
-  now_.distributed_load = distributed_load;
+  now_.loads = {};
+  now_.loads[Loads::tip_load_coefficient] = hat_;
+  loads.for_each([this](std::size_t i, const Polynomial& f) { now_.loads[i] = f[0]; });
 }
 
-double Beam::load_potential() const { return -(now_.distributed_load * deflection_integral() + hat_ * hat_work()); }
+double Beam::load_potential() const {
+  return -(now_.loads[Loads::distributed] * deflection_integral() + hat_ * hat_work());
+}
 
 bool Beam::outputs_finite() const {
   Shape u{}, theta{};
   deflection(u);
   rotation(theta);
   const auto finite = [](double value) { return std::isfinite(value); };
-  const std::array<double, 10> scalars{tip_displacement(), tip_velocity(),   tip_acceleration(), now_.integral,
+  const std::array<double, 11> scalars{tip_displacement(), tip_velocity(),   tip_acceleration(), now_.integral,
                                        now_.integral_2,    kinetic_energy(), strain_energy(),    dissipated_energy(),
-                                       load_potential(),   tip_rotation()};
+                                       load_work(),        load_potential(), tip_rotation()};
   return std::all_of(u.begin(), u.end(), finite) && std::all_of(theta.begin(), theta.end(), finite) &&
          std::all_of(scalars.begin(), scalars.end(), finite);
 }
@@ -106,14 +130,16 @@ class Beam::Trial {
 Beam::Forecast Beam::forecast(double size) {
   const Trial trial(*this);
   const double u = tip_displacement(), v = tip_velocity();
-  for (int i = 0; i < 2; ++i) step(size, {}, now_.distributed_load);
+  Loads loads;
+  for (std::size_t i = 0; i < Loads::count; ++i) loads.set(i, {now_.loads[i], 0.0, 0.0});
+  for (int i = 0; i < 2; ++i) step_under(size, {}, loads);
   return {(tip_displacement() - u) / (2.0 * size), (tip_velocity() - v) / (2.0 * size)};
 }
 
-Beam::Forecast Beam::forecast_per_load(double size) {
+Beam::Forecast Beam::forecast_per_load(double size, std::size_t shape) {
   Trial trial(*this);
   trial.clear();
-  observe(0.0, 1.0);
+  now_.loads[shape] = 1.0;
   return forecast(size);
 }
 
@@ -121,21 +147,18 @@ std::array<double, 2> Beam::tip_response(double size) {
   Trial trial(*this);
   trial.clear();
   std::array<double, 2> response{};
-  step(size, {1.0, 0.0, 0.0}, 0.0);
+  step(size, {1.0, 0.0, 0.0}, {});
   response[0] = tip_displacement();
-  step(size, {}, 0.0);
+  step(size, {}, {});
   response[1] = tip_displacement();
   return response;
 }
 
 void Beam::save(std::vector<double>& state) const {
-  now_.dissipated = dissipated_energy();
+  book();
   state.resize(motion_size_ + sizeof now_ / sizeof(double));
   save_motion(state.data());
-  double* rest = state.data() + motion_size_;
-  for (const double value : {now_.integral, now_.integral_2, now_.dissipated, now_.tip_force, now_.distributed_load}) {
-    *rest++ = value;
-  }
+  std::memcpy(state.data() + motion_size_, &now_, sizeof now_);
 }
 
 void Beam::require_state(const std::vector<double>& state) const {
@@ -149,8 +172,8 @@ void Beam::require_state(const std::vector<double>& state) const {
 
 void Beam::restore(const std::vector<double>& state) {
   restore_motion(state.data());
-  const double* rest = state.data() + motion_size_;
-  now_ = {rest[0], rest[1], rest[2], rest[3], rest[4]};
+  std::memcpy(&now_, state.data() + motion_size_, sizeof now_);
+  now_.loads[Loads::tip_load_coefficient] = hat_;
 }
 
 }  // namespace beam

@@ -1,6 +1,6 @@
 // The viscoelastic (Kelvin–Voigt) Timoshenko beam, clamped at x = 0, loaded at its tip x = L by the contact force C.
 // Semi-discrete form:  M q̈ + α_b K q̇ + K q = e C(t) + F,   q = (θ₁,u₁, …, θₙ,uₙ) for elements of degree 1,  e picks
-// u(L). Ahn & Tate, eqs. (1)–(5), (59).  Up is positive; C > 0 lifts the tip.
+// u(L), F what the loads below give. Ahn & Tate, eqs. (1)–(5), (59).  Up is positive; C > 0 lifts the tip.
 #pragma once
 
 #include <array>
@@ -45,6 +45,7 @@ struct Parameters {
   double initial_deflection_slope = 0.0;  ///< s in u⁰ = s·x [–]
   double initial_velocity_slope = 0.0;    ///< s in u_t⁰ = s·x [1/s]
   double tip_load_coefficient = 0.0;      ///< coefficient of the last hat function in f_b [N/m]
+  std::array<double, 4> point_force_position{0.5, 0.5, 0.5, 0.5};  ///< x/L of the point forces
 };
 
 /// f(τ) = f[0] + f[1] τ + f[2] τ²/2, τ [s] from a step's start: a value and its first two time derivatives there.
@@ -52,6 +53,50 @@ using Polynomial = std::array<double, 3>;
 
 inline double value_at(const Polynomial& f, double t) { return f[0] + t * (f[1] + 0.5 * t * f[2]); }
 inline double mean_over(const Polynomial& f, double h) { return f[0] + h * (f[1] / 2.0 + h * f[2] / 6.0); }
+
+/// What acts on the beam beside the tip force: each load has a shape in space and is a polynomial in time. The moving
+/// clamp's frame is not inertial: in it the beam is under the uniform load −ρA a.
+class Loads {
+ public:
+  enum Shape : std::size_t {
+    distributed = 0,            ///< four of them, f_b = (x/L)^i, i = 0 … 3 [N/m]
+    point = 4,                  ///< four of them, at point_force_position [N]
+    tip = 8,                    ///< [N]
+    base_acceleration = 9,      ///< a of the clamp [m/s²]
+    tip_load_coefficient = 10,  ///< f_b = the last hat function [N/m]: the parameter, never set from outside
+    count = 11
+  };
+  static constexpr std::array<const char*, count> names{
+      "distributed_load", "distributed_load_1", "distributed_load_2",  "distributed_load_3",
+      "point_force[1]",   "point_force[2]",     "point_force[3]",      "point_force[4]",
+      "tip_load",         "base_acceleration",  "tip_load_coefficient"};
+
+  Loads() = default;
+  Loads(const Polynomial& uniform) { set(distributed, uniform); }  // NOLINT(google-explicit-constructor)
+  Loads(double uniform) : Loads(Polynomial{uniform, 0.0, 0.0}) {}  // NOLINT(google-explicit-constructor)
+
+  void set(std::size_t shape, const Polynomial& value) {
+    values_[shape] = value;
+    const unsigned bit = 1U << shape;
+    acting_ = value == Polynomial{} ? acting_ & ~bit : acting_ | bit;
+  }
+  bool any() const { return acting_ != 0; }  ///< whether one is not 0
+
+  /// Calls use(shape, value) for each that is not 0, in ascending order: the others cost nothing.
+  template <class Use>
+  void for_each(const Use& use) const {
+    for (std::size_t shape = 0; acting_ >> shape != 0; ++shape) {
+      if ((acting_ >> shape & 1U) != 0) use(shape, values_[shape]);
+    }
+  }
+
+ private:
+  std::array<Polynomial, count> values_{};
+  unsigned acting_ = 0;  ///< a bit per shape
+};
+
+/// Of each load: what it is at one instant, or its mean.
+using LoadValues = std::array<double, Loads::count>;
 
 /// Points at which the shape is reported: x = 0, L/20, …, L.
 inline constexpr int shape_points = 21;
@@ -66,22 +111,19 @@ class Beam {
   Beam(const Beam&) = delete;
   Beam& operator=(const Beam&) = delete;
 
-  /// Advance by `size` [s] > 0 under the tip force C [N] and the uniform load f_b [N/m].
+  /// Advance by `size` [s] > 0 under the tip force C [N] and the loads.
   /// @throws std::invalid_argument for a step size that is not finite and > 0, or an input that is not finite
   /// @throws std::domain_error (state unchanged) if the result is not finite
-  void step(double size, const Polynomial& tip_force, const Polynomial& distributed_load);
-  void step(double size, const Polynomial& tip_force, double distributed_load) {
-    step(size, tip_force, Polynomial{distributed_load, 0.0, 0.0});
-  }
+  void step(double size, const Polynomial& tip_force, const Loads& loads);
 
   /// Instantaneous upward impulse J [N·s] at the tip: v += M⁻¹ e J.
   /// @throws as step()
   void apply_tip_impulse(double impulse);
 
-  /// Take C [N] and f_b [N/m] as acting now, for tip_acceleration() and load_potential(), which otherwise refer to the
-  /// end of the last step. The motion does not depend on it.
-  void observe(double tip_force, double distributed_load);
-  double distributed_load() const { return now_.distributed_load; }  ///< f_b acting now [N/m]
+  /// Take C [N] and the loads' values as acting now, for tip_acceleration() and load_potential(), which otherwise refer
+  /// to the end of the last step. The motion does not depend on it.
+  void observe(double tip_force, const Loads& loads);
+  const LoadValues& loads() const { return now_.loads; }  ///< acting now
 
   virtual double tip_displacement() const = 0;                            ///< u(L) [m]
   virtual double tip_velocity() const = 0;                                ///< u_t(L) [m/s]
@@ -91,8 +133,9 @@ class Beam {
   double tip_displacement_integral_2() const { return now_.integral_2; }  ///< ∫∫ u dτ dτ over it [m·s²]
   virtual double kinetic_energy() const = 0;                              ///< [J]
   virtual double strain_energy() const = 0;                               ///< [J]
-  virtual double dissipated_energy() const { return now_.dissipated; }    ///< by α_b since the start [J]
-  double load_potential() const;                                          ///< −qᵀF [J] of f_b and the hat load
+  double dissipated_energy() const { return book(), now_.dissipated; }    ///< by α_b since the start [J]
+  double load_work() const { return book(), now_.load_work; }             ///< of all loads since the start [J]
+  double load_potential() const;  ///< −qᵀF [J] of the uniform and the hat load, as if they were constant
   virtual double deflection_integral() const = 0;                 ///< ∫ u dx = −∂load_potential/∂f_b [m²]
   virtual double tip_mass() const = 0;                            ///< 1/(eᵀ M⁻¹ e) [kg]
   virtual double static_tip_compliance() const = 0;               ///< u(L) per unit static tip force [m/N]
@@ -108,8 +151,8 @@ class Beam {
   /// Under the load that load_potential() refers to, by two trial steps, which leave no trace.
   /// @throws as step()
   Forecast forecast(double size);
-  /// What 1 N/m of that load adds to the forecast, which is linear in it.
-  Forecast forecast_per_load(double size);
+  /// What a load adds to the forecast per unit, which is linear in it.
+  Forecast forecast_per_load(double size, std::size_t shape);
 
   /// What 1 N held over a step of `size` [s] adds to u(L) at that step's end, and at the end of another step without a
   /// force [m/N]. As the beam is linear, forces C₁, C₂ over the next two steps lead to
@@ -129,15 +172,17 @@ class Beam {
 
   /// Beside the motion, what a state has.
   struct Scalars {
-    double integral, integral_2, dissipated;
-    double tip_force, distributed_load;  // C [N] and f_b [N/m] at the end of the last step, or as observed since
+    double integral, integral_2, dissipated, load_work;
+    double tip_force;  // C [N] and the loads at the end of the last step, or as observed since
+    LoadValues loads;
   };
 
   /// Makes the step and changes `now_`, but for the loads. Returns a sum of squares of the new motion, see `ordinary`.
-  virtual double advance(double size, const Polynomial& tip_force, const Polynomial& distributed_load) = 0;
+  virtual double advance(double size, const Polynomial& tip_force, const Loads& loads) = 0;
   virtual void undo() = 0;  ///< takes the last advance() back, but for `now_`
   virtual void strike(double impulse) = 0;
-  virtual double hat_work() const = 0;                     ///< ∫ u ψ dx, ψ the tip's hat function [m²]
+  virtual void book() const {}          ///< adds to `now_` what the last step dissipated and its loads did
+  virtual double hat_work() const = 0;  ///< ∫ u ψ dx, ψ the tip's hat function [m²]
   virtual void save_motion(double* numbers) const = 0;     ///< motion_size of them
   virtual void restore_motion(const double* numbers) = 0;  ///< likewise
 
@@ -151,6 +196,7 @@ class Beam {
 
  private:
   class Trial;
+  void step_under(double size, const Polynomial& tip_force, const Loads& loads);
   bool outputs_finite() const;
   std::size_t motion_size_;
 };

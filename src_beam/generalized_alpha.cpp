@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -125,11 +126,12 @@ struct StepMatrix {
 /// The midpoint rule's w without tip force. It is linear in that force: a coupling that repeats a step from one state
 /// with other forces solves once.
 struct FreeStep {
-  double size = 0.0, load = 0.0, hat = 0.0;  // size 0: none
+  double size = 0.0;  // 0: none
+  LoadValues loads{};
   VectorXd q, v, w;
 
-  bool holds(double h, double mean_load, double hat_load, const VectorXd& q_now, const VectorXd& v_now) const {
-    return h == size && mean_load == load && hat_load == hat && q_now == q && v_now == v;
+  bool holds(double h, const LoadValues& mean_loads, const VectorXd& q_now, const VectorXd& v_now) const {
+    return h == size && mean_loads == loads && q_now == q && v_now == v;
   }
 };
 
@@ -148,8 +150,6 @@ class GeneralizedAlphaBeam final : public Beam {
         gamma_(0.5 - alpha_m_ + alpha_f_),
         K_(mesh_.stiffness()),
         M_(mesh_.mass()),
-        uniform_load_(mesh_.uniform_load()),
-        hat_load_(mesh_.hat_load()),
         tip_response_(mesh_.mass_solve(mesh_.unit_tip_force()) / mu_),
         q_(p.initial_deflection_slope * mesh_.linear_shape()),
         v_(p.initial_velocity_slope * mesh_.linear_shape()),
@@ -160,8 +160,8 @@ class GeneralizedAlphaBeam final : public Beam {
         rhs_(mesh_.size()) {
     const auto largest = [](const auto& values) { return values.cwiseAbs().maxCoeff(); };
     ordinary_ = true;
-    for (const double value : {largest(K_.coeffs()), largest(uniform_load_), std::abs(hat_) * largest(hat_load_),
-                               largest(tip_response_), mu_, 1.0 / mu_, alpha_, 1.0 / mesh_.radius_of_gyration()}) {
+    for (const double value : {largest(K_.coeffs()), largest(shape(Loads::distributed)), largest(tip_response_), mu_,
+                               1.0 / mu_, alpha_, 1.0 / mesh_.radius_of_gyration()}) {
       ordinary_ = ordinary_ && value < ordinary;
     }
   }
@@ -170,14 +170,14 @@ class GeneralizedAlphaBeam final : public Beam {
   double tip_velocity() const override { return v_[mesh_.tip_index()]; }
   double tip_acceleration() const override {
     VectorXd force = -mu_ * mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
-    force += now_.distributed_load * uniform_load_ + hat_ * hat_load_;
+    force += load_of(now_.loads);
     force[mesh_.tip_index()] += now_.tip_force;
     return tip_response_.dot(force);
   }
   double tip_rotation() const override { return q_[mesh_.tip_rotation_index()] / mesh_.radius_of_gyration(); }
   double kinetic_energy() const override { return 0.5 * mu_ * mesh_.mass_norm2(v_); }
   double strain_energy() const override { return 0.5 * mu_ * mesh_.stiffness_norm2(q_); }
-  double deflection_integral() const override { return uniform_load_.dot(q_); }
+  double deflection_integral() const override { return shape(Loads::distributed).dot(q_); }
   double tip_mass() const override { return 1.0 / tip_response_[mesh_.tip_index()]; }
   double static_tip_compliance() const override {
     return mesh_.flexibility_times(mesh_.unit_tip_force())[mesh_.tip_index()] / mu_;
@@ -189,18 +189,25 @@ class GeneralizedAlphaBeam final : public Beam {
   }
 
  private:
-  double advance(double h, const Polynomial& c, const Polynomial& f) override {
+  double advance(double h, const Polynomial& c, const Loads& loads) override {
     const StepMatrix& S = cache_.get(h, [this](double size, StepMatrix& matrix) { factorise(size, matrix); });
     q0_.swap(q_);
     v0_.swap(v_);
     a0_.swap(a_);
     before_ = last_;
-    const double loss = midpoint_ ? midpoint_step(S, h, mean_over(c, h), mean_over(f, h)) : alpha_step(S, h, c, f);
+    LoadValues inside{}, start{}, end{};  // inside: what the scheme sees
+    loads.for_each([&](std::size_t i, const Polynomial& f) {
+      inside[i] = midpoint_ ? mean_over(f, h) : value_at(f, (1.0 - alpha_f_) * h);
+      start[i] = f[0];
+      end[i] = value_at(f, h);
+    });
+    const double loss = midpoint_ ? midpoint_step(S, h, mean_over(c, h), inside) : alpha_step(S, h, c, start, inside);
+    loads.for_each([&](std::size_t i, const Polynomial&) { now_.load_work += inside[i] * shape(i).dot(q_ - q0_); });
     const double u0 = q0_[mesh_.tip_index()], u1 = q_[mesh_.tip_index()];
     now_.integral = 0.5 * h * (u0 + u1);
     now_.integral_2 = h * h * (2.0 * u0 + u1) / 6.0;
     now_.dissipated += loss;
-    last_ = {value_at(c, h), value_at(f, h), 0.0, 1.0};
+    last_ = {value_at(c, h), 0.0, 1.0, end};
     return q_.squaredNorm() + v_.squaredNorm() + a_.squaredNorm();
   }
 
@@ -216,11 +223,11 @@ class GeneralizedAlphaBeam final : public Beam {
     last_.impulse += impulse;
   }
 
-  double hat_work() const override { return hat_load_.dot(q_); }
+  double hat_work() const override { return shape(Loads::tip_load_coefficient).dot(q_); }
 
   void save_motion(double* numbers) const override {
     for (const VectorXd* x : {&q_, &v_, &a_}) numbers = std::copy_n(x->data(), x->size(), numbers);
-    for (const double value : {last_.tip_force, last_.load, last_.impulse, last_.started}) *numbers++ = value;
+    std::memcpy(numbers, &last_, sizeof last_);
   }
 
   void restore_motion(const double* numbers) override {
@@ -228,21 +235,20 @@ class GeneralizedAlphaBeam final : public Beam {
       *x = Eigen::Map<const VectorXd>(numbers, x->size());
       numbers += x->size();
     }
-    last_ = {numbers[0], numbers[1], numbers[2], numbers[3]};
+    std::memcpy(&last_, numbers, sizeof last_);
   }
 
   /// Makes q_ and v_ from q0_ and v0_; returns the loss.
-  double midpoint_step(const StepMatrix& S, double h, double force, double load) {
+  double midpoint_step(const StepMatrix& S, double h, double force, const LoadValues& loads) {
     const VectorXd &q = q0_, &v = v0_;
-    if (!free_.holds(h, load, hat_, q, v)) {
+    if (!free_.holds(h, loads, q, v)) {
       free_.size = 0.0;
-      rhs_ = (0.5 * h / mu_) * (load * uniform_load_ + hat_ * hat_load_);
+      rhs_ = (0.5 * h / mu_) * load_of(loads);
       mesh_.add_products(1.0, v, -0.5 * h, q, rhs_);
       solve(S, free_.w);
       free_.q = q;
       free_.v = v;
-      free_.load = load;
-      free_.hat = hat_;
+      free_.loads = loads;
       free_.size = h;
     }
     if (response_size_ != h) {
@@ -258,15 +264,16 @@ class GeneralizedAlphaBeam final : public Beam {
   }
 
   /// Makes q_, v_ and a_ from q0_, v0_ and a0_; returns the loss.
-  double alpha_step(const StepMatrix& S, double h, const Polynomial& c, const Polynomial& load) {
+  double alpha_step(const StepMatrix& S, double h, const Polynomial& c, const LoadValues& start,
+                    const LoadValues& inside) {
     const VectorXd &q = q0_, &v = v0_;
     VectorXd a = a0_;
-    if (add_missing_force(c[0], load[0])) {
+    if (add_missing_force(c[0], start)) {
       solve(S, w_);
       a += (1.0 - alpha_m_) * w_;
     }
     const double f = 1.0 - alpha_f_;
-    rhs_ = (value_at(load, f * h) * uniform_load_ + hat_ * hat_load_) / mu_;
+    rhs_ = load_of(inside) / mu_;
     rhs_[mesh_.tip_index()] += value_at(c, f * h) / mu_;
     w_ = alpha_ * (v + (f * (1.0 - gamma_) * h) * a) + q + (f * h) * (v + ((0.5 - beta_) * h) * a);
     mesh_.add_products(-alpha_m_, a, -1.0, w_, rhs_);
@@ -279,19 +286,33 @@ class GeneralizedAlphaBeam final : public Beam {
   }
 
   /// rhs_ = the force that the acceleration at the step's start does not know of yet; false if there is none.
-  bool add_missing_force(double tip_force, double load) {
+  bool add_missing_force(double tip_force, LoadValues loads) {
     if (last_.started == 0.0) {
-      rhs_ = (load * uniform_load_ + hat_ * hat_load_) / mu_ - mesh_.stiffness_times(VectorXd(q0_ + alpha_ * v0_));
+      rhs_ = load_of(loads) / mu_ - mesh_.stiffness_times(VectorXd(q0_ + alpha_ * v0_));
       rhs_[mesh_.tip_index()] += tip_force / mu_;
       return true;
     }
-    load -= last_.load;
+    for (std::size_t i = 0; i < loads.size(); ++i) loads[i] = (loads[i] - last_.loads[i]) / mu_;
     tip_force -= last_.tip_force;
-    if (load == 0.0 && tip_force == 0.0 && last_.impulse == 0.0) return false;
-    rhs_ = (load / mu_) * uniform_load_;
+    if (loads == LoadValues{} && tip_force == 0.0 && last_.impulse == 0.0) return false;
+    rhs_ = load_of(loads);
     rhs_[mesh_.tip_index()] += tip_force / mu_;
     if (last_.impulse != 0.0) rhs_ -= (alpha_ * last_.impulse) * mesh_.stiffness_times(tip_response_);
     return true;
+  }
+
+  const VectorXd& shape(std::size_t i) const {
+    if (shapes_[i].size() == 0) shapes_[i] = mesh_.load(i);
+    return shapes_[i];
+  }
+
+  /// Σ values·F; valid until the next call.
+  const VectorXd& load_of(const LoadValues& values) const {
+    load_.setZero(mesh_.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (values[i] != 0.0) load_ += values[i] * shape(i);
+    }
+    return load_;
   }
 
   void solve_once(const StepMatrix& S, VectorXd& x) {
@@ -336,15 +357,17 @@ class GeneralizedAlphaBeam final : public Beam {
   double alpha_;  // α_b [s]
   bool midpoint_, linear_;
   double alpha_m_, alpha_f_, beta_, gamma_;
-  Eigen::SparseMatrix<double> K_, M_;  // with the same pattern
-  VectorXd uniform_load_, hat_load_;
+  Eigen::SparseMatrix<double> K_, M_;                  // with the same pattern
+  mutable std::array<VectorXd, Loads::count> shapes_;  // of the loads, where one was asked for
+  mutable VectorXd load_;
   VectorXd tip_response_;  // M⁻¹e/ρA [1/kg], the velocity that a unit impulse leaves
 
   VectorXd q_, v_, a_;  // state [m, m/s, m/s²]; a only for ρ∞ < 1
   struct Last {
-    double tip_force, load;  // at the end of the last step: what a_ knows of
-    double impulse;          // since then [N·s]
-    double started;          // 0 before the first step, when a_ knows of nothing
+    double tip_force;  // at the end of the last step, as the loads: what a_ knows of
+    double impulse;    // since then [N·s]
+    double started;    // 0 before the first step, when a_ knows of nothing
+    LoadValues loads;
   };
   static constexpr std::size_t remembered = sizeof(Last) / sizeof(double);
   Last last_{}, before_{};

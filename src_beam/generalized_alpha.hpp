@@ -19,9 +19,10 @@
 // the same to O(h²) for motions that the step resolves; for those it does not, M⁻¹ would overshoot by (ωh)².
 //
 // Dissipated energy: (q₁ − q₀)ᵀ α_b K v_f, the work of the damping force in the scheme; for ρ∞ = 1 it is the exact
-// h α_b wᵀKw. What ρ∞ < 1 takes out of high frequencies is not part of it.
-// ∫u and ∫∫u are those of u linear in time between the steps, as the paper reads (62): the work of a polynomial C on
-// that motion is F̄ Δu, what the midpoint rule sees.
+// h α_b wᵀKw. What ρ∞ < 1 takes out of high frequencies is not part of it. The work of a load with the vector F is that
+// of the same scheme, F̄ᵀ(q₁ − q₀), with F at t + (1−α_f)h instead for ρ∞ < 1. ∫u and ∫∫u are those of u linear in time
+// between the steps, as the paper reads (62): the work of a polynomial C on that motion is F̄ Δu, what the midpoint rule
+// sees.
 #pragma once
 
 #include <memory>

@@ -20,11 +20,10 @@ using Eigen::Index;
 struct Coefficients {
   ArrayXd sign, kick, drift, reflection;  // undamped; reflection = (1 − sign)/ω²
   ArrayXd one_minus_decay, G0;            // damped; 1 − ġ = ω²G₁ + cG₀
-  ArrayXd G1, G2, G3;
-  // ∫u and ∫∫u: from η₀ and v₀ per mode; from the tip force, f_b and the hat load in sum.
+  ArrayXd G1, G2, G3, G4, G5;
+  // ∫u and ∫∫u: from η₀ and v₀ per mode; from the tip force in sum.
   ArrayXd integral_eta, integral_v, integral2_eta, integral2_v;
-  Polynomial integral_force{}, integral2_force{}, integral_load{}, integral2_load{};
-  double integral_hat = 0.0, integral2_hat = 0.0;
+  Polynomial integral_force{}, integral2_force{};
 };
 
 /// The quadratic form of oscillator_dissipation(), a row per entry.
@@ -38,7 +37,6 @@ class ModalBeam final : public Beam {
       : Beam(p, static_cast<std::size_t>(2 * modes.omega.size())),
         modes_(std::move(modes)),
         tip_(modes_.tip),
-        uniform_load_(modes_.uniform_load),
         omega2_(modes_.omega.array().square()),
         damping_(p.alpha_b * omega2_),
         damped_(p.alpha_b > 0.0),
@@ -52,29 +50,25 @@ class ModalBeam final : public Beam {
     };
     bound(modes_.tip);
     bound(modes_.tip_rotation);
-    bound(modes_.uniform_load);
+    for (const Eigen::VectorXd& load : modes_.loads) bound(load);
     bound(modes_.deflection);
     bound(modes_.rotation);
     bound(omega2_.matrix());
     bound(damping_.matrix());
-    bound(hat_ * modes_.hat_load);
-    find_load(0.0);
     update_tip();
   }
 
   double tip_displacement() const override { return displacement_; }
   double tip_velocity() const override { return velocity_; }
   double tip_acceleration() const override {
-    return (tip_ * (now_.tip_force * tip_ + find_load(now_.distributed_load) - omega2_ * eta_ - damping_ * v_)).sum();
+    ArrayXd force = now_.tip_force * tip_;
+    for (std::size_t i = 0; i < Loads::count; ++i) force += now_.loads[i] * modes_.loads[i].array();
+    return (tip_ * (force - omega2_ * eta_ - damping_ * v_)).sum();
   }
   double tip_rotation() const override { return modes_.tip_rotation.dot(eta_.matrix()); }
   double kinetic_energy() const override { return 0.5 * v_.square().sum(); }
   double strain_energy() const override { return 0.5 * (modes_.omega.array() * eta_).square().sum(); }
-  double dissipated_energy() const override {
-    add_loss();
-    return now_.dissipated;
-  }
-  double deflection_integral() const override { return modes_.uniform_load.dot(eta_.matrix()); }
+  double deflection_integral() const override { return modes_.loads[Loads::distributed].dot(eta_.matrix()); }
   double tip_mass() const override { return 1.0 / tip_.square().sum(); }
   double static_tip_compliance() const override { return (tip_ / modes_.omega.array()).square().sum(); }
   void deflection(Shape& u) const override {
@@ -90,53 +84,66 @@ class ModalBeam final : public Beam {
   }
 
  private:
-  double advance(double size, const Polynomial& c, const Polynomial& f) override {
-    add_loss();
-    const Coefficients& k =
-        coefficients_.get(size, [this](double h, Coefficients& value) { make_coefficients(h, value); });
-    force_ = c[0] * tip_ + find_load(f[0]);
-    r_ = force_ - omega2_ * eta_;
+  double advance(double size, const Polynomial& c, const Loads& loads) override {
+    const Coefficients& k = coefficients(size);
+    const bool loaded = loads.any();
+    bool load_varies = false;
+    force_[0] = c[0] * tip_;
+    if (loaded) {
+      for (ArrayXd& load : load_) load.setZero(eta_.size());
+      loads.for_each([&](std::size_t i, const Polynomial& f) {
+        load_varies = load_varies || f[1] != 0.0 || f[2] != 0.0;
+        for (std::size_t j = 0; j < f.size(); ++j) {
+          if (f[j] != 0.0) load_[j] += f[j] * modes_.loads[i].array();
+        }
+      });
+      force_[0] += load_[0];
+    }
+    r_ = force_[0] - omega2_ * eta_;
     if (damped_) {
       eta_next_ = eta_ + (k.G0 * v_ + k.G1 * r_);
       v_next_ = v_ + (k.G0 * r_ - k.one_minus_decay * v_);
     } else {
       v_next_ = v_ + k.kick * r_;
       eta_next_ = eta_ + k.drift * v_next_;
-      v_next_ = k.sign * (v_next_ + k.kick * (force_ - omega2_ * eta_next_));
-      eta_next_ = k.sign * eta_next_ + k.reflection * force_;
+      v_next_ = k.sign * (v_next_ + k.kick * (force_[0] - omega2_ * eta_next_));
+      eta_next_ = k.sign * eta_next_ + k.reflection * force_[0];
     }
-    const bool varying = c[1] != 0.0 || c[2] != 0.0 || f[1] != 0.0 || f[2] != 0.0;
+    const bool varying = c[1] != 0.0 || c[2] != 0.0 || load_varies;
     if (varying) {
-      force1_ = c[1] * tip_ + f[1] * uniform_load_;
-      force2_ = c[2] * tip_ + f[2] * uniform_load_;
-      eta_next_ += k.G2 * force1_ + k.G3 * force2_;
-      v_next_ += k.G1 * force1_ + k.G2 * force2_;
+      for (std::size_t j = 1; j < force_.size(); ++j) {
+        force_[j] = c[j] * tip_;
+        if (load_varies) force_[j] += load_[j];
+      }
+      eta_next_ += k.G2 * force_[1] + k.G3 * force_[2];
+      v_next_ += k.G1 * force_[1] + k.G2 * force_[2];
     }
-    now_.integral = (k.integral_eta * eta_ + k.integral_v * v_).sum() + dot(k.integral_force, c) +
-                    dot(k.integral_load, f) + hat_ * k.integral_hat;
-    now_.integral_2 = (k.integral2_eta * eta_ + k.integral2_v * v_).sum() + dot(k.integral2_force, c) +
-                      dot(k.integral2_load, f) + hat_ * k.integral2_hat;
+    now_.integral = (k.integral_eta * eta_ + k.integral_v * v_).sum() + dot(k.integral_force, c);
+    now_.integral_2 = (k.integral2_eta * eta_ + k.integral2_v * v_).sum() + dot(k.integral2_force, c);
+    if (loaded) {
+      now_.integral += (tip_ * (k.G2 * load_[0] + k.G3 * load_[1] + k.G4 * load_[2])).sum();
+      now_.integral_2 += (tip_ * (k.G3 * load_[0] + k.G4 * load_[1] + k.G5 * load_[2])).sum();
+    }
     eta_.swap(eta_next_);
     v_.swap(v_next_);
     update_tip();
-    if (damped_) loss_step_ = {size, varying};
+    if (damped_ || loaded) unbooked_ = {size, varying, loaded, load_varies};
     return (v_.square() + omega2_ * eta_.square()).sum();
   }
 
   void undo() override {
-    loss_step_.size = 0.0;
+    unbooked_.size = 0.0;
     eta_.swap(eta_next_);
     v_.swap(v_next_);
     update_tip();
   }
 
   void strike(double impulse) override {
-    add_loss();
     v_ += impulse * tip_;
     update_tip();
   }
 
-  double hat_work() const override { return modes_.hat_load.dot(eta_.matrix()); }
+  double hat_work() const override { return modes_.loads[Loads::tip_load_coefficient].dot(eta_.matrix()); }
 
   void save_motion(double* numbers) const override {
     Eigen::Map<ArrayXd>(numbers, eta_.size()) = eta_;
@@ -144,7 +151,7 @@ class ModalBeam final : public Beam {
   }
 
   void restore_motion(const double* numbers) override {
-    loss_step_.size = 0.0;
+    unbooked_.size = 0.0;
     eta_ = Eigen::Map<const ArrayXd>(numbers, eta_.size());
     v_ = Eigen::Map<const ArrayXd>(numbers + eta_.size(), eta_.size());
     update_tip();
@@ -152,7 +159,8 @@ class ModalBeam final : public Beam {
 
   void make_coefficients(double h, Coefficients& k) const {
     const Index m = eta_.size();
-    for (ArrayXd* array : {&k.G1, &k.G2, &k.G3, &k.integral_eta, &k.integral_v, &k.integral2_eta, &k.integral2_v}) {
+    for (ArrayXd* array :
+         {&k.G1, &k.G2, &k.G3, &k.G4, &k.G5, &k.integral_eta, &k.integral_v, &k.integral2_eta, &k.integral2_v}) {
       array->resize(m);
     }
     if (damped_) {
@@ -160,14 +168,15 @@ class ModalBeam final : public Beam {
     } else {
       for (ArrayXd* array : {&k.sign, &k.kick, &k.drift, &k.reflection}) array->resize(m);
     }
-    k.integral_force = k.integral2_force = k.integral_load = k.integral2_load = {};
-    k.integral_hat = k.integral2_hat = 0.0;
+    k.integral_force = k.integral2_force = {};
     for (Index i = 0; i < m; ++i) {
       const double phi = tip_[i], c = damping_[i];
       const std::array<double, 6> G = oscillator_response(modes_.omega[i], c, h).G;
       k.G1[i] = G[1];
       k.G2[i] = G[2];
       k.G3[i] = G[3];
+      k.G4[i] = G[4];
+      k.G5[i] = G[5];
       k.integral_eta[i] = phi * (G[0] + c * G[1]);
       k.integral_v[i] = phi * G[1];
       k.integral2_eta[i] = phi * (G[1] + c * G[2]);
@@ -175,11 +184,7 @@ class ModalBeam final : public Beam {
       for (std::size_t j = 0; j < 3; ++j) {
         k.integral_force[j] += phi * phi * G[j + 2];
         k.integral2_force[j] += phi * phi * G[j + 3];
-        k.integral_load[j] += phi * uniform_load_[i] * G[j + 2];
-        k.integral2_load[j] += phi * uniform_load_[i] * G[j + 3];
       }
-      k.integral_hat += phi * modes_.hat_load[i] * G[2];
-      k.integral2_hat += phi * modes_.hat_load[i] * G[3];
       if (damped_) {
         k.one_minus_decay[i] = omega2_[i] * G[1] + c * G[0];
         k.G0[i] = G[0];
@@ -201,20 +206,40 @@ class ModalBeam final : public Beam {
     }
   }
 
-  /// Adds the loss of the last step, which is due only when it is asked for or its work space is needed again: a step
-  /// that is tried and taken back, as event location does with ever new sizes, never pays for it.
-  void add_loss() const {
-    if (loss_step_.size == 0.0) return;
+  /// Due only when it is asked for or its work space is needed again: a step that is tried and taken back, as event
+  /// location does with ever new sizes, never pays for it.
+  void book() const override {
+    if (unbooked_.size == 0.0) return;
+    if (damped_) now_.dissipated += loss();
+    if (unbooked_.loaded) now_.load_work += work();
+    unbooked_.size = 0.0;
+  }
+
+  double loss() const {
     const Dissipation& Q =
-        dissipation_.get(loss_step_.size, [this](double h, Dissipation& value) { make_dissipation(h, value); });
-    const ArrayXd& v = v_next_;  // before the step
-    now_.dissipated += (v * (Q[0] * v + 2.0 * Q[1] * r_) + Q[4] * r_.square()).sum();
-    if (loss_step_.varying) {
-      now_.dissipated += (2.0 * force1_ * (Q[2] * v + Q[5] * r_ + Q[8] * force2_) +
-                          2.0 * force2_ * (Q[3] * v + Q[6] * r_) + Q[7] * force1_.square() + Q[9] * force2_.square())
-                             .sum();
+        dissipation_.get(unbooked_.size, [this](double h, Dissipation& value) { make_dissipation(h, value); });
+    const ArrayXd &v = v_next_, &force1 = force_[1], &force2 = force_[2];  // v before the step
+    double sum = (v * (Q[0] * v + 2.0 * Q[1] * r_) + Q[4] * r_.square()).sum();
+    if (unbooked_.varying) {
+      sum += (2.0 * force1 * (Q[2] * v + Q[5] * r_ + Q[8] * force2) + 2.0 * force2 * (Q[3] * v + Q[6] * r_) +
+              Q[7] * force1.square() + Q[9] * force2.square())
+                 .sum();
     }
-    loss_step_.size = 0.0;
+    return sum;
+  }
+
+  double work() const {
+    const double h = unbooked_.size;
+    const auto rise = eta_ - eta_next_;  // which is from before the step
+    double sum = (load_[0] * rise).sum();
+    if (unbooked_.load_varies) {
+      const Coefficients& k = coefficients(h);
+      const ArrayXd& v = v_next_;
+      const ArrayXd Z1 = k.G1 * v + k.G2 * r_ + k.G3 * force_[1] + k.G4 * force_[2];
+      const auto Z2 = k.G2 * v + k.G3 * r_ + k.G4 * force_[1] + k.G5 * force_[2];
+      sum += (load_[1] * (h * rise - Z1) + load_[2] * (0.5 * h * h * rise - h * Z1 + Z2)).sum();
+    }
+    return sum;
   }
 
   void update_tip() {
@@ -222,35 +247,28 @@ class ModalBeam final : public Beam {
     velocity_ = (tip_ * v_).sum();
   }
 
-  /// Modal force of f_b and the hat load [N/√kg].
-  const ArrayXd& find_load(double distributed_load) const {
-    if (load_of_[0] != distributed_load || load_of_[1] != hat_ || load_.size() == 0) {
-      load_ = distributed_load * uniform_load_ + hat_ * modes_.hat_load.array();
-      load_of_ = {distributed_load, hat_};
-    }
-    return load_;
+  const Coefficients& coefficients(double size) const {
+    return coefficients_.get(size, [this](double h, Coefficients& value) { make_coefficients(h, value); });
   }
 
   Modes modes_;
-  ArrayXd tip_;           // φ(L) [1/√kg]
-  ArrayXd uniform_load_;  // ∫ φ_u dx [m/√kg]
-  ArrayXd omega2_;        // ω² [1/s²]
-  ArrayXd damping_;       // α_b ω² [1/s]
+  ArrayXd tip_;      // φ(L) [1/√kg]
+  ArrayXd omega2_;   // ω² [1/s²]
+  ArrayXd damping_;  // α_b ω² [1/s]
   bool damped_;
 
   ArrayXd eta_, v_;                             // state: modal displacement [m √kg] and velocity
   double displacement_ = 0.0, velocity_ = 0.0;  // of the tip
-  mutable ArrayXd load_;                        // see find_load
-  mutable std::array<double, 2> load_of_{};     // f_b and the hat load's coefficient
 
-  // Work space; after a step v_next_, r_ and the rates of the force are those of its start.
-  ArrayXd eta_next_, v_next_, force_, r_, force1_, force2_;
-  struct LossStep {
+  // Work space; after a step all of it is that of its start.
+  ArrayXd eta_next_, v_next_, r_;
+  std::array<ArrayXd, 3> force_, load_;  // modal force and its part that is the loads', with their rates [N/√kg, …]
+  struct Unbooked {
     double size;
-    bool varying;
+    bool varying, loaded, load_varies;
   };
-  mutable LossStep loss_step_ = {0.0, false};  // the step whose loss is not in `dissipated` yet; size 0: none
-  StepCache<Coefficients> coefficients_;
+  mutable Unbooked unbooked_{};  // the step that is not in `now_` yet; size 0: none
+  mutable StepCache<Coefficients> coefficients_;
   mutable StepCache<Dissipation> dissipation_;
 };
 

@@ -228,7 +228,7 @@ Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
 
   if (count < size) {
     for (const VectorXd& shape : {mesh.flexibility_times(mesh.unit_tip_force()),
-                                  mesh.flexibility_times(mesh.uniform_load()), mesh.linear_shape()}) {
+                                  mesh.flexibility_times(mesh.load(Loads::distributed)), mesh.linear_shape()}) {
       if (columns < basis.cols()) augment(mesh, shape, basis, columns);
     }
     basis.conservativeResize(Eigen::NoChange, columns);
@@ -263,8 +263,7 @@ Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
   modes.rotation = rotation_norm * (theta * W);
   modes.tip = (basis.row(mesh.tip_index()) * W).transpose();
   modes.tip_rotation = rotation_norm * (basis.row(mesh.tip_rotation_index()) * W).transpose();
-  modes.uniform_load = W.transpose() * (basis.transpose() * mesh.uniform_load());
-  modes.hat_load = W.transpose() * (basis.transpose() * mesh.hat_load());
+  for (std::size_t i = 0; i < Loads::count; ++i) modes.loads[i] = W.transpose() * (basis.transpose() * mesh.load(i));
   modes.linear_shape =
       mesh.mass_per_length() * (W.transpose() * (basis.transpose() * mesh.mass_times(mesh.linear_shape())));
   return modes;

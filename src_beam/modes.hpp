@@ -26,14 +26,13 @@ namespace beam {
 
 /// Mass-normalised: φᵀ M φ = 1 kg, φᵀ K φ = ω². m of them, ω ascending (to rounding).
 struct Modes {
-  Eigen::VectorXd omega;         ///< [rad/s], m
-  Eigen::VectorXd tip;           ///< φ_u(L) ≥ 0 [1/√kg], m
-  Eigen::VectorXd tip_rotation;  ///< φ_θ(L) [1/(m √kg)], m
-  Eigen::VectorXd uniform_load;  ///< ∫ φ_u dx [m/√kg], m
-  Eigen::VectorXd hat_load;      ///< ∫ φ_u ψ_n dx [m/√kg], m
-  Eigen::VectorXd linear_shape;  ///< coordinates of u = x, θ = 0: φᵀ M q [m √kg], m
-  Eigen::MatrixXd deflection;    ///< φ_u at the output points, 21 × m
-  Eigen::MatrixXd rotation;      ///< φ_θ at the output points, 21 × m
+  Eigen::VectorXd omega;                            ///< [rad/s], m
+  Eigen::VectorXd tip;                              ///< φ_u(L) ≥ 0 [1/√kg], m
+  Eigen::VectorXd tip_rotation;                     ///< φ_θ(L) [1/(m √kg)], m
+  std::array<Eigen::VectorXd, Loads::count> loads;  ///< modal force per unit of each, as ∫ φ_u dx [m/√kg], m
+  Eigen::VectorXd linear_shape;                     ///< coordinates of u = x, θ = 0: φᵀ M q [m √kg], m
+  Eigen::MatrixXd deflection;                       ///< φ_u at the output points, 21 × m
+  Eigen::MatrixXd rotation;                         ///< φ_θ at the output points, 21 × m
   double residual = 0.0;  ///< largest ‖φ − ω² K⁻¹M φ‖_K / ω of the computed modes, φ with unit M-norm
 };
 

@@ -1,5 +1,6 @@
 #include "timoshenko.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
@@ -34,7 +35,8 @@ Timoshenko::Timoshenko(const Parameters& p)
       r_(std::sqrt(p.second_moment_of_area / p.area)),
       b_(p.young_modulus / p.density),
       b_top_(b_),
-      s_(p.shear_modulus * p.shear_coefficient / p.density) {
+      s_(p.shear_modulus * p.shear_coefficient / p.density),
+      point_force_position_(p.point_force_position) {
   if (!p.reduced_integration) b_top_ += s_ * (h_ / r_) * (h_ / r_) / (4.0 * static_cast<double>(4 * p_ * p_ - 1));
   for (const double value : {h_, mu_, r_, b_, b_top_, s_}) {
     if (!std::isnormal(value)) {
@@ -382,13 +384,48 @@ Eigen::SparseMatrix<double> Timoshenko::stiffness() const {
 
 Eigen::VectorXd Timoshenko::unit_tip_force() const { return Eigen::VectorXd::Unit(size(), tip_index()); }
 
-Eigen::VectorXd Timoshenko::uniform_load() const {
+Eigen::VectorXd Timoshenko::load(std::size_t shape) const {
+  if (shape < Loads::point) return distributed_load(shape - Loads::distributed);
+  if (shape < Loads::tip) return point_force(point_force_position_[shape - Loads::point]);
+  if (shape == Loads::tip) return unit_tip_force();
+  return shape == Loads::base_acceleration ? Eigen::VectorXd(-mu_ * distributed_load(0)) : hat_load();
+}
+
+// In an element (x/L)^power = Σ a_j P_j(ξ), found from x/L = (e + ½ + ξ/2)/n and ξ P_j = ((j+1) P_{j+1} + j
+// P_{j−1})/(2j+1). Its moments with the hats and N_k = (P_k − P_{k−2})/(2k−1) follow from ∫P_j² dx = h/(2j+1).
+Eigen::VectorXd Timoshenko::distributed_load(std::size_t power) const {
   Eigen::VectorXd F = Eigen::VectorXd::Zero(size());
-  for (Index i = 0; i < size(); i += 2 * p_) {
-    if (p_ > 1) F[i + 1] = -h_ / 3.0;  // N_2; the others are orthogonal to 1
-    F[i + 2 * p_ - 1] = h_;
+  const double count = static_cast<double>(n_);
+  for (Index e = 0; e < n_; ++e) {
+    std::array<double, max_element_degree + 1> moment{};
+    moment[0] = 1.0;
+    for (std::size_t k = 0; k < power; ++k) {
+      const auto a = moment;
+      for (std::size_t j = 0; j <= k + 1; ++j) {
+        const double degree = static_cast<double>(j);
+        moment[j] = (static_cast<double>(e) + 0.5) / count * a[j] +
+                    (degree + 1.0) / (2.0 * degree + 3.0) * a[j + 1] / (2.0 * count);
+        if (j > 0) moment[j] += degree / (2.0 * degree - 1.0) * a[j - 1] / (2.0 * count);
+      }
+    }
+    for (std::size_t j = 0; j <= power; ++j) moment[j] *= h_ / static_cast<double>(2 * j + 1);
+    double* q = F.data() + 2 * p_ * e;
+    if (e > 0) *(q - 1) += 0.5 * (moment[0] - moment[1]);
+    q[2 * p_ - 1] = 0.5 * (moment[0] + moment[1]);
+    for (Index k = 2; k <= p_; ++k) q[2 * k - 3] = (moment[k] - moment[k - 2]) / static_cast<double>(2 * k - 1);
   }
-  F[tip_index()] = 0.5 * h_;
+  return F;
+}
+
+Eigen::VectorXd Timoshenko::point_force(double position) const {
+  Eigen::VectorXd F = Eigen::VectorXd::Zero(size());
+  const double place = position * static_cast<double>(n_);
+  const Index e = std::min(static_cast<Index>(place), n_ - 1);
+  const ShapeFunctions N = shape_functions(place - static_cast<double>(e));
+  double* q = F.data() + 2 * p_ * e;
+  if (e > 0) *(q - 1) = N[0];
+  q[2 * p_ - 1] = N[1];
+  for (Index k = 2; k <= p_; ++k) q[2 * k - 3] = N[k];
   return F;
 }
 
@@ -408,6 +445,23 @@ Eigen::VectorXd Timoshenko::linear_shape() const {
   return q;
 }
 
+/// At a part of the element: of its left node, of its right node, N_2, …, N_p.
+Timoshenko::ShapeFunctions Timoshenko::shape_functions(double part) const {
+  ShapeFunctions N;
+  N[0] = 1.0 - part;
+  N[1] = part;
+  const double xi = 2.0 * part - 1.0;
+  double before = 1.0, legendre = xi;  // P_{k−2}, P_{k−1}
+  for (Index k = 2; k <= p_; ++k) {
+    const double degree = static_cast<double>(k);
+    const double next = ((2.0 * degree - 1.0) * xi * legendre - (degree - 1.0) * before) / degree;
+    N[k] = (next - before) / (2.0 * degree - 1.0);
+    before = legendre;
+    legendre = next;
+  }
+  return N;
+}
+
 void Timoshenko::sample(const double* q, int field, double* values) const {
   constexpr Index intervals = shape_points - 1;
   for (Index j = 0; j <= intervals; ++j) {
@@ -419,16 +473,9 @@ void Timoshenko::sample(const double* q, int field, double* values) const {
       values[j] = a;
       continue;
     }
+    const ShapeFunctions N = shape_functions(part);
     values[j] = a + part * (element[2 * p_ - 2] - a);
-    const double xi = 2.0 * part - 1.0;
-    double before = 1.0, legendre = xi;  // P_{k−2}, P_{k−1}
-    for (Index k = 2; k <= p_; ++k) {
-      const double degree = static_cast<double>(k);
-      const double next = ((2.0 * degree - 1.0) * xi * legendre - (degree - 1.0) * before) / degree;
-      values[j] += element[2 * k - 4] * (next - before) / (2.0 * degree - 1.0);
-      before = legendre;
-      legendre = next;
-    }
+    for (Index k = 2; k <= p_; ++k) values[j] += element[2 * k - 4] * N[k];
   }
 }
 

@@ -84,8 +84,8 @@ class Timoshenko {
   Eigen::SparseMatrix<double> stiffness() const;  ///< K, lower triangle, with the pattern of M
 
   Eigen::VectorXd unit_tip_force() const;  ///< e: 1 in the row of u(L)
-  Eigen::VectorXd uniform_load() const;    ///< ∫ψ_i dx in the rows of u: F of f_b = 1 N/m
-  Eigen::VectorXd hat_load() const;  ///< ∫ψ_i ψ dx in the rows of u, ψ the hat function of the tip: F of f_b = ψ
+  /// F of a load of 1 N/m, 1 N or 1 m/s² (Loads::Shape), exact at any degree: ∫ψ_i f_b dx or ψ_i(x) in the rows of u.
+  Eigen::VectorXd load(std::size_t shape) const;
   Eigen::VectorXd linear_shape() const;  ///< u = x, θ = 0
 
   /// Fields at x = 0, L/20, …, L: `values[j]` = u or θ̃.
@@ -114,6 +114,11 @@ class Timoshenko {
   template <typename Entry>
   Eigen::SparseMatrix<double> assemble(const Entry& entry) const;
   void sample(const double* q, int field, double* values) const;
+  using ShapeFunctions = std::array<double, max_element_degree + 1>;
+  ShapeFunctions shape_functions(double part) const;
+  Eigen::VectorXd distributed_load(std::size_t power) const;
+  Eigen::VectorXd point_force(double position) const;
+  Eigen::VectorXd hat_load() const;
 
   Eigen::Index n_, p_;
   double h_;    // element length [m]
@@ -125,6 +130,7 @@ class Timoshenko {
   double b_;      // bending stiffness per ρI, b_j [m²/s²]
   double b_top_;  // b_{p−1}
   double s_;      // shear stiffness per ρA [m²/s²]
+  std::array<double, 4> point_force_position_;
 };
 
 /// @throws std::runtime_error if the factor is not to be used

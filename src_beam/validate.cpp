@@ -39,6 +39,10 @@ void validate(const Parameters& p) {
   require_finite("initial_deflection_slope", p.initial_deflection_slope);
   require_finite("initial_velocity_slope [1/s]", p.initial_velocity_slope);
   require_finite("tip_load_coefficient [N/m]", p.tip_load_coefficient);
+  for (const double position : p.point_force_position) {
+    if (!(position >= 0.0 && position <= 1.0))
+      reject("point_force_position", position, "between 0 (the clamp) and 1 (the tip)");
+  }
 
   // Each factor may be harmless and the product still leave the range of a double.
   require_positive("density * area [kg/m]", p.density * p.area);

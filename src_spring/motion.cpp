@@ -5,14 +5,19 @@
 namespace spring {
 
 Loads Loads::from(const Parameters& parameters, const Inputs& inputs) {
-  Loads loads;
+  Loads loads{load_of(parameters, inputs), inputs.tip_displacement};
   for (std::size_t i = 0; i < 3; ++i) {
-    loads.force[i] = -inputs.contact_force[i];
-    if (!parameters.stop_enabled) loads.force[i] += inputs.foundation_force[i];
+    const double N = parameters.stop_enabled ? 0.0 : inputs.foundation_force[i];
+    loads.force[i] = N - inputs.contact_force[i] + loads.force[i];
   }
-  loads.force[0] += inputs.external_force;
-  loads.tip = inputs.tip_displacement;
   return loads;
+}
+
+Quadratic load_of(const Parameters& parameters, const Inputs& inputs) {
+  Quadratic load;
+  for (std::size_t i = 0; i < 3; ++i)
+    load[i] = inputs.external_force[i] - parameters.mass * inputs.base_acceleration[i];
+  return load;
 }
 
 Motion::Motion(const Parameters& parameters)

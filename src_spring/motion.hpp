@@ -1,5 +1,5 @@
 // The spring's equation of motion while its top is free,
-//     m ÿ = F(τ) − α_s ẏ − k1 y − k2 y³ − [touching] C(y − u_tip(τ), ẏ − u̇_tip(τ)),      F = −C + N + f_s,
+//     m ÿ = F(τ) − α_s ẏ − k1 y − k2 y³ − [touching] C(y − u_tip(τ), ẏ − u̇_tip(τ)),      F = −C + N + f_s − m a,
 // with its Jacobian and, for the start of a segment, its time derivatives.
 #pragma once
 
@@ -20,6 +20,9 @@ struct Loads {
   static Loads from(const Parameters& parameters, const Inputs& inputs);
   Loads from_time(double t) const { return {shifted(force, t), shifted(tip, t)}; }
 };
+
+/// f_s − m a [N]
+Quadratic load_of(const Parameters& parameters, const Inputs& inputs);
 
 class Motion {
  public:

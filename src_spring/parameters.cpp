@@ -71,6 +71,7 @@ void check(const Inputs& inputs) {
   require_finite("contact_force", inputs.contact_force);
   require_finite("foundation_force", inputs.foundation_force);
   require_finite("external_force", inputs.external_force);
+  require_finite("base_acceleration", inputs.base_acceleration);
   require_finite("tip_displacement", inputs.tip_displacement);
 }
 

@@ -24,7 +24,7 @@ constexpr long most_stalled = 100;  ///< events without progress
 struct State {
   double y, z;
   double integral = 0.0, integral_2 = 0.0;
-  double dissipated = 0.0, impact_loss = 0.0;
+  double dissipated = 0.0, impact_loss = 0.0, load_work = 0.0;
   double stop_force = 0.0, stop_impulse = 0.0;
   double seated = 0.0;                            ///< 1 on the foundation
   double force = 0.0, tip = 0.0, tip_rate = 0.0;  ///< F, u_tip and its rate where the step ended
@@ -220,9 +220,13 @@ class Step {
 }  // namespace
 
 State Spring::Impl::advanced(double size, const Inputs& inputs) {
-  return Step(motion, laws, parameters.restitution, flight, seated ? &*seated : nullptr, state, size,
-              Loads::from(parameters, inputs))
-      .run();
+  State reached = Step(motion, laws, parameters.restitution, flight, seated ? &*seated : nullptr, state, size,
+                       Loads::from(parameters, inputs))
+                      .run();
+  // Impacts turn the velocity around, y goes on: the step's integrals know the work through all of its events.
+  reached.load_work += work(load_of(parameters, inputs), size, reached.y - state.y, reached.integral - state.y * size,
+                            reached.integral_2 - state.y * size * size / 2);
+  return reached;
 }
 
 Spring::Spring(const Parameters& parameters) {
@@ -283,6 +287,7 @@ double Spring::contact_energy() const {
   return impl_->laws.compliance ? impl_->motion.compliance().energy(impl_->depth(impl_->state)) : 0.0;
 }
 double Spring::dissipated_energy() const { return impl_->state.dissipated; }
+double Spring::load_work() const { return impl_->state.load_work; }
 double Spring::impact_loss() const { return impl_->state.impact_loss; }
 bool Spring::seated() const { return impl_->state.seated != 0.0; }
 long Spring::ida_steps() const { return static_cast<long>(impl_->state.steps); }

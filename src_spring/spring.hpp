@@ -1,5 +1,6 @@
 // The Duffing spring with its foundation, integrated by SUNDIALS IDA as an implicit system F(t, Y, Ẏ) = 0.
-//     m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s        (Ahn & Tate, eq. (6)),      up is positive.
+//     m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s − m a   (Ahn & Tate, eq. (6)),      up is positive.
+// a is the acceleration of the foundation, relative to which y is counted.
 // C comes from outside (contact_law external) or from the normal compliance inside, C = λ_nc δ₊^p (1 + χ δ̇)₊,
 // δ = y − u_tip;
 // N comes from outside or, with the stop enabled, from Signorini's condition (8) with restitution:
@@ -38,10 +39,11 @@ struct Parameters {
 
 /// Held or polynomial over one step; τ from its start.
 struct Inputs {
-  Quadratic contact_force{};     ///< C [N], positive presses the spring down
-  Quadratic foundation_force{};  ///< N ≥ 0 [N], upward; used when the stop inside is not enabled
-  double external_force = 0.0;   ///< f_s [N]
-  Quadratic tip_displacement{};  ///< u_tip [m]; read by normal_compliance only
+  Quadratic contact_force{};      ///< C [N], positive presses the spring down
+  Quadratic foundation_force{};   ///< N ≥ 0 [N], upward; used when the stop inside is not enabled
+  Quadratic external_force{};     ///< f_s [N]
+  Quadratic base_acceleration{};  ///< a of the foundation [m/s²]: y is relative to it, so that it acts as −m a
+  Quadratic tip_displacement{};   ///< u_tip [m]; read by normal_compliance only
 };
 
 /// The step could not be completed: the state is as before the step, `reached` tells how far it came.
@@ -89,6 +91,7 @@ class Spring {
   double potential_energy() const;         ///< ½ k1 y² + ¼ k2 y⁴ [J]
   double contact_energy() const;           ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
   double dissipated_energy() const;        ///< by α_s and χ since the start, an integrated unknown [J]
+  double load_work() const;                ///< of f_s and −m a since the start [J]
   double impact_loss() const;              ///< energy lost in stop impacts since the start [J]
   bool seated() const;                     ///< held on the foundation by the law inside
   long ida_steps() const;                  ///< internal IDA steps since the start

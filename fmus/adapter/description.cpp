@@ -26,6 +26,7 @@ constexpr Unit units[] = {
     {"m2", "Area", 0, 2, 0, 0},
     {"m4", "SecondMomentOfArea", 0, 4, 0, 0},
     {"m/s", "Velocity", 0, 1, -1, 0},
+    {"m/s2", "Acceleration", 0, 1, -2, 0},
     {"m.s", "Absement", 0, 1, 1, 0},
     {"m.s2", "Absity", 0, 1, 2, 0},
     {"s", "Time", 0, 0, 1, 0},

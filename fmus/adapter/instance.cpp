@@ -46,6 +46,10 @@ void require_allowed(const Variable& v, const Polynomial& p) {
   }
 }
 
+/// What every input is before it is set: nothing acts.
+constexpr Polynomial idle{0.0, unset, unset};
+bool is_idle(const Polynomial& p) { return p[0] == 0.0 && std::isnan(p[1]) && std::isnan(p[2]); }
+
 bool is_setting(const Variable& v) { return v.causality == Causality::parameter || v.exact; }
 
 }  // namespace
@@ -65,10 +69,12 @@ void Instance::reset() {
   model_ = make_model();
   built_ = false;
   std::vector<double> starts;
+  starts.reserve(fixed_.size());
   for (const Variable* v : fixed_) starts.push_back(v->start);
   settings_ = std::make_shared<const std::vector<double>>(std::move(starts));
   values_.clear();
-  for (const Variable* v : inputs_) values_.push_back({v->start, unset, unset});
+  values_.resize(inputs_.size(), idle);
+  pushed_.assign(inputs_.size(), false);
   time_ = 0.0;
   stop_time_ = std::numeric_limits<double>::infinity();
   tolerance_ = 0.0;
@@ -113,7 +119,11 @@ void Instance::ensure_built() {
 }
 
 void Instance::push_inputs() {
-  for (std::size_t i = 0; i < inputs_.size(); ++i) inputs_[i]->set(*model_, values_[i]);
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    const bool used = !is_idle(values_[i]);
+    if (used || pushed_[i]) inputs_[i]->set(*model_, values_[i]);
+    pushed_[i] = used;
+  }
 }
 
 const Variable& Instance::variable(unsigned reference, Type type, const char* what) const {
@@ -160,6 +170,7 @@ void Instance::set(unsigned reference, Type type, double value) {
   values_[place][0] = value;
   if (built_) {
     v.set(*model_, values_[place]);
+    pushed_[place] = true;
     model_->observe();
   }
 }
@@ -220,8 +231,9 @@ void Instance::step(double time, double size) {
   ensure_built();
   push_inputs();
   model_->step(size);
-  for (std::size_t i = 0; i < inputs_.size(); ++i)
-    values_[i] = {inputs_[i]->consumed ? 0.0 : values_[i][0], unset, unset};
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    if (pushed_[i]) values_[i] = {inputs_[i]->consumed ? 0.0 : values_[i][0], unset, unset};
+  }
   time_ = time + size;
 }
 

@@ -78,6 +78,7 @@ class Instance {
   std::vector<std::size_t> place_;                       ///< of every variable, among the inputs or the fixed
   std::shared_ptr<const std::vector<double>> settings_;  ///< of the fixed; saved states share it
   std::vector<Polynomial> values_;                       ///< of the inputs
+  std::vector<char> pushed_;                             ///< inputs that the model may know as something not idle
   bool built_ = false;
   double time_ = 0.0;
   double stop_time_ = std::numeric_limits<double>::infinity();

@@ -85,29 +85,39 @@ class TableBuilder {
  public:
   explicit TableBuilder(Table& table) : table_(table) {}
 
-  /// A parameter stored in a field of the model's parameter struct, whose default is the start value.
-  template <class P, class B, class T>
-  Variable& parameter(const std::string& name, const std::string& unit, P M::*parameters, T B::*field,
+  /// A parameter stored in a field of the model's parameter struct, whose default is the start value. The field is a
+  /// pointer to a member or a function that returns a reference.
+  template <class P, class Field>
+  Variable& parameter(const std::string& name, const std::string& unit, P M::*parameters, Field field,
                       const std::string& description) {
+    using T = std::decay_t<std::invoke_result_t<Field, P&>>;
     Variable& v = add(name, unit, description, Causality::parameter);
     v.type = std::is_same_v<T, bool>                      ? Type::boolean
              : std::is_integral_v<T> || std::is_enum_v<T> ? Type::integer
                                                           : Type::real;
-    v.start = static_cast<double>(P{}.*field);
-    v.set = [=](Model& m, const Polynomial& value) { assign(static_cast<M&>(m).*parameters.*field, value[0]); };
+    P defaults;
+    v.start = static_cast<double>(std::invoke(field, defaults));
+    v.set = [=](Model& m, const Polynomial& value) {
+      assign(std::invoke(field, static_cast<M&>(m).*parameters), value[0]);
+    };
     return v;
   }
 
-  /// An input that is a polynomial over the step, with 0 for derivatives that are unset.
-  template <class Access>
-  Variable& input(const std::string& name, const std::string& unit, const std::string& description, Access access) {
+  /// An input that is a polynomial over the step, handed to `set(model, polynomial)` with 0 for derivatives that are
+  /// unset.
+  template <class Set>
+  Variable& input(const std::string& name, const std::string& unit, const std::string& description, Set set) {
     Variable& v = add(name, unit, description, Causality::input);
-    v.set = [access](Model& m, const Polynomial& value) {
-      Polynomial& input = access(static_cast<M&>(m)) = value;
-      for (double& derivative : input)
+    v.set = [set](Model& m, Polynomial value) {
+      for (double& derivative : value)
         if (std::isnan(derivative)) derivative = 0.0;
+      set(static_cast<M&>(m), value);
     };
     return v;
+  }
+  Variable& input(const std::string& name, const std::string& unit, const std::string& description,
+                  Polynomial M::*field) {
+    return input(name, unit, description, [field](M& m, const Polynomial& value) { m.*field = value; });
   }
 
   /// An input that acts at the start of the next step and is then 0 again.

@@ -12,6 +12,7 @@
 namespace {
 
 using beam::Beam;
+using beam::Loads;
 using beam::Parameters;
 
 /// The beam's parameters and what exchange between steps adds to them.
@@ -22,30 +23,28 @@ struct FmuParameters : Parameters {
 
 struct BeamModel final : fmi::Model {
   FmuParameters parameters;
-  fmi::Polynomial tip_force{}, distributed_load{};
+  fmi::Polynomial tip_force{};
+  Loads loads;
   double tip_impulse = 0.0;
   std::unique_ptr<Beam> beam;
   /// With communication_step > 0, otherwise 0. A forecast that leaves the range of numbers is not finite.
-  Beam::Forecast forecast{}, forecast_per_load{};
+  Beam::Forecast forecast{};
   std::array<double, 2> tip_response{};
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
     beam = beam::make_beam(parameters);
-    forecast = forecast_per_load = {};
+    forecast = {};
     tip_response = {};
-    if (forecasts()) {
-      tip_response = beam->tip_response(parameters.communication_step);
-      forecast_per_load = beam->forecast_per_load(parameters.communication_step);
-    }
+    if (forecasts()) tip_response = beam->tip_response(parameters.communication_step);
     deflection_.current = rotation_.current = false;
     look_ahead();
   }
 
   void observe() override {
-    const bool same_load = distributed_load[0] == beam->distributed_load();
-    beam->observe(tip_force[0], distributed_load[0]);
-    if (!same_load) look_ahead();
+    const beam::LoadValues before = beam->loads();
+    beam->observe(tip_force[0], loads);
+    if (beam->loads() != before) look_ahead();
   }
 
   void step(double size) override {
@@ -53,7 +52,7 @@ struct BeamModel final : fmi::Model {
     if (tip_impulse != 0.0 || forecasts()) beam->save(before);
     try {
       if (tip_impulse != 0.0) beam->apply_tip_impulse(tip_impulse);
-      beam->step(size, tip_force, distributed_load);
+      beam->step(size, tip_force, loads);
       foresee();
     } catch (const std::domain_error& e) {
       if (!before.empty()) restore(before);
@@ -73,6 +72,9 @@ struct BeamModel final : fmi::Model {
   // At point `i` of the shape.
   double deflection(std::size_t i) const { return at(i, deflection_, &Beam::deflection); }
   double rotation(std::size_t i) const { return at(i, rotation_, &Beam::rotation); }
+  double forecast_by(std::size_t load) const {
+    return forecasts() ? beam->forecast_per_load(parameters.communication_step, load).velocity : 0.0;
+  }
 
  private:
   bool forecasts() const { return parameters.communication_step > 0.0; }
@@ -165,6 +167,14 @@ fmi::Table make_table() {
             "s in the initial velocity u_t = s*x");
   parameter("tip_load_coefficient", "N/m", &Parameters::tip_load_coefficient,
             "coefficient of the last hat function in the distributed load");
+  const auto position = [](std::size_t i) { return "point_force_position[" + std::to_string(i + 1) + "]"; };
+  for (std::size_t i = 0; i < Loads::tip - Loads::point; ++i) {
+    add.parameter(
+           position(i), "", &BeamModel::parameters,
+           [i](FmuParameters& p) -> double& { return p.point_force_position[i]; },
+           "where point_force[" + std::to_string(i + 1) + "] acts, x/L")
+        .range(0, 1);
+  }
   parameter(
       "communication_step", "s", &FmuParameters::communication_step,
       "size H of the communication steps, for a partner that foresees the tip (communication_step of the spring). "
@@ -176,12 +186,30 @@ fmi::Table make_table() {
       "tip_force", "N",
       "contact force C on the tip, positive upward; its derivatives of order 1 and 2 hold for the next step only: "
       "C(tau) = C + C' tau + C'' tau^2/2. generalized_alpha sees their mean over the step",
-      [](BeamModel& m) -> fmi::Polynomial& { return m.tip_force; });
+      &BeamModel::tip_force);
   add.impulse("tip_impulse", "N.s", "upward impulse on the tip, applied at the start of the next step, then 0 again",
               [](BeamModel& m) -> double& { return m.tip_impulse; });
-  add.input("distributed_load", "N/m",
-            "distributed load f_b, uniform in x, positive upward; derivatives as for tip_force",
-            [](BeamModel& m) -> fmi::Polynomial& { return m.distributed_load; });
+  std::vector<std::string> load_names;
+  const auto load = [&](std::size_t i, const char* unit, const std::string& text) {
+    load_names.emplace_back(Loads::names[i]);
+    add.input(Loads::names[i], unit, text, [i](BeamModel& m, const fmi::Polynomial& value) { m.loads.set(i, value); });
+  };
+  load(Loads::distributed, "N/m",
+       "distributed load f_b, its part that is uniform in x, positive upward; derivatives as for tip_force");
+  for (std::size_t i = 1; i < Loads::point; ++i) {
+    load(i, "N/m",
+         "distributed load f_b, its part that grows as (x/L)^" + std::to_string(i) +
+             ": f_b is the sum of all four; derivatives as for tip_force");
+  }
+  for (std::size_t i = Loads::point; i < Loads::tip; ++i) {
+    load(i, "N", "force at x = L*" + position(i - Loads::point) + ", positive upward; derivatives as for tip_force");
+  }
+  load(Loads::tip, "N",
+       "force on the tip, positive upward, that is a load: unlike that of tip_force its work is part of load_work; "
+       "derivatives as for tip_force");
+  load(Loads::base_acceleration, "m/s2",
+       "acceleration a of the clamp, upward; all displacements are relative to it, so that it acts as a distributed "
+       "load of -density*area*a; derivatives as for tip_force");
 
   const std::vector<std::string> start_u{"initial_deflection_slope", "length"};
   // What the modal basis depends on. Every start is in it: u = s*x without a rotation, for any number of modes.
@@ -196,8 +224,9 @@ fmi::Table make_table() {
   std::vector<std::string> motion = basis;
   motion.insert(motion.end(), {"alpha_b", "rho_inf", "communication_step"});
   std::vector<std::string> free_motion = motion;
-  free_motion.insert(free_motion.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient",
-                                         "distributed_load"});
+  for (std::size_t i = 0; i < Loads::tip - Loads::point; ++i) free_motion.push_back(position(i));
+  free_motion.insert(free_motion.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient"});
+  free_motion.insert(free_motion.end(), load_names.begin(), load_names.end());
   add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
       .from({"initial_velocity_slope", "length"});
   add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation));
@@ -210,9 +239,19 @@ fmi::Table make_table() {
   add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy))
       .from({"area", "shear_modulus", "shear_coefficient", "length", "initial_deflection_slope"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy));
-  add.output("load_potential", "J", "potential of the distributed load", of(&Beam::load_potential))
+  add.output("load_potential", "J",
+             "potential of the loads distributed_load and tip_load_coefficient, as if they were constant",
+             of(&Beam::load_potential))
       .from({"length", "n_elements", "initial_deflection_slope", "tip_load_coefficient", "distributed_load"});
   add.depends("distributed_load", [](const BeamModel& m) { return -m.beam->deflection_integral(); });
+  add.output(
+      "load_work", "J",
+      "work of all loads on the beam since the start, where it is 0: distributed_load, point_force, tip_load, "
+      "base_acceleration and tip_load_coefficient, not tip_force or tip_impulse. A load that is there at the start "
+      "acts suddenly from then on: the start is no state of rest under it. kinetic_energy + strain_energy + "
+      "dissipated_energy - load_work changes by the work of tip_force and tip_impulse alone, for "
+      "generalized_alpha if rho_inf = 1",
+      of(&Beam::load_work));
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
       .from(basis);
   add.output(
@@ -222,7 +261,9 @@ fmi::Table make_table() {
          [](const BeamModel& m) { return m.forecast.velocity; },
          [](const BeamModel& m) { return m.forecast.acceleration; })
       .from(free_motion);
-  add.depends("distributed_load", [](const BeamModel& m) { return m.forecast_per_load.velocity; });
+  for (std::size_t i = 0; i < load_names.size(); ++i) {
+    add.depends(load_names[i], [i](const BeamModel& m) { return m.forecast_by(i); });
+  }
   add.output("tip_response", "m/N",
              "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
              [](const BeamModel& m) { return m.tip_response[0]; })

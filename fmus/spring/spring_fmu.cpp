@@ -28,8 +28,10 @@ struct FmuParameters : Parameters {
 
 struct SpringModel final : fmi::Model {
   FmuParameters parameters;
-  fmi::Polynomial contact_force{}, foundation_force{}, external_force{}, tip_velocity{}, forecast{};
-  fmi::Polynomial tip_displacement{0.0, fmi::unset, fmi::unset};  ///< as set; after a step, as extrapolated
+  fmi::Polynomial contact_force{}, foundation_force{}, external_force{}, base_acceleration{}, tip_velocity{},
+      forecast{};
+  fmi::Polynomial tip_displacement{0.0, fmi::unset, fmi::unset};  ///< as set
+  std::optional<fmi::Polynomial> reached;  ///< what it was extrapolated to, until it is set or used again
   double impulse = 0.0;
   std::optional<Spring> spring;
   std::optional<spring::HeldContact> held;
@@ -60,6 +62,7 @@ struct SpringModel final : fmi::Model {
   }
 
   void step(double size) override {
+    reached.reset();
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
     const bool goes_on = held && size > rounding * held->size();
     if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
@@ -101,7 +104,7 @@ struct SpringModel final : fmi::Model {
   // Of what the held force follows before its first step only the value is known, later it follows nothing.
   double reaction_by_tip_displacement() const { return by_tip(-law_slopes().force_by_depth); }
   double reaction_by_tip_velocity() const {
-    return by_tip(is_set(tip_displacement[1]) ? 0.0 : -law_slopes().force_by_rate);
+    return by_tip(is_set((reached ? *reached : tip_displacement)[1]) ? 0.0 : -law_slopes().force_by_rate);
   }
   double contact_energy_by_tip_displacement() const { return by_tip(-law().elastic(depth())); }
   double dissipated_energy() const { return spring->dissipated_energy() + (held ? held->dissipated() : 0.0); }
@@ -152,16 +155,15 @@ struct SpringModel final : fmi::Model {
 
   /// The tip from now on: tip_velocity is its rate where tip_displacement has no derivative.
   spring::Quadratic tip() const {
-    const auto& [u, rate, curvature] = tip_displacement;
+    const auto& [u, rate, curvature] = reached ? *reached : tip_displacement;
     if (!is_set(rate)) return {u, tip_velocity[0], is_set(curvature) ? curvature : tip_velocity[1]};
     return {u, rate, is_set(curvature) ? curvature : 0.0};
   }
 
-  /// Until tip_displacement is set again it is what it was extrapolated to.
   void keep_tip() {
     if (held) return;
-    const spring::Quadratic reached = spring->tip();
-    tip_displacement = {reached[0], reached[1] == tip_velocity[0] ? fmi::unset : reached[1], fmi::unset};
+    const spring::Quadratic tip = spring->tip();
+    reached = {tip[0], tip[1] == tip_velocity[0] ? fmi::unset : tip[1], fmi::unset};
   }
 
   /// A pair that is wired wrongly gains energy without a sign: say so, once.
@@ -194,8 +196,8 @@ struct SpringModel final : fmi::Model {
       inputs.contact_force = contact_force;
     }
     inputs.foundation_force = foundation_force;
-    inputs.external_force = external_force[0];
-    for (std::size_t i = 1; i < 3; ++i) inputs.contact_force[i] -= external_force[i];  // both act on the top alone
+    inputs.external_force = external_force;
+    inputs.base_acceleration = base_acceleration;
     inputs.tip_displacement = tip();
     return inputs;
   }
@@ -205,7 +207,9 @@ struct SpringModel final : fmi::Model {
     std::vector<double> present;
     spring->save(present);
     spring::Inputs inputs = acting();
-    for (auto* input : {&inputs.contact_force, &inputs.foundation_force}) (*input)[1] = (*input)[2] = 0.0;
+    for (auto* input :
+         {&inputs.contact_force, &inputs.foundation_force, &inputs.external_force, &inputs.base_acceleration})
+      (*input)[1] = (*input)[2] = 0.0;
     return [this, present, inputs, work = 0L](double force) mutable {
       if (work > most_trial_work) return unknown;
       inputs.contact_force[0] = force;
@@ -294,9 +298,7 @@ fmi::Table make_table() {
       .typical(1e-14);
 
   const auto input = [&](const char* name, const char* unit, fmi::Polynomial SpringModel::*field,
-                         const char* text) -> fmi::Variable& {
-    return add.input(name, unit, text, [field](SpringModel& m) -> fmi::Polynomial& { return m.*field; });
-  };
+                         const char* text) -> fmi::Variable& { return add.input(name, unit, text, field); };
   input("contact_force", "N", &SpringModel::contact_force,
         "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next step "
         "only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2");
@@ -306,11 +308,16 @@ fmi::Table make_table() {
               [](SpringModel& m) -> double& { return m.impulse; });
   input("external_force", "N", &SpringModel::external_force,
         "external force f_s, positive upward; derivatives as for contact_force");
+  input("base_acceleration", "m/s2", &SpringModel::base_acceleration,
+        "acceleration a of the foundation, upward; all displacements are relative to it, so that it acts as a force of "
+        "-mass*a; derivatives as for contact_force");
   input("tip_displacement", "m", &SpringModel::tip_displacement,
         "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives or "
         "else by tip_velocity")
       .set = [](fmi::Model& m, const fmi::Polynomial& value) {
-    static_cast<SpringModel&>(m).tip_displacement = value;  // with what is unset
+    auto& model = static_cast<SpringModel&>(m);
+    model.tip_displacement = value;  // with what is unset
+    model.reached.reset();
   };
   input("tip_velocity", "m/s", &SpringModel::tip_velocity,
         "velocity of the beam's tip, read by contact_law = 2 where no derivative of tip_displacement is set; its "
@@ -333,8 +340,8 @@ fmi::Table make_table() {
              "tip_displacement", "tip_velocity",
              // with communication_step > 0, of which the first is foreseen:
              "communication_step", "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping",
-             "linear_stiffness", "cubic_stiffness", "external_force", "foundation_force", "stop_enabled",
-             "stop_position", "restitution", "equilibrium"});
+             "linear_stiffness", "cubic_stiffness", "external_force", "base_acceleration", "foundation_force",
+             "stop_enabled", "stop_position", "restitution", "equilibrium"});
   add.depends("tip_displacement", [](const SpringModel& m) { return m.reaction_by_tip_displacement(); });
   add.depends("tip_velocity", [](const SpringModel& m) { return m.reaction_by_tip_velocity(); });
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
@@ -349,6 +356,10 @@ fmi::Table make_table() {
   add.depends("tip_displacement", [](const SpringModel& m) { return m.contact_energy_by_tip_displacement(); });
   add.output("dissipated_energy", "J", "work of the damping force and of the contact's damping since the start",
              [](const SpringModel& m) { return m.dissipated_energy(); });
+  add.output("load_work", "J",
+             "work of external_force and base_acceleration since the start, where it is 0, impacts and rest on the "
+             "foundation inside included",
+             of(&Spring::load_work));
   add.output("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
              of(&Spring::impact_loss));
   add.output("internal_steps", "", "steps that IDA took since the start",

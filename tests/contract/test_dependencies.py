@@ -39,6 +39,7 @@ COMMON: dict[str, dict[str, float]] = {
         "initial_deflection_slope": 0.3,
         "initial_velocity_slope": -1.0,
         "distributed_load": 0.5,
+        **{f"point_force[{i}]": 0.1 * i for i in range(1, 5)},
         "tip_load_coefficient": 0.2,
         "tip_force": 0.1,
     },

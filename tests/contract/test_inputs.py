@@ -8,6 +8,11 @@ from typing import Any
 import pytest
 
 OK, DISCARD, ERROR = 0, 2, 3
+LOADS = [
+    *("distributed_load", "distributed_load_1", "distributed_load_2", "distributed_load_3"),
+    *(f"point_force[{i}]" for i in range(1, 5)),
+    *("tip_load", "base_acceleration"),
+]
 
 
 def test_free_mass_under_a_polynomial_force_is_exact(spring: Any) -> None:
@@ -151,42 +156,64 @@ def test_every_continuous_input_takes_derivatives_of_order_1_and_2(case: Any) ->
     k.step(0.0, 0.01)
 
 
-def test_a_distributed_load_that_is_a_polynomial_is_exact(beam: Any) -> None:
+def polynomial(k: Any, name: str, f: tuple[float, float, float], t: float = 0.0) -> None:
+    """Sets f₀ + f₁τ + f₂τ²/2 as it is seen from time t on."""
+    k.set(name, f[0] + f[1] * t + f[2] * t * t / 2)
+    assert k.derive(name, 1, f[1] + f[2] * t) == OK
+    assert k.derive(name, 2, f[2]) == OK
+
+
+@pytest.mark.parametrize("load", LOADS)
+def test_a_load_that_is_a_polynomial_is_exact(beam: Any, load: str) -> None:
     """By superposition of steps: one step under a polynomial equals its two halves, modal and the mean alike."""
     H, f = 0.2, (0.8, -3.0, 11.0)
     for parameters, halves_agree in (({"alpha_b": 1e-3}, True), ({"integrator": 2}, False)):
         values = {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 12, **parameters}
         whole, other = beam.running(**values), beam.running(**values)
-        whole.set("distributed_load", f[0])
-        whole.derive("distributed_load", 1, f[1])
-        whole.derive("distributed_load", 2, f[2])
+        polynomial(whole, load, f)
         whole.step(0.0, H)
         if halves_agree:
-            for i in range(2):
-                t = i * H / 2
-                other.set("distributed_load", f[0] + f[1] * t + f[2] * t * t / 2)
-                other.derive("distributed_load", 1, f[1] + f[2] * t)
-                other.derive("distributed_load", 2, f[2])
+            for t in (0.0, H / 2):
+                polynomial(other, load, f, t)
                 other.step(t, H / 2)
         else:
-            other.set("distributed_load", f[0] + f[1] * H / 2 + f[2] * H * H / 6)
+            other.set(load, f[0] + f[1] * H / 2 + f[2] * H * H / 6)
             other.step(0.0, H)
-        names = ("tip_displacement", "tip_velocity", "kinetic_energy", "strain_energy", "dissipated_energy")
+        energies = ("kinetic_energy", "strain_energy", "dissipated_energy", "load_work")
+        names = ("tip_displacement", "tip_velocity", *energies)
         assert whole.get(*names) == pytest.approx(other.get(*names), rel=1e-10, abs=1e-12)
+        assert whole.get("load_work") != 0.0
 
 
-def test_external_force_of_the_spring_is_a_polynomial(spring: Any) -> None:
-    """f_s = −C: one given as the other is the same motion, to the last bit."""
+SAME = {
+    "beam": [
+        ("base_acceleration", "distributed_load", -6.0, {"density": 3.0, "area": 2.0}),  # -density*area
+        ("tip_load", "tip_force", 1.0, {}),
+        ("tip_load", "point_force[3]", 1.0, {"point_force_position[3]": 1.0}),
+    ],
+    "spring": [
+        ("external_force", "contact_force", -1.0, {}),
+        ("base_acceleration", "external_force", -2.5, {"mass": 2.5, "stop_enabled": True}),
+    ],
+}
+
+
+def test_inputs_that_are_another_times_a_factor(case: Any) -> None:
     H, f = 0.2, (0.8, -3.0, 11.0)
-    outputs = []
-    for name, sign in (("external_force", 1.0), ("contact_force", -1.0)):
-        k = spring.running(linear_stiffness=3.0, displacement=0.5)
-        k.set(name, sign * f[0])
-        k.derive(name, 1, sign * f[1])
-        k.derive(name, 2, sign * f[2])
-        k.step(0.0, H)
-        outputs.append(k.get("displacement", "velocity", "displacement_integral"))
-    assert outputs[0] == outputs[1]
+    for one, other, factor, values in SAME[case.name]:
+        a, b = case.running(**values), case.running(**values)
+        for i in range(5):
+            polynomial(a, one, f)
+            polynomial(b, other, tuple(factor * x for x in f))
+            for k in (a, b):
+                k.step(i * H, H)
+        contact = other in ("tip_force", "contact_force")  # of which no work is booked
+        apart = {"load_potential", "load_work" if contact else ""}
+        names = [name for name in case.fmu.outputs if name not in apart]
+        assert a.get(*names) == pytest.approx(b.get(*names), rel=1e-12, abs=1e-14), (one, other)
+        if contact:
+            assert b.get("load_work") == 0.0
+    assert a.get("load_work") != 0.0
 
 
 def test_tip_velocity_with_its_rate_is_a_tip_displacement_with_its_derivatives(spring: Any) -> None:
@@ -253,15 +280,26 @@ def test_the_top_starts_at_its_equilibrium_or_at_the_displacement_that_is_set(sp
     assert k.get("displacement") == pytest.approx(0.1 * math.cos(math.sqrt(2.0) * 0.5), rel=1e-12)
 
 
-def test_energy_of_the_spring_closes_through_lossy_impacts(spring: Any) -> None:
+@pytest.mark.parametrize("loads", [{}, {"external_force": 1.0, "base_acceleration": -0.7}])
+@pytest.mark.parametrize("law", [{}, {"contact_law": 2, "tip_displacement": -0.02, "compliance_damping": 0.3}])
+def test_energy_of_the_spring_closes(spring: Any, loads: dict[str, float], law: dict[str, float]) -> None:
+    """Through lossy impacts and rest, under loads that change within the steps, also with a law inside."""
     k = spring.running(
-        linear_stiffness=30.0, damping=0.2, velocity=-2.0, stop_enabled=True, stop_position=-0.05, restitution=0.6
-    )
+        linear_stiffness=30.0, cubic_stiffness=500.0, damping=0.2, velocity=-1.0, stop_enabled=True, mass=1.2,
+        stop_position=-0.05, restitution=0.4, relative_tolerance=1e-14, absolute_tolerance=1e-16, **law,
+    )  # fmt: skip
+    start, H, seated, impacts = 0.6 + k.get("contact_energy"), 0.02, 0, 0
     for i in range(60):
-        k.step(i * 0.02, 0.02)
-        total = sum(k.get("kinetic_energy", "potential_energy", "dissipated_energy", "impact_loss"))
-        assert total == pytest.approx(2.0, rel=1e-11), i
-    assert k.get("impact_loss") > 1.0
+        for name, factor in loads.items():
+            polynomial(k, name, (-3.0 * factor, 150.0 * (-1) ** i * factor, -1e4 * factor))
+        k.step(i * H, H)
+        seated += k.get("stop_force") > 0.0
+        impacts += k.get("stop_impulse") > 0.0
+        stored = sum(k.get("kinetic_energy", "potential_energy", "contact_energy"))
+        total = stored + sum(k.get("dissipated_energy", "impact_loss")) - k.get("load_work")
+        assert total == pytest.approx(start, rel=1e-12), i
+    assert impacts >= 2
+    assert (k.get("load_work") != 0.0, seated > 9) == (bool(loads), bool(loads))
 
 
 def test_a_derivative_of_the_tip_that_is_set_counts_even_if_it_is_zero(spring: Any) -> None:

@@ -84,9 +84,9 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
     # design.md, section 5: names, kinds and units that masters rely on.
     agreed = {
         "beam": {
-            ("input", "N"): ["tip_force"],
+            ("input", "N"): ["tip_force", "tip_load", *(f"point_force[{i}]" for i in range(1, 5))],
             ("input", "N.s"): ["tip_impulse"],
-            ("input", "N/m"): ["distributed_load"],
+            ("input", "N/m"): ["distributed_load", *(f"distributed_load_{i}" for i in range(1, 4))],
             ("output", "m"): ["tip_displacement"],
             ("local", "m"): [f"deflection[{i}]" for i in range(1, 22)],
             ("output", "m/s"): ["tip_velocity", "tip_velocity_forecast"],
@@ -94,7 +94,8 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
             ("local", "rad"): [f"rotation[{i}]" for i in range(1, 22)],
             ("output", "m.s"): ["tip_displacement_integral"],
             ("output", "m.s2"): ["tip_displacement_integral_2"],
-            ("output", "J"): ["kinetic_energy", "strain_energy", "dissipated_energy", "load_potential"],
+            ("input", "m/s2"): ["base_acceleration"],
+            ("output", "J"): ["kinetic_energy", "strain_energy", "dissipated_energy", "load_potential", "load_work"],
             ("output", "kg"): ["tip_mass"],
             ("parameter", "s"): ["alpha_b"],
             ("parameter", "N/m"): ["tip_load_coefficient"],
@@ -102,10 +103,12 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
                 *("shear_coefficient", "n_elements", "n_modes", "reduced_integration", "mass_matrix", "integrator"),
                 "rho_inf",
                 "initial_deflection_slope",
+                *(f"point_force_position[{i}]" for i in range(1, 5)),
             ],
         },
         "spring": {
             ("input", "N"): ["contact_force", "foundation_force", "external_force"],
+            ("input", "m/s2"): ["base_acceleration"],
             ("input", "N.s"): ["impulse"],
             ("input", "m"): ["tip_displacement"],
             ("input", "m/s"): ["tip_velocity", "tip_velocity_forecast"],
@@ -114,7 +117,8 @@ def test_variables_of_the_agreed_contract_are_there(case: Any) -> None:
             ("output", "N"): ["reaction", "stop_force"],
             ("output", "N.s"): ["stop_impulse"],
             ("output", "J"): [
-                *("kinetic_energy", "potential_energy", "contact_energy", "dissipated_energy", "impact_loss")
+                *("kinetic_energy", "potential_energy", "contact_energy", "dissipated_energy", "impact_loss"),
+                "load_work",
             ],
             ("parameter", "kg"): ["mass"],
             ("parameter", "N.s/m"): ["damping"],

@@ -94,15 +94,23 @@ TEST(BeamDegree, FormsAreTheIntegralsOfTheirDefinition) {
         ASSERT_EQ(mesh.size(), 2 * n * degree);
         const Eigen::VectorXd q = noise(mesh.size());
         const double h = p.length / n, r = std::sqrt(p.second_moment_of_area / p.area);
-        double mass = 0.0, bending = 0.0, shear = 0.0, uniform = 0.0, hat = 0.0;
+        double mass = 0.0, bending = 0.0, shear = 0.0, hat = 0.0;
+        std::array<double, Loads::point> distributed{};
         for (int e = 0; e < n; ++e) {
           for (const auto& [xi, w] : gauss(degree + 1)) {  // exact to degree 2p + 1
             const Point at = evaluate(p, q, e, xi);
             mass += 0.5 * h * w * (at.theta * at.theta + at.u * at.u);
             bending += 0.5 * h * w * at.theta_x * at.theta_x;
             if (!reduced) shear += 0.5 * h * w * std::pow(at.u_x - at.theta / r, 2);
-            uniform += 0.5 * h * w * at.u;
             if (e == n - 1) hat += 0.5 * h * w * 0.5 * (1.0 + xi) * at.u;
+          }
+          for (const auto& [xi, w] : gauss(degree + 2)) {
+            const double x = (e + 0.5 + 0.5 * xi) / n;
+            double power = 0.5 * h * w * evaluate(p, q, e, xi).u;
+            for (double& work : distributed) {
+              work += power;
+              power *= x;
+            }
           }
           if (reduced) {
             for (const auto& [xi, w] : gauss(degree)) {
@@ -118,8 +126,10 @@ TEST(BeamDegree, FormsAreTheIntegralsOfTheirDefinition) {
         EXPECT_NEAR(dot(q, mesh.mass_times(q)), mass, rounding * mass) << degree;
         EXPECT_NEAR(mesh.stiffness_norm2(q), stiffness, rounding * stiffness) << degree;
         EXPECT_NEAR(dot(q, mesh.stiffness_times(q)), stiffness, rounding * stiffness) << degree;
-        EXPECT_NEAR(mesh.uniform_load().dot(q), uniform, 1e-14 * degree) << degree;
-        EXPECT_NEAR(mesh.hat_load().dot(q), hat, 1e-14 * degree) << degree;
+        for (std::size_t i = 0; i < distributed.size(); ++i) {
+          EXPECT_NEAR(mesh.load(i).dot(q), distributed[i], 1e-14 * degree) << degree << " " << i;
+        }
+        EXPECT_NEAR(mesh.load(Loads::tip_load_coefficient).dot(q), hat, 1e-14 * degree) << degree;
 
         Eigen::VectorXd strains(mesh.size());
         mesh.weighted_strains(q.data(), strains.data());
@@ -242,17 +252,31 @@ TEST(BeamDegree, OneElementHasTheExactTipComplianceFromDegreeThree) {
   }
 }
 
-TEST(BeamDegree, AUniformLoadIsExactFromDegreeFour) {
-  // u is of degree 4, θ of degree 3: u(L) = f_b (L⁴/8EI + L²/2KAG). One degree less suffices with p Gauss points.
+TEST(BeamDegree, LoadsLiftTheTipExactlyFromDegreeFour) {
+  // u(L) is the work of the load on the shape of a unit tip force, w(x) = (L x²/2 − x³/6)/EI + x/KAG, which is then in
+  // the space. One degree less suffices with p Gauss points.
   for (int degree = 3; degree <= max_element_degree; ++degree) {
     for (const bool reduced : {false, true}) {
       if (degree == 3 && !reduced) continue;
       Parameters p = general_beam(2, degree);
       p.reduced_integration = reduced;
+      p.point_force_position = {0.0, 0.3, 0.5, 1.0};
       const Timoshenko mesh(p);
-      const double L = p.length, exact = L * L * L * L / (8.0 * bending(p)) + L * L / (2.0 * shearing(p));
-      const double u = mesh.flexibility_times(mesh.uniform_load())[mesh.tip_index()] / (p.density * p.area);
-      EXPECT_NEAR(u, exact, 1e-13 * exact) << degree;
+      const double L = p.length, mu = p.density * p.area;
+      const auto tip = [&](std::size_t load) { return mesh.flexibility_times(mesh.load(load))[mesh.tip_index()] / mu; };
+      std::array<double, Loads::tip_load_coefficient> exact{};
+      for (std::size_t k = 0; k < Loads::point; ++k) {
+        const double power = static_cast<double>(k);
+        exact[k] = std::pow(L, 4) * (0.5 / (power + 3.0) - 1.0 / (6.0 * (power + 4.0))) / bending(p) +
+                   L * L / ((power + 2.0) * shearing(p));
+      }
+      const auto w = [&](double x) { return (L * x * x / 2.0 - x * x * x / 6.0) / bending(p) + x / shearing(p); };
+      for (std::size_t i = 0; i < 4; ++i) exact[Loads::point + i] = w(L * p.point_force_position[i]);
+      exact[Loads::tip] = w(L);
+      exact[Loads::base_acceleration] = -mu * exact[0];
+      for (std::size_t i = 0; i < exact.size(); ++i) {
+        EXPECT_NEAR(tip(i), exact[i], 1e-13 * std::abs(exact[Loads::tip])) << degree << " " << Loads::names[i];
+      }
     }
   }
 }

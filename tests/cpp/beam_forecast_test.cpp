@@ -48,14 +48,19 @@ TEST(BeamForecast, DependsOnTheLoadAsItSays) {
     const double H = 0.05;
     const auto b = make_beam(p);
     stir(*b);
-    const Beam::Forecast per_load = b->forecast_per_load(H);
-    b->observe(0.0, -0.7);
-    const Beam::Forecast one = b->forecast(H);
-    b->observe(0.0, 2.3);
-    const Beam::Forecast other = b->forecast(H);
-    EXPECT_NEAR(other.velocity - one.velocity, 3.0 * per_load.velocity, 1e-12 * std::abs(other.velocity));
-    EXPECT_NEAR(other.acceleration - one.acceleration, 3.0 * per_load.acceleration,
-                1e-12 * (std::abs(one.acceleration) + std::abs(other.acceleration)));
+    for (std::size_t i = 0; i < Loads::tip_load_coefficient; ++i) {
+      const auto under = [&](double value) {
+        Loads loads;
+        loads.set(i, {value, 0.0, 0.0});
+        b->observe(0.0, loads);
+        return b->forecast(H);
+      };
+      const Beam::Forecast per_load = b->forecast_per_load(H, i), one = under(-0.7), other = under(2.3);
+      EXPECT_NEAR(other.velocity - one.velocity, 3.0 * per_load.velocity,
+                  1e-12 * (std::abs(one.velocity) + std::abs(other.velocity)));
+      EXPECT_NEAR(other.acceleration - one.acceleration, 3.0 * per_load.acceleration,
+                  1e-12 * (std::abs(one.acceleration) + std::abs(other.acceleration)));
+    }
   }
 }
 
@@ -74,7 +79,7 @@ TEST(BeamForecast, LeavesNoTrace) {
     stir(*b);
     stir(*untouched);
     b->forecast(0.02);
-    b->forecast_per_load(0.02);
+    b->forecast_per_load(0.02, Loads::distributed);
     b->tip_response(0.03);
     EXPECT_EQ(outputs(*b), outputs(*untouched));
     stir(*b);

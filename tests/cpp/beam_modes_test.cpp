@@ -213,7 +213,7 @@ TEST(BeamModes, TheStaticTipUnderAHatLoadIsThatOfTheMesh) {
     p.n_modes = n_modes;
     const Timoshenko mesh(p);
     const double exact = p.tip_load_coefficient / mesh.mass_per_length() *
-                         mesh.hat_load().dot(mesh.flexibility_times(mesh.unit_tip_force()));
+                         mesh.load(Loads::tip_load_coefficient).dot(mesh.flexibility_times(mesh.unit_tip_force()));
     const auto b = make_beam(p);
     b->step(1000.0, {0.0, 0.0, 0.0}, 0.0);
     EXPECT_NEAR(b->tip_displacement(), exact, 1e-12 * std::abs(exact)) << n_modes;

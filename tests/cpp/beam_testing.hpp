@@ -76,6 +76,25 @@ inline const std::vector<double>& clamped_free_frequencies() {
 /// C(τ) seen from τ₀ on: the same polynomial re-expanded.
 inline Force shifted(const Force& c, double t) { return {c[0] + t * (c[1] + 0.5 * t * c[2]), c[1] + t * c[2], c[2]}; }
 
+/// Every load at once, each with f₀, f₁/H and f₂/H² of the order 1 made by `noise`.
+template <class Noise>
+Loads every_load(double H, Noise& noise) {
+  Loads loads;
+  for (std::size_t i = 0; i < Loads::tip_load_coefficient; ++i) {
+    const double f0 = noise(), f1 = noise() / H, f2 = noise() / (H * H);
+    loads.set(i, {f0, f1, f2});
+  }
+  return loads;
+}
+
+/// The same loads, each made another polynomial.
+template <class Change>
+Loads changed(const Loads& loads, const Change& change) {
+  Loads other;
+  loads.for_each([&](std::size_t i, const Force& f) { other.set(i, change(f)); });
+  return other;
+}
+
 inline double mechanical_energy(const Beam& b) { return b.kinetic_energy() + b.strain_energy(); }
 
 /// Everything that can be read, for comparisons bit by bit.
@@ -89,6 +108,7 @@ inline std::vector<double> outputs(const Beam& b) {
                              b.kinetic_energy(),
                              b.strain_energy(),
                              b.dissipated_energy(),
+                             b.load_work(),
                              b.load_potential()};
   std::array<double, shape_points> shape;
   b.deflection(shape);

@@ -95,7 +95,7 @@ TEST(Spring, DampedOscillatorAndItsDissipation) {
     p.damping = exact.c;
     Spring s(p);
     Inputs inputs;
-    inputs.external_force = exact.F;
+    inputs.external_force[0] = exact.F;
     const int steps = static_cast<int>(std::lround(2.0 / H));
     for (int i = 1; i <= steps; ++i) {
       s.step(H, inputs);
@@ -129,7 +129,7 @@ TEST(Spring, FreeMassUnderPolynomialForceIsExact) {
   Inputs inputs;
   inputs.contact_force = {1.5, -40.0, 900.0};
   inputs.foundation_force = {0.25, 3.0, -100.0};
-  inputs.external_force = -2.0;
+  inputs.external_force[0] = -2.0;
   const double f0 = -3.25 / 2.5, f1 = 43.0 / 2.5, f2 = -1000.0 / 2.5;
   for (const double t : {1e-4, 1e-2, 0.5}) {
     Spring s(p);

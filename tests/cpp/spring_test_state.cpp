@@ -221,7 +221,7 @@ TEST(SpringState, AccelerationFollowsTheInputs) {
   Inputs inputs;
   inputs.contact_force = {1.0, 2.0, 6.0};
   inputs.foundation_force[0] = 0.5;
-  inputs.external_force = 0.25;
+  inputs.external_force[0] = 0.25;
   const auto expected = [&](double force) {
     const double y = s.displacement(), z = s.velocity();
     return force - 0.7 * z - 3.0 * y + 0.2 * y * y * y;
@@ -288,7 +288,7 @@ TEST(SpringEscape, BeyondTheHilltopIsReported) {
 // A force that pushes it over, within one long step; a hardening spring takes the same force.
 TEST(SpringEscape, AForceCanPushItOver) {
   Inputs inputs;
-  inputs.external_force = 20.0;
+  inputs.external_force[0] = 20.0;
   Spring s(softening());
   EXPECT_THROW(s.step(1.0, inputs), Escape);
   Parameters p = softening();
@@ -316,7 +316,7 @@ TEST(SpringEscape, AStopAtTheHilltopHoldsTheTop) {
   p.displacement = -hilltop;  // rests there: unstable, but held
   p.velocity = 0.0;
   Inputs weight;
-  weight.external_force = -1.0;
+  weight.external_force[0] = -1.0;
   Spring resting(p);
   resting.step(1.0, weight);
   EXPECT_TRUE(resting.seated());
@@ -343,7 +343,7 @@ TEST(SpringStep, WorkIsBounded) {
   bouncing.stop_enabled = true;
   bouncing.stop_position = 0.0;
   Inputs pressed;
-  pressed.external_force = -5e6;
+  pressed.external_force[0] = -5e6;
   Spring b(bouncing);
   expect(failure(b, 1.0, pressed), {"1 s spans too much", "internal steps with ", "smaller step size"});
 }
@@ -351,7 +351,7 @@ TEST(SpringStep, WorkIsBounded) {
 // Finite numbers whose results are not: the motion, its energy, the force of the law inside.
 TEST(SpringStep, ResultsThatAreNotFiniteAreRefused) {
   Inputs force;
-  force.external_force = 1e300;
+  force.external_force[0] = 1e300;
   Parameters p;
   p.cubic_stiffness = 1.0;
   Spring hardening(p);

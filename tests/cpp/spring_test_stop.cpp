@@ -28,7 +28,7 @@ Parameters ball(double height, double velocity, double restitution) {
 
 Inputs weight(double force) {
   Inputs inputs;
-  inputs.external_force = -force;
+  inputs.external_force[0] = -force;
   return inputs;
 }
 
