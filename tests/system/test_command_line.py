@@ -30,6 +30,7 @@ TABLES = {
     "report": "done --out page.html",
     "animate": "done --seconds 0.2 --fps 10 --out moving.gif",
     "predict": "soft --set beam.n_elements=10",
+    "converge": "soft --levels 3 --set beam.n_elements=4 --set time.t_end=0.05 --out meshes",
     "tradeoff": "duffing --until 0.5 --repeats 1 --out traded",
     "crosscheck": "soft --set time.t_end=0.1",
     "stability": "--samples 4 --resolution 0 --workers 1 --out grid",
@@ -155,7 +156,7 @@ def test_json_is_one_document_and_all_of_stdout(place, tmp_path, monkeypatch, na
     elif name == "stability":
         assert sum(document["classes"].values()) == document["cells"] == 4
     else:
-        assert Path(document["directory"], "tradeoff.csv").exists()
+        assert Path(document["directory"], f"{name}.csv").exists()
 
 
 def test_json_of_a_run_that_stops_early_is_its_summary_and_the_error_is_on_stderr(tmp_path, monkeypatch):

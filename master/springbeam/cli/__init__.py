@@ -17,6 +17,7 @@ import typer
 
 from . import (
     checks,
+    converge,
     doctor,
     report,
     resume,
@@ -91,7 +92,7 @@ def _common(
 for title, commands in {
     "Run": (scenes.scenes, run.run, resume.resume, sweep.sweep),
     "Look": (report.report, report.animate),
-    "Choose scheme and accuracy": (stability.predict, tradeoff.tradeoff),
+    "Choose scheme and accuracy": (stability.predict, tradeoff.tradeoff, converge.converge),
     "Check": (checks.crosscheck, checks.verify, stability.stability, doctor.doctor),
 }.items():
     for command in commands:
