@@ -16,6 +16,7 @@ from math import factorial
 import numpy as np
 from scipy.linalg import eigh, expm
 
+from springbeam.bodies.force import combined, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
 from springbeam.results.recording import MemoryRecorder
 from springbeam.results.trajectory import Trajectory
@@ -71,27 +72,44 @@ class ModalBody(BeamBody):
         self.alpha, self._sampler = alpha, sampler
         self.mass = 1.0 / float(self.b @ self.b)
         self._integrals = (0.0, 0.0)
-        self._dissipated = 0.0
+        self._dissipated = self._work = 0.0
         self._maps = {}
+        self._load = np.zeros((3, len(self.omega)))
         self.steps = self.rewinds = 0
 
     def mark(self):
-        self._marked = (self.a, self.v, self._integrals, self._dissipated)
+        self._marked = (self.a, self.v, self._integrals, self._dissipated, self._work)
         self._moved = False
 
     def rewind(self):
         if self._moved:
             self.rewinds += 1
-            self.a, self.v, self._integrals, self._dissipated = self._marked
+            self.a, self.v, self._integrals, self._dissipated, self._work = self._marked
             self._moved = False
+
+    def expect_loads(self, loads):
+        self._patterns = [self.pattern(load) for load in loads]
+
+    def pattern(self, load):
+        """What a unit of the load is in the modes; `beam_body` knows more than the tip."""
+        assert load.on == "tip"
+        return self.b
+
+    def set_loads(self, forces):
+        self._load = sum(np.outer(f, pattern) for f, pattern in zip(forces, self._patterns, strict=True))
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self.steps += 1
         self._moved = True
         step = self._undamped if self.alpha == 0.0 else self._damped
-        p = np.outer(contact, self.b)
+        p = np.outer(contact, self.b) + self._load
         p[0] += self.f
+        before, (f, df, ddf) = self.a, self._load
         i1, i2 = step(size, p)
+        # By parts, as `springbeam.bodies.force.work_on`.
+        once, twice = i1 - before * size, i2 - before * (0.5 * size * size)
+        ends = f + size * (df + 0.5 * size * ddf)
+        self._work += float(ends @ (self.a - before) - df @ once - ddf @ (size * once - twice))
         self._integrals = (float(self.b @ i1), float(self.b @ i2))
         return self.motion()
 
@@ -140,9 +158,8 @@ class ModalBody(BeamBody):
 
     def energies(self) -> Energies:
         stretch = self.omega * self.a
-        return Energies(
-            0.5 * float(self.v @ self.v), 0.5 * float(stretch @ stretch), self._dissipated, -float(self.f @ self.a)
-        )
+        load = -float(self.f @ self.a) - self._work
+        return Energies(0.5 * float(self.v @ self.v), 0.5 * float(stretch @ stretch), self._dissipated, load)
 
     def apply_impulse(self, impulse: float):
         self.v = self.v + self.b * impulse
@@ -170,6 +187,7 @@ def beam_body(beam: Beam, slope: float | None = None) -> ModalBody:
         Ke[::2, 1::2], Ke[1::2, ::2] = -shear * s, -shear * s.T
         M[d, d] += Me
         K[d, d] += Ke
+    clamp_mass = M[2:, 1].copy()  # of the clamp's deflection on the others
     M, K = M[2:, 2:], K[2:, 2:]
     squares, basis = eigh(K, M)
     x = np.zeros(2 * n)
@@ -182,7 +200,25 @@ def beam_body(beam: Beam, slope: float | None = None) -> ModalBody:
     nodes = np.linspace(0.0, 1.0, n + 1)
     deflection = np.vstack([np.zeros((1, 2 * n)), basis[1::2]])
     line = basis.T @ (M @ x)
-    return ModalBody(
+    gauss, weights = np.polynomial.legendre.leggauss(4)
+
+    def pattern(load):
+        if load.on == "tip":
+            return basis[-1]
+        if load.on == "base":
+            return -basis.T @ (M @ np.tile([0.0, 1.0], n)) - basis.T @ clamp_mass
+        at = np.zeros(n + 1)
+        if load.at is not None:
+            k = min(int(load.at * n), n - 1)
+            at[[k, k + 1]] = k + 1 - load.at * n, load.at * n - k
+        else:
+            for k in range(n):
+                s = 0.5 * (gauss + 1.0)
+                f = 0.5 * h * weights * np.polynomial.polynomial.polyval((k + s) / n, load.shape or [1.0])
+                at[[k, k + 1]] += f @ (1.0 - s), f @ s
+        return basis[1::2].T @ at[1:]
+
+    body = ModalBody(
         np.sqrt(squares),
         basis[-1],
         (beam.initial_deflection_slope if slope is None else slope) * line,
@@ -191,6 +227,8 @@ def beam_body(beam: Beam, slope: float | None = None) -> ModalBody:
         beam.alpha_b,
         np.array([np.interp(SHAPE_POINTS, nodes, column) for column in deflection.T]).T,
     )
+    body.pattern = pattern
+    return body
 
 
 def modal_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> ModalBody:
@@ -208,23 +246,34 @@ class DuffingBody(Body):
         self.mass, self.k1, self.k2, self.damping, self.external = mass, k1, k2, damping, external
         self.y, self.z = float(y), float(z)
         self._integrals = (0.0, 0.0)
-        self._dissipated = 0.0
+        self._dissipated = self._work = 0.0
+        self._load = NO_FORCE
         self.steps = self.rewinds = 0
 
     def mark(self):
-        self._marked = (self.y, self.z, self._integrals, self._dissipated)
+        self._marked = (self.y, self.z, self._integrals, self._dissipated, self._work)
         self._moved = False
 
     def rewind(self):
         if self._moved:
             self.rewinds += 1
-            self.y, self.z, self._integrals, self._dissipated = self._marked
+            self.y, self.z, self._integrals, self._dissipated, self._work = self._marked
             self._moved = False
+
+    def expect_loads(self, loads):
+        self._shares = [-self.mass if load.on == "base" else 1.0 for load in loads]
+
+    def set_loads(self, forces):
+        self._load = combined(self._shares, forces)
+
+    def load_on_end(self):
+        return self._load
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self.steps += 1
         self._moved = True
-        f0, f1, f2 = (n - p for n, p in zip(foundation, contact, strict=True))
+        f0, f1, f2 = (n - p + f for n, p, f in zip(foundation, contact, self._load, strict=True))
+        start = self.motion()
         f0 += self.external
         i1 = i2 = done = 0.0
         while done < size:
@@ -245,6 +294,7 @@ class DuffingBody(Body):
             i1 = new1
             self.y, self.z = _sum(y, h), _sum([k * c for k, c in enumerate(y)][1:], h)
         self._integrals = (i1, i2)
+        self._work += work_on(self._load, start, self.motion(), size)
         return self.motion()
 
     def _series(self, *forcing: float) -> list[float]:
@@ -280,7 +330,7 @@ class DuffingBody(Body):
             0.5 * self.mass * z * z,
             0.5 * self.k1 * y * y + 0.25 * self.k2 * y**4,
             self._dissipated,
-            -self.external * y,
+            -self.external * y - self._work,
         )
 
     def apply_impulse(self, impulse: float):

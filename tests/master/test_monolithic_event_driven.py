@@ -455,7 +455,8 @@ def test_jacobian_is_the_derivative_of_the_right_hand_side(law, damping, phase):
     h = 1e-6
     rates = (system.derivative(phase, X + h * direction) - system.derivative(phase, X - h * direction)) / (2.0 * h)
     expected = system.jacobian(phase, X) @ direction
-    np.testing.assert_allclose(rates[:-1], expected[:-1], atol=1e-8 * np.abs(expected).max())
+    mechanical = slice(0, system.D)
+    np.testing.assert_allclose(rates[mechanical], expected[mechanical], atol=1e-8 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("method", ["exponential", "DOP853"])

@@ -26,7 +26,8 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[FmuBeam | QuasiStaticB
             if scene.beam.approach == "elastic" or scene.contact.law == "compliance":
                 beam.release()
         else:
-            beam = FmuBeam(scene.beam, start_time, scene.beam.initial_deflection_slope + start_time * rate)
+            slope = scene.beam.initial_deflection_slope + start_time * rate
+            beam = FmuBeam(scene.beam, start_time, slope, scene.loads)
     try:
         return beam, None if scene.spring is None else FmuSpring(scene.spring, start_time)
     except BaseException:

@@ -9,10 +9,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..scene import Beam, Spring
+from ..scene import Beam, Load, Spring
 from ..scene.statics import SHAPE_POINTS
 from .archive import fmu_directory
 from .fmu import WARNING, Fmu, FmuError, Reals
+from .force import combined
 from .protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion, StepRefused
 
 #: The numbers by which the beam FMU knows its alternatives.
@@ -32,6 +33,8 @@ class _FmuBody(Body):
     _ENERGIES: tuple[str, ...]
     _IMPULSE: str
     _FORCES: tuple[str, ...]
+    _constants: dict[str, float]  #: of the scene, by the inputs that hold them from the start
+    _bears_loads = False  #: whether the last of the energies is the work of the loads
     _current: Motion
     _marked_motion: Motion
 
@@ -46,10 +49,20 @@ class _FmuBody(Body):
     def _prepare(self, fmu: Fmu) -> None:
         self._motion, self._energies = Reals(fmu, *self._MOTION), Reals(fmu, *self._ENERGIES)
         self._impulse = Reals(fmu, self._IMPULSE)
-        n = len(self._FORCES)
-        forces = [fmu.reference(name, "Real") for name in self._FORCES]
-        Reals(fmu, *self._FORCES)  # a wrong reference is found before the run
-        self._inputs: Any = (c_double * (3 * n))()  # the forces, then Ḟ and F̈ of each
+        self._prepare_inputs(())
+        self._pending = self._marked_pending = 0.0
+        self.mass = self._mass()
+        if not isfinite(self.mass):
+            raise FmuError(f"{fmu.path}: the mass of its end is {self.mass}")
+        self._begin()
+
+    def _prepare_inputs(self, loads: Sequence[str]) -> None:
+        """Calls that set the forces and ``loads``, inputs of the FMU, and their derivatives."""
+        fmu, names = self.fmu, (*self._FORCES, *loads)
+        n = self._number = len(names)
+        forces = [fmu.reference(name, "Real") for name in names]
+        Reals(fmu, *names)  # a wrong reference is found before the run
+        self._inputs: Any = (c_double * (3 * n))()  # the forces and loads, then the two derivatives of each
         self._set_forces = fmu.prepared("fmi2SetReal", (c_uint * n)(*forces), c_size_t(n), self._inputs)
         self._set_slopes = fmu.prepared(
             "fmi2SetRealInputDerivatives",
@@ -58,11 +71,29 @@ class _FmuBody(Body):
             (c_int * (2 * n))(*[1, 2] * n),
             byref(self._inputs, n * sizeof(c_double)),
         )
-        self._pending = self._marked_pending = 0.0
-        self.mass = self._mass()
-        if not isfinite(self.mass):
-            raise FmuError(f"{fmu.path}: the mass of its end is {self.mass}")
-        self._begin()
+        #: The loads of a step, and two derivatives of each.
+        self._loads: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,) * len(loads), (0.0,) * (2 * len(loads)))
+
+    def expect_loads(self, loads: Sequence[Load]) -> None:
+        #: By input of the FMU: what is added to it by a unit of which load.
+        self._shares: dict[str, list[tuple[int, float]]] = {}
+        for number, load in enumerate(loads):
+            for name, share in self._inputs_of(load):
+                self._shares.setdefault(name, []).append((number, share))
+        self._prepare_inputs(tuple(self._shares))
+        self._energies, self._bears_loads = Reals(self.fmu, *self._ENERGIES[:3], "load_work"), True
+
+    def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
+        """Return the inputs of the FMU that ``load`` acts by, and how much of it each takes."""
+        raise NotImplementedError
+
+    def set_loads(self, forces: Sequence[Force]) -> None:
+        values, slopes = [], []
+        for name, shares in self._shares.items():
+            f, df, ddf = combined([share for _, share in shares], [forces[number] for number, _ in shares])
+            values.append(f + self._constants.get(name, 0.0))
+            slopes += [df, ddf]
+        self._loads = (tuple(values), tuple(slopes))
 
     def _mass(self) -> float:
         raise NotImplementedError
@@ -96,14 +127,14 @@ class _FmuBody(Body):
         self._current = self._current._replace(velocity=self._current.velocity + impulse / self.mass)
 
     def _advance(self, time: float, size: float, inputs: Sequence[float]) -> Motion:
-        """``inputs`` at the start of the step: the forces, then Ḟ and F̈ of each."""
-        fmu, n = self.fmu, len(self._FORCES)
+        """``inputs`` at the start of the step: the forces and loads, then the two derivatives of each."""
+        fmu, n = self.fmu, self._number
         if not isfinite(sum(inputs)):
             raise StepRefused(f"{fmu.path.name}: the force it should step under is not finite: {list(inputs[:n])}")
         self._inputs[:] = inputs
         fmu.moved = True
         if (status := self._set_forces()) > WARNING:
-            raise fmu.failed(status, f"cannot set {', '.join(self._FORCES)}")
+            raise fmu.failed(status, f"cannot set {', '.join(self._FORCES)} and loads")
         if any(inputs[n:]) and (status := self._set_slopes()) > WARNING:
             raise fmu.failed(status, "cannot set input derivatives")
         fmu.step(time, size)
@@ -149,12 +180,15 @@ class FmuBeam(_FmuBody, BeamBody):
     _IMPULSE = "tip_impulse"
     _FORCES = ("tip_force",)
 
-    def __init__(self, beam: Beam, start_time: float, deflection_slope: float) -> None:
-        """At ``start_time`` [s], with u = ``deflection_slope``·x."""
+    def __init__(self, beam: Beam, start_time: float, deflection_slope: float, loads: Sequence[Load] = ()) -> None:
+        """At ``start_time`` [s], with u = ``deflection_slope``·x; ``loads`` say where point forces may act."""
+        self._points = sorted({load.at for load in loads if load.at is not None})
+        self._constants = {"distributed_load": beam.distributed_load}
         parameters: dict[str, float | int | bool] = beam.model_dump(exclude={"approach", "fidelity"})
         parameters["integrator"] = _INTEGRATORS[beam.integrator]
         parameters["mass_matrix"] = _MASS_MATRICES[beam.mass_matrix]
         parameters["initial_deflection_slope"] = deflection_slope
+        parameters |= {f"point_force_position[{k}]": at for k, at in enumerate(self._points, 1)}
         super().__init__(Fmu("beam", fmu_directory() / "beam.fmu", parameters, start_time))
 
     def _prepare(self, fmu: Fmu) -> None:
@@ -165,10 +199,22 @@ class FmuBeam(_FmuBody, BeamBody):
         return Reals(self.fmu, "tip_mass").get()[0]
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        return self._advance(time, size, contact)
+        values, slopes = self._loads
+        return self._advance(time, size, (contact[0], *values, contact[1], contact[2], *slopes))
+
+    def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
+        if load.on == "tip":
+            return [("tip_load", 1.0)]
+        if load.on == "base":
+            return [("base_acceleration", 1.0)]
+        if load.at is not None:
+            return [(f"point_force[{self._points.index(load.at) + 1}]", 1.0)]
+        shape = load.shape or [1.0]
+        return [(f"distributed_load_{i}" if i else "distributed_load", s) for i, s in enumerate(shape) if s != 0.0]
 
     def energies(self) -> Energies:
-        return _energies_of(Energies, self._stored())
+        kinetic, strain, dissipated, load = self._stored()
+        return _energies_of(Energies, (kinetic, strain, dissipated, -load if self._bears_loads else load))
 
     def shape(self) -> np.ndarray:
         """Deflection [m] at `SHAPE_POINTS`, shape (21,)."""
@@ -187,11 +233,12 @@ class FmuSpring(_FmuBody):
     _FORCES = ("contact_force", "foundation_force")
 
     def __init__(self, spring: Spring, start_time: float) -> None:
-        self._spring = spring
+        self._spring, self._constants = spring, {"external_force": spring.external_force}
         parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
         parameters["displacement"] = spring.equilibrium
         parameters["velocity"] = spring.initial_velocity
         self._dissipated_before = 0.0  #: before the last `restart` [J]
+        self._on_end = NO_FORCE
         super().__init__(Fmu("spring", fmu_directory() / "spring.fmu", parameters, start_time))
 
     def _mass(self) -> float:
@@ -203,12 +250,27 @@ class FmuSpring(_FmuBody):
         return static + spring.damping * velocity
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        (c, dc, ddc), (n, dn, ddn) = contact, foundation
-        return self._advance(time, size, (c, n, dc, ddc, dn, ddn))
+        (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
+        return self._advance(time, size, (c, n, *values, dc, ddc, dn, ddn, *slopes))
+
+    def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
+        return [("base_acceleration" if load.on == "base" else "external_force", 1.0)]
+
+    def expect_loads(self, loads: Sequence[Load]) -> None:
+        super().expect_loads(loads)
+        #: What a unit of each load is at the top [N].
+        self._at_top = [-self._spring.mass if load.on == "base" else 1.0 for load in loads]
+
+    def set_loads(self, forces: Sequence[Force]) -> None:
+        super().set_loads(forces)
+        self._on_end = combined(self._at_top, forces)
+
+    def load_on_end(self) -> Force:
+        return self._on_end
 
     def energies(self) -> Energies:
-        kinetic, potential, dissipated = self._stored()
-        load = -self._spring.external_force * self._current.displacement
+        kinetic, potential, dissipated, *work = self._stored()
+        load = -work[0] if work else -self._spring.external_force * self._current.displacement
         return _energies_of(Energies, (kinetic, potential, self._dissipated_before + dissipated, load))
 
     def _prepare(self, fmu: Fmu) -> None:

@@ -77,6 +77,12 @@ def shifted(force: Force, tau: float) -> Force:
     return (value(force, tau), force[1] + tau * force[2], force[2])
 
 
+def combined(shares: Sequence[float], forces: Sequence[Force]) -> Force:
+    """Return Σ share · force."""
+    f, df, ddf = (sum(map(mul, shares, derivative)) for derivative in zip(*forces, strict=True))
+    return (f, df, ddf)
+
+
 def legendre(force: Force, size: float, degree: int) -> list[float]:
     """The degree + 1 Legendre coefficients of the polynomial (cut above ``degree``)."""
     value, slope, bend = force[0], size * force[1], size * size * force[2]

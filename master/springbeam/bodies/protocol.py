@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from ..scene import Load, SceneError
 from .memory import Memory
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
@@ -32,7 +34,7 @@ class Motion(NamedTuple):
 
 
 class Energies(NamedTuple):
-    """All in J; ``dissipated`` since the start; ``load_potential`` of the constant loads, −(their work)."""
+    """All in J; ``dissipated`` since the start; ``load_potential`` is −(the work of the loads), up to a constant."""
 
     kinetic: float
     potential: float
@@ -89,6 +91,27 @@ class Body(Memory):
         The force on a spring seated on a stop comes from here.
         """
         raise NotImplementedError(f"{type(self).__name__} has no holding_force, which a body seated on a stop needs")
+
+    def expect_loads(self, loads: Sequence[Load]) -> None:
+        """Say once, before the first step, which of a scene's loads act on this body.
+
+        Raises SceneError for a load that it does not take.
+        """
+        first = loads[0]
+        raise SceneError(f'[[loads]] on = "{first.on}": {type(self).__name__} has no expect_loads, and takes no loads')
+
+    def set_loads(self, forces: Sequence[Force]) -> None:
+        """Let the loads act on every step from here on, rewound or not, each a polynomial over the step.
+
+        They are in the order of `expect_loads`, and in the unit of each: N, N/m or, of the base, m/s².
+        """
+
+    def load_on_end(self) -> Force:
+        """Return what the loads of `set_loads` amount to at the end of a body that is a mass there [N], upward.
+
+        The foundation bears it while the body is seated.
+        """
+        return NO_FORCE
 
     def join(self, velocity: float) -> None:
         """Let a massless end take the velocity [m/s] of what it is joined to; other ends keep theirs."""

@@ -145,14 +145,17 @@ class _Run:
             if time_limit is not None and clock.perf_counter() - began > time_limit:
                 raise ReferenceFailure(f"takes more than {time_limit:g} s; it is at t = {state.time:.6g} s")
             target = samples[upcoming] if upcoming < len(samples) else self.t_end
+            kink = self.system.loads.next_kink(state.time)
+            target = min(target, kink)
             segment = propagator.advance(max(target - state.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
             self.counts["steps"] += 1
             found = locator.first(segment)
             begin = state.time
             if found is None:
                 reach, end = segment.size, phase_start + propagator.elapsed
-                if abs(end - target) <= 1e-14 * self.t_end:
-                    end = target  # the sum is off by rounding
+                for exact in (kink, target):
+                    if abs(end - exact) <= 1e-14 * self.t_end:
+                        end = exact  # the sum is off by rounding
             else:
                 reach, end = found[1], begin + found[1]
             while upcoming < len(samples) and samples[upcoming] <= end:
@@ -162,7 +165,10 @@ class _Run:
                 upcoming += 1
             state.time = end
             state.X = _at(segment, reach)
+            state.X[self.system.T] = end
             if found is None:
+                if end == kink:
+                    propagator, phase_start = self._propagator(), end
                 continue
             if every_event:
                 self._record()
@@ -173,6 +179,7 @@ class _Run:
             if len(state.events) > self.max_events or self._chatters():
                 raise ReferenceFailure(f"{len(state.events)} events by t = {state.time!r} s: they do not end")
             propagator, locator, phase_start = self._propagator(), self._locator(), state.time
+        self.system.loads.whole()
         return self.rows.trajectory(state, self._summary(clock.perf_counter() - began))
 
     def _samples(self, sample_times: Sequence[float] | np.ndarray | None) -> np.ndarray:
@@ -204,7 +211,7 @@ class _Run:
             if state.phase not in self._forms:
                 self._forms[state.phase] = LinearForm(self.system, state.phase)
             return ExponentialPropagator(self._forms[state.phase], state.X)
-        horizon = max(self.t_end - state.time, 1e-300)
+        horizon = max(min(self.t_end, self.system.loads.next_kink(state.time)) - state.time, 1e-300)
         return RungeKuttaPropagator(
             self.system, state.phase, state.X, horizon, self.method, self.rtol, self.atol, self._nodes
         )
@@ -250,4 +257,5 @@ def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
                 slope = obstacle / scene.beam.length
         X[s.A] = slope * s.beam.slope_shape
         X[s.V] = (rate + perturbation) * s.beam.slope_shape
+    X[s.T] = time
     return time, X

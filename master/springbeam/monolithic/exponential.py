@@ -55,6 +55,8 @@ class LinearForm:
         ω² [1/s²]; negative where a spring with k1 < 0 wins.
     constant : (p,) array
         c, of the constant loads.
+    loads : (loads, p) array
+        Forces of a unit of each load that varies.
     inputs : (k, p) array
         P: the forces r. First the spring's remainder −(α_s − α_b k1) z − k2 y³, then the law's force C, or what
         `linked` leaves of it; each if the phase has it.
@@ -114,6 +116,7 @@ class LinearForm:
         self.omega2, modes = _modes(s.omega[:, None] * tangent)
         self.basis = tangent @ modes
         self.constant = self.basis.T @ (s.load - s.stiffness * self.offset)
+        self.loads = s.loads.patterns @ self.basis
         self.inputs = self.outputs = self.watched = np.zeros((0, len(self.omega2)))
         self.pressing = self.basis.T @ s.b
         self._to_modes = self.basis.T
@@ -134,6 +137,7 @@ class LinearForm:
         self.basis = inverse_root @ modes
         self._to_modes = modes.T @ (identity + (growth - 1.0) * projector)
         self.constant = self.basis.T @ (s.load + s.b * p.external_force)
+        self.loads = (s.loads.patterns + np.outer(s.loads.on_spring, s.b)) @ self.basis
         tip = self.basis.T @ s.b
         self.inputs = self.outputs = self.watched = tip[None, :]
         self.pressing = tip if self.phase.contact == "touch" else np.zeros_like(tip)
@@ -141,11 +145,12 @@ class LinearForm:
     def _separate(self) -> None:
         """Beam and spring side by side, ξ = (a, √m y); the spring only if it moves."""
         s, p = self.system, self.system.spring
-        self.omega2, self.constant = s.stiffness, s.load
+        self.omega2, self.constant, self.loads = s.stiffness, s.load, s.loads.patterns
         spring_row, tip_row = np.zeros(s.r), s.b
         if self.spring_moves:
             self.omega2 = np.append(self.omega2, p.linear_stiffness / p.mass)
             self.constant = np.append(self.constant, p.external_force / self.root_mass)
+            self.loads = np.column_stack([self.loads, s.loads.on_spring / self.root_mass])
             spring_row = np.append(spring_row, 1.0 / self.root_mass)
             tip_row = np.append(tip_row, 0.0)
         inputs, outputs = [], []
@@ -174,8 +179,8 @@ class LinearForm:
             self.omega2, self.basis = np.linalg.eigh(np.diag(self.omega2) + k * np.outer(relative, relative))
         self._to_modes = self.basis.T
         self.constant = self._to_modes @ self.constant
-        self.inputs, self.outputs, self.watched = (
-            rows @ self.basis for rows in (self.inputs, self.outputs, self.watched)
+        self.inputs, self.outputs, self.watched, self.loads = (
+            rows @ self.basis for rows in (self.inputs, self.outputs, self.watched, self.loads)
         )
 
     def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -189,7 +194,7 @@ class LinearForm:
         return (self._to_modes @ a, self._to_modes @ v) if self.linked > 0.0 else (a, v)
 
     def unpack(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
-        """States of shape (k, 2r + 3) from modes of shape (k, p); X supplies what does not move."""
+        """States of shape (k, 2r + 5) from modes of shape (k, p); X supplies what does not move."""
         s = self.system
         states = np.repeat(X[None, :], len(xi), axis=0)
         if self.joined or self.held:
@@ -202,6 +207,10 @@ class LinearForm:
         if self.spring_moves:
             states[:, s.Y], states[:, s.Z] = xi[:, -1] / self.root_mass, xi_dot[:, -1] / self.root_mass
         return states
+
+    def load_at(self, times: np.ndarray) -> np.ndarray:
+        """The loads on the modes at ``times`` [s] of shape (...), (..., p)."""
+        return np.asarray(self.system.loads.values(times) @ self.loads)
 
     def forces_at(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
         """The forces r of one state, (k, 1)."""
@@ -241,14 +250,16 @@ class LinearForm:
             interface_dot=np.einsum("okp,ijp->oikj", pairs, modes.force_dot[:-1]),
         )
 
-    def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray) -> float:
+    def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray, time: float) -> float:
         """Step size [s] that resolves the free motion seen in displacements, contact forces and dissipation.
 
-        ``r`` (k,) are the forces at the start. What is left out is no error: it only may hide an event as small.
+        ``r`` (k,) are the forces at the start, at ``time`` [s]. What is left out is no error: it only may hide an event
+        as small.
         """
         if not len(self.omega2):
-            return np.inf
-        rates, amplitudes = self.oscillators.components(xi, xi_dot, self.constant + r @ self.inputs)
+            return self.system.loads.longest_step
+        force = self.constant + r @ self.inputs + self.load_at(np.float64(time))
+        rates, amplitudes = self.oscillators.components(xi, xi_dot, force)
         order = np.argsort(-rates)
         rates, amplitudes = rates[order], amplitudes[order]
         mode = order % len(self.omega2)
@@ -264,7 +275,7 @@ class LinearForm:
             seen = from_fast > unseen * from_fast[-1]
             if np.any(seen):
                 fastest = max(fastest, float(rates[np.argmax(seen)]))
-        return _STEP_PHASE / fastest if fastest > 0.0 else np.inf
+        return min(_STEP_PHASE / fastest if fastest > 0.0 else np.inf, self.system.loads.longest_step)
 
 
 def _modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -303,7 +314,7 @@ class ExponentialPropagator(Propagator):
     def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
         xi, xi_dot = self.form.pack(self.X)
         r = self.form.forces_at(xi, xi_dot, self.X)
-        limit = self.form.longest_step(xi, xi_dot, r[:, 0])
+        limit = self.form.longest_step(xi, xi_dot, r[:, 0], float(self.X[self.form.system.T]))
         while True:
             size = self._next_size(remaining, resolution, min(limit, self._force_limit))
             segment = self._step(size, xi, xi_dot, r)
@@ -334,6 +345,12 @@ class ExponentialPropagator(Propagator):
         w = weights.modes
         free = w.C * xi + w.S * xi_dot + weights.constant
         free_dot = w.C_dot * xi + w.S_dot * xi_dot + weights.constant_dot
+        s = form.system
+        times = X[s.T] + size * GAUSS.nodes
+        if len(form.loads):
+            load = form.load_at(times)
+            free = free + np.einsum("ijp,jp->ip", w.force, load)
+            free_dot = free_dot + np.einsum("ijp,jp->ip", w.force_dot, load)
         if len(form.inputs):
             r = self._forces(weights, free[:-1] @ form.outputs.T, free_dot[:-1] @ form.outputs.T, start)
             if r is None:
@@ -349,8 +366,10 @@ class ExponentialPropagator(Propagator):
         states = form.unpack(free, free_dot, X)
         if not np.all(np.isfinite(states)):
             return None
-        rate = form.system.dissipation_rate(form.phase, states[:-1])
-        states[-1, form.system.D] = X[form.system.D] + size * float(GAUSS.weights @ rate)
+        states[:-1, s.T], states[-1, s.T] = times, X[s.T] + size
+        states[-1, s.D] = X[s.D] + size * float(GAUSS.weights @ s.dissipation_rate(form.phase, states[:-1]))
+        if len(form.loads):
+            states[-1, s.W] = X[s.W] + size * float(GAUSS.weights @ s.load_power(states[:-1]))
         nodes = np.concatenate([[0.0], GAUSS.nodes * size, [size]])
         return _ExponentialSegment(form, size, nodes, np.vstack([X, states]), self._speed)
 

@@ -1,10 +1,10 @@
 """Spring and beam as one constraint-eliminated ODE per phase.
 
-State of every phase, a vector of length 2r + 3 (r modal coordinates of the beam, r = 0 without one)::
+State of every phase, a vector of length 2r + 5 (r modal coordinates of the beam, r = 0 without one)::
 
-    X = (a, ȧ, y, z, D),      D the energy dissipated so far [J]
+    X = (a, ȧ, y, z, D, W, t),      D the energy dissipated so far [J], W the work of the loads that vary [J]
 
-Dynamics, with u = bᵀa, p = f − ω²(a + α_b ȧ) the beam's own forces and s = f_s − α_s z − k1 y − k2 y³ the
+Dynamics, with u = bᵀa, p = f(t) − ω²(a + α_b ȧ) the beam's own forces and s = f_s(t) − α_s z − k1 y − k2 y³ the
 spring's (Ahn & Tate, eqs. (1)–(6), (8))::
 
     free    ä = p + b C,  m z' = s − C,           C = 0, or the force of the law (`laws`)
@@ -20,6 +20,7 @@ import numpy as np
 
 from ..scene import Scene, Spring
 from .laws import Motion, Phase, law_of
+from .loads import Loads
 from .semi_discrete import ModalBeam, modal_beam
 
 #: What rounding leaves of a sum that is exactly zero, as a share of its terms.
@@ -47,10 +48,12 @@ class HybridSystem:
         self.alpha_b = 0.0 if self.beam is None else self.beam.alpha
         self.stiffness = self.omega**2
         self.inverse_tip_mass = float(self.b @ self.b)
+        self.loads = Loads(scene, self.beam)
         self.r = len(self.omega)
-        self.size = 2 * self.r + 3
+        self.size = 2 * self.r + 5
         self.A, self.V = slice(0, self.r), slice(self.r, 2 * self.r)
-        self.Y, self.Z, self.D = 2 * self.r, 2 * self.r + 1, 2 * self.r + 2
+        self.Y, self.Z = 2 * self.r, 2 * self.r + 1
+        self.D, self.W, self.T = 2 * self.r + 2, 2 * self.r + 3, 2 * self.r + 4
 
     @property
     def dissipative(self) -> bool:
@@ -69,12 +72,26 @@ class HybridSystem:
         p = self.spring
         return np.asarray(p.external_force - p.damping * z - (p.linear_stiffness + p.cubic_stiffness * y**2) * y)
 
-    def motion(self, phase: Phase, X: np.ndarray) -> Motion:
-        """Accelerations and interface quantities of states of shape (..., 2r + 3)."""
+    def _own_forces(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return p, (..., r), and s [N], (...), of states."""
         a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
         p = self.load - self.stiffness * (a + self.alpha_b * v)
-        u_tip, v_tip = a @ self.b, v @ self.b
         s = self.spring_force(y, z) if self.has_spring else np.zeros_like(y)
+        if len(self.loads):
+            values = self.loads.values(X[..., self.T])
+            p, s = p + values @ self.loads.patterns, s + values @ self.loads.on_spring
+        return p, s
+
+    def load_power(self, X: np.ndarray) -> np.ndarray:
+        """Return the power of the loads that vary [W] on states of shape (..., 2r + 5)."""
+        speeds = X[..., self.V] @ self.loads.patterns.T + X[..., self.Z, None] * self.loads.on_spring
+        return np.asarray(np.sum(self.loads.values(X[..., self.T]) * speeds, axis=-1))
+
+    def motion(self, phase: Phase, X: np.ndarray) -> Motion:
+        """Accelerations and interface quantities of states of shape (..., 2r + 5)."""
+        a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
+        u_tip, v_tip = a @ self.b, v @ self.b
+        p, s = self._own_forces(X)
         C = self._contact_force(phase, p, y - u_tip, z - v_tip, s)
         N = C - s if phase.seated else np.zeros_like(y)
         z_dot = np.zeros_like(y) if phase.seated else (s - C) * self.inverse_mass
@@ -95,8 +112,7 @@ class HybridSystem:
     def derivative(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """dX/dt for one state."""
         a, v, y, z = X[self.A], X[self.V], X[self.Y], X[self.Z]
-        p = self.load - self.stiffness * (a + self.alpha_b * v)
-        s = self.spring_force(y, z) if self.has_spring else y * 0.0
+        p, s = self._own_forces(X)
         C = self._contact_force(phase, p, y - a @ self.b, z - v @ self.b, s)
         dX = np.empty_like(X)
         dX[self.A] = v
@@ -104,10 +120,12 @@ class HybridSystem:
         dX[self.Y] = 0.0 if phase.seated else z
         dX[self.Z] = 0.0 if phase.seated else (s - C) * self.inverse_mass
         dX[self.D] = self.dissipation_rate(phase, X) if self.dissipative else 0.0
+        dX[self.W] = self.load_power(X) if len(self.loads) else 0.0
+        dX[self.T] = 1.0
         return dX
 
     def jacobian(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """∂(dX/dt)/∂X for one state, (2r + 3, 2r + 3), but for the dissipated energy, which nothing depends on."""
+        """∂(dX/dt)/∂X for one state, (2r + 5, 2r + 5), but for D and W, which nothing depends on, and the time."""
         A, V, Y, Z, b = self.A, self.V, self.Y, self.Z, self.b
         p = self.spring
         J = np.zeros((self.size, self.size))
@@ -155,7 +173,7 @@ class HybridSystem:
         return X
 
     def energies(self, X: np.ndarray, phase: Phase) -> dict[str, np.ndarray]:
-        """Energies [J] of states of shape (k, 2r + 3); ``e_load`` is minus the work of the constant loads."""
+        """Energies [J] of states of shape (k, 2r + 5); ``e_load`` is minus the work of the loads."""
         a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
         p = self.spring
         spring = (0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4) * float(
@@ -167,7 +185,7 @@ class HybridSystem:
             "e_spring": spring,
             "e_contact": contact,
             "e_dissipated": X[..., self.D],
-            "e_load": -(a @ self.load) - p.external_force * y * float(self.has_spring),
+            "e_load": -(a @ self.load) - p.external_force * y * float(self.has_spring) - X[..., self.W],
         }
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:

@@ -23,7 +23,7 @@ class Segment(ABC):
 
     size: float
     nodes: np.ndarray  #: (k,)
-    states: np.ndarray  #: (k, 2r + 3); good enough to find events, exact at both ends
+    states: np.ndarray  #: (k, 2r + 5); good enough to find events, exact at both ends
 
     @abstractmethod
     def state(self, tau: float) -> np.ndarray:

@@ -50,6 +50,8 @@ def simulate(
     ValueError
         If the law is another.
     """
+    if scene.loads:
+        raise ValueError("[[loads]]: with a quasi-static beam, this reference knows constant loads only")
     if not law_of(scene).rigid:
         raise ValueError(
             f"contact.law = {scene.contact.law!r}: with a quasi-static beam, this reference knows a tie only"

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..results.trajectory import COLUMNS, Trajectory
+from ..results.trajectory import COLUMNS, Trajectory, load_units
 from .hybrid_system import HybridSystem
 from .laws import Phase
 from .transitions import HybridState
@@ -46,7 +46,9 @@ class Rows:
         shapes = None if s.beam is None else (columns["time"], states[:, s.A] @ s.beam.sampler.T)
         for name in self._absent():
             columns.pop(name, None)
-        ordered = {name: columns[name] for name in COLUMNS if name in columns}
+        loads = self._system.loads.values(columns["time"])
+        columns |= {name: loads[:, i] for i, name in enumerate(load_units(s.scene))}
+        ordered = {name: columns[name] for name in (*COLUMNS, *load_units(s.scene)) if name in columns}
         return Trajectory(s.scene, ordered, state.events, shapes, summary)
 
     def _columns(self, states: np.ndarray) -> dict[str, np.ndarray]:

@@ -76,11 +76,11 @@ class SemiDiscreteBeam:
         e[self.tip] = 1.0
         return e
 
-    def deflection_sampler(self) -> sp.csr_matrix:
-        """(21, 2N) matrix: q → u at the fractions `SHAPE_POINTS` of the length."""
-        position = SHAPE_POINTS * self.n_elements
+    def deflection_sampler(self, fractions: np.ndarray = SHAPE_POINTS) -> sp.csr_matrix:
+        """Return the (k, 2N) matrix that takes q to u at k ``fractions`` of the length."""
+        position = fractions * self.n_elements
         element = np.minimum(position.astype(int), self.n_elements - 1)
-        sampler = sp.lil_matrix((len(SHAPE_POINTS), self.size))
+        sampler = sp.lil_matrix((len(fractions), self.size))
         for row, (e, part) in enumerate(zip(element, position - element, strict=True)):
             values, _ = _lagrange(self.degree, np.array([part]))
             for local, value in enumerate(values[0]):

@@ -8,6 +8,7 @@ Steps end on events and on changes of phase, so that no polynomial reaches acros
   each with what the rows say of the gap and of the mismatch, linear between them;
 * ``contact_force``, ``foundation_force`` are the polynomials applied; ``gap``, ``velocity_mismatch``, ``tie_reaction``,
   ``e_total`` and ``energy_residual`` follow from the other columns as in a row;
+* ``load_0`` and its like are the signals;
 * ``compliance_force``, ``contact_force_smoothed`` and the energies are linear between the rows (order 2; the smoothed
   force, which belongs to the start of its row's step, 1); what an event takes is taken at its row.
 
@@ -74,6 +75,8 @@ class _Between:
         for position, velocity in (("u_tip", "v_tip"), ("y", "z")):
             if position in run.columns:
                 found[position], found[velocity] = self._path(position, velocity)
+        at = self._run.columns["time"][self._row] + self._tau
+        found |= {f"load_{i}": load.value(at) for i, load in enumerate(run.scene.loads)}
         pair = "u_tip" in found and "y" in found
         phase = run.columns["phase"][self._row]
         if pair and contact.rigid:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..scene.statics import SHAPE_POINTS
 from .totals import LOSS_NAMES, TOTAL_UNITS
-from .trajectory import COLUMN_UNITS, Trajectory, rounded
+from .trajectory import Trajectory, rounded, units_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -33,15 +33,15 @@ def to_pandas(run: Trajectory) -> DataFrame:
     """Return the columns as a DataFrame. Times of rows at an event repeat, so ``time`` is a column."""
     table: DataFrame = _optional("pandas").DataFrame(run.columns)
     table.attrs["title"] = run.scene.title
-    table.attrs["units"] = {name: unit for name, unit in COLUMN_UNITS.items() if name in run.columns}
+    table.attrs["units"] = {name: unit for name, unit in units_of(run.scene).items() if name in run.columns}
     return table
 
 
 def to_xarray(run: Trajectory) -> Dataset:
     """Return the columns over ``time`` and the shapes over ``shape_time`` and ``x`` [m], with units."""
+    units = units_of(run.scene)
     variables: dict[str, Any] = {
-        name: ("time", values, {"units": COLUMN_UNITS[name]} if name in COLUMN_UNITS else {})
-        for name, values in run.columns.items()
+        name: ("time", values, {"units": units[name]} if name in units else {}) for name, values in run.columns.items()
     }
     time = variables.pop("time")
     coordinates = {"time": time}

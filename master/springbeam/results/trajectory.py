@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-#: Columns of a whole pair, in file order; those of an absent body are left out.
+#: Columns of a whole pair, in file order; those of an absent body are left out. Loads follow, `load_units`.
 COLUMNS = (
     "time",
     "u_tip",
@@ -91,7 +91,7 @@ class Event:
 
 
 def columns_of(scene: Scene) -> tuple[str, ...]:
-    """Return the columns of ``scene`` in file order: `COLUMNS` without those of bodies that it does not have.
+    """Return the columns of ``scene`` in file order: `COLUMNS` without those of absent bodies, and its loads.
 
     ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
     """
@@ -107,7 +107,17 @@ def columns_of(scene: Scene) -> tuple[str, ...]:
         absent.add("foundation_force")
     if not (beam and (spring or stop)):
         absent.add("gap")
-    return tuple(name for name in COLUMNS if name not in absent)
+    return (*(name for name in COLUMNS if name not in absent), *load_units(scene))
+
+
+def load_units(scene: Scene) -> dict[str, str]:
+    """Return the columns of the loads, ``load_0`` for ``loads.0``, and the unit of each."""
+    return {f"load_{i}": load.unit for i, load in enumerate(scene.loads)}
+
+
+def units_of(scene: Scene) -> dict[str, str]:
+    """Return the units of all columns of ``scene``; ``phase`` has none."""
+    return {**COLUMN_UNITS, **load_units(scene)}
 
 
 def rounded(value: float, scale: float) -> str:

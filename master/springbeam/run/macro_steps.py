@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, log2
+from math import ceil, inf, log2
 
 from ..bodies.memory import Memory
 
@@ -32,14 +32,17 @@ class MacroGrid(Memory):
         self._index = 0
         self._struck = False
 
-    def next(self, time: float) -> tuple[float, float]:
-        """The time at which the step from ``time`` should end, and its size (exactly H where it is a whole one)."""
+    def next(self, time: float, kink: float = inf) -> tuple[float, float]:
+        """The time at which the step from ``time`` should end, and its size (exactly H where it is a whole one).
+
+        It ends at ``kink`` [s], where a load jumps or bends, if that comes first or soon after.
+        """
         H = self.size
         if self._struck:
             self._struck = False
             size = _AFTER_IMPACT * H
             if time + size < self._end:
-                return time + size, size
+                return (time + size, size) if kink >= time + size + _SHORT_REMAINDER * H else (kink, kink - time)
         target = self._start + (self._index + 1) * H
         size = target - time
         on_grid = abs(size - H) <= _SAME * H
@@ -48,6 +51,9 @@ class MacroGrid(Memory):
             target, size, on_grid = target + H, size + H, False
         if target >= self._end - _SAME * H:
             target, size = self._end, self._end - time
+            on_grid = abs(size - H) <= _SAME * H
+        if kink < target + _SHORT_REMAINDER * H:
+            target, size = kink, kink - time
             on_grid = abs(size - H) <= _SAME * H
         return target, H if on_grid else size
 
@@ -81,7 +87,7 @@ class AdaptiveSteps(Memory):
     def __init__(self, start: float, end: float) -> None:
         self._end, self._length = end, end - start
         self._rung = _FIRST * _PER_OCTAVE
-        self._just_rejected = False
+        self._just_rejected = self._cut = False
         self.rejections = 0
 
     @property
@@ -89,9 +95,12 @@ class AdaptiveSteps(Memory):
         """H [s] of a whole step from here."""
         return self._length * float(2.0 ** (-self._rung / _PER_OCTAVE))
 
-    def next(self, time: float) -> tuple[float, float]:
-        """The time at which the step from ``time`` should end, and its size."""
+    def next(self, time: float, kink: float = inf) -> tuple[float, float]:
+        """The time at which the step from ``time`` should end, and its size; ``kink`` as of `MacroGrid`."""
         size, left = self.size, self._end - time
+        self._cut = kink < time + (1.0 + _SHORT_REMAINDER) * size
+        if self._cut:
+            return kink, kink - time
         return (self._end, left) if left <= (1.0 + _SHORT_REMAINDER) * size else (time + size, size)
 
     def reached(self, time: float) -> None:
@@ -110,7 +119,9 @@ class AdaptiveSteps(Memory):
         """
         factor = _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
         if error <= 1.0:
-            self._rung = self._rung_below(size * min(factor, 1.0 if self._just_rejected else _GROW))
+            wanted = size * min(factor, 1.0 if self._just_rejected else _GROW)
+            if not (self._cut and wanted < self.size):
+                self._rung = self._rung_below(wanted)
             self._just_rejected = False
             return True
         self.rejections += 1

@@ -14,7 +14,7 @@ from ..coupling.protocol import Step
 from ..results.paths import Path
 from ..results.recording import Recorder
 from ..results.steps import packed
-from ..results.trajectory import COLUMNS
+from ..results.trajectory import COLUMNS, load_units
 from ..scene import Scene
 from ..scene.resolution import MISMATCH
 from .ledger import Ledger
@@ -49,7 +49,8 @@ class Rows(Memory):
         length = scene.time.t_end - start_time or 1.0  # 0 where contact is at t_end: the one shape is that of the start
         self._shape_every = length / _SHAPES_OVER_RUN
         #: The columns of the scene, out of all.
-        self._present = itemgetter(*(COLUMNS.index(name) for name in recorder.columns))
+        known = (*COLUMNS, *load_units(scene))
+        self._present = itemgetter(*(known.index(name) for name in recorder.columns))
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
         self._relative_speed = 0.0  #: |v_tip − z| of ends that a soft law couples [m/s]
         self._stiffest = 0.0  #: slope of a soft law at the deepest penetration [N/m]
@@ -76,7 +77,8 @@ class Rows(Memory):
                 reaction = contact - inside
         self.largest_speed = max(self.largest_speed, abs(v), abs(z))
         forces = (contact, smoothed, inside, reaction, state.foundation[0])
-        row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *self._ledger.book(*pair.energies(ends)))
+        booked, loads = self._ledger.book(*pair.energies(ends)), pair.loads.values(time)
+        row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *booked, *loads)
         if step is None or step.size == 0.0:
             kept = packed(time, 0.0, *ends[0], *ends[1], *NO_FORCE, 0.0)
         else:

@@ -41,7 +41,9 @@ class Separation:
         push = self._pushing(state.phase)
         if push is None:
             return None
-        if self._pair.coupling(state.phase).degree == 0:
+        _, slope, bend = push.force(step)
+        apart_under_loads = state.phase.joint is Joint.FREE and (slope, bend) != (0.0, 0.0)
+        if self._pair.coupling(state.phase).degree == 0 and not apart_under_loads:
             return self._by_means(state, step, push, macro_step)
         return self._by_polynomial(state, step, push, macro_step)
 
@@ -80,7 +82,7 @@ class Separation:
         return last, push.event
 
     def _by_means(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, str] | None:
-        c = push.force(step)[0]
+        c = force.mean(push.force(step), step.size)
         if not state.middles:
             if c < 0.0 and not state.reclosed and self._opens(state, step, push.event):
                 return self.no_step(step), push.event

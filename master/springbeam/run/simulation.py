@@ -29,6 +29,8 @@ from .outcome import OVERFLOW, Progress, RunStopped
 from .rows import NOT_SHOWN, Rows
 from .stepping import Pair
 
+#: A load that jumps or bends within this fraction of H has done so.
+_SAME_TIME = 1e-9
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
 #: Events closer than this fraction of H are at once; so many of them and the contact is said to chatter. Impacts that
@@ -136,13 +138,13 @@ class Simulation(Memory):
         return self._rows.largest_speed
 
     def _run(self) -> None:
-        state, steps, t_end = self._state, self._steps, self._scene.time.t_end
+        state, steps, loads, t_end = self._state, self._steps, self._pair.loads, self._scene.time.t_end
         if not self._begun:
             self._settle_start()
             self._record(None)
             self._begun = True
         while state.time < t_end:
-            target, size = steps.next(state.time)
+            target, size = steps.next(state.time, loads.next_kink(state.time + _SAME_TIME * steps.size))
             step, event = self._advance(size)
             whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
             end = target if whole else state.time + step.size

@@ -12,6 +12,7 @@ from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
 from ..coupling.protocol import Booking, Coupling, Ends, Step, Uncoupled, Window
 from ..scene import Scene
+from .loads import Loads
 
 #: The force of a step is continued over at most this many times its size; beyond, its end value is held.
 _REACH_OF_FORCE = 4.0
@@ -34,7 +35,8 @@ class State(Memory):
 
     def accept(self, step: Step, time: float) -> None:
         """The step that ends at ``time`` is made."""
-        self.middles = [*self.middles[-1:], (self.time + 0.5 * step.size, step.contact[0], step.foundation[0])]
+        held = force.mean(step.foundation, step.size)
+        self.middles = [*self.middles[-1:], (self.time + 0.5 * step.size, step.contact[0], held)]
         self.time, self.last_size = time, step.size
         first = self.steps_in_phase == 0
         # At the macro point between two steps both forces are wrong by nearly the same, one up, one down.
@@ -83,6 +85,7 @@ class Pair(Memory):
         self._held = None if self.stop is None else Held(self.stop)
         self.upper: Body = beam or _ABSENT
         self.lower: Body = spring or self._held or _ABSENT
+        self.loads = Loads(scene, beam, spring)
         self._bodies: list[Body] = [body for body in (beam, spring) if body is not None]
         #: Where the ends are; looked up once, since every step asks a few times.
         self._tip, self._low = self.upper.motion, self.lower.motion
@@ -136,6 +139,7 @@ class Pair(Memory):
         phase = state.phase if phase is None else phase
         partner = self._held if phase.seated and self._held is not None else self.lower
         window = Window(state.time, size, start)
+        self.loads.act(state.time, size)
         contact = self.coupling(phase).solve(self.upper, partner, window, state.guess(size))
         foundation = self._held_down(state.time, size, contact) if phase.seated else NO_FORCE
         self._last = step = Step(state.time, size, contact, foundation, start, (self._tip(), self._low()))
@@ -146,11 +150,12 @@ class Pair(Memory):
         if self.spring is None:
             return contact
         assert self.stop is not None
-        static = self.spring.holding_force(self.stop, 0.0)
+        static, (load, slope, bend) = self.spring.holding_force(self.stop, 0.0), self.spring.load_on_end()
+        bearing = (static - load, -slope, -bend)
         self.spring.rewind()
         # C and the part of N that bears it cancel: together, rounding of a large C would move a light top.
-        self.spring.advance(time, size, NO_FORCE, (static, 0.0, 0.0))
-        return (contact[0] + static, contact[1], contact[2])
+        self.spring.advance(time, size, NO_FORCE, bearing)
+        return (contact[0] + bearing[0], contact[1] + bearing[1], contact[2] + bearing[2])
 
     def repeated(self, state: State, step: Step) -> Step:
         """Leave the bodies at the end of ``step``, repeating it if a look inside it has moved them."""

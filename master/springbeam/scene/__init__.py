@@ -1,10 +1,12 @@
 """What is simulated: scene files, their keys, and what follows from them before anything is built or loaded.
 
-Imports nothing else of the package. Floors, from below: ``tables`` (the keys) → ``statics`` → ``scene`` (all tables) →
-``rules``, ``messages`` → ``reading`` (files, overrides; start here) → estimates: ``linearised``, ``resolution``,
-``automatic``. ``shipped/`` has the scenes that come with the package.
+Imports nothing else of the package. Floors, from below: ``tables`` (the keys), ``loads`` (those of ``[[loads]]``, and
+each load as a function of time) → ``statics`` → ``scene`` (all tables) → ``rules``, ``messages`` → ``reading`` (files,
+overrides; start here) → estimates: ``linearised``, ``resolution``, ``automatic``. ``shipped/`` has the scenes that come
+with the package.
 """
 
+from .loads import Load
 from .messages import key_kind, scene_keys
 from .reading import load_scene, parse_value, scene_from_dict, shipped_scenes, with_changes
 from .rules import suspicions
@@ -15,6 +17,7 @@ __all__ = [
     "Beam",
     "Contact",
     "Coupling",
+    "Load",
     "Scene",
     "SceneError",
     "Spring",

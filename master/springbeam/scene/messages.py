@@ -12,22 +12,25 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from .scene import TABLES, Scene
-from .tables import SceneError
+from .loads import Load
+from .scene import TABLES, Scene, table_of
+from .tables import SceneError, Table
 
 
 def scene_keys() -> list[str]:
     """Return all keys as ``table.key``."""
-    return [f"{table}.{key}" for table, model in TABLES.items() for key in model.model_fields]
+    tables: dict[str, type[Table]] = {**TABLES, "loads.0": Load}
+    return [f"{table}.{key}" for table, model in tables.items() for key in model.model_fields]
 
 
 def key_kind(table: str, key: str) -> type:
     """Return which of int, float, bool and str ``[table] key`` takes. Raises SceneError if there is no such key."""
-    if table not in TABLES:
+    model = table_of(table)
+    if model is None:
         raise SceneError(_explain_top("extra_forbidden", {}, table))
-    if key not in TABLES[table].model_fields:
+    if key not in model.model_fields:
         raise SceneError(f"[{table}] {key}: unknown key; {_nearest_key(table, key)}")
-    kinds = {get_origin(part) or part for part in _alternatives(TABLES[table].model_fields[key].annotation)}
+    kinds = {get_origin(part) or part for part in _alternatives(model.model_fields[key].annotation)}
     return next((kind for kind in (int, bool, float) if kind in kinds), str)
 
 
@@ -38,6 +41,8 @@ def _alternatives(annotation: Any) -> tuple[Any, ...]:
 def explain(error: Any) -> list[str]:
     """Return lines ``[table] key = value: what is wrong and what would be allowed`` for one of pydantic's errors."""
     kind, value, loc = error["type"], error["input"], [str(part) for part in error["loc"]]
+    if loc[:1] == ["loads"] and len(loc) > 1:
+        loc = [f"loads.{loc[1]}", *loc[2:]]
     if kind == "value_error":
         prefix = f"[{loc[0]}] " if loc else ""
         return [prefix + line for line in error["msg"].removeprefix("Value error, ").splitlines()]
@@ -46,9 +51,12 @@ def explain(error: Any) -> list[str]:
     table, key = loc[0], ".".join(map(_bare, loc[1:]))
     if kind == "extra_forbidden":
         return [f"[{table}] {key}: unknown key; {_nearest_key(table, key)}"]
+    model = table_of(table)
+    assert model is not None
+    allowed = _allowed(model.model_fields[loc[1]])
     if kind == "missing":
-        return [f"[{table}] {key}: missing; must be {_allowed(TABLES[table].model_fields[key])}"]
-    return [f"[{table}] {key} = {_toml(value)}: must be {_allowed(TABLES[table].model_fields[key])}"]
+        return [f"[{table}] {key}: missing; must be {allowed}"]
+    return [f"[{table}] {key} = {_toml(value)}: must be {allowed}"]
 
 
 def _explain_top(kind: str, value: Any, name: str) -> str:
@@ -58,7 +66,10 @@ def _explain_top(kind: str, value: Any, name: str) -> str:
         return f"[{_bare(name)}]: unknown table; {nearest(name, TABLES)}allowed: {', '.join(TABLES)}"
     if kind == "extra_forbidden":
         return f"{_bare(name)} = {_toml(value)}: unknown key outside a table; {_nearest_key('', name)}"
-    allowed = _allowed(Scene.model_fields[name]) if name not in TABLES else f"a table, written as [{name}]"
+    if table_of(name):
+        allowed = f"a table, written as [{'[loads]' if name not in TABLES else name}]"
+    else:
+        allowed = _allowed(Scene.model_fields[name])
     return f"{name} = {_toml(value)}: must be {allowed}"
 
 
@@ -68,14 +79,19 @@ def nearest(name: str, candidates: Iterable[str]) -> str:
 
 
 def _nearest_key(table: str, key: str) -> str:
-    here = list(TABLES[table].model_fields) if table else ["title", *(f"[{name}]" for name in TABLES)]
-    elsewhere = [name for name, model in TABLES.items() if key in model.model_fields]
+    model = table_of(table)
+    here = list(model.model_fields) if model else ["title", *(f"[{name}]" for name in TABLES)]
+    elsewhere = [name for name, other in TABLES.items() if key in other.model_fields]
     hint = f"it belongs to [{elsewhere[0]}]; " if elsewhere else nearest(key, here)
     return f"{hint}allowed: {', '.join(here)}"
 
 
 def _allowed(field: FieldInfo) -> str:
     """Return in words what a key may be, from its declaration."""
+    if field.annotation == tuple[Load, ...]:
+        return "tables, written as [[loads]]"
+    if tuple[float, ...] in _alternatives(field.annotation):
+        return "a list of 1 to 4 finite numbers"
     if get_origin(field.annotation) is Literal:
         return " or ".join(_toml(choice) for choice in get_args(field.annotation))
     nouns: dict[Any, str] = {bool: "true or false", str: "a text in quotes", int: "a whole number"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Iterable, Mapping
@@ -13,7 +14,7 @@ from pydantic import ValidationError
 
 from .messages import explain, nearest, one_line
 from .rules import impossible
-from .scene import TABLES, Scene
+from .scene import TABLES, Scene, split_key
 from .tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS, SceneError
 
 if sys.version_info >= (3, 11):
@@ -71,6 +72,9 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
     changes = _override(data, overrides)
     if accuracy is not None:
         data["accuracy"] = accuracy
+    for load in data["loads"] if isinstance(data.get("loads"), list) else ():
+        if isinstance(load, dict) and isinstance(load.get("file"), str):
+            load["file"] = os.path.abspath(path.parent / load["file"])
     for (table, key), override in changes.items():
         if (picked := _picked(data, table, key)) is not None:
             raise SceneError(f"--set {override}: {picked}; leave one of the two out")
@@ -92,7 +96,7 @@ def _blamed(message: str, path: str, changes: Mapping[tuple[str, str], str]) -> 
     lines = []
     for line in message.splitlines():
         said = line.removeprefix(f"{path}: ")
-        found = re.match(r"\[(\w+)\](?: (\w+))?", said)
+        found = re.match(r"\[([\w.]+)\](?: (\w+))?", said)
         given = [
             text for (table, key), text in changes.items() if found and found[1] == table and found[2] in (key, None)
         ]
@@ -116,7 +120,8 @@ def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
 def with_changes(scene: Scene, **changes: Any) -> Scene:
     """Return a validated copy with keys changed: ``with_changes(scene, coupling={"macro_step": 1e-3})``.
 
-    ``None`` takes a table out, ``with_changes(scene, stop=None)``, or the accuracy.
+    ``None`` takes a table out, ``with_changes(scene, stop=None)``, or the accuracy. A list ``loads`` takes the place of
+    all loads, ``with_changes(scene, **{"loads.0": {"frequency": 12.0}})`` changes the first of them.
 
     Raises
     ------
@@ -126,7 +131,7 @@ def with_changes(scene: Scene, **changes: Any) -> Scene:
     data = scene.model_dump(exclude_none=True)
     for name, change in changes.items():
         if isinstance(change, Mapping):
-            _change(data.setdefault(name, {}), change)
+            _change(_table(data, name), change)
         else:
             data[name] = change
     data = {name: content for name, content in data.items() if content is not None}
@@ -167,16 +172,32 @@ def _override(data: dict[str, Any], overrides: Iterable[str]) -> dict[tuple[str,
     values: dict[str, dict[str, Any]] = {}
     for override in overrides:
         target, separator, text = override.partition("=")
-        table, dot, key = (part.strip() for part in target.partition("."))
-        if not (separator and dot and table and key):
+        split = split_key(target)
+        if not separator or split is None:
             raise SceneError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
-        if not isinstance(data.setdefault(table, {}), dict):
+        table, key = split
+        try:
+            found = _table(data, table)
+        except SceneError as error:
+            raise SceneError(f"--set {override}: {error}") from None
+        if not isinstance(found, dict):
             raise SceneError(f"--set {override}: {table} is not a table; tables: {', '.join(TABLES)}")
         given[table, key] = override
         values.setdefault(table, {})[key] = parse_value(text.strip())
     for table, changes in values.items():
-        _change(data[table], changes)
+        _change(_table(data, table), changes)
     return given
+
+
+def _table(data: dict[str, Any], name: str) -> Any:
+    """Return the content of a table, made where it is missing. Raises SceneError if there is no such load."""
+    if not re.fullmatch(r"loads\.\d+", name):
+        return data.setdefault(name, {})
+    loads, index = data.get("loads", []), int(name.partition(".")[2])
+    if not isinstance(loads, list) or index >= len(loads):
+        number = len(loads) if isinstance(loads, list) else 0
+        raise SceneError(f"{name}: the scene has {number} [[loads]], and the first is loads.0")
+    return loads[index]
 
 
 def _change(content: dict[str, Any], changes: Mapping[str, Any]) -> None:

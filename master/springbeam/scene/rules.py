@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from .loads import MOST_POINTS
 from .scene import TABLES, Scene
 from .statics import bending_stiffness, locking, shear_stiffness, tip_compliance, tip_inertia
 from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring
@@ -302,6 +303,30 @@ def _coupling_resolves(scene: Scene) -> Iterator[str]:
             yield f"[coupling] degree = {coupling.degree}: {remedy}, or degree = 0"
 
 
+def _loads_act(scene: Scene) -> Iterator[str]:
+    beam, points = scene.beam, {load.at for load in scene.loads if load.at is not None}
+    if len(points) > MOST_POINTS:
+        yield (
+            f"[[loads]]: point forces at {len(points)} places, {', '.join(f'{at:g}' for at in sorted(points))}; the "
+            f"beam takes them at {MOST_POINTS} at most. Put some at one place, or give them a shape"
+        )
+    for number, load in enumerate(scene.loads):
+        name = f"[loads.{number}]"
+        on = f'{name} on = "{load.on}"'
+        for table, acts in (("beam", load.on in ("beam", "tip")), ("spring", load.on == "spring")):
+            if acts and getattr(scene, table) is None:
+                yield f"{on}: acts on a [{table}], and this scene has none"
+        if beam is not None and beam.fidelity == "quasi_static" and load.on != "spring":
+            yield (
+                f'{on}: [beam] fidelity = "quasi_static" takes no loads that vary; use fidelity = "dynamic", or '
+                "distributed_load for a constant"
+            )
+        if scene.contact.law == "paper":
+            yield f'{name}: [contact] law = "paper" is Algorithm 1, which knows constant loads only; take another law'
+        if (fault := load.fault()) is not None:
+            yield f'{name} file = "{load.file}": {fault}'
+
+
 #: Checks of what cannot be run although each value is allowed; each yields ``[table] key = value: reason and remedy``.
 _CHECKS = (
     _bodies,
@@ -312,6 +337,7 @@ _CHECKS = (
     _inertia_needed,
     _feedback_negligible,
     _coupling_resolves,
+    _loads_act,
 )
 
 

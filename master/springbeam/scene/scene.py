@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+import re
+from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
+from .loads import Load
 from .statics import tip_compliance, tip_load_deflection
 from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time
 
@@ -30,6 +32,14 @@ class Scene(Table):
     stop: Stop | None = None
     contact: Contact = Contact()
     coupling: Coupling = Coupling()
+    loads: Annotated[tuple[Load, ...], Field(strict=False)] = ()
+
+    @model_serializer(mode="wrap")
+    def _only_what_there_is(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        data: dict[str, Any] = dump(self)
+        if loads := data.pop("loads", ()):
+            data["loads"] = list(loads)
+        return data
 
     @property
     def fmus(self) -> tuple[str, ...]:
@@ -110,3 +120,16 @@ TABLES: dict[str, type[Table]] = {
     "contact": Contact,
     "coupling": Coupling,
 }
+
+
+def table_of(name: str) -> type[Table] | None:
+    """Return the table of that name, ``"loads.0"`` being the first of ``[[loads]]``; ``None`` if there is none."""
+    return Load if re.fullmatch(r"loads\.\d+", name) else TABLES.get(name)
+
+
+def split_key(text: str) -> tuple[str, str] | None:
+    """Return table and key of ``"table.key"`` or ``"loads.0.key"``; ``None`` if it is neither."""
+    found = re.fullmatch(r"\s*(loads\s*\.\s*\d+|[^.]*?)\s*\.(.*)", text, re.DOTALL)
+    if found is None or not found[1] or not found[2].strip():
+        return None
+    return re.sub(r"\s", "", found[1]) if found[1].startswith("loads") else found[1], found[2].strip()

@@ -19,6 +19,8 @@ def refuse_without_reference(scene: Scene) -> None:
         raise SceneError("contact.impact = 'rest': a rigid tie has no reference there; take 'inelastic' or 'tip'")
     if scene.contact.law == "compliance" and scene.beam and scene.beam.fidelity == "quasi_static":
         raise SceneError("beam.fidelity = 'quasi_static': has no reference with law 'compliance'; take 'dynamic'")
+    if scene.loads and scene.beam and scene.beam.fidelity == "quasi_static":
+        raise SceneError("beam.fidelity = 'quasi_static': has no reference with [[loads]]; take 'dynamic'")
 
 
 def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ...scene import Scene, SceneError, key_kind, parse_value, with_changes
+from ...scene.scene import split_key
 from ...scene.tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS
 
 Sampling = Literal["random", "latin_hypercube"]
@@ -59,9 +60,10 @@ def parse_axis(text: str) -> Axis:
         If it is none of these; the message says what is allowed.
     """
     target, separator, values = text.partition("=")
-    table, dot, key = (part.strip() for part in target.partition("."))
-    if not (separator and dot and table and key and values.strip()):
+    split = split_key(target)
+    if not separator or split is None or not values.strip():
         raise _wrong(text, "must be TABLE.KEY=VALUES, as in spring.mass=0.5:2:16")
+    table, key = split
     try:
         kind = key_kind(table, key)
     except SceneError as error:

@@ -1,0 +1,157 @@
+"""The loads of a run: over each step a polynomial of degree 2 in time, the projection of the signal in L².
+
+The projection errs by something orthogonal to all polynomials of degree 2, which a body's motion hardly sees: a load
+costs displacements and velocities at the ends of steps an error of order 6 (``docs/coupling.md``, "Loads"). Where a
+signal jumps or bends, a step ends. Nothing here is shared with the references, which sample the signal itself.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import pairwise
+from math import cos, inf, pi, sin
+
+import numpy as np
+from scipy.special import spherical_jn
+
+from ..bodies import force
+from ..bodies.protocol import NO_FORCE, Body, Force
+from ..scene import Load, Scene
+
+#: Which loads act on which body.
+ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
+#: A straight table ends steps at its points unless they are closer than this share of H on average.
+_CLOSE = 0.25
+#: Gauss–Legendre nodes on [−1, 1], and (2k + 1)/2 P_k there times the weights: exact for a cubic times P_2.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+_VALUES = np.polynomial.legendre.legvander(_NODES, 2)
+_NORMS = np.array([0.5, 1.5, 2.5])
+
+
+def kinks(load: Load, macro_step: float | None) -> list[float]:
+    """Return when a signal jumps or bends [s]; points of a table that is finer than the macro step are left out."""
+    if load.signal == "constant":
+        return []
+    if load.signal == "table":
+        times = load.start + load.record.x
+        if load.interpolation == "cubic" or is_fine(load, macro_step):
+            times = times[[0, -1]]
+        return [float(time) for time in times]
+    return [load.start] if load.duration is None else [load.start, load.start + load.duration]
+
+
+def is_fine(load: Load, macro_step: float | None) -> bool:
+    """Return whether the points of a straight table are too close for steps that end on them."""
+    if load.signal != "table" or load.interpolation == "cubic" or macro_step is None:
+        return False
+    times = load.record.x
+    return bool(times[-1] - times[0] < _CLOSE * macro_step * (len(times) - 1))
+
+
+class Signal:
+    """One load over the steps of a run."""
+
+    def __init__(self, load: Load, macro_step: float | None) -> None:
+        self._load = load
+        self._end = inf if load.end is None else load.end
+        self.kinks = kinks(load, macro_step)
+
+    def over(self, time: float, size: float) -> Force:
+        """Return the projection onto a step of ``size`` [s] from ``time`` [s] on."""
+        if time >= self._end:
+            return NO_FORCE
+        cuts = [time, *(kink for kink in self.kinks if time < kink < time + size), time + size]
+        if len(cuts) == 2:
+            return force.derivatives(self._legendre(time, size), size)
+        total = np.zeros(3)
+        for a, b in pairwise(cuts):
+            values = _VALUES @ self._legendre(a, b - a)
+            s = (2.0 * a + (b - a) * (_NODES + 1.0) - 2.0 * time) / size - 1.0
+            total += (b - a) / size * (_WEIGHTS * values) @ np.polynomial.legendre.legvander(s, 2)
+        return force.derivatives((_NORMS * total).tolist(), size)
+
+    def _legendre(self, start: float, size: float) -> Sequence[float]:
+        """Return the three Legendre coefficients over a piece without a jump inside."""
+        load, middle = self._load, start + 0.5 * size
+        elapsed = middle - load.start
+        if load.signal == "table":
+            return self._of_table(start, size)
+        if load.signal == "ramp":
+            assert load.duration is not None
+            if 0.0 < elapsed < load.duration:
+                return (load.amplitude * elapsed / load.duration, 0.5 * load.amplitude * size / load.duration, 0.0)
+        elif load.signal != "constant" and not load.start <= middle < self._end:
+            return (0.0, 0.0, 0.0)
+        if load.signal == "harmonic":
+            assert load.frequency is not None
+            return _wave(load.amplitude, 2.0 * pi * load.frequency, elapsed, load.phase, size)
+        if load.signal == "half_sine":
+            assert load.duration is not None
+            return _wave(load.amplitude, pi / load.duration, elapsed, 0.0, size)
+        return (float(load.value(middle)), 0.0, 0.0)
+
+    def _of_table(self, start: float, size: float) -> Sequence[float]:
+        """By pieces, each a polynomial of degree 3 at most."""
+        points = self._load.start + self._load.record.x
+        first, last = np.searchsorted(points, (start, start + size), side="right")
+        edges = np.concatenate([[start], points[first:last], [start + size]])
+        half = 0.5 * np.diff(edges)[:, None]
+        t = edges[:-1, None] + half * (_NODES + 1.0)
+        weights = half * _WEIGHTS * self._load.value(t)
+        polynomials = np.polynomial.legendre.legvander((2.0 * (t - start) / size - 1.0).ravel(), 2)
+        return list(2.0 / size * _NORMS * (weights.ravel() @ polynomials))
+
+
+def _wave(amplitude: float, omega: float, elapsed: float, phase: float, size: float) -> Sequence[float]:
+    """Return the coefficients of a sine: ∫ P_k(s) e^{iθs} ds = 2 i^k j_k(θ) over [−1, 1], θ = ωH/2."""
+    angle = omega * elapsed + phase
+    j0, j1, j2 = _bessel(0.5 * omega * size)
+    return (amplitude * j0 * sin(angle), 3.0 * amplitude * j1 * cos(angle), -5.0 * amplitude * j2 * sin(angle))
+
+
+@lru_cache(maxsize=256)
+def _bessel(theta: float) -> tuple[float, float, float]:
+    return tuple(spherical_jn([0, 1, 2], theta).tolist())
+
+
+class Loads:
+    """The loads of a scene, handed to its bodies step by step.
+
+    Parameters
+    ----------
+    scene
+        Whose loads act.
+    beam, spring
+        The bodies; ``None`` where the scene has none.
+    """
+
+    def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
+        self._loads = scene.loads
+        self._signals = [Signal(load, scene.coupling.macro_step) for load in scene.loads]
+        self._kinks = sorted({kink for signal in self._signals for kink in signal.kinks if kink < scene.time.t_end})
+        self._bodies: list[tuple[Body, list[int]]] = []
+        self._last = (-1.0, 0.0)
+        for body, places in ((beam, ON_BEAM), (spring, ON_SPRING)):
+            taken = [i for i, load in enumerate(scene.loads) if load.on in places]
+            if body is not None and taken:
+                body.expect_loads([scene.loads[i] for i in taken])
+                self._bodies.append((body, taken))
+
+    def act(self, time: float, size: float) -> None:
+        """Let the loads act on every step from ``time`` by ``size`` [s], until told otherwise."""
+        if self._bodies and (time, size) != self._last:
+            self._last = (time, size)
+            forces = [signal.over(time, size) for signal in self._signals]
+            for body, taken in self._bodies:
+                body.set_loads([forces[i] for i in taken])
+
+    def next_kink(self, time: float) -> float:
+        """Return when a load next jumps or bends after ``time`` [s]; ∞ if it does not before the end."""
+        index = bisect_right(self._kinks, time)
+        return self._kinks[index] if index < len(self._kinks) else inf
+
+    def values(self, time: float) -> tuple[float, ...]:
+        """Return the loads at ``time`` [s], each in its unit."""
+        return tuple(float(load.value(time)) for load in self._loads)

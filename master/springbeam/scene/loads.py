@@ -1,0 +1,179 @@
+"""A load of a scene, ``[[loads]]``: where it acts, and its value as a function of time.
+
+``docs/model.md``, "Loads", has the equations. A table is a file of lines ``time, value``, in seconds and in the unit of
+the load; lines that are empty or begin with # are skipped, and the first may name the columns.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, field_serializer, model_validator
+from scipy.interpolate import CubicSpline, PPoly
+
+from .tables import Table
+
+#: Which keys each signal takes, and which of them it needs.
+_TAKES: dict[str, tuple[str, ...]] = {
+    "constant": (),
+    "harmonic": ("frequency", "phase", "start", "duration"),
+    "half_sine": ("start", "duration"),
+    "step": ("start", "duration"),
+    "ramp": ("start", "duration"),
+    "table": ("file", "interpolation", "start"),
+}
+_NEEDS: dict[str, tuple[str, ...]] = {
+    "harmonic": ("frequency",),
+    "half_sine": ("duration",),
+    "ramp": ("duration",),
+    "table": ("file",),
+}
+_OF_SIGNALS = ("frequency", "phase", "start", "duration", "file", "interpolation")
+#: Most different places of point forces on a beam.
+MOST_POINTS = 4
+
+
+class TableFault(ValueError):
+    """The file of a table is not one; the message names line and column."""
+
+
+class Load(Table):
+    """A load that acts on the beam, on its tip, on the spring, or on all by the acceleration of the base."""
+
+    #: "beam": f_b [N/m], or a point force [N]; "tip": a force [N]; "spring": f_s [N]; "base": its acceleration [m/s²].
+    on: Literal["beam", "tip", "spring", "base"]
+    #: On the beam: f_b = Σ s_i (x/L)^i times the signal; uniform if neither this nor ``at`` is given.
+    shape: Annotated[tuple[float, ...] | None, Field(strict=False, min_length=1, max_length=4)] = None
+    at: Annotated[float | None, Field(gt=0.0, le=1.0)] = None  #: on the beam: a point force at this fraction of L
+    amplitude: float = 1.0  #: of the signal; upward is positive
+    signal: Literal["constant", "harmonic", "half_sine", "step", "ramp", "table"] = "constant"
+    frequency: Annotated[float | None, Field(gt=0.0)] = None  #: "harmonic" [Hz]
+    phase: float = 0.0  #: "harmonic": at its start [rad]
+    start: float = 0.0  #: before it the load is 0 [s]; "table": its time 0
+    #: Of the pulse or the rise [s]; "harmonic" and "step" last for ever without it.
+    duration: Annotated[float | None, Field(gt=0.0)] = None
+    file: str | None = None  #: "table": the file, relative to that of the scene
+    interpolation: Literal["linear", "cubic"] = "linear"  #: "table": between its lines
+
+    @field_serializer("shape")
+    def _as_in_a_file(self, shape: tuple[float, ...] | None) -> list[float] | None:
+        return None if shape is None else list(shape)
+
+    @model_validator(mode="after")
+    def _keys_of_signal(self) -> Load:
+        given = [key for key in _OF_SIGNALS if getattr(self, key) != type(self).model_fields[key].default]
+        takes = _TAKES[self.signal]
+        for key in given:
+            if key not in takes:
+                allowed = f"it takes {', '.join(takes)}" if takes else "it takes none of these keys"
+                raise ValueError(
+                    f'{key} = {getattr(self, key)!r}: plays no part in signal = "{self.signal}"; {allowed}'
+                )
+        for key in _NEEDS.get(self.signal, ()):
+            if getattr(self, key) is None:
+                raise ValueError(f'{key}: missing; signal = "{self.signal}" needs it')
+        for key in ("shape", "at"):
+            if getattr(self, key) is not None and self.on != "beam":
+                raise ValueError(f'{key} = {getattr(self, key)!r}: is for on = "beam", this load is on = "{self.on}"')
+        if self.shape is not None and self.at is not None:
+            raise ValueError(f"at = {self.at}: a load has a shape or acts at a point; leave one of the two out")
+        return self
+
+    @property
+    def unit(self) -> str:
+        """Unit of `value`."""
+        return {"beam": "N" if self.at is not None else "N/m", "base": "m/s²"}.get(self.on, "N")
+
+    @property
+    def end(self) -> float | None:
+        """Time [s] from which on the load is 0; ``None`` if there is none."""
+        if self.signal == "table":
+            return self.start + float(self.record.x[-1])
+        return None if self.duration is None or self.signal == "ramp" else self.start + self.duration
+
+    @property
+    def record(self) -> PPoly:
+        """The table, as the polynomials between its lines. Raises TableFault, or OSError."""
+        assert self.file is not None
+        path = Path(self.file)
+        return _record(path, path.stat().st_mtime_ns, self.interpolation)
+
+    def fault(self) -> str | None:
+        """Return what is wrong with the table, with line and column; ``None`` if nothing is, or there is none."""
+        try:
+            if self.signal == "table":
+                _ = self.record
+        except (TableFault, OSError) as error:
+            return str(error.strerror) if isinstance(error, OSError) else str(error)
+        return None
+
+    def value(self, times: Any) -> np.ndarray:
+        """Return the signal at ``times`` [s], any shape, in `unit`; where it jumps, the value after the jump."""
+        t = np.asarray(times, dtype=float) - self.start
+        if self.signal == "constant":
+            return np.full_like(t, self.amplitude)
+        if self.signal == "table":
+            record = self.record
+            return np.asarray(self.amplitude * np.where((t >= record.x[0]) & (t <= record.x[-1]), record(t), 0.0))
+        duration = np.inf if self.duration is None else self.duration
+        if self.signal == "ramp":
+            return self.amplitude * np.clip(t / duration, 0.0, 1.0)
+        wave = np.ones_like(t)
+        if self.signal == "harmonic":
+            assert self.frequency is not None
+            wave = np.sin(2.0 * np.pi * self.frequency * t + self.phase)
+        elif self.signal == "half_sine":
+            wave = np.sin(np.pi / duration * t)
+        return np.where((t >= 0.0) & (t < duration), self.amplitude * wave, 0.0)
+
+
+@lru_cache(maxsize=16)
+def _record(path: Path, modified: int, interpolation: str) -> PPoly:
+    times, values = _columns(path)
+    if interpolation == "cubic":
+        spline = CubicSpline(times, values)
+        return PPoly(spline.c, spline.x)
+    return PPoly(np.array([np.diff(values) / np.diff(times), values[:-1]]), times)
+
+
+def _columns(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Return times [s] and values of a table. Raises TableFault, or OSError."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise TableFault(f"not a text in UTF-8: {error.reason} at byte {error.start}") from error
+    rows: list[tuple[float, float]] = []
+    named = False
+    for number, line in enumerate(lines, 1):
+        if not line.strip() or line.lstrip().startswith("#"):
+            continue
+        cells = [cell.strip() for cell in line.split(",")]
+        if len(cells) != 2:
+            raise TableFault(f"line {number}: {len(cells)} columns; a table has two, time and value")
+        found = [_number(cell) for cell in cells]
+        if not rows and not named and found == [None, None]:
+            named = True
+            continue
+        for column, (cell, value) in enumerate(zip(cells, found, strict=True), 1):
+            if value is None:
+                raise TableFault(f"line {number}, column {column}: {cell[:40]!r} is not a finite number")
+        time, value = (x for x in found if x is not None)
+        if rows and time <= rows[-1][0]:
+            raise TableFault(f"line {number}, column 1: {time!r} s comes after {rows[-1][0]!r} s; times must increase")
+        rows.append((time, value))
+    if len(rows) < 2:
+        raise TableFault(f"{len(rows)} lines with numbers; a table needs two at least")
+    times, values = np.array(rows).T
+    return times, values
+
+
+def _number(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if isfinite(value) else None

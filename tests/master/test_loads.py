@@ -1,0 +1,216 @@
+"""Loads: their values, their projections, and runs under them beside the reference, with bodies exact to rounding."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bodies import orders, simulate
+
+from springbeam.bodies import force
+from springbeam.bodies.protocol import Body
+from springbeam.monolithic import event_driven
+from springbeam.run.loads import Loads, Signal
+from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid
+from springbeam.scene import Load, Scene, SceneError, load_scene, scene_from_dict, with_changes
+
+RECORD = np.column_stack([np.linspace(0.0, 0.05, 26), 3.0 * np.sin(200.0 * np.linspace(0.0, 0.05, 26))])
+#: One of each signal, on all places.
+SIGNALS: dict[str, dict[str, Any]] = {
+    "constant": {"on": "spring", "amplitude": -2.0},
+    "harmonic": {"on": "base", "signal": "harmonic", "frequency": 12.0, "amplitude": 5.0, "phase": 0.3},
+    "burst": {"on": "tip", "signal": "harmonic", "frequency": 50.0, "start": 0.0127, "duration": 0.031},
+    "pulse": {"on": "tip", "signal": "half_sine", "start": 0.0103, "duration": 0.02, "amplitude": 3.0},
+    "step": {"on": "beam", "at": 0.37, "signal": "step", "start": 0.02, "duration": 0.0123, "amplitude": -2.0},
+    "ramp": {"on": "beam", "shape": [1.0, -2.0, 0.5, 0.3], "signal": "ramp", "start": 0.004, "duration": 0.01},
+    "linear": {"on": "spring", "signal": "table", "file": "record.csv", "start": 0.002},
+    "cubic": {"on": "tip", "signal": "table", "file": "record.csv", "interpolation": "cubic"},
+}
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
+
+
+@pytest.fixture(autouse=True)
+def _record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    np.savetxt(tmp_path / "record.csv", RECORD, delimiter=",", header="time, force")
+    monkeypatch.chdir(tmp_path)
+
+
+def soft(*loads: str, t_end: float = 0.07, **coupling: Any) -> Scene:
+    """The soft scene with 6 elements; `_tied` until 0.07 s."""
+    return with_changes(
+        load_scene("soft"),
+        beam={"n_elements": 6},
+        time={"t_end": t_end},
+        coupling=coupling,
+        loads=[SIGNALS[name] for name in loads],
+    )
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+@pytest.mark.parametrize(("start", "size"), [(0.013, 1e-3), (0.0, 0.06), (0.0499, 4e-3)])
+def test_the_projection_is_that_of_the_signal(name, start, size):
+    """The moments against 1, s, s² are those of the signal, by quadrature between all points where it is not smooth."""
+    load = Load(**SIGNALS[name])
+    f = Signal(load, 1e-3).over(start, size)
+    edges = np.unique(
+        np.clip([*RECORD[:, 0] + load.start, *Signal(load, None).kinks, start, start + size], start, start + size)
+    )
+    for power in range(3):
+        exact = 0.0
+        for a, b in pairwise(edges):
+            t = a + 0.5 * (b - a) * (NODES + 1.0)
+            exact += 0.5 * (b - a) * WEIGHTS @ (load.value(t) * ((t - start) / size) ** power)
+        tau = 0.5 * size * (NODES + 1.0)
+        mine = 0.5 * size * WEIGHTS @ (np.array([force.value(f, x) for x in tau]) * (tau / size) ** power)
+        assert mine == pytest.approx(exact, abs=2e-14 * size * abs(load.amplitude) * 3.0)
+
+
+def test_a_load_that_is_over_is_zero_without_being_looked_at(monkeypatch):
+    pulse = Signal(Load(**SIGNALS["pulse"]), 1e-3)
+    monkeypatch.setattr(Signal, "_legendre", None)
+    assert pulse.over(0.0303, 1e-3) == (0.0, 0.0, 0.0)
+
+
+ORDERS = [("energy", 0, 4, 2), ("energy", 1, 4, 2), ("energy", 2, 6, 4), ("hermite", 1, 4, 4), ("hermite", 2, 6, 6)]
+
+
+@pytest.mark.parametrize(
+    ("names", "scheme", "degree", "displacement", "velocity"),
+    [(("harmonic", "cubic", "linear", "constant"), *row) for row in ORDERS]
+    # Steps of another size, as before a jump, cost degree 0 the order 4 that it has on a regular grid.
+    + [(("pulse", "ramp", "step", "burst"), *row) for row in ORDERS[1:]],
+)
+def test_the_schemes_keep_their_orders_under_loads(names, scheme, degree, displacement, velocity):
+    """Tied, before any event; bounded from both sides where rounding is not reached."""
+    sizes, errors = (2e-3, 1e-3), []
+    for size in sizes:
+        scene = soft(*names, t_end=0.05, scheme=scheme, degree=degree, macro_step=size)
+        run = simulate(scene)
+        rows = run.time > 0.01
+        exact = event_driven.simulate(scene, sample_times=run.time[rows])
+        errors.append([np.abs(run[column][rows] - exact[column]).max() for column in ("y", "z")])
+    found = [orders(column, sizes)[0] for column in np.transpose(errors)]
+    for order, expected, error in zip(found, (displacement, velocity), errors[-1], strict=True):
+        assert order > expected - 0.5 or error < 1e-14
+        assert order < expected + 1.5 or error < 1e-12
+
+
+def test_half_sine_base_and_table_are_met_to_a_nanometre():
+    """`energy` of degree 2 at the scene's own H, through foundation impact, release and second meeting."""
+    scene = soft("pulse", "harmonic", "linear", t_end=0.28, degree=2)
+    run = simulate(scene)
+    exact = event_driven.simulate(scene, sample_times=np.unique(run.time))
+    at = np.searchsorted(exact.time, run.time)
+    for column in ("y", "u_tip"):
+        assert np.abs(run[column] - exact[column][at]).max() < 1e-9
+    assert [event.kind for event in run.events[:3]] == ["impact", "stop_impact", "release"]
+
+
+@pytest.mark.parametrize(("scheme", "degree"), [("energy", 0), ("energy", 1), ("energy", 2)])
+@pytest.mark.parametrize("law", ["transmission", "compliance"])
+def test_the_ledger_closes_under_all_kinds_of_loads(scheme, degree, law):
+    scene = with_changes(soft(*SIGNALS, t_end=0.2, scheme=scheme, degree=degree), contact={"law": law, "exponent": 1.5})
+    run = simulate(with_changes(scene, beam={"alpha_b": 1e-3}, spring={"damping": 0.3}))
+    assert run.summary["stopped"] is None
+    assert run.summary["max_energy_residual"] < 1e-11
+    assert np.ptp(run.e_load) > 1e-3 * run.e_total[0]
+    assert run["load_1"] == pytest.approx(5.0 * np.sin(24.0 * np.pi * run.time + 0.3))
+
+
+def test_steps_end_where_a_load_jumps_or_bends_and_none_is_a_sliver():
+    """Of two kinks that differ by rounding one is a row, every other to the last bit; no step is shorter than H/4."""
+    scene = with_changes(soft("step", "linear", "burst", t_end=0.06, macro_step=1e-3), stop=None)
+    scene = with_changes(scene, beam={"approach": "elastic"}, spring={"equilibrium": -1.0})
+    run = simulate(scene)
+    kinks = [kink for load in scene.loads for kink in Signal(load, 1e-3).kinks if kink < 0.06]
+    assert len(kinks) == 30
+    assert all(np.abs(run.time - kink).min() <= 4e-18 for kink in kinks)
+    assert not run.events
+    gaps = np.diff(sorted(kinks))
+    assert np.diff(run.time).min() >= min(gaps[gaps > 1e-12].min(), 0.25e-3)
+
+
+@pytest.mark.parametrize("make", [lambda: MacroGrid(0.0, 1.0, 0.1), lambda: AdaptiveSteps(0.0, 1.0)])
+def test_a_kink_soon_after_a_step_ends_it(make):
+    steps = make()
+    H = steps.size
+    for kink in (0.3 * H, 1.2 * H):
+        assert steps.next(0.0, kink) == (kink, kink)
+    assert steps.next(0.0, 1.3 * H)[1] == H
+
+
+def test_a_table_finer_than_the_step_does_not_cut_it_and_keeps_the_integral():
+    fine = Signal(Load(**SIGNALS["linear"]), 0.01)
+    assert fine.kinks == pytest.approx([0.002, 0.052])
+    assert force.mean(fine.over(0.002, 0.05), 0.05) == pytest.approx(np.trapezoid(RECORD[:, 1], RECORD[:, 0]) / 0.05)
+
+
+def test_a_base_that_falls_faster_than_the_spring_lifts_it_off_the_foundation():
+    """A spring seated under a load, N = −s − f(t): it leaves when N vanishes, and the flight is the reference's."""
+    table = {
+        "time": {"t_end": 0.6},
+        "spring": {"linear_stiffness": 3.0, "equilibrium": 0.01, "external_force": -2.0},
+        "stop": {"position": 0.0, "restitution": 0.0},
+        "coupling": {"macro_step": 1e-3, "degree": 2},
+        "loads": [{"on": "base", "signal": "harmonic", "frequency": 3.0, "amplitude": -4.0}],
+    }
+    scene = scene_from_dict(table)
+    run = simulate(scene)
+    exact = event_driven.simulate(scene, sample_times=run.time)
+    assert [event.kind for event in run.events[:2]] == ["seated", "unseated"]
+    leaves = next(event.time for event in exact.events if event.kind == "unseated")
+    assert run.events[1].time == pytest.approx(leaves, abs=1e-9)
+    assert np.abs(run.y - exact.y).max() < 1e-9
+    seated = (run.phase == "seated") & (exact.phase == "seated")
+    assert run.foundation_force[seated] == pytest.approx(exact.foundation_force[seated], abs=0.1)
+    assert run.summary["max_energy_residual"] < 1e-11
+
+
+def test_both_integrators_of_the_reference_agree_under_loads():
+    scene = soft(*SIGNALS, t_end=0.06)
+    one, two = (event_driven.simulate(scene, method=method) for method in ("exponential", "DOP853"))
+    assert one.y == pytest.approx(two.y, abs=1e-13)
+    assert one.e_load == pytest.approx(two.e_load, abs=1e-11)
+    assert np.abs(one.energy_residual).max() < 1e-11 * one.e_beam.max()
+
+
+def test_a_body_without_the_method_refuses_loads_by_name():
+    class Own(Body):
+        mass = 1.0
+
+    with pytest.raises(SceneError, match=r'\[\[loads\]\] on = "tip": Own has no expect_loads'):
+        Loads(soft("pulse"), Own(), None)
+
+
+def test_loads_are_changed_by_their_number_and_tables_lie_beside_the_scene(tmp_path):
+    folder = tmp_path / "scenes"
+    folder.mkdir()
+    text = '[time]\nt_end = 1.0\n[spring]\n[[loads]]\non = "spring"\nsignal = "table"\nfile = "../record.csv"\n'
+    (folder / "one.toml").write_text(text + '[[loads]]\non = "base"\nsignal = "harmonic"\nfrequency = 3.0\n')
+    scene = load_scene(folder / "one.toml", ["loads.1.frequency=7", "loads.0.start=0.5"])
+    assert (scene.loads[1].frequency, scene.loads[0].start) == (7.0, 0.5)
+    assert scene.loads[0].value(0.52) == pytest.approx(3.0 * np.sin(4.0))
+    assert with_changes(scene, **{"loads.0": {"start": 0.0}}).loads[0].start == 0.0
+    assert scene_from_dict(scene.model_dump(exclude_none=True)) == scene
+    with pytest.raises(SceneError, match=r"loads\.2: the scene has 2 \[\[loads\]\], and the first is loads\.0"):
+        load_scene(folder / "one.toml", ["loads.2.frequency=7"])
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("0,1\n1,two\n", "line 2, column 2: 'two' is not a finite number"),
+        ("t,f\n0,1\n\n# a note\n0,nan\n", "line 5, column 2: 'nan' is not a finite number"),
+        ("0,1\n1,2,3\n", "line 2: 3 columns; a table has two, time and value"),
+        ("0,1\n2,2\n1,3\n", "line 3, column 1: 1.0 s comes after 2.0 s; times must increase"),
+        ("time,value\n0,1\n", "1 lines with numbers; a table needs two at least"),
+    ],
+)
+def test_a_bad_table_is_named_with_line_and_column(text, error):
+    Path("record.csv").write_text(text)
+    with pytest.raises(SceneError) as refused:
+        soft("linear")
+    assert str(refused.value) == f'scene: [loads.0] file = "record.csv": {error}'
