@@ -66,6 +66,7 @@ PARAMETERS = (
     Parameter("escape", 0.3, 30.0),  # hilltop of the softening spring / the deflection that takes the beam's energy
     Parameter("contact_stiffness", 1.0, 1e12),
     Parameter("exponent", 1.0, 5.0, linear=True),
+    Parameter("contact_damping", 1e-3, 1e3, zero=0.5),
     Parameter("alpha_b", 1e-9, 1.0, zero=0.4),
     Parameter("alpha_s", 1e-3, 1e3, zero=0.4),
     Parameter("speed", 1e-6, 1e3),
@@ -101,6 +102,7 @@ BASE: dict[str, Any] = {
     "escape": 6.7,
     "contact_stiffness": 1e4,
     "exponent": 1.5,
+    "contact_damping": 0.0,
     "alpha_b": 0.0,
     "alpha_s": 0.0,
     "speed": 1.0,
@@ -141,6 +143,9 @@ SLICES = (
     Slice("jacobi 0", "macro_step", "contact_stiffness", {"coupling": ("compliance", "jacobi", 0)}),
     Slice("compliance energy", "macro_step", "contact_stiffness", {"coupling": ("compliance", "energy", 0)}),
     Slice("compliance energy 2", "macro_step", "contact_stiffness", {"coupling": ("compliance", "energy", 2)}),
+    Slice(
+        "damped compliance energy 2", "contact_damping", "contact_stiffness", {"coupling": ("compliance", "energy", 2)}
+    ),
     Slice("link energy 1", "macro_step", "contact_stiffness", {"coupling": ("link", "energy", 1)}),
     Slice("tie energy 2", "macro_step", "mass", {"coupling": ("tie", "energy", 2)}),
     Slice("compliance exponents", "exponent", "contact_stiffness", {"coupling": ("compliance", "energy", 0)}),
@@ -182,9 +187,9 @@ def _spring_frequency(cell: dict[str, Any], k1: float, k2: float) -> float:
         energy = 0.5 * cell["mass"] * cell["speed"] ** 2
     else:
         energy = cell["speed"] ** 2 / 6.0
-        if cell["approach"] == "elastic":  # from u = s x, θ = 0
-            slope = cell["equilibrium"] + cell["clearance"]
-            energy += 0.5 * cell["stiffness"] * np.sqrt(cell["shear_ratio"]) * slope**2
+        # Of the shear of u = s x, θ = 0: at the start, or where the undeformed beam first touches.
+        slope = cell["equilibrium"] + (cell["clearance"] if cell["approach"] == "elastic" else 0.0)
+        energy += 0.5 * cell["stiffness"] * np.sqrt(cell["shear_ratio"]) * slope**2
     load = cell["external_force"] + cell["distributed_load"]
     y = abs(cell["equilibrium"]) + min(np.sqrt(2.0 * energy / k1) + 2.0 * load / k1,
                                        (4.0 * energy / k2) ** 0.25 + 2.0 * (load / k2) ** (1.0 / 3.0))  # fmt: skip
@@ -223,6 +228,7 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
             "impact": impact,
             "stiffness": cell["contact_stiffness"],
             "exponent": cell["exponent"],
+            "damping": cell["contact_damping"] if law in ("compliance", "link") else 0.0,
         },
         "coupling": {"scheme": scheme, "degree": degree, "macro_step": H},
         "time": {"t_end": steps * H + (0.0 if elastic or cell["bodies"] == "spring" else clearance / speed)},
