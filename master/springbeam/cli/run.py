@@ -65,6 +65,10 @@ def run(
             help="Pick scheme, macro step and tolerances that keep tip displacement and event times so accurate.",
         ),
     ] = None,
+    mesh: Annotated[
+        bool,
+        typer.Option("--mesh", help="With --accuracy: refine the mesh too, until the continuous beam is met so well."),
+    ] = False,
     checkpoint: Annotated[
         float | None,
         typer.Option(
@@ -103,7 +107,9 @@ def run(
             )
         if interval is not None:
             _check_interval(interval, what, checkpoint)
-        made = picked(what)
+        if mesh and what.accuracy is None:
+            fail(BAD_INPUT, "--mesh: picks a mesh that keeps an accuracy; give one, as in --accuracy 1e-3 --mesh")
+        made = picked(what, mesh)
         what = what if made is None else made.scene
         directory = _run_directory(scene, out, force)
     carry_out(
@@ -132,16 +138,17 @@ def _check_interval(interval: float, scene: Scene, checkpoint: float | None) -> 
         fail(BAD_INPUT, f"--output-interval {interval:g}: {cause}")
 
 
-def picked(scene: Scene) -> Trajectory | None:
-    """Return the run that keeps the accuracy asked for, ``None`` if none is."""
+def picked(scene: Scene, mesh: bool = False) -> Trajectory | None:
+    """Return the run that keeps the accuracy asked for, of the ``mesh`` too; ``None`` if none is."""
     if scene.accuracy is None:
         return None
     from ..run.outcome import RunStopped
     from ..studies.accuracy import pick
+    from ..studies.mesh import pick_mesh
 
     try:
         with watched(lambda cause: f"a pilot run for accuracy = {scene.accuracy:g}: {cause}"):
-            return pick(scene).trajectory()
+            return pick_mesh(scene) if mesh else pick(scene).trajectory()
     except RunStopped as stopped:
         fail(STOPPED, f"a pilot run for accuracy = {scene.accuracy:g} {stopped}")
 
@@ -339,6 +346,9 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
             f"          errors {found['estimated_displacement_error']:.1e} (displacement), "
             f"{found['estimated_event_error']:.1e} (times of {found['events_compared']} events)"
         )
+        if "estimated_mesh_error" in found:
+            mesh = f"{found['picked']['n_elements']} elements"
+            console.print(f"mesh      {mesh}: error {found['estimated_mesh_error']:.1e} beside the continuous beam")
     for warning in summary.get("warnings", ()):
         console.print(Text(f"warning   {warning}"))
     console.print(Text(f"results   {directory.path}"), soft_wrap=True)

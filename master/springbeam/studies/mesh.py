@@ -1,0 +1,79 @@
+"""An accuracy that includes the mesh: finer meshes, each solved to the accuracy, until the last two agree."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ..results.contact_times import contact_time_difference
+from ..results.trajectory import Trajectory
+from ..scene import Scene, SceneError, with_changes
+from ..scene.tables import ALL_MODES_UP_TO
+from .accuracy import pick
+from .converge import RATIO
+
+#: Shares of the accuracy that the mesh may use, and the coupling and the time integration.
+_SHARE = 0.5
+#: Times at which two meshes are compared, and the part of the run that is too short for a contact to be told.
+_TIMES, _SHORT = 1000, 1e-3
+#: Order in the size of the elements that is relied on at least, and at most.
+_LOWEST, _HIGHEST = 1.0, 2.0
+
+
+def pick_mesh(scene: Scene) -> Trajectory:
+    """Return a run of ``scene`` that keeps its ``accuracy`` beside the continuous beam.
+
+    The elements, and with them the modes kept, are doubled until two meshes agree. The finer one's error is their
+    difference over 2ᵖ − 1, p being the order that three meshes show, between 1 and 2.
+
+    Raises
+    ------
+    SceneError
+        If the scene asks for no accuracy, has no mesh, or the accuracy cannot be reached; the message says how far it
+        is.
+    RunStopped
+        If a run that does keep it stops early.
+    """
+    if scene.accuracy is None:
+        raise SceneError("accuracy: the scene asks for none, and the mesh is picked to keep one")
+    if scene.beam is None or scene.beam.fidelity == "quasi_static":
+        raise SceneError("[beam]: the scene has no mesh to pick")
+    beam, asked = scene.beam, scene.accuracy
+    coarse: Trajectory | None = None
+    before = error = math.inf
+    factor = 1
+    while 2 * beam.n_elements * beam.element_degree * factor <= ALL_MODES_UP_TO:
+        mesh = {"n_elements": factor * beam.n_elements, "n_modes": factor * beam.n_modes}
+        fine = pick(with_changes(scene, accuracy=None, beam=mesh).model_copy(update={"accuracy": _SHARE * asked}))
+        made = fine.trajectory()
+        if coarse is not None:
+            difference = _difference(coarse, made)
+            order = math.log(before / difference, RATIO) if 0.0 < difference < before < math.inf else _LOWEST
+            error = difference / (RATIO ** min(max(order, _LOWEST), _HIGHEST) - 1.0)
+            if error <= _SHARE * asked:
+                found = {"asked": asked, "picked": {**made.summary["accuracy"]["picked"], **mesh}}
+                accuracy = {**made.summary["accuracy"], **found, "estimated_mesh_error": error}
+                return replace(made, summary={**made.summary, "accuracy": accuracy})
+            before = difference
+        coarse, factor = made, RATIO * factor
+    reached = f"{factor // RATIO * beam.n_elements} elements still leave some {error:.1e}"
+    raise SceneError(
+        f"accuracy = {asked:g} with the mesh: not reached, {reached}; ask for less, shorten [time] t_end, or take "
+        "elements of a higher degree where the motion is smooth (springbeam converge shows what settles)"
+    )
+
+
+def _difference(coarse: Trajectory, fine: Trajectory) -> float:
+    """Return the largest difference of tip or spring top over its largest change, or of times of contact over the time
+    that is run."""
+    begin, end = float(fine.time[0]), float(fine.time[-1])
+    times = np.linspace(begin, end, _TIMES)
+    ours, theirs = coarse.at(times), fine.at(times)
+    worst = contact_time_difference(coarse, fine, _SHORT * (end - begin))[0] / (end - begin)
+    for name in ("u_tip", "y"):
+        if name in fine.columns:
+            scale = float(np.abs(theirs[name] - theirs[name][0]).max()) or 1.0
+            worst = max(worst, float(np.abs(ours[name] - theirs[name]).max()) / scale)
+    return worst
