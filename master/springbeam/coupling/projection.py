@@ -92,10 +92,16 @@ class Projection:
             raise OverflowError
         return Projected(a, by_x.tolist())
 
-    def work(self, a: Vector, start: float, x: Vector) -> float:
-        """Return ∫ C ṗ dτ [J] of the force with coefficients ``a`` on a penetration with the numbers ``x``."""
-        rates = (self._derivative @ self._coefficients(start, x)).tolist()
-        return float(sum(norm * c * rate for norm, c, rate in zip(self._norms, a, rates, strict=True)))
+    def dissipated(self, start: float, x: Vector, size: float) -> float:
+        """Return ∫ D ṗ dτ ≥ 0 [J] over a step of ``size`` [s] with the penetration's numbers ``x``."""
+        c = self._coefficients(start, x)
+        points = self._where_it_acts(c)
+        if points is None:
+            return 0.0
+        V, W = points
+        derivative = self._derivative @ c
+        D, _, _ = self.law.resistance(V @ c, (2.0 / size) * (V[:, :-1] @ derivative))
+        return float(np.dot(self._norms * (W @ D), derivative))
 
     def left_out(self, start: float, x: Vector) -> float:
         """Return the Legendre coefficient of F(p̃) of degree d + 1 [N], the first that C leaves out."""

@@ -16,7 +16,6 @@ from operator import sub
 
 import numpy as np
 
-from ..bodies import force
 from ..bodies.protocol import Body, Force
 from ..contact.laws import SoftLaw
 from . import energy
@@ -78,9 +77,7 @@ class SoftSolver(Coupling):
         self._reduced += self._simplified
         if self.law.damped:
             start, x = penetration(step, self.degree)
-            a = force.legendre(step.contact, step.size, self.degree)
-            stored = self.law.potential(x[0]) - self.law.potential(start)
-            self.dissipated += self._solver.projection.work(a, start, x) - stored
+            self.dissipated += self._solver.projection.dissipated(start, x, step.size)
 
     def booking(self, ends: Ends) -> Booking:
         tip, low = ends
@@ -171,7 +168,10 @@ class _Line:
             projected = self._law([x])
             residual = self._residual([x], projected.a, 1.0)[0]
             low, high = (x, high) if residual > 0.0 else (low, x)
-            change = residual / (E + projected.slope[0][0])
+            rise = E + projected.slope[0][0]
+            if not rise > 0.0:  # responses that rounding has spoilt
+                raise NotConverged(abs(x), _MAX_NEWTON)
+            change = residual / rise
             if abs(change) <= _SETTLED * max(abs(x), abs(self._start)) or high <= low:
                 return [x], projected
             x += change
