@@ -76,6 +76,19 @@ def test_flight_before_contact_costs_one_step_of_each_body(counted, coupling):
         assert calls[body, "fmi2SetFMUstate"] == 0
 
 
+def test_a_load_sets_slopes_while_it_varies_and_makes_no_other_call(counted):
+    """Without loads these are 50 steps, 51 fmi2SetReal and no slopes (above); the pulse lasts for 10 steps."""
+    approach = {"approach": "elastic", "initial_deflection_slope": 0.5, "n_elements": 10}
+    pulse = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.01}
+    scene = with_changes(load_scene("soft"), beam=approach, time={"t_end": 0.05}, coupling={"macro_step": 1e-3})
+    run, calls = counted(with_changes(scene, loads=[pulse, {"on": "beam", "at": 0.5, "amplitude": 0.1}]))
+    assert run.summary["macro_steps"] == 50
+    assert calls["beam", SET_SLOPES] == 10
+    assert calls["spring", SET_SLOPES] == 0
+    for body in ("beam", "spring"):
+        assert (calls[body, "fmi2DoStep"], calls[body, "fmi2SetReal"]) == (50, 51)
+
+
 def test_a_compliant_pair_apart_costs_one_step_of_each_body(counted):
     apart = {"approach": "elastic", "initial_deflection_slope": 0.5, "n_elements": 10}
     law = {"law": "compliance"}

@@ -41,6 +41,22 @@ def test_elements_of_higher_degree_pass(beam):
     assert report.horizon == pytest.approx(0.1)
 
 
+@pytest.mark.parametrize("beam", [{}, {"n_elements": 6, "element_degree": 3, "n_modes": 8, "mass_matrix": "averaged"}])
+@pytest.mark.parametrize("degree", [0, 2])
+def test_loads_pass(degree, beam):
+    """The reference takes loads on a mesh of its own and samples their signals."""
+    loads = [
+        {"on": "base", "signal": "harmonic", "frequency": 12.0, "amplitude": 5.0},
+        {"on": "beam", "shape": [1.0, -2.0, 0.5, 0.3], "signal": "half_sine", "start": 0.01, "duration": 0.033},
+        {"on": "beam", "at": 0.37, "signal": "step", "start": 0.02, "amplitude": -0.5},
+        {"on": "spring", "signal": "ramp", "start": 0.0, "duration": 0.05, "amplitude": -1.0},
+    ]
+    coupling = {"degree": degree, "macro_step": 5e-4}
+    report = crosscheck(with_changes(load_scene("soft"), beam=beam, loads=loads, **{**SHORT, "coupling": coupling}))
+    assert report.passed, report.rows
+    assert report.horizon == pytest.approx(0.2)
+
+
 def test_compliance_passes():
     law = {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}
     report = crosscheck(with_changes(load_scene("soft"), contact=law, **SHORT))
@@ -55,6 +71,7 @@ WRONG = {
     "law": {"contact": {"law": "compliance", "stiffness": 1e6}},
     "restitution": {"stop": {"restitution": 0.9}},
     "load": {"spring": {"external_force": 1e-3}},
+    "load that varies": {"loads": [{"on": "tip", "signal": "harmonic", "frequency": 12.0, "amplitude": 1e-3}]},
 }
 
 

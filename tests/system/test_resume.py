@@ -56,6 +56,16 @@ SCENES = {
         stop={"restitution": 0.3},
         time={"t_end": 1.0},
     ),
+    "loads": with_changes(
+        SOFT,
+        coupling={"degree": 1},
+        spring={"external_force": -5.0, "damping": 2.0},
+        stop={"restitution": 0.3},
+        loads=[
+            {"on": "base", "signal": "harmonic", "frequency": 12.0, "amplitude": 5.0},
+            {"on": "beam", "at": 0.4, "signal": "half_sine", "start": 0.01, "duration": 0.3, "amplitude": -9.0},
+        ],
+    ),
     "beam on a stop": with_changes(SOFT, spring=None, stop={"restitution": 0.4}, beam={"alpha_b": 1e-3}),
     "spring on a stop": with_changes(
         SOFT, beam=None, stop={"restitution": 0.7}, spring={"initial_velocity": -1.0}, time={"t_end": 4.0}
@@ -146,6 +156,9 @@ SET_ANEW = {
     *(f"Fmu.{name}" for name in ("moved", "_time", "_size", "_start_time", "_messages")),
     *(f"EventFunctions.{name}" for name in ("_phase", "_functions", "_ends", "_samples")),
     "Pair._last",
+    "Loads._last",
+    "FmuBeam._loads",
+    *(f"FmuSpring.{name}" for name in ("_loads", "_on_end")),
 }
 
 
@@ -169,7 +182,7 @@ def snapshot(part: Any) -> list[tuple[str, bool, bytes]]:
     return found
 
 
-@pytest.mark.parametrize("name", ["energy 2, damped", "compliance", "seated", "paper"])
+@pytest.mark.parametrize("name", ["energy 2, damped", "compliance", "seated", "loads", "paper"])
 def test_everything_that_changes_is_remembered_or_set_anew(name):
     """An attribute that is forgotten in REMEMBERED is named here, before a resumed run differs."""
     run = Run(SCENES[name])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from pathlib import Path
 
 from ..scene import Scene
 from .archive import fmu_directory
@@ -37,12 +38,14 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[FmuBeam | QuasiStaticB
 
 
 def fingerprints(scene: Scene) -> dict[str, str]:
-    """SHA-256 of the files of the FMUs that ``scene`` contains. Raises FmuError if one is missing."""
+    """Return SHA-256 by name of the files that ``scene`` needs: FMUs and tables. Raises FmuError if one is missing."""
+    files = {f"{name}.fmu": fmu_directory() / f"{name}.fmu" for name in scene.fmus}
+    files |= {load.file: Path(load.file) for load in scene.loads if load.file is not None}
     found = {}
-    for name in scene.fmus:
-        path = fmu_directory() / f"{name}.fmu"
+    for name, path in files.items():
         try:
             found[name] = hashlib.sha256(path.read_bytes()).hexdigest()
         except OSError as error:
-            raise FmuError(f"{path}: {error.strerror}; ./build.sh fmus builds it") from error
+            remedy = "; ./build.sh fmus builds it" if path.suffix == ".fmu" else ""
+            raise FmuError(f"{path}: {error.strerror}{remedy}") from error
     return found

@@ -42,7 +42,7 @@ class Checkpoint:
 
     scene: Scene  #: as run
     version: str  #: of springbeam
-    fmus: dict[str, str]  #: SHA-256 of each FMU's file
+    files: dict[str, str]  #: SHA-256 of the FMUs and tables, by name
     seconds: float  #: between checkpoints [s]
     wall_time: float  #: so far [s]
     results: dict[str, Any]  #: `springbeam.results.file_recorder.FileRecorder.save`
@@ -101,16 +101,16 @@ class Checkpoints:
         Of the run.
     seconds
         Of the clock between checkpoints [s]; the first is taken at once.
-    version, fmus
+    version, files
         As in `Checkpoint`.
     wall_time
         That the run took before now [s].
     """
 
     def __init__(
-        self, recorder: FileRecorder, seconds: float, version: str, fmus: dict[str, str], wall_time: float
+        self, recorder: FileRecorder, seconds: float, version: str, files: dict[str, str], wall_time: float
     ) -> None:
-        self._recorder, self._seconds, self._version, self._fmus = recorder, seconds, version, fmus
+        self._recorder, self._seconds, self._version, self._files = recorder, seconds, version, files
         self._began = perf_counter() - wall_time
         self._due = self._began + wall_time
 
@@ -121,7 +121,7 @@ class Checkpoints:
             return
         scene, results = self._recorder.scene, self._recorder.save()
         wall_time = now - self._began
-        checkpoint = Checkpoint(scene, self._version, self._fmus, self._seconds, wall_time, results, simulation.save())
+        checkpoint = Checkpoint(scene, self._version, self._files, self._seconds, wall_time, results, simulation.save())
         checkpoint.write(self._recorder.directory.checkpoint)
         self._due = perf_counter() + self._seconds
 

@@ -22,8 +22,8 @@ from ..scene import Load, Scene
 
 #: Which loads act on which body.
 ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
-#: A straight table ends steps at its points unless they are closer than this share of H on average.
-_CLOSE = 0.25
+#: A jump closer to an end of a step than this share of it is at that end.
+_SAME = 1e-9
 #: Gauss–Legendre nodes on [−1, 1], and (2k + 1)/2 P_k there times the weights: exact for a cubic times P_2.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _VALUES = np.polynomial.legendre.legvander(_NODES, 2)
@@ -36,18 +36,10 @@ def kinks(load: Load, macro_step: float | None) -> list[float]:
         return []
     if load.signal == "table":
         times = load.start + load.record.x
-        if load.interpolation == "cubic" or is_fine(load, macro_step):
+        if load.interpolation == "cubic" or load.is_finer_than(macro_step):
             times = times[[0, -1]]
         return [float(time) for time in times]
     return [load.start] if load.duration is None else [load.start, load.start + load.duration]
-
-
-def is_fine(load: Load, macro_step: float | None) -> bool:
-    """Return whether the points of a straight table are too close for steps that end on them."""
-    if load.signal != "table" or load.interpolation == "cubic" or macro_step is None:
-        return False
-    times = load.record.x
-    return bool(times[-1] - times[0] < _CLOSE * macro_step * (len(times) - 1))
 
 
 class Signal:
@@ -60,9 +52,10 @@ class Signal:
 
     def over(self, time: float, size: float) -> Force:
         """Return the projection onto a step of ``size`` [s] from ``time`` [s] on."""
-        if time >= self._end:
+        same = _SAME * size
+        if time + same >= self._end:
             return NO_FORCE
-        cuts = [time, *(kink for kink in self.kinks if time < kink < time + size), time + size]
+        cuts = [time, *(kink for kink in self.kinks if time + same < kink < time + size - same), time + size]
         if len(cuts) == 2:
             return force.derivatives(self._legendre(time, size), size)
         total = np.zeros(3)
@@ -85,8 +78,7 @@ class Signal:
         elif load.signal != "constant" and not load.start <= middle < self._end:
             return (0.0, 0.0, 0.0)
         if load.signal == "harmonic":
-            assert load.frequency is not None
-            return _wave(load.amplitude, 2.0 * pi * load.frequency, elapsed, load.phase, size)
+            return _wave(load.amplitude, load.rate, elapsed, load.phase, size)
         if load.signal == "half_sine":
             assert load.duration is not None
             return _wave(load.amplitude, pi / load.duration, elapsed, 0.0, size)

@@ -182,7 +182,7 @@ def last_checkpoint(directory: str | Path) -> Checkpoint:
     if start.scene != scene_from_dict(summary["scene"], source=f"{results.summary}: scene"):
         raise CheckpointRefused(f"{results.summary}: its scene is not the one that was run")
     found = fingerprints(start.scene)
-    changed = [f"{name}.fmu" for name in found if found[name] != start.fmus.get(name)]
+    changed = [name for name in found if found[name] != start.files.get(name)]
     if changed:
         raise CheckpointRefused(f"{results.checkpoint}: the run began with another {' and another '.join(changed)}")
     return start

@@ -33,6 +33,8 @@ _NEEDS: dict[str, tuple[str, ...]] = {
     "table": ("file",),
 }
 _OF_SIGNALS = ("frequency", "phase", "start", "duration", "file", "interpolation")
+#: A straight table ends steps at its lines unless they are closer than this share of the macro step on average.
+_CLOSE = 0.25
 #: Most different places of point forces on a beam.
 MOST_POINTS = 4
 
@@ -94,6 +96,18 @@ class Load(Table):
         if self.signal == "table":
             return self.start + float(self.record.x[-1])
         return None if self.duration is None or self.signal == "ramp" else self.start + self.duration
+
+    @property
+    def rate(self) -> float:
+        """Rate of an oscillation that goes on and on [rad/s], 0 for any other signal."""
+        return 0.0 if self.frequency is None else 2.0 * np.pi * self.frequency
+
+    def is_finer_than(self, macro_step: float | None) -> bool:
+        """Return whether the lines of a straight table are too close for steps of ``macro_step`` [s] to end on them."""
+        if self.signal != "table" or self.interpolation == "cubic" or macro_step is None:
+            return False
+        times = self.record.x
+        return bool(times[-1] - times[0] < _CLOSE * macro_step * (len(times) - 1))
 
     @property
     def record(self) -> PPoly:

@@ -2,7 +2,7 @@
 
 A run is called *not resolved* if (``docs/coupling.md``, "Is the motion resolved?")
 
-* the slowest oscillation of a body turns more than `TURN` in a macro step: its rows are aliased;
+* the slowest oscillation of a body, or a load, turns more than `TURN` in a macro step: its rows are aliased;
 * tip and lower end turn more than `CONTACT_TURN` against each other on a soft contact law; or
 * the velocities of the joined ends differ by more than `MISMATCH` of their largest speed.
 
@@ -87,7 +87,7 @@ def force_window(scene: Scene) -> float:
 
 
 def _slowest(scene: Scene) -> list[tuple[str, float, str]]:
-    """Return (body, frequency [rad/s], what else would help) of each body that oscillates."""
+    """Return (name, frequency [rad/s], what else would help) of each body and load that oscillates."""
     found = []
     beam, spring = scene.beam, scene.spring
     if beam is not None and beam.fidelity == "dynamic":
@@ -99,6 +99,7 @@ def _slowest(scene: Scene) -> list[tuple[str, float, str]]:
         omega = spring_frequency(scene)
         if spring.damping < 2.0 * spring.mass * omega:
             found.append(("spring", omega, ""))
+    found += [(f"load loads.{i}", load.rate, "") for i, load in enumerate(scene.loads) if load.rate > 0.0]
     return found
 
 

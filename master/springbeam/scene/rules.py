@@ -354,7 +354,13 @@ def _beam_energy(scene: Scene) -> float:
 
 def suspicions(scene: Scene) -> list[str]:
     """Return warnings about what can be run but may not be meant."""
-    found = []
+    H = scene.coupling.macro_step
+    found = [
+        f"[loads.{number}] file: its lines are closer than a quarter of [coupling] macro_step = {H:g} s, so steps do "
+        'not end on them and no scheme has its order; take a smaller macro_step, or interpolation = "cubic"'
+        for number, load in enumerate(scene.loads)
+        if load.is_finer_than(H)
+    ]
     beam, spring = scene.beam, scene.spring
     if spring is not None and spring.cubic_stiffness < 0.0:
         energy, depth = _spring_energy(spring) + _beam_energy(scene), _well_depth(scene)

@@ -241,9 +241,10 @@ class _Search:
     def _first(self) -> float:
         """Return the number of macro steps of the first run."""
         beam, spring, span = self._scene.beam, self._scene.spring, self._span
-        if (beam is None or spring is None) and self._scene.stop is None:
+        if (beam is None or spring is None) and self._scene.stop is None and not self._scene.loads:
             return _UNCOUPLED  # exact but for IDA
-        of_spring = 0.0 if spring is None else spring_frequency(self._scene)
+        of_load = max((load.rate for load in self._scene.loads), default=0.0)
+        of_spring = max(of_load, 0.0 if spring is None else spring_frequency(self._scene))
         if beam is None:
             return _rung(of_spring * span / _SPRING_ALONE)
         if self._softly:

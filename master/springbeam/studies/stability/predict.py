@@ -102,6 +102,12 @@ def predict(scene: Scene) -> Prediction:
             "hermite is unstable in bands of H: some narrower than 3 % may lie below its critical H, none has been "
             f"seen below ω_max H = {STABLE:g}, {STABLE / _frequencies(pair)[0]:.3g} s here"
         )
+    notes += [
+        f"the motion is not resolved: loads.{i} turns {load.rate * H:.3g} rad in a macro step; H <= "
+        f"{RESOLVED / load.rate:.3g} s resolves it"
+        for i, load in enumerate(scene.loads)
+        if load.rate * H > RESOLVED
+    ]
     Z = None if scene.beam is None else math.sqrt(shear_stiffness(scene.beam) * scene.beam.density * scene.beam.area)
     mass = None if scene.spring is None else scene.spring.mass
     resolved = None if modal is None else int(np.sum(modal.omega * H <= RESOLVED))
