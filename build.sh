@@ -12,6 +12,7 @@ usage() {
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
 ./build.sh bench [GROUP]…          measure the speed and write the tables of docs/performance.md (minutes)
 ./build.sh browser                 install playwright and Chromium and look at the report in it
+./build.sh docs                    make the pages of docs/ into a site, build/site/index.html
 ./build.sh wheel                   build a source archive, and from that a wheel, into dist/, and test the wheel
 ./build.sh fuzz [SEED]             a million random calls of each FMU under sanitizers (about 10 minutes)
 ./build.sh lint                    formatters, linters and type checker
@@ -216,6 +217,12 @@ case $command in
       build/memory/tests/fuzz/fuzz_$body calls "$seed" 1000000 || failed=1
     done
     [ -z "$failed" ] || die "a promise is broken, see above; the same again: ./build.sh fuzz $seed"
+    ;;
+  docs)
+    set_up_python docs
+    $venv/bin/sphinx-build -q -E -W --keep-going docs build/site
+    cp build/site/README.html build/site/index.html
+    say "build/site/index.html"
     ;;
   lint)
     set_up_python lint

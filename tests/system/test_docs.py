@@ -48,6 +48,14 @@ NOT_RUN = {
 }
 
 
+def test_every_page_has_its_place_on_the_site():
+    spec = importlib.util.spec_from_file_location("conf", DOCS / "conf.py")
+    conf = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(conf)
+    named = [name for pages in conf.PAGES.values() for name in pages.split()]
+    assert sorted([*named, conf.root_doc]) == sorted(page.stem for page in DOCS.glob("*.md"))
+
+
 def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S)
 
