@@ -35,9 +35,10 @@ def table(name: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def page() -> str:
-    return HEAD + table("beam") + table("spring")
+def files() -> dict[Path, str]:
+    return {TARGET: HEAD + table("beam") + table("spring")}
 
 
 if __name__ == "__main__":
-    TARGET.write_text(page(), encoding="utf-8")
+    for path, text in files().items():
+        path.write_text(text, encoding="utf-8")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenes import scene_from_dict
 
 from springbeam.results.contact_times import contact_changes
 from springbeam.results.contact_times import contact_time_difference as difference
 from springbeam.results.trajectory import Event, Trajectory
-from springbeam.scene import scene_from_dict
 
 SCENE = scene_from_dict(
     {"time": {"t_end": 1.0}, "beam": {"initial_velocity_slope": -1.0}, "spring": {}, "stop": {"position": -0.1}}

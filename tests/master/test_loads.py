@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import orders, simulate
+from scenes import scene_from_dict
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Body
 from springbeam.monolithic import event_driven
 from springbeam.run.loads import Loads, Signal
 from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid
-from springbeam.scene import Load, Scene, SceneError, load_scene, scene_from_dict, with_changes
+from springbeam.scene import Load, Scene, SceneError, load_scene, with_changes
 
 RECORD = np.column_stack([np.linspace(0.0, 0.05, 26), 3.0 * np.sin(200.0 * np.linspace(0.0, 0.05, 26))])
 #: One of each signal, on all places.
@@ -188,7 +189,8 @@ def test_a_body_without_the_method_refuses_loads_by_name():
 def test_loads_are_changed_by_their_number_and_tables_lie_beside_the_scene(tmp_path):
     folder = tmp_path / "scenes"
     folder.mkdir()
-    text = '[time]\nt_end = 1.0\n[spring]\n[[loads]]\non = "spring"\nsignal = "table"\nfile = "../record.csv"\n'
+    text = "[time]\nt_end = 1.0\n[spring]\nmass = 1.0\nlinear_stiffness = 1.0\n"
+    text += '[[loads]]\non = "spring"\nsignal = "table"\nfile = "../record.csv"\n'
     (folder / "one.toml").write_text(text + '[[loads]]\non = "base"\nsignal = "harmonic"\nfrequency = 3.0\n')
     scene = load_scene(folder / "one.toml", ["loads.1.frequency=7", "loads.0.start=0.5"])
     assert (scene.loads[1].frequency, scene.loads[0].start) == (7.0, 0.5)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import scene_from_dict
 from scipy.linalg import expm
 from scipy.special import ellipj, ellipk
 
@@ -14,7 +15,7 @@ from springbeam.monolithic.hybrid_system import HybridSystem
 from springbeam.monolithic.laws import Phase
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.trajectory import COLUMNS, EVENT_KINDS, Trajectory
-from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
+from springbeam.scene import Scene, load_scene, with_changes
 
 
 def soft(n_elements: int = 10, **tables: dict[str, Any]) -> Scene:

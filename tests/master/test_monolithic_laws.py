@@ -40,7 +40,8 @@ def test_free_masses_part_after_the_exact_time(method: str, q: float) -> None:
     """p_max = ((q+1) μ v²/2λ)^{1/(q+1)}, duration by the beta function, velocities as of elastic balls."""
     hit = exact.impact(REDUCED, 1.0, STIFFNESS, q)
     assert hit.duration is not None
-    scene = exact.free_masses(TIP, TOP, 1.0, 2.0 * hit.duration, {"law": "compliance", "exponent": q}, macro_step=1e-3)
+    contact = {"law": "compliance", "stiffness": STIFFNESS, "exponent": q}
+    scene = exact.free_masses(TIP, TOP, 1.0, 2.0 * hit.duration, contact, macro_step=1e-3)
     result = simulate(scene, method=method, sample_times=[0.5 * hit.duration])
     assert kinds(result) == ["impact", "separation"]
     assert result.gap[0] == pytest.approx(-hit.penetration, rel=2e-12)
@@ -72,7 +73,7 @@ def test_the_closed_forms_are_those_of_the_oscillator_and_of_the_quadrature() ->
 def test_hunt_and_crossley_rebound(method: str, q: float, chi: float) -> None:
     """χw − ln(1 + χw) is the same before and after; what the speeds lose is what is booked as dissipated."""
     hit = exact.impact(REDUCED, 1.0, STIFFNESS, q, chi)
-    contact = {"law": "compliance", "exponent": q, "damping": chi}
+    contact = {"law": "compliance", "stiffness": STIFFNESS, "exponent": q, "damping": chi}
     undamped = exact.impact(REDUCED, 1.0, STIFFNESS, q).duration
     assert undamped is not None
     scene = exact.free_masses(TIP, TOP, 1.0, 2.0 * undamped, contact, macro_step=5e-3 * undamped)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import DuffingBody, orders
+from scenes import scene_from_dict
 from scipy.sparse.linalg import spsolve
 
 from springbeam.bodies.quasi_static import QuasiStaticBeam
@@ -18,10 +19,11 @@ from springbeam.results.recording import MemoryRecorder
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.simulation import Simulation
 from springbeam.run.stepping import Pair
-from springbeam.scene import Beam, Scene, SceneError, scene_from_dict, statics, suspicions
+from springbeam.scene import Scene, SceneError, statics, suspicions
 from springbeam.scene.statics import SHAPE_POINTS
+from springbeam.scene.unit import unit_beam
 
-BEAM = Beam(
+BEAM = unit_beam(
     density=2.0, area=0.5, second_moment_of_area=0.3, young_modulus=30.0, shear_modulus=50.0, shear_coefficient=0.8,
     length=1.3, n_elements=4, distributed_load=-1.5, tip_load_coefficient=4.0,
 )  # fmt: skip
@@ -51,7 +53,7 @@ def test_statics_are_those_of_a_mesh_that_holds_them() -> None:
 
 
 def test_a_slender_beam_moves_33_of_140_of_its_mass() -> None:
-    slender = Beam(second_moment_of_area=1e-8, young_modulus=1e8, shear_modulus=1e8)
+    slender = unit_beam(second_moment_of_area=1e-8, young_modulus=1e8, shear_modulus=1e8)
     assert statics.tip_inertia(slender) == pytest.approx(33.0 / 140.0, rel=1e-6)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenes import scene_from_dict
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene import scene_from_dict, shipped_scenes
+from springbeam.scene import shipped_scenes
 from springbeam.scene.resolution import (
     CONTACT_TURN,
     MISMATCH,

@@ -8,17 +8,26 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import scene_from_dict
 
-from springbeam.scene import Scene, SceneError, load_scene, scene_from_dict, shipped_scenes, suspicions, with_changes
+import springbeam
+from springbeam.scene import Scene, SceneError, load_scene, reference, shipped_scenes, suspicions, with_changes
+from springbeam.scene.unit import UNIT_BEAM
 
 PAIR = """
 [time]
 t_end = 0.6
 [beam]
+density = 1.0
+length = 1.0
+area = 1.0
+second_moment_of_area = 1.0
+shear_coefficient = 1.0
 young_modulus = 100.0
 shear_modulus = 100.0
 initial_velocity_slope = -1.0
 [spring]
+mass = 1.0
 linear_stiffness = 3.0
 cubic_stiffness = -0.2
 [stop]
@@ -251,9 +260,9 @@ def test_a_step_and_a_tolerance_at_once_are_refused():
     """The first of the two was dropped without a word."""
     both = {"macro_step": 1e-3, "relative_tolerance": 1e-4}
     for ordered in (both, dict(reversed(both.items()))):
-        with pytest.raises(SceneError, match=r"macro_step = 0\.001: with relative_tolerance"):
+        with pytest.raises(SceneError, match="macro_step, relative_tolerance: give the steps one way"):
             with_changes(load_scene("soft"), coupling=ordered)
-        with pytest.raises(SceneError, match=r"--set coupling\.macro_step=0\.001: .* with relative_tolerance"):
+        with pytest.raises(SceneError, match=r"--set coupling\.macro_step=0\.001: .* give the steps one way"):
             load_scene("soft", [f"coupling.{key}={value}" for key, value in ordered.items()])
 
 
@@ -344,7 +353,9 @@ def test_any_value_of_a_beam_key_is_allowed_or_explained(key, value):
         assert kept == type(kept)(value)  # integers beyond 2^53 are rounded
     else:
         # Another key is named where the two do not go together.
-        assert any(f"[beam] {name}" in result for name in (key, "n_modes", "initial_velocity_slope"))
+        assert any(
+            f"[beam] {name}" in result for name in (key, "n_modes", "initial_velocity_slope", "area", "shear_modulus")
+        )
 
 
 @pytest.mark.parametrize("load", [0.0, 2.0, -2.0])
@@ -372,3 +383,36 @@ def test_the_beams_energy_counts_for_the_well():
     slow, fast = (scene_from_dict(changed(beam={"initial_velocity_slope": -s})) for s in (8.21, 8.22))
     assert suspicions(slow) == []
     assert "starts with 11.3 J" in suspicions(fast)[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "follows"),
+    [
+        ({"width": 0.02, "height": 0.005}, {"area": 1e-4, "second_moment_of_area": 0.02 * 0.005**3 / 12}),
+        ({"diameter": 0.1}, {"area": math.pi * 0.05**2, "second_moment_of_area": math.pi * 0.05**4 / 4}),
+        ({"poisson_ratio": 0.25}, {"shear_modulus": 40.0}),
+        ({"approach_speed": 3.0}, {"initial_velocity_slope": -1.5}),
+    ],
+)
+def test_other_ways_to_give_a_beam_mean_the_same(given, follows):
+    """A beam given another way is the beam of ρ, A, I, …; it is kept, and changed, as it was given."""
+    without = dict.fromkeys((*follows, *(("shear_coefficient",) if "area" in follows else ())))
+    beam = {k: v for k, v in {**UNIT_BEAM, "length": 2.0, "young_modulus": 100.0, **given}.items() if k not in without}
+    scene = springbeam.scene.scene_from_dict({**load_pair(), "spring": None, "stop": None, "beam": beam})
+    assert {key: getattr(scene.beam, key) for key in follows} == pytest.approx(follows, rel=1e-15)
+    assert scene.beam.shear_coefficient == (5 / 6 if "width" in given else 0.9 if "diameter" in given else 1.0)
+    kept = scene.model_dump(exclude_none=True)["beam"]
+    assert given.items() <= kept.items()
+    assert not kept.keys() & without.keys()
+    assert with_changes(scene, title="again").beam == scene.beam
+    back = with_changes(scene, beam={**follows, **{k: 1.0 for k in without if k not in follows}})
+    assert back.beam.model_dump(exclude_none=True).keys().isdisjoint(given)
+
+
+def test_every_key_is_explained():
+    for key in reference.listed():
+        assert key.meaning, key
+        assert key.unit, key
+    assert [f"{key.table}.{key.name}" for key in reference.listed() if key.table] == [
+        name.replace(".0.", ".") for name in springbeam.scene.scene_keys()
+    ]

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 import tomli_w
 from commands import command
 
-from springbeam.scene import load_scene
+from springbeam.scene import load_scene, reference, scene_from_dict, shipped_scenes
 from springbeam.scene.reading import LONGEST_FILE, tomllib
 
 GROUPS = tomllib.loads(Path(__file__).with_name("scenes_bad.toml").read_text(encoding="utf-8"))
 BASE = GROUPS.pop("base")
+SCHEMA = jsonschema.Draft202012Validator(reference.schema())
 #: How each message about syntax ends.
 TOML_IS = "; a line is a [table] or key = value, with numbers like 0.5 or 1e-3 and texts in quotes"
 CASES = {f"{group}-{name}": case for group, cases in GROUPS.items() for name, case in cases.items()}
@@ -63,7 +66,7 @@ def test_refused_with_its_message(name: str, tmp_path: Path, monkeypatch: pytest
 
 
 NO_TIME = "[time]: missing table; it must have t_end"
-GOOD = "[time]\nt_end = 1.0\n[spring]\nlinear_stiffness = 3.0\n"
+GOOD = "[time]\nt_end = 1.0\n[spring]\nmass = 1.0\nlinear_stiffness = 3.0\n"
 NOT_UTF8 = "not TOML, which is text in UTF-8: … at byte "
 BYTES: dict[str, tuple[bytes, str]] = {
     "empty": (b"", NO_TIME),
@@ -83,12 +86,12 @@ BYTES: dict[str, tuple[bytes, str]] = {
     "nested lists": (b"a = " + b"[" * 100_000, "nested too deeply; …"),
     "nested tables": (b"a = " + b"{a = " * 50_000, "nested too deeply; …"),
     "a value nested deeply": (
-        GOOD.encode() + b"mass = " + b"[" * 150 + b"]" * 150,
-        "[spring] mass = [[…]]: must be a finite number greater than 0",
+        GOOD.encode() + b"damping = " + b"[" * 150 + b"]" * 150,
+        "[spring] damping = [[…]]: must be a finite number at least 0",
     ),
     "a dotted key of many parts": (GOOD.encode() + b".".join([b"a"] * 300) + b" = 1", "[spring] a: unknown key; …"),
     "a long key": (GOOD.encode() + b"k" * 5000 + b" = 1", f"[spring] {'k' * 59}…: unknown key; allowed: …"),
-    "a long line": (GOOD.encode() + b"mass = " + b"x" * 5000, "not TOML: … (at line 5, column 8): mass = …"),
+    "a long line": (GOOD.encode() + b"damping = " + b"x" * 5000, "not TOML: … (at line 6, column 11): damping = …"),
     "a huge integer": (
         b"[time]\nt_end = 1" + b"0" * 400,
         "[time] t_end = 0x1b4ec7f91973ff3cb1ccf26fbc177c38db6e54582de258ff…: must be a finite number greater than 0",
@@ -102,8 +105,8 @@ BYTES: dict[str, tuple[bytes, str]] = {
         "a number in it has more digits than can be read",
     ),
     "a long text": (
-        GOOD.encode() + b'mass = "' + b"9" * 500 + b'"',
-        f'[spring] mass = "{"9" * 58}…: must be a finite number greater than 0',
+        GOOD.encode() + b'damping = "' + b"9" * 500 + b'"',
+        f'[spring] damping = "{"9" * 58}…: must be a finite number at least 0',
     ),
     "too long": (GOOD.encode() + b"#" * LONGEST_FILE, f"{LONGEST_FILE + len(GOOD)} bytes, more than a scene has; …"),
 }  # fmt: skip
@@ -142,3 +145,25 @@ def test_what_is_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     long = "x" * 300 + ".toml"
     result = command("run", long)
     assert (result.exit_code, result.stderr) == (2, f"error: {'x' * 59}…: File name too long\n")
+
+
+#: What the schema leaves to the rules; and 50.0 is a whole number in JSON.
+NOT_IN_SCHEMA = {"missing-body", "missing-law-without-stiffness", "missing-shear-coefficient"}
+NOT_IN_SCHEMA |= {"type-exponent-as-count", "type-float-as-count", "type-float-as-degree"}
+
+
+@pytest.mark.parametrize("name", [n for n in CASES if n.split("-")[0] in ("key", "table", "missing", "type", "range")])
+def test_the_schema_refuses_it_too(name: str) -> None:
+    accepted = SCHEMA.is_valid(json.loads(json.dumps(tomllib.loads(text_of(CASES[name])), default=str)))
+    assert accepted == (name in NOT_IN_SCHEMA)
+
+
+def test_the_schema_accepts_the_scenes_that_are_shipped_and_begun() -> None:
+    SCHEMA.check_schema(SCHEMA.schema)
+    texts = [
+        reference.beginning('a "scene"'),
+        *(path.read_text(encoding="utf-8") for path in shipped_scenes().values()),
+    ]
+    for text in texts:
+        SCHEMA.validate(tomllib.loads(text))
+        scene_from_dict(tomllib.loads(text))

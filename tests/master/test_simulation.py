@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import simulate
+from scenes import scene_from_dict
 
 from springbeam.bodies.protocol import StepRefused
 from springbeam.monolithic import event_driven
 from springbeam.results.trajectory import Event, Trajectory
-from springbeam.scene import Scene, load_scene, scene_from_dict, with_changes
+from springbeam.scene import Scene, load_scene, with_changes
 
 
 def soft(n: int = 6, **tables: dict[str, Any]) -> Scene:

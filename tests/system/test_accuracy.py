@@ -8,14 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tomli_w
 from commands import command
+from scenes import completed, scene_from_dict
 
 from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_time_difference
 from springbeam.results.reading import load_trajectory
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.runner import run
-from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
+from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.studies.accuracy import simulate
 from springbeam.studies.crosscheck import crosscheck, orders
 from springbeam.studies.stability.predict import predict
@@ -191,7 +193,8 @@ def test_a_run_may_be_shorter_than_the_default_macro_step(law, tmp_path):
     run = simulate(scene_from_dict({**short, "accuracy": 1e-3}))
     assert run.time[-1] == 1e-3
     path = tmp_path / "short.toml"
-    path.write_text(f'[time]\nt_end = 1e-3\n[spring]\nequilibrium = 0.1\n[contact]\nlaw = "{law}"\n')
+    tables = {"time": {"t_end": 1e-3}, "spring": {"equilibrium": 0.1}, "contact": {"law": law}}
+    path.write_text(tomli_w.dumps(completed(tables)))
     result = command("run", path, "--accuracy", "1e-3", "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     with pytest.raises(SceneError, match=r"macro_step = 0\.004, the default: .*; give a smaller one, or an accuracy"):
@@ -212,23 +215,18 @@ def test_what_it_replaces_need_not_fit(scheme):
 
 # -- a scene that asks for an accuracy, in the studies ---------------------------------------------------------------
 
-ASKING = """accuracy = 1e-4
-[time]
-t_end = 0.05
-[beam]
-young_modulus = 100.0
-shear_modulus = 100.0
-n_elements = 6
-initial_velocity_slope = -1.0
-[spring]
-linear_stiffness = 3.0
-"""
+ASKING = {
+    "accuracy": 1e-4,
+    "time": {"t_end": 0.05},
+    "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 6, "initial_velocity_slope": -1.0},
+    "spring": {"linear_stiffness": 3.0},
+}
 
 
 @pytest.fixture
 def asking(tmp_path):
     path = tmp_path / "asking.toml"
-    path.write_text(ASKING)
+    path.write_text(tomli_w.dumps(completed(ASKING)))
     return path
 
 
@@ -256,7 +254,7 @@ def test_orders_are_those_of_the_scheme_that_was_picked(asking):
 
 
 def test_crosscheck_compares_soft_laws_that_were_picked(asking):
-    asking.write_text(ASKING + '[contact]\nlaw = "compliance"\n')
+    asking.write_text(tomli_w.dumps(completed({**ASKING, "contact": {"law": "compliance"}})))
     result = command("crosscheck", asking)
     assert result.exit_code == 0, result.output
     assert "accuracy 0.0001 asked: energy 2, H = " in result.stdout

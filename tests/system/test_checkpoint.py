@@ -243,7 +243,9 @@ def test_changed_results_are_refused_and_not_touched(interrupted, name):
 def test_checkpoints_of_a_run_that_picks_its_accuracy_are_refused(tmp_path, monkeypatch):
     """They were left out without a word; `springbeam resume` found none."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "asking.toml").write_text("accuracy = 1e-3\n[time]\nt_end = 0.1\n[spring]\nequilibrium = 0.1\n")
+    (tmp_path / "asking.toml").write_text(
+        "accuracy = 1e-3\n[time]\nt_end = 0.1\n[spring]\nmass = 1.0\nlinear_stiffness = 1.0\n"
+    )
     for arguments in (["soft", "--accuracy", "1e-3"], ["asking.toml"]):
         result = command("run", *arguments, "--checkpoint", "0")
         assert result.exit_code == 2

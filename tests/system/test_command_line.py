@@ -18,12 +18,14 @@ from commands import command
 from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
 from springbeam.results.reading import load_summary
-from springbeam.scene import load_scene, shipped_scenes
+from springbeam.scene import load_scene, scene_keys, shipped_scenes
 
 COMMAND = typer.main.get_command(app)
 #: Arguments of each command that make it print its tables within a second or two. `verify` is in test_verify.py.
 TABLES = {
     "scenes": "",
+    "keys": "",
+    "new": "my_scene",
     "run": "soft --no-plots",
     "resume": "cut --no-plots",
     "sweep": "duffing --vary spring.mass=0.5,1 --set time.t_end=1 --workers 1 --out varied",
@@ -130,7 +132,7 @@ def test_the_command_alone_shows_how_to_start():
 # -- JSON, quiet, colours -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [name for name in TABLES if name not in ("report", "animate", "resume")])
+@pytest.mark.parametrize("name", [name for name in TABLES if name not in ("new", "report", "animate", "resume")])
 def test_json_is_one_document_and_all_of_stdout(place, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     result = command(name, *TABLES[name].split(), "--json")
@@ -149,6 +151,10 @@ def test_json_is_one_document_and_all_of_stdout(place, tmp_path, monkeypatch, na
         assert [event["kind"] for event in document["events"]] == ["closes", "strikes"]
     elif name == "scenes":
         assert [scene["name"] for scene in document] == list(shipped_scenes())
+    elif name == "keys":
+        assert [f"{key['table']}.{key['name']}" for key in document if key["table"]] == [
+            name.replace(".0.", ".") for name in scene_keys()
+        ]
     elif name == "doctor":
         assert [fmu["error"] for fmu in document["fmus"].values()] == [None, None]
     elif name == "predict":

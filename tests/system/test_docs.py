@@ -128,11 +128,13 @@ def test_every_page_is_in_the_index():
     assert sorted(listed) == sorted(["../README.md", *(p.name for p in DOCS.glob("*.md") if p.name != "README.md")])
 
 
-def test_the_table_of_variables_is_current():
-    specification = importlib.util.spec_from_file_location("fmu_variables", DOCS / "fmu_variables.py")
+@pytest.mark.parametrize("name", ["fmu_variables", "scene"])
+def test_generated_pages_are_current(name):
+    specification = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     module = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(module)
-    assert (DOCS / "fmu_variables.md").read_text(encoding="utf-8") == module.page(), "run python docs/fmu_variables.py"
+    for path, text in module.files().items():
+        assert path.read_text(encoding="utf-8") == text, f"run python docs/{name}.py"
 
 
 def test_links_between_pages_lead_somewhere():

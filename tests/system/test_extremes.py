@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import scene_from_dict
 
 from springbeam import RunStopped, simulate
 from springbeam.monolithic import event_driven
 from springbeam.results.trajectory import Trajectory
-from springbeam.scene import load_scene, scene_from_dict, with_changes
+from springbeam.scene import load_scene, with_changes
 
 #: 50 mg of spring top, pressed by a tip 1000 times as fast as its own motion, on a foundation 1 μm below it.
 LIGHT_TOP: dict[str, Any] = {

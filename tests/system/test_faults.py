@@ -12,6 +12,7 @@ import pytest
 import tomli_w
 from commands import command
 from faulty import NAMES, Fault, Script, installed
+from scenes import completed
 
 from springbeam.results.reading import load_trajectory
 
@@ -62,7 +63,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     def started(law: str, *faults: Fault, name: str = "faulty") -> tuple[int, Path, Script]:
         changes, _ = LAWS[law]
         scene = {table: {**SCENE.get(table, {}), **changes.get(table, {})} for table in {**SCENE, **changes}}
-        (tmp_path / "scene.toml").write_text(tomli_w.dumps(scene))
+        (tmp_path / "scene.toml").write_text(tomli_w.dumps(completed(scene)))
         with monkeypatch.context() as patch:
             script = installed(patch, *faults)
             result = command("run", tmp_path / "scene.toml", "--out", tmp_path / name, "--no-plots", "-q")

@@ -10,6 +10,7 @@ import pytest
 import tomli_w
 from commands import Interrupt, command
 from matplotlib.figure import Figure
+from scenes import completed
 
 from springbeam.cli.run import _ProgressBar
 from springbeam.results.directory import PICTURES
@@ -69,7 +70,7 @@ def test_a_pair_runs_or_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Figure, "savefig", lambda self, path, **options: Path(path).touch())
     words = " ".join(OPTIONS[name] for name in pair).split()
     left_out = {word.removeprefix("no-") for word in words if word.startswith("no-")}
-    Path("scene.toml").write_text(tomli_w.dumps({k: v for k, v in SCENE.items() if k not in left_out}))
+    Path("scene.toml").write_text(tomli_w.dumps(completed({k: v for k, v in SCENE.items() if k not in left_out})))
     settings = [word for word in words if "=" in word]
     arguments = ["run", "scene.toml", "--out", "run", *(f"--set={word}" for word in settings)]
     arguments += [word for word in words if "=" not in word and word.removeprefix("no-") not in left_out]

@@ -68,6 +68,7 @@ def scenes(draw: st.DrawFn) -> Tables:
             "second_moment_of_area": draw(decades(-6, 1)),
             "young_modulus": draw(decades(0, 11)),
             "shear_modulus": draw(decades(0, 11)),
+            "shear_coefficient": draw(st.sampled_from([1.0, 5 / 6])),
             "length": draw(decades(-1, 1)),
             "alpha_b": draw(st.one_of(st.just(0.0), decades(-6, 0))),
             "n_elements": elements,

@@ -184,7 +184,7 @@ class FmuBeam(_FmuBody, BeamBody):
         """At ``start_time`` [s], with u = ``deflection_slope``·x; ``loads`` say where point forces may act."""
         self._points = sorted({load.at for load in loads if load.at is not None})
         self._constants = {"distributed_load": beam.distributed_load}
-        parameters: dict[str, float | int | bool] = beam.model_dump(exclude={"approach", "fidelity"})
+        parameters: dict[str, float | int | bool] = {name: value for name, value in beam if name not in beam.GIVEN_ONLY}
         parameters["integrator"] = _INTEGRATORS[beam.integrator]
         parameters["mass_matrix"] = _MASS_MATRICES[beam.mass_matrix]
         parameters["initial_deflection_slope"] = deflection_slope

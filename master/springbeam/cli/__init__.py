@@ -10,6 +10,7 @@ import errno
 import os
 import sys
 import textwrap
+from collections.abc import Callable
 from importlib import metadata
 from typing import Annotated
 
@@ -89,11 +90,13 @@ def _common(
         typer.echo("springbeam --help lists all commands, springbeam COMMAND --help their options.")
 
 
-for title, commands in {
-    "Run": (scenes.scenes, run.run, resume.resume, sweep.sweep),
+_COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
+    "Scenes": (scenes.scenes, scenes.keys, scenes.new),
+    "Run": (run.run, resume.resume, sweep.sweep),
     "Look": (report.report, report.animate),
     "Choose scheme and accuracy": (stability.predict, tradeoff.tradeoff, converge.converge),
     "Check": (checks.crosscheck, checks.verify, stability.stability, doctor.doctor),
-}.items():
+}
+for title, commands in _COMMANDS.items():
     for command in commands:
         app.command(cls=Command, rich_help_panel=title)(command)

@@ -17,7 +17,7 @@ from rich.text import Text
 from ..bodies.archive import fmu_directory
 from ..bodies.fmu import FmuError
 from ..bodies.fmu_bodies import FmuBeam, FmuSpring
-from ..scene import Beam, Spring
+from ..scene.unit import unit_beam, unit_spring
 from .common import DISAGREES, JsonOption, console_for, print_json
 
 _REQUIRED = ("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly")
@@ -66,7 +66,7 @@ def _found() -> dict[str, Any]:
         platforms: list[str] = []
         error = None
         try:
-            (FmuBeam(Beam(), 0.0, 0.0) if name == "beam" else FmuSpring(Spring(), 0.0)).close()
+            (FmuBeam(unit_beam(), 0.0, 0.0) if name == "beam" else FmuSpring(unit_spring(), 0.0)).close()
             platforms = _platforms(path)
         except FmuError as failure:
             error = str(failure)

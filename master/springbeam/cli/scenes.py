@@ -1,12 +1,22 @@
-"""``springbeam scenes``."""
+"""``springbeam scenes``, ``springbeam keys`` and ``springbeam new``."""
 
 from __future__ import annotations
 
+from itertools import groupby
+from pathlib import Path
+from typing import Annotated
+
+import typer
 from rich.table import Table
 from rich.text import Text
 
 from ..scene import load_scene, shipped_scenes
-from .common import JsonOption, bad_input_reported, console_for, print_json
+from ..scene.reference import MODELS
+from .common import BAD_INPUT, JsonOption, bad_input_reported, console_for, fail, print_json
+
+
+def _complete_table(incomplete: str) -> list[str]:
+    return [name for name in MODELS if name and name.startswith(incomplete)]
 
 
 def scenes(as_json: JsonOption = False) -> None:
@@ -34,3 +44,57 @@ def scenes(as_json: JsonOption = False) -> None:
     console = console_for(silent=as_json)
     console.print(table)
     console.print(Text(f"\nfiles: {path.parent}"), soft_wrap=True)
+
+
+def keys(
+    table: Annotated[
+        str | None, typer.Argument(metavar="TABLE", help="Only the keys of this table.", autocompletion=_complete_table)
+    ] = None,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON Schema of scene files, for editors.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """List every key of a scene with unit, allowed values, default and meaning.
+
+    Example: springbeam keys beam
+    """
+    from ..scene import reference
+
+    if schema:
+        print_json(reference.schema())
+        return
+    if table is not None and table not in MODELS:
+        fail(BAD_INPUT, f"{table}: unknown table; allowed: {', '.join(filter(None, MODELS))}")
+    found = reference.listed(table)
+    if as_json:
+        print_json([key._asdict() for key in found])
+    console = console_for(silent=as_json)
+    for name, group in groupby(found, lambda key: key.table):
+        console.print(Text(f"\n[{name}]  {reference.about(name)}" if name else "outside the tables", style="bold"))
+        for ways in MODELS[name].WAYS:
+            console.print(Text(f"give the {ways.thing} one way: {ways}"))
+        for key in group:
+            unit = "" if key.unit == "–" else f" [{key.unit}]"
+            console.print(Text(f"{key.name}{unit}: {key.meaning}"), style="")
+            left_out = key.default if key.default.startswith("needed") else f"default: {key.default}"
+            console.print(Text(f"    {key.allowed}; {left_out}"), style="dim")
+
+
+def new(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The file is NAME.toml; it must not be there yet.")],
+) -> None:
+    """Write a commented scene to start from: an aluminium beam above a rubber bumper above a stop.
+
+    Example: springbeam new my_scene
+    """
+    from ..scene.reference import beginning
+
+    path = Path(name).with_suffix(".toml")
+    with bad_input_reported():
+        try:
+            with path.open("x", encoding="utf-8") as file:
+                file.write(beginning(path.stem))
+        except FileExistsError:
+            fail(BAD_INPUT, f"{path}: already there; give another NAME")
+    typer.echo(f"{path}: a scene to change; springbeam predict checks its values")

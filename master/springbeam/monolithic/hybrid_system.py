@@ -39,7 +39,7 @@ class HybridSystem:
         self.beam: ModalBeam | None = None if scene.beam is None else modal_beam(scene.beam)
         self.has_spring = scene.spring is not None
         #: Without a spring its terms vanish: no stiffness, and 1/m = 0.
-        self.spring = scene.spring or Spring(linear_stiffness=0.0)
+        self.spring = scene.spring or Spring(mass=1.0, linear_stiffness=0.0)
         self.inverse_mass = 1.0 / self.spring.mass if self.has_spring else 0.0
         empty = np.zeros(0)
         self.omega = empty if self.beam is None else self.beam.omega

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field, field_serializer, model_validator
 from scipy.interpolate import CubicSpline, PPoly
 
-from .tables import Table
+from .tables import Table, key
 
 #: Which keys each signal takes, and which of them it needs.
 _TAKES: dict[str, tuple[str, ...]] = {
@@ -46,20 +46,26 @@ class TableFault(ValueError):
 class Load(Table):
     """A load that acts on the beam, on its tip, on the spring, or on all by the acceleration of the base."""
 
-    #: "beam": f_b [N/m], or a point force [N]; "tip": a force [N]; "spring": f_s [N]; "base": its acceleration [m/s²].
-    on: Literal["beam", "tip", "spring", "base"]
-    #: On the beam: f_b = Σ s_i (x/L)^i times the signal; uniform if neither this nor ``at`` is given.
-    shape: Annotated[tuple[float, ...] | None, Field(strict=False, min_length=1, max_length=4)] = None
-    at: Annotated[float | None, Field(gt=0.0, le=1.0)] = None  #: on the beam: a point force at this fraction of L
-    amplitude: float = 1.0  #: of the signal; upward is positive
-    signal: Literal["constant", "harmonic", "half_sine", "step", "ramp", "table"] = "constant"
-    frequency: Annotated[float | None, Field(gt=0.0)] = None  #: "harmonic" [Hz]
-    phase: float = 0.0  #: "harmonic": at its start [rad]
-    start: float = 0.0  #: before it the load is 0 [s]; "table": its time 0
-    #: Of the pulse or the rise [s]; "harmonic" and "step" last for ever without it.
-    duration: Annotated[float | None, Field(gt=0.0)] = None
-    file: str | None = None  #: "table": the file, relative to that of the scene
-    interpolation: Literal["linear", "cubic"] = "linear"  #: "table": between its lines
+    on: Literal["beam", "tip", "spring", "base"] = key(
+        "–", "what it acts on: a force on the beam (N/m, or N at a point), on tip or spring (N), or the base (m/s²)"
+    )
+    shape: Annotated[tuple[float, ...] | None, Field(strict=False, min_length=1, max_length=4)] = key(
+        "–", "on the beam: f_b is the signal times Σ s_i (x/L)^i", None, otherwise="uniform, without at"
+    )
+    at: float | None = key("–", "on the beam: a point force at this fraction of L", None, gt=0.0, le=1.0)
+    amplitude: float = key("N/m, N or m/s²", "amplitude of the signal; upward is positive", 1.0)
+    signal: Literal["constant", "harmonic", "half_sine", "step", "ramp", "table"] = key(
+        "–", "value over time", "constant"
+    )
+    frequency: float | None = key("Hz", "frequency of harmonic", None, gt=0.0, otherwise="needed with harmonic")
+    phase: float = key("rad", "phase of harmonic at its start", 0.0)
+    start: float = key("s", "time before which the load is 0; time 0 of a table", 0.0)
+    duration: float | None = key(
+        "s", "length of the pulse, or of the rise", None, gt=0.0,
+        otherwise="for ever; needed with half_sine and ramp",
+    )  # fmt: skip
+    file: str | None = key("–", "file of a table, relative to that of the scene", None, otherwise="needed with table")
+    interpolation: Literal["linear", "cubic"] = key("–", "between the lines of a table", "linear")
 
     @field_serializer("shape")
     def _as_in_a_file(self, shape: tuple[float, ...] | None) -> list[float] | None:
@@ -67,20 +73,20 @@ class Load(Table):
 
     @model_validator(mode="after")
     def _keys_of_signal(self) -> Load:
-        given = [key for key in _OF_SIGNALS if getattr(self, key) != type(self).model_fields[key].default]
+        given = [name for name in _OF_SIGNALS if getattr(self, name) != type(self).model_fields[name].default]
         takes = _TAKES[self.signal]
-        for key in given:
-            if key not in takes:
+        for name in given:
+            if name not in takes:
                 allowed = f"it takes {', '.join(takes)}" if takes else "it takes none of these keys"
                 raise ValueError(
-                    f'{key} = {getattr(self, key)!r}: plays no part in signal = "{self.signal}"; {allowed}'
+                    f'{name} = {getattr(self, name)!r}: plays no part in signal = "{self.signal}"; {allowed}'
                 )
-        for key in _NEEDS.get(self.signal, ()):
-            if getattr(self, key) is None:
-                raise ValueError(f'{key}: missing; signal = "{self.signal}" needs it')
-        for key in ("shape", "at"):
-            if getattr(self, key) is not None and self.on != "beam":
-                raise ValueError(f'{key} = {getattr(self, key)!r}: is for on = "beam", this load is on = "{self.on}"')
+        for name in _NEEDS.get(self.signal, ()):
+            if getattr(self, name) is None:
+                raise ValueError(f'{name}: missing; signal = "{self.signal}" needs it')
+        for name in ("shape", "at"):
+            if getattr(self, name) is not None and self.on != "beam":
+                raise ValueError(f'{name} = {getattr(self, name)!r}: is for on = "beam", this load is on = "{self.on}"')
         if self.shape is not None and self.at is not None:
             raise ValueError(f"at = {self.at}: a load has a shape or acts at a point; leave one of the two out")
         return self

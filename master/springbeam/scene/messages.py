@@ -35,6 +35,7 @@ def key_kind(table: str, key: str) -> type:
 
 
 def _alternatives(annotation: Any) -> tuple[Any, ...]:
+    """Return the types that an annotation allows, None last."""
     return get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)
 
 
@@ -53,10 +54,26 @@ def explain(error: Any) -> list[str]:
         return [f"[{table}] {key}: unknown key; {_nearest_key(table, key)}"]
     model = table_of(table)
     assert model is not None
-    allowed = _allowed(model.model_fields[loc[1]])
     if kind == "missing":
-        return [f"[{table}] {key}: missing; must be {allowed}"]
-    return [f"[{table}] {key} = {_toml(value)}: must be {allowed}"]
+        return [f"[{table}] {_missing(model, key, value)}"]
+    return [f"[{table}] {key} = {_toml(value)}: must be {allowed(model.model_fields[loc[1]])}"]
+
+
+def _missing(model: type[Table], key: str, given: Any) -> str:
+    """Return what is missing and the ways to give it; ``given`` is the content of the table."""
+    for ways in model.WAYS:
+        if key in ways.groups[0]:
+            begun = ways.taken(given)
+            names = [name for name in begun[0] if name not in given] if begun else [ways.thing]
+            return f"{' and '.join(names)}: missing; give {ways}"
+    field = model.model_fields[key]
+    also = f" ({words})" if (words := extra(field, "otherwise")) else ""
+    return f"{key}: missing; give the {field.description} [{extra(field, 'unit')}]{also}: {allowed(field)}"
+
+
+def extra(field: FieldInfo, name: str) -> str:
+    """Return what `springbeam.scene.tables.key` noted of a key: its "unit", or what holds "otherwise"."""
+    return str(field.json_schema_extra[name]) if isinstance(field.json_schema_extra, dict) else ""
 
 
 def _explain_top(kind: str, value: Any, name: str) -> str:
@@ -67,10 +84,10 @@ def _explain_top(kind: str, value: Any, name: str) -> str:
     if kind == "extra_forbidden":
         return f"{_bare(name)} = {_toml(value)}: unknown key outside a table; {_nearest_key('', name)}"
     if table_of(name):
-        allowed = f"a table, written as [{'[loads]' if name not in TABLES else name}]"
+        may_be = f"a table, written as [{'[loads]' if name not in TABLES else name}]"
     else:
-        allowed = _allowed(Scene.model_fields[name])
-    return f"{name} = {_toml(value)}: must be {allowed}"
+        may_be = allowed(Scene.model_fields[name])
+    return f"{name} = {_toml(value)}: must be {may_be}"
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str:
@@ -86,7 +103,7 @@ def _nearest_key(table: str, key: str) -> str:
     return f"{hint}allowed: {', '.join(here)}"
 
 
-def _allowed(field: FieldInfo) -> str:
+def allowed(field: FieldInfo) -> str:
     """Return in words what a key may be, from its declaration."""
     if field.annotation == tuple[Load, ...]:
         return "tables, written as [[loads]]"
@@ -95,7 +112,7 @@ def _allowed(field: FieldInfo) -> str:
     if get_origin(field.annotation) is Literal:
         return " or ".join(_toml(choice) for choice in get_args(field.annotation))
     nouns: dict[Any, str] = {bool: "true or false", str: "a text in quotes", int: "a whole number"}
-    noun = nouns.get(field.annotation, "a finite number")
+    noun = nouns.get(_alternatives(field.annotation)[0], "a finite number")
     bounds = {
         name: value
         for m in field.metadata

@@ -14,8 +14,8 @@ from pydantic import ValidationError
 
 from .messages import explain, nearest, one_line
 from .rules import impossible
-from .scene import TABLES, Scene, split_key
-from .tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS, SceneError
+from .scene import TABLES, Scene, split_key, table_of
+from .tables import PICKED_BY_ACCURACY, SceneError
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -111,7 +111,7 @@ def scene_from_dict(data: dict[str, Any], source: str = "scene") -> Scene:
         scene = Scene.model_validate(data)
         lines = impossible(scene)
     except ValidationError as error:
-        lines = [line for e in error.errors() for line in explain(e)]
+        lines = list(dict.fromkeys(line for e in error.errors() for line in explain(e)))
     if lines:
         raise SceneError("\n".join(f"{source}: {line}" for line in lines))
     return scene
@@ -128,10 +128,10 @@ def with_changes(scene: Scene, **changes: Any) -> Scene:
     SceneError
         If the changed scene cannot be run, or its ``accuracy`` would overrule a change.
     """
-    data = scene.model_dump(exclude_none=True)
+    data = scene.model_dump(exclude_none=True, exclude_unset=True)
     for name, change in changes.items():
         if isinstance(change, Mapping):
-            _change(_table(data, name), change)
+            _change(name, _table(data, name), change)
         else:
             data[name] = change
     data = {name: content for name, content in data.items() if content is not None}
@@ -185,7 +185,7 @@ def _override(data: dict[str, Any], overrides: Iterable[str]) -> dict[tuple[str,
         given[table, key] = override
         values.setdefault(table, {})[key] = parse_value(text.strip())
     for table, changes in values.items():
-        _change(_table(data, table), changes)
+        _change(table, _table(data, table), changes)
     return given
 
 
@@ -200,13 +200,14 @@ def _table(data: dict[str, Any], name: str) -> Any:
     return loads[index]
 
 
-def _change(content: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Set keys of a table. A macro step takes the place of tolerances, and the other way round, unless both are new."""
+def _change(table: str, content: dict[str, Any], changes: Mapping[str, Any]) -> None:
+    """Set keys of a table; one way to give a thing takes the place of another, unless both are new."""
     given = {key for key, value in changes.items() if value is not None}
-    stepped, adaptive = STEP_KEY in given, not given.isdisjoint(TOLERANCE_KEYS)
-    if stepped != adaptive:
-        for other in TOLERANCE_KEYS if stepped else (STEP_KEY,):
-            content.pop(other, None)
+    model = table_of(table)
+    for ways in model.WAYS if model else ():
+        if len(new := ways.taken(given)) == 1:
+            for key in (key for group in ways.groups if group != new[0] for key in group):
+                content.pop(key, None)
     content.update(changes)
 
 

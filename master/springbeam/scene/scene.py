@@ -10,7 +10,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from .loads import Load
 from .statics import tip_compliance, tip_load_deflection
-from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time
+from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time, key
 
 #: Remainders of the macro grid, as fractions of H: shorter than the first is rounding; shorter than the second, a step
 #: would drown in rounding.
@@ -23,9 +23,11 @@ class Scene(Table):
     `springbeam.scene.reading` makes scenes that can be run; a scene made by hand is not held against the rules.
     """
 
-    title: str = ""
-    #: Picks scheme, macro step and tolerances instead of those given: `springbeam.studies.accuracy`.
-    accuracy: Annotated[float | None, Field(gt=0.0, lt=1.0)] = None
+    title: str = key("–", "what the scene is, for pictures and reports", "")
+    accuracy: float | None = key(
+        "–", "picks scheme, steps and tolerances that keep tip displacement and event times so accurate", None,
+        gt=0.0, lt=1.0,
+    )  # fmt: skip
     time: Time
     beam: Beam | None = None
     spring: Spring | None = None

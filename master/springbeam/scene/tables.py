@@ -1,13 +1,25 @@
 """The tables of a scene file, one class each: meaning, unit, default and range of every key.
 
-Field names are those of the FMU parameters; units are SI. `springbeam.scene.rules` has what several tables decide.
+Field names are those of the FMU parameters; units are SI. `springbeam.scene.rules` has what several tables decide,
+`springbeam.scene.reference` lists the keys and makes ``docs/scene.md`` and the JSON Schema from what stands here.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from math import pi
+from typing import Any, ClassVar, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ModelWrapValidatorHandler,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
+from typing_extensions import Self
 
 #: Up to this many unknowns all modes may be kept; the full eigenproblem grows with the cube.
 ALL_MODES_UP_TO = 1000
@@ -25,50 +37,149 @@ MOST_MODE_VALUES = 25_000_000
 MOST_ELEMENTS = 1_000_000
 
 
-Positive = Annotated[float, Field(gt=0.0)]
-
-
-NonNegative = Annotated[float, Field(ge=0.0)]
-
-
 class SceneError(ValueError):
     """A scene that cannot be run; the message names the file, the table, the key and what would be allowed."""
+
+
+def key(unit: str, meaning: str, default: Any = ..., *, otherwise: str = "", **bounds: float) -> Any:
+    """Declare a key of a table: its unit ("–" for none), one line of meaning, its default (none: it must be given).
+
+    ``otherwise`` says in words what holds where the key is left out and ``default`` does not tell; ``bounds`` are
+    pydantic's gt, ge, le, lt.
+    """
+    return Field(default, description=meaning, json_schema_extra={"unit": unit, "otherwise": otherwise}, **bounds)  # type: ignore[call-overload]
+
+
+class Ways(NamedTuple):
+    """Ways to give one thing, each a group of keys; a table has keys of one group, and those of the first follow."""
+
+    thing: str
+    groups: tuple[tuple[str, ...], ...]
+
+    def __str__(self) -> str:
+        return ", or ".join(" and ".join(group) for group in self.groups)
+
+    def taken(self, content: Any) -> list[tuple[str, ...]]:
+        """Return the groups of which ``content`` (a mapping, or a set of keys) has a key."""
+        return [group for group in self.groups if any(name in content for name in group)]
 
 
 class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
+    WAYS: ClassVar[tuple[Ways, ...]] = ()
+
+    #: Keys that follow from others that were given; files do not have them.
+    _followed: frozenset[str] = PrivateAttr(frozenset())
+
+    @classmethod
+    def _follows(cls, data: dict[str, Any]) -> dict[str, float]:
+        """Return the values of keys that follow from those given."""
+        return {}
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _completed(cls, data: Any, handler: ModelWrapValidatorHandler[Self]) -> Self:
+        if not isinstance(data, dict):
+            return handler(data)
+        given = [name for name, value in data.items() if value is not None]
+        for ways in cls.WAYS:
+            if len(groups := ways.taken(given)) > 1:
+                both = [name for group in groups for name in group if name in given]
+                raise ValueError(f"{', '.join(both)}: give the {ways.thing} one way: {ways}")
+        follows = {name: value for name, value in cls._follows(data).items() if name not in given}
+        table = handler({**data, **follows})
+        table._followed = frozenset(follows)
+        return table
+
+    @model_serializer(mode="wrap")
+    def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {name: value for name, value in handler(self).items() if name not in self._followed}
+
 
 class Time(Table):
-    t_end: Positive  #: end of the run [s]; it starts at 0
+    """The run, which starts at 0."""
+
+    t_end: float = key("s", "end of the run", gt=0.0)
 
 
 class Beam(Table):
-    """Kelvin–Voigt Timoshenko beam, clamped at x = 0 (Ahn & Tate, (1)–(5))."""
+    """Kelvin–Voigt Timoshenko beam, clamped at x = 0 (Ahn & Tate, (1)–(5)). Geometry and material have no defaults."""
 
-    density: Positive = 1.0  #: ρ [kg/m³]
-    area: Positive = 1.0  #: A [m²]
-    second_moment_of_area: Positive = 1.0  #: I [m⁴]
-    young_modulus: Positive = 1.0  #: E [Pa]
-    shear_modulus: Positive = 1.0  #: G [Pa]
-    shear_coefficient: Positive = 1.0  #: K [–]
-    length: Positive = 1.0  #: L [m]
-    alpha_b: NonNegative = 0.0  #: Kelvin–Voigt retardation time [s]
-    n_elements: Annotated[int, Field(ge=1, le=MOST_ELEMENTS)] = 50
-    element_degree: Annotated[int, Field(ge=1, le=12)] = 1  #: of u and θ in an element; 1 is the paper's
-    n_modes: Annotated[int, Field(ge=0)] = 0  #: lowest modes kept; 0 = all
-    reduced_integration: bool = False
-    #: "averaged" with the lumped one, so that short waves travel at the right speed; the paper's is consistent.
-    mass_matrix: Literal["consistent", "averaged"] = "consistent"
-    integrator: Literal["modal", "generalized_alpha"] = "modal"
-    rho_inf: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0  #: generalized-α only; 1 = midpoint rule (62)
-    distributed_load: float = 0.0  #: f_b, uniform [N/m]
-    tip_load_coefficient: float = 0.0  #: last hat-function coefficient of f_b [N/m]
-    initial_deflection_slope: float = 0.0  #: u⁰ = s x
-    initial_velocity_slope: float = 0.0  #: u_t⁰ = s x [1/s]
-    approach: Literal["undeformed", "elastic"] = "undeformed"
-    #: "quasi_static": without inertia, a tip compliance; mesh, modes, integrator and density then play no part.
-    fidelity: Literal["dynamic", "quasi_static"] = "dynamic"
+    density: float = key("kg/m³", "density ρ", gt=0.0)
+    length: float = key("m", "length L", gt=0.0)
+    area: float = key("m²", "area A of the section", gt=0.0)
+    second_moment_of_area: float = key("m⁴", "second moment of area I about the axis of bending", gt=0.0)
+    width: float | None = key("m", "width of a rectangular section", None, gt=0.0)
+    height: float | None = key("m", "height of a rectangular section, in the direction of motion", None, gt=0.0)
+    diameter: float | None = key("m", "diameter of a round section", None, gt=0.0)
+    young_modulus: float = key("Pa", "Young's modulus E", gt=0.0)
+    shear_modulus: float = key("Pa", "shear modulus G", gt=0.0)
+    poisson_ratio: float | None = key("–", "Poisson's ratio ν: G = E/2(1 + ν)", None, gt=-1.0, le=0.5)
+    shear_coefficient: float = key(
+        "–", "shear coefficient K", gt=0.0, otherwise="5/6 with width and height, 9/10 with diameter; needed with area"
+    )
+    alpha_b: float = key("s", "Kelvin–Voigt retardation time α_b", 0.0, ge=0.0)
+    n_elements: int = key("–", "number of elements", 50, ge=1, le=MOST_ELEMENTS)
+    element_degree: int = key("–", "degree of u and θ in an element; 1 is the paper's", 1, ge=1, le=12)
+    n_modes: int = key("–", "number of lowest modes kept; 0 keeps all", 0, ge=0)
+    reduced_integration: bool = key("–", "integrate the shear energy with one point less, against locking", False)
+    mass_matrix: Literal["consistent", "averaged"] = key(
+        "–", "the paper's, or averaged with the lumped one so that short waves travel at the right speed", "consistent"
+    )
+    integrator: Literal["modal", "generalized_alpha"] = key(
+        "–", "exact in time for each mode, or generalized-α (with rho_inf)", "modal"
+    )
+    rho_inf: float = key(
+        "–", "spectral radius at infinity of generalized-α; 1 is the midpoint rule", 1.0, ge=0.0, le=1.0
+    )
+    distributed_load: float = key("N/m", "uniform load f_b, upward", 0.0)
+    tip_load_coefficient: float = key("N/m", "load of the last element's hat function, upward", 0.0)
+    initial_deflection_slope: float = key("–", "slope s₀ of the beam at the start: u = s₀ x", 0.0)
+    initial_velocity_slope: float = key("1/s", "slope s₁ of its velocity at the start: u̇ = s₁ x, upward", 0.0)
+    approach_speed: float | None = key("m/s", "speed of the tip at the start, downward: s₁ = −speed/L", None)
+    approach: Literal["undeformed", "elastic"] = key(
+        "–", "until first contact the beam turns as a straight line, or moves by its equations", "undeformed"
+    )
+    fidelity: Literal["dynamic", "quasi_static"] = key(
+        "–", "quasi_static: no inertia, so that mesh, modes and integrator play no part", "dynamic"
+    )
+
+    WAYS = (
+        Ways("section", (("area", "second_moment_of_area"), ("width", "height"), ("diameter",))),
+        Ways("shear stiffness", (("shear_modulus",), ("poisson_ratio",))),
+        Ways("velocity at the start", (("initial_velocity_slope",), ("approach_speed",))),
+    )
+    #: Keys that are not the FMU's.
+    GIVEN_ONLY: ClassVar[frozenset[str]] = frozenset(
+        ("width", "height", "diameter", "poisson_ratio", "approach_speed", "approach", "fidelity")
+    )
+
+    @classmethod
+    def _follows(cls, data: dict[str, Any]) -> dict[str, float]:
+        """Return what follows from the given keys: A, I, K of a section, G, s₁; a bad value is reported as such."""
+
+        def number(name: str) -> float | None:
+            value = data.get(name)
+            if value is None or (isinstance(value, (int, float)) and abs(value) < 1e300):
+                return value
+            return 1.0
+
+        follows: dict[str, float] = {}
+        b, h, d = number("width"), number("height"), number("diameter")
+        if b is not None and h is not None:
+            follows = {"area": b * h, "second_moment_of_area": b * h * h * h / 12.0, "shear_coefficient": 5.0 / 6.0}
+        elif d is not None:
+            follows = {"area": pi * d * d / 4.0, "second_moment_of_area": pi * d * d * d * d / 64.0}
+            follows["shear_coefficient"] = 9.0 / 10.0
+        elif data.get("area") is None:
+            follows["shear_coefficient"] = 1.0  # what is missing is the section
+        E, nu, L, speed = number("young_modulus"), number("poisson_ratio"), number("length"), number("approach_speed")
+        if nu is not None:
+            follows["shear_modulus"] = (1.0 if E is None else E) / (2.0 * (1.0 + nu)) if nu > -1.0 else 1.0
+        if speed is not None:
+            follows["initial_velocity_slope"] = 0.0 - speed / (L or 1.0)
+        return follows
 
     @property
     def damped_numerically(self) -> bool:
@@ -107,34 +218,55 @@ class Beam(Table):
 class Spring(Table):
     """Duffing spring m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s (Ahn & Tate, (6))."""
 
-    mass: Positive = 1.0  #: m [kg]
-    damping: NonNegative = 0.0  #: α_s [N·s/m]
-    linear_stiffness: float = 1.0  #: k1 [N/m]
-    cubic_stiffness: float = 0.0  #: k2 [N/m³]
-    equilibrium: float = 0.0  #: Ψ [m]: where the top starts
-    external_force: float = 0.0  #: f_s [N]
-    initial_velocity: float = 0.0  #: z at the start [m/s]
-    relative_tolerance: Annotated[float, Field(gt=0.0, le=1e-2)] = 1e-12  #: IDA's
-    absolute_tolerance: Annotated[float, Field(gt=0.0, le=1e-2)] = 1e-14  #: IDA's, of y [m] and z [m/s]
+    mass: float = key("kg", "mass m", gt=0.0)
+    damping: float = key("N·s/m", "damping α_s", 0.0, ge=0.0)
+    linear_stiffness: float = key("N/m", "linear stiffness k1")
+    cubic_stiffness: float = key("N/m³", "cubic stiffness k2: above 0 it hardens, below it softens", 0.0)
+    equilibrium: float = key("m", "height Ψ at which the top starts; it rests unloaded at 0", 0.0)
+    external_force: float = key("N", "constant force f_s on the top, upward", 0.0)
+    initial_velocity: float = key("m/s", "velocity of the top at the start, upward", 0.0)
+    relative_tolerance: float = key("–", "relative tolerance of IDA, which integrates it", 1e-12, gt=0.0, le=1e-2)
+    absolute_tolerance: float = key("m, m/s", "absolute tolerance of IDA, of y and z", 1e-14, gt=0.0, le=1e-2)
 
 
 class Stop(Table):
     """Rigid foundation: 0 ≤ N ⊥ y − φ ≥ 0 (Ahn & Tate, (8))."""
 
-    position: float  #: φ [m]
-    restitution: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0  #: e
+    position: float = key("m", "height φ, below that of the spring's top")
+    restitution: float = key("–", "restitution e: speed after an impact over that before", 1.0, ge=0.0, le=1.0)
 
 
 class Contact(Table):
     """What force C belongs to the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
 
-    law: Literal["transmission", "compliance", "tie", "link", "paper"] = "transmission"
-    impact: Literal["inelastic", "rest", "tip"] = "inelastic"
-    stiffness: NonNegative = 1.0e4  #: λ_nc [N/m^p], of "link" [N/m]
-    exponent: Annotated[float, Field(ge=1.0, le=100.0)] = 3.0  #: p; "link" has none
-    damping: NonNegative = 0.0  #: "compliance": χ [s/m] (Hunt & Crossley 1975); "link": c [N·s/m]
-    #: Over which the force is averaged before its peak is taken [s]; `springbeam.scene.resolution.force_window`.
-    force_window: Annotated[float | None, Field(gt=0.0)] = None
+    law: Literal["transmission", "compliance", "tie", "link", "paper"] = key(
+        "–", "the interface law (docs/contact.md says which)", "transmission"
+    )
+    impact: Literal["inelastic", "rest", "tip"] = key(
+        "–", "what a rigid meeting does: both ends get their common velocity; the spring's becomes 0, or the tip's",
+        "inelastic",
+    )  # fmt: skip
+    stiffness: float = key(
+        "N/m^p", "stiffness λ_nc of normal compliance, or of a link (N/m)", 1.0e4, ge=0.0,
+        otherwise="1e4; needed with compliance, link and paper",
+    )  # fmt: skip
+    exponent: float = key(
+        "–", "exponent p of normal compliance; a link has none", 3.0, ge=1.0, le=100.0,
+        otherwise="3; needed with compliance and paper",
+    )  # fmt: skip
+    damping: float = key("s/m", "χ of compliance (Hunt & Crossley 1975), or damping c of a link (N·s/m)", 0.0, ge=0.0)
+    force_window: float | None = key(
+        "s", "time over which the force is averaged before its peak is taken", None, gt=0.0,
+        otherwise="a fiftieth of the slowest period",
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _law_is_complete(self) -> Contact:
+        needed = {"compliance": ("stiffness", "exponent"), "paper": ("stiffness", "exponent"), "link": ("stiffness",)}
+        missing = [name for name in needed.get(self.law, ()) if name not in self.model_fields_set]
+        if missing:
+            raise ValueError("\n".join(f'{name}: missing; law = "{self.law}" needs it' for name in missing))
+        return self
 
     @property
     def rigid(self) -> bool:
@@ -167,18 +299,27 @@ ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
 
 
 class Coupling(Table):
-    #: "auto" picks scheme and degree: `springbeam.scene.automatic`.
-    scheme: Literal["energy", "hermite", "auto", "gauss_seidel", "jacobi"] = "energy"
-    degree: Annotated[int, Field(ge=0, le=2)] = 0  #: of the contact force over a step
-    macro_step: Annotated[float | None, Field(gt=0.0)] = None  #: H [s]; `DEFAULT_STEP` where no tolerance is given
-    #: Largest error of a step, relative to the motion so far, and absolute [m]; instead of ``macro_step``.
-    relative_tolerance: Annotated[float | None, Field(gt=0.0, le=0.1)] = None
-    absolute_tolerance: Annotated[float | None, Field(gt=0.0)] = None
-    tolerance: Annotated[float, Field(gt=0.0, le=1e-3)] = 1.0e-12
-    #: One-way: the driving body does not feel the contact force (law "compliance").
-    feedback: Literal["two_way", "beam_drives", "spring_drives"] = "two_way"
-    #: Motion of the driving end that one-way coupling may neglect, over the largest penetration.
-    feedback_tolerance: Annotated[float, Field(gt=0.0, le=0.1)] = 1.0e-6
+    """How the force of a step is found, and how long steps are (``docs/coupling.md``)."""
+
+    scheme: Literal["energy", "hermite", "auto", "gauss_seidel", "jacobi"] = key(
+        "–", "coupling scheme; auto picks scheme and degree", "energy"
+    )
+    degree: int = key("–", "degree of the contact force over a step: hermite 1, 2; exchanges 0, 1", 0, ge=0, le=2)
+    macro_step: float | None = key("s", "length H of a macro step", None, gt=0.0, otherwise="0.004 without tolerances")
+    relative_tolerance: float | None = key(
+        "–", "largest error of a step, relative to the motion so far", None, gt=0.0, le=0.1
+    )
+    absolute_tolerance: float | None = key("m", "largest error of a step", None, gt=0.0)
+    tolerance: float = key("–", "relative tolerance of the contact force of a step", 1.0e-12, gt=0.0, le=1e-3)
+    feedback: Literal["two_way", "beam_drives", "spring_drives"] = key(
+        "–", "one-way coupling: the body that drives does not feel the contact force (compliance)", "two_way"
+    )
+    feedback_tolerance: float = key(
+        "–", "largest motion of the driving end that one-way coupling may neglect, over the largest penetration",
+        1.0e-6, gt=0.0, le=0.1,
+    )  # fmt: skip
+
+    WAYS = (Ways("steps", ((STEP_KEY,), TOLERANCE_KEYS)),)
 
     @model_validator(mode="before")
     @classmethod
@@ -186,15 +327,6 @@ class Coupling(Table):
         if isinstance(data, dict) and all(data.get(key) is None for key in (STEP_KEY, *TOLERANCE_KEYS)):
             return {**data, STEP_KEY: DEFAULT_STEP}
         return data
-
-    @model_validator(mode="after")
-    def _step_or_tolerance(self) -> Coupling:
-        if self.macro_step is not None and self.adaptive:
-            raise ValueError(
-                f"macro_step = {self.macro_step}: with relative_tolerance or absolute_tolerance the master chooses its "
-                "steps; give either macro_step or tolerances"
-            )
-        return self
 
     @property
     def adaptive(self) -> bool:

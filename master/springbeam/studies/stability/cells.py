@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
+from ...scene.unit import UNIT_BEAM
+
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
 _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
 
@@ -238,6 +240,7 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
         degree_of_elements = cell["element_degree"]
         n = max(1, cell["n_elements"] // degree_of_elements)
         scene["beam"] = {
+            **UNIT_BEAM,
             "young_modulus": cell["stiffness"] / root,
             "shear_modulus": cell["stiffness"] * root,
             "alpha_b": cell["alpha_b"],

@@ -15,7 +15,8 @@ from ...bodies.fmu_bodies import FmuBeam, FmuSpring
 from ...bodies.protocol import NO_FORCE
 from ...run.outcome import RunStopped
 from ...run.runner import simulate
-from ...scene import Beam, Coupling, Scene, Spring, Time
+from ...scene import Coupling, Scene, Time
+from ...scene.unit import unit_beam, unit_spring
 from .check import EPS, UNIT_FORCE, Check
 from .spring import IDA, ida_error
 
@@ -28,8 +29,8 @@ def two_masses() -> list[Check]:
     """
     k_own, k_between = 4.0 * pi**2, 16.0 * pi**2
     sizes = (1e-3, 5e-4)
-    by_force = Spring(linear_stiffness=k_own)
-    by_displacement = Spring(linear_stiffness=k_own + k_between)
+    by_force = unit_spring(linear_stiffness=k_own)
+    by_displacement = unit_spring(linear_stiffness=k_own + k_between)
     with closing(FmuSpring(by_force, 0.0)) as f, closing(FmuSpring(by_displacement, 0.0)) as d:
         load = Reals(d.fmu, "external_force")
 
@@ -106,7 +107,7 @@ def added_mass() -> list[Check]:
     """
     n, m, inertia = 100, 1.0, 1e8
     cutoff = sqrt(12.0) * n
-    beam, spring = Beam(n_elements=n, second_moment_of_area=inertia), Spring(mass=m, linear_stiffness=0.0)
+    beam, spring = unit_beam(n_elements=n, second_moment_of_area=inertia), unit_spring(mass=m, linear_stiffness=0.0)
 
     def gain(size: float) -> float:
         with closing(FmuBeam(beam, 0.0, 0.0)) as upper, closing(FmuSpring(spring, 0.0)) as lower:
@@ -146,11 +147,11 @@ def energy_scheme() -> list[Check]:
     steps, n = 100, 50
     reason = "relative drift in 100 steps: coupling.tolerance of each step's work, at most twice the energy; and " + IDA
     for kappa, size in ((1.0, 0.01), (1e4, 1e-3), (1e4, 0.1)):
-        spring = Spring(linear_stiffness=3.0, cubic_stiffness=100.0, external_force=-0.1 * kappa)
+        spring = unit_spring(linear_stiffness=3.0, cubic_stiffness=100.0, external_force=-0.1 * kappa)
         for degree in (0, 1, 2):
             scene = Scene(
                 time=Time(t_end=steps * size),
-                beam=Beam(young_modulus=kappa, shear_modulus=kappa, n_elements=n),
+                beam=unit_beam(young_modulus=kappa, shear_modulus=kappa, n_elements=n),
                 spring=spring,
                 coupling=Coupling(scheme="energy", degree=degree, macro_step=size),
             )

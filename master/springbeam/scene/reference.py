@@ -1,0 +1,135 @@
+"""All keys of a scene: in words, as a JSON Schema, and a file to start from, made of `springbeam.scene.tables`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import tomli_w
+from pydantic.fields import FieldInfo
+
+from .loads import Load
+from .messages import allowed, extra
+from .scene import TABLES, Scene
+from .tables import Table, Ways
+
+#: Tables by their names; "" is what stands outside of them.
+MODELS: dict[str, type[Table]] = {"": Scene, **TABLES, "loads": Load}
+
+
+class Key(NamedTuple):
+    """One key of a scene file; ``table`` is "" for those outside a table."""
+
+    table: str
+    name: str
+    unit: str
+    allowed: str
+    default: str
+    meaning: str
+
+
+def listed(table: str | None = None) -> list[Key]:
+    """Return the keys of one table, or all."""
+    wanted = MODELS if table is None else [table]
+    return [Key(name, *described) for name in wanted for described in _described(MODELS[name])]
+
+
+def about(table: str) -> str:
+    """Return what a table describes, in one sentence."""
+    return (MODELS[table].__doc__ or "").splitlines()[0].replace("``", "`")
+
+
+def _described(model: type[Table]) -> Iterator[tuple[str, str, str, str, str]]:
+    for name, field in model.model_fields.items():
+        if name not in MODELS:
+            yield name, extra(field, "unit"), allowed(field), _default(model, name, field), field.description or ""
+
+
+def _default(model: type[Table], name: str, field: FieldInfo) -> str:
+    if otherwise := extra(field, "otherwise"):
+        return otherwise
+    for ways in model.WAYS:
+        if any(name in group for group in ways.groups) and model.model_fields[ways.groups[0][0]].is_required():
+            return f"needed: the {ways.thing} one way"
+    if field.is_required():
+        return "needed"
+    default = field.default
+    return "none" if default in (None, "") else str(default).lower() if isinstance(default, bool) else f"{default}"
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of a scene file (draft 2020-12), for editors and other programs.
+
+    What several keys decide together is left to `springbeam.scene.rules`, but for the ways to give one thing.
+    """
+    found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema()}
+    _plain(found["properties"])
+    models: list[type[Table]] = [*TABLES.values(), Load]
+    for model in models:
+        table = found["$defs"][model.__name__]
+        _plain(table["properties"])
+        conditional = {name for name, field in model.model_fields.items() if extra(field, "otherwise")}
+        conditional |= {name for ways in model.WAYS for group in ways.groups for name in group}
+        table["required"] = [name for name in table.get("required", ()) if name not in conditional]
+        if model.WAYS:
+            table["allOf"] = [{"oneOf": list(_alternatives(model, ways))} for ways in model.WAYS]
+    return found
+
+
+def _plain(properties: dict[str, dict[str, Any]]) -> None:
+    """Take out what says nothing about a file: TOML has no null, and names are titles enough."""
+    for described in properties.values():
+        described |= next((way for way in described.pop("anyOf", ()) if way.get("type") != "null"), {})
+        for name, empty in (("title", described.get("title")), ("default", None), ("otherwise", "")):
+            if name in described and (described[name] == empty or isinstance(described[name], dict)):
+                del described[name]
+
+
+def _alternatives(model: type[Table], ways: Ways) -> Iterator[dict[str, Any]]:
+    everything = [name for group in ways.groups for name in group]
+    needed = model.model_fields[everything[0]].is_required()
+    for group in ways.groups:
+        others = {name: False for name in everything if name not in group}
+        if needed:
+            yield {"required": list(group), "properties": others}
+        else:
+            yield {"anyOf": [{"required": [name]} for name in group], "properties": others}
+    if not needed:
+        yield {"properties": dict.fromkeys(everything, False)}
+
+
+#: Of the scene that `springbeam new` writes: an aluminium beam, 0.8 m × 30 × 3 mm, above a rubber bumper above a stop.
+_BEGINNING: dict[str, dict[str, Any]] = {
+    "time": {"t_end": 0.3},
+    "beam": {
+        "density": 2700.0, "length": 0.8, "width": 0.03, "height": 0.003, "young_modulus": 7.0e10,
+        "poisson_ratio": 0.33, "alpha_b": 2.0e-5, "n_elements": 40, "n_modes": 12, "reduced_integration": True,
+        "approach_speed": 1.0,
+    },
+    "spring": {"mass": 0.02, "damping": 2.0, "linear_stiffness": 5.0e3, "cubic_stiffness": 1.0e8},
+    "stop": {"position": -0.005, "restitution": 0.5},
+    "contact": {"law": "compliance", "stiffness": 2.0e5, "exponent": 1.5},
+    "coupling": {"scheme": "auto", "macro_step": 1.0e-4},
+}  # fmt: skip
+
+
+def beginning(title: str) -> str:
+    """Return a scene file to start from, with the meaning and unit of each key beside it."""
+    lines = [
+        tomli_w.dumps({"title": title}).strip(),
+        "",
+        "# All values are SI, up is positive. springbeam keys lists every key, springbeam predict checks the values.",
+    ]
+    for table, content in _BEGINNING.items():
+        model = TABLES[table]
+        lines += ["", f"[{table}]  # {about(table)}"]
+        for name, value in content.items():
+            field = model.model_fields[name]
+            unit = "" if extra(field, "unit") == "–" else f" [{extra(field, 'unit')}]"
+            text = (
+                f"{value:.1e}".replace("e+", "e")
+                if isinstance(value, float) and value >= 1e4
+                else tomli_w.dumps({"": value})[5:].strip()
+            )
+            lines.append(f"{name} = {text}".ljust(32) + f"# {field.description}{unit}")
+    return "\n".join(lines) + "\n"
