@@ -12,7 +12,7 @@ suppress_warnings = ["myst.xref_missing"]
 
 PAGES = {
     "How to": "accuracy report sweeps scripting tools faq",
-    "Reference": "commands files api fmu_variables",
+    "Reference": "scene commands files api fmu_variables",
     "Theory and measurements": "model coupling stability measured performance paper",
     "Development": "architecture contributing",
 }
