@@ -138,7 +138,7 @@ struct FreeStep {
 class GeneralizedAlphaBeam final : public Beam {
  public:
   GeneralizedAlphaBeam(const Parameters& p, Timoshenko mesh)
-      : Beam(p, static_cast<std::size_t>((p.rho_inf == 1.0 ? 2 : 3) * mesh.size()) + remembered),
+      : Beam(p, static_cast<std::size_t>(p.rho_inf == 1.0 ? 2 * mesh.size() : 3 * mesh.size() + remembered)),
         mesh_(std::move(mesh)),
         mu_(mesh_.mass_per_length()),
         alpha_(p.alpha_b),
@@ -194,20 +194,16 @@ class GeneralizedAlphaBeam final : public Beam {
     q0_.swap(q_);
     v0_.swap(v_);
     a0_.swap(a_);
-    before_ = last_;
-    LoadValues inside{}, start{}, end{};  // inside: what the scheme sees
+    if (!midpoint_) before_ = last_;
+    LoadValues seen{};  // by the scheme
     loads.for_each([&](std::size_t i, const Polynomial& f) {
-      inside[i] = midpoint_ ? mean_over(f, h) : value_at(f, (1.0 - alpha_f_) * h);
-      start[i] = f[0];
-      end[i] = value_at(f, h);
+      seen[i] = midpoint_ ? mean_over(f, h) : value_at(f, (1.0 - alpha_f_) * h);
     });
-    const double loss = midpoint_ ? midpoint_step(S, h, mean_over(c, h), inside) : alpha_step(S, h, c, start, inside);
-    loads.for_each([&](std::size_t i, const Polynomial&) { now_.load_work += inside[i] * shape(i).dot(q_ - q0_); });
+    now_.dissipated += midpoint_ ? midpoint_step(S, h, mean_over(c, h), seen) : alpha_step(S, h, c, loads, seen);
+    loads.for_each([&](std::size_t i, const Polynomial&) { now_.load_work += seen[i] * shape(i).dot(q_ - q0_); });
     const double u0 = q0_[mesh_.tip_index()], u1 = q_[mesh_.tip_index()];
     now_.integral = 0.5 * h * (u0 + u1);
     now_.integral_2 = h * h * (2.0 * u0 + u1) / 6.0;
-    now_.dissipated += loss;
-    last_ = {value_at(c, h), 0.0, 1.0, end};
     return q_.squaredNorm() + v_.squaredNorm() + a_.squaredNorm();
   }
 
@@ -227,7 +223,7 @@ class GeneralizedAlphaBeam final : public Beam {
 
   void save_motion(double* numbers) const override {
     for (const VectorXd* x : {&q_, &v_, &a_}) numbers = std::copy_n(x->data(), x->size(), numbers);
-    std::memcpy(numbers, &last_, sizeof last_);
+    if (!midpoint_) std::memcpy(numbers, &last_, sizeof last_);
   }
 
   void restore_motion(const double* numbers) override {
@@ -235,7 +231,7 @@ class GeneralizedAlphaBeam final : public Beam {
       *x = Eigen::Map<const VectorXd>(numbers, x->size());
       numbers += x->size();
     }
-    std::memcpy(&last_, numbers, sizeof last_);
+    if (!midpoint_) std::memcpy(&last_, numbers, sizeof last_);
   }
 
   /// Makes q_ and v_ from q0_ and v0_; returns the loss.
@@ -264,22 +260,25 @@ class GeneralizedAlphaBeam final : public Beam {
   }
 
   /// Makes q_, v_ and a_ from q0_, v0_ and a0_; returns the loss.
-  double alpha_step(const StepMatrix& S, double h, const Polynomial& c, const LoadValues& start,
-                    const LoadValues& inside) {
+  double alpha_step(const StepMatrix& S, double h, const Polynomial& c, const Loads& loads, const LoadValues& seen) {
     const VectorXd &q = q0_, &v = v0_;
     VectorXd a = a0_;
+    LoadValues start{};
+    loads.for_each([&start](std::size_t i, const Polynomial& f) { start[i] = f[0]; });
     if (add_missing_force(c[0], start)) {
       solve(S, w_);
       a += (1.0 - alpha_m_) * w_;
     }
     const double f = 1.0 - alpha_f_;
-    rhs_ = load_of(inside) / mu_;
+    rhs_ = load_of(seen) / mu_;
     rhs_[mesh_.tip_index()] += value_at(c, f * h) / mu_;
     w_ = alpha_ * (v + (f * (1.0 - gamma_) * h) * a) + q + (f * h) * (v + ((0.5 - beta_) * h) * a);
     mesh_.add_products(-alpha_m_, a, -1.0, w_, rhs_);
     solve(S, a_);
     q_ = q + h * (v + h * ((0.5 - beta_) * a + beta_ * a_));
     v_ = v + h * ((1.0 - gamma_) * a + gamma_ * a_);
+    last_ = {value_at(c, h), 0.0, 1.0, {}};
+    loads.for_each([&](std::size_t i, const Polynomial& f) { last_.loads[i] = value_at(f, h); });
     if (alpha_ == 0.0) return 0.0;
     w_ = f * v_ + alpha_f_ * v;
     return mu_ * alpha_ * (q_ - q).dot(mesh_.stiffness_times(w_));
@@ -363,13 +362,13 @@ class GeneralizedAlphaBeam final : public Beam {
   VectorXd tip_response_;  // M⁻¹e/ρA [1/kg], the velocity that a unit impulse leaves
 
   VectorXd q_, v_, a_;  // state [m, m/s, m/s²]; a only for ρ∞ < 1
-  struct Last {
-    double tip_force;  // at the end of the last step, as the loads: what a_ knows of
-    double impulse;    // since then [N·s]
-    double started;    // 0 before the first step, when a_ knows of nothing
+  struct Last {         // for ρ∞ < 1
+    double tip_force;   // at the end of the last step, as the loads: what a_ knows of
+    double impulse;     // since then [N·s]
+    double started;     // 0 before the first step, when a_ knows of nothing
     LoadValues loads;
   };
-  static constexpr std::size_t remembered = sizeof(Last) / sizeof(double);
+  static constexpr Index remembered = sizeof(Last) / sizeof(double);
   Last last_{}, before_{};
 
   FreeStep free_;

@@ -48,7 +48,6 @@ void require_allowed(const Variable& v, const Polynomial& p) {
 
 /// What every input is before it is set: nothing acts.
 constexpr Polynomial idle{0.0, unset, unset};
-bool is_idle(const Polynomial& p) { return p[0] == 0.0 && std::isnan(p[1]) && std::isnan(p[2]); }
 
 bool is_setting(const Variable& v) { return v.causality == Causality::parameter || v.exact; }
 
@@ -73,8 +72,7 @@ void Instance::reset() {
   for (const Variable* v : fixed_) starts.push_back(v->start);
   settings_ = std::make_shared<const std::vector<double>>(std::move(starts));
   values_.clear();
-  values_.resize(inputs_.size(), idle);
-  pushed_.assign(inputs_.size(), false);
+  values_.assign(inputs_.size(), idle);
   time_ = 0.0;
   stop_time_ = std::numeric_limits<double>::infinity();
   tolerance_ = 0.0;
@@ -119,11 +117,12 @@ void Instance::ensure_built() {
 }
 
 void Instance::push_inputs() {
-  for (std::size_t i = 0; i < inputs_.size(); ++i) {
-    const bool used = !is_idle(values_[i]);
-    if (used || pushed_[i]) inputs_[i]->set(*model_, values_[i]);
-    pushed_[i] = used;
-  }
+  for (const std::size_t i : used_) inputs_[i]->set(*model_, values_[i]);
+}
+
+Polynomial& Instance::use(std::size_t input) {
+  if (std::find(used_.begin(), used_.end(), input) == used_.end()) used_.push_back(input);
+  return values_[input];
 }
 
 const Variable& Instance::variable(unsigned reference, Type type, const char* what) const {
@@ -167,10 +166,9 @@ void Instance::set(unsigned reference, Type type, double value) {
     built_ = false;
     return;
   }
-  values_[place][0] = value;
+  use(place)[0] = value;
   if (built_) {
     v.set(*model_, values_[place]);
-    pushed_[place] = true;
     model_->observe();
   }
 }
@@ -185,7 +183,7 @@ void Instance::set_derivative(unsigned reference, int order, double value) {
   if (!std::isfinite(value)) {
     throw std::invalid_argument("derivative of '" + v.name + "' = " + text(value) + " is not finite");
   }
-  values_[place_[reference]][static_cast<std::size_t>(order)] = value;
+  use(place_[reference])[static_cast<std::size_t>(order)] = value;
 }
 
 double Instance::output_derivative(unsigned reference, int order) {
@@ -231,9 +229,7 @@ void Instance::step(double time, double size) {
   ensure_built();
   push_inputs();
   model_->step(size);
-  for (std::size_t i = 0; i < inputs_.size(); ++i) {
-    if (pushed_[i]) values_[i] = {inputs_[i]->consumed ? 0.0 : values_[i][0], unset, unset};
-  }
+  for (const std::size_t i : used_) values_[i] = {inputs_[i]->consumed ? 0.0 : values_[i][0], unset, unset};
   time_ = time + size;
 }
 
@@ -244,7 +240,8 @@ void Instance::save(Snapshot& s) const {
   s.stop_time = stop_time_;
   s.tolerance = tolerance_;
   s.settings = settings_;
-  s.inputs = values_;
+  s.inputs.resize(values_.size(), idle);
+  for (const std::size_t i : used_) s.inputs[i] = values_[i];
   s.built = built_;
   s.foreign = false;
   s.numerics.clear();
@@ -255,10 +252,11 @@ void Instance::restore(Snapshot& s) {
   if (s.foreign) {
     for (std::size_t i = 0; i < fixed_.size(); ++i) require_allowed(*fixed_[i], {(*s.settings)[i], unset, unset});
     for (std::size_t i = 0; i < inputs_.size(); ++i) require_allowed(*inputs_[i], s.inputs[i]);
+    for (std::size_t i = 0; i < inputs_.size(); ++i) use(i);
   }
   built_ = built_ && s.built && tolerance_ == s.tolerance && (settings_ == s.settings || *settings_ == *s.settings);
   settings_ = s.settings;
-  values_ = s.inputs;
+  for (const std::size_t i : used_) values_[i] = s.inputs[i];
   tolerance_ = s.tolerance;
   if (s.built) {
     ensure_built();

@@ -71,6 +71,7 @@ class Instance {
   const Variable& variable(unsigned reference, Type type, const char* what) const;
   void ensure_built();
   void push_inputs();
+  Polynomial& use(std::size_t input);
 
   const Table& table_;
   std::unique_ptr<Model> model_;
@@ -78,7 +79,7 @@ class Instance {
   std::vector<std::size_t> place_;                       ///< of every variable, among the inputs or the fixed
   std::shared_ptr<const std::vector<double>> settings_;  ///< of the fixed; saved states share it
   std::vector<Polynomial> values_;                       ///< of the inputs
-  std::vector<char> pushed_;                             ///< inputs that the model may know as something not idle
+  std::vector<std::size_t> used_;                        ///< inputs that were ever set: the others cost nothing
   bool built_ = false;
   double time_ = 0.0;
   double stop_time_ = std::numeric_limits<double>::infinity();

@@ -42,9 +42,9 @@ struct BeamModel final : fmi::Model {
   }
 
   void observe() override {
-    const beam::LoadValues before = beam->loads();
+    const beam::LoadValues before = forecasts() ? beam->loads() : beam::LoadValues{};
     beam->observe(tip_force[0], loads);
-    if (beam->loads() != before) look_ahead();
+    if (forecasts() && beam->loads() != before) look_ahead();
   }
 
   void step(double size) override {
