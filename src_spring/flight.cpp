@@ -24,6 +24,10 @@ constexpr int least_halvings = 3, most_halvings = 48;
 
 enum Unknown { q, p, A, B, e, unknowns };
 
+// Something in contact with the top may hold it past the hilltop, but hardly so many times as far from 0: there the
+// spring pushes as hard as 1e12 linear springs would pull.
+constexpr double runaway = 1e6;
+
 }  // namespace
 
 Flight::Flight(const Motion& motion, const Laws& laws)
@@ -71,6 +75,8 @@ void Flight::prepare(const FlightStart& start) {
 
   remainder_ = motion_.remainder(R_, start.loads);
   contact_taylor_ = dissipation_taylor_ = {};
+  held_ = touching_ || start.loads.held;
+  height_ = held_ ? runaway * laws_.hilltop : laws_.hilltop;
   if (touching_ && order >= 2) {
     const auto c = contact.rates(depth);
     const auto lost = contact.dissipation(depth);
@@ -138,18 +144,27 @@ Flight::Event Flight::run(const FlightStart& start) {
   solver_.start(*this, relative_, h0_, start.most_steps);
   Event event = Event::none;
   while (event == Event::none && solver_.advance() == IdaSolver::Outcome::event) {
-    if (hilltop_ >= 0 && solver_.occurred(hilltop_))
-      event = Event::hilltop;
-    else if (stop_ >= 0 && solver_.fell(stop_))
+    if (hilltop_ >= 0 && solver_.occurred(hilltop_)) {
+      finish();
+      if (escapes()) return Event::hilltop;
+    }
+    if (stop_ >= 0 && solver_.fell(stop_))
       event = Event::stop;
     else if (contact_ >= 0 && solver_.fell(contact_))
       event = Event::contact;
   }
   finish();
-  if (event == Event::none && laws_.to_hilltop(y_) < 0.0) event = Event::hilltop;
+  if (event == Event::none && laws_.to(height_, y_) < 0.0 && escapes()) event = Event::hilltop;
   if (event == Event::none && laws_.stop && start.gap + (y_ - start.y) < -solver_.absolute_tolerance()[q])
     throw IdaError("the top passed the stop unnoticed");
   return event;
+}
+
+/// Past the hilltop the spring pushes outwards: a top that moves outwards comes back only if something else pulls.
+bool Flight::escapes() const {
+  const double outwards = y_ < 0.0 ? -1.0 : 1.0;
+  const double force = value(start_.loads.force, elapsed());
+  return held_ || (outwards * z_ > 0.0 && motion_.push_outwards(y_, outwards, force) >= 0.0);
 }
 
 double Flight::elapsed() const { return solver_.s() * start_.size; }
@@ -212,7 +227,7 @@ void Flight::jacobian(double s, double c, const double* Y, const double*, double
 void Flight::events(double s, const double* Y, double* g) const noexcept {
   const double H = start_.size, t = H * s;
   const double rise = R_.rise(t) + Y[q], z = R_.rate(t) + Y[p] / H;
-  if (hilltop_ >= 0) g[hilltop_] = laws_.to_hilltop(start_.y + rise);
+  if (hilltop_ >= 0) g[hilltop_] = laws_.to(height_, start_.y + rise);
   if (stop_ >= 0) {
     g[stop_] = stop_watch_.distance(start_.gap + rise, t);
     g[stop_ + 1] = stop_watch_.rate(z, t);

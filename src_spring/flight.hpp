@@ -7,9 +7,9 @@
 // cancellation (motion.hpp). q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H² B. All unknowns are under error
 // control, see tolerances in flight.cpp.
 //
-// Events: [hilltop] |y| reaches the hilltop; [stop] y − φ falls to 0; [contact] y − u_tip changes sign. A rate (ẏ,
-// ẏ − u̇_tip) that rises through 0 marks a minimum of the gap, so that a gap that dips below 0 between two internal
-// steps is noticed. See watch.hpp for gaps that start at 0.
+// Events: [hilltop] |y| is past the hilltop and nothing brings it back, neither a contact nor the loads; [stop] y − φ
+// falls to 0; [contact] y − u_tip changes sign. A rate (ẏ, ẏ − u̇_tip) that rises through 0 marks a minimum of the gap,
+// so that a gap that dips below 0 between two internal steps is noticed. See watch.hpp for gaps that start at 0.
 #pragma once
 
 #include <cmath>
@@ -30,8 +30,8 @@ struct Laws {
   bool compliance;
   double relative_tolerance, absolute_tolerance;
 
-  /// How far the top is from escaping [m]; a stop at the lower hilltop or above keeps it from that one.
-  double to_hilltop(double y) const { return hilltop - (stop && stop_position >= -hilltop ? y : std::abs(y)); }
+  /// How far the top is from ±height [m]; a stop at the lower hilltop or above keeps it from the lower one.
+  double to(double height, double y) const { return height - (stop && stop_position >= -hilltop ? y : std::abs(y)); }
 };
 
 /// Where a segment starts, and what may be known better than by subtraction.
@@ -70,6 +70,7 @@ class Flight final : public ImplicitSystem {
  private:
   void prepare(const FlightStart& start);
   double remainder(double t) const;
+  bool escapes() const;  ///< once past `height_`
   double contact_depth(double rise, double t) const;
   double contact_rate(double z, double t) const { return z - rate(start_.loads.tip, t); }
   void finish();
@@ -86,7 +87,8 @@ class Flight final : public ImplicitSystem {
   std::array<double, 13> remainder_{};  ///< of the equation of motion along R
   Quadratic contact_taylor_{};          ///< of the contact force, as far as R accounts for it
   Quadratic dissipation_taylor_{};      ///< d_R
-  bool touching_ = false;
+  bool touching_ = false, held_ = false;
+  double height_ = 0.0;  ///< |y| from where it may escape
   double contact_sign_ = 1.0;
   Watch stop_watch_, contact_watch_;
   double relative_ = 0.0, h0_ = 1.0;

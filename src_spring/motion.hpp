@@ -3,6 +3,7 @@
 // with its Jacobian and, for the start of a segment, its time derivatives.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "compliance.hpp"
@@ -14,11 +15,12 @@ namespace spring {
 
 /// What acts from outside over a segment, τ from its start.
 struct Loads {
-  Quadratic force;  ///< F [N]
-  Quadratic tip;    ///< u_tip [m]
+  Quadratic force;    ///< F [N]
+  Quadratic tip;      ///< u_tip [m]
+  bool held = false;  ///< something is in contact with the top, and may hold it
 
   static Loads from(const Parameters& parameters, const Inputs& inputs);
-  Loads from_time(double t) const { return {shifted(force, t), shifted(tip, t)}; }
+  Loads from_time(double t) const { return {shifted(force, t), shifted(tip, t), held}; }
 };
 
 /// f_s − m a [N]
@@ -57,6 +59,10 @@ class Motion {
   /// Force that would hold the top at y, at rest, with its first two derivatives: −F + k1 y + k2 y³ + C. [N, N/s, N/s²]
   Quadratic holding_force(double y, const Loads& loads, bool touching, double depth) const;
 
+  /// What F and the spring, where it pushes that way, add to a motion of the top at y in direction `sense`. [N]
+  double push_outwards(double y, double sense, double force) const {
+    return sense * force + std::max(0.0, -sense * (k1_ + k2_ * y * y) * y);
+  }
   double potential_energy(double y) const;
   const Compliance& compliance() const { return compliance_; }
   double mass() const { return mass_; }

@@ -154,7 +154,8 @@ class Step {
     state_.z = flight_.velocity();
     t_ += flight_.elapsed();
     if (event == Flight::Event::hilltop)
-      throw Escape("spring: y = " + number(state_.y) + " m is past the hilltop |y| = " + number(laws_.hilltop) +
+      throw Escape("spring: y = " + number(state_.y) +
+                       " m has run away, past the hilltop |y| = " + number(laws_.hilltop) +
                        " m of the softening spring, reached " + number(t_) + " s after the step's start",
                    t_);
     // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.

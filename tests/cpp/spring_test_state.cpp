@@ -297,6 +297,26 @@ TEST(SpringEscape, AForceCanPushItOver) {
   EXPECT_NO_THROW(hardening.step(1.0, inputs));
 }
 
+// Whatever pulls harder than the spring pushes brings it back from there: E = ½mz² + V(y) + C y is constant.
+TEST(SpringEscape, WhatPullsHarderHoldsItPastTheHilltop) {
+  for (const bool contact : {true, false}) {
+    Parameters p = softening();
+    p.displacement = 0.99 * hilltop;
+    p.velocity = 2.0;
+    Inputs inputs;
+    (contact ? inputs.contact_force : inputs.external_force)[0] = contact ? 20.0 : -20.0;
+    Spring s(p);
+    const double before = energy(s) + 20.0 * s.displacement();
+    double highest = 0.0;
+    while (s.velocity() > -2.0) {
+      s.step(0.01, inputs);
+      highest = std::max(highest, s.displacement());
+    }
+    EXPECT_NEAR(highest, 0.99 * hilltop + 0.1, 0.01);  // z²/2a
+    EXPECT_NEAR(energy(s) + 20.0 * s.displacement(), before, 1e-12 * before);
+  }
+}
+
 // A stop at the lower hilltop is met before the spring can fall over it; the upper hilltop stays open.
 TEST(SpringEscape, AStopAtTheHilltopHoldsTheTop) {
   Parameters p = softening();

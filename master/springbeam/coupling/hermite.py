@@ -7,6 +7,8 @@ on an event hands the right velocities to it, and the order holds through events
 
 from __future__ import annotations
 
+from math import sqrt
+
 from ..bodies.protocol import Motion
 from .protocol import Conditions
 
@@ -20,6 +22,9 @@ def _degree_2(m: Motion, size: float) -> tuple[float, ...]:
 
 
 CONDITIONS: dict[int, Conditions] = {1: _degree_1, 2: _degree_2}
+
+#: Where C is most accurate, as a share of the step: the last Gauss point.
+SHARPEST = {1: 0.5 + 0.5 / sqrt(3.0), 2: 0.5 + 0.5 * sqrt(0.6)}
 
 #: Order in the step's size of `gap_inside`.
 ORDER_INSIDE = {1: 4, 2: 5}

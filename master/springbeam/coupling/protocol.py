@@ -67,6 +67,8 @@ class Coupling(Memory):
 
     #: Degree of the contact force over a step.
     degree: int = 0
+    #: Share of a step at which `told_force` has one order more than elsewhere.
+    sharpest: float = 1.0
     #: Whether the force does no net work but what is booked, at any step.
     energy_exact: bool = True
 
@@ -97,6 +99,10 @@ class Coupling(Memory):
     def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
         """Return estimates of the step's error that its motion does not show by itself."""
         return []
+
+    def told_force(self, step: Step, reduced_mass: float) -> Force:
+        """Return the contact force of ``step`` as far as it tells of the ends [kg], without what the scheme adds."""
+        return step.contact
 
     def neglected(self) -> Neglected | None:
         """Return what of the motion is left out by now, ``None`` if nothing is."""

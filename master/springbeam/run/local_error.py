@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ..bodies.memory import Memory
 from ..bodies.protocol import Motion
-from ..contact.phases import Joint
+from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Scales, Step
 from ..scene import Scene
 from .stepping import Pair, State
@@ -47,7 +47,7 @@ class LocalError(Memory):
             return 0.0, _CUBIC
         tolerance = self._relative + self._absolute / span
         coupling = pair.coupling(state.phase)
-        scales = Scales(span, self._speed(step), energy_scale, self._reduced_mass())
+        scales = Scales(span, self._speed(step), energy_scale, pair.reduced_mass(Phase()))
         tied = not pair.law.soft and state.phase.joint is not Joint.FREE
         curve = self._curve(cubic, ranges, max(self._relative, _SEEN) if tied else self._relative)
         told = coupling.local_errors(step, scales)
@@ -85,11 +85,6 @@ class LocalError(Memory):
         if (spring := self._scene.spring) is not None:
             lower += spring.relative_tolerance * reach[1] + spring.absolute_tolerance
         return [tip, lower]
-
-    def _reduced_mass(self) -> float:
-        masses = [body.mass for body in (self._pair.upper, self._pair.lower)]
-        inverse = sum(1.0 / m for m in masses) if min(masses) > 0.0 else 0.0
-        return 1.0 / inverse if inverse > 0.0 else 0.0
 
 
 def _beside_cubic(start: Motion, end: Motion, size: float) -> float:

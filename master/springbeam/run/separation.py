@@ -16,8 +16,8 @@ from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Step
 from .stepping import Pair, State
 
-#: Repetitions to end a step where the contact force vanishes.
-_MAX_CUTS = 8
+#: Trial steps to find where the contact force vanishes, and the shortest of them as a share of the macro step.
+_MAX_LOOKS, _SHORTEST_LOOK = 8, 0.25
 
 
 class Push(NamedTuple):
@@ -60,7 +60,7 @@ class Separation:
         return None
 
     def _by_polynomial(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, str] | None:
-        f = push.force(step)
+        f = self._told(state, step, push)
         falling = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
         if f[0] < 0.0:
             # The sign at the start may be a false alarm: it is one if the ends, let go, close.
@@ -69,17 +69,27 @@ class Separation:
             step = self._pair.repeated(state, step)
         if not falling:
             return None
-        # The polynomial tells where the force of the step vanishes; the step is repeated until it ends there.
-        last, size = step, falling[0]
-        for _ in range(_MAX_CUTS):
-            last = self._pair.attempt(state, size, step.start)
-            g = push.force(last)
-            value, slope = force.end_value(g, size), g[1] + size * g[2]
+        # The force is not equally good all over a step: the zero is brought to where it is best, and then stepped to.
+        zero, best = falling[0], self._pair.coupling(state.phase).sharpest
+        for _ in range(_MAX_LOOKS):
+            size = max(zero / best, _SHORTEST_LOOK * macro_step)
+            g = self._told(state, self._pair.attempt(state, size, step.start), push)
+            value, slope = force.value(g, zero), g[1] + zero * g[2]
             change = -value / slope if slope < 0.0 else 0.0
-            if not 0.0 < size + change < step.size or abs(change) <= 1e-12 * macro_step:
+            if not 0.0 < zero + change < step.size or abs(change) <= 1e-12 * macro_step:
                 break
-            size += change
-        return last, push.event
+            zero += change
+        return self._pair.attempt(state, zero, step.start), push.event
+
+    def _told(self, state: State, step: Step, push: Push) -> Force:
+        """The force that pushes, without what the scheme adds to the contact's."""
+        contact = self._pair.told_force(state.phase, step)
+        f = push.force(step)
+        return (
+            f[0] + contact[0] - step.contact[0],
+            f[1] + contact[1] - step.contact[1],
+            f[2] + contact[2] - step.contact[2],
+        )
 
     def _by_means(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, str] | None:
         c = force.mean(push.force(step), step.size)

@@ -46,7 +46,9 @@ class State(Memory):
         self.steps_in_phase += 1
 
     def guess(self, size: float) -> Force:
-        """C over a step of ``size`` [s], as far as the last step tells."""
+        """C over a step of ``size`` [s], as far as the last step tells; none between ends that are apart."""
+        if self.phase.joint is Joint.FREE:
+            return NO_FORCE
         return self.contact if size <= _REACH_OF_FORCE * self.last_size else (self.contact[0], 0.0, 0.0)
 
     def enter(self, phase: Phase) -> None:
@@ -188,4 +190,17 @@ class Pair(Memory):
         if self.upper.massless:
             low = self.lower.motion()
             return self.upper.holding_force(low.displacement, low.velocity)
-        return force.end_value(step.contact, step.size) if self._joined.degree > 0 else state.smoothed
+        return (
+            force.end_value(self.told_force(state.phase, step), step.size)
+            if self._joined.degree > 0
+            else state.smoothed
+        )
+
+    def told_force(self, phase: Phase, step: Step) -> Force:
+        """C of a step of ``phase`` as far as it tells of the ends [N]."""
+        return self.coupling(phase).told_force(step, self.reduced_mass(phase))
+
+    def reduced_mass(self, phase: Phase) -> float:
+        """Of both ends [kg]; of the tip alone where the lower one is held."""
+        masses = [self.upper.mass] if phase.seated else [self.upper.mass, self.lower.mass]
+        return 0.0 if min(masses) == 0.0 else 1.0 / inverse if (inverse := sum(1.0 / m for m in masses)) else 0.0
