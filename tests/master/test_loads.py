@@ -170,6 +170,28 @@ def test_a_base_that_falls_faster_than_the_spring_lifts_it_off_the_foundation():
     assert run.summary["max_energy_residual"] < 1e-11
 
 
+@pytest.mark.parametrize("law", [("compliance", 1.0), ("compliance", 1.5), ("link", 1.0)])
+def test_an_elastic_stop_is_a_stop_with_a_law(law):
+    """A sudden tip force, C between the tip and φ, and no spring: beside the reference, which locates the contact."""
+    table = {
+        "time": {"t_end": 0.5},
+        "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 6, "approach": "elastic"},
+        "stop": {"position": -0.01},
+        "contact": {"law": law[0], "stiffness": 400.0, "exponent": law[1], "damping": 0.1},
+        "coupling": {"macro_step": 5e-4, "degree": 2},
+        "loads": [{"on": "tip", "amplitude": -3.0}, {"on": "base", "signal": "harmonic", "frequency": 5.0}],
+    }
+    scene = scene_from_dict(table)
+    run = simulate(scene)
+    exact = event_driven.simulate(scene, sample_times=run.time)
+    assert scene.fmus == ("beam",)
+    assert [event.kind for event in run.events] == [event.kind for event in exact.events]
+    assert bool(run.events) == (law[0] == "compliance")
+    assert np.abs(run.u_tip - exact.u_tip).max() < 1e-9
+    assert run.summary["max_energy_residual"] < 1e-11
+    assert np.abs(run.contact_force).max() > 1.0
+
+
 def test_both_integrators_of_the_reference_agree_under_loads():
     scene = soft(*SIGNALS, t_end=0.06)
     one, two = (event_driven.simulate(scene, method=method) for method in ("exponential", "DOP853"))

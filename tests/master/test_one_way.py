@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from bodies import modal_beam, simulate
 
-from springbeam.bodies.protocol import NO_FORCE, Held, Motion
+from springbeam.bodies.protocol import NO_FORCE, Motion
+from springbeam.bodies.rigid_wall import RigidWall
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.one_way import OneWay
 from springbeam.coupling.projection import Projection
@@ -104,8 +105,8 @@ def test_both_ends_known_leave_nothing_to_solve() -> None:
     beam.mark()
     law = Compliance(*LAW)
     one_way = OneWay(law, 0, 1e-12, upper_drives=True, driver_stiffness=1e6)
-    ends = (beam.motion()._replace(displacement=-start), Held(0.0).motion())
-    force = one_way.solve(beam, Held(0.0), Window(0.0, 0.01, ends), (5.0, 0.0, 0.0))
+    ends = (beam.motion()._replace(displacement=-start), RigidWall(0.0).motion())
+    force = one_way.solve(beam, RigidWall(0.0), Window(0.0, 0.01, ends), (5.0, 0.0, 0.0))
     assert force == (Projection(law, 0)(start, [-beam.motion().displacement], 0.01).a[0], 0.0, 0.0)
     assert beam.steps == 1
 

@@ -14,7 +14,7 @@ from scipy.special import ellipk
 from springbeam import RunStopped, load_scene, simulate
 from springbeam.monolithic import event_driven
 from springbeam.results.trajectory import Trajectory
-from springbeam.scene import Scene, shipped_scenes, with_changes
+from springbeam.scene import Scene, scene_from_dict, shipped_scenes, with_changes
 
 
 @lru_cache(maxsize=32)
@@ -306,3 +306,30 @@ def test_bad_input_is_exit_code_2(tmp_path):
     assert result.exit_code == 2
     assert "mas" in result.output
     assert not (tmp_path / "x").exists()
+
+
+def test_a_cantilever_under_a_sudden_force_meets_an_elastic_stop():
+    """Slender limit of L = 1, R = 0.1, E = 1e10, ρ = 1e6, −1000 N, a stop of 1e8 N/m at a gap of 1e-4.
+
+    Cubic Hermite elements, exact in time from contact to contact, have u(0.1315 s) = −1.840e-6, −1.838e-6 m and
+    v(0.1566 s) = −4.52e-3, −4.50e-3 m/s for 50 and 100 elements: v depends on the fastest modes.
+    """
+    area, inertia, thin = np.pi * 0.01, np.pi / 4.0 * 1e-4, 1e-4
+    beam = {
+        "density": 1e6, "area": area, "second_moment_of_area": thin * inertia, "young_modulus": 1e10 / thin,
+        "shear_modulus": 1e16 * inertia / area, "length": 1.0, "n_elements": 20, "element_degree": 4,
+        "reduced_integration": True, "approach": "elastic",
+    }  # fmt: skip
+    table = {
+        "time": {"t_end": 0.16},
+        "beam": beam,
+        "stop": {"position": -1e-4},
+        "contact": {"law": "compliance", "stiffness": 1e8, "exponent": 1.0},
+        "coupling": {"macro_step": 1e-4, "degree": 2},
+        "loads": [{"on": "tip", "amplitude": -1000.0}],
+    }
+    found = simulate(scene_from_dict(table))
+    at = found.at([0.1315, 0.1566])
+    assert at.u_tip[0] == pytest.approx(-1.838e-6, rel=3e-3)
+    assert at.v_tip[1] == pytest.approx(-4.51e-3, rel=1e-2)
+    assert found.summary["max_energy_residual"] < 1e-11

@@ -151,29 +151,3 @@ class Prescribed(Body):
         return self._motion
 
     def apply_impulse(self, impulse: float) -> None: ...
-
-
-class Held(Body):
-    """An end held at rest at a fixed position: the foundation, or a spring seated on it."""
-
-    REMEMBERED = ("_size",)
-
-    mass = float("inf")
-
-    def __init__(self, position: float) -> None:
-        self._position = position
-        self._size = 0.0
-
-    def mark(self) -> None: ...
-
-    def rewind(self) -> None: ...
-
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        self._size = size
-        return self.motion()
-
-    def motion(self) -> Motion:
-        w, h = self._position, self._size
-        return Motion(w, 0.0, w * h, 0.5 * w * h * h)
-
-    def apply_impulse(self, impulse: float) -> None: ...

@@ -137,7 +137,7 @@ class EventFunctions:
                 beam = self._scene.beam
                 if beam is not None and beam.fidelity == "quasi_static" and not phase.seated:
                     functions.append(("separation", Holding(beam, spring)))
-        if stop is not None and not phase.seated:
+        if stop is not None and not phase.seated and not self._scene.elastic_stop:
             end, share = (tip, 1.0) if spring is None else (low, share)
             functions.append(("stop_impact", Height(end, stop.position, share)))
         return functions

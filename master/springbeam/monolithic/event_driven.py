@@ -117,7 +117,7 @@ class _Run:
         self.method, self.rtol, self.atol, self._nodes = method, rtol, atol, nodes
         self.max_events = max_events
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
-        if self.system.two_bodies and self.system.law.rigid and scene.contact.impact == "rest":
+        if self.system.two_ends and self.system.law.rigid and scene.contact.impact == "rest":
             raise ValueError(
                 "contact.impact = 'rest' leaves tip and spring with different velocities, which the rigid tie of law "
                 f"'{scene.contact.law}' excludes; allowed here: 'inelastic', 'tip'"
@@ -238,6 +238,8 @@ def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     if s.has_spring:
         X[s.Y] = s.spring.equilibrium
         X[s.Z] = s.spring.initial_velocity + (perturbation if s.beam is None else 0.0)
+    if scene.elastic_stop and scene.stop is not None:
+        X[s.Y] = scene.stop.position
     if scene.beam is not None and s.beam is not None:
         slope, rate = scene.beam.initial_deflection_slope, scene.beam.initial_velocity_slope
         if scene.tip_target is not None:

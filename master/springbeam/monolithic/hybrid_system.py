@@ -9,6 +9,7 @@ spring's (Ahn & Tate, eqs. (1)–(6), (8))::
 
     free    ä = p + b C,  m z' = s − C,           C = 0, or the force of the law (`laws`)
     joined  ä = p + b C,  m z' = s − C,  u = y:   C = (s/m − bᵀp) / (bᵀb + 1/m)
+    elastic stop: no spring, y = φ, z = 0, and C the force of the law
     seated  y = φ, z = 0, N = C − s;  joined: u = φ, C = −bᵀp / bᵀb;  without a spring: u = φ, N = C
 """
 
@@ -60,8 +61,9 @@ class HybridSystem:
         return self.alpha_b > 0.0 or self.spring.damping > 0.0 or self.law.dissipative
 
     @property
-    def two_bodies(self) -> bool:
-        return self.beam is not None and self.has_spring
+    def two_ends(self) -> bool:
+        """Whether the law acts between the tip and a lower end, the spring top or an elastic stop at y = φ."""
+        return self.scene.coupled
 
     def joined(self, phase: Phase) -> bool:
         """Whether u = y holds as a constraint."""

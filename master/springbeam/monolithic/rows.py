@@ -78,7 +78,7 @@ class Rows:
     def _derive(self, columns: dict[str, np.ndarray]) -> None:
         """Add what follows from other columns."""
         s, stop = self._system, self._system.scene.stop
-        if s.two_bodies:
+        if s.two_ends:
             columns["gap"] = columns["u_tip"] - columns["y"]
             together = columns["phase"] != "free"
             columns["velocity_mismatch"] = np.where(together, columns["v_tip"] - columns["z"], 0.0)
@@ -99,8 +99,8 @@ class Rows:
             absent += ("u_tip", "v_tip", "e_beam")
         if not s.has_spring:
             absent += ("y", "z", "e_spring")
-        if not s.two_bodies:
+        if not s.two_ends:
             absent += ("contact_force", "e_contact")
-        if s.scene.stop is None:
+        if s.scene.stop is None or s.scene.elastic_stop:
             absent += ("foundation_force",)
         return absent

@@ -49,10 +49,10 @@ class HybridState:
     def watched(self) -> list[Watch]:
         """Return the functions that are ≥ 0 as long as the phase lasts."""
         s, stop = self.system, self.system.scene.stop
-        watched = s.law.watched(self.phase) if s.two_bodies else []
+        watched = s.law.watched(self.phase) if s.two_ends else []
         if self.phase.seated:
             return [*watched, Watch("unseat", lambda m: m.N, "N")]
-        if stop is not None:
+        if stop is not None and not s.scene.elastic_stop:
             phi = stop.position
             return [*watched, Watch("stop", (lambda m: m.y - phi) if s.has_spring else (lambda m: m.u - phi), "m")]
         return watched
@@ -80,7 +80,7 @@ class HybridState:
             return
         m = s.motion(self.phase, X)
         noise = s.displacement_noise(X)
-        if s.two_bodies and float(m.u - m.y) <= noise:
+        if s.two_ends and float(m.u - m.y) <= noise:
             if m.v <= m.z:
                 self._meet()
         elif not s.has_spring and stop is not None and m.u - stop.position <= noise:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from .paths import Path
-from .steps import contact_force
+from .steps import contact_force, load_on_spring
 from .trajectory import Trajectory
 
 #: Columns that are linear between rows, and do not change with an event.
@@ -98,7 +98,8 @@ class _Between:
             found["tie_reaction"] = force - found["compliance_force"] if contact.rigid else np.zeros_like(force)
         if "foundation_force" in run.columns:
             held = steps["foundation_force"]
-            found["foundation_force"] = np.where(held != 0.0, held + force - steps["contact_force"], 0.0)
+            borne = load_on_spring(run.scene, at - self._tau) - load_on_spring(run.scene, at)
+            found["foundation_force"] = np.where(held != 0.0, held + force - steps["contact_force"] + borne, 0.0)
         if pair:
             found["gap"] = found["u_tip"] - found["y"]
             if not (contact.rigid or contact.lasting):

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ..scene import Scene
+
 #: Numbers of a step in the order of the file ``steps.bin``: its end [s] and size [s] (0 for a row that ends no step),
 #: the ends' displacements [m], velocities [m/s], integrals [m·s] and [m·s²] over it; C, Ċ, C̈ and N at its start.
 STEP_COLUMNS = (
@@ -59,6 +61,14 @@ def impulse(steps: np.ndarray, tau: np.ndarray, of: Any = slice(None)) -> np.nda
     # By columns: picking whole steps would move ten times as much.
     c, dc, ddc = (steps[name][of] for name in ("contact_force", "contact_force_rate", "contact_force_rate_2"))
     return np.asarray(tau * (c + tau * (dc / 2.0 + tau * ddc / 6.0)))
+
+
+def load_on_spring(scene: Scene, times: np.ndarray) -> np.ndarray:
+    """Return what the loads of ``scene`` amount to on its spring [N] at ``times`` [s]."""
+    mass = 0.0 if scene.spring is None else scene.spring.mass
+    shares = {"spring": 1.0, "base": -mass}
+    parts = [shares[load.on] * load.value(times) for load in scene.loads if load.on in shares]
+    return sum(parts, np.zeros_like(times))
 
 
 def contact_force(steps: np.ndarray, tau: np.ndarray) -> np.ndarray:

@@ -101,9 +101,9 @@ def columns_of(scene: Scene) -> tuple[str, ...]:
         absent |= _BEAM_COLUMNS
     if not spring:
         absent |= _SPRING_COLUMNS
-    if not (beam and spring):
+    if not scene.coupled:
         absent |= _PAIR_COLUMNS
-    if not stop:
+    if not stop or scene.elastic_stop:
         absent.add("foundation_force")
     if not (beam and (spring or stop)):
         absent.add("gap")

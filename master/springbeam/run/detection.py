@@ -54,9 +54,7 @@ class Detector:
     ) -> None:
         self._pair, self._steps, self._fastest = pair, steps, fastest
         tip_share = 0.0
-        if pair.joinable:
-            assert pair.beam is not None
-            assert pair.spring is not None
+        if pair.beam is not None and pair.spring is not None:
             tip_share = common_velocity(1.0, 0.0, pair.beam.mass, pair.spring.mass)
         self._separation = Separation(pair, _NO_TIME)
         self._functions = EventFunctions(scene, pair.law, tip_share)

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 from ..bodies import force
 from ..bodies.memory import Memory
-from ..bodies.protocol import NO_FORCE, Body, Energies, Force, Held
+from ..bodies.protocol import NO_FORCE, Body, Energies, Force
+from ..bodies.rigid_wall import RigidWall
 from ..contact.laws import Transmission, law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
@@ -65,7 +66,7 @@ class State(Memory):
 
 
 #: In place of a body that the scene does not have: at rest at 0.
-_ABSENT = Held(0.0)
+_ABSENT = RigidWall(0.0)
 
 
 class Pair(Memory):
@@ -84,7 +85,7 @@ class Pair(Memory):
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self.beam, self.spring = beam, spring
         self.stop = None if scene.stop is None else scene.stop.position
-        self._held = None if self.stop is None else Held(self.stop)
+        self._held = None if self.stop is None else RigidWall(self.stop)
         self.upper: Body = beam or _ABSENT
         self.lower: Body = spring or self._held or _ABSENT
         self.loads = Loads(scene, beam, spring)
@@ -92,9 +93,9 @@ class Pair(Memory):
         #: Where the ends are; looked up once, since every step asks a few times.
         self._tip, self._low = self.upper.motion, self.lower.motion
         self._last: Step | None = None  #: at whose end the bodies are
-        #: Whether tip and spring top can be joined.
-        self.joinable = beam is not None and spring is not None
-        #: Between tip and spring top; a tip alone is tied to the foundation while it rests there.
+        #: Whether a law acts between the tip and what lies below it, the spring top or an elastic stop.
+        self.joinable = beam is not None and (spring is not None or scene.elastic_stop)
+        #: Between these; a tip alone is tied to the foundation while it rests there.
         self.law = law_of(scene.contact) if self.joinable else Transmission()
         #: Whether contact opens and closes inside steps, without an event that ends them.
         self.opens_softly = self.law.soft and not self.law.lasting

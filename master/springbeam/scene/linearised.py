@@ -8,11 +8,11 @@ from __future__ import annotations
 from math import sqrt
 
 from .scene import Scene
-from .statics import shear_stiffness
+from .statics import shear_stiffness, tip_compliance
 
 
 def contact_energy(scene: Scene) -> float:
-    """Return the energy at first contact [J]: of u̇ = s₁x, of the shear of u = s₀x with θ = 0, and of the spring."""
+    """Return the energy at first contact [J]: of u̇ = s₁x, the shear of u = s₀x with θ = 0, the spring, and loads."""
     energy = 0.0
     if (spring := scene.spring) is not None:
         y, z = spring.equilibrium, spring.initial_velocity
@@ -21,7 +21,28 @@ def contact_energy(scene: Scene) -> float:
         energy += beam.density * beam.area * beam.initial_velocity_slope**2 * beam.length**3 / 6.0
         slope = beam.initial_deflection_slope + (scene.contact_time or 0.0) * beam.initial_velocity_slope
         energy += 0.5 * shear_stiffness(beam) * beam.length * slope**2
-    return max(energy, 0.0)
+    return max(energy, 0.0) + _load_energy(scene)
+
+
+def _load_energy(scene: Scene) -> float:
+    """Estimate what loads that begin all at once do [J]: twice the static deflection under their peaks, 2 F²/k.
+
+    F is the tip force that would bend the slender beam as far, ∫ f ξ² (3 − ξ)/2 dx with ξ = x/L.
+    """
+    on_tip = on_spring = 0.0
+    for load in scene.loads:
+        if load.on == "spring":
+            on_spring += load.peak
+        elif (beam := scene.beam) is not None:
+            shape = (beam.density * beam.area,) if load.on == "base" else load.shape or (1.0,)
+            spread = sum(s * (1.5 / (i + 3.0) - 0.5 / (i + 4.0)) for i, s in enumerate(shape))
+            at = 1.0 if load.on == "tip" else load.at
+            share = beam.length * abs(spread) if at is None else at * at * (3.0 - at) / 2.0
+            on_tip += load.peak * share
+    energy = 0.0 if scene.beam is None else 2.0 * on_tip**2 * tip_compliance(scene.beam)
+    if on_spring > 0.0 and scene.spring is not None and scene.spring.linear_stiffness > 0.0:
+        energy += 2.0 * on_spring**2 / scene.spring.linear_stiffness
+    return energy
 
 
 def contact_depth(scene: Scene) -> float:

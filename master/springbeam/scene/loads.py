@@ -104,6 +104,13 @@ class Load(Table):
         return None if self.duration is None or self.signal == "ramp" else self.start + self.duration
 
     @property
+    def peak(self) -> float:
+        """Largest absolute value, in `unit`."""
+        return abs(self.amplitude) * (
+            float(np.abs(self.record(self.record.x)).max()) if self.signal == "table" else 1.0
+        )
+
+    @property
     def rate(self) -> float:
         """Rate of an oscillation that goes on and on [rad/s], 0 for any other signal."""
         return 0.0 if self.frequency is None else 2.0 * np.pi * self.frequency

@@ -152,7 +152,7 @@ def _ends_can_be_joined(scene: Scene) -> Iterator[str]:
     if not contact.lasting:
         return
     for table in ("beam", "spring"):
-        if getattr(scene, table) is None:
+        if getattr(scene, table) is None and not scene.elastic_stop:
             yield f"{name}: joins a [beam] and a [spring]; this scene has no [{table}]"
     if contact.law == "link" and contact.stiffness == contact.damping == 0.0:
         yield f"[contact] stiffness = 0.0: {name} needs a stiffness or a damping greater than 0"
@@ -179,6 +179,11 @@ def _law_applies(scene: Scene) -> Iterator[str]:
         yield (
             '[contact] stiffness = 0.0: with law = "compliance" nothing would hold the bodies apart; it must be '
             "greater than 0"
+        )
+    if scene.elastic_stop and scene.stop is not None and scene.stop.restitution != 1.0:
+        yield (
+            f'[stop] restitution = {scene.stop.restitution}: [contact] law = "{contact.law}" makes the stop elastic, '
+            "and its loss is [contact] damping; leave restitution out"
         )
     if coupling.scheme in ORDINARY_SCHEMES and contact.law not in ("compliance", "link"):
         yield (

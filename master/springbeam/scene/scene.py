@@ -50,6 +50,17 @@ class Scene(Table):
         return ("beam",) * beam + ("spring",) * (self.spring is not None)
 
     @property
+    def elastic_stop(self) -> bool:
+        """Whether the contact law acts between the tip and the stop: there is no spring, and the law is soft."""
+        alone = self.beam is not None and self.spring is None and self.stop is not None
+        return alone and self.contact.law in ("compliance", "link")
+
+    @property
+    def coupled(self) -> bool:
+        """Whether a contact law acts at all: between the tip and the spring top, or an elastic stop."""
+        return self.beam is not None and (self.spring is not None or self.elastic_stop)
+
+    @property
     def driver_stiffness(self) -> float | None:
         """Static force per displacement [N/m] of the end that drives a one-way coupling; ``None`` without one."""
         if self.coupling.feedback == "beam_drives" and self.beam is not None:

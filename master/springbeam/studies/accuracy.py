@@ -202,8 +202,7 @@ class _Search:
         changes = {"scheme": "auto", "degree": 0, "macro_step": 1e-9 * self._span}
         taken = choice(with_changes(scene, accuracy=None, coupling=changes))  # where everything is resolved
         self._scheme, self._degree = taken.scheme, taken.degree
-        both = scene.beam is not None and scene.spring is not None
-        self._softly = both and not scene.contact.rigid and self._degree == 2
+        self._softly = scene.coupled and not scene.contact.rigid and self._degree == 2
         self._runs, self._calls, self._spent, self._stopped = 0, 0, 0.0, 0
         self._range = 0.0  #: of the spring top in the run before [m]
 

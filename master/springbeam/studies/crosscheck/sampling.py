@@ -44,7 +44,7 @@ def quantities(scene: Scene) -> Iterable[tuple[str, Sample]]:
         names += ["y", "z", "e_spring"]
     for name in names:
         yield name, column(name)
-    if scene.beam is not None and scene.spring is not None:
+    if scene.coupled:
         yield "contact_force", _contact_force
 
 

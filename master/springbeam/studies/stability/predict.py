@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...contact.laws import law_of
+from ...contact.laws import Transmission, law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene
 from ...scene.automatic import STABLE, Choice, choice
@@ -170,14 +170,14 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
     moved = modal.tip**2 > _UNMOVED * modal.inverse_tip_mass
     omega2 = modal.omega[moved] ** 2
     beam = LinearBody(omega2, modal.alpha * omega2, modal.tip[moved])
-    if scene.spring is None:
-        return LinearPair(beam, LinearBody(np.zeros(0), np.zeros(0), np.zeros(0)))
-    law = law_of(scene.contact)
+    wall = LinearBody(np.zeros(0), np.zeros(0), np.zeros(0))
+    low = wall if scene.spring is None else spring_body(scene)
+    law = law_of(scene.contact) if scene.coupled else Transmission()
     if not law.soft:
-        return LinearPair(beam, spring_body(scene))
+        return LinearPair(beam, low)
     depth = contact_depth(scene) if law.one_sided else 0.0
     damping = law.resistance(np.array([depth]), np.zeros(1))[2]
-    return LinearPair(beam, spring_body(scene), law.slope(depth), float(damping[0]))
+    return LinearPair(beam, low, law.slope(depth), float(damping[0]))
 
 
 def contact_frequency(scene: Scene) -> float:
