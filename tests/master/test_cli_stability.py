@@ -28,7 +28,7 @@ def test_json_is_the_prediction():
     expected = predict(with_changes(load_scene("soft"), beam={"n_elements": 10}))
     assert printed["omega_max"] == expected.omega_max
     assert printed["schemes"][3]["critical_step"] == expected.schemes[3].critical_step
-    assert printed["advised"] == ["hermite", 2]
+    assert printed["auto"][:2] == ["hermite", 2]
 
 
 def test_a_scene_that_cannot_be_read_is_bad_input():

@@ -189,16 +189,16 @@ def test_soft_is_predicted():
     assert p.resolved_modes == p.modes == 40
     assert [(s.scheme, s.degree) for s in p.schemes] == TIES
     assert all(s.spectral_radius == pytest.approx(1.0, abs=1e-11) for s in p.schemes)
-    assert p.advised == ("hermite", 2)
+    assert p.auto[:2] == ("hermite", 2)
 
 
 def test_advice_beyond_the_bound_of_hermite_and_beyond_the_lowest_mode():
     soft = with_changes(load_scene("soft"), beam={"n_elements": 10})
     critical = predict(soft).schemes[-1].critical_step
     coarse = predict(with_changes(soft, coupling={"macro_step": 1.05 * critical}))
-    assert coarse.advised == ("energy", 2)
+    assert coarse.auto[:2] == ("energy", 2)
     aliased = predict(with_changes(soft, coupling={"macro_step": 0.1}))
-    assert aliased.advised == ("energy", 0)
+    assert aliased.auto[:2] == ("energy", 0)
     assert aliased.resolved_modes == 0
     assert any("not resolved" in note for note in aliased.notes)
 
@@ -212,7 +212,7 @@ def test_compliance_is_predicted_where_it_is_stiffest():
     depth2 = (4.0 / 6.0 / 1e4) ** 0.5
     assert cubic.contact_frequency == pytest.approx((3e4 * depth2 * inverse) ** 0.5)
     assert [(s.scheme, s.degree) for s in cubic.schemes] == [*ENERGY, *EXCHANGES]
-    assert cubic.advised == ("energy", 2)
+    assert cubic.auto[:2] == ("energy", 2)
 
 
 def test_ties_and_links_are_predicted():
@@ -241,7 +241,7 @@ def test_what_a_scene_lacks_is_left_out(name, changes):
     p = predict(with_changes(load_scene(name), **changes))
     assert (p.omega_1 is None) == (name == "duffing")
     assert (p.displacement_gain is None) == (name != "soft")
-    assert (p.advised is None) == (name == "duffing")
+    assert (p.auto is None) == (name == "duffing")
     # The beam on its stop has one note: hermite's bands may be narrow.
     assert [note.split()[0] for note in p.notes if note.startswith("hermite")] == ["hermite"] * (name == "beam-on-stop")
     assert len(p.notes) >= 1

@@ -25,6 +25,7 @@ from ..results.recording import NonFiniteValue, replay
 from ..results.trajectory import Event, Trajectory, rounded
 from ..run.checkpoint import Checkpoint
 from ..scene import Scene, load_scene
+from ..scene.estimates import implausible
 from .common import (
     BAD_INPUT,
     STOPPED,
@@ -109,6 +110,8 @@ def run(
             _check_interval(interval, what, checkpoint)
         if mesh and what.accuracy is None:
             fail(BAD_INPUT, "--mesh: picks a mesh that keeps an accuracy; give one, as in --accuracy 1e-3 --mesh")
+        for line in () if quiet or as_json else implausible(what):
+            typer.echo(f"warning: {line}", err=True)
         made = picked(what, mesh)
         what = what if made is None else made.scene
         directory = _run_directory(scene, out, force)

@@ -6,8 +6,9 @@ import os
 import re
 import textwrap
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     from ..studies.stability.grid import Outcome
     from ..studies.stability.predict import Prediction
 
+#: A mesh that is so much too stiff is said to lock.
+_LOCKS = 1.05
 #: How many reasons the summary lists, and how many characters of each.
 _REASONS, _REASON_WIDTH = 12, 66
 
@@ -46,7 +49,7 @@ def predict(
     settings: SettingsOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say before a scene runs where its coupling is stable, whether the motion is resolved, which scheme fits.
+    """Say before a scene runs what it is, where its coupling is stable, whether the motion is resolved, what fits.
 
     Example: springbeam predict soft --set coupling.macro_step=4e-3
     """
@@ -65,16 +68,34 @@ def predict(
         console.print(_schemes_table(prediction))
     for note in prediction.notes:
         console.print(Text(f"note      {note}"))
-    if prediction.advised is not None:
-        scheme, degree = prediction.advised
-        console.print(Text(f"advised   coupling.scheme = {scheme!r}, degree = {degree}"))
     if prediction.auto is not None:
         scheme, degree, because = prediction.auto
-        console.print(Text(f"auto      takes {scheme} {degree}: {because}"))
+        console.print(Text(f'fits      {scheme} {degree}, which coupling.scheme = "auto" takes: {because}'))
+
+
+def _estimated(p: Prediction) -> Iterator[tuple[str, str]]:
+    e = p.estimates
+    masses = {"beam": e.beam_mass, "spring": e.spring_mass}
+    yield "mass", ", ".join(f"{name} {mass:.4g} kg" for name, mass in masses.items() if mass is not None)
+    if e.frequency is not None and p.frequencies:
+        found = ", ".join(f"{frequency:.4g}" for frequency in p.frequencies)
+        yield "vibrates", f"at {found} Hz on this mesh; first without a mesh {e.frequency:.4g} Hz"
+    stiffness = [] if e.tip_stiffness is None else [f"tip {e.tip_stiffness:.4g} N/m (static)"]
+    if e.locking is not None and e.locking > _LOCKS:
+        stiffness[0] += f", {e.locking:.3g} times that on this mesh, which locks"
+    yield (
+        "stiffness",
+        ", ".join([*stiffness, *([] if e.spring_stiffness is None else [f"spring {e.spring_stiffness:.4g} N/m"])]),
+    )
+    times = [] if e.contact_time is None or e.contact_time == inf else [f"first at t = {e.contact_time:.4g} s"]
+    if e.contact_duration is not None:
+        times.append(f"lasts about {e.contact_duration:.2g} s (half a period together)")
+    if times:
+        yield "contact", ", ".join(times)
 
 
 def _lines(p: Prediction) -> list[tuple[str, str]]:
-    lines = [("H", f"{p.macro_step:g} s")]
+    lines = [*_estimated(p), ("H", f"{p.macro_step:g} s")]
     if p.omega_1 is not None and p.omega_max is not None:
         lines.append(("beam", f"ω₁H = {p.omega_1 * p.macro_step:.3g}, ω_max H = {p.omega_max * p.macro_step:.3g}; "
                               f"{p.resolved_modes} of {p.modes} modes resolved (ωH ≤ 1)"))  # fmt: skip

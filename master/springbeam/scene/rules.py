@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from .estimates import implausible
 from .loads import MOST_POINTS
 from .scene import TABLES, Scene
 from .statics import bending_stiffness, locking, shear_stiffness, tip_compliance, tip_inertia
@@ -31,10 +32,10 @@ def impossible(scene: Scene) -> list[str]:
     try:
         found = [message for check in _CHECKS for message in check(scene)]
         if not found:
-            suspicions(scene)  # what is certain to overflow once the scene runs overflows here
             beam = scene.beam
             if beam is not None and not 0.0 < min(quantities := _beam_quantities(beam)) <= max(quantities) < math.inf:
                 raise OverflowError
+            suspicions(scene)  # what is certain to overflow once the scene runs overflows here
     except ArithmeticError:
         found = ["no double holds what follows from these values; check their units: " + _extreme(scene)]
     return found
@@ -366,6 +367,7 @@ def suspicions(scene: Scene) -> list[str]:
         for number, load in enumerate(scene.loads)
         if load.is_finer_than(H)
     ]
+    found += implausible(scene)
     beam, spring = scene.beam, scene.spring
     if spring is not None and spring.cubic_stiffness < 0.0:
         energy, depth = _spring_energy(spring) + _beam_energy(scene), _well_depth(scene)

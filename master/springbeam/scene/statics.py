@@ -60,19 +60,25 @@ def tip_inertia(beam: Beam) -> float:
 
 
 def lowest_frequency(beam: Beam) -> float:
-    """Return the lowest frequency, clamped and free [rad/s], by Ritz's method: u and θ are polynomials of degree 6."""
-    nodes, weights = np.polynomial.legendre.leggauss(_RITZ_DEGREE + 1)  # exact for their products
-    x = 0.5 * (nodes + 1.0)
-    powers = np.arange(1, _RITZ_DEGREE + 1)
-    w = x[:, None] ** powers
-    slope, zero = powers * x[:, None] ** (powers - 1) / beam.length, np.zeros_like(w)
+    """Return the lowest frequency, clamped and free [rad/s], by Ritz's method.
+
+    θ and the shear strain u' − θ are polynomials: with them the stiffness has no differences of large numbers, however
+    slender the beam; and 1/ω² is the largest eigenvalue of the inertia against it.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(_RITZ_DEGREE + 2)  # exact for their products
+    x = 0.5 * (nodes[:, None] + 1.0)
+    L, n = beam.length, np.arange(1, _RITZ_DEGREE + 1)
+    zero = np.zeros((len(x), _RITZ_DEGREE))
+    # The strains are scaled so that their energy is that of the rotations.
+    small = np.sqrt(bending_stiffness(beam) / shear_stiffness(beam)) / L
+    u, theta = np.hstack([L * x ** (n + 1) / (n + 1), small * L * x**n]), np.hstack([x**n, zero])
+    curvature, strain = np.hstack([n * x ** (n - 1) / L, zero]), np.hstack([zero, small * n * x ** (n - 1)])
     area, inertia = beam.density * beam.area, beam.density * beam.second_moment_of_area
-    rows = (
-        ((area, np.hstack([w, zero])), (inertia, np.hstack([zero, w]))),
-        ((shear_stiffness(beam), np.hstack([slope, -w])), (bending_stiffness(beam), np.hstack([zero, slope]))),
-    )
+    rows = ((area, u), (inertia, theta)), ((bending_stiffness(beam), curvature), (shear_stiffness(beam), strain))
     mass, stiffness = (sum(c * (B.T * weights) @ B for c, B in energy) for energy in rows)
-    return float(np.sqrt(scipy.linalg.eigh(stiffness, mass, eigvals_only=True, subset_by_index=(0, 0))[0]))
+    last = 2 * _RITZ_DEGREE - 1
+    largest = scipy.linalg.eigh(mass, stiffness, eigvals_only=True, subset_by_index=(last, last))[0]
+    return float(1.0 / np.sqrt(largest))
 
 
 def load_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:

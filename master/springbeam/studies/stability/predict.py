@@ -13,8 +13,9 @@ import numpy as np
 
 from ...contact.laws import Transmission, law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
-from ...scene import Beam, Scene
+from ...scene import Beam, Scene, suspicions
 from ...scene.automatic import STABLE, Choice, choice
+from ...scene.estimates import Estimates, estimates
 from ...scene.linearised import contact_depth, spring_frequency, spring_stiffness
 from ...scene.statics import shear_stiffness
 from .linear import LinearBody, LinearPair, spectral_radius
@@ -50,6 +51,8 @@ class SchemePrediction:
 class Prediction:
     """All that can be said of a scene's coupling beforehand; ``None`` where the scene lacks what it takes."""
 
+    estimates: Estimates  #: mass, frequency, stiffness, time of contact, by hand
+    frequencies: tuple[float, ...]  #: the lowest three of the beam's mesh [Hz]
     macro_step: float  #: H [s]
     threshold: float  #: of the spectral radius above 1, from which on a coupling is called unstable
     omega_1: float | None  #: lowest and highest frequency kept of the beam [rad/s]
@@ -58,19 +61,20 @@ class Prediction:
     contact_frequency: float | None  #: of tip and spring top on the linearised contact law [rad/s]
     tip_mass: float | None  #: [kg]
     impedance: float | None  #: Z = √(KAG ρA) [N·s/m]
-    displacement_gain: float | None  #: 2m/(ZH): the fixed-point gain of an exchange of displacement against force
+    displacement_gain: (
+        float | None
+    )  #: 2m/(ZH) of rigid laws: the fixed-point gain of an exchange of displacement against force
     resolved_modes: int | None  #: of the beam's, with ωH ≤ `RESOLVED`
     modes: int | None
     schemes: tuple[SchemePrediction, ...]
-    advised: tuple[str, int] | None  #: scheme and degree
-    auto: Choice | None  #: what ``scheme = "auto"`` takes, where there is something to couple
+    auto: Choice | None  #: the scheme that fits, which ``scheme = "auto"`` takes, where there is something to couple
     notes: tuple[str, ...]
 
 
 def predict(scene: Scene) -> Prediction:
     """Predict the coupling of ``scene`` (no FMU is loaded)."""
     H = scene.coupling.H
-    notes = []
+    notes = suspicions(scene)
     if scene.accuracy is not None:
         notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")
     modal = None
@@ -117,6 +121,8 @@ def predict(scene: Scene) -> Prediction:
             f"H <= {RESOLVED / modal.omega[0]:.3g} s resolves it"
         )
     return Prediction(
+        estimates=estimates(scene),
+        frequencies=() if modal is None else tuple(float(omega) / (2.0 * math.pi) for omega in modal.omega[:3]),
         macro_step=H,
         threshold=THRESHOLD,
         omega_1=None if modal is None else float(modal.omega[0]),
@@ -125,11 +131,10 @@ def predict(scene: Scene) -> Prediction:
         contact_frequency=None if pair is None or not pair.soft else pair.contact_frequency,
         tip_mass=None if modal is None else 1.0 / modal.inverse_tip_mass,
         impedance=Z,
-        displacement_gain=None if mass is None or Z is None else 2.0 * mass / (Z * H),
+        displacement_gain=None if mass is None or Z is None or (pair and pair.soft) else 2.0 * mass / (Z * H),
         resolved_modes=resolved,
         modes=None if modal is None else len(modal.omega),
         schemes=schemes,
-        advised=_advised(schemes, H, resolved),
         auto=choice(scene) if schemes else None,
         notes=tuple(notes),
     )
@@ -142,19 +147,6 @@ def _reduced(beam: Beam) -> tuple[Beam, bool]:
     if kept <= MOST_MODES:
         return beam, False
     return beam.model_copy(update={"n_modes": MOST_MODES}), True
-
-
-def _advised(schemes: tuple[SchemePrediction, ...], H: float, resolved: int | None) -> tuple[str, int] | None:
-    """Return the scheme of the highest order among those that are stable here and at every smaller step.
-
-    Where not even the lowest mode is resolved a higher degree buys nothing: ``energy`` of degree 0.
-    """
-    sure = [s for s in schemes if s.critical_step is None or s.critical_step > H]
-    sure = [s for s in sure if s.spectral_radius <= 1.0 + THRESHOLD and s.scheme in ("energy", "hermite")]
-    if not sure:
-        return None
-    best = max(sure, key=lambda s: (s.scheme == "hermite", s.degree)) if resolved else sure[0]
-    return best.scheme, best.degree
 
 
 # -- the linearised scene -------------------------------------------------------------------------------------------
