@@ -46,6 +46,8 @@ NOT_RUN = {
     ".venv/bin/python docs/promise.py": "takes minutes; test_accuracy.py judges some scenes with it",
     "springbeam animate results/soft": "draws for half a minute; the command is in test_animation.py",
     "springbeam stability": "takes minutes; parts of it are run in test_stability_grid.py, test_critical_steps.py",
+    "springbeam sweep bumper.toml": "takes half a minute; the command is in test_sweep.py",
+    "springbeam crosscheck bumper.toml": "takes some seconds; the command is in test_command_line.py",
     "springbeam tradeoff soft --until 0.0712": "takes minutes; the command is in test_tradeoff.py",
 }
 

@@ -103,7 +103,7 @@ _BEGINNING: dict[str, dict[str, Any]] = {
     "time": {"t_end": 0.3},
     "beam": {
         "density": 2700.0, "length": 0.8, "width": 0.03, "height": 0.003, "young_modulus": 7.0e10,
-        "poisson_ratio": 0.33, "alpha_b": 2.0e-5, "n_elements": 40, "n_modes": 12, "reduced_integration": True,
+        "poisson_ratio": 0.33, "alpha_b": 2.0e-5, "n_elements": 10, "element_degree": 4, "n_modes": 12,
         "approach_speed": 1.0,
     },
     "spring": {"mass": 0.02, "damping": 2.0, "linear_stiffness": 5.0e3, "cubic_stiffness": 1.0e8},
