@@ -35,19 +35,7 @@ std::unique_ptr<Beam> make_beam(const Parameters& parameters) {
                                                     : make_generalized_alpha_beam(parameters);
 }
 
-Beam::Beam(const Parameters& parameters, std::size_t motion_size)
-    : hat_(parameters.tip_load_coefficient), motion_size_(motion_size) {
-  now_.loads[Loads::tip_load_coefficient] = hat_;
-}
-
 void Beam::step(double size, const Polynomial& c, const Loads& loads) {
-  if (hat_ == 0.0) return step_under(size, c, loads);
-  Loads all = loads;
-  all.set(Loads::tip_load_coefficient, {hat_, 0.0, 0.0});
-  step_under(size, c, all);
-}
-
-void Beam::step_under(double size, const Polynomial& c, const Loads& loads) {
   require_step_size(size);
   double inputs = 0.0;
   for (const double value : c) inputs += std::abs(value);
@@ -85,12 +73,13 @@ void Beam::observe(double tip_force, const Loads& loads) {
   loads.for_each([](std::size_t i, const Polynomial& f) { require_finite(Loads::names[i], f[0]); });
   now_.tip_force = tip_force;
   now_.loads = {};
-  now_.loads[Loads::tip_load_coefficient] = hat_;
   loads.for_each([this](std::size_t i, const Polynomial& f) { now_.loads[i] = f[0]; });
 }
 
 double Beam::load_potential() const {
-  return -(now_.loads[Loads::distributed] * deflection_integral() + hat_ * hat_work());
+  double work = 0.0;
+  for (const Loads::Shape i : {Loads::distributed, Loads::hat}) work += now_.loads[i] * load_work_per_unit(i);
+  return -work;
 }
 
 bool Beam::outputs_finite() const {
@@ -108,22 +97,15 @@ bool Beam::outputs_finite() const {
 /// Puts the state back.
 class Beam::Trial {
  public:
-  explicit Trial(Beam& beam) : beam_(beam), hat_(beam.hat_) { beam_.save(state_); }
+  explicit Trial(Beam& beam) : beam_(beam) { beam_.save(state_); }
   Trial(const Trial&) = delete;
   Trial& operator=(const Trial&) = delete;
-  ~Trial() {
-    beam_.hat_ = hat_;
-    beam_.restore(state_);
-  }
+  ~Trial() { beam_.restore(state_); }
   /// At rest, under nothing.
-  void clear() {
-    beam_.hat_ = 0.0;
-    beam_.restore(std::vector<double>(state_.size(), 0.0));
-  }
+  void clear() { beam_.restore(std::vector<double>(state_.size(), 0.0)); }
 
  private:
   Beam& beam_;
-  double hat_;
   std::vector<double> state_;
 };
 
@@ -132,7 +114,7 @@ Beam::Forecast Beam::forecast(double size) {
   const double u = tip_displacement(), v = tip_velocity();
   Loads loads;
   for (std::size_t i = 0; i < Loads::count; ++i) loads.set(i, {now_.loads[i], 0.0, 0.0});
-  for (int i = 0; i < 2; ++i) step_under(size, {}, loads);
+  for (int i = 0; i < 2; ++i) step(size, {}, loads);
   return {(tip_displacement() - u) / (2.0 * size), (tip_velocity() - v) / (2.0 * size)};
 }
 
@@ -173,7 +155,6 @@ void Beam::require_state(const std::vector<double>& state) const {
 void Beam::restore(const std::vector<double>& state) {
   restore_motion(state.data());
   std::memcpy(&now_, state.data() + motion_size_, sizeof now_);
-  now_.loads[Loads::tip_load_coefficient] = hat_;
 }
 
 }  // namespace beam

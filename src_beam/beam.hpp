@@ -44,7 +44,6 @@ struct Parameters {
   double rho_inf = 1.0;                   ///< spectral radius at infinity of generalized-α; 1 = midpoint rule (62)
   double initial_deflection_slope = 0.0;  ///< s in u⁰ = s·x [–]
   double initial_velocity_slope = 0.0;    ///< s in u_t⁰ = s·x [1/s]
-  double tip_load_coefficient = 0.0;      ///< coefficient of the last hat function in f_b [N/m]
   std::array<double, 4> point_force_position{0.5, 0.5, 0.5, 0.5};  ///< x/L of the point forces
 };
 
@@ -59,11 +58,11 @@ inline double mean_over(const Polynomial& f, double h) { return f[0] + h * (f[1]
 class Loads {
  public:
   enum Shape : std::size_t {
-    distributed = 0,            ///< four of them, f_b = (x/L)^i, i = 0 … 3 [N/m]
-    point = 4,                  ///< four of them, at point_force_position [N]
-    tip = 8,                    ///< [N]
-    base_acceleration = 9,      ///< a of the clamp [m/s²]
-    tip_load_coefficient = 10,  ///< f_b = the last hat function [N/m]: the parameter, never set from outside
+    distributed = 0,        ///< four of them, f_b = (x/L)^i, i = 0 … 3 [N/m]
+    point = 4,              ///< four of them, at point_force_position [N]
+    tip = 8,                ///< [N]
+    base_acceleration = 9,  ///< a of the clamp [m/s²]
+    hat = 10,               ///< f_b = the last hat function [N/m]
     count = 11
   };
   static constexpr std::array<const char*, count> names{
@@ -136,12 +135,12 @@ class Beam {
   double dissipated_energy() const { return book(), now_.dissipated; }    ///< by α_b since the start [J]
   double load_work() const { return book(), now_.load_work; }             ///< of all loads since the start [J]
   double load_potential() const;  ///< −qᵀF [J] of the uniform and the hat load, as if they were constant
-  virtual double deflection_integral() const = 0;                 ///< ∫ u dx = −∂load_potential/∂f_b [m²]
-  virtual double tip_mass() const = 0;                            ///< 1/(eᵀ M⁻¹ e) [kg]
-  virtual double static_tip_compliance() const = 0;               ///< u(L) per unit static tip force [m/N]
-  virtual void deflection(Shape& u) const = 0;                    ///< [m]
-  virtual void rotation(Shape& theta) const = 0;                  ///< [rad]
-  virtual std::vector<double> frequencies() const { return {}; }  ///< of the modes, ascending [rad/s]
+  virtual double load_work_per_unit(std::size_t shape) const = 0;  ///< qᵀF of a unit of a load, as ∫ u dx [m²]
+  virtual double tip_mass() const = 0;                             ///< 1/(eᵀ M⁻¹ e) [kg]
+  virtual double static_tip_compliance() const = 0;                ///< u(L) per unit static tip force [m/N]
+  virtual void deflection(Shape& u) const = 0;                     ///< [m]
+  virtual void rotation(Shape& theta) const = 0;                   ///< [rad]
+  virtual std::vector<double> frequencies() const { return {}; }   ///< of the modes, ascending [rad/s]
 
   /// How the tip goes on over two steps of `size` [s] without a tip force.
   struct Forecast {
@@ -168,7 +167,7 @@ class Beam {
   void restore(const std::vector<double>& state);
 
  protected:
-  Beam(const Parameters& parameters, std::size_t motion_size);
+  explicit Beam(std::size_t motion_size) : motion_size_(motion_size) {}
 
   /// Beside the motion, what a state has.
   struct Scalars {
@@ -181,8 +180,7 @@ class Beam {
   virtual double advance(double size, const Polynomial& tip_force, const Loads& loads) = 0;
   virtual void undo() = 0;  ///< takes the last advance() back, but for `now_`
   virtual void strike(double impulse) = 0;
-  virtual void book() const {}          ///< adds to `now_` what the last step dissipated and its loads did
-  virtual double hat_work() const = 0;  ///< ∫ u ψ dx, ψ the tip's hat function [m²]
+  virtual void book() const {}  ///< adds to `now_` what the last step dissipated and its loads did
   virtual void save_motion(double* numbers) const = 0;     ///< motion_size of them
   virtual void restore_motion(const double* numbers) = 0;  ///< likewise
 
@@ -191,12 +189,10 @@ class Beam {
   static constexpr double ordinary = 1e40, ordinary_size = 1e10;
   bool ordinary_ = false;  ///< whether all coefficients stay below
 
-  double hat_;  ///< coefficient of the hat load [N/m]
   mutable Scalars now_{};
 
  private:
   class Trial;
-  void step_under(double size, const Polynomial& tip_force, const Loads& loads);
   bool outputs_finite() const;
   std::size_t motion_size_;
 };

@@ -138,7 +138,7 @@ struct FreeStep {
 class GeneralizedAlphaBeam final : public Beam {
  public:
   GeneralizedAlphaBeam(const Parameters& p, Timoshenko mesh)
-      : Beam(p, static_cast<std::size_t>(p.rho_inf == 1.0 ? 2 * mesh.size() : 3 * mesh.size() + remembered)),
+      : Beam(static_cast<std::size_t>(p.rho_inf == 1.0 ? 2 * mesh.size() : 3 * mesh.size() + remembered)),
         mesh_(std::move(mesh)),
         mu_(mesh_.mass_per_length()),
         alpha_(p.alpha_b),
@@ -177,7 +177,7 @@ class GeneralizedAlphaBeam final : public Beam {
   double tip_rotation() const override { return q_[mesh_.tip_rotation_index()] / mesh_.radius_of_gyration(); }
   double kinetic_energy() const override { return 0.5 * mu_ * mesh_.mass_norm2(v_); }
   double strain_energy() const override { return 0.5 * mu_ * mesh_.stiffness_norm2(q_); }
-  double deflection_integral() const override { return shape(Loads::distributed).dot(q_); }
+  double load_work_per_unit(std::size_t i) const override { return shape(i).dot(q_); }
   double tip_mass() const override { return 1.0 / tip_response_[mesh_.tip_index()]; }
   double static_tip_compliance() const override {
     return mesh_.flexibility_times(mesh_.unit_tip_force())[mesh_.tip_index()] / mu_;
@@ -218,8 +218,6 @@ class GeneralizedAlphaBeam final : public Beam {
     v_ += impulse * tip_response_;
     last_.impulse += impulse;
   }
-
-  double hat_work() const override { return shape(Loads::tip_load_coefficient).dot(q_); }
 
   void save_motion(double* numbers) const override {
     for (const VectorXd* x : {&q_, &v_, &a_}) numbers = std::copy_n(x->data(), x->size(), numbers);

@@ -34,7 +34,7 @@ double dot(const Polynomial& a, const Polynomial& b) { return a[0] * b[0] + a[1]
 class ModalBeam final : public Beam {
  public:
   ModalBeam(const Parameters& p, Modes modes)
-      : Beam(p, static_cast<std::size_t>(2 * modes.omega.size())),
+      : Beam(static_cast<std::size_t>(2 * modes.omega.size())),
         modes_(std::move(modes)),
         tip_(modes_.tip),
         omega2_(modes_.omega.array().square()),
@@ -68,7 +68,7 @@ class ModalBeam final : public Beam {
   double tip_rotation() const override { return modes_.tip_rotation.dot(eta_.matrix()); }
   double kinetic_energy() const override { return 0.5 * v_.square().sum(); }
   double strain_energy() const override { return 0.5 * (modes_.omega.array() * eta_).square().sum(); }
-  double deflection_integral() const override { return modes_.loads[Loads::distributed].dot(eta_.matrix()); }
+  double load_work_per_unit(std::size_t i) const override { return modes_.loads[i].dot(eta_.matrix()); }
   double tip_mass() const override { return 1.0 / tip_.square().sum(); }
   double static_tip_compliance() const override { return (tip_ / modes_.omega.array()).square().sum(); }
   void deflection(Shape& u) const override {
@@ -142,8 +142,6 @@ class ModalBeam final : public Beam {
     v_ += impulse * tip_;
     update_tip();
   }
-
-  double hat_work() const override { return modes_.loads[Loads::tip_load_coefficient].dot(eta_.matrix()); }
 
   void save_motion(double* numbers) const override {
     Eigen::Map<ArrayXd>(numbers, eta_.size()) = eta_;

@@ -38,7 +38,6 @@ void validate(const Parameters& p) {
   if (!(std::isfinite(p.alpha_b) && p.alpha_b >= 0.0)) reject("alpha_b [s]", p.alpha_b, "finite and >= 0");
   require_finite("initial_deflection_slope", p.initial_deflection_slope);
   require_finite("initial_velocity_slope [1/s]", p.initial_velocity_slope);
-  require_finite("tip_load_coefficient [N/m]", p.tip_load_coefficient);
   for (const double position : p.point_force_position) {
     if (!(position >= 0.0 && position <= 1.0))
       reject("point_force_position", position, "between 0 (the clamp) and 1 (the tip)");

@@ -121,10 +121,10 @@ class TableBuilder {
   }
 
   /// An input that acts at the start of the next step and is then 0 again.
-  template <class Access>
-  Variable& impulse(const std::string& name, const std::string& unit, const std::string& description, Access access) {
+  Variable& impulse(const std::string& name, const std::string& unit, const std::string& description,
+                    double M::*field) {
     Variable& v = add(name, unit, description, Causality::input);
-    v.set = [access](Model& m, const Polynomial& value) { access(static_cast<M&>(m)) = value[0]; };
+    v.set = [field](Model& m, const Polynomial& value) { static_cast<M&>(m).*field = value[0]; };
     v.consumed = true;
     return v;
   }

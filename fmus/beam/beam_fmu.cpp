@@ -17,7 +17,7 @@ using beam::Parameters;
 
 /// The beam's parameters and what exchange between steps adds to them.
 struct FmuParameters : Parameters {
-  double communication_step = 0.0;
+  double tip_load_coefficient = 0.0, communication_step = 0.0;
   FmuParameters() { initial_velocity_slope = -1.0; }  // so that a first try shows a motion
 };
 
@@ -34,6 +34,7 @@ struct BeamModel final : fmi::Model {
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
     beam = beam::make_beam(parameters);
+    loads.set(Loads::hat, {parameters.tip_load_coefficient, 0.0, 0.0});
     forecast = {};
     tip_response = {};
     if (forecasts()) tip_response = beam->tip_response(parameters.communication_step);
@@ -165,7 +166,7 @@ fmi::Table make_table() {
             "s in the initial deflection u = s*x");
   parameter("initial_velocity_slope", "1/s", &Parameters::initial_velocity_slope,
             "s in the initial velocity u_t = s*x");
-  parameter("tip_load_coefficient", "N/m", &Parameters::tip_load_coefficient,
+  parameter("tip_load_coefficient", "N/m", &FmuParameters::tip_load_coefficient,
             "coefficient of the last hat function in the distributed load");
   const auto position = [](std::size_t i) { return "point_force_position[" + std::to_string(i + 1) + "]"; };
   for (std::size_t i = 0; i < Loads::tip - Loads::point; ++i) {
@@ -188,7 +189,7 @@ fmi::Table make_table() {
       "C(tau) = C + C' tau + C'' tau^2/2. generalized_alpha sees their mean over the step",
       &BeamModel::tip_force);
   add.impulse("tip_impulse", "N.s", "upward impulse on the tip, applied at the start of the next step, then 0 again",
-              [](BeamModel& m) -> double& { return m.tip_impulse; });
+              &BeamModel::tip_impulse);
   std::vector<std::string> load_names;
   const auto load = [&](std::size_t i, const char* unit, const std::string& text) {
     load_names.emplace_back(Loads::names[i]);
@@ -243,7 +244,7 @@ fmi::Table make_table() {
              "potential of the loads distributed_load and tip_load_coefficient, as if they were constant",
              of(&Beam::load_potential))
       .from({"length", "n_elements", "initial_deflection_slope", "tip_load_coefficient", "distributed_load"});
-  add.depends("distributed_load", [](const BeamModel& m) { return -m.beam->deflection_integral(); });
+  add.depends("distributed_load", [](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); });
   add.output(
       "load_work", "J",
       "work of all loads on the beam since the start, where it is 0: distributed_load, point_force, tip_load, "

@@ -297,33 +297,39 @@ fmi::Table make_table() {
       .range(std::numeric_limits<double>::min(), 1e-2)
       .typical(1e-14);
 
-  const auto input = [&](const char* name, const char* unit, fmi::Polynomial SpringModel::*field,
-                         const char* text) -> fmi::Variable& { return add.input(name, unit, text, field); };
-  input("contact_force", "N", &SpringModel::contact_force,
-        "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next step "
-        "only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2");
-  input("foundation_force", "N", &SpringModel::foundation_force,
-        "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled");
+  add.input(
+      "contact_force", "N",
+      "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next step "
+      "only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2",
+      &SpringModel::contact_force);
+  add.input("foundation_force", "N",
+            "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled",
+            &SpringModel::foundation_force);
   add.impulse("impulse", "N.s", "upward impulse, applied at the start of the next step, then 0 again",
-              [](SpringModel& m) -> double& { return m.impulse; });
-  input("external_force", "N", &SpringModel::external_force,
-        "external force f_s, positive upward; derivatives as for contact_force");
-  input("base_acceleration", "m/s2", &SpringModel::base_acceleration,
-        "acceleration a of the foundation, upward; all displacements are relative to it, so that it acts as a force of "
-        "-mass*a; derivatives as for contact_force");
-  input("tip_displacement", "m", &SpringModel::tip_displacement,
-        "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives or "
-        "else by tip_velocity")
+              &SpringModel::impulse);
+  add.input("external_force", "N", "external force f_s, positive upward; derivatives as for contact_force",
+            &SpringModel::external_force);
+  add.input(
+      "base_acceleration", "m/s2",
+      "acceleration a of the foundation, upward; all displacements are relative to it, so that it acts as a force of "
+      "-mass*a; derivatives as for contact_force",
+      &SpringModel::base_acceleration);
+  add.input("tip_displacement", "m",
+            "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives or "
+            "else by tip_velocity",
+            &SpringModel::tip_displacement)
       .set = [](fmi::Model& m, const fmi::Polynomial& value) {
     auto& model = static_cast<SpringModel&>(m);
     model.tip_displacement = value;  // with what is unset
     model.reached.reset();
   };
-  input("tip_velocity", "m/s", &SpringModel::tip_velocity,
-        "velocity of the beam's tip, read by contact_law = 2 where no derivative of tip_displacement is set; its "
-        "derivative of order 1 is the tip's acceleration, that of order 2 is not used");
-  input("tip_velocity_forecast", "m/s", &SpringModel::forecast,
-        "for communication_step > 0: tip_velocity_forecast of the beam; its derivatives are not used");
+  add.input("tip_velocity", "m/s",
+            "velocity of the beam's tip, read by contact_law = 2 where no derivative of tip_displacement is set; its "
+            "derivative of order 1 is the tip's acceleration, that of order 2 is not used",
+            &SpringModel::tip_velocity);
+  add.input("tip_velocity_forecast", "m/s",
+            "for communication_step > 0: tip_velocity_forecast of the beam; its derivatives are not used",
+            &SpringModel::forecast);
 
   add.output("displacement", "m", "position y of the top", of(&Spring::displacement), of(&Spring::velocity));
   add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);

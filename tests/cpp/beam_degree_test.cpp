@@ -129,7 +129,7 @@ TEST(BeamDegree, FormsAreTheIntegralsOfTheirDefinition) {
         for (std::size_t i = 0; i < distributed.size(); ++i) {
           EXPECT_NEAR(mesh.load(i).dot(q), distributed[i], 1e-14 * degree) << degree << " " << i;
         }
-        EXPECT_NEAR(mesh.load(Loads::tip_load_coefficient).dot(q), hat, 1e-14 * degree) << degree;
+        EXPECT_NEAR(mesh.load(Loads::hat).dot(q), hat, 1e-14 * degree) << degree;
 
         Eigen::VectorXd strains(mesh.size());
         mesh.weighted_strains(q.data(), strains.data());
@@ -264,7 +264,7 @@ TEST(BeamDegree, LoadsLiftTheTipExactlyFromDegreeFour) {
       const Timoshenko mesh(p);
       const double L = p.length, mu = p.density * p.area;
       const auto tip = [&](std::size_t load) { return mesh.flexibility_times(mesh.load(load))[mesh.tip_index()] / mu; };
-      std::array<double, Loads::tip_load_coefficient> exact{};
+      std::array<double, Loads::hat> exact{};
       for (std::size_t k = 0; k < Loads::point; ++k) {
         const double power = static_cast<double>(k);
         exact[k] = std::pow(L, 4) * (0.5 / (power + 3.0) - 1.0 / (6.0 * (power + 4.0))) / bending(p) +

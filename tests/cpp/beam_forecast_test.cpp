@@ -48,7 +48,7 @@ TEST(BeamForecast, DependsOnTheLoadAsItSays) {
     const double H = 0.05;
     const auto b = make_beam(p);
     stir(*b);
-    for (std::size_t i = 0; i < Loads::tip_load_coefficient; ++i) {
+    for (std::size_t i = 0; i < Loads::count; ++i) {
       const auto under = [&](double value) {
         Loads loads;
         loads.set(i, {value, 0.0, 0.0});

@@ -182,7 +182,8 @@ TEST(BeamState, ParametersAreChecked) {
        {"rho_inf", "between 0 and 1"}},
       {[&](Parameters& p) { p.initial_deflection_slope = nan; }, {"initial_deflection_slope"}},
       {[&](Parameters& p) { p.initial_velocity_slope = nan; }, {"initial_velocity_slope"}},
-      {[&](Parameters& p) { p.tip_load_coefficient = nan; }, {"tip_load_coefficient"}},
+      {[&](Parameters& p) { p.point_force_position[2] = nan; }, {"point_force_position", "between 0"}},
+      {[&](Parameters& p) { p.point_force_position[0] = -0.1; }, {"point_force_position", "-0.1"}},
       {[](Parameters& p) { p.density = 1e-200, p.area = 1e-200; }, {"density * area"}},
   };
   for (const Refused& refused : all) {

@@ -31,7 +31,6 @@ TEST(BeamStep, OneModalStepEqualsTenShorterOnes) {
       for (const double H : {1e-5, 1e-2, 0.7, 30.0}) {
         Parameters p = mesh;
         p.alpha_b = alpha_b;
-        p.tip_load_coefficient = 0.4;
         p.initial_deflection_slope = 0.03;
         p.initial_velocity_slope = 0.5;
         p.point_force_position = {0.0, 0.37, 0.5, 1.0};
@@ -114,7 +113,8 @@ TEST(BeamStep, MidpointRuleIsThePapersEquation62) {
       p.alpha_b = alpha_b;
       p.initial_deflection_slope = 0.1;
       p.initial_velocity_slope = -1.0;
-      p.tip_load_coefficient = -6.0;
+      Loads hat;
+      hat.set(Loads::hat, {-6.0, 0.0, 0.0});
       const auto b = make_beam(p);
 
       Eigen::VectorXd q = Eigen::VectorXd::Zero(2 * n), v = q;
@@ -132,7 +132,7 @@ TEST(BeamStep, MidpointRuleIsThePapersEquation62) {
         const Eigen::VectorXd next = lu.solve(rhs);
         v = 2.0 / ht * (next - q) - v;
         q = next;
-        b->step(ht, {C, 0.0, 0.0}, 0.0);
+        b->step(ht, {C, 0.0, 0.0}, hat);
         EXPECT_NEAR(b->tip_displacement(), q[2 * n - 1], 1e-10) << ht << " " << step;
         EXPECT_NEAR(b->tip_velocity(), v[2 * n - 1], 1e-10 * (1.0 + 1.0 / ht)) << ht << " " << step;
         EXPECT_NEAR(b->tip_rotation(), q[n - 1], 1e-10) << ht << " " << step;
@@ -239,7 +239,6 @@ TEST(BeamStep, EnergyIdentityHoldsToRounding) {
       p.young_modulus *= kappa;
       p.shear_modulus *= kappa;
       p.alpha_b = c.alpha_b;
-      p.tip_load_coefficient = -0.5;
       p.n_modes = c.integrator == Integrator::modal ? 30 : 0;
       p.initial_velocity_slope = -1.0;
       const auto b = make_beam(p);
@@ -322,7 +321,6 @@ TEST(BeamStep, AccelerationIsTheDerivativeOfTheVelocity) {
   Parameters p = general_beam(8);
   p.alpha_b = 1e-3;
   p.initial_velocity_slope = 1.0;
-  p.tip_load_coefficient = 0.3;
   const double e = 1e-6;
   const auto a = make_beam(p), b = make_beam(p), c = make_beam(p);
   const Force force = {0.2, 3.0, -20.0};

@@ -47,7 +47,6 @@ inline std::vector<Parameters> variants() {
   for (Parameters p : {general_beam(25), general_beam(3, 5)}) {
     p.initial_velocity_slope = -1.0;
     p.initial_deflection_slope = 0.05;
-    p.tip_load_coefficient = -0.2;
     for (const double alpha_b : {0.0, 2e-3}) {
       p.alpha_b = alpha_b;
       for (const int n_modes : {0, 4}) {
@@ -80,7 +79,7 @@ inline Force shifted(const Force& c, double t) { return {c[0] + t * (c[1] + 0.5 
 template <class Noise>
 Loads every_load(double H, Noise& noise) {
   Loads loads;
-  for (std::size_t i = 0; i < Loads::tip_load_coefficient; ++i) {
+  for (std::size_t i = 0; i < Loads::count; ++i) {
     const double f0 = noise(), f1 = noise() / H, f2 = noise() / (H * H);
     loads.set(i, {f0, f1, f2});
   }
