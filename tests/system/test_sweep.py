@@ -15,7 +15,7 @@ import pytest
 from commands import command
 
 from springbeam.run.runner import simulate
-from springbeam.scene import SceneError, load_scene, with_changes
+from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
 from springbeam.studies import sweep
 from springbeam.studies.sweep.design import Axis, design, parse_axis, varied
 
@@ -226,6 +226,33 @@ def test_bad_input(tmp_path, arguments, words):
     result = command("sweep", "duffing", *arguments, "--out", tmp_path / "out")
     assert result.exit_code == 2
     assert words in result.stderr
+
+
+def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period(client, tmp_path):
+    """A damped oscillator: A sin(2πft) at phase 0 is −A sin φ, its peak A; the bumper doubles the period at 45 Hz."""
+    drive = {"on": "spring", "signal": "harmonic", "frequency": 2.0, "amplitude": 3.0, "start": 0.05}
+    spring = {"mass": 1.0, "linear_stiffness": 40.0, "damping": 4.0}
+    scene = scene_from_dict(
+        {"time": {"t_end": 30.0}, "spring": spring, "coupling": {"macro_step": 0.02}, "loads": [drive]}
+    )
+    found = sweep.row(scene, (), (), (), once_a_period=True)
+    w = 4.0 * np.pi
+    exact = 3.0 / (40.0 - w * w + 4.0j * w)
+    assert len(found["stroboscopic"]) == 20
+    assert found["stroboscopic"] == pytest.approx([exact.imag] * 20, abs=1e-9)
+    assert found["peak_response"] == pytest.approx(abs(exact), rel=8e-3)  # of rows: (ωH)²/8 of it
+    axes = (parse_axis("loads.0.frequency=35,45"),)
+    todo = sweep.Sweep(
+        load_scene("vibro-impact"), axes, design(axes, 0, 0, "random"), ("u_tip_max",), stroboscopic=True
+    )
+    assert sweep.run(todo, tmp_path, client)["done"] == 2
+    columns = sweep.rows(tmp_path)
+    once, doubled = (np.unique(np.round(np.array(points), 5)) for points in columns["stroboscopic"])
+    assert (len(once), len(doubled)) == (1, 2)
+    assert sweep.stroboscopic.draw(columns, axes, tmp_path)
+    assert (tmp_path / "bifurcation.png").stat().st_size > 5000
+    with pytest.raises(SceneError, match=r"--stroboscopic: the scene has no drive"):
+        sweep.Sweep(load_scene("pulse"), axes, [(1.0,)], (), stroboscopic=True)
 
 
 def test_an_existing_cluster_is_used(tmp_path):

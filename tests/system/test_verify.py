@@ -94,6 +94,11 @@ def undamped(patch: pytest.MonkeyPatch) -> None:
     )
 
 
+def base_as_force(patch: pytest.MonkeyPatch) -> None:
+    """The spring takes the acceleration of its base for a force."""
+    patch.setattr(FmuSpring, "_inputs_of", lambda self, load: [("external_force", 1.0)])
+
+
 @pytest.mark.parametrize(
     ("section", "mistake"),
     [
@@ -117,6 +122,10 @@ def undamped(patch: pytest.MonkeyPatch) -> None:
         (verify.linked_masses, changed(FmuBeam, "shear_modulus", 1.01)),
         (verify.linked_masses, changed(FmuSpring, "linear_stiffness", 1.01)),
         (verify.tied_masses, changed(FmuSpring, "mass", 1.01)),
+        (verify.resonance, changed(FmuBeam, "alpha_b", 1.01)),
+        (verify.pulse, changed(FmuSpring, "linear_stiffness", 1.01)),
+        (verify.slow_ramp, changed(FmuBeam, "shear_modulus", 1.01)),
+        (verify.moving_base, base_as_force),
     ],
     ids=lambda function: function.__name__,
 )

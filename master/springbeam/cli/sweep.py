@@ -55,6 +55,13 @@ def sweep(
             "--metric", metavar="NAME", help="Keep only this number of each run; may be repeated. Default: all."
         ),
     ] = None,
+    stroboscopic: Annotated[
+        bool,
+        typer.Option(
+            "--stroboscopic",
+            help="Keep the positions once a period of the harmonic load in the last third of each run, and draw them.",
+        ),
+    ] = False,
     workers: Annotated[
         int | None, typer.Option("--workers", metavar="N", min=1, help="Local processes. Default: one per core.")
     ] = None,
@@ -88,7 +95,7 @@ def sweep(
         if unknown := [name for name in metrics if name not in sweeps.METRICS]:
             raise SceneError(f"--metric {unknown[0]}: unknown; allowed: {', '.join(sweeps.METRICS)}")
         what, axes = load_scene(scene, settings or ()), tuple(parse_axis(text) for text in vary or ())
-        todo = sweeps.Sweep(what, axes, design(axes, samples, seed, sampling), metrics)
+        todo = sweeps.Sweep(what, axes, design(axes, samples, seed, sampling), metrics, stroboscopic)
         try:
             with bar, sweeps.cluster(scheduler, workers) as client:
                 task = bar.add_task("", total=len(todo.values), state="starting")
@@ -104,6 +111,9 @@ def sweep(
             fail(STOPPED, f"interrupted; the same command goes on with what is in {directory}")
         columns = sweeps.rows(directory)
         drawn = not no_plots and draw(columns, axes, metrics, directory / sweeps.PICTURE)
+        pictures = [directory / sweeps.PICTURE] if drawn else []
+        if stroboscopic and not no_plots and sweeps.stroboscopic.draw(columns, axes, directory):
+            pictures.append(directory / sweeps.stroboscopic.PICTURE)
     if as_json:
         picture = directory / sweeps.PICTURE if drawn else None
         print_json({"directory": directory, "rows": directory / sweeps.TABLE, "picture": picture, "runs": counts})
@@ -114,5 +124,5 @@ def sweep(
     if first := next(filter(None, columns["error"]), None):
         console.print(Text(f"error     {first}, the first of them"))
     console.print(Text(f"rows      {directory / sweeps.TABLE}"), soft_wrap=True)
-    if drawn:
-        console.print(Text(f"picture   {directory / 'sweep.png'}"), soft_wrap=True)
+    for path in pictures:
+        console.print(Text(f"picture   {path}"), soft_wrap=True)

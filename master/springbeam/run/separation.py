@@ -71,8 +71,9 @@ class Separation:
             return None
         # The force is not equally good all over a step: the zero is brought to where it is best, and then stepped to.
         zero, best = falling[0], self._pair.coupling(state.phase).sharpest
+        room = self._pair.loads.next_kink(state.time + self._no_time * macro_step) - state.time
         for _ in range(_MAX_LOOKS):
-            size = max(zero / best, _SHORTEST_LOOK * macro_step)
+            size = min(max(zero / best, _SHORTEST_LOOK * macro_step), room)
             g = self._told(state, self._pair.attempt(state, size, step.start), push)
             value, slope = force.value(g, zero), g[1] + zero * g[2]
             change = -value / slope if slope < 0.0 else 0.0

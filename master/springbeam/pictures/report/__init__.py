@@ -107,20 +107,26 @@ def page(trajectory: Trajectory) -> str:
 
 def shipped_command(scene: Scene) -> str | None:
     """Return the command that runs ``scene`` from the shipped scene of its title; ``None`` if none is."""
-    wanted = scene.model_dump(exclude_none=True)
+    wanted = _tables(scene)
     for name in shipped_scenes():
-        shipped = load_scene(name).model_dump(exclude_none=True)
-        if shipped.keys() != wanted.keys() or shipped["title"] != wanted["title"]:
+        shipped = _tables(load_scene(name))
+        if shipped.keys() != wanted.keys() or load_scene(name).title != scene.title:
             continue
         settings = [
             f"--set {shlex.quote(f'{table}.{key}={_setting(value)}')}"
             for table, content in wanted.items()
-            if table != "title"
             for key, value in content.items()
-            if shipped[table][key] != value
+            if shipped[table].get(key) != value
         ]
         return " ".join(["springbeam", "run", name, *settings])
     return None
+
+
+def _tables(scene: Scene) -> dict[str, dict[str, Any]]:
+    """Return the tables of a scene as ``--set`` names them."""
+    data = scene.model_dump(exclude_none=True)
+    tables = {name: content for name, content in data.items() if isinstance(content, dict)}
+    return tables | {f"loads.{i}": load for i, load in enumerate(data.get("loads", ()))}
 
 
 def _setting(value: Any) -> str:

@@ -32,12 +32,16 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
                 f"Ψ = {spring.equilibrium:.4g} m"
             ),
         )
-    if beam is not None and spring is not None:
+    if scene.coupled:
         soft = f"λ = {contact.stiffness:.4g}, exponent {contact.exponent:.4g}"
         words = {"link": f"stiffness {contact.stiffness:.4g} N/m", "compliance": soft, "paper": soft}
         yield "contact", f"{contact.law}: {(_LAWS | words)[contact.law]}"
     if stop is not None:
-        yield "foundation", f"at φ = {stop.position:.4g} m, restitution {stop.restitution:.4g}"
+        rebound = "elastic" if scene.elastic_stop else f"restitution {stop.restitution:.4g}"
+        yield "foundation", f"at φ = {stop.position:.4g} m, {rebound}"
+    for i, load in enumerate(scene.loads):
+        words = f"{load.signal.replace('_', '-')} on the {load.on}, {load.peak:.4g} {load.unit}"
+        yield f"load_{i}", words + (f", {load.frequency:.4g} Hz" if load.frequency else "")
     coupling = scene.coupling
     yield (
         "steps",

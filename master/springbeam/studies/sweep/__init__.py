@@ -21,6 +21,7 @@ from ...bodies.fmu import FmuError
 from ...run.outcome import RunStopped
 from ...scene import Scene, SceneError, scene_from_dict
 from ..accuracy import simulate
+from . import stroboscopic
 from .design import Axis, compatible, varied
 from .metrics import METRICS
 
@@ -51,9 +52,13 @@ class Sweep:
     axes: tuple[Axis, ...]
     values: Sequence[tuple[Any, ...]]  #: of the axes, per run
     metrics: tuple[str, ...]
+    #: Whether each run is also seen once a period of its drive.
+    stroboscopic: bool = False
 
     def __post_init__(self) -> None:
         compatible(self.scene, self.axes)
+        if self.stroboscopic:
+            stroboscopic.drive(self.scene)
 
     def description(self) -> dict[str, Any]:
         """Return what tells one sweep from another, as it goes into ``sweep.json``."""
@@ -64,11 +69,17 @@ class Sweep:
             "runs": len(self.values),
             "design": hashlib.sha256(design.encode()).hexdigest(),
             "metrics": list(self.metrics),
+            **({"stroboscopic": True} if self.stroboscopic else {}),
         }
 
 
-def row(scene: Scene, axes: Sequence[Axis], values: Sequence[Any], metrics: Sequence[str]) -> dict[str, Any]:
-    """Run once. ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` says why."""
+def row(
+    scene: Scene, axes: Sequence[Axis], values: Sequence[Any], metrics: Sequence[str], once_a_period: bool = False
+) -> dict[str, Any]:
+    """Run once. ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` says why.
+
+    ``once_a_period`` adds what `stroboscopic` observes.
+    """
     blank: dict[str, Any] = dict.fromkeys(metrics)
     try:
         run = simulate(varied(scene, axes, values))
@@ -76,7 +87,9 @@ def row(scene: Scene, axes: Sequence[Axis], values: Sequence[Any], metrics: Sequ
         return {"status": "refused", "error": str(error), "warnings": "", **blank}
     except RunStopped as error:
         return {"status": "stopped", "error": str(error), "warnings": "", **blank}
-    found = {name: METRICS[name](run) for name in metrics}
+    found: dict[str, Any] = {name: METRICS[name](run) for name in metrics}
+    if once_a_period:
+        found |= stroboscopic.observed(run)
     return {"status": "done", "error": "", "warnings": "\n".join(run.summary["warnings"]), **found}
 
 
@@ -199,12 +212,16 @@ def _check_workers(client: Client) -> None:
 
 
 def _task(
-    scene: dict[str, Any], axes: Sequence[Axis], several: Sequence[Sequence[Any]], metrics: Sequence[str]
+    scene: dict[str, Any],
+    axes: Sequence[Axis],
+    several: Sequence[Sequence[Any]],
+    metrics: Sequence[str],
+    once_a_period: bool,
 ) -> tuple[list[dict[str, Any]], float]:
     """Return the rows of several runs, and the seconds that they took."""
     began = perf_counter()
     try:
-        found = [row(scene_from_dict(scene), axes, values, metrics) for values in several]
+        found = [row(scene_from_dict(scene), axes, values, metrics, once_a_period) for values in several]
     except FmuError as error:  # an exception would be in the worker's log with its traceback
         found = [{"status": "no FMU", "error": str(error)}]
     return found, perf_counter() - began
@@ -221,7 +238,8 @@ def _results(sweep: Sweep, todo: Sequence[int], client: Client) -> Iterator[tupl
     def submit(indices: Sequence[int]) -> None:
         values = [sweep.values[index] for index in indices]
         key = ("springbeam", *indices)
-        queue.add(client.submit(_task, shared, sweep.axes, values, sweep.metrics, key=key, pure=False))
+        of_sweep = (sweep.metrics, sweep.stroboscopic)
+        queue.add(client.submit(_task, shared, sweep.axes, values, *of_sweep, key=key, pure=False))
 
     def submit_next() -> None:
         if left:
@@ -268,6 +286,8 @@ class _Parts:
             fields.append((axis.name, kind))
         fields += [(name, pa.string()) for name in ("status", "error", "warnings")]
         fields += [(name, pa.float64()) for name in sweep.metrics]
+        if sweep.stroboscopic:
+            fields += [(stroboscopic.POINTS, pa.list_(pa.float64())), (stroboscopic.PEAK, pa.float64())]
         self._schema = pa.schema(fields)
         #: Status of the rows that need not be run again.
         self.finished: dict[int, str] = {}

@@ -3,8 +3,8 @@
 Every function of `SECTIONS` computes one exact solution from its formula, has ``beam.fmu`` and ``spring.fmu`` (alone,
 or in a scene) compute the same, and returns the comparison as a list of `Check`. A bound follows from what the method
 leaves out, the discretisation's leading error, the solver's tolerance or rounding, and says which; none is fitted.
-A new exact solution is a function in ``beam``, ``spring``, ``impact``, ``coupling`` or ``laws``, and a line in
-`SECTIONS`; ``table`` prints them.
+A new exact solution is a function in one of the modules beside this one, and a line in `SECTIONS`; ``table`` prints
+them.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from .check import Check
 from .coupling import added_mass, energy_scheme, two_masses
 from .impact import bar_impact
 from .laws import compliant_impact, hunt_crossley, linked_masses, tied_masses
+from .loads import moving_base, pulse, resonance, slow_ramp
 from .spring import duffing, escape
 
 #: Title and exact solution, in the order of the table.
@@ -32,6 +33,10 @@ SECTIONS: tuple[tuple[str, Callable[[], list[Check]]], ...] = (
     ("Coupling: two masses, held exchange, ρ ≈ 1 + cπ²H²", two_masses),
     ("Coupling: gain of the tie by displacement exchange", added_mass),
     ("Coupling: energy scheme, tied, undamped", energy_scheme),
+    ("Loads: a damped beam driven at its tip, amplitude and phase", resonance),
+    ("Loads: half-sine pulse on an oscillator", pulse),
+    ("Loads: static limit of a slow ramp, EI = KAG = L = 1", slow_ramp),
+    ("Loads: a moving base and the equivalent loads", moving_base),
     ("Law: free masses on normal compliance λ p^q", compliant_impact),
     ("Law: Hunt & Crossley, χ = 0.5 s/m", hunt_crossley),
     ("Law: two masses on a link", linked_masses),
