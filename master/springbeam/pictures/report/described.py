@@ -40,8 +40,8 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
         rebound = "elastic" if scene.elastic_stop else f"restitution {stop.restitution:.4g}"
         yield "foundation", f"at φ = {stop.position:.4g} m, {rebound}"
     for i, load in enumerate(scene.loads):
-        words = f"{load.signal.replace('_', '-')} on the {load.on}, {load.peak:.4g} {load.unit}"
-        yield f"load_{i}", words + (f", {load.frequency:.4g} Hz" if load.frequency else "")
+        what = f"{load.signal.replace('_', '-')} on the {load.on}, {load.peak:.4g} {load.unit}"
+        yield f"load_{i}", what + (f", {load.frequency:.4g} Hz" if load.frequency else "")
     coupling = scene.coupling
     yield (
         "steps",
