@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstring>
 #include <stdexcept>
-#include <utility>
 #include <vector>
 
 #include "step_cache.hpp"
@@ -137,9 +136,9 @@ struct FreeStep {
 
 class GeneralizedAlphaBeam final : public Beam {
  public:
-  GeneralizedAlphaBeam(const Parameters& p, Timoshenko mesh)
+  GeneralizedAlphaBeam(const Parameters& p, const Timoshenko& mesh)
       : Beam(static_cast<std::size_t>(p.rho_inf == 1.0 ? 2 * mesh.size() : 3 * mesh.size() + remembered)),
-        mesh_(std::move(mesh)),
+        mesh_(mesh),
         mu_(mesh_.mass_per_length()),
         alpha_(p.alpha_b),
         midpoint_(p.rho_inf == 1.0),

@@ -71,7 +71,6 @@ void Instance::reset() {
   starts.reserve(fixed_.size());
   for (const Variable* v : fixed_) starts.push_back(v->start);
   settings_ = std::make_shared<const std::vector<double>>(std::move(starts));
-  values_.clear();
   values_.assign(inputs_.size(), idle);
   time_ = 0.0;
   stop_time_ = std::numeric_limits<double>::infinity();
@@ -240,6 +239,7 @@ void Instance::save(Snapshot& s) const {
   s.stop_time = stop_time_;
   s.tolerance = tolerance_;
   s.settings = settings_;
+  if (s.foreign) s.inputs.clear();  // it may know inputs that are not used here
   s.inputs.resize(values_.size(), idle);
   for (const std::size_t i : used_) s.inputs[i] = values_[i];
   s.built = built_;

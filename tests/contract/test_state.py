@@ -54,6 +54,19 @@ def test_pending_inputs_belong_to_the_state(case: Any) -> None:
     assert k.outputs() == first
 
 
+@pytest.mark.parametrize("overwritten", [False, True])
+def test_inputs_that_were_not_set_yet_belong_to_the_state(case: Any, overwritten: bool) -> None:
+    """Of a state from outside that knows a force, or in its place one of an instance that does not."""
+    k, other = case.running(), case.running()
+    other.set(case.force, 0.7)
+    _, token = k.try_deserialize(other.serialized())
+    if overwritten:
+        assert k.call("fmi2GetFMUstate", ct.byref(token)) == OK
+    k.set(case.force, 0.2)
+    k.restore(token)
+    assert k.get(case.force) == (0.0 if overwritten else 0.7)
+
+
 def test_a_state_can_be_overwritten_and_freed(case: Any) -> None:
     k = case.running()
     token = k.state()
