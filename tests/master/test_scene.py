@@ -416,3 +416,13 @@ def test_every_key_is_explained():
     assert [f"{key.table}.{key.name}" for key in reference.listed() if key.table] == [
         name.replace(".0.", ".") for name in springbeam.scene.scene_keys()
     ]
+
+
+def test_bodies_without_any_scale_are_dimensionless():
+    """As in the paper's section 6, where κ1 and κ2 say all of the beam; the scene stays as it was given."""
+    given = {"young_modulus": 3.6e10, "shear_modulus": 3.6e10}
+    scene = springbeam.scene.scene_from_dict({"time": {"t_end": 1.0}, "beam": given, "spring": {}})
+    beam, spring = scene.beam, scene.spring
+    units = (beam.density, beam.length, beam.area, beam.second_moment_of_area, beam.shear_coefficient)
+    assert {*units, spring.mass, spring.linear_stiffness} == {1.0}
+    assert scene.model_dump(exclude_unset=True)["beam"] == given

@@ -35,8 +35,8 @@ def listed(table: str | None = None) -> list[Key]:
 
 
 def about(table: str) -> str:
-    """Return what a table describes, in one sentence."""
-    return (MODELS[table].__doc__ or "").splitlines()[0].replace("``", "`")
+    """Return what a table describes."""
+    return " ".join((MODELS[table].__doc__ or "").split()).replace("``", "`")
 
 
 def _described(model: type[Table]) -> Iterator[tuple[str, str, str, str, str]]:
@@ -52,7 +52,7 @@ def _default(model: type[Table], name: str, field: FieldInfo) -> str:
         if any(name in group for group in ways.groups) and model.model_fields[ways.groups[0][0]].is_required():
             return f"needed: the {ways.thing} one way"
     if field.is_required():
-        return "needed"
+        return "needed" + (", or dimensionless" if name in model.SCALES else "")
     default = field.default
     return "none" if default in (None, "") else str(default).lower() if isinstance(default, bool) else f"{default}"
 
@@ -73,6 +73,11 @@ def schema() -> dict[str, Any]:
         table["required"] = [name for name in table.get("required", ()) if name not in conditional]
         if model.WAYS:
             table["allOf"] = [{"oneOf": list(_alternatives(model, ways))} for ways in model.WAYS]
+        if model.SCALES:
+            needed = [name for name in table["required"] if name in model.SCALES]
+            table["required"] = [name for name in table["required"] if name not in model.SCALES]
+            dimensionless = {"properties": dict.fromkeys(model.SCALES, False)}
+            table["anyOf"] = [{"required": needed}, dimensionless]
     return found
 
 
@@ -122,7 +127,7 @@ def beginning(title: str) -> str:
     ]
     for table, content in _BEGINNING.items():
         model = TABLES[table]
-        lines += ["", f"[{table}]  # {about(table)}"]
+        lines += ["", f"[{table}]  # {about(table).partition('. ')[0].rstrip('.')}."]
         for name, value in content.items():
             field = model.model_fields[name]
             unit = "" if extra(field, "unit") == "–" else f" [{extra(field, 'unit')}]"

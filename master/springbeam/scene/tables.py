@@ -68,6 +68,8 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
     WAYS: ClassVar[tuple[Ways, ...]] = ()
+    #: Keys that give the table its scales: of a table with none of them, those that are needed are 1 (dimensionless).
+    SCALES: ClassVar[tuple[str, ...]] = ()
 
     #: Keys that follow from others that were given; files do not have them.
     _followed: frozenset[str] = PrivateAttr(frozenset())
@@ -88,6 +90,8 @@ class Table(BaseModel):
                 both = [name for group in groups for name in group if name in given]
                 raise ValueError(f"{', '.join(both)}: give the {ways.thing} one way: {ways}")
         follows = {name: value for name, value in cls._follows(data).items() if name not in given}
+        if not any(name in given for name in cls.SCALES):
+            follows |= {name: 1.0 for name in cls.SCALES if cls.model_fields[name].is_required()}
         table = handler({**data, **follows})
         table._followed = frozenset(follows)
         return table
@@ -104,7 +108,11 @@ class Time(Table):
 
 
 class Beam(Table):
-    """Kelvin–Voigt Timoshenko beam, clamped at x = 0 (Ahn & Tate, (1)–(5)). Geometry and material have no defaults."""
+    """Kelvin–Voigt Timoshenko beam, clamped at x = 0 (Ahn & Tate, (1)–(5)).
+
+    Geometry and material have no defaults. Only if neither density, length, section, shear coefficient nor Poisson's
+    ratio is given, the beam is dimensionless: the first four are 1, as in the paper's section 6.
+    """
 
     density: float = key("kg/m³", "density ρ", gt=0.0)
     length: float = key("m", "length L", gt=0.0)
@@ -149,6 +157,10 @@ class Beam(Table):
         Ways("section", (("area", "second_moment_of_area"), ("width", "height"), ("diameter",))),
         Ways("shear stiffness", (("shear_modulus",), ("poisson_ratio",))),
         Ways("velocity at the start", (("initial_velocity_slope",), ("approach_speed",))),
+    )
+    SCALES = (
+        *("density", "length", "area", "second_moment_of_area", "width", "height", "diameter"),
+        *("poisson_ratio", "shear_coefficient"),
     )
     #: Keys that are not the FMU's.
     GIVEN_ONLY: ClassVar[frozenset[str]] = frozenset(
@@ -216,7 +228,12 @@ class Beam(Table):
 
 
 class Spring(Table):
-    """Duffing spring m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s (Ahn & Tate, (6))."""
+    """Duffing spring m ÿ + α_s ẏ + k1 y + k2 y³ = −C + N + f_s (Ahn & Tate, (6)).
+
+    Mass and linear stiffness have no defaults. Only if neither is given, the spring is dimensionless: both are 1.
+    """
+
+    SCALES = ("mass", "linear_stiffness")
 
     mass: float = key("kg", "mass m", gt=0.0)
     damping: float = key("N·s/m", "damping α_s", 0.0, ge=0.0)
