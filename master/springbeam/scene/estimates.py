@@ -66,7 +66,7 @@ def _frequency(beam: Beam) -> float:
 def implausible(scene: Scene) -> Iterator[str]:
     """Yield what can hardly be meant, as lines ``[table] key = value: why, and what may be meant``."""
     beam = scene.beam
-    if beam is None or beam.area == 1.0:
+    if beam is None or 1.0 in (beam.area, beam.density):  # in units of its own
         return
     E, rho = beam.young_modulus, beam.density
     if not _MODULI[0] <= E <= _MODULI[1]:
