@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import os
 import re
 import shutil
@@ -92,6 +93,16 @@ def test_a_program_of_the_documentation_runs(page, number, capsys, monkeypatch):
     path = ROOT / page if page == "README.md" else DOCS / page
     exec(compile(blocks(path, "python")[number], f"{page}[{number}]", "exec"), {"__name__": "__main__"})
     assert re.search(PROGRAMS[page, number], capsys.readouterr().out)
+
+
+def test_the_notebook_runs(capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    names = {"__name__": "__main__"}
+    for cell in json.loads((DOCS / "first_steps.ipynb").read_text(encoding="utf-8"))["cells"]:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == []
+            exec(compile("".join(cell["source"]), "first_steps.ipynb", "exec"), names)
+    assert re.search(r"deepest tip -15\.00 mm\n0\.000000 s  impact\n(.*\n)+\{0\.5: 8\.61", capsys.readouterr().out)
 
 
 def test_all_programs_are_run():
