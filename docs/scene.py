@@ -27,8 +27,8 @@ def page() -> str:
     """Return the text of scene.md."""
     lines = [HEAD]
     for table, model in reference.MODELS.items():
-        heading = f"[[{table}]], any number" if table == "loads" else f"[{table}]"
-        lines += [f"## {heading}\n\n{reference.about(table)}\n" if table else "## Outside the tables\n"]
+        heading = reference.heading(table)
+        lines += [f"## {heading}\n\n{reference.about(table)}\n" if table else f"## {heading.capitalize()}\n"]
         for ways in model.WAYS:
             marked = ", or ".join(" and ".join(f"`{name}`" for name in group) for group in ways.groups)
             lines.append(f"Give the {ways.thing} one way: {marked}.\n")

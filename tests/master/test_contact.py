@@ -114,7 +114,9 @@ def test_a_phase_is_named_by_its_joint_unless_seated():
 @pytest.mark.parametrize(("speed", "joint"), [(0.3, Joint.TOUCH), (0.0, Joint.TIED), (-0.3, Joint.TIED)])
 def test_a_meeting_at_the_equilibrium_is_told_by_the_velocity(y, speed, joint):
     """Within rounding of Ψ: tied while rising it would be released at once, and meet again, for ever."""
-    transitions = Transitions(load_scene("soft"), Transmission(), tip_mass=0.01, mass=1.0, fastest=lambda: 0.3)
+    transitions = Transitions(
+        load_scene("soft"), Transmission(), tip_mass=0.01, mass=1.0, fastest=lambda: 0.3, equilibrium=0.0
+    )
     end = Motion(y, speed, 0.0, 0.0)
     _, phase, impact = transitions.after("impact", Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
     assert phase.joint is joint
@@ -126,7 +128,7 @@ def test_a_meeting_at_the_equilibrium_is_told_by_the_velocity(y, speed, joint):
 def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, one_velocity):
     """Parting by 20 % of the largest speed, here 1 m/s, and more is no error of the scheme."""
     z, tip_mass, mass = 0.5, 0.01, 1.0
-    transitions = Transitions(load_scene("soft"), Transmission(), tip_mass, mass, fastest=lambda: 1.0)
+    transitions = Transitions(load_scene("soft"), Transmission(), tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0)
     _, phase, impact = transitions.after(kind, Phase(Joint.TIED), ends, 0.0, ends, -1.0, 1e-17)
     assert phase.joint is Joint.FREE

@@ -119,7 +119,9 @@ def test_locate_gives_up_where_time_itself_is_rounded():
 def test_joined_ends_go_on_with_their_common_velocity(v, z, rate):
     """A tip of 4 kg and a top of 1 kg: a release needs both to rise, whichever way the top alone would go."""
     scene = load_scene("soft")
-    functions = EventFunctions(scene, Transmission(), tip_share=common_velocity(1.0, 0.0, 4.0, 1.0))
+    functions = EventFunctions(
+        scene, Transmission(), tip_share=common_velocity(1.0, 0.0, 4.0, 1.0), equilibrium=scene.spring.equilibrium
+    )
     motions = (Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0))
     joined = dict(functions.of(Phase(Joint.TIED)))
     assert joined["stop_impact"](motions) == pytest.approx((-scene.stop.position, rate))

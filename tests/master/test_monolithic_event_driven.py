@@ -340,7 +340,7 @@ def test_softening_spring_runs_up_to_its_barrier_and_fails_beyond() -> None:
     below = simulate(spring_only(20.0, equilibrium=barrier - 1e-3, linear_stiffness=3.0, cubic_stiffness=-0.2))
     assert np.max(np.abs(below.y)) <= barrier
     scene = spring_only(20.0, linear_stiffness=3.0, cubic_stiffness=-0.2)
-    unchecked = scene.model_copy(update={"spring": scene.spring.model_copy(update={"initial_velocity": 5.0})})
+    unchecked = scene.model_copy(update={"lower": scene.spring.model_copy(update={"initial_velocity": 5.0})})
     with pytest.raises(ReferenceFailure):  # ½ z² = 12.5 J, the barrier is k1²/4|k2| = 11.25 J high
         simulate(unchecked)
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import atexit
+import difflib
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from ctypes import byref, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import lru_cache, partial
 from pathlib import Path
 from struct import Struct
@@ -29,6 +30,13 @@ from .archive import UnsafeArchive, unpack
 from .memory import Memory
 from .protocol import BodyFailed, StepRefused
 
+#: Types of variables: in C, and of the values that they take.
+_KINDS: dict[str, tuple[Any, tuple[type, ...]]] = {
+    "Real": (c_double, (int, float)),
+    "Integer": (c_int, (int,)),
+    "Boolean": (c_int, (bool, int)),
+    "String": (c_char_p, (str,)),
+}
 #: Values of fmi2Status.
 WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
@@ -65,7 +73,8 @@ class Reals:
         references = (c_uint * n)(*[fmu.reference(name, "Real") for name in names])
         self._read = fmu.prepared("fmi2GetReal", references, c_size_t(n), self.values)
         self._write = fmu.prepared("fmi2SetReal", references, c_size_t(n), self.values)
-        self.get()  # a wrong reference is found before the run
+        if names:
+            self.get()  # a wrong reference is found before the run
 
     def get(self) -> tuple[float, ...]:
         if (status := self._read()) > WARNING:
@@ -79,13 +88,30 @@ class Reals:
             raise self._fmu.failed(status, f"cannot set {self._names}")
 
 
+#: A value of a parameter.
+Value = float | int | bool | str
+
+
 class Fmu(Memory):
-    """One instance of a co-simulation FMU and its state."""
+    """One instance of a co-simulation FMU and its state.
+
+    Parameters
+    ----------
+    name
+        The model identifier that it must have, of one of our own; ``None`` for an FMU that others made.
+    path
+        The file.
+    parameters
+        Parameters and start values.
+    start_time
+        [s].
+    """
 
     REMEMBERED = ("steps", "rewinds")
 
-    def __init__(self, name: str, path: Path, parameters: dict[str, float | int | bool], start_time: float) -> None:
-        self.path, self._name = path, name
+    def __init__(self, name: str | None, path: Path, parameters: Mapping[str, Value], start_time: float) -> None:
+        self.path, self._own = path, name is not None
+        self._name = path.stem if name is None else name
         self._messages: list[str] = []
         self._slave = self._load()
         self._state = fmi2FMUstate()
@@ -110,14 +136,20 @@ class Fmu(Memory):
 
     def _load(self) -> FMU2Slave:
         if not self.path.is_file():
-            raise FmuError(f"{self.path}: not found; ./build.sh fmus builds it, SPRINGBEAM_FMUS names another folder")
+            remedy = "; ./build.sh fmus builds it, SPRINGBEAM_FMUS names another folder" if self._own else ""
+            raise FmuError(f"{self.path}: not found{remedy}")
         folder, description = _unpacked(self.path, self.path.stat().st_mtime_ns)
         if description.coSimulation is None or description.fmiVersion != "2.0":
-            raise FmuError(f"{self.path}: not an FMI 2.0 co-simulation FMU")
-        if description.coSimulation.modelIdentifier != self._name:
+            kind = "co-simulation" if description.coSimulation else "model exchange"
             raise FmuError(
-                f"{self.path}: model identifier {description.coSimulation.modelIdentifier!r}, expected {self._name!r}"
+                f"{self.path}: not an FMI 2.0 co-simulation FMU but one of FMI {description.fmiVersion}, {kind}; "
+                "export it as that"
             )
+        identifier = description.coSimulation.modelIdentifier
+        if self._own and identifier != self._name:
+            raise FmuError(f"{self.path}: model identifier {identifier!r}, expected {self._name!r}")
+        #: What it says it can do.
+        self.says = description.coSimulation
         self._variables = {v.name: v for v in description.modelVariables}
         # The callbacks must outlive the instance.
         self._logger = fmi2CallbackLoggerTYPE(self._log)
@@ -129,7 +161,7 @@ class Fmu(Memory):
             slave = FMU2Slave(
                 guid=description.guid,
                 unzipDirectory=str(folder),
-                modelIdentifier=self._name,
+                modelIdentifier=identifier,
                 instanceName=self._name,
             )
             slave.instantiate(callbacks=self._callbacks)
@@ -137,7 +169,7 @@ class Fmu(Memory):
             raise FmuError(f"{self.path}: cannot be instantiated: {self._cause(error)}") from error
         return slave
 
-    def _prepare_start(self, parameters: dict[str, float | int | bool]) -> None:
+    def _prepare_start(self, parameters: Mapping[str, Value]) -> None:
         """Calls that initialise, with the parameters in their arguments."""
         self._start_time = c_double()
         no = c_int(0)
@@ -148,13 +180,22 @@ class Fmu(Memory):
         #: Where the value of a parameter is.
         self._parameters: dict[str, tuple[Any, int]] = {}
         self._set_parameters = []
-        kinds: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int}
-        for kind, ctype in kinds.items():
-            names = [name for name in parameters if self._variable(name).type == kind]
+        for name in parameters:
+            variable = self.variable(name)
+            if variable.type not in _KINDS:
+                raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, which cannot be set here")
+            if variable.causality not in ("parameter", "input") and variable.initial != "exact":
+                raise FmuError(f"{self.path}: variable {name!r} is {variable.causality}, not a parameter")
+        for kind, (ctype, taken) in _KINDS.items():
+            names = [name for name in parameters if self.variable(name).type == kind]
             if not names:
                 continue
             n = len(names)
-            values: Any = (ctype * n)(*[parameters[name] for name in names])
+            for name in names:
+                if not isinstance(parameters[name], taken):
+                    raise FmuError(f"{self.path}: {name} = {parameters[name]!r}: variable {name!r} is {kind}")
+            given = [parameters[name] for name in names]
+            values: Any = (ctype * n)(*[value.encode() if isinstance(value, str) else value for value in given])
             references = (c_uint * n)(*[self.reference(name, kind) for name in names])
             self._set_parameters.append(self.prepared(f"fmi2Set{kind}", references, c_size_t(n), values))
             self._parameters.update((name, (values, i)) for i, name in enumerate(names))
@@ -166,7 +207,7 @@ class Fmu(Memory):
             if (status := call()) > WARNING:
                 raise self.failed(status, "cannot be initialised")
 
-    def reset(self, time: float, changed: dict[str, float]) -> None:
+    def reset(self, time: float, changed: Mapping[str, float]) -> None:
         """Start again at ``time`` with some parameters changed."""
         for name, value in changed.items():
             values, i = self._parameters[name]
@@ -191,18 +232,34 @@ class Fmu(Memory):
         function.restype = c_int
         return partial(function, c_void_p(self._slave.component), *arguments)
 
-    def _variable(self, name: str) -> Any:
+    def variable(self, name: str) -> Any:
+        """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""
         try:
             return self._variables[name]
         except KeyError:
-            raise FmuError(f"{self.path}: has no variable {name!r}") from None
+            close = difflib.get_close_matches(name, self._variables, n=1)
+            meant = f"; did you mean {close[0]!r}?" if close else ""
+            raise FmuError(f"{self.path}: has no variable {name!r}{meant}") from None
 
     def reference(self, name: str, kind: str) -> int:
         """Value reference of a variable of type ``kind``."""
-        variable = self._variable(name)
+        variable = self.variable(name)
         if variable.type != kind:
             raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, expected {kind}")
         return int(variable.valueReference)
+
+    def input_derivative(self, name: str, order: int) -> Callable[[float], None]:
+        """Return what sets the derivative of an input over the next step."""
+        value = c_double()
+        reference, orders = (c_uint * 1)(self.reference(name, "Real")), (c_int * 1)(order)
+        call = self.prepared("fmi2SetRealInputDerivatives", reference, c_size_t(1), orders, byref(value))
+
+        def set_to(derivative: float) -> None:
+            value.value, self.moved = derivative, True
+            if (status := call()) > WARNING:
+                raise self.failed(status, f"cannot set derivative {order} of {name}")
+
+        return set_to
 
     def mark(self) -> None:
         if (status := self._get_state()) > WARNING:

@@ -24,17 +24,21 @@ _motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
 _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
 
 
-class _FmuBody(Body):
+class FmuBody(Body):
     """What both bodies do alike; a subclass names its variables."""
 
     REMEMBERED: ClassVar[tuple[str, ...]] = ("fmu", "_pending", "_current")
 
     _MOTION: tuple[str, ...]
     _ENERGIES: tuple[str, ...]
-    _IMPULSE: str
+    _IMPULSE: tuple[str, ...]
     _FORCES: tuple[str, ...]
     _constants: dict[str, float]  #: of the scene, by the inputs that hold them from the start
     _bears_loads = False  #: whether the last of the energies is the work of the loads
+    #: Highest derivative of a force that is handed over.
+    _SLOPES: int = 2
+    #: Whether the derivatives of one step may act in the next one if they are not set again.
+    _KEEPS_SLOPES: bool = False
     _current: Motion
     _marked_motion: Motion
 
@@ -48,7 +52,7 @@ class _FmuBody(Body):
 
     def _prepare(self, fmu: Fmu) -> None:
         self._motion, self._energies = Reals(fmu, *self._MOTION), Reals(fmu, *self._ENERGIES)
-        self._impulse = Reals(fmu, self._IMPULSE)
+        self._impulse = Reals(fmu, *self._IMPULSE)
         self._prepare_inputs(())
         self._pending = self._marked_pending = 0.0
         self.mass = self._mass()
@@ -59,16 +63,17 @@ class _FmuBody(Body):
     def _prepare_inputs(self, loads: Sequence[str]) -> None:
         """Calls that set the forces and ``loads``, inputs of the FMU, and their derivatives."""
         fmu, names = self.fmu, (*self._FORCES, *loads)
-        n = self._number = len(names)
+        n, orders = len(names), self._SLOPES
+        self._number = n
         forces = [fmu.reference(name, "Real") for name in names]
         Reals(fmu, *names)  # a wrong reference is found before the run
         self._inputs: Any = (c_double * (3 * n))()  # the forces and loads, then the two derivatives of each
         self._set_forces = fmu.prepared("fmi2SetReal", (c_uint * n)(*forces), c_size_t(n), self._inputs)
         self._set_slopes = fmu.prepared(
             "fmi2SetRealInputDerivatives",
-            (c_uint * (2 * n))(*[reference for reference in forces for _ in (1, 2)]),
-            c_size_t(2 * n),
-            (c_int * (2 * n))(*[1, 2] * n),
+            (c_uint * (orders * n))(*[reference for reference in forces for _ in range(orders)]),
+            c_size_t(orders * n),
+            (c_int * (orders * n))(*[1, 2][:orders] * n),
             byref(self._inputs, n * sizeof(c_double)),
         )
         #: The loads of a step, and two derivatives of each.
@@ -135,7 +140,7 @@ class _FmuBody(Body):
         fmu.moved = True
         if (status := self._set_forces()) > WARNING:
             raise fmu.failed(status, f"cannot set {', '.join(self._FORCES)} and loads")
-        if any(inputs[n:]) and (status := self._set_slopes()) > WARNING:
+        if (any(inputs[n:]) or self._KEEPS_SLOPES) and (status := self._set_slopes()) > WARNING:
             raise fmu.failed(status, "cannot set input derivatives")
         fmu.step(time, size)
         self._pending = 0.0
@@ -150,7 +155,9 @@ class _FmuBody(Body):
             raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
 
     def _read_motion(self) -> Motion:
-        motion = _motion_of(Motion, self._motion.get())
+        return self._finite(_motion_of(Motion, self._motion.get()))
+
+    def _finite(self, motion: Motion) -> Motion:
         if not isfinite(sum(motion)):
             raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
         return motion
@@ -167,7 +174,7 @@ class _FmuBody(Body):
         self.fmu.close()
 
 
-class FmuBeam(_FmuBody, BeamBody):
+class FmuBeam(FmuBody, BeamBody):
     """``beam.fmu`` as a body."""
 
     _MOTION = (
@@ -177,7 +184,7 @@ class FmuBeam(_FmuBody, BeamBody):
         "tip_displacement_integral_2",
     )
     _ENERGIES = ("kinetic_energy", "strain_energy", "dissipated_energy", "load_potential")
-    _IMPULSE = "tip_impulse"
+    _IMPULSE = ("tip_impulse",)
     _FORCES = ("tip_force",)
 
     def __init__(self, beam: Beam, start_time: float, deflection_slope: float, loads: Sequence[Load] = ()) -> None:
@@ -222,14 +229,14 @@ class FmuBeam(_FmuBody, BeamBody):
         return np.array(np.frombuffer(self._shape.values))
 
 
-class FmuSpring(_FmuBody):
+class FmuSpring(FmuBody):
     """``spring.fmu`` as a body; contact law and foundation are the master's."""
 
-    REMEMBERED = (*_FmuBody.REMEMBERED, "_dissipated_before")
+    REMEMBERED = (*FmuBody.REMEMBERED, "_dissipated_before")
 
     _MOTION = ("displacement", "velocity", "displacement_integral", "displacement_integral_2")
     _ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy")
-    _IMPULSE = "impulse"
+    _IMPULSE = ("impulse",)
     _FORCES = ("contact_force", "foundation_force")
 
     def __init__(self, spring: Spring, start_time: float) -> None:

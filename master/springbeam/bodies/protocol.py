@@ -58,6 +58,12 @@ class Body(Memory):
         """Whether the end has no inertia: it then has the velocity of what it is joined to, and springs back alone."""
         return self.mass == 0.0
 
+    #: Whether `rewind` works; if not, a step is made once, by the schemes that never repeat one.
+    repeatable: bool = True
+
+    def take_place(self, *, upper: bool) -> None:
+        """Learn, before the run, whether it is the upper body; one that fits in either place needs to know."""
+
     def mark(self) -> None:
         """Remember the present state as the one ``rewind`` returns to."""
         raise NotImplementedError

@@ -364,7 +364,7 @@ def picked_in_words(accuracy: Mapping[str, Any]) -> str:
 
 
 def _event_table(first: list[Event], last: list[Event], between: int, scene: Scene) -> Table:
-    position, speed = ("u_tip", "v_tip") if scene.spring is None else ("y", "z")
+    position, speed = ("u_tip", "v_tip") if scene.lower is None else ("y", "z")
     table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
     table.add_column("event", no_wrap=True)
     units = {"time": "s", position: "m", speed: "m/s", "on the tip": "N·s", "of the stop": "N·s", "lost": "J"}

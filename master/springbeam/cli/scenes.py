@@ -33,7 +33,7 @@ def scenes(as_json: JsonOption = False) -> None:
     with bad_input_reported():
         for name, path in shipped_scenes().items():
             scene = load_scene(path)
-            parts = {"beam": scene.beam, "spring": scene.spring, "stop": scene.stop}
+            parts = {"beam": scene.upper, "spring": scene.lower, "stop": scene.stop}
             contents = [part for part, there in parts.items() if there is not None]
             table.add_row(name, ", ".join(contents), f"{scene.time.t_end:g}", Text(scene.title))
             listed.append({
@@ -71,7 +71,12 @@ def keys(
         print_json([key._asdict() for key in found])
     console = console_for(silent=as_json)
     for name, group in groupby(found, lambda key: key.table):
-        console.print(Text(f"\n[{name}]  {reference.about(name)}" if name else "outside the tables", style="bold"))
+        console.print(
+            Text(
+                f"\n{reference.heading(name)}  {reference.about(name)}" if name else reference.heading(name),
+                style="bold",
+            )
+        )
         for ways in MODELS[name].WAYS:
             console.print(Text(f"give the {ways.thing} one way: {ways}"))
         for key in group:

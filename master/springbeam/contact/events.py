@@ -96,13 +96,14 @@ class EventFunctions:
     """Which event functions each phase of a scene has, by the kind of their event.
 
     ``tip_share`` is the tip's part in the velocity with which joined ends go on, `contact.common_velocity`: they differ
-    from each other by what the energy schemes leave open, and one of them may even go the other way.
+    from each other by what the energy schemes leave open, and one of them may even go the other way. ``equilibrium`` is
+    Ψ, the height below which the ends are tied [m].
     """
 
-    def __init__(self, scene: Scene, law: Law, tip_share: float) -> None:
-        self._scene, self._tip_share = scene, tip_share
-        pair = scene.beam is not None and scene.spring is not None
-        self._ties, self._meets = pair and not law.soft, pair and not law.soft and not law.lasting
+    def __init__(self, scene: Scene, law: Law, tip_share: float, equilibrium: float) -> None:
+        self._scene, self._tip_share, self._equilibrium = scene, tip_share, equilibrium
+        self._ties = scene.joins and not law.soft
+        self._meets = self._ties and not law.lasting
         self._phase: Phase | None = None
         self._functions: list[tuple[str, EventFunction]] = []
         #: The ends last asked for, and the samples there: a step starts where the one before has ended.
@@ -123,22 +124,22 @@ class EventFunctions:
 
     def _built(self, phase: Phase) -> list[tuple[str, EventFunction]]:
         tip, low = 0, 1
-        spring, stop = self._scene.spring, self._scene.stop
+        stop = self._scene.stop
         functions: list[tuple[str, EventFunction]] = []
         share = self._tip_share if self._ties and phase.joint is not Joint.FREE else 0.0
         if self._meets:
-            assert spring is not None
             if phase.joint is Joint.FREE:
                 functions.append(("impact", gap))
             if phase.joint is Joint.TIED and not phase.seated:
-                functions.append(("release", Height(low, spring.equilibrium, share, -1.0)))
+                functions.append(("release", Height(low, self._equilibrium, share, -1.0)))
             if phase.joint is Joint.TOUCH:
-                functions.append(("retie", Height(low, spring.equilibrium, share)))
-                beam = self._scene.beam
+                functions.append(("retie", Height(low, self._equilibrium, share)))
+                beam, spring = self._scene.beam, self._scene.spring
                 if beam is not None and beam.fidelity == "quasi_static" and not phase.seated:
+                    assert spring is not None
                     functions.append(("separation", Holding(beam, spring)))
         if stop is not None and not phase.seated and not self._scene.elastic_stop:
-            end, share = (tip, 1.0) if spring is None else (low, share)
+            end, share = (tip, 1.0) if self._scene.lower is None else (low, share)
             functions.append(("stop_impact", Height(end, stop.position, share)))
         return functions
 

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
+from math import inf
 
 from ..bodies.memory import Memory
 from ..bodies.protocol import Motion
@@ -88,6 +89,8 @@ def foundation_impact(z: float | None, mass: float, v: float | None, tip_mass: f
 
 def common_velocity(v: float, z: float, tip_mass: float, mass: float) -> float:
     """With which joined ends of velocities v and z [m/s] go on: that of their momentum, whatever force joins them."""
+    if max(tip_mass, mass) == inf:
+        return v if tip_mass == inf else z
     return (tip_mass * v + mass * z) / (tip_mass + mass)
 
 
@@ -107,14 +110,22 @@ class Transitions(Memory):
         Between the ends.
     tip_mass, mass
         What an impulse meets at the tip and at the spring top [kg]; ``None`` for an absent body.
+    equilibrium
+        Ψ: the height below which the ends are tied [m].
     """
 
     REMEMBERED = ("_fastest_impact",)
 
     def __init__(
-        self, scene: Scene, law: Law, tip_mass: float | None, mass: float | None, fastest: Callable[[], float]
+        self,
+        scene: Scene,
+        law: Law,
+        tip_mass: float | None,
+        mass: float | None,
+        fastest: Callable[[], float],
+        equilibrium: float,
     ) -> None:
-        self._law = law
+        self._law, self._equilibrium = law, equilibrium
         self._scene, self._tip_mass, self._mass, self._fastest = scene, tip_mass, mass, fastest
         self._fastest_impact = 0.0
 
@@ -153,8 +164,7 @@ class Transitions(Memory):
     def _meet(self, phase: Phase, tip: Motion, low: Motion, tolerance: float) -> tuple[Phase, Impact]:
         assert self._tip_mass is not None
         assert self._mass is not None
-        assert self._scene.spring is not None
-        psi = self._scene.spring.equilibrium
+        psi = self._equilibrium
         impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
         at_equilibrium = abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)

@@ -63,7 +63,7 @@ def totals(
     """
     events = list(events)
     found: dict[str, float | int] = {}
-    beam, spring = scene.beam is not None, scene.spring is not None
+    beam, spring = scene.upper is not None, scene.lower is not None
     stop = scene.stop is not None and not scene.elastic_stop
     if scene.coupled or (beam and stop):
         found |= _contact(scene, steps, events, window, free_at_end)

@@ -95,7 +95,7 @@ def columns_of(scene: Scene) -> tuple[str, ...]:
 
     ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
     """
-    beam, spring, stop = scene.beam is not None, scene.spring is not None, scene.stop is not None
+    beam, spring, stop = scene.upper is not None, scene.lower is not None, scene.stop is not None
     absent: set[str] = set()
     if not beam:
         absent |= _BEAM_COLUMNS

@@ -57,7 +57,7 @@ class Detector:
         if pair.beam is not None and pair.spring is not None:
             tip_share = common_velocity(1.0, 0.0, pair.beam.mass, pair.spring.mass)
         self._separation = Separation(pair, _NO_TIME)
-        self._functions = EventFunctions(scene, pair.law, tip_share)
+        self._functions = EventFunctions(scene, pair.law, tip_share, pair.equilibrium)
         self._level = pair.stop or 0.0
 
     def tolerance(self, ends: Ends) -> float:
@@ -183,7 +183,7 @@ class Detector:
     def _touched_inside(self, state: State, step: Step) -> Step:
         """Compliance: a contact that closes and opens inside the step would be missed; it is cut to its middle."""
         start, end = gap(step.start), gap(step.end)
-        if start[0] < 0.0 or end[0] < 0.0 or any(step.contact):
+        if start[0] < 0.0 or end[0] < 0.0 or any(step.contact) or not self._pair.repeatable:
             return step
         path = Path.through(start, end, step.size, gap.means(step.end, step.size))
         inside = path.lowest_inside()

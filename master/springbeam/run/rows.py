@@ -43,7 +43,6 @@ class Rows(Memory):
         self._pair, self._ledger, self._recorder = pair, ledger, recorder
         self._shapes_left = _SHAPES_AFTER_CONTACT
         self._next_shape = start_time
-        self._equilibrium = 0.0 if scene.spring is None else scene.spring.equilibrium
         #: The normal-compliance part of a rigid contact's force, as the paper has it.
         self._inside = Compliance(scene.contact.stiffness, scene.contact.exponent)
         length = scene.time.t_end - start_time or 1.0  # 0 where contact is at t_end: the one shape is that of the start
@@ -73,7 +72,7 @@ class Rows(Memory):
         else:
             self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
             if pair.joinable and not pair.law.lasting:
-                inside = self._diagnostic(self._equilibrium - u)
+                inside = self._diagnostic(pair.equilibrium - u)
                 reaction = contact - inside
         self.largest_speed = max(self.largest_speed, abs(v), abs(z))
         forces = (contact, smoothed, inside, reaction, state.foundation[0])

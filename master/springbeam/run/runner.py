@@ -11,10 +11,9 @@ from typing import Any
 
 from ..bodies.factory import fingerprints, load_bodies
 from ..bodies.fmu import FmuError
-from ..bodies.fmu_bodies import FmuBeam, FmuSpring
+from ..bodies.fmu_bodies import FmuBeam, FmuBody, FmuSpring
 from ..bodies.memory import Memory
 from ..bodies.protocol import Body
-from ..bodies.quasi_static import QuasiStaticBeam
 from ..results.directory import RunDirectory
 from ..results.file_recorder import FileRecorder
 from ..results.reading import load_summary, load_trajectory
@@ -94,7 +93,7 @@ def run(
                 progress(time, phase, macro_steps)
             checkpoints.take_when_due(simulation)
 
-    of_scene = _without_own(scene, beam=upper, spring=lower)
+    of_scene = _without_own(scene, upper=upper, lower=lower)
     start_time = 0.0 if upper is not None else scene.contact_time or 0.0
     paper = scene.contact.law == "paper"
     beam, spring = load_bodies(_as_in_paper(scene) if paper else of_scene, start_time)
@@ -102,7 +101,7 @@ def run(
         simulation: Simulation | PaperLaw
         if paper:
             assert isinstance(beam, FmuBeam)
-            assert spring is not None
+            assert isinstance(spring, FmuSpring)
             simulation = PaperLaw(scene, start_time, beam, spring, recorder, after_step)
         else:
             simulation = Simulation(scene, start_time, upper or beam, lower or spring, recorder, after_step)
@@ -211,13 +210,14 @@ def simulate(
 
 def _without_own(scene: Scene, **own: Body | None) -> Scene:
     """Return ``scene`` without the tables whose places bodies of the caller's take; see `run`."""
-    given = [name for name, body in own.items() if body is not None]
+    given = [place for place, body in own.items() if body is not None]
     if not given:
         return scene
-    for name in given:
-        if not isinstance(own[name], Body):
-            raise TypeError(f"the body in place of the {name} is a {type(own[name]).__name__}, not a springbeam.Body")
-        if getattr(scene, name) is None:
+    for place in given:
+        name = {"upper": "beam", "lower": "spring"}[place]
+        if not isinstance(own[place], Body):
+            raise TypeError(f"the body in place of the {name} is a {type(own[place]).__name__}, not a springbeam.Body")
+        if getattr(scene, place) is None:
             raise SceneError(f"[{name}]: missing; a body of your own takes the place of one that the scene has")
     asked = {
         'contact.law = "paper"': scene.contact.law == "paper",
@@ -241,10 +241,10 @@ def _totals(simulation: Simulation | PaperLaw, scene: Scene, recorder: Recorder)
     return totals(scene, steps, recorder.events(), force_window(scene), free_at_end=simulation.apart)
 
 
-def _calls(**bodies: FmuBeam | FmuSpring | QuasiStaticBeam | None) -> dict[str, int]:
+def _calls(**bodies: Body | None) -> dict[str, int]:
     counts = {}
     for name, body in bodies.items():
-        if isinstance(body, (FmuBeam, FmuSpring)):
+        if isinstance(body, FmuBody):
             counts[f"{name}_steps"] = body.steps
             counts[f"{name}_rollbacks"] = body.rewinds
         if isinstance(body, FmuSpring):

@@ -101,6 +101,7 @@ class Simulation(Memory):
             None if beam is None else beam.mass,
             None if spring is None else spring.mass,
             self._fastest,
+            self._pair.equilibrium,
         )
         self._ledger = Ledger()
         self._energy_warns, self._energy_stops = bounds(scene)
@@ -229,7 +230,8 @@ class Simulation(Memory):
             return
         tip, low = start = pair.ends()
         tolerance = self._detector.tolerance(start) + 1e-12 * abs(low.displacement)
-        if abs(tip.displacement - low.displacement) > tolerance or tip.velocity - low.velocity > 0.0:
+        parting = tip.velocity - low.velocity > 0.0 and not pair.law.lasting
+        if abs(tip.displacement - low.displacement) > tolerance or parting:
             return
         pair.mark()
         # The bodies are recorded as they arrive: the ledger starts before the impact.
@@ -306,10 +308,8 @@ class Simulation(Memory):
         causes, remedies = [], []
         if not self._pair.joined.energy_exact:
             causes.append(f"{coupling.scheme} of degree {coupling.degree}")
-            remedies.append(
-                f"the macro step {self._steps.size:g} s is too large for it; take a smaller one, or "
-                "coupling.scheme = 'energy'"
-            )
+            or_else = ", or coupling.scheme = 'energy'" if self._pair.repeatable else ""
+            remedies.append(f"the macro step {self._steps.size:g} s is too large for it; take a smaller one{or_else}")
         if self._numerically_damped:
             assert beam is not None
             causes.append(f"beam.rho_inf = {beam.rho_inf:g}")

@@ -90,6 +90,11 @@ class Pair(Memory):
         self.lower: Body = spring or self._held or _ABSENT
         self.loads = Loads(scene, beam, spring)
         self._bodies: list[Body] = [body for body in (beam, spring) if body is not None]
+        for body in self._bodies:
+            body.take_place(upper=body is beam)
+        self.repeatable = all(body.repeatable for body in self._bodies)
+        #: Ψ: where the ends of a rigid law are tied below [m].
+        self.equilibrium = scene.spring.equilibrium if scene.spring is not None else self.lower.motion().displacement
         #: Where the ends are; looked up once, since every step asks a few times.
         self._tip, self._low = self.upper.motion, self.lower.motion
         self._last: Step | None = None  #: at whose end the bodies are

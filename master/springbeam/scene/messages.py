@@ -13,6 +13,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from .loads import Load
+from .partners import OWN, PARTNERS
 from .scene import TABLES, Scene, table_of
 from .tables import SceneError, Table
 
@@ -28,9 +29,13 @@ def key_kind(table: str, key: str) -> type:
     model = table_of(table)
     if model is None:
         raise SceneError(_explain_top("extra_forbidden", {}, table))
-    if key not in model.model_fields:
+    models = [model, *(PARTNERS.values() if table in ("beam", "spring") else ())]
+    field = next((model.model_fields[key] for model in models if key in model.model_fields), None)
+    if field is None and models[1:] and key.startswith("parameters."):
+        return float
+    if field is None:
         raise SceneError(f"[{table}] {key}: unknown key; {_nearest_key(table, key)}")
-    kinds = {get_origin(part) or part for part in _alternatives(model.model_fields[key].annotation)}
+    kinds = {get_origin(part) or part for part in _alternatives(field.annotation)}
     return next((kind for kind in (int, bool, float) if kind in kinds), str)
 
 
@@ -44,6 +49,13 @@ def explain(error: Any) -> list[str]:
     kind, value, loc = error["type"], error["input"], [str(part) for part in error["loc"]]
     if loc[:1] == ["loads"] and len(loc) > 1:
         loc = [f"loads.{loc[1]}", *loc[2:]]
+    if loc[0] in ("beam", "spring"):
+        if kind == "union_tag_invalid":
+            elements = " or ".join(_toml(name) for name in PARTNERS if name != "fmu")
+            return [f"[{loc[0]}] element = {_toml(value['element'])}: must be {elements}"]
+        loc, partner = [loc[0], *loc[2:]], loc[1]
+        if partner != OWN and len(loc) > 1:
+            return [_explain_partner(kind, value, loc[0], partner, ".".join(map(_bare, loc[1:])))]
     if kind == "value_error":
         prefix = f"[{loc[0]}] " if loc else ""
         return [prefix + line for line in error["msg"].removeprefix("Value error, ").splitlines()]
@@ -74,6 +86,22 @@ def _missing(model: type[Table], key: str, given: Any) -> str:
 def extra(field: FieldInfo, name: str) -> str:
     """Return what `springbeam.scene.tables.key` noted of a key: its "unit", or what holds "otherwise"."""
     return str(field.json_schema_extra[name]) if isinstance(field.json_schema_extra, dict) else ""
+
+
+def _explain_partner(kind: str, value: Any, table: str, partner: str, key: str) -> str:
+    """Explain a key of a body that is not our own; ``partner`` is its name in `PARTNERS`."""
+    fields = PARTNERS[partner].model_fields
+    if kind == "extra_forbidden":
+        beside = "beside fmu" if partner == "fmu" else f'of element = "{partner}"'
+        ours = f"it belongs to our own {table}; " if key in TABLES[table].model_fields else nearest(key, fields)
+        return f"[{table}] {key}: unknown key {beside}; {ours}allowed: {', '.join(fields)}"
+    if kind == "missing":
+        return f"[{table}] {_missing(PARTNERS[partner], key, value)}"
+    name, _, of_parameter = key.partition(".")
+    if of_parameter:  # its last word is one of the types that the value is not
+        may_be = "a number, true or false, or a text in quotes"
+        return f"[{table}] {key.rpartition('.')[0]} = {_toml(value)}: must be {may_be}"
+    return f"[{table}] {name} = {_toml(value)}: must be {allowed(fields[name])}"
 
 
 def _explain_top(kind: str, value: Any, name: str) -> str:
@@ -109,10 +137,12 @@ def allowed(field: FieldInfo) -> str:
         return "tables, written as [[loads]]"
     if tuple[float, ...] in _alternatives(field.annotation):
         return "a list of 1 to 4 finite numbers"
+    if get_origin(field.annotation) is dict:
+        return "a table, as { k = 3.0e4 }"
     if get_origin(field.annotation) is Literal:
         return " or ".join(_toml(choice) for choice in get_args(field.annotation))
     nouns: dict[Any, str] = {bool: "true or false", str: "a text in quotes", int: "a whole number"}
-    noun = nouns.get(_alternatives(field.annotation)[0], "a finite number")
+    noun = next((nouns[part] for part in _alternatives(field.annotation) if part in nouns), "a finite number")
     bounds = {
         name: value
         for m in field.metadata

@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from .messages import explain, nearest, one_line
+from .partners import kind_of
 from .rules import impossible
 from .scene import TABLES, Scene, split_key, table_of
 from .tables import PICKED_BY_ACCURACY, SceneError
@@ -75,6 +76,10 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
     for load in data["loads"] if isinstance(data.get("loads"), list) else ():
         if isinstance(load, dict) and isinstance(load.get("file"), str):
             load["file"] = os.path.abspath(path.parent / load["file"])
+    for table in ("beam", "spring"):
+        body = data.get(table)
+        if isinstance(body, dict) and isinstance(body.get("fmu"), str):
+            body["fmu"] = os.path.abspath(path.parent / body["fmu"])
     for (table, key), override in changes.items():
         if (picked := _picked(data, table, key)) is not None:
             raise SceneError(f"--set {override}: {picked}; leave one of the two out")
@@ -208,7 +213,14 @@ def _change(table: str, content: dict[str, Any], changes: Mapping[str, Any]) -> 
         if len(new := ways.taken(given)) == 1:
             for key in (key for group in ways.groups if group != new[0] for key in group):
                 content.pop(key, None)
-    content.update(changes)
+    if not {"fmu", "element"}.isdisjoint(changes) and kind_of(dict(changes)) != kind_of(content):
+        content.clear()  # another body has other keys
+    for key, value in changes.items():
+        outer, dot, parameter = key.partition(".")
+        if dot and outer == "parameters":
+            content[outer] = {**content.get(outer, {}), parameter: value}
+        else:
+            content[key] = value
 
 
 def parse_value(text: str) -> Any:

@@ -10,11 +10,12 @@ from pydantic.fields import FieldInfo
 
 from .loads import Load
 from .messages import allowed, extra
+from .partners import PARTNERS
 from .scene import TABLES, Scene
 from .tables import Table, Ways
 
-#: Tables by their names; "" is what stands outside of them.
-MODELS: dict[str, type[Table]] = {"": Scene, **TABLES, "loads": Load}
+#: Tables by their names, "" is what stands outside of them, and by theirs the bodies that are not our own.
+MODELS: dict[str, type[Table]] = {"": Scene, **TABLES, "loads": Load, **PARTNERS}
 
 
 class Key(NamedTuple):
@@ -34,6 +35,13 @@ def listed(table: str | None = None) -> list[Key]:
     return [Key(name, *described) for name in wanted for described in _described(MODELS[name])]
 
 
+def heading(table: str) -> str:
+    """Return how a table of `MODELS` stands in a file."""
+    if table in PARTNERS:
+        return "[beam] or [spring] with " + ("fmu" if table == "fmu" else f'element = "{table}"')
+    return "outside the tables" if not table else "[[loads]], any number" if table == "loads" else f"[{table}]"
+
+
 def about(table: str) -> str:
     """Return what a table describes."""
     return " ".join((MODELS[table].__doc__ or "").split()).replace("``", "`")
@@ -41,7 +49,7 @@ def about(table: str) -> str:
 
 def _described(model: type[Table]) -> Iterator[tuple[str, str, str, str, str]]:
     for name, field in model.model_fields.items():
-        if name not in MODELS:
+        if (field.alias or name) not in MODELS:
             yield name, extra(field, "unit"), allowed(field), _default(model, name, field), field.description or ""
 
 
@@ -64,7 +72,7 @@ def schema() -> dict[str, Any]:
     """
     found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema()}
     _plain(found["properties"])
-    models: list[type[Table]] = [*TABLES.values(), Load]
+    models: list[type[Table]] = [*TABLES.values(), Load, *PARTNERS.values()]
     for model in models:
         table = found["$defs"][model.__name__]
         _plain(table["properties"])

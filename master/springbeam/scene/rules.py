@@ -7,9 +7,10 @@ from collections.abc import Iterator
 
 from .estimates import implausible
 from .loads import MOST_POINTS
+from .partners import PARTNERS, RigidWall, kind_of
 from .scene import TABLES, Scene
 from .statics import bending_stiffness, locking, shear_stiffness, tip_compliance, tip_inertia
-from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring
+from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring, Table
 
 #: More are a mistyped macro step: two weeks at a microsecond a step.
 MOST_MACRO_STEPS = 1e12
@@ -20,11 +21,17 @@ def _extreme(scene: Scene) -> str:
     places = {
         f"[{table}] {key}": float(value)
         for table in TABLES
-        for key, value in (getattr(scene, table) or ())
+        for key, value in (_content(scene, table) or ())
         if isinstance(value, (int, float)) and value != 0.0
     }
     place = max(places, key=lambda name: abs(math.log10(abs(places[name]))))
     return f"{place} = {places[place]!r}"
+
+
+def _content(scene: Scene, table: str) -> Table | None:
+    """Return what the scene has under ``[table]``, whatever body that is."""
+    content: Table | None = getattr(scene, {"beam": "upper", "spring": "lower"}.get(table, table))
+    return content
 
 
 def impossible(scene: Scene) -> list[str]:
@@ -50,13 +57,40 @@ def _beam_quantities(beam: Beam) -> tuple[float, ...]:
 
 
 def _bodies(scene: Scene) -> Iterator[str]:
-    if scene.beam is None and scene.spring is None:
+    if scene.upper is None and scene.lower is None:
         yield "no body: a scene needs [beam], [spring] or both"
     if scene.spring is not None and scene.stop is not None and scene.stop.position >= scene.spring.equilibrium:
         yield (
             f"[stop] position = {scene.stop.position}: the foundation must lie below "
             f"[spring] equilibrium = {scene.spring.equilibrium}"
         )
+
+
+def _partners_fit(scene: Scene) -> Iterator[str]:
+    """What only our own bodies can do, and what makes no sense with the others."""
+    contact, stop, lower, upper = scene.contact, scene.stop, scene.lower, scene.upper
+    for table, body in (("beam", upper), ("spring", lower)):
+        if (kind := kind_of(body)) not in PARTNERS:
+            continue
+        name = f"[{table}] fmu" if kind == "fmu" else f'[{table}] element = "{kind}"'
+        if contact.law == "paper":
+            yield f'{name}: [contact] law = "paper" is Algorithm 1, which needs our own bodies; take another law'
+        if scene.coupling.feedback != "two_way":
+            yield (
+                f'{name}: [coupling] feedback = "{scene.coupling.feedback}" bounds what it neglects for our own bodies '
+                'only; use "two_way"'
+            )
+        if scene.beam is not None and scene.beam.fidelity == "quasi_static":
+            yield f'{name}: [beam] fidelity = "quasi_static" needs our own spring; use fidelity = "dynamic"'
+    if isinstance(upper, RigidWall) and (lower is None or isinstance(lower, RigidWall)):
+        yield '[beam] element = "rigid_wall": nothing moves in this scene; give it a body in [spring]'
+    elif isinstance(lower, RigidWall) and (upper is None or stop is not None):
+        what = "nothing moves in this scene; give it a body in [beam]" if upper is None else "leave [stop] out"
+        yield f'[spring] element = "rigid_wall": {what}'
+    if stop is not None and lower is not None and scene.spring is None:
+        top = scene.initial_top
+        if top is not None and stop.position >= top:
+            yield f"[stop] position = {stop.position}: the foundation must lie below [spring] displacement = {top}"
 
 
 def _spring_holds(scene: Scene) -> Iterator[str]:
@@ -129,9 +163,13 @@ def _well_depth(scene: Scene) -> float:
 
 def _tip_arrives(scene: Scene) -> Iterator[str]:
     beam, target, clearance = scene.beam, scene.tip_target, scene.initial_clearance
-    if beam is None or target is None or clearance is None:
+    if target is None or clearance is None:
         return
     name, height = target
+    if beam is None:
+        if clearance < 0.0:
+            yield f"[beam] displacement: starts {-clearance:.6g} m below {name} = {height}; let it start there or above"
+        return
     if clearance < 0.0:
         yield (
             f"[beam] initial_deflection_slope = {beam.initial_deflection_slope}: the tip starts {-clearance:.6g} m "
@@ -146,33 +184,34 @@ def _tip_arrives(scene: Scene) -> Iterator[str]:
 
 
 def _ends_can_be_joined(scene: Scene) -> Iterator[str]:
-    beam, spring, contact = scene.beam, scene.spring, scene.contact
+    beam, contact = scene.beam, scene.contact
     name = f'[contact] law = "{contact.law}"'
     if contact.damping > 0.0 and contact.law not in ("compliance", "link"):
         yield f'[contact] damping = {contact.damping}: law = "{contact.law}" has none; use 0.0, "compliance" or "link"'
     if not contact.lasting:
         return
     for table in ("beam", "spring"):
-        if getattr(scene, table) is None and not scene.elastic_stop:
+        if _content(scene, table) is None and not scene.elastic_stop:
             yield f"{name}: joins a [beam] and a [spring]; this scene has no [{table}]"
     if contact.law == "link" and contact.stiffness == contact.damping == 0.0:
         yield f"[contact] stiffness = 0.0: {name} needs a stiffness or a damping greater than 0"
     if contact.law == "tie" and contact.impact != "inelastic":
         yield f'[contact] impact = "{contact.impact}": law = "tie" gives both ends one velocity; use "inelastic"'
-    if contact.law == "tie" and beam is not None and spring is not None:
-        tip, top = scene.initial_tip or 0.0, spring.equilibrium
-        if not math.isclose(tip, top, rel_tol=1e-12):
-            yield (
-                f"[beam] initial_deflection_slope = {beam.initial_deflection_slope}: the tip starts at {tip:.6g} m, "
-                f'but law = "tie" holds it at [spring] equilibrium = {top}; let them start at one height, or use "link"'
-            )
+    tip, top = scene.initial_tip, scene.initial_top
+    if contact.law == "tie" and tip is not None and top is not None and not math.isclose(tip, top, rel_tol=1e-12):
+        key = f"initial_deflection_slope = {beam.initial_deflection_slope}" if beam else "displacement"
+        other = "equilibrium" if scene.spring else "displacement"
+        yield (
+            f"[beam] {key}: the tip starts at {tip:.6g} m, "
+            f'but law = "tie" holds it at [spring] {other} = {top}; let them start at one height, or use "link"'
+        )
 
 
 def _law_applies(scene: Scene) -> Iterator[str]:
     beam, contact, coupling = scene.beam, scene.contact, scene.coupling
     if contact.law == "paper":
         for table in ("beam", "spring", "stop"):
-            if getattr(scene, table) is None:
+            if _content(scene, table) is None:
                 yield f'[contact] law = "paper": Algorithm 1 needs a [{table}]'
         if beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf != 1.0:
             yield f'[beam] rho_inf = {beam.rho_inf}: [contact] law = "paper" is the midpoint rule, rho_inf = 1'
@@ -196,8 +235,7 @@ def _law_applies(scene: Scene) -> Iterator[str]:
             f'[coupling] scheme = "hermite": holds rigid ties; [contact] law = "{contact.law}" needs '
             'scheme = "energy", "gauss_seidel" or "jacobi"'
         )
-    joinable = beam is not None and scene.spring is not None
-    if coupling.scheme == "hermite" and contact.impact == "rest" and contact.rigid and joinable:
+    if coupling.scheme == "hermite" and contact.impact == "rest" and contact.rigid and scene.joins:
         yield (
             '[coupling] scheme = "hermite": gives both ends one velocity, [contact] impact = "rest" leaves them two; '
             'use scheme = "energy" or impact = "inelastic"'
@@ -209,8 +247,9 @@ def _feedback_negligible(scene: Scene) -> Iterator[str]:
     if coupling.feedback == "two_way":
         return
     name = f'[coupling] feedback = "{coupling.feedback}"'
-    if beam is None or spring is None:
+    if not scene.joins:
         yield f'{name}: there is one body only; use "two_way"'
+    if beam is None or spring is None:
         return
     if contact.law != "compliance" or coupling.scheme not in ("energy", "auto"):
         yield (
@@ -242,7 +281,7 @@ def _inertia_needed(scene: Scene) -> Iterator[str]:
     if beam is None or beam.fidelity == "dynamic":
         return
     name = '[beam] fidelity = "quasi_static"'
-    if scene.spring is None:
+    if scene.lower is None:
         yield f'{name}: a beam without inertia moves with a [spring] or not at all; use fidelity = "dynamic"'
     if contact.law == "compliance" and scene.coupling.feedback != "beam_drives":
         yield (
@@ -320,8 +359,10 @@ def _loads_act(scene: Scene) -> Iterator[str]:
         name = f"[loads.{number}]"
         on = f'{name} on = "{load.on}"'
         for table, acts in (("beam", load.on in ("beam", "tip")), ("spring", load.on == "spring")):
-            if acts and getattr(scene, table) is None:
+            if acts and _content(scene, table) is None:
                 yield f"{on}: acts on a [{table}], and this scene has none"
+            elif kind_of(_content(scene, table)) in PARTNERS and (acts or load.on == "base"):
+                yield f"{on}: acts on our own bodies, and [{table}] is none; take the load out"
         if beam is not None and beam.fidelity == "quasi_static" and load.on != "spring":
             yield (
                 f'{on}: [beam] fidelity = "quasi_static" takes no loads that vary; use fidelity = "dynamic", or '
@@ -336,6 +377,7 @@ def _loads_act(scene: Scene) -> Iterator[str]:
 #: Checks of what cannot be run although each value is allowed; each yields ``[table] key = value: reason and remedy``.
 _CHECKS = (
     _bodies,
+    _partners_fit,
     _spring_holds,
     _tip_arrives,
     _ends_can_be_joined,

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from .loads import Load
+from .partners import ForeignFmu, LowerBody, UpperBody
 from .statics import tip_compliance, tip_load_deflection
 from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time, key
 
@@ -18,8 +19,10 @@ _SAME, _SHORTEST = 1e-9, 1e-6
 
 
 class Scene(Table):
-    """The tables of a scene; ``beam``, ``spring`` and ``stop`` are ``None`` where the scene does not have them.
+    """The tables of a scene; those that it does not have are ``None``.
 
+    ``upper`` is the table ``[beam]``, ``lower`` is ``[spring]``, whatever body they describe; ``beam`` and ``spring``
+    are these where they are our own.
     `springbeam.scene.reading` makes scenes that can be run; a scene made by hand is not held against the rules.
     """
 
@@ -29,8 +32,8 @@ class Scene(Table):
         gt=0.0, lt=1.0,
     )  # fmt: skip
     time: Time
-    beam: Beam | None = None
-    spring: Spring | None = None
+    upper: UpperBody | None = Field(None, alias="beam")
+    lower: LowerBody | None = Field(None, alias="spring")
     stop: Stop | None = None
     contact: Contact = Contact()
     coupling: Coupling = Coupling()
@@ -44,21 +47,42 @@ class Scene(Table):
         return data
 
     @property
+    def beam(self) -> Beam | None:
+        """Our beam, if it is the upper body."""
+        return self.upper if isinstance(self.upper, Beam) else None
+
+    @property
+    def spring(self) -> Spring | None:
+        """Our spring, if it is the lower body."""
+        return self.lower if isinstance(self.lower, Spring) else None
+
+    @property
+    def joins(self) -> bool:
+        """Whether there are two bodies."""
+        return self.upper is not None and self.lower is not None
+
+    @property
+    def foreign(self) -> dict[str, ForeignFmu]:
+        """The FMUs that others made, by table."""
+        places = {"beam": self.upper, "spring": self.lower}
+        return {name: body for name, body in places.items() if isinstance(body, ForeignFmu)}
+
+    @property
     def fmus(self) -> tuple[str, ...]:
-        """Names of the FMUs that the scene needs; a beam without inertia needs none."""
+        """Names of our FMUs that the scene needs; a beam without inertia needs none."""
         beam = self.beam is not None and self.beam.fidelity == "dynamic"
         return ("beam",) * beam + ("spring",) * (self.spring is not None)
 
     @property
     def elastic_stop(self) -> bool:
         """Whether the contact law acts between the tip and the stop: there is no spring, and the law is soft."""
-        alone = self.beam is not None and self.spring is None and self.stop is not None
+        alone = self.upper is not None and self.lower is None and self.stop is not None
         return alone and self.contact.law in ("compliance", "link")
 
     @property
     def coupled(self) -> bool:
         """Whether a contact law acts at all: between the tip and the spring top, or an elastic stop."""
-        return self.beam is not None and (self.spring is not None or self.elastic_stop)
+        return self.upper is not None and (self.lower is not None or self.elastic_stop)
 
     @property
     def driver_stiffness(self) -> float | None:
@@ -71,28 +95,36 @@ class Scene(Table):
 
     @property
     def tip_target(self) -> tuple[str, float] | None:
-        """What the beam's tip meets first, as ``("[table] key", height [m])``: the spring, else the stop.
+        """What the upper end meets first, as ``("[table] key", height [m])``: the lower body, else the stop.
 
-        ``None`` where there is nothing to meet, or where the law joins the tip to the spring from the start.
+        ``None`` where there is nothing to meet, where only an FMU knows, or where the law joins the ends at once.
         """
-        if self.beam is None or self.contact.lasting:
+        if self.upper is None or self.contact.lasting:
             return None
-        if self.spring is not None:
-            return "[spring] equilibrium", self.spring.equilibrium
+        if self.lower is not None:
+            top = self.initial_top
+            return None if top is None else (f"[spring] {'equilibrium' if self.spring else 'displacement'}", top)
         return None if self.stop is None else ("[stop] position", self.stop.position)
+
+    @property
+    def initial_top(self) -> float | None:
+        """Where the lower end is at the start [m]; of our spring Ψ."""
+        if self.lower is None:
+            return None
+        return self.lower.equilibrium if isinstance(self.lower, Spring) else self.lower.start
 
     @property
     def initial_tip(self) -> float | None:
         """u_tip at the start [m]: s₀ L, or the static deflection of a beam let go without inertia and damping."""
-        if (beam := self.beam) is None:
-            return None
+        if (beam := self.upper) is None or not isinstance(beam, Beam):
+            return None if beam is None else beam.start
         if beam.fidelity == "quasi_static" and beam.approach == "elastic" and beam.alpha_b == 0.0:
             return tip_load_deflection(beam)
         return beam.initial_deflection_slope * beam.length
 
     @property
     def initial_clearance(self) -> float | None:
-        """Height [m] of the tip above `tip_target` at the start, 0 where only rounding separates them."""
+        """Height [m] of the upper end above `tip_target` at the start, 0 where only rounding separates them."""
         tip = self.initial_tip
         if tip is None or self.tip_target is None:
             return None

@@ -65,7 +65,7 @@ class Ways(NamedTuple):
 
 
 class Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True, serialize_by_alias=True)
 
     WAYS: ClassVar[tuple[Ways, ...]] = ()
     #: Keys that give the table its scales: of a table with none of them, those that are needed are 1 (dimensionless).

@@ -1,0 +1,132 @@
+"""Simple partners that need no FMU: a free mass, a mass on a linear spring and damper.
+
+They fit in either place. Each step is exact: the state with the polynomial force and the integrals is one linear
+system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H). What damping takes is the quadratic form
+∫ c ẋ² dτ = sᵀ W s, by W(2h) = W(h) + E(h)ᵀ W(h) E(h), E(h) = exp(A h).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.linalg import expm
+
+from .protocol import NO_FORCE, Body, Energies, Force, Motion
+from .rigid_wall import RigidWall
+
+_SIZES_REMEMBERED = 64
+#: Terms of the series of W over a step that A does not turn by more than 1.
+_TERMS = 20
+
+
+class SpringDamper(Body):
+    """m ẍ + c ẋ + k (x − x₀) = F + f, F being the force of the other body and of the foundation, upward.
+
+    Parameters
+    ----------
+    mass, stiffness, damping
+        m > 0 [kg], k [N/m], c [N·s/m].
+    rest
+        x₀, where the spring has no force [m].
+    displacement, velocity
+        x [m] and ẋ [m/s] at the start.
+    external_force
+        f, constant, upward [N].
+    """
+
+    REMEMBERED = ("_state", "_integrals", "_dissipated")
+
+    def __init__(
+        self,
+        mass: float,
+        stiffness: float = 0.0,
+        damping: float = 0.0,
+        rest: float = 0.0,
+        displacement: float = 0.0,
+        velocity: float = 0.0,
+        external_force: float = 0.0,
+    ) -> None:
+        self.mass, self._stiffness, self._damping, self._rest = mass, stiffness, damping, rest
+        self._load, self._sign = external_force, 1.0
+        self._state = (displacement, velocity)
+        self._integrals = (0.0, 0.0)
+        self._dissipated = 0.0
+        self._maps: dict[float, tuple[np.ndarray, np.ndarray | None]] = {}
+        self.mark()
+
+    def take_place(self, *, upper: bool) -> None:
+        self._sign = 1.0 if upper else -1.0
+
+    def mark(self) -> None:
+        self._marked = (self._state, self._integrals, self._dissipated)
+
+    def rewind(self) -> None:
+        self._state, self._integrals, self._dissipated = self._marked
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        forces = [self._sign * c + n for c, n in zip(contact, foundation, strict=True)]
+        forces[0] += self._load + self._stiffness * self._rest
+        step, lost = self._maps.get(size) or self._map(size)
+        start = np.array([*self._state, *forces, 0.0, 0.0])
+        x, v, once, twice = (step @ start).tolist()
+        if lost is not None:
+            self._dissipated += float(start @ lost @ start)
+        self._state, self._integrals = (x, v), (once, twice)
+        return self.motion()
+
+    def _map(self, size: float) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return the rows of exp(A H) of x, ẋ, ∫x, ∫∫x, shape (4, 7), and W, shape (7, 7), ``None`` undamped."""
+        A = np.zeros((7, 7))
+        A[0, 1] = A[2, 3] = A[3, 4] = A[5, 0] = A[6, 5] = 1.0
+        A[1, :3] = -self._stiffness / self.mass, -self._damping / self.mass, 1.0 / self.mass
+        lost = None
+        if self._damping > 0.0:
+            doublings = max(0, int(np.ceil(np.log2(size * np.abs(A).sum(axis=1).max()))) + 1)
+            h = size / 2**doublings
+            lost, term = np.zeros((7, 7)), np.zeros((7, 7))
+            term[1, 1] = self._damping
+            for n in range(1, _TERMS):
+                lost += term * h**n
+                term = (A.T @ term + term @ A) / (n + 1)
+            small = expm(A * h)
+            for _ in range(doublings):
+                lost, small = lost + small.T @ lost @ small, small @ small
+        if len(self._maps) >= _SIZES_REMEMBERED:
+            self._maps.clear()
+        found = self._maps[size] = (expm(A * size)[[0, 1, 5, 6]], lost)
+        return found
+
+    def motion(self) -> Motion:
+        return Motion(*self._state, *self._integrals)
+
+    def energies(self) -> Energies:
+        x, v = self._state
+        stretched = x - self._rest
+        return Energies(
+            0.5 * self.mass * v * v, 0.5 * self._stiffness * stretched**2, self._dissipated, -self._load * x
+        )
+
+    def apply_impulse(self, impulse: float) -> None:
+        x, v = self._state
+        self._state = (x, v + impulse / self.mass)
+
+    def holding_force(self, displacement: float, velocity: float) -> float:
+        return self._stiffness * (displacement - self._rest) + self._damping * velocity - self._load
+
+
+class PointMass(SpringDamper):
+    """A free mass, m ẍ = F + f; parameters as of `SpringDamper`."""
+
+    def __init__(
+        self, mass: float, displacement: float = 0.0, velocity: float = 0.0, external_force: float = 0.0
+    ) -> None:
+        super().__init__(mass, displacement=displacement, velocity=velocity, external_force=external_force)
+
+
+#: The elements by their names in a scene; the keys of their tables are the parameters.
+ELEMENTS: dict[str, Callable[..., Body]] = {
+    "point_mass": PointMass,
+    "spring_damper": SpringDamper,
+    "rigid_wall": RigidWall,
+}

@@ -1,0 +1,231 @@
+"""An FMU that others made as a body: what it lacks is made up for where that is possible, elsewhere refused by name.
+
+* No velocity: the mean over the last step.
+* No integrals: at degree 0, where no scheme uses them, those of the cubic through the ends of the step (of the line
+  without velocities). At degrees 1 and 2 the step is made in four, which end on the nodes of Lobatto's rule: it is
+  exact where the displacement is a polynomial of degree 7, so that the error of a moment is of order 9. The velocity,
+  if it is not told, is then that of the polynomial through the nodes.
+* No energies: the body is booked with the work that it has received, W = ∫ F ẇ dτ. The ledger is then that of the
+  interface: the work of C on both ends and the energy of the law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+
+from ..scene.partners import ForeignFmu
+from . import force
+from .abilities import Abilities
+from .fmu import Fmu, FmuError
+from .fmu_bodies import FmuBody
+from .protocol import NO_FORCE, Body, BodyFailed, Energies, Force, Motion
+
+#: Corrections of a holding force; the velocity that it may leave, and the displacement, over those without it.
+_MAX_CORRECTIONS, _AT_REST, _STAYS = 20, 1e-12, 1e-6
+#: An impulse that changes the velocity by less than this share is rounding.
+_NO_IMPULSE = 1e-12
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What `springbeam.bodies.probe` has found out about an FMU."""
+
+    abilities: Abilities
+    mass: float  #: that a force meets at first [kg]
+    velocity: float  #: at the start [m/s]
+    faults: tuple[str, ...] = ()  #: what it says, or a scene says of it, and is not so
+
+
+#: Lobatto's rule of five nodes on [0, 1]: nodes, weights; and weights of the slope at 1 of the polynomial through them.
+_NODES = np.array([0.0, 0.5 - sqrt(3.0 / 28.0), 0.5, 0.5 + sqrt(3.0 / 28.0), 1.0])
+_ONCE = np.array([0.05, 49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0, 0.05])
+_TWICE = _ONCE * (1.0 - _NODES)
+_SLOPE = np.linalg.solve(np.vander(_NODES, increasing=True).T, np.arange(5.0))
+
+
+class ForeignBody(FmuBody):
+    """A foreign FMU in either place.
+
+    Parameters
+    ----------
+    spec
+        Its table.
+    start_time
+        [s].
+    found
+        What was found out about it.
+    by_substeps
+        Whether moments are found by substeps.
+    """
+
+    REMEMBERED = (*FmuBody.REMEMBERED, "received", "_size", "_time")
+
+    def __init__(self, spec: ForeignFmu, start_time: float, found: Findings, by_substeps: bool) -> None:
+        self._spec, self._found, self._by_substeps = spec, found, by_substeps
+        self.abilities, self.repeatable = found.abilities, found.abilities.state
+        names = (spec.displacement, spec.velocity, spec.integral, spec.integral_2)
+        self._MOTION = tuple(name for name in names if name is not None)
+        self._at = [None if name is None else self._MOTION.index(name) for name in names]
+        self._ENERGIES = tuple(name for name in spec.energies if name is not None) if found.abilities.energies else ()
+        self._IMPULSE = () if spec.impulse is None else (spec.impulse,)
+        self._FORCES, self._SLOPES = (spec.force,), found.abilities.slopes
+        self._KEEPS_SLOPES = self._SLOPES > 0
+        self._upward = 1.0
+        #: Work of all forces and impulses on the end so far [J].
+        self.received = self._marked_received = 0.0
+        self._size = 0.0  #: of the last step [s]
+        self._time = self._marked_time = start_time  #: of the present state [s]
+        self._held: dict[float, float] = {}  #: holding forces [N] by displacement [m]
+        check_names(fmu := Fmu(None, Path(spec.fmu), spec.parameters, start_time), spec)
+        super().__init__(fmu)
+
+    def take_place(self, *, upper: bool) -> None:
+        self._upward = 1.0 if upper else -1.0
+
+    def start_as_fast_as(self, other: Body) -> None:
+        """Start with the velocity of ``other``, to which it is tied, where its own is not told but measured."""
+        if not self.abilities.velocity:
+            self._current = self._current._replace(velocity=other.motion().velocity)
+
+    def _mass(self) -> float:
+        return self._spec.mass or self._found.mass
+
+    def mark(self) -> None:
+        if self.repeatable:
+            super().mark()
+        else:
+            self.fmu.moved = False
+        self._marked_received, self._marked_time = self.received, self._time
+
+    def rewind(self) -> None:
+        if self.fmu.moved:
+            if not self.repeatable:
+                raise BodyFailed(f"{self.fmu.path}: a step had to be repeated, and its state cannot be restored")
+            super().rewind()
+            self.received, self._time = self._marked_received, self._marked_time
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        c, dc, ddc = (x - y for x, y in zip(contact, foundation, strict=True))
+        sign, start = self._spec.force_sign, self._current
+        inputs = (sign * c, sign * dc, sign * ddc)
+        end = self._in_parts(time, size, inputs) if self._by_substeps else self._part(time, size, inputs)
+        self._time, self._size = time + size, size
+        up = self._upward
+        self.received += force.work_on((up * c, up * dc, up * ddc), start, end, size)
+        return end
+
+    def _part(self, time: float, size: float, inputs: Force) -> Motion:
+        struck, self._size = self._pending != 0.0, size
+        end = self._advance(time, size, inputs)
+        if struck:
+            self._impulse.set((0.0,))  # should the FMU not take it as used up
+        return end
+
+    def _in_parts(self, time: float, size: float, inputs: Force) -> Motion:
+        places = [self._current.displacement]
+        for begin, until in pairwise((size * _NODES).tolist()):
+            end = self._part(time + begin, until - begin, force.shifted(inputs, begin))
+            places.append(end.displacement)
+        x = np.array(places)
+        velocity = end.velocity if self.abilities.velocity else float(_SLOPE @ x) / size
+        self._current = end = Motion(x[-1].item(), velocity, size * float(_ONCE @ x), size**2 * float(_TWICE @ x))
+        return end
+
+    def apply_impulse(self, impulse: float) -> None:
+        if not self._IMPULSE:
+            if abs(impulse) <= _NO_IMPULSE * self.mass * abs(self._current.velocity):
+                return
+            raise BodyFailed(f"{self.fmu.path}: cannot take an impulse of {impulse:.6g} N·s, it has no input for one")
+        before = self._current.velocity
+        super().apply_impulse(impulse)
+        self.received += 0.5 * impulse * (before + self._current.velocity)
+
+    def _read_motion(self) -> Motion:
+        if None not in self._at:
+            return super()._read_motion()
+        told, size = self._motion.get(), self._size
+        w, v, once, twice = (None if at is None else told[at] for at in self._at)
+        assert w is not None
+        if size == 0.0:
+            motion = Motion(w, self._found.velocity if v is None else v, once or 0.0, twice or 0.0)
+        else:
+            w0, v0 = self._current[:2]
+            if v is None:
+                v0 = v = (w - w0) / size
+            first = size * 0.5 * (w0 + w) + size**2 * (v0 - v) / 12.0
+            second = size**2 * (7.0 * w0 + 3.0 * w) / 20.0 + size**3 * (v0 / 20.0 - v / 30.0)
+            motion = Motion(w, v, first if once is None else once, second if twice is None else twice)
+        return self._finite(motion)
+
+    def energies(self) -> Energies:
+        if not self.abilities.energies:
+            return Energies(0.0, self.received, 0.0, 0.0)
+        told = iter(self._stored())
+        return Energies(*(0.0 if name is None else next(told) for name in self._spec.energies))
+
+    def holding_force(self, displacement: float, velocity: float) -> float:
+        """Return the force that holds the end where it now rests, found by trial steps.
+
+        Raises BodyFailed if no constant force does, as where a body moves inside.
+        """
+        if (known := self._held.get(displacement)) is not None:
+            return known
+        size = self._size
+
+        def pushed(upward: float) -> Motion:
+            self.rewind()
+            return self.advance(self._time, size, NO_FORCE, (upward, 0.0, 0.0))
+
+        let_go = pushed(0.0)
+        last, left, found = 0.0, let_go.velocity, -self.mass * let_go.velocity / size
+        for _ in range(_MAX_CORRECTIONS):
+            end = pushed(found)
+            if abs(end.velocity) <= _AT_REST * abs(let_go.velocity) or end.velocity == left:
+                break
+            last, left, found = found, end.velocity, found - end.velocity * (found - last) / (end.velocity - left)
+        self.rewind()
+        fallen = abs(let_go.displacement - displacement)
+        if abs(end.displacement - displacement) > _STAYS * fallen and abs(end.velocity) > _STAYS * abs(let_go.velocity):
+            raise BodyFailed(
+                f"{self.fmu.path}: no constant force holds its end at rest on the foundation; use a [stop] restitution "
+                "of 1, which lets nothing come to rest, or leave [stop] out"
+            )
+        self._held[displacement] = found
+        return found
+
+
+def check_names(fmu: Fmu, spec: ForeignFmu) -> None:
+    """Raise FmuError, after closing it, if the FMU has not the variables that the scene names, or not as such."""
+    inputs = {"force": spec.force, "impulse": spec.impulse}
+    keys = ("displacement", "velocity", "integral", "integral_2")
+    outputs: Mapping[str, str | None] = {
+        **{key: getattr(spec, key) for key in keys},
+        **dict(
+            zip(
+                ("kinetic_energy", "potential_energy", "dissipated_energy", "load_potential"),
+                spec.energies,
+                strict=True,
+            )
+        ),
+    }
+    try:
+        for wanted, names in (("input", inputs), ("output", outputs)):
+            for key, name in names.items():
+                if name is None:
+                    continue
+                try:
+                    fmu.reference(name, "Real")
+                    causality = fmu.variable(name).causality
+                except FmuError as error:
+                    raise FmuError(f"{error}; it is the scene's {key}") from None
+                if causality != wanted and (causality, wanted) != ("local", "output"):
+                    raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
+    except BaseException:
+        fmu.close()
+        raise

@@ -1,0 +1,112 @@
+"""Bodies that take the place of our beam or our spring: an FMU that others made, or an element of a few keys.
+
+``[beam]`` is the body whose end is above, ``[spring]`` the one below. Either table is our own body, or, by its key
+``fmu`` or ``element``, one of these.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Tag
+
+from .tables import Beam, Spring, Table, key
+
+
+class ForeignFmu(Table):
+    """An FMI 2.0 co-simulation FMU with one end that a force moves, and the names of its variables.
+
+    What has no name decides what can be offered: `springbeam.bodies.abilities`.
+    """
+
+    fmu: str = key("–", "the file; relative to the scene's")
+    force: str = key("N", "input: the contact force, which presses the lower body down and lifts the upper one")
+    force_sign: Literal[1, -1] = key("–", "-1 where a positive input does the opposite", 1)
+    displacement: str = key("m", "output, upward")
+    velocity: str | None = key("m/s", "output", None)
+    integral: str | None = key("m·s", "output: ∫ x dτ over the last step, 0 at its start", None)
+    integral_2: str | None = key("m·s²", "output: ∫∫ x dτ dτ over the last step", None)
+    impulse: str | None = key("N·s", "input, upward, applied at the start of the next step", None)
+    mass: float | None = key(
+        "kg", "what an impulse or a force meets at first", None, gt=0.0, otherwise="it is measured"
+    )
+    kinetic_energy: str | None = key("J", "output", None)
+    potential_energy: str | None = key("J", "output", None)
+    dissipated_energy: str | None = key("J", "output, since the start", None)
+    load_potential: str | None = key("J", "output: −(work of loads inside)", None)
+    parameters: dict[str, float | int | bool | str] = key("–", "values of the FMU's parameters, by name", {})
+
+    @property
+    def start(self) -> None:
+        """Where the end is at the start: only the FMU knows."""
+        return
+
+    @property
+    def energies(self) -> tuple[str | None, ...]:
+        """Names of the energies, in the order of `springbeam.bodies.protocol.Energies`."""
+        return (self.kinetic_energy, self.potential_energy, self.dissipated_energy, self.load_potential)
+
+
+class PointMass(Table):
+    """A free mass, m ẍ = ± C + N + f."""
+
+    element: Literal["point_mass"] = key("–", "a free mass")
+    mass: float = key("kg", "mass m", gt=0.0)
+    displacement: float = key("m", "where it is at the start", 0.0)
+    velocity: float = key("m/s", "velocity at the start, upward", 0.0)
+    external_force: float = key("N", "constant force f, upward", 0.0)
+
+    @property
+    def start(self) -> float:
+        """Where the end is at the start [m]."""
+        return self.displacement
+
+
+class SpringDamper(PointMass):
+    """A mass on a linear spring and damper, m ẍ + c ẋ + k (x − x₀) = ± C + N + f."""
+
+    element: Literal["spring_damper"] = key("–", "a mass on a linear spring and damper")  # type: ignore[assignment]
+    stiffness: float = key("N/m", "stiffness k", ge=0.0)
+    damping: float = key("N·s/m", "damping c", 0.0, ge=0.0)
+    rest: float = key("m", "where the spring has no force, x₀", 0.0)
+
+
+class RigidWall(Table):
+    """An end that is held at rest, whatever acts on it."""
+
+    element: Literal["rigid_wall"] = key("–", "an end that nothing moves")
+    position: float = key("m", "where it is", 0.0)
+
+    @property
+    def start(self) -> float:
+        """Where the end is [m]."""
+        return self.position
+
+
+Element = PointMass | SpringDamper | RigidWall
+Partner = ForeignFmu | Element
+#: The tables of partners by what names them: the key ``fmu``, or the value of ``element``.
+PARTNERS: dict[str, type[Table]] = {
+    "fmu": ForeignFmu,
+    "point_mass": PointMass,
+    "spring_damper": SpringDamper,
+    "rigid_wall": RigidWall,
+}
+OWN = "own"
+
+
+def kind_of(table: Any) -> str:
+    """Return which body a table describes: a key of `PARTNERS`, `OWN`, or an ``element`` that there is not."""
+    if not isinstance(table, dict):
+        return next((kind for kind, model in PARTNERS.items() if type(table) is model), OWN)
+    return "fmu" if "fmu" in table else str(table["element"]) if "element" in table else OWN
+
+
+_Partners = (
+    Annotated[ForeignFmu, Tag("fmu")]
+    | Annotated[PointMass, Tag("point_mass")]
+    | Annotated[SpringDamper, Tag("spring_damper")]
+    | Annotated[RigidWall, Tag("rigid_wall")]
+)
+UpperBody = Annotated[Annotated[Beam, Tag(OWN)] | _Partners, Discriminator(kind_of)]
+LowerBody = Annotated[Annotated[Spring, Tag(OWN)] | _Partners, Discriminator(kind_of)]

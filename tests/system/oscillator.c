@@ -1,0 +1,126 @@
+/* A mass on a spring and damper, m a + c v + k x = sign * F + load, as an FMI 2.0 co-simulation FMU in plain C.
+ * Taylor series of the linear equation: exact to rounding for a force quadratic in time. `lie` makes it lie. */
+#include <stdlib.h>
+#include <string.h>
+
+typedef enum { OK, WARNING, DISCARD, ERROR } Status;
+enum { FORCE, IMPULSE, X, V, I1, I2, KINETIC, POTENTIAL, DISSIPATED, LOAD_POTENTIAL, MASS, K, C, LOAD, X0, V0, SIGN, LIE, N };
+enum { HONEST, STATE, VELOCITY, INTEGRAL, SLOPES, HANG, CRASH, NAN_OUT, ENERGY, INTEGRAL_2 };
+typedef struct { double r[N], slope, bend; unsigned calls; } Fmu;
+
+#define API __attribute__((visibility("default")))
+API const char *fmi2GetTypesPlatform(void) { return "default"; }
+API const char *fmi2GetVersion(void) { return "2.0"; }
+API Status fmi2SetDebugLogging(void *c, int on, size_t n, const char *const names[]) { return OK; }
+static void initial(Fmu *f) {
+    memset(f, 0, sizeof *f);
+    f->r[MASS] = f->r[SIGN] = 1.0;
+}
+API void *fmi2Instantiate(const char *name, int type, const char *guid, const char *where, const void *callbacks, int v, int l) {
+    Fmu *f = malloc(sizeof *f);
+    initial(f);
+    return f;
+}
+API void fmi2FreeInstance(void *c) { free(c); }
+API Status fmi2SetupExperiment(void *c, int t, double tol, double start, int s, double stop) { return OK; }
+static void outputs(Fmu *f) {
+    double *r = f->r;
+    r[KINETIC] = 0.5 * r[MASS] * r[V] * r[V] * (r[LIE] == ENERGY ? 2.0 : 1.0);
+    r[POTENTIAL] = 0.5 * r[K] * r[X] * r[X];
+    r[LOAD_POTENTIAL] = -r[LOAD] * r[X];
+}
+API Status fmi2EnterInitializationMode(void *c) { return OK; }
+API Status fmi2ExitInitializationMode(void *c) {
+    Fmu *f = c;
+    f->r[X] = f->r[X0], f->r[V] = f->r[V0];
+    outputs(f);
+    return OK;
+}
+API Status fmi2Terminate(void *c) { return OK; }
+API Status fmi2Reset(void *c) { initial(c); return OK; }
+API Status fmi2GetReal(void *c, const unsigned vr[], size_t n, double value[]) {
+    Fmu *f = c;
+    for (size_t i = 0; i < n; ++i) {
+        value[i] = f->r[vr[i]];
+        if (vr[i] == V && f->r[LIE] == VELOCITY) value[i] *= 1.1;
+        if (vr[i] == I1 && f->r[LIE] == INTEGRAL) value[i] *= 2.0;
+        if (vr[i] == I2 && f->r[LIE] == INTEGRAL_2) value[i] *= 2.0;
+        if (vr[i] == X && f->r[LIE] == NAN_OUT && f->calls > 2) value[i] = 0.0 / 0.0;
+    }
+    return OK;
+}
+API Status fmi2SetReal(void *c, const unsigned vr[], size_t n, const double value[]) {
+    Fmu *f = c;
+    for (size_t i = 0; i < n; ++i) f->r[vr[i]] = value[i];
+    return OK;
+}
+#define NONE(kind, type) \
+    API Status fmi2Get##kind(void *c, const unsigned vr[], size_t n, type value[]) { return ERROR; } \
+    API Status fmi2Set##kind(void *c, const unsigned vr[], size_t n, const type value[]) { return ERROR; }
+NONE(Integer, int) NONE(Boolean, int) NONE(String, char *)
+API Status fmi2SetRealInputDerivatives(void *c, const unsigned vr[], size_t n, const int order[], const double value[]) {
+    Fmu *f = c;
+    if (f->r[LIE] == SLOPES) return OK;
+    for (size_t i = 0; i < n; ++i) *(order[i] == 1 ? &f->slope : &f->bend) = value[i];
+    return OK;
+}
+API Status fmi2GetRealOutputDerivatives(void *c, const unsigned vr[], size_t n, const int o[], double v[]) { return ERROR; }
+API Status fmi2DoStep(void *c, double time, double H, int no_set) {
+    Fmu *f = c;
+    double *r = f->r, h = H, rate = (r[C] + 1.0) / r[MASS] + r[K] / r[MASS] + 1.0;
+    if (++f->calls > 2 && r[LIE] == HANG) for (volatile int i = 1; i;) {}
+    if (f->calls > 2 && r[LIE] == CRASH) *(volatile int *)0 = 0;
+    r[V] += r[IMPULSE] / r[MASS];
+    r[IMPULSE] = r[I1] = r[I2] = 0.0;
+    double at = r[SIGN] * r[FORCE] + r[LOAD], slope = r[SIGN] * f->slope, bend = r[SIGN] * f->bend;
+    int parts = 1;
+    while (h * h * rate > 0.25 || h * rate > 0.5) h *= 0.5, parts *= 2;
+    for (int i = 0; i < parts; ++i) {
+        /* x = sum a_j t^j; (j+2)(j+1) m a_{j+2} = F_j - c (j+1) a_{j+1} - k a_j */
+        double a[26] = {r[X], r[V]}, F[24] = {at, slope, bend / 2}, x = 0, v = 0, once = 0, twice = 0, vv = 0;
+        for (int j = 0; j < 24; ++j) a[j + 2] = (F[j] - r[C] * (j + 1) * a[j + 1] - r[K] * a[j]) / (r[MASS] * (j + 1) * (j + 2));
+        for (int j = 25; j >= 0; --j) {
+            x = x * h + a[j], once = once * h + a[j] / (j + 1), twice = twice * h + a[j] / ((j + 1) * (j + 2));
+            if (j) v = v * h + j * a[j];
+        }
+        once *= h, twice *= h * h;
+        /* the integral of v^2, by 12-point sums of the Taylor coefficients */
+        for (int j = 40; j >= 0; --j) {
+            double s = 0;
+            for (int k = j > 24 ? j - 24 : 0; k <= j && k <= 24; ++k) s += (k + 1) * a[k + 1] * (j - k + 1) * a[j - k + 1];
+            vv = vv * h + s / (j + 1);
+        }
+        r[DISSIPATED] += r[C] * vv * h;
+        r[I2] += r[I1] * h + twice, r[I1] += once;
+        r[X] = x, r[V] = v;
+        at += h * (slope + 0.5 * h * bend), slope += h * bend;
+    }
+    outputs(f);
+    return OK;
+}
+API Status fmi2CancelStep(void *c) { return ERROR; }
+API Status fmi2GetStatus(void *c, int k, int *v) { return DISCARD; }
+API Status fmi2GetRealStatus(void *c, int k, double *v) { return DISCARD; }
+API Status fmi2GetIntegerStatus(void *c, int k, int *v) { return DISCARD; }
+API Status fmi2GetBooleanStatus(void *c, int k, int *v) { return DISCARD; }
+API Status fmi2GetStringStatus(void *c, int k, const char **v) { return DISCARD; }
+API Status fmi2GetFMUstate(void *c, void **state) {
+    if (!*state) *state = malloc(sizeof(Fmu));
+    memcpy(*state, c, sizeof(Fmu));
+    return OK;
+}
+API Status fmi2SetFMUstate(void *c, void *state) {
+    Fmu *f = c, before = *f;
+    memcpy(f, state, sizeof *f);
+    if (f->r[LIE] == STATE) f->r[V] = before.r[V]; /* forgets the velocity */
+    return OK;
+}
+API Status fmi2FreeFMUstate(void *c, void **state) { free(*state); *state = NULL; return OK; }
+API Status fmi2SerializedFMUstateSize(void *c, void *state, size_t *n) { *n = sizeof(Fmu); return OK; }
+API Status fmi2SerializeFMUstate(void *c, void *state, char bytes[], size_t n) { memcpy(bytes, state, n); return OK; }
+API Status fmi2DeSerializeFMUstate(void *c, const char bytes[], size_t n, void **state) {
+    if (!*state) *state = malloc(sizeof(Fmu));
+    memcpy(*state, bytes, n);
+    return OK;
+}
+API Status fmi2GetDirectionalDerivative(void *c, const unsigned u[], size_t n, const unsigned k[], size_t m, const double d[], double v[]) { return ERROR; }
