@@ -12,6 +12,7 @@ from scenes import scene_from_dict
 
 import springbeam
 from springbeam.scene import Scene, SceneError, load_scene, reference, shipped_scenes, suspicions, with_changes
+from springbeam.scene.partners import PARTNERS
 from springbeam.scene.unit import UNIT_BEAM
 
 PAIR = """

@@ -254,7 +254,8 @@ def _told_and_due(spec: ForeignFmu, path: Sequence[Sample], h: float, force: flo
     curved = 1.0 if spec.velocity else 0.0
     wrong = {}
     due = sum(0.5 * h * (a.v + b.v) for a, b in steps)
-    if spec.velocity and abs(moved - due) > _TOLERANCE * change + _ROUNDING * reach:
+    off = sum(abs(b.x - a.x - 0.5 * h * (a.v + b.v)) for a, b in steps)
+    if spec.velocity and off > _TOLERANCE * change + _ROUNDING * reach * len(steps):
         wrong["velocity"] = (
             f"velocity {spec.velocity!r} is not the rate of displacement {spec.displacement!r}: {here} that moves by "
             f"{moved:.6g} m, and the integral of the velocity is {due:.6g} m"
@@ -280,7 +281,8 @@ def _told_and_due(spec: ForeignFmu, path: Sequence[Sample], h: float, force: flo
     work, gained = force * moved, path[-1].energy - path[0].energy
     if spec.kinetic_energy and spec.potential_energy:
         largest = max(abs(s.energy) for s in path)
-        if abs(gained - work) > _TOLERANCE * abs(work) + _ROUNDING * largest:
+        off = sum(abs(b.energy - a.energy - force * (b.x - a.x)) for a, b in steps)
+        if off > _TOLERANCE * abs(force) * change + _ROUNDING * largest * len(steps):
             wrong["energies"] = (
                 f"the energies named do not account for the work on the end: {here} that is {work:.6g} J, they gain "
                 f"{gained:.6g} J; name dissipated_energy and load_potential as well, or no energies"

@@ -7,28 +7,56 @@ import shutil
 import sys
 import textwrap
 import zipfile
+from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
+from rich.table import Table
 from rich.text import Text
 
+from ..bodies.abilities import OFFERED, refusals
 from ..bodies.archive import fmu_directory
+from ..bodies.factory import findings
 from ..bodies.fmu import FmuError
 from ..bodies.fmu_bodies import FmuBeam, FmuSpring
+from ..scene import Scene, load_scene
+from ..scene.partners import kind_of
 from ..scene.unit import unit_beam, unit_spring
-from .common import DISAGREES, JsonOption, console_for, print_json
+from .common import (
+    BAD_INPUT,
+    DISAGREES,
+    JsonOption,
+    SettingsOption,
+    bad_input_reported,
+    console_for,
+    fail,
+    print_json,
+)
 
 _REQUIRED = ("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly")
 _FOR_SWEEPS = ("distributed", "pyarrow")
 
 
-def doctor(as_json: JsonOption = False) -> None:
+def doctor(
+    scene: Annotated[
+        str | None, typer.Argument(metavar="[SCENE]", help="Examine the FMUs that this scene names instead.")
+    ] = None,
+    settings: SettingsOption = None,
+    as_json: JsonOption = False,
+) -> None:
     """Show versions, and whether the FMUs are found and can be loaded here. Exit code 1 if they cannot.
 
-    Example: springbeam doctor
+    With a scene, examine the FMUs of others that it names, and show what they can do and what that allows. Exit code 2
+    if one is not what the scene or itself says, or cannot do what the scene asks for.
+
+    Example: springbeam doctor my-scene.toml
     """
+    if scene is not None:
+        with bad_input_reported():
+            _examine(load_scene(scene, settings or ()), as_json)
+        return
     found = _found()
     if as_json:
         print_json(found)
@@ -56,6 +84,39 @@ def doctor(as_json: JsonOption = False) -> None:
         line(f"{name}.fmu", f"{state}\n{'':<12}{fmu['error'] or fmu['path']}")
     if any(fmu["error"] is not None for fmu in found["fmus"].values()):
         raise typer.Exit(DISAGREES)
+
+
+def _examine(scene: Scene, as_json: bool) -> None:
+    """Print what the bodies of ``scene`` can do; end the command if the scene cannot be run with them."""
+    found = findings(scene)
+    bodies = {"beam": scene.upper, "spring": scene.lower}
+    console = console_for(silent=as_json)
+    for name, body in bodies.items():
+        if body is None:
+            continue
+        finding = found.get(name)
+        if finding is None:
+            console.print(Text(f"[{name}] {kind_of(body).replace('_', ' ')}: everything is offered"))
+            continue
+        path, told = scene.foreign[name].fmu, asdict(finding.abilities)
+        mass = scene.foreign[name].mass
+        console.print(Text(f"[{name}] {path}", style="bold"), soft_wrap=True)
+        given = f"{finding.mass:.9g} kg" + (" (measured)" if mass is None else f" measured, {mass:.9g} kg given")
+        console.print(Text(f"mass that a force or an impulse meets: {given}"))
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for header in ("", "capability", "shown by", "what is offered"):
+            table.add_column(header)
+        for key, shown_by, having, lacking in OFFERED:
+            there = told[key] > 0
+            table.add_row("yes" if there else "no", key, shown_by, Text(having if there else lacking))
+        console.print(table)
+    faults = [fault for finding in found.values() for fault in finding.faults]
+    refused = refusals(scene, {table: finding.abilities for table, finding in found.items()})
+    if as_json:
+        print_json({"bodies": {name: asdict(finding) for name, finding in found.items()}, "refused": refused})
+    if faults or refused:
+        fail(BAD_INPUT, "\n".join([*faults, *refused]))
+    console.print("The checks found nothing wrong, and the scene can be run.")
 
 
 def _found() -> dict[str, Any]:

@@ -30,6 +30,8 @@ def choice(scene: Scene) -> Choice:
     beam, coupling = scene.beam, scene.coupling
     if scene.contact.law == "paper":
         return Choice("energy", 0, 'contact.law = "paper"')
+    if scene.partners:
+        return Choice("energy", _told(scene), "a body that is not our own")
     if beam is None:
         return Choice("energy", 0, "one body")
     if beam.integrator != "modal":
@@ -50,6 +52,12 @@ def choice(scene: Scene) -> Choice:
     if slowest * H <= TURN:
         return Choice("energy", 2, f"ω_max H = {fastest * H:.3g} > {STABLE:g}")
     return Choice("energy", 0, f"ω₁H = {slowest * H:.3g} > {TURN:g}")
+
+
+def _told(scene: Scene) -> int:
+    """Return the highest degree that the bodies' tables speak of: of a foreign FMU, by its integrals."""
+    integrals = [(body.integral, body.integral_2) for body in scene.foreign.values()]
+    return min((2 if all(names) else 0 for names in integrals), default=2)
 
 
 def decided(scene: Scene) -> tuple[Scene, Choice | None]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from .loads import Load
-from .partners import ForeignFmu, LowerBody, UpperBody
+from .partners import ForeignFmu, LowerBody, Partner, UpperBody
 from .statics import tip_compliance, tip_load_deflection
 from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time, key
 
@@ -62,10 +62,15 @@ class Scene(Table):
         return self.upper is not None and self.lower is not None
 
     @property
+    def partners(self) -> dict[str, Partner]:
+        """The bodies that are not our own, by table."""
+        places = {"beam": self.upper, "spring": self.lower}
+        return {name: body for name, body in places.items() if not isinstance(body, (Beam, Spring, type(None)))}
+
+    @property
     def foreign(self) -> dict[str, ForeignFmu]:
         """The FMUs that others made, by table."""
-        places = {"beam": self.upper, "spring": self.lower}
-        return {name: body for name, body in places.items() if isinstance(body, ForeignFmu)}
+        return {name: body for name, body in self.partners.items() if isinstance(body, ForeignFmu)}
 
     @property
     def fmus(self) -> tuple[str, ...]:

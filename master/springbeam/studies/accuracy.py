@@ -45,8 +45,8 @@ _COUPLING_SHARE, _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-4, 1e-12, 1e-8
 #: IDA's absolute tolerance over its relative one and the range of the spring top.
 _IDA_ABSOLUTE = 1e-2
 
-#: Fewest macro steps, where bodies are coupled and where not.
-_FEWEST, _UNCOUPLED = 8, 4
+#: Fewest macro steps, where bodies are coupled and where not; of a first run with bodies whose motion nobody knows.
+_FEWEST, _UNCOUPLED, _PARTNERS = 8, 4, 64
 #: Growth of their number from run to run: at least, at most, after a run that gained energy, and after one that
 #: stopped for another reason, which may be gone at the next size.
 _LEAST_GROWTH, _MOST_GROWTH, _AFTER_GAIN, _AFTER_STOP = 1.2, 4.0, 1.4, 1.01
@@ -240,13 +240,13 @@ class _Search:
     def _first(self) -> float:
         """Return the number of macro steps of the first run."""
         beam, spring, span = self._scene.beam, self._scene.spring, self._span
-        if (beam is None or spring is None) and self._scene.stop is None and not self._scene.loads:
+        if not self._scene.coupled and self._scene.stop is None and not self._scene.loads:
             return _UNCOUPLED  # exact but for IDA
         of_load = max((load.rate for load in self._scene.loads), default=0.0)
         of_spring = max(of_load, 0.0 if spring is None else spring_frequency(self._scene))
         if beam is None:
-            return _rung(of_spring * span / _SPRING_ALONE)
-        if self._softly:
+            return _rung(max(of_spring * span / _SPRING_ALONE, _PARTNERS if self._scene.partners else 0.0))
+        if self._softly and not self._scene.partners:
             return _rung(max(contact_frequency(self._scene), of_spring) * span / (_CONTACT_TURN * self._accuracy**0.25))
         if beam.fidelity == "quasi_static":
             assert spring is not None
@@ -254,7 +254,7 @@ class _Search:
         waves = min(shear_frequency(beam), fastest_frequency(beam))
         if beam.alpha_b > 0.0:
             waves = min(waves, _DIES_OUT / beam.alpha_b)
-        turn = _BEAM_ALONE if spring is None else _TURN * self._accuracy ** (1.0 / _ORDER)
+        turn = _BEAM_ALONE if self._scene.lower is None else _TURN * self._accuracy ** (1.0 / _ORDER)
         return _rung(max(waves, of_spring) * span / turn)
 
     def _second(self, first: _Pilot) -> float:

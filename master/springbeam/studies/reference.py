@@ -15,6 +15,11 @@ PERTURBATION, _GROWTH = 1e-7, 1e4
 
 def refuse_without_reference(scene: Scene) -> None:
     """Raise SceneError if `event_driven` is not defined for ``scene``; the message says what is."""
+    for table, body in scene.partners.items():
+        raise SceneError(
+            f"[{table}] {'fmu' if table in scene.foreign else 'element'}: no reference knows this body, a "
+            f"{type(body).__name__}; springbeam run --accuracy compares runs of smaller and smaller steps instead"
+        )
     if scene.contact.law == "transmission" and scene.contact.impact == "rest" and scene.beam and scene.spring:
         raise SceneError("contact.impact = 'rest': a rigid tie has no reference there; take 'inelastic' or 'tip'")
     if scene.contact.law == "compliance" and scene.beam and scene.beam.fidelity == "quasi_static":

@@ -75,6 +75,7 @@ def predict(scene: Scene) -> Prediction:
     """Predict the coupling of ``scene`` (no FMU is loaded)."""
     H = scene.coupling.H
     notes = suspicions(scene)
+    notes += [f"[{table}] is not our own body: its frequencies are not known beforehand" for table in scene.partners]
     if scene.accuracy is not None:
         notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")
     modal = None

@@ -1,0 +1,261 @@
+"""FMUs that others made, and elements, in the places of beam and spring: exact solutions, and what is refused."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import oscillator
+import pytest
+from commands import command
+from scipy.linalg import expm
+
+from springbeam import SceneError, simulate, with_changes
+from springbeam.bodies import probe
+from springbeam.bodies.factory import findings
+from springbeam.bodies.fmu import FmuError
+from springbeam.scene import scene_from_dict
+
+M1, M2, K, C, V = 2.0, 3.0, 40.0, 0.2, -0.3
+STIFFNESS, DAMPING = 50.0, 0.1
+#: Names that a scene may leave out, each with what stands on it.
+WITHOUT = {
+    "nothing": (),
+    "integrals": ("integral", "integral_2"),
+    "integrals, velocity, impulse": ("integral", "integral_2", "velocity", "impulse"),
+}
+ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy", "load_potential")
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("foreign")
+
+    @functools.cache
+    def make(name: str = "oscillator", **flags: bool) -> str:
+        return str(oscillator.made(folder / f"{name}.fmu", **flags))
+
+    return make
+
+
+def pair(path: str, **changes: dict) -> object:
+    """A mass with the velocity V on a foreign oscillator, linked."""
+    names = {**oscillator.ALL, "fmu": path, "force_sign": -1, "parameters": {"m": M2, "k": K, "c": C}}
+    scene = scene_from_dict(
+        {
+            "time": {"t_end": 1.0},
+            "beam": {"element": "point_mass", "mass": M1, "velocity": V},
+            "spring": names,
+            "contact": {"law": "link", "stiffness": STIFFNESS, "damping": DAMPING},
+            "coupling": {"degree": 2, "macro_step": 0.02},
+        }
+    )
+    return with_changes(scene, **changes)
+
+
+def linked(times: np.ndarray) -> np.ndarray:
+    """The exact displacements of both ends, shape (2, n)."""
+    k, c = STIFFNESS, DAMPING
+    mass = np.diag([M1, M2])
+    A = np.zeros((4, 4))
+    A[:2, 2:] = np.eye(2)
+    A[2:, :2] = -np.linalg.solve(mass, [[k, -k], [-k, k + K]])
+    A[2:, 2:] = -np.linalg.solve(mass, [[c, -c], [-c, c + C]])
+    return np.array([expm(A * t)[:2, 2] * V for t in times]).T
+
+
+def tied(times: np.ndarray, velocity: float) -> np.ndarray:
+    """The exact displacement of both ends as one."""
+    A = np.array([[0.0, 1.0], [-K / (M1 + M2), -C / (M1 + M2)]])
+    return np.array([expm(A * t)[0, 1] * velocity for t in times])
+
+
+@pytest.mark.parametrize("without", WITHOUT)
+def test_link_and_tie_are_exact_and_keep_the_interface_energy(fmu, without):
+    spring = dict.fromkeys((*WITHOUT[without], *ENERGIES))
+    run = simulate(pair(fmu(), spring=spring))
+    assert np.abs(np.array([run.u_tip, run.y]) - linked(run.time)).max() < 1e-9
+    assert run.summary["max_energy_residual"] < 1e-12
+    # An end without an input for impulses starts as fast as the other.
+    start = 0.2 if "impulse" in spring else 0.0
+    common = start if "impulse" in spring else M1 * V / (M1 + M2)
+    parameters = {"m": M2, "k": K, "c": C, "v0": start}
+    scene = pair(
+        fmu(),
+        spring={**spring, "parameters": parameters},
+        beam={"velocity": start or V},
+        contact={"law": "tie", "stiffness": 1e4, "damping": 0.0},
+    )
+    run = simulate(scene)
+    for end in (run.u_tip, run.y):
+        assert np.abs(end - tied(run.time, common)).max() < 1e-12
+    assert run.summary["max_energy_residual"] < 1e-12
+    assert run.summary["warnings"] == []
+
+
+@pytest.mark.parametrize("without", WITHOUT)
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_orders_are_those_of_the_scheme_also_where_moments_come_from_substeps(fmu, without, degree):
+    spring = dict.fromkeys((*WITHOUT[without], *ENERGIES))
+    errors = []
+    for size in (0.04, 0.02):
+        run = simulate(pair(fmu(), spring=spring, coupling={"degree": degree, "macro_step": size}))
+        errors.append(np.abs(np.array([run.u_tip, run.y]) - linked(run.time)).max())
+    order = 2 * (degree + 1)
+    assert order - 0.3 < np.log2(errors[0] / errors[1]) < order + 0.3
+
+
+def test_two_foreign_fmus_are_the_elements_that_they_describe(fmu):
+    """The same pair four ways: either body an FMU or an element."""
+    above = {"fmu": fmu(), **oscillator.ALL, "parameters": {"m": M1, "v0": V}}
+    below = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
+    scenes = [pair(fmu()), pair(fmu(), spring=below), pair(fmu(), beam=above), pair(fmu(), beam=above, spring=below)]
+    runs = [simulate(scene) for scene in scenes]
+    for run in runs:
+        assert np.abs(np.array([run.u_tip, run.y]) - linked(run.time)).max() < 1e-10
+        assert run.summary["max_energy_residual"] < 1e-12
+
+
+def test_the_seated_force_is_the_body_s(fmu):
+    """A mass of weight 8 N on the foundation: it comes to rest, and the foundation bears it; k1 there is none."""
+    scene = pair(
+        fmu(),
+        beam={"element": "point_mass", "mass": 1e-3, "displacement": 5.0, "velocity": 0.0},
+        spring={"parameters": {"m": M2, "load": -8.0}},
+        stop={"position": -0.01, "restitution": 0.5},
+        contact={"law": "compliance", "stiffness": 1e4, "damping": 0.0, "exponent": 1.0},
+        coupling={"degree": 0},
+    )
+    run = simulate(scene)
+    assert [event.kind for event in run.events][-1] == "seated"
+    assert run["foundation_force"][-1] == pytest.approx(8.0, rel=1e-9)
+    assert run.y[-1] == pytest.approx(-0.01, rel=1e-12)
+    assert run.summary["max_energy_residual"] < 1e-9
+
+
+@pytest.mark.parametrize("scheme", ["jacobi", "gauss_seidel"])
+def test_without_state_saving_values_are_exchanged(fmu, scheme):
+    path, spring = fmu("plain", state=False, slopes=False), dict.fromkeys(ENERGIES)
+    errors = []
+    for size in (2e-3, 1e-3):
+        coupling = {"scheme": scheme, "degree": 0, "macro_step": size}
+        run = simulate(pair(path, spring=spring, coupling=coupling, contact={"damping": 0.0}))
+        assert run.summary["spring_rollbacks"] == 0
+        exact = simulate(pair(fmu(), contact={"damping": 0.0}, coupling={"macro_step": size}))
+        errors.append(np.abs(run.y - exact.y).max())
+    assert 0.9 < np.log2(errors[0] / errors[1]) < 1.1
+
+
+REFUSED = {
+    "state": ({"coupling": {"degree": 0}}, '[coupling] scheme = "energy"', "canGetAndSetFMUstate"),
+    "slopes": ({"coupling": {"scheme": "jacobi", "degree": 1}}, "[coupling] degree = 1", "canInterpolateInputs"),
+    "stop": ({"coupling": {"scheme": "jacobi", "degree": 0}, "stop": {"position": -1.0}}, "[stop]", "leave it out"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_a_missing_capability_is_named_with_what_would_work(fmu, what):
+    changes, *said = REFUSED[what]
+    with pytest.raises(SceneError) as caught:
+        simulate(pair(fmu("plain", state=False, slopes=False), contact={"damping": 0.0}, **changes))
+    assert all(text in str(caught.value) for text in said)
+    assert "[spring]" in str(caught.value)
+
+
+def test_what_a_missing_name_takes_is_refused(fmu):
+    with pytest.raises(SceneError, match=r'law = "transmission".*no impulse; use "compliance", "link" or "tie"'):
+        simulate(pair(fmu(), spring={"impulse": None}, contact={"law": "transmission", "damping": 0.0}))
+    tie = pair(fmu(), spring={"velocity": None}, contact={"law": "tie", "damping": 0.0}, coupling={"scheme": "hermite"})
+    with pytest.raises(SceneError, match=r'"hermite".*no velocity'):
+        simulate(tie)
+
+
+@pytest.mark.parametrize("lie", [name for name in oscillator.LIES if name not in ("none", "hang")])
+def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
+    parameters = {"m": M2, "k": K, "lie": oscillator.LIES[lie]}
+    said = {
+        "state": "canGetAndSetFMUstate = true, but",
+        "velocity": "velocity 'v' is not the rate",
+        "integral": "integral 'ix' is not that",
+        "integral_2": "integral_2 'ix2' is not that",
+        "slopes": "canInterpolateInputs = true, but",
+        "crash": "crashed (SIGSEGV) in fmi2DoStep",
+        "nan": "not finite",
+        "energy": "energies named do not account",
+    }
+    with pytest.raises(FmuError) as caught:
+        simulate(pair(fmu(), spring={"parameters": parameters}))
+    assert said[lie] in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_fmu_that_hangs_is_given_up(fmu, monkeypatch):
+    monkeypatch.setattr(probe, "PATIENCE", 4.0)
+    with pytest.raises(FmuError, match="fmi2DoStep has not returned within 4 s"):
+        simulate(pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["hang"]}}))
+
+
+NAMES = {
+    "no such input": ({"force": "G"}, "has no variable 'G'; it is the scene's force"),
+    "force is an output": ({"force": "x"}, "variable 'x' is output, and force must be an input"),
+    "velocity is an input": ({"velocity": "F"}, "variable 'F' is input, and velocity must be an output"),
+    "nearly": ({"velocity": "v0 "}, "did you mean 'v0'?"),
+    "no such parameter": ({"parameters": {"kk": 1.0}}, "has no variable 'kk'"),
+    "not a parameter": ({"parameters": {"x": 1.0}}, "variable 'x' is output, not a parameter"),
+    "text for a number": ({"parameters": {"k": "stiff"}}, "variable 'k' is Real"),
+    "wrong way": ({"force_sign": 1}, "set force_sign = -1"),
+    "wrong mass": ({"mass": 6.0}, "with the mass 6 kg it should be"),
+}
+
+
+@pytest.mark.parametrize("what", NAMES)
+def test_wrong_names_are_one_error(fmu, what):
+    change, said = NAMES[what]
+    with pytest.raises(FmuError) as caught:
+        simulate(pair(fmu(), spring=change))
+    assert said in str(caught.value)
+
+
+def test_the_mass_is_measured_as_well_as_it_needs_to_be(fmu):
+    for without in WITHOUT.values():
+        found = findings(pair(fmu(), spring=dict.fromkeys(without)))["spring"]
+        assert found.mass == pytest.approx(M2, rel=1e-11)
+
+
+def test_commands(fmu, tmp_path):
+    path = fmu()
+    text = f"""
+[time]
+t_end = 0.2
+[beam]
+element = "point_mass"
+mass = 2.0
+velocity = -0.3
+[spring]
+fmu = "{path}"
+force = "F"
+force_sign = -1
+displacement = "x"
+velocity = "v"
+parameters = {{ m = 3.0, k = 40.0 }}
+[contact]
+law = "link"
+stiffness = 50.0
+"""
+    file = tmp_path / "linked.toml"
+    file.write_text(text, encoding="utf-8")
+    shown = command("doctor", file)
+    assert shown.exit_code == 0, shown.output
+    assert "the ledger of the interface" in shown.stdout
+    assert "the scene can be run" in shown.stdout
+    done = command("run", file, "--out", tmp_path / "run", "--checkpoint", "0", "--quiet")
+    assert done.exit_code == 0, done.output
+    assert command("report", tmp_path / "run").exit_code == 0
+    refused = command("crosscheck", file)
+    assert refused.exit_code == 2
+    assert "no reference knows this body" in refused.stderr
+    assert command("run", file, "--accuracy", "1e-4", "--out", tmp_path / "accurate", "--quiet").exit_code == 0
+    for setting in ("spring.force=x", "spring.parameters.lie=2.0", "coupling.degree=2 "):
+        wrong = command("run", file, "--set", setting, "--out", tmp_path / "wrong", "--set", "coupling.scheme=hermite")
+        assert wrong.exit_code == 2
+        assert wrong.stdout == ""
