@@ -9,13 +9,15 @@ from __future__ import annotations
 from functools import lru_cache
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, field_serializer, model_validator
-from scipy.interpolate import CubicSpline, PPoly
 
 from .tables import Table, key
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
 
 #: Which keys each signal takes, and which of them it needs.
 _TAKES: dict[str, tuple[str, ...]] = {
@@ -161,6 +163,8 @@ class Load(Table):
 @lru_cache(maxsize=16)
 def _record(path: Path, modified: int, interpolation: str) -> PPoly:
     times, values = _columns(path)
+    from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only for who has a table
+
     if interpolation == "cubic":
         spline = CubicSpline(times, values)
         return PPoly(spline.c, spline.x)
