@@ -171,6 +171,32 @@ def test_equilibrium_and_foundation_are_drawn_unless_far_outside():
     assert "φ" not in texts(plots._positions(a_trajectory(deep)))
 
 
+@pytest.mark.parametrize("draw", [plots._positions, plots._shapes_later])
+def test_names_of_levels_that_are_near_do_not_overprint(draw):
+    figure = draw(a_trajectory(with_changes(PAIR, stop={"position": -1e-5})))
+    figure.canvas.draw()
+    psi, phi = (
+        next(t for t in figure.findobj(matplotlib.text.Text) if t.get_text() == name).get_window_extent()
+        for name in "Ψφ"
+    )
+    assert psi.y0 >= phi.y1
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        ("compliance", {"in contact (u < y)", "of the law λ(y − u)₊ᵖ"}),
+        ("link", {"joined by the link", "of the link λ(y − u)"}),
+        ("tie", {"tied (u = y)"}),
+        ("transmission", {"touch (y ≥ Ψ)", "part λ(Ψ − u)₊ᵖ"}),
+    ],
+)
+def test_phases_and_forces_have_the_words_of_the_law(law, words):
+    scene = with_changes(PAIR, contact={"law": law})
+    phase = np.where(np.arange(400) < 200, "touch" if law in ("compliance", "transmission") else "tied", "free")
+    assert words <= set(texts(plots._velocities_and_forces(a_trajectory(scene, phase=phase))))
+
+
 def test_many_events_become_ticks_in_rows():
     events = [Event(0.6 * i / 100, "impact" if i % 2 else "separation") for i in range(100)]
     figure = plots._positions(a_trajectory(events=events))

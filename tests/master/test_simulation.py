@@ -267,7 +267,7 @@ def test_a_diagnostic_column_that_overflows_does_not_stop_a_run(stiffness, expon
     assert run.compliance_force.max() == 1e150
     assert np.isfinite(run.tie_reaction).all()
     assert [w for w in run.summary["warnings"] if "compliance_force is larger than 1e+150 N" in w]
-    assert plain.summary["warnings"] == []
+    assert not any("compliance_force" in warning for warning in plain.summary["warnings"])
 
 
 # -- the ledger -----------------------------------------------------------------------------------------------------

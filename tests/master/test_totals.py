@@ -11,6 +11,7 @@ from springbeam.results.totals import totals
 from springbeam.results.trajectory import Event
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.resolution import force_window, slowest_frequency
+from springbeam.scene.statics import tip_inertia
 
 SCENE = load_scene("soft")
 
@@ -132,6 +133,10 @@ def test_the_deepest_place_is_between_the_rows_unless_something_is_struck_there(
 def test_the_window_is_a_fiftieth_of_the_slowest_period():
     assert force_window(SCENE) == pytest.approx(2.0 * np.pi / slowest_frequency(SCENE.beam) / 50.0, rel=1e-15)
     assert force_window(with_changes(SCENE, contact={"force_window": 0.25})) == 0.25
+    # Of compliance with p = 1: 2π √(μ/λ), μ of the spring and the tip's Rayleigh mass.
+    compliant = with_changes(SCENE, contact={"law": "compliance", "stiffness": 4.0, "exponent": 1.0})
+    reduced = 1.0 / (1.0 / SCENE.spring.mass + 1.0 / tip_inertia(SCENE.beam))
+    assert force_window(compliant) == pytest.approx(2.0 * np.pi * np.sqrt(reduced / 4.0) / 50.0, rel=1e-14)
     # 1/k of the beam is 3.3e-3 + 1e-2 m/N: with the spring's 3 N/m it holds 1 kg.
     massless = with_changes(SCENE, beam={"fidelity": "quasi_static"})
     stiffness = 3.0 + 1.0 / (1.0 / 300.0 + 1.0 / 100.0)

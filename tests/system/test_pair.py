@@ -317,7 +317,8 @@ def test_a_cantilever_under_a_sudden_force_meets_an_elastic_stop():
     area, inertia, thin = np.pi * 0.01, np.pi / 4.0 * 1e-4, 1e-4
     beam = {
         "density": 1e6, "area": area, "second_moment_of_area": thin * inertia, "young_modulus": 1e10 / thin,
-        "shear_modulus": 1e16 * inertia / area, "length": 1.0, "n_elements": 20, "element_degree": 4,
+        "shear_modulus": 1e16 * inertia / area, "shear_coefficient": 1.0, "length": 1.0,
+        "n_elements": 20, "element_degree": 4,
         "reduced_integration": True, "approach": "elastic",
     }  # fmt: skip
     table = {

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..bodies.fmu import FmuError
+from ..results.trajectory import COLUMN_UNITS
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,
@@ -136,8 +137,9 @@ def _error_table(report: Report) -> Table:
     for name in ("max error", "at t [s]", "L2 error", "bound", ""):
         table.add_column(Text(name), justify="right", no_wrap=True)
     for row in report.rows:
-        verdict = "ok" if row.passed else "FAILED"
-        table.add_row(row.quantity, f"{row.error:.2e}", f"{row.at:.6g}", f"{row.l2:.1e}", f"{row.bound:.1e}", verdict)
+        verdict, unit = "ok" if row.passed else "FAILED", COLUMN_UNITS[row.quantity]
+        numbers = (f"{row.error:.2e}", f"{row.at:.6g}", f"{row.l2:.1e}", f"{row.bound:.1e}")
+        table.add_row(Text(f"{row.quantity} [{unit}]"), *numbers, verdict)
     return table
 
 

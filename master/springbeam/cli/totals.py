@@ -15,7 +15,7 @@ def totals_in_words(summary: Mapping[str, Any]) -> list[str]:
         found = {name: f"{summary[name]:.4g} {unit}" for name, unit in TOTAL_UNITS.items() if name in summary}
         parts = [
             f"impulse {found['contact_impulse']}",
-            f"peak force {found['contact_force_max']} (mean over {found['contact_force_window']})",
+            f"peak force {found['contact_force_max']} (mean over {found['contact_force_window']}; docs/contact.md)",
         ]
         lines.append(f"contact   {', '.join(parts)}")
         parts = []

@@ -30,6 +30,7 @@ from .drawing import (
     Unit,
     decimated,
     length_along,
+    level_side,
     mark,
     much_smaller,
     near_levels,
@@ -194,7 +195,8 @@ class _Picture:
                 for begin, end in ((ends[0], length - inner), (length + inner, ends[1])):
                     ax.add_patch(Rectangle((begin, low), end - begin, level - low, color=STONE, lw=0.0))
             ax.plot(ends, [level, level], color=BLACK, **line_style(LEVEL_LINES[symbol]))
-            ax.annotate(symbol, (ends[1], level), xytext=(3.0, 0.0), textcoords="offset points", va="center")
+            ax.annotate(symbol, (ends[1], level), xytext=(3.0, 0.0), textcoords="offset points",
+                        va=level_side(symbol, self.frames.levels))  # fmt: skip
 
     def _beam_enlarged(self, ax: Axes) -> None:
         assert self.frames.deflection is not None

@@ -5,8 +5,8 @@ Colours are those of Okabe and Ito, told apart with any colour vision. Widths an
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -19,11 +19,17 @@ GREY, STONE = "#777777", "#B8B8B8"
 
 PHASE_SHADES = {"free": "#FFFFFF", "tied": "#D6EAF7", "touch": "#FFF1B8", "seated": "#CFE8DD"}
 OTHER_SHADES = ("#EADCE7", "#E4E4E4", "#F7DCC8")
-PHASE_WORDS = {
+_PHASE_WORDS = {
     "free": "free",
     "tied": "tied (u = y < Ψ)",
     "touch": "touch (y ≥ Ψ)",
     "seated": "seated (at φ)",
+}
+#: What phases are called where the law means another thing by them.
+_PHASE_WORDS_OF_LAWS = {
+    "compliance": {"touch": "in contact (u < y)"},
+    "tie": {"tied": "tied (u = y)"},
+    "link": {"tied": "joined by the link"},
 }
 
 
@@ -73,7 +79,7 @@ VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)"), "z": Look(VERMILLION, "spring 
 FORCES = {
     "contact_force": Look(SKY, "contact C, as applied"),
     "contact_force_smoothed": Look(BLUE, "contact C, smoothed"),
-    "compliance_force": Look(GREEN, "part λ(Ψ − u)₊ᵖ"),
+    "compliance_force": Look(GREEN, "part λ(Ψ − u)₊ᵖ"),  # `forces_of` has those of other laws
     "foundation_force": Look(BLACK, "foundation N"),
 }
 ENERGIES = {
@@ -206,8 +212,12 @@ def shaded_phases(trajectory: Trajectory) -> list[tuple[Look, list[tuple[float, 
     if spans.keys() == {"free"}:
         return []
     others = iter(OTHER_SHADES * len(spans))
+    scene = trajectory.scene
+    words = _PHASE_WORDS | _PHASE_WORDS_OF_LAWS.get(scene.contact.law, {})
+    if scene.spring is None:
+        words = {name: text.replace("y", "φ") for name, text in words.items()}
     return [
-        (Look(PHASE_SHADES.get(phase) or next(others), PHASE_WORDS.get(phase, phase)), found)
+        (Look(PHASE_SHADES.get(phase) or next(others), words.get(phase, phase)), found)
         for phase, found in spans.items()
     ]
 
@@ -220,6 +230,19 @@ def present(trajectory: Trajectory, names: Iterable[str]) -> list[str]:
 def present_and_not_zero(trajectory: Trajectory, names: Iterable[str]) -> list[str]:
     """Return those of ``names`` that the run has columns of with other values than 0."""
     return [name for name in present(trajectory, names) if np.any(trajectory[name] != 0.0)]
+
+
+def forces_of(trajectory: Trajectory) -> dict[str, Look]:
+    """Return the forces that a run has and that are not zero throughout, in the words of its law."""
+    contact = trajectory.scene.contact
+    words = {
+        "compliance": "of the law λ(y − u)₊ᵖ" + " (1 + χ ṗ)" * (contact.damping > 0.0),
+        "link": "of the link λ(y − u)" + " + c(z − v)" * (contact.damping > 0.0),
+    }
+    looks = dict(FORCES)
+    if contact.law in words:
+        looks["compliance_force"] = Look(GREEN, words[contact.law])
+    return {name: looks[name] for name in present_and_not_zero(trajectory, looks)}
 
 
 def gap_look(trajectory: Trajectory) -> Look:
@@ -243,6 +266,11 @@ def levels(scene: Scene) -> dict[str, float]:
     if scene.stop is not None:
         heights["φ"] = scene.stop.position
     return heights
+
+
+def level_side(symbol: str, beside: Collection[str]) -> Literal["bottom", "top", "center"]:
+    """Return where the name of a level stands: Ψ above and φ below, alone in the middle."""
+    return "center" if len(beside) < 2 else "bottom" if symbol == "Ψ" else "top"
 
 
 def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:

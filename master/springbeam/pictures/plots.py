@@ -25,7 +25,6 @@ from ..scene.statics import SHAPE_POINTS
 from .drawing import (
     BLACK,
     ENERGIES,
-    FORCES,
     GREY,
     IMPULSE_MARKERS,
     IMPULSES,
@@ -38,9 +37,11 @@ from .drawing import (
     alternates,
     decimated,
     first_contact_time,
+    forces_of,
     gap_look,
     impulses,
     length_along,
+    level_side,
     levels,
     much_smaller,
     present,
@@ -225,14 +226,22 @@ def _levels(ax: Axes, trajectory: Trajectory, unit: Unit, *, whole_width: bool =
     """Draw Ψ and φ, across the panel or as ticks at the tip, unless what moves is tiny beside their distance."""
     low, high = ax.get_ylim()
     reach = 1.5 * (high - low)
-    for symbol, value in levels(trajectory.scene).items():
-        level = unit.factor * value
-        if not low - reach <= level <= high + reach:
-            continue
+    seen = {
+        symbol: unit.factor * value
+        for symbol, value in levels(trajectory.scene).items()
+        if low - reach <= unit.factor * value <= high + reach
+    }
+    for symbol, level in seen.items():
         ax.axhline(level, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **line_style(LEVEL_LINES[symbol]))
-        place: dict[str, Any] = {"xytext": (3.0, 0.0), "va": "center"}
+        # One above and one below: however near the two levels are, their names are apart.
+        side: str = level_side(symbol, seen)
+        place: dict[str, Any] = {"xytext": (3.0, 0.0), "va": side}
         if whole_width:  # beside the panel is the key
-            place = {"xytext": (-2.0, 1.5), "ha": "right"}
+            place = {
+                "xytext": (-2.0, -1.5 if side == "top" else 1.5),
+                "ha": "right",
+                "va": side.replace("center", "bottom"),
+            }
         ax.annotate(symbol, (1.0, level), xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=8.0,
                     **place)  # fmt: skip
 
@@ -274,7 +283,7 @@ def _velocity_panel(timeline: Timeline, ax: Axes, names: list[str]) -> None:
 
 
 def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
-    forces = present_and_not_zero(trajectory, FORCES)
+    forces = list(forces_of(trajectory))
     speeds = present(trajectory, ["z"])
     struck = any(e.impulse_contact != 0.0 or e.impulse_foundation != 0.0 for e in trajectory.events)
     panels = [1.6] * bool(speeds) + [2.0] * bool(forces) + [1.2] * struck
@@ -296,8 +305,9 @@ def _force_panel(timeline: Timeline, ax: Axes, names: list[str]) -> None:
     trajectory = timeline.trajectory
     unit = readable_unit([trajectory[name] for name in names], "N")
     ax.axhline(0.0, color=GREY, lw=0.5)
-    for name in _visible(ax, trajectory, {name: FORCES[name] for name in names}, "N"):
-        timeline.line(ax, unit, name, FORCES[name])
+    looks = forces_of(trajectory)
+    for name in _visible(ax, trajectory, {name: looks[name] for name in names}, "N"):
+        timeline.line(ax, unit, name, looks[name])
     ax.set_ylabel(f"force [{unit.name}]")
     key(ax)
 

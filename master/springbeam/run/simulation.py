@@ -20,7 +20,7 @@ from ..results.recording import NonFiniteValue, Recorder
 from ..results.trajectory import Event
 from ..scene import Scene
 from ..scene.automatic import decided
-from ..scene.resolution import not_resolved
+from ..scene.resolution import not_resolved, peak_force_doubt
 from .detection import Detector
 from .ledger import Ledger, bounds
 from .local_error import LocalError
@@ -332,8 +332,9 @@ class Simulation(Memory):
                 "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
             )
         unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed, rows.contact_frequency)
-        if unresolved is not None:
-            warnings.append(unresolved)
+        doubt = unresolved or peak_force_doubt(self._scene)
+        if doubt is not None:
+            warnings.append(doubt)
         if self._untold:
             warnings.append("a body tells no energies: nothing says whether the energy is kept")
         if rows.not_shown:

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
-from .linearised import spring_frequency, spring_stiffness
+from .linearised import contact_stiffness, spring_frequency, spring_stiffness
 from .scene import Scene
-from .statics import bending_stiffness, locking, lowest_frequency, shear_stiffness, tip_compliance
+from .statics import bending_stiffness, locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from .tables import Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
@@ -26,6 +26,8 @@ TURN = 1.0
 CONTACT_TURN = (0.5, 2.0, 4.0)
 #: Velocity mismatch of tip and spring top, relative to their speed, above which the motion is called unresolved.
 MISMATCH = 0.2
+#: Periods of the fastest wave of the mesh that a window must hold for the mean of a rigid force to be settled to 5 %.
+SETTLED = 2.5
 #: Share of the slowest period over which the contact force is averaged.
 WINDOW = 0.02
 
@@ -71,12 +73,16 @@ def not_resolved(scene: Scene, mismatch: float, speed: float, contact_frequency:
 def force_window(scene: Scene) -> float:
     """Return over which time the contact force is averaged before its peak is taken [s].
 
-    It is ``contact.force_window``, or `WINDOW` of the slowest period of the beam alone; of spring and beam together
-    where the beam has no inertia, of the run where nothing oscillates.
+    It is ``contact.force_window``, or `WINDOW` of a period: that of a compliant contact, whose peak is the law's; else
+    the slowest of the beam alone; that of spring and beam together where the beam has no inertia; the run where nothing
+    oscillates.
     """
     beam, spring = scene.beam, scene.spring
     if scene.contact.force_window is not None:
         return scene.contact.force_window
+    if scene.contact.law == "compliance" and beam is not None and (stiffness := contact_stiffness(scene)) > 0.0:
+        masses = [tip_inertia(beam), *([] if spring is None else [spring.mass])]
+        return WINDOW * 2.0 * pi / sqrt(stiffness * sum(1.0 / mass for mass in masses))
     if beam is not None and beam.fidelity == "dynamic":
         return WINDOW * 2.0 * pi / slowest_frequency(beam)
     if beam is not None and spring is not None:
@@ -84,6 +90,26 @@ def force_window(scene: Scene) -> float:
         if together > 0.0:
             return WINDOW * 2.0 * pi * sqrt(spring.mass / together)
     return WINDOW * scene.time.t_end
+
+
+def peak_force_doubt(scene: Scene) -> str | None:
+    """Return in words why the run cannot vouch for its peak contact force, and what would; ``None`` if it can.
+
+    At a rigid impact the force at an instant grows with the mesh. Its mean over a window settles where the window is
+    longer than `SETTLED` periods of the fastest wave kept (``docs/contact.md`` has the numbers).
+    """
+    beam = scene.beam
+    meets = scene.spring is not None or scene.stop is not None
+    if beam is None or not meets or beam.fidelity == "quasi_static" or not scene.contact.rigid:
+        return None
+    window, fastest = force_window(scene), min(shear_frequency(beam), fastest_frequency(beam))
+    if window * fastest >= SETTLED * 2.0 * pi:
+        return None
+    longer = 1.05 * SETTLED * 2.0 * pi / fastest
+    return (
+        f'the peak contact force, a mean over {window:.2g} s, depends on the mesh: law = "{scene.contact.law}" is '
+        f"rigid. contact.force_window >= {longer:.2g} s, more elements or more modes settle it"
+    )
 
 
 def _slowest(scene: Scene) -> list[tuple[str, float, str]]:

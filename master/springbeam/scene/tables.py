@@ -274,7 +274,7 @@ class Contact(Table):
     damping: float = key("s/m", "χ of compliance (Hunt & Crossley 1975), or damping c of a link (N·s/m)", 0.0, ge=0.0)
     force_window: float | None = key(
         "s", "time over which the force is averaged before its peak is taken", None, gt=0.0,
-        otherwise="a fiftieth of the slowest period",
+        otherwise="a fiftieth of the period of a compliant contact, else of the beam's slowest",
     )  # fmt: skip
 
     @model_validator(mode="after")

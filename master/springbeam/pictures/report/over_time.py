@@ -16,7 +16,6 @@ from ..drawing import (
     ENERGIES,
     EVENT_LOOKS,
     EVENT_MARKERS,
-    FORCES,
     IMPULSE_MARKERS,
     IMPULSES,
     LEVEL_LINES,
@@ -31,6 +30,7 @@ from ..drawing import (
     Unit,
     alternates,
     decimated,
+    forces_of,
     gap_look,
     impulses,
     much_smaller,
@@ -71,9 +71,8 @@ def charts(trajectory: Trajectory) -> list[Chart]:
         heading, look = "The smaller one, enlarged", {name: POSITIONS[name]}
         found.append(_lines(trajectory, f"position-{name}", heading, look, "position", "m", line=Line()))
     found.append(_lines(trajectory, "velocities", "Velocities", VELOCITIES, "velocity", "m/s"))
-    if forces := present_and_not_zero(trajectory, FORCES):
-        looks = {name: FORCES[name] for name in forces}
-        found.append(_lines(trajectory, "forces", "Forces", looks, "force", "N", seen=True))
+    if forces := forces_of(trajectory):
+        found.append(_lines(trajectory, "forces", "Forces", forces, "force", "N", seen=True))
     if any(event.impulse_contact != 0.0 or event.impulse_foundation != 0.0 for event in events):
         found.append(_impulses(trajectory))
     if "gap" in columns:
