@@ -113,13 +113,13 @@ def _alternatives(model: type[Table], ways: Ways) -> Iterator[dict[str, Any]]:
 
 #: Of the scene that `springbeam new` writes: an aluminium beam, 0.8 m × 30 × 3 mm, above a rubber bumper above a stop.
 _BEGINNING: dict[str, dict[str, Any]] = {
-    "time": {"t_end": 0.1},
+    "time": {"t_end": 0.3},
     "beam": {
         "density": 2700.0, "length": 0.8, "width": 0.03, "height": 0.003, "young_modulus": 7.0e10,
         "poisson_ratio": 0.33, "alpha_b": 2.0e-5, "n_elements": 10, "element_degree": 4, "n_modes": 12,
-        "approach_speed": 2.0,
+        "approach_speed": 1.0,
     },
-    "spring": {"mass": 0.02, "damping": 2.0, "linear_stiffness": 2.0e3, "cubic_stiffness": 1.0e8},
+    "spring": {"mass": 0.02, "damping": 2.0, "linear_stiffness": 5.0e3, "cubic_stiffness": 1.0e8},
     "stop": {"position": -0.005, "restitution": 0.5},
     "contact": {"law": "compliance", "stiffness": 2.0e5, "exponent": 1.5},
     "coupling": {"scheme": "auto", "macro_step": 1.0e-4},
