@@ -1,0 +1,49 @@
+"""The two pictures of docs/loads.md:  .venv/bin/python docs/loads.py   (about a minute)"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+from pages import IMAGES, shrink  # beside this script
+
+from springbeam import load_scene, simulate
+from springbeam.pictures.drawing import BLACK, BLUE, VERMILLION
+from springbeam.studies import sweep
+from springbeam.studies.sweep.design import design, parse_axis
+
+
+def bifurcation() -> None:
+    """Draw what `springbeam sweep vibro-impact --vary loads.0.frequency=25:65:81 --stroboscopic` draws."""
+    axes = (parse_axis("loads.0.frequency=25:65:81"),)
+    todo = sweep.Sweep(
+        load_scene("vibro-impact"), axes, design(axes, 0, 0, "random"), ("u_tip_max",), stroboscopic=True
+    )
+    with tempfile.TemporaryDirectory() as folder, sweep.cluster(None, None) as client:
+        sweep.run(todo, Path(folder), client)
+        sweep.stroboscopic.draw(sweep.rows(folder), axes, Path(folder))
+        shutil.copy(Path(folder) / sweep.stroboscopic.PICTURE, IMAGES / "vibro-impact.png")
+
+
+def shock() -> None:
+    """Draw the board's end, the pad under it and the shock of the scene `pulse`."""
+    run = simulate(load_scene("pulse"))
+    figure, (upper, lower) = plt.subplots(
+        2, 1, figsize=(7.0, 4.5), sharex=True, layout="constrained", height_ratios=(3, 1)
+    )
+    upper.plot(1e3 * run.time, 1e3 * run.u_tip, color=BLUE, label="end of the board")
+    upper.plot(1e3 * run.time, 1e3 * run.y, color=VERMILLION, label="top of the pad")
+    upper.set_ylabel("beside the base [mm]")
+    upper.legend(frameon=False)
+    lower.plot(1e3 * run.time, run["load_0"], color=BLACK)
+    lower.set(xlabel="time [ms]", ylabel="base [m/s²]")
+    figure.savefig(IMAGES / "pulse.png", dpi=100)
+
+
+if __name__ == "__main__":
+    shock()
+    bifurcation()
+    for name in ("pulse.png", "vibro-impact.png"):
+        shrink(IMAGES / name)
