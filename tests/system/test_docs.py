@@ -46,7 +46,6 @@ NOT_RUN = {
     ".venv/bin/python docs/paper_figures.py": "takes minutes",
     ".venv/bin/python docs/promise.py": "takes minutes; test_accuracy.py judges some scenes with it",
     "springbeam animate results/soft": "draws for half a minute; the command is in test_animation.py",
-    ".venv/bin/python docs/loads.py": "takes a minute; its parts are in test_sweep.py",
     "springbeam sweep vibro-impact": "takes a minute; the command is in test_sweep.py",
     "springbeam stability": "takes minutes; parts of it are run in test_stability_grid.py, test_critical_steps.py",
     "springbeam sweep bumper.toml": "takes half a minute; the command is in test_sweep.py",
