@@ -35,7 +35,7 @@ def crosscheck(
     scene: SceneArgument,
     settings: SettingsOption = None,
     with_orders: Annotated[
-        bool, typer.Option("--orders", help="Repeat the run at H/2, H/4, H/8 and print observed orders instead.")
+        bool, typer.Option("--orders", help="Repeat the run at H/2, H/4, H/8; print observed orders instead.")
     ] = False,
     out: Annotated[
         Path | None,
@@ -92,7 +92,7 @@ def crosscheck(
 
 
 def verify(as_json: JsonOption = False) -> None:
-    """Check the FMUs against exact solutions. Exit code 1 if one is missed.
+    """Check the FMUs against exact solutions. Exit code 1 if a check fails.
 
     Example: springbeam verify
     """

@@ -1,7 +1,7 @@
-"""Arguments, exit codes and errors that the commands share.
+"""Arguments, exit codes and errors that all commands use.
 
 Results go to stdout, progress and errors to stderr. ``--json`` puts one JSON document on stdout and nothing else,
-``--quiet`` only where the results are. Colours are for terminals, and NO_COLOR turns them off (rich sees to both).
+``--quiet`` only the path of the results. Colours are for terminals, and NO_COLOR turns them off (rich sees to both).
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ STOPPED = 3
 
 
 def complete_scene(incomplete: str) -> list[str]:
-    """Return the shipped scenes that begin so; if there is none, the shell offers files."""
+    """Return the shipped scenes that begin with the text typed; without any, the shell offers files."""
     return [name for name in shipped_scenes() if name.startswith(incomplete)]
 
 
 def complete_key(incomplete: str) -> list[str]:
-    """Return the keys of a scene that begin so, each as ``table.key=``."""
+    """Return the keys of a scene that begin with the text typed, each as ``table.key=``."""
     return [f"{name}=" for name in scene_keys() if name.startswith(incomplete)]
 
 
@@ -61,7 +61,7 @@ SettingsOption = Annotated[
 RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory with the results of springbeam run.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document, and nothing else, on stdout.")]
 QuietOption = Annotated[
-    bool, typer.Option("--quiet", "-q", help="No progress bar and no tables; print only where the results are.")
+    bool, typer.Option("--quiet", "-q", help="No progress bar and no tables; print only the path of the results.")
 ]
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no pictures.")]
 
@@ -78,7 +78,7 @@ class _TellingParameters:
 
 
 class Command(_TellingParameters, TyperCommand):
-    """A command that can be interrupted, and that explains an argument too many."""
+    """A command that can be interrupted, and that explains an unexpected argument."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         ctx.allow_extra_args = True
@@ -98,7 +98,7 @@ class Command(_TellingParameters, TyperCommand):
 
 
 class Group(_TellingParameters, TyperGroup):
-    """A group of commands that suggests one for a word that is none."""
+    """A group of commands that suggests the nearest command for an unknown one."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         word = args[0]
@@ -124,7 +124,7 @@ def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
 
 
 def print_json(document: Any) -> None:
-    """Print ``document`` as JSON; a number that is not finite, as in a run that stopped, becomes its name."""
+    """Print ``document`` as JSON; NaN and infinity, as in a run that stopped, become strings."""
     typer.echo(json.dumps(json_ready(document), indent=2, allow_nan=False, ensure_ascii=False))
 
 
@@ -143,7 +143,7 @@ def results_directory(path: Path) -> Path:
 
 @contextmanager
 def bad_input_reported() -> Iterator[None]:
-    """End the command with exit code 2 and one error for what the user can mend."""
+    """End the command with exit code 2 and one error if the input or a file is at fault."""
     try:
         yield
     except ResultsExist as error:

@@ -19,7 +19,7 @@ ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace a file
 def report(
     directory: RunArgument,
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", metavar="FILE", help=f"Where it goes. Default: DIR/{REPORT}")
+        Path | None, typer.Option("--out", "-o", metavar="FILE", help=f"The file to write. Default: DIR/{REPORT}")
     ] = None,
     force: ForceOption = False,
 ) -> None:

@@ -49,7 +49,7 @@ def predict(
     settings: SettingsOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Say before a scene runs what it is, where its coupling is stable, whether the motion is resolved, what fits.
+    """Predict, without a run, frequencies, stable macro steps, whether the motion is resolved, and the best scheme.
 
     Example: springbeam predict soft --set coupling.macro_step=4e-3
     """
@@ -152,7 +152,7 @@ def stability(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Run extreme scenes and say how each ends: energy kept, refused, stopped, or silent garbage (exit code 1).
+    """Run extreme scenes and classify each result. Exit code 1 if a wrong result came without a warning.
 
     Example: springbeam stability --samples 100 --resolution 0
     """

@@ -36,11 +36,11 @@ def tradeoff(
     settings: SettingsOption = None,
     until: Annotated[
         float | None,
-        typer.Option("--until", metavar="SECONDS", help="End of the compared window. Default: as far as it can be."),
+        typer.Option("--until", metavar="SECONDS", help="End of the comparison. Default: while comparable."),
     ] = None,
     repeats: Annotated[
         int,
-        typer.Option("--repeats", metavar="N", min=1, help="Timings of a configuration, of which the median counts."),
+        typer.Option("--repeats", metavar="N", min=1, help="Timings per configuration; the median is used."),
     ] = 3,
     out: Annotated[
         Path | None,

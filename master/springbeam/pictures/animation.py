@@ -1,4 +1,4 @@
-"""The run as a moving picture, GIF or MP4: beam and spring above their positions over time."""
+"""A run as an animation, GIF or MP4: beam and spring above their positions over time."""
 
 from __future__ import annotations
 

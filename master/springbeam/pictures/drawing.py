@@ -1,4 +1,4 @@
-"""What plots, report and animation share, whatever draws them: looks and words, units, thinning, what can be seen.
+"""What plots, report and animation share: looks and words, units, thinning, and what is large enough to be seen.
 
 Colours are those of Okabe and Ito, told apart with any colour vision. Widths and sizes are in points.
 """
@@ -103,7 +103,7 @@ IMPULSE_MARKERS = {
 
 
 class Line(NamedTuple):
-    """What tells lines apart besides their colour."""
+    """Width and dashes, which distinguish lines besides their colour."""
 
     width: float = 1.1  #: [pt]
     dashed: bool = False
@@ -164,7 +164,7 @@ def decimated(time: np.ndarray, values: np.ndarray, columns: int = PIXEL_COLUMNS
 
 
 def alternates(values: np.ndarray) -> bool:
-    """Tell whether ``values`` mostly jump up and down from row to row: the steps are too long for what they show."""
+    """Tell whether ``values`` mostly jump up and down from row to row, which means that the steps are too long."""
     if len(values) < 20:
         return False
     jumps = np.diff(values)
@@ -274,7 +274,7 @@ def level_side(symbol: str, beside: Collection[str]) -> Literal["bottom", "top",
 
 
 def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
-    """Return those of `levels` that do not dwarf what moves [m]: not further off than 1.5 times its range."""
+    """Return those of `levels` that lie within 1.5 times the range of the motion [m]."""
     low, high = min(float(np.min(part)) for part in moving), max(float(np.max(part)) for part in moving)
     reach = 1.5 * (high - low)
     return {symbol: height for symbol, height in levels(scene).items() if low - reach <= height <= high + reach}

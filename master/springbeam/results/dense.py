@@ -1,4 +1,4 @@
-"""A run at any times: what lies between its rows, by the dense output of each step.
+"""Interpolate a run between its rows, by the dense output of each step.
 
 Steps end on events and on changes of phase, so that no polynomial reaches across one. Between two rows
 
@@ -12,8 +12,8 @@ Steps end on events and on changes of phase, so that no polynomial reaches acros
 * ``compliance_force``, ``contact_force_smoothed`` and the energies are linear between the rows (order 2; the smoothed
   force, which belongs to the start of its row's step, 1); what an event takes is taken at its row.
 
-At the time of a row they are the row's, at the time of an event those after it. Orders are those of the polynomials:
-nothing between the rows is better than the rows are.
+At the time of a row the values are the row's, at an event those after it. Orders are those of the polynomials: values
+between rows are no more accurate than the rows.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A run directory: its files, who may write to it, and what is wrong with one that cannot be read.
+"""A run directory: its files, the lock on it, and the errors of one that cannot be read.
 
 It holds ``trajectory.csv`` (a row per accepted step), ``events.csv``, ``shapes.csv`` (the beam's deflection at
 `SHAPE_POINTS`), ``steps.bin`` (what lies between rows), ``summary.json`` and pictures. ``file_recorder`` writes it,
@@ -74,16 +74,16 @@ class RunDirectory:
 
     @property
     def checkpoint(self) -> Path:
-        """The file that is there until the run is done, if it takes checkpoints (`springbeam.run.checkpoint`)."""
+        """The checkpoint file; it exists until the run is done (`springbeam.run.checkpoint`)."""
         return self.path / "run.checkpoint"
 
     @property
     def pictures(self) -> list[Path]:
-        """The pictures that are there."""
+        """The pictures that exist."""
         return [self.path / name for name in PICTURES if (self.path / name).exists()]
 
     def results(self) -> list[Path]:
-        """Return the result files that are there, and what was made from them."""
+        """Return the result files that exist, and the files made from them."""
         files = (self.summary, self.trajectory, self.events, self.shapes, self.steps, self.checkpoint)
         made = (self.path / name for name in (REPORT, *ANIMATIONS))
         return [file for file in (*files, *self.pictures, *made) if file.exists()]

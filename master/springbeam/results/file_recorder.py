@@ -139,7 +139,7 @@ class FileRecorder(CheckedRecorder):
                 files.callback(lines.file.close)
 
     def save(self) -> dict[str, Any]:
-        """Put what was recorded on the disk, and return what `restore` needs."""
+        """Write what was recorded to the disk, and return what `restore` needs."""
         self._begin()
         self._write_steps()
         for lines in self._files.values():
@@ -291,7 +291,7 @@ def _line(fields: Sequence[Any]) -> bytes:
 
 
 def json_ready(value: Any) -> Any:
-    """Return ``value`` in plain JSON types; a number that is not finite becomes its name, since JSON has none."""
+    """Return ``value`` in plain JSON types; NaN and infinity become strings, because JSON has no such numbers."""
     for kind, plain in _PLAIN:
         if isinstance(value, kind):
             value = plain(value)

@@ -1,4 +1,4 @@
-"""How a position moves inside a step: a quintic through both ends' values and rates that has the step's two moments.
+"""The path of a position inside a step: a quintic through both ends' values and rates, with the step's two moments.
 
 The cubic through values and rates alone hides what is shallower than its own error, of order 4 in the step. The bodies
 report ∫ w and ∫∫ w as well: with these the polynomial is of order 6, and its distance from the cubic tells how well

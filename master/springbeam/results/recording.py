@@ -190,7 +190,7 @@ class MemoryRecorder(CheckedRecorder):
 
 
 def replay(trajectory: Trajectory, recorder: Recorder) -> None:
-    """Record a finished run, row by row, event by event, as if it were made now."""
+    """Record a finished run row by row and event by event."""
     steps = trajectory.steps
     for i in range(len(trajectory)):
         step = None if steps is None else steps[i].tobytes()

@@ -1,4 +1,4 @@
-"""What a recorded step tells beyond its row: where its ends were before the event that ends it, and its contact force.
+"""The data of a step that its row lacks: the ends before the event that ends it, and the contact force.
 
 A row holds the state after its event. Between two rows the motion follows from the start of the step (the row before),
 its end and its two moments, the force from the step's polynomial: `springbeam.results.dense` and

@@ -37,9 +37,9 @@ def pick_mesh(scene: Scene) -> Trajectory:
         If a run that does keep it stops early.
     """
     if scene.accuracy is None:
-        raise SceneError("accuracy: the scene asks for none, and the mesh is picked to keep one")
+        raise SceneError("accuracy: missing; the mesh is chosen to reach it")
     if scene.beam is None or scene.beam.fidelity == "quasi_static":
-        raise SceneError("[beam]: the scene has no mesh to pick")
+        raise SceneError("[beam]: the scene has no mesh to choose")
     beam, asked = scene.beam, scene.accuracy
     coarse: Trajectory | None = None
     before = error = math.inf

@@ -1,4 +1,4 @@
-"""The monolithic reference that a scene is judged by, and how long two solutions of it stay together."""
+"""The monolithic reference of a scene, and how long two solutions can be compared."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ PERTURBATION, _GROWTH = 1e-7, 1e4
 
 
 def refuse_without_reference(scene: Scene) -> None:
-    """Raise SceneError if `event_driven` is not defined for ``scene``; the message says what is."""
+    """Raise SceneError if `event_driven` cannot solve ``scene``; the message names what it can solve."""
     for table, body in scene.partners.items():
         raise SceneError(
             f"[{table}] {'fmu' if table in scene.foreign else 'element'}: no reference knows this body, a "
             f"{type(body).__name__}; springbeam run --accuracy compares runs of smaller and smaller steps instead"
         )
     if scene.contact.law == "transmission" and scene.contact.impact == "rest" and scene.beam and scene.spring:
-        raise SceneError("contact.impact = 'rest': a rigid tie has no reference there; take 'inelastic' or 'tip'")
+        raise SceneError("contact.impact = 'rest': no reference has it; use 'inelastic' or 'tip'")
     if scene.contact.law == "compliance" and scene.beam and scene.beam.fidelity == "quasi_static":
-        raise SceneError("beam.fidelity = 'quasi_static': has no reference with law 'compliance'; take 'dynamic'")
+        raise SceneError("beam.fidelity = 'quasi_static': no reference has it with law 'compliance'; use 'dynamic'")
     if scene.loads and scene.beam and scene.beam.fidelity == "quasi_static":
-        raise SceneError("beam.fidelity = 'quasi_static': has no reference with [[loads]]; take 'dynamic'")
+        raise SceneError("beam.fidelity = 'quasi_static': no reference has it with [[loads]]; use 'dynamic'")
 
 
 def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:

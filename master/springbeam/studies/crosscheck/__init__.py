@@ -1,4 +1,4 @@
-"""Is the co-simulation right? It is run beside the monolithic reference of its law and judged by bounds of its own.
+"""Compare the co-simulation with the monolithic reference of its law, and judge the differences by bounds.
 
 The bound of a quantity at time t is
 

@@ -34,7 +34,7 @@ def orders(scene: Scene, halvings: int = 3) -> list[OrderRow]:
     """
     size = scene.coupling.H
     if scene.contact.law == "paper":
-        raise SceneError("contact.law = 'paper': Algorithm 1 has no order to observe; --orders takes the other laws")
+        raise SceneError("contact.law = 'paper': Algorithm 1 does not converge; --orders needs another law")
     runs = [simulate(with_changes(scene, coupling={"macro_step": size / 2**k})) for k in range(halvings + 1)]
     times = macro_points(runs[0], scene)
     reference = event_driven.simulate(scene, sample_times=times)

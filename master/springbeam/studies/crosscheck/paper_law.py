@@ -1,4 +1,4 @@
-"""Law `paper` through the FMUs beside Algorithm 1 as one system."""
+"""Compare law `paper` through the FMUs with Algorithm 1 as one system."""
 
 from __future__ import annotations
 

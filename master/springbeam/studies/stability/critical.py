@@ -1,7 +1,7 @@
-"""Critical macro steps measured, beside those that the spectral radius predicts.
+"""Measure critical macro steps, and compare them with those that the spectral radius predicts.
 
-Measured are the FMUs, coupled by the solvers of a run without its events: the linear closed contact of
-`springbeam.studies.stability.linear`, stepped until its growth shows. `Preloaded` makes the one-sided law λ p₊ a
+The FMUs are coupled by the solvers of a run, without events: the linear closed contact of
+`springbeam.studies.stability.linear` is stepped until its growth shows. `Preloaded` makes the one-sided law λ p₊ a
 two-sided one: the bodies are counted from where a preload holds them in equilibrium.
 """
 
@@ -150,7 +150,7 @@ def measured_critical_step(scene: Scene, near: float, precision: float = 0.002) 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A coupling's critical macro step, predicted and measured [s]; ``None``: stable at any."""
+    """A coupling's critical macro step, predicted and measured [s]; ``None``: stable at any step."""
 
     law: str
     scheme: str

@@ -1,14 +1,14 @@
-"""Run the grid of extreme scenes: every cell must end in a named class, whatever it was.
+"""Run the grid of extreme scenes, and put the outcome of every cell into a class.
 
 ===========  ==========================================================================================================
-conserved    done, energy kept to `ledger.EXACT`, nothing lost
-dissipative  done, energy kept to `ledger.EXACT` with what damping and impacts have booked; or a numerically damped beam
-             (``rho_inf`` < 1) that has only lost energy
+conserved    done, energy constant to `ledger.EXACT`, nothing lost
+dissipative  done, energy plus booked losses constant to `ledger.EXACT`; or a numerically damped beam (``rho_inf`` < 1)
+             that has only lost energy
 approximate  done, energy changed by more: within the bound of its scheme (`ledger.bounds`), or the run says so
 refused      a scene that cannot be run, with the reason
 stopped      ended early, with the cause
-garbage      anything else: energy that comes or goes unsaid, numbers that are not finite, bodies that overlap, damping
-             that gives energy back, a crash
+garbage      anything else: energy changed without a warning, numbers that are not finite, bodies that overlap, damping
+             that returns energy, a crash
 ===========  ==========================================================================================================
 
 The same cells give the same outcomes, in whatever order and in however many processes they run.
@@ -179,7 +179,7 @@ def _overlap(run: Trajectory) -> float:
 def run_cells(
     cells: Sequence[dict[str, Any]], processes: int, report: Callable[[Outcome], None] = lambda outcome: None
 ) -> list[Outcome]:
-    """Run all cells in so many processes; return the outcomes in the order of the cells, each reported as it is there.
+    """Run all cells in ``processes`` processes; report each outcome when it is there; return all in the cells' order.
 
     Raises
     ------
@@ -202,7 +202,7 @@ COLUMNS = (
 
 
 def write_csv(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], path: Path) -> None:
-    """Write a row per cell in their order; numbers that there are not are left empty."""
+    """Write a row per cell in their order; missing numbers are left empty."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()

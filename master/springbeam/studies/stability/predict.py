@@ -1,4 +1,4 @@
-"""What a scene's coupling will do, told before it runs: is it stable, is the motion resolved, which scheme fits.
+"""Predict a scene's coupling before it runs: is it stable, is the motion resolved, which scheme fits.
 
 The scene is linearised where it is stiffest: the hardening spring at the largest deflection and the contact law at the
 largest penetration that the energy at first contact allows; a softening spring at rest.
@@ -49,7 +49,7 @@ class SchemePrediction:
 
 @dataclass(frozen=True)
 class Prediction:
-    """All that can be said of a scene's coupling beforehand; ``None`` where the scene lacks what it takes."""
+    """What can be predicted of a scene's coupling; ``None`` if the scene lacks a body or key that is needed."""
 
     estimates: Estimates  #: mass, frequency, stiffness, time of contact, by hand
     frequencies: tuple[float, ...]  #: the lowest three of the beam's mesh [Hz]

@@ -1,4 +1,4 @@
-"""What a sweep varies: ``TABLE.KEY=VALUES``, and the scenes that come of it."""
+"""The keys that a sweep varies, as ``TABLE.KEY=VALUES``, and the scenes that follow."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) ->
 
 
 def compatible(scene: Scene, axes: Sequence[Axis]) -> None:
-    """Raise SceneError if an axis would play no part beside another one, or beside the accuracy of ``scene``."""
+    """Raise SceneError if an axis has no effect because of another one, or because of the accuracy of ``scene``."""
     if scene.accuracy is not None:
         for axis in axes:
             if axis.key in PICKED_BY_ACCURACY.get(axis.table, ()):

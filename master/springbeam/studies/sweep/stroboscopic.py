@@ -1,4 +1,4 @@
-"""A driven motion seen once a period of its drive: bifurcation diagram and peak response over one varied key."""
+"""A driven motion sampled once per period of its drive: bifurcation diagram, and peak response over one varied key."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ _ADAPTIVE_ROWS = 60
 
 @dataclass(frozen=True)
 class Point:
-    """A configuration, how wrong it is and what it cost."""
+    """A configuration, its errors and its cost."""
 
     configuration: Configuration
     errors: Errors | None  #: ``None`` if the run stopped early

@@ -1,4 +1,4 @@
-"""What the sweep of `springbeam.studies.tradeoff` runs: ways to pay for accuracy."""
+"""The configurations that `springbeam.studies.tradeoff` runs."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Configuration:
 
 
 def configurations(scene: Scene) -> list[Configuration]:
-    """Return the sweep for a scene; settings that the scene cannot have are left out."""
+    """Return the configurations for a scene, without those that the scene cannot have."""
     return [*_macro_steps(scene), *_ida(scene), *_automatic(scene), *_adaptive(scene), *_models(scene), *_rivals(scene)]
 
 

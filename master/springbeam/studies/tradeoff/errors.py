@@ -1,4 +1,4 @@
-"""How far a run is from the reference: displacements, event times, impulses, energy."""
+"""The errors of a run against the reference: displacements, event times, impulses, energy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exact solutions, asked of the FMUs themselves: ``springbeam verify``.
+"""Compare the FMUs with exact solutions: ``springbeam verify``.
 
 Every function of `SECTIONS` computes one exact solution from its formula, has ``beam.fmu`` and ``spring.fmu`` (alone,
 or in a scene) compute the same, and returns the comparison as a list of `Check`. A bound follows from what the method

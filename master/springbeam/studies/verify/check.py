@@ -1,4 +1,4 @@
-"""A number that is known exactly beside what the FMUs make of it."""
+"""A number that is known exactly, and its value by the FMUs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ UNIT_FORCE = (1.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Check:
-    """One number that is known exactly, and what the FMUs make of it.
+    """One number that is known exactly, and its value by the FMUs.
 
     Parameters
     ----------
