@@ -229,6 +229,16 @@ def test_ties_and_links_are_predicted():
     assert damper.contact_frequency == 0.0
 
 
+def test_an_elastic_stop_is_predicted_as_a_law_on_a_wall_and_a_coarse_drive_is_told():
+    """√(k/m_tip): the wall has no mass to swing; 20 ms at 45 Hz are 5.65 rad."""
+    scene = load_scene("vibro-impact")
+    p = predict(with_changes(scene, coupling={"macro_step": 0.02}))
+    assert [(s.scheme, s.degree) for s in p.schemes] == [*ENERGY, *EXCHANGES]
+    assert p.contact_frequency == pytest.approx(np.sqrt(2e5 / p.tip_mass), rel=1e-12)
+    assert any("loads.0 turns 5.65 rad in a macro step; H <= 0.00354 s resolves it" in note for note in p.notes)
+    assert not any("loads.0" in note for note in predict(scene).notes)
+
+
 @pytest.mark.parametrize(
     ("name", "changes"),
     [

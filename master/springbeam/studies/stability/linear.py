@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import factorial, sqrt
+from math import factorial, inf, sqrt
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -104,8 +104,9 @@ class LinearBody:
 
     @property
     def mass(self) -> float:
-        """What an impulse at the interface meets [kg]."""
-        return 1.0 / float(self.b @ self.b)
+        """What an impulse at the interface meets [kg]; ∞ of a wall, which has no modes."""
+        mobility = float(self.b @ self.b)
+        return 1.0 / mobility if mobility > 0.0 else inf
 
     def displacement(self, x: np.ndarray) -> np.ndarray:
         """Return w [m] of states, the columns of ``x``."""
