@@ -165,9 +165,12 @@ class ForeignBody(FmuBody):
 
     def energies(self) -> Energies:
         if not self.abilities.energies:
-            return Energies(0.0, self.received, 0.0, 0.0)
+            return self.exchanged()
         told = iter(self._stored())
         return Energies(*(0.0 if name is None else next(told) for name in self._spec.energies))
+
+    def exchanged(self) -> Energies:
+        return Energies(0.0, self.received, 0.0, 0.0)
 
     def holding_force(self, displacement: float, velocity: float) -> float:
         """Return the force that holds the end where it now rests, found by trial steps.

@@ -87,6 +87,10 @@ class Body(Memory):
         """Return what the body stores and has dissipated; a body that cannot tell stores nothing."""
         return Energies(0.0, 0.0, 0.0, 0.0)
 
+    def exchanged(self) -> Energies:
+        """Return the energies by which the coupling is judged, of a foreign body the work that it has received."""
+        return self.energies()
+
     def apply_impulse(self, impulse: float) -> None:
         """Upward impulse [N·s]."""
         raise NotImplementedError

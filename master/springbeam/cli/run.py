@@ -341,7 +341,9 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
     if "coupling" in summary:
         console.print(Text("coupling  {scheme} {degree}: {because}".format(**summary["coupling"])))
     if "max_energy_residual" in summary:
-        console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}")
+        interface = summary.get("max_interface_residual")
+        beside = "" if interface is None else f", of the interface {float(interface):.1e}"
+        console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}{beside}")
     if "accuracy" in summary:
         found = summary["accuracy"]
         console.print(

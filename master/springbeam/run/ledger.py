@@ -72,7 +72,7 @@ class Ledger(Memory):
         residual = total - initial
         if isfinite(residual):
             self.dissipated = lost_in
-            self.scale = scale = max(self.scale, abs(initial), e_beam + abs(e_spring) + contact)
+            self.scale = scale = max(self.scale, abs(initial), abs(e_beam) + abs(e_spring) + contact)
             self.largest_residual = max(self.largest_residual, abs(residual))
             if scale > 0.0:
                 self.relative = max(self.relative, abs(residual) / scale)

@@ -9,7 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from ..bodies.factory import fingerprints, load_bodies
+from ..bodies.factory import findings, fingerprints, load_bodies
 from ..bodies.fmu import FmuError
 from ..bodies.fmu_bodies import FmuBeam, FmuBody, FmuSpring
 from ..bodies.memory import Memory
@@ -93,6 +93,8 @@ def run(
                 progress(time, phase, macro_steps)
             checkpoints.take_when_due(simulation)
 
+    if seconds is not None:
+        _refuse_checkpoints(scene)
     of_scene = _without_own(scene, upper=upper, lower=lower)
     start_time = 0.0 if upper is not None else scene.contact_time or 0.0
     paper = scene.contact.law == "paper"
@@ -206,6 +208,16 @@ def simulate(
     recorder = MemoryRecorder(scene)
     run(scene, recorder, progress, upper=upper, lower=lower)
     return recorder.trajectory()
+
+
+def _refuse_checkpoints(scene: Scene) -> None:
+    """Raise SceneError if a foreign FMU of ``scene`` cannot write its state."""
+    for table, found in findings(scene).items():
+        if not found.abilities.serialized:
+            raise SceneError(
+                f"[{table}] fmu: its state cannot be written to a file (canSerializeFMUstate = false), which "
+                "--checkpoint needs; leave it out"
+            )
 
 
 def _without_own(scene: Scene, **own: Body | None) -> Scene:

@@ -15,7 +15,7 @@ from ..bodies.memory import Memory
 from ..bodies.protocol import NO_FORCE, Body, BodyFailed, StepRefused
 from ..contact.events import gap
 from ..contact.phases import Joint, Phase, Transitions
-from ..coupling.protocol import NotConverged, Step
+from ..coupling.protocol import Ends, NotConverged, Step
 from ..results.recording import NonFiniteValue, Recorder
 from ..results.trajectory import Event
 from ..scene import Scene
@@ -65,6 +65,7 @@ class Simulation(Memory):
         "_error",
         "_transitions",
         "_ledger",
+        "_interface",
         "_rows",
         "_begun",
         "_last_opening",
@@ -104,9 +105,14 @@ class Simulation(Memory):
             self._pair.equilibrium,
         )
         self._ledger = Ledger()
+        #: What judges the coupling: the ledger, or with foreign bodies, whose own accounts may be off, that of the work
+        #: that they have received.
+        self._interface = Ledger() if scene.foreign else self._ledger
         self._energy_warns, self._energy_stops = bounds(scene)
         #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
-        self._untold = any(body is not None and type(body).energies is Body.energies for body in (beam, spring))
+        self._untold = any(
+            body is not None and type(body).energies is Body.energies and body.mass < inf for body in (beam, spring)
+        )
         if self._untold:
             self._energy_warns = self._energy_stops = inf
         self._numerically_damped = scene.beam is not None and scene.beam.damped_numerically
@@ -236,6 +242,7 @@ class Simulation(Memory):
         pair.mark()
         # The bodies are recorded as they arrive: the ledger starts before the impact.
         self._ledger.book(*pair.energies(start))
+        self._judge(start)
         at_start = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
         self._act("impact" if pair.joinable else "stop_impact", at_start)
 
@@ -256,6 +263,8 @@ class Simulation(Memory):
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.follow_phase(phase)
         self._ledger.impact_loss += lost
+        if self._interface is not self._ledger:
+            self._interface.impact_loss += lost
         state.enter(phase)
         tip, low = pair.ends()
         beam, spring = pair.beam is not None, pair.spring is not None
@@ -286,11 +295,17 @@ class Simulation(Memory):
 
     def _record(self, step: Step | None) -> None:
         self._rows.write(self._state, step)
+        self._judge(self._pair.ends())
         # What numerical damping takes is not an error; what it brings is.
-        if (self._ledger.gain if self._numerically_damped else self._ledger.relative) > self._energy_stops:
+        judged = self._interface
+        if (judged.gain if self._numerically_damped else judged.relative) > self._energy_stops:
             raise RunStopped(self._energy_cause(), self._state.time)
         if self._scene.coupling.feedback != "two_way":
             self._refuse_neglect()
+
+    def _judge(self, ends: Ends) -> None:
+        if self._interface is not self._ledger:
+            self._interface.book(*self._pair.exchanged(ends))
 
     def _refuse_neglect(self) -> None:
         """Raise RunStopped where a one-way coupling neglects more than the scene allows."""
@@ -317,14 +332,19 @@ class Simulation(Memory):
         if not causes:
             causes.append("rounding, or a solver's tolerance,")
             remedies.append("the results are not to be trusted; try another coupling.macro_step")
-        percent = 100.0 * self._ledger.relative
+        percent = 100.0 * self._interface.relative
         return f"{' with '.join(causes)} has changed the energy by {percent:.2g} %: {'; '.join(remedies)}"
 
     def summary(self) -> dict[str, Any]:
         """Counts, residuals and warnings, as they go into ``summary.json``."""
         warnings, rows = [], self._rows
-        if self._ledger.relative > self._energy_warns:
+        if self._interface.relative > self._energy_warns:
             warnings.append(self._energy_cause())
+        elif self._ledger.relative > self._energy_warns:
+            warnings.append(
+                f"the energies that the FMUs tell are off by {100.0 * self._ledger.relative:.2g} %, by their own "
+                f"solvers: the coupling has kept those of the interface to {self._interface.relative:.1e}"
+            )
         if reduced := self._pair.joined.reduced:
             warnings.append(
                 f"the contact force of {reduced} of {self._macro_steps} macro steps was not found at coupling.degree = "
@@ -354,6 +374,7 @@ class Simulation(Memory):
             **({"reduced_steps": reduced} if reduced else {}),
             "max_energy_residual": self._ledger.relative,
             "max_energy_residual_joule": self._ledger.largest_residual,
+            **({"max_interface_residual": self._interface.relative} if self._scene.foreign else {}),
             "max_velocity_mismatch": rows.largest_mismatch,
             "resolved": unresolved is None,
             **self._losses(),

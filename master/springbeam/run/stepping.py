@@ -191,6 +191,10 @@ class Pair(Memory):
         """Energies of the beam, of the spring and of what couples them [J], where the ends are."""
         return self.upper.energies(), self.lower.energies(), self._joined.booking(ends)
 
+    def exchanged(self, ends: Ends) -> tuple[Energies, Energies, Booking]:
+        """Return the energies by which the coupling is judged [J], where the ends are."""
+        return self.upper.exchanged(), self.lower.exchanged(), self._joined.booking(ends)
+
     def end_force(self, state: State, step: Step) -> float:
         """C at the end of the step as well as the degree tells; exactly, where the tip has no mass [N]."""
         if self.upper.massless:
