@@ -31,7 +31,7 @@ TIE = {"law": "tie"}
 
 def built(folder: Path) -> dict[str, Any]:
     """Build the FMU of the page by PythonFMU and return its table."""
-    source = re.search(r"```python\n(from pythonfmu .*?)```", (DOCS / "own_fmu.md").read_text("utf-8"), re.S)
+    source = re.search(r"```py\n(from pythonfmu .*?)```", (DOCS / "own_fmu.md").read_text("utf-8"), re.S)
     assert source is not None
     (folder / "msd.py").write_text(source[1], "utf-8")
     subprocess.run(["pythonfmu", "build", "-f", "msd.py", "--handle-state"], cwd=folder, check=True)

@@ -9,7 +9,9 @@ __version__: str
 
 if TYPE_CHECKING:
     from .api import load, simulate
+    from .bodies.elements import PointMass, SpringDamper
     from .bodies.protocol import Body, Energies, Motion
+    from .bodies.rigid_wall import RigidWall
     from .results.trajectory import Event, Trajectory
     from .run.outcome import RunStopped
     from .run.runner import resume
@@ -20,9 +22,12 @@ __all__ = [
     "Energies",
     "Event",
     "Motion",
+    "PointMass",
+    "RigidWall",
     "RunStopped",
     "Scene",
     "SceneError",
+    "SpringDamper",
     "Trajectory",
     "__version__",
     "load",
@@ -36,6 +41,9 @@ _HOME = {
     "Body": "bodies.protocol",
     "Energies": "bodies.protocol",
     "Motion": "bodies.protocol",
+    "PointMass": "bodies.elements",
+    "RigidWall": "bodies.rigid_wall",
+    "SpringDamper": "bodies.elements",
     "load": "api",
     "Event": "results.trajectory",
     "RunStopped": "run.outcome",

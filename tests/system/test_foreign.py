@@ -10,10 +10,13 @@ import pytest
 from commands import command
 from scipy.linalg import expm
 
-from springbeam import SceneError, simulate, with_changes
+from springbeam import SceneError, resume, simulate, with_changes
 from springbeam.bodies import probe
 from springbeam.bodies.factory import findings
 from springbeam.bodies.fmu import FmuError
+from springbeam.results.directory import RunDirectory
+from springbeam.results.file_recorder import FileRecorder
+from springbeam.run import runner
 from springbeam.scene import scene_from_dict
 
 M1, M2, K, C, V = 2.0, 3.0, 40.0, 0.2, -0.3
@@ -214,6 +217,37 @@ def test_wrong_names_are_one_error(fmu, what):
     with pytest.raises(FmuError) as caught:
         simulate(pair(fmu(), spring=change))
     assert said in str(caught.value)
+
+
+def test_events_are_those_of_the_element_and_a_run_goes_on_to_the_same_bits(fmu, tmp_path):
+    """A mass falls on a foreign oscillator above a lossy foundation, and the run is resumed on the way."""
+    falling = {"displacement": 0.01, "velocity": -1.0, "external_force": -5.0}
+    below = {"integral": None, "integral_2": None, "parameters": {"m": M2, "k": 400.0, "c": C}}
+    element = {"element": "spring_damper", "mass": M2, "stiffness": 400.0, "damping": C}
+    tables = {
+        "beam": falling,
+        "stop": {"position": -0.05, "restitution": 0.6},
+        "contact": {"law": "transmission", "damping": 0.0},
+        "coupling": {"macro_step": 0.01},
+    }
+    scene = pair(fmu(), spring=below, **tables)
+    run, exact = simulate(scene), simulate(pair(fmu(), spring=element, **tables))
+    assert [event.kind for event in run.events] == [event.kind for event in exact.events]
+    assert {"impact", "stop_impact", "release", "separation"} <= {event.kind for event in run.events}
+    for event, other in zip(run.events, exact.events, strict=True):
+        assert event.time == pytest.approx(other.time, abs=1e-10)
+    assert run.summary["max_interface_residual"] < 1e-12
+
+    def interrupted(time: float, phase: str, steps: int) -> None:
+        if time > 0.5:
+            raise KeyboardInterrupt
+
+    directory = RunDirectory.create(tmp_path / "run")
+    with pytest.raises(KeyboardInterrupt), FileRecorder(scene, directory) as recorder:
+        runner.run(scene, recorder, interrupted, seconds=0.0)
+    resumed = resume(directory.path)
+    for name, column in run.columns.items():
+        assert np.array_equal(resumed[name], column), name
 
 
 def test_the_mass_is_measured_as_well_as_it_needs_to_be(fmu):

@@ -56,7 +56,7 @@ def needs(scene: Scene, body: Abilities) -> Iterator[Need]:
         yield Need(scheme, body.state, _STATE, exchanged)
     if coupling.scheme == "hermite":
         yield Need(scheme, body.velocity, _VELOCITY, 'use scheme = "energy"')
-    if coupling.degree > 0 and scene.joins:
+    if coupling.degree > 0:
         lower = f"use degree = {body.slopes if ordinary else body.degree}"
         slopes = _SLOPES if body.slopes == 0 else f"its input takes derivatives of order {body.slopes} at most"
         yield Need(degree, body.slopes >= coupling.degree, slopes, lower)

@@ -56,7 +56,7 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[Body | None, Body | No
 def _body(scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None) -> Body:
     if isinstance(spec, ForeignFmu):
         assert found is not None
-        by_substeps = scene.joins and scene.coupling.degree > found.abilities.integrals
+        by_substeps = scene.coupling.degree > found.abilities.integrals
         return ForeignBody(spec, start_time, found, by_substeps and scene.coupling.scheme not in ORDINARY_SCHEMES)
     if isinstance(spec, Spring):
         return FmuSpring(spec, start_time)

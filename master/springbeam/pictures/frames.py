@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..results.trajectory import Trajectory
+from ..scene.statics import SHAPE_POINTS
 from .drawing import near_levels
 
 #: More frames than this are thinned.
@@ -52,13 +53,16 @@ class Frames:
 def frames_of(trajectory: Trajectory) -> Frames | None:
     """Return the frames of a run; ``None`` if it has fewer than two."""
     rows = trajectory["time"]
+    deflection: np.ndarray | None
     if trajectory.shapes is not None:
         time, deflection = trajectory.shapes
         # A killed run may have a shape more than it has rows.
         known = time <= rows[-1] if len(rows) else np.zeros(len(time), dtype=bool)
         time, deflection = time[known], deflection[known]
     elif trajectory.scene.beam is None:
-        time, deflection = rows, None
+        # A body that is not our beam is a level bar at the height of its end.
+        ends = trajectory["u_tip"] if "u_tip" in trajectory.columns else None
+        time, deflection = rows, None if ends is None else np.repeat(ends[:, None], len(SHAPE_POINTS), axis=1)
     else:
         return None
     if len(time) < 2 or time[-1] <= time[0]:
