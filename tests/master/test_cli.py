@@ -389,3 +389,23 @@ def test_summary_in_the_directory_is_the_runners(here):
     command("run", "soft", "--no-plots")
     summary = json.loads((here / "results" / "soft" / "summary.json").read_text(encoding="utf-8"))
     assert {key: summary[key] for key in SUMMARY} == SUMMARY
+
+
+def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch):
+    """Keys that are alike are left out; a result that one run lacks is told nevertheless."""
+    forces = iter((3.0, None))
+
+    def run(scene, recorder, *args, **kwargs):
+        fake_run(scene, recorder)
+        force = next(forces)
+        recorder.finish({**SUMMARY, "stop_strokes": 2, **({} if force is None else {"contact_force_max": force})})
+
+    monkeypatch.setattr(springbeam.run.runner, "run", run)
+    command("run", "soft", "--no-plots", "--out", "a")
+    command("run", "soft", "--no-plots", "--out", "b", "--set", "spring.mass=2.5", "--set", "contact.damping=0")
+    found = json.loads(command("compare", "a", "b", "--out", "p.png", "--json").stdout)
+    assert found["keys"] == {"spring.mass": [1.0, 2.5]}
+    assert found["results"] == {"contact_force_max [N]": [3.0, None], "stop_strokes": [2, 2], "warnings": [0, 0]}
+    assert Path("p.png").stat().st_size > 10_000
+    assert "spring.mass" in command("compare", "a", "b", "--no-plots").stdout
+    assert command("compare", "a").exit_code == 2

@@ -15,7 +15,7 @@ from commands import command
 import springbeam
 from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.results.totals import LOSS_NAMES, TOTAL_UNITS
+from springbeam.results.totals import LOSS_NAMES, TOTALS
 from springbeam.studies.sweep.metrics import METRICS
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
@@ -79,7 +79,7 @@ def test_the_peak_of_the_mean_does_not_grow_with_the_mesh():
 
 
 def test_metrics_are_the_totals(run):
-    for name in (*TOTAL_UNITS, *LOSS_NAMES):
+    for name in (*TOTALS, *LOSS_NAMES):
         assert METRICS[name](run) == run.summary.get(name)
     paper = simulate(
         with_changes(

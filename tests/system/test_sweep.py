@@ -158,6 +158,15 @@ def test_a_sweep_goes_on_where_it_was_left_and_does_not_depend_on_workers(client
     assert again == [12]
 
 
+def test_a_finished_sweep_opens_without_workers(client, tmp_path, monkeypatch):
+    plan = planned("spring.mass=0.5,-1")
+    assert sweep.finished(plan, tmp_path) is None
+    counts = sweep.run(plan, tmp_path, client)
+    assert sweep.finished(plan, tmp_path) == counts == {"done": 1, "stopped": 0, "refused": 1, "lost": 0}
+    with pytest.raises(sweep.SweepError):
+        sweep.finished(planned("spring.mass=0.5,2"), tmp_path)
+
+
 def test_another_sweep_is_not_mixed_in(client, tmp_path):
     sweep.run(planned("spring.mass=1,2"), tmp_path / "s", client)
     with pytest.raises(sweep.SweepError, match="another sweep"):

@@ -18,6 +18,7 @@ import typer
 
 from . import (
     checks,
+    compare,
     converge,
     doctor,
     report,
@@ -93,7 +94,7 @@ def _common(
 _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Scenes": (scenes.scenes, scenes.keys, scenes.new),
     "Run": (run.run, resume.resume, sweep.sweep),
-    "Look": (report.report, report.animate),
+    "Look": (report.report, report.animate, compare.compare),
     "Choose scheme and accuracy": (stability.predict, tradeoff.tradeoff, converge.converge),
     "Check": (checks.crosscheck, checks.verify, stability.stability, doctor.doctor),
 }

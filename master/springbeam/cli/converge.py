@@ -89,7 +89,7 @@ def converge(
 
 def _table(found: Study, refinement: Refinement) -> Table:
     """Return a row a quantity: of the mesh as given, and where finer ones or more modes lead."""
-    from ..studies.sweep.metrics import UNITS
+    from ..studies.sweep.metrics import heading
 
     title = f"more {refinement.refined}"
     table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left")
@@ -105,8 +105,7 @@ def _table(found: Study, refinement: Refinement) -> Table:
             error = f"{given - limit:.1e}"
         by_time = "" if last is None or halved is None else f"{halved - last:.1e}"
         cells = (_number(given, ".6g"), _number(limit, ".6g"), error, _number(settled.order, ".1f"), by_time)
-        unit = f" [{UNITS[name]}]" if name in UNITS else ""
-        table.add_row(Text(name + unit), *cells)
+        table.add_row(Text(heading(name)), *cells)
     return table
 
 

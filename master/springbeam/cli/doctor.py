@@ -70,7 +70,7 @@ def doctor(
     line("system", f"{found['system']}, {found['machine']}")
     for name, remedy in (
         ("packages", "pip install --upgrade springbeam"),
-        ("sweep", "pip install 'springbeam[sweep]'"),
+        ("sweep", "pip install distributed pyarrow"),
     ):
         versions = found[name]
         absent = [package for package, number in versions.items() if number is None]

@@ -53,6 +53,9 @@ def keys(
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of scene files, for editors.")
     ] = False,
+    metrics: Annotated[
+        bool, typer.Option("--metrics", help="List the numbers of a run that sweep and converge know instead.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """List every key of a scene with unit, allowed values, default and meaning.
@@ -63,6 +66,14 @@ def keys(
 
     if schema:
         print_json(reference.schema())
+        return
+    if metrics:
+        from ..studies.sweep.metrics import METRICS
+
+        if as_json:
+            print_json([{"name": name, "unit": m.unit, "meaning": m.words} for name, m in METRICS.items()])
+        for name, m in () if as_json else METRICS.items():
+            typer.echo(f"{name}{f' [{m.unit}]' if m.unit else ''}: {m.words}")
         return
     if table is not None and table not in MODELS:
         fail(BAD_INPUT, f"{table}: unknown table; allowed: {', '.join(filter(None, MODELS))}")

@@ -82,7 +82,7 @@ def sweep(
     Example: springbeam sweep soft --vary spring.linear_stiffness=1:200:64:log
     """
     if missing := [name for name in ("distributed", "pyarrow") if find_spec(name) is None]:
-        fail(BAD_INPUT, f"sweep needs the packages {' and '.join(missing)}: pip install 'springbeam[sweep]'")
+        fail(BAD_INPUT, f"sweep needs the packages {' and '.join(missing)}: pip install {' '.join(missing)}")
     from ..studies import sweep as sweeps
     from ..studies.sweep.design import design, parse_axis
     from ..studies.sweep.picture import draw
@@ -97,20 +97,22 @@ def sweep(
         what, axes = load_scene(scene, settings or ()), tuple(parse_axis(text) for text in vary or ())
         todo = sweeps.Sweep(what, axes, design(axes, samples, seed, sampling), metrics, stroboscopic)
         try:
-            with bar, sweeps.cluster(scheduler, workers) as client:
-                task = bar.add_task("", total=len(todo.values), state="starting")
-                counts = sweeps.run(
-                    todo,
-                    directory,
-                    client,
-                    lambda done, total, failed: bar.update(task, completed=done, state=f"{failed} failed"),
-                )
+            counts = sweeps.finished(todo, directory)
+            if counts is None:
+                with bar, sweeps.cluster(scheduler, workers) as client:
+                    task = bar.add_task("", total=len(todo.values), state="starting")
+                    counts = sweeps.run(
+                        todo,
+                        directory,
+                        client,
+                        lambda done, total, failed: bar.update(task, completed=done, state=f"{failed} failed"),
+                    )
         except sweeps.SweepError as error:
             fail(BAD_INPUT, str(error))
         except KeyboardInterrupt:
             fail(STOPPED, f"interrupted; the same command goes on with what is in {directory}")
         columns = sweeps.rows(directory)
-        drawn = not no_plots and draw(columns, axes, metrics, directory / sweeps.PICTURE)
+        drawn = not no_plots and draw(columns, axes, metric or sweeps.PRINCIPAL, what.title, directory / sweeps.PICTURE)
         pictures = [directory / sweeps.PICTURE] if drawn else []
         if stroboscopic and not no_plots and sweeps.stroboscopic.draw(columns, axes, directory):
             pictures.append(directory / sweeps.stroboscopic.PICTURE)

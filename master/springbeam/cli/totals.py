@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..results.totals import LOSS_NAMES, TOTAL_UNITS
+from ..results.totals import LOSS_NAMES, TOTALS
 
 
 def totals_in_words(summary: Mapping[str, Any]) -> list[str]:
     """Return what the run amounts to (`springbeam.results.totals`), a line per subject."""
     lines = []
     if "contact_impulse" in summary:
-        found = {name: f"{summary[name]:.4g} {unit}" for name, unit in TOTAL_UNITS.items() if name in summary}
+        found = {name: f"{summary[name]:.4g} {unit}" for name, (_, unit) in TOTALS.items() if name in summary}
         parts = [
             f"impulse {found['contact_impulse']}",
             f"peak force {found['contact_force_max']} (mean over {found['contact_force_window']}; docs/contact.md)",

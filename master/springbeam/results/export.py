@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ..scene.statics import SHAPE_POINTS
-from .totals import LOSS_NAMES, TOTAL_UNITS
+from .totals import LOSS_NAMES, TOTALS
 from .trajectory import Trajectory, rounded, units_of
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def as_html(run: Trajectory) -> str:
     rows = [
         ("rows, events", f"{len(run)}, {len(run.events)}"),
         ("status", str(summary.get("status", "no summary"))),
-        *((name, f"{rounded(summary[name], 1.0)} {unit}") for name, unit in TOTAL_UNITS.items() if name in summary),
+        *((name, f"{rounded(summary[name], 1.0)} {unit}") for name, (_, unit) in TOTALS.items() if name in summary),
         *(
             (f"lost: {words}", f"{rounded(summary[name], 1.0)} J")
             for name, words in LOSS_NAMES.items()

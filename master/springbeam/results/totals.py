@@ -7,6 +7,7 @@ polynomial that was applied, so its integral, and its mean over any window, are 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,18 +17,26 @@ from .paths import Path
 from .steps import impulse, load_on_spring
 from .trajectory import Event
 
-#: Units of `totals`, in the order in which they are shown.
-TOTAL_UNITS = {
-    "contact_impulse": "N·s",
-    "contact_force_max": "N",
-    "contact_force_window": "s",
-    "contact_duration": "s",
-    "contact_duration_total": "s",
-    "rebound_velocity": "m/s",
-    "deepest_tip": "m",
-    "deepest_tip_time": "s",
-    "stop_strokes": "",
-    "foundation_impulse": "N·s",
+
+class Quantity(NamedTuple):
+    """What a number of a run is; ``unit`` is "" for a count."""
+
+    words: str
+    unit: str
+
+
+#: The numbers of `totals`, in the order in which they are shown.
+TOTALS = {
+    "contact_impulse": Quantity("impulse of the contact, ∫ C dt and impacts", "N·s"),
+    "contact_force_max": Quantity("peak contact force, mean over the window", "N"),
+    "contact_force_window": Quantity("window of the peak contact force", "s"),
+    "contact_duration": Quantity("longest contact", "s"),
+    "contact_duration_total": Quantity("all contacts together", "s"),
+    "rebound_velocity": Quantity("velocity of the tip when it last leaves", "m/s"),
+    "deepest_tip": Quantity("lowest place of the tip", "m"),
+    "deepest_tip_time": Quantity("when the tip is lowest", "s"),
+    "stop_strokes": Quantity("strokes on the foundation", ""),
+    "foundation_impulse": Quantity("impulse of the foundation", "N·s"),
 }
 #: Where energy is lost, by summary key [J].
 LOSS_NAMES = {
@@ -46,7 +55,7 @@ _CHUNK = 65536
 def totals(
     scene: Scene, steps: np.ndarray, events: Iterable[Event], window: float, *, free_at_end: bool
 ) -> dict[str, float | int]:
-    """Return the numbers of `TOTAL_UNITS` that the scene has, and the energies lost in impacts [J].
+    """Return the numbers of `TOTALS` that the scene has, and the energies lost in impacts [J].
 
     Parameters
     ----------

@@ -127,7 +127,11 @@ def _nearest_key(table: str, key: str) -> str:
     model = table_of(table)
     here = list(model.model_fields) if model else ["title", *(f"[{name}]" for name in TABLES)]
     elsewhere = [name for name, other in TABLES.items() if key in other.model_fields]
-    hint = f"it belongs to [{elsewhere[0]}]; " if elsewhere else nearest(key, here)
+    longer = [name for name in here if name.endswith(f"_{key}")]
+    if longer:
+        hint = f"did you mean {longer[0]}? "
+    else:
+        hint = f"it belongs to [{elsewhere[0]}]; " if elsewhere else nearest(key, here)
     return f"{hint}allowed: {', '.join(here)}"
 
 

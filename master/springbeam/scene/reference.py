@@ -42,6 +42,11 @@ def heading(table: str) -> str:
     return "outside the tables" if not table else "[[loads]], any number" if table == "loads" else f"[{table}]"
 
 
+def unit_of(table: str, key: str) -> str:
+    """Return the unit of a key of a table, or of a load by its number ("loads.0"); "–" if it has none."""
+    return extra(MODELS[table.partition(".")[0]].model_fields[key], "unit")
+
+
 def about(table: str) -> str:
     """Return what a table describes."""
     return " ".join((MODELS[table].__doc__ or "").split()).replace("``", "`")

@@ -19,7 +19,7 @@ from ..pictures.drawing import BLACK
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, with_changes
 from .accuracy import simulate
-from .sweep.metrics import METRICS, UNITS
+from .sweep.metrics import METRICS, heading
 
 #: Quantities that are compared unless others are asked for, those that a scene has.
 QUANTITIES = (
@@ -211,7 +211,7 @@ def _errors(found: Study, sequence: Refinement) -> Iterator[tuple[str, list[int]
         ]
         if points:
             sizes, errors = zip(*points, strict=True)
-            yield f"{name} [{UNITS[name]}]" if name in UNITS else name, list(sizes), list(errors)
+            yield heading(name), list(sizes), list(errors)
 
 
 def _size(sequence: Refinement, level: Level) -> int:

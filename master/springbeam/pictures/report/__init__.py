@@ -17,7 +17,7 @@ import numpy as np
 import tomli_w
 from plotly.offline import get_plotlyjs
 
-from ...results.totals import LOSS_NAMES
+from ...results.totals import LOSS_NAMES, TOTALS
 from ...results.trajectory import Event, Trajectory, rounded
 from ...scene import Scene, load_scene, shipped_scenes
 from ..drawing import (
@@ -43,16 +43,8 @@ _EVENT_UNITS = {"y": "m", "z": "m/s", "u_tip": "m", "v_tip": "m/s"}
 _FORCES_READ = ("contact_force", "foundation_force")
 #: So many events of a kind in succession are a cascade.
 _CASCADE = 4
-_RESULT_WORDS = {
-    "contact_force_max": ("peak contact force", "N"),
-    "contact_impulse": ("impulse of the contact, ∫ C dt and impacts", "N·s"),
-    "contact_duration": ("longest contact", "s"),
-    "contact_duration_total": ("all contacts together", "s"),
-    "rebound_velocity": ("velocity of the tip when it last leaves", "m/s"),
-    "deepest_tip": ("lowest place of the tip", "m"),
-    "stop_strokes": ("strokes on the foundation", ""),
-    "foundation_impulse": ("impulse of the foundation", "N·s"),
-}
+#: Numbers of a run that say something only beside others.
+_BESIDE = ("contact_force_window", "deepest_tip_time")
 
 
 def page(trajectory: Trajectory) -> str:
@@ -151,10 +143,11 @@ def _warnings(trajectory: Trajectory) -> list[str]:
 
 def _results(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Return words and values of what the run amounts to (`springbeam.results.totals`)."""
-    for name, (words, unit) in _RESULT_WORDS.items():
-        if name in summary and (summary[name] or not unit):
-            window = f", mean over {summary['contact_force_window']:.4g} s" if name == "contact_force_max" else ""
-            yield words + window, f"{summary[name]:.5g} {unit}".rstrip()
+    for name, (words, unit) in TOTALS.items():
+        if name in summary and name not in _BESIDE and (summary[name] or not unit):
+            if name == "contact_force_max":
+                words = words.replace("the window", f"{summary['contact_force_window']:.4g} s")
+            yield words, f"{summary[name]:.5g} {unit}".rstrip()
     for name, words in LOSS_NAMES.items():
         if summary.get(name):
             yield f"energy lost by {words}", f"{summary[name]:.4g} J"

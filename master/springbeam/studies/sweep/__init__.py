@@ -23,13 +23,13 @@ from ...scene import Scene, SceneError, scene_from_dict
 from ..accuracy import simulate
 from . import stroboscopic
 from .design import Axis, compatible, varied
-from .metrics import METRICS
+from .metrics import METRICS, PRINCIPAL
 
 if TYPE_CHECKING:
     import pyarrow as pa
     from distributed import Client
 
-__all__ = ["METRICS", "Sweep", "SweepError", "cluster", "rows", "run"]
+__all__ = ["METRICS", "PRINCIPAL", "Sweep", "SweepError", "cluster", "finished", "rows", "run"]
 
 #: Rows are written at least this often [s].
 _WRITE_SECONDS = 5.0
@@ -38,6 +38,9 @@ _AHEAD = 4
 #: Runs that take less together are handed out as one task [s]: Dask takes some 6 ms for each.
 _TASK_SECONDS = 1.0
 TABLE, DESCRIPTION, PARTS, PICTURE = "sweep.parquet", "sweep.json", "parts", "sweep.png"
+
+
+STATUSES = ("done", "stopped", "refused", "lost")
 
 
 class SweepError(RuntimeError):
@@ -119,7 +122,7 @@ def run(
     _check_workers(client)
     parts = _Parts(sweep, directory / PARTS)
     finished = parts.finished
-    total, counts = len(sweep.values), {"done": 0, "stopped": 0, "refused": 0, "lost": 0}
+    total, counts = len(sweep.values), dict.fromkeys(STATUSES, 0)
     for status in finished.values():
         counts[status] += 1
     todo = [index for index in range(total) if index not in finished]
@@ -135,6 +138,19 @@ def run(
     pq.write_table(parts.table(), temporary)
     os.replace(temporary, directory / TABLE)
     return counts
+
+
+def finished(sweep: Sweep, directory: Path) -> dict[str, int] | None:
+    """Return the number of rows by status of a sweep that has nothing left to run; ``None`` if there is something.
+
+    Raises SweepError if the directory holds another sweep.
+    """
+    if not (directory / TABLE).exists():
+        return None
+    _claim(sweep, directory)
+    statuses = rows(directory)["status"]
+    counts = {status: statuses.count(status) for status in STATUSES}
+    return None if counts["lost"] else counts
 
 
 def rows(directory: str | Path) -> dict[str, list[Any]]:

@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...results.totals import LOSS_NAMES, TOTAL_UNITS
+from ...results.totals import LOSS_NAMES, TOTALS
 from ...results.trajectory import EVENT_KINDS, Trajectory
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A number of a run; ``None`` where the scene has no such thing, or it did not happen."""
+
+    unit: str  #: "" for a count
+    words: str
+    of: Callable[[Trajectory], float | None]
+
+    def __call__(self, run: Trajectory) -> float | None:
+        return self.of(run)
 
 
 def _extreme(column: str, pick: Callable[[np.ndarray], float]) -> Callable[[Trajectory], float | None]:
@@ -30,30 +43,34 @@ def _total(name: str) -> Callable[[Trajectory], float | None]:
     return lambda run: float(run.summary[name]) if name in run.summary else None
 
 
-#: Name → value of a run; ``None`` where the scene has no such thing, or it did not happen.
-METRICS: dict[str, Callable[[Trajectory], float | None]] = {
-    "u_tip_min": _extreme("u_tip", np.min),
-    "u_tip_max": _extreme("u_tip", np.max),
-    "u_tip_end": _last("u_tip"),
-    "y_min": _extreme("y", np.min),
-    "y_max": _extreme("y", np.max),
-    "y_end": _last("y"),
-    "z_max": _extreme("z", lambda z: np.max(np.abs(z))),
-    "gap_max": _extreme("gap", np.max),
-    **{name: _total(name) for name in (*TOTAL_UNITS, *LOSS_NAMES)},
-    "dissipated": _last("e_dissipated"),
-    "impact_loss": _last("e_impact_loss"),
-    "energy_residual": lambda run: float(run.summary["max_energy_residual"]),
-    "macro_steps": lambda run: float(run.summary["macro_steps"]),
-    **{f"first_{kind}": _first(kind) for kind in EVENT_KINDS},
-    **{f"number_of_{kind}": _number(kind) for kind in EVENT_KINDS},
+METRICS: dict[str, Metric] = {
+    "u_tip_min": Metric("m", "lowest row of the tip", _extreme("u_tip", np.min)),
+    "u_tip_max": Metric("m", "highest row of the tip", _extreme("u_tip", np.max)),
+    "u_tip_end": Metric("m", "the tip at the end", _last("u_tip")),
+    "y_min": Metric("m", "lowest row of the spring's top", _extreme("y", np.min)),
+    "y_max": Metric("m", "highest row of the spring's top", _extreme("y", np.max)),
+    "y_end": Metric("m", "the spring's top at the end", _last("y")),
+    "z_max": Metric("m/s", "largest speed of the spring's top", _extreme("z", lambda z: np.max(np.abs(z)))),
+    "gap_max": Metric("m", "largest gap", _extreme("gap", np.max)),
+    **{name: Metric(unit, words, _total(name)) for name, (words, unit) in TOTALS.items()},
+    **{name: Metric("J", f"energy lost by {words}", _total(name)) for name, words in LOSS_NAMES.items()},
+    "dissipated": Metric("J", "energy lost to damping", _last("e_dissipated")),
+    "impact_loss": Metric("J", "energy lost in impacts", _last("e_impact_loss")),
+    "energy_residual": Metric(
+        "", "largest change of the sum of all energies, relative", lambda run: float(run.summary["max_energy_residual"])
+    ),
+    "macro_steps": Metric("", "macro steps", lambda run: float(run.summary["macro_steps"])),
+    **{f"first_{kind}": Metric("s", f"first event {kind}", _first(kind)) for kind in EVENT_KINDS},
+    **{f"number_of_{kind}": Metric("", f"events {kind}", _number(kind)) for kind in EVENT_KINDS},
 }
-#: Units of the metrics that have one; `z_max` is the largest |z|.
-UNITS = {
-    **dict.fromkeys(("u_tip_min", "u_tip_max", "u_tip_end", "y_min", "y_max", "y_end", "gap_max"), "m"),
-    "z_max": "m/s",
-    **{name: unit for name, unit in TOTAL_UNITS.items() if unit},
-    **dict.fromkeys(LOSS_NAMES, "J"),
-    **dict.fromkeys(("dissipated", "impact_loss"), "J"),
-    **{f"first_{kind}": "s" for kind in EVENT_KINDS},
-}
+#: What a picture shows of a sweep that was asked for no metric in particular.
+PRINCIPAL = (
+    *("contact_force_max", "contact_impulse", "contact_duration", "rebound_velocity", "deepest_tip", "stop_strokes"),
+    *("y_min", "u_tip_end", "y_end"),
+)
+
+
+def heading(name: str) -> str:
+    """Return a metric with its unit."""
+    unit = METRICS[name].unit
+    return f"{name} [{unit}]" if unit else name

@@ -9,12 +9,15 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ...pictures.drawing import BLUE, VERMILLION
+from ...scene.reference import unit_of
 from .design import Axis
-from .metrics import UNITS
+from .metrics import heading
 
 #: A metric that varies less, relative to its largest value, is constant.
 _ROUNDING = 1e-12
@@ -22,19 +25,23 @@ _ROUNDING = 1e-12
 _FEW = 8
 
 
-def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], metrics: Sequence[str], path: Path) -> bool:
-    """Draw to ``path`` what the one or two keys of a sweep change; ``False`` where there is nothing to draw."""
+def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], metrics: Sequence[str], title: str, path: Path) -> bool:
+    """Draw to ``path`` what of ``metrics`` the one or two keys of a sweep change; ``False`` if that is nothing."""
+    metrics = [name for name in metrics if name in columns]
     numbers = {name: np.array([np.nan if v is None else v for v in columns[name]], dtype=float) for name in metrics}
     shown = [name for name in metrics if _varies(numbers[name])]
     if len(axes) not in (1, 2) or not shown:
         return False
     wide = min(3, len(shown))
     high = -(-len(shown) // wide)
-    figure, panels = plt.subplots(high, wide, figsize=(4.0 * wide, 3.0 * high), squeeze=False, layout="constrained")
+    figure, panels = plt.subplots(
+        high, wide, figsize=(4.0 * wide, 3.0 * high + 0.4), squeeze=False, layout="constrained"
+    )
+    figure.suptitle(title or "sweep")
     for ax in panels.flat[len(shown) :]:
         ax.remove()
     for ax, name in zip(panels.flat, shown, strict=False):
-        ax.set_title(f"{name} [{UNITS[name]}]" if name in UNITS else name, fontsize="medium")
+        ax.set_title(heading(name), fontsize="medium")
         if len(axes) == 1:
             _curve(ax, columns[axes[0].name], numbers[name], axes[0])
         else:
@@ -61,8 +68,8 @@ def _curve(ax: Axes, at: list[Any], values: np.ndarray, axis: Axis) -> None:
             low = ax.get_ylim()[0]
             ax.plot(position[failed], np.full(failed.sum(), low), "x", color=VERMILLION, clip_on=False)
         if axis.log:
-            ax.set_xscale("log")
-    ax.set_xlabel(axis.name)
+            _logarithmic(ax.xaxis, position)
+    ax.set_xlabel(_labelled(axis))
     ax.grid(alpha=0.3)
 
 
@@ -80,15 +87,30 @@ def _map(figure: Figure, ax: Axes, columns: dict[str, list[Any]], values: np.nda
         x, y = (np.array([level.index(v) for v in columns[a.name]] if word else columns[a.name], dtype=float)
                 for a, level, word in zip(axes, levels, words, strict=True))  # fmt: skip
         picture = ax.scatter(x, y, c=values, s=14, cmap="cividis")
-    for axis, set_scale, set_ticks, level, word in (
-        (axes[0], ax.set_xscale, ax.set_xticks, levels[0], words[0]),
-        (axes[1], ax.set_yscale, ax.set_yticks, levels[1], words[1]),
+    for axis, drawn, set_ticks, level, word in (
+        (axes[0], ax.xaxis, ax.set_xticks, levels[0], words[0]),
+        (axes[1], ax.yaxis, ax.set_yticks, levels[1], words[1]),
     ):
         if word:
             set_ticks(range(len(level)), [str(v) for v in level])
         elif axis.log:
-            set_scale("log")
+            _logarithmic(drawn, np.array(level, dtype=float))
         elif grid and len(level) <= _FEW:
             set_ticks(level)
-    ax.set(xlabel=axes[0].name, ylabel=axes[1].name)
+    ax.set(xlabel=_labelled(axes[0]), ylabel=_labelled(axes[1]))
     figure.colorbar(picture, ax=ax)
+
+
+def _labelled(axis: Axis) -> str:
+    """Return a varied key with its unit."""
+    unit = unit_of(axis.table, axis.key)
+    return f"{axis.name} [{unit}]" if unit != "–" else axis.name
+
+
+def _logarithmic(axis: XAxis | YAxis, values: np.ndarray) -> None:
+    """Make an axis logarithmic, with plain numbers at decades, and at 2 and 5 if there are few."""
+    (axis.axes.set_xscale if isinstance(axis, XAxis) else axis.axes.set_yscale)("log")
+    wide = np.max(values) > 20.0 * np.min(values)
+    axis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,108 @@
+"""``springbeam compare``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+from rich.text import Text
+
+from ..results.reading import load_trajectory
+from ..results.totals import LOSS_NAMES, TOTALS
+from ..results.trajectory import Trajectory
+from ..scene import Scene
+from .common import (
+    BAD_INPUT,
+    JsonOption,
+    NoPlotsOption,
+    QuietOption,
+    bad_input_reported,
+    console_for,
+    fail,
+    print_json,
+    results_directory,
+)
+
+
+def compare(
+    runs: Annotated[list[Path], typer.Argument(metavar="DIR…", help="Directories of two runs or more.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Where the picture goes.")] = Path(
+        "results/comparison.png"
+    ),
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare runs: the keys that differ, the results that matter, and their motions and forces in one picture.
+
+    Example: springbeam compare results/soft results/light
+    """
+    if len(runs) < 2:
+        fail(BAD_INPUT, "one run; compare takes two or more")
+    with bad_input_reported():
+        trajectories = [load_trajectory(results_directory(run)) for run in runs]
+        names = [str(run) for run in runs]
+        keys, results = differing_keys([run.scene for run in trajectories]), results_of(trajectories)
+        drawn = not no_plots
+        if drawn:
+            from ..pictures.comparison import draw  # matplotlib takes a second to load
+
+            out.parent.mkdir(parents=True, exist_ok=True)
+            draw(dict(zip(names, trajectories, strict=True)), out)
+    if as_json:
+        print_json({"runs": names, "keys": keys, "results": results, "picture": out if drawn else None})
+    elif quiet and drawn:
+        typer.echo(out)
+    console = console_for(silent=quiet or as_json)
+    console.print(_table("keys that differ", names, keys))
+    console.print(_table("results", names, results))
+    if drawn:
+        console.print(Text(f"picture   {out}"), soft_wrap=True)
+
+
+def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:
+    """Return the values of the keys that are not the same in all scenes, ``None`` where a scene has no such key."""
+    flat = [dict(_flat(scene.model_dump(exclude_none=True))) for scene in scenes]
+    names = dict.fromkeys(name for keys in flat for name in keys)
+    values = {name: [keys.get(name) for keys in flat] for name in names}
+    return {name: found for name, found in values.items() if any(value != found[0] for value in found)}
+
+
+def _flat(scene: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield ``table.key`` and value, of loads ``loads.0.key``."""
+    for name, content in scene.items():
+        tables = {f"{name}.{i}": load for i, load in enumerate(content)} if name == "loads" else {name: content}
+        for table, keys in tables.items():
+            yield from (
+                ((f"{table}.{key}", value) for key, value in keys.items())
+                if isinstance(keys, dict)
+                else [(table, keys)]
+            )
+
+
+def results_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
+    """Return the numbers of `springbeam.results.totals` that any of the runs has, with their units, by run."""
+    units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
+    found = {}
+    for name, unit in units.items():
+        values = [run.summary.get(name) for run in runs]
+        if any(values):
+            found[f"{name} [{unit}]" if unit else name] = values
+    return {**found, "warnings": [len(run.summary.get("warnings", ())) for run in runs]}
+
+
+def _table(title: str, names: list[str], rows: dict[str, list[Any]]) -> Table:
+    table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left")
+    table.add_column("", overflow="fold")
+    for name in names:
+        table.add_column(Text(name), justify="right", overflow="fold")
+    for name, values in rows.items():
+        table.add_row(Text(name), *(_shown(value) for value in values))
+    return table
+
+
+def _shown(value: Any) -> Text:
+    return Text("" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value))
