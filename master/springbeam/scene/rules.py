@@ -1,16 +1,17 @@
-"""Rules for several keys together: scenes that cannot be run although each value is allowed, and suspicious ones."""
+"""Rules for several keys together: scenes that cannot be run although each value is allowed."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 
-from .estimates import implausible
 from .loads import MOST_POINTS
 from .partners import PARTNERS, RigidWall, kind_of
 from .scene import TABLES, Scene
-from .statics import bending_stiffness, locking, shear_stiffness, tip_compliance, tip_inertia
-from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring, Table
+from .statics import bending_stiffness, shear_stiffness, tip_compliance
+from .suspicions import suspicions
+from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Table
+from .well import largest_load, spring_energy, well_depth
 
 #: More are a mistyped macro step: two weeks at a microsecond a step.
 MOST_MACRO_STEPS = 1e12
@@ -109,7 +110,7 @@ def _spring_holds(scene: Scene) -> Iterator[str]:
         )
     elif k2 < 0.0:
         free = scene.beam is None and (spring.external_force > 0.0 or scene.stop is None)
-        if free and abs(spring.external_force) >= (largest := _largest_load(spring)):
+        if free and abs(spring.external_force) >= (largest := largest_load(spring)):
             yield (
                 f"[spring] external_force = {spring.external_force}: the softening spring can hold less than "
                 f"2/3 linear_stiffness √(linear_stiffness/3|cubic_stiffness|) = {largest:.6g} N"
@@ -119,46 +120,13 @@ def _spring_holds(scene: Scene) -> Iterator[str]:
         lossless = (
             scene.beam is None and spring.damping == 0.0 and (scene.stop is None or scene.stop.restitution == 1.0)
         )
-        energy, depth = _spring_energy(spring), _well_depth(scene)
+        energy, depth = spring_energy(spring), well_depth(scene)
         if lossless and energy > depth:
             yield (
                 f"[spring] cubic_stiffness = {k2}: the softening spring starts with {energy:.6g} J and escapes from a "
                 f"well {depth:.6g} J deep; use a smaller initial_velocity or external_force, an equilibrium nearer to "
                 "0, or a larger linear_stiffness"
             )
-
-
-def _potential(spring: Spring, y: float) -> float:
-    """Return the potential of the spring and its load at ``y`` [J]."""
-    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
-    return y * (y * (0.5 * k1 + 0.25 * k2 * y * y) - spring.external_force)
-
-
-def _spring_energy(spring: Spring) -> float:
-    """Return the energy of the spring and its load at the start [J]."""
-    return 0.5 * spring.mass * spring.initial_velocity**2 + _potential(spring, spring.equilibrium)
-
-
-def _largest_load(spring: Spring) -> float:
-    """Return the largest load under which a softening spring has an equilibrium, 2/3 k1 √(k1/3|k2|) [N]."""
-    return 2.0 / 3.0 * spring.linear_stiffness * math.sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
-
-
-def _well_depth(scene: Scene) -> float:
-    """Return the potential [J] at the lower rim of a softening spring's well; a rim below the foundation is none.
-
-    −∞ where the load leaves no well. The rims are the outer roots of k1 y + k2 y³ = f_s: y = 2a cos θ with
-    a² = k1/3|k2| and cos 3θ = −f_s/(2|k2|a³) (Viète).
-    """
-    spring = scene.spring
-    assert spring is not None
-    a = math.sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
-    if not abs(spring.external_force) < _largest_load(spring):
-        return -math.inf
-    theta = math.acos(-spring.external_force / _largest_load(spring)) / 3.0
-    low, high = 2.0 * a * math.cos(theta + 2.0 / 3.0 * math.pi), 2.0 * a * math.cos(theta)
-    barred = scene.stop is not None and scene.stop.position > low
-    return min(_potential(spring, y) for y in ((high,) if barred else (low, high)))
 
 
 def _tip_arrives(scene: Scene) -> Iterator[str]:
@@ -387,54 +355,3 @@ _CHECKS = (
     _coupling_resolves,
     _loads_act,
 )
-
-
-def _beam_energy(scene: Scene) -> float:
-    """Return the energy of the beam as it arrives [J]: of motion and of a straight slope's shear, without its loads."""
-    if (beam := scene.beam) is None or beam.fidelity == "quasi_static":
-        return 0.0
-    target, slope = scene.tip_target, beam.initial_deflection_slope
-    if beam.approach == "undeformed" and target is not None:
-        slope = target[1] / beam.length
-    kinetic = beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
-    return kinetic + 0.5 * shear_stiffness(beam) * beam.length * slope**2
-
-
-def suspicions(scene: Scene) -> list[str]:
-    """Return warnings about what can be run but may not be meant."""
-    H = scene.coupling.macro_step
-    found = [
-        f"[loads.{number}] file: its lines are closer than a quarter of [coupling] macro_step = {H:g} s, so steps do "
-        'not end on them and no scheme has its order; take a smaller macro_step, or interpolation = "cubic"'
-        for number, load in enumerate(scene.loads)
-        if load.is_finer_than(H)
-    ]
-    found += implausible(scene)
-    beam, spring = scene.beam, scene.spring
-    if spring is not None and spring.cubic_stiffness < 0.0:
-        energy, depth = _spring_energy(spring) + _beam_energy(scene), _well_depth(scene)
-        if energy > depth:
-            deep = f"well is {depth:.3g} J deep" if depth > -math.inf else "well is gone under external_force"
-            found.append(
-                f"[spring] cubic_stiffness = {spring.cubic_stiffness}: the motion starts with {energy:.3g} J, the "
-                f"softening spring's {deep}; the run stops should it escape"
-            )
-    if beam is not None and (factor := locking(beam)) > 1.05:
-        found.append(
-            f"[beam] n_elements = {beam.n_elements}: full integration locks, the beam is {factor:.3g} times too "
-            "stiff; use reduced_integration = true, element_degree = 3, or more elements"
-        )
-    if beam is not None and beam.fidelity == "quasi_static" and scene.spring is not None:
-        share = tip_inertia(beam) / scene.spring.mass
-        if share > 0.05 and scene.contact.rigid:
-            found.append(
-                f'[beam] fidelity = "quasi_static": leaves out an inertia that at the tip is {share:.2g} of the '
-                f"spring's mass; the joined motion is about {math.sqrt(1.0 + share) - 1.0:.0%} too fast"
-            )
-        if beam.approach == "undeformed" and beam.initial_velocity_slope != 0.0:
-            energy = beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
-            found.append(
-                f'[beam] fidelity = "quasi_static": the beam arrives without its kinetic energy, {energy:.3g} J; its '
-                "blow, and the vibration it leaves, are not in the result"
-            )
-    return found
