@@ -376,7 +376,7 @@ def test_a_softening_spring_may_start_with_the_energy_of_its_lower_rim(load, sto
         with pytest.raises(SceneError, match=r"escapes from a well .* J deep"):
             scene_from_dict(scene)
         scene["spring"]["damping"] = 0.1
-        assert "J deep; the run stops should it escape" in suspicions(scene_from_dict(scene))[0]
+        assert "J deep; the run stops if it escapes" in suspicions(scene_from_dict(scene))[0]
 
 
 def test_the_beams_energy_counts_for_the_well():

@@ -233,7 +233,7 @@ def test_a_body_need_not_tell_its_shape_or_energies():
     assert np.abs(run.y - simulate(scene).y).max() < 1e-9
     assert len(run.shapes[0]) == 0
     assert np.array_equal(run.e_beam, np.zeros(len(run)))
-    assert "a body tells no energies: nothing says whether the energy is kept" in run.summary["warnings"]
+    assert "a body reports no energies, so the energy balance is not checked" in run.summary["warnings"]
 
 
 def test_what_a_body_cannot_do_is_said():

@@ -118,7 +118,7 @@ def test_times_that_are_not_known_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"shape \(1, 2\)"):
         run.at([[0.01, 0.02]])
     reference = event_driven.simulate(run.scene)
-    with pytest.raises(ValueError, match="nothing tells what lies between the rows"):
+    with pytest.raises(ValueError, match="this run has no data between its rows"):
         reference.at(0.01)
     assert run.at([0.02, 0.01]).time.tolist() == [0.02, 0.01]
     assert len(run.at([])) == 0

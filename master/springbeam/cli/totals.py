@@ -1,4 +1,4 @@
-"""What a run amounts to, in words for a terminal."""
+"""The results of a run in words, for a terminal."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ COIL_HEIGHTS = np.array([0.0, 0.12, *np.linspace(0.12, 0.92, 2 * _TURNS + 2)[1:-
 
 @dataclass(frozen=True)
 class Frames:
-    """Frames at ``time`` [s], shape (n,): recorded values, nothing between them is made up.
+    """Frames at ``time`` [s], shape (n,): recorded values, without interpolation.
 
     ``deflection`` [m], shape (n, 21), and ``y`` [m], shape (n,), are ``None`` for a body that is not there. ``row`` is
     each frame's row of the trajectory. ``low`` and ``high`` [m] hold all of it with room around, and the heights of

@@ -41,7 +41,7 @@ def at(run: Trajectory, times: Any) -> Trajectory:
     steps = run.steps
     if steps is None:
         raise ValueError(
-            "nothing tells what lies between the rows of this run: it is by a reference, by contact.law = 'paper', or "
+            "this run has no data between its rows: it is by a reference, by contact.law = 'paper', or "
             "its rows were written at an output interval"
         )
     known = run.columns["time"][: len(steps)]

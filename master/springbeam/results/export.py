@@ -1,4 +1,4 @@
-"""A trajectory handed on: as a table of pandas, a dataset of xarray, HTML of a notebook."""
+"""Convert a trajectory into a table of pandas, a dataset of xarray, or HTML for a notebook."""
 
 from __future__ import annotations
 

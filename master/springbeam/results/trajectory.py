@@ -137,7 +137,7 @@ class Trajectory:
     events: list[Event] = field(default_factory=list)
     shapes: tuple[np.ndarray, np.ndarray] | None = None
     summary: dict[str, Any] = field(default_factory=dict)
-    #: What lies between the rows, a step per row (`springbeam.results.steps.STEP`); ``None`` where nothing tells.
+    #: What lies between the rows, a step per row (`springbeam.results.steps.STEP`); ``None`` without such data.
     steps: np.ndarray | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:

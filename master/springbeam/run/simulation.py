@@ -356,7 +356,7 @@ class Simulation(Memory):
         if doubt is not None:
             warnings.append(doubt)
         if self._untold:
-            warnings.append("a body tells no energies: nothing says whether the energy is kept")
+            warnings.append("a body reports no energies, so the energy balance is not checked")
         if rows.not_shown:
             warnings.append(NOT_SHOWN)
         left_out = self._pair.joined.neglected()

@@ -207,10 +207,10 @@ class Pair(Memory):
         )
 
     def told_force(self, phase: Phase, step: Step) -> Force:
-        """C of a step of ``phase`` as far as it tells of the ends [N]."""
+        """Return C of a step of ``phase``, as far as the motion of the ends determines it [N]."""
         return self.coupling(phase).told_force(step, self.reduced_mass(phase))
 
     def reduced_mass(self, phase: Phase) -> float:
-        """Of both ends [kg]; of the tip alone where the lower one is held."""
+        """Reduced mass of both ends [kg]; the tip's mass while the lower end is seated."""
         masses = [self.upper.mass] if phase.seated else [self.upper.mass, self.lower.mass]
         return 0.0 if min(masses) == 0.0 else 1.0 / inverse if (inverse := sum(1.0 / m for m in masses)) else 0.0

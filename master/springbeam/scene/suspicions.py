@@ -1,4 +1,4 @@
-"""Warnings about scenes that can be run but may not be meant."""
+"""Warnings about scenes that can be run but probably contain a mistake."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ def _beam_energy(scene: Scene) -> float:
 
 
 def suspicions(scene: Scene) -> list[str]:
-    """Return warnings about what can be run but may not be meant."""
+    """Return warnings about values that can be run but are probably mistaken."""
     H = scene.coupling.macro_step
     found = [
         f"[loads.{number}] file: its lines are closer than a quarter of [coupling] macro_step = {H:g} s, so steps do "
-        'not end on them and no scheme has its order; take a smaller macro_step, or interpolation = "cubic"'
+        'not end on them and errors fall slowly with the step; take a smaller macro_step, or interpolation = "cubic"'
         for number, load in enumerate(scene.loads)
         if load.is_finer_than(H)
     ]
@@ -38,7 +38,7 @@ def suspicions(scene: Scene) -> list[str]:
             deep = f"well is {depth:.3g} J deep" if depth > -math.inf else "well is gone under external_force"
             found.append(
                 f"[spring] cubic_stiffness = {spring.cubic_stiffness}: the motion starts with {energy:.3g} J, the "
-                f"softening spring's {deep}; the run stops should it escape"
+                f"softening spring's {deep}; the run stops if it escapes"
             )
     if beam is not None and (factor := locking(beam)) > 1.05:
         found.append(
@@ -49,13 +49,13 @@ def suspicions(scene: Scene) -> list[str]:
         share = tip_inertia(beam) / scene.spring.mass
         if share > 0.05 and scene.contact.rigid:
             found.append(
-                f'[beam] fidelity = "quasi_static": leaves out an inertia that at the tip is {share:.2g} of the '
+                f'[beam] fidelity = "quasi_static": neglects an inertia that at the tip is {share:.2g} of the '
                 f"spring's mass; the joined motion is about {math.sqrt(1.0 + share) - 1.0:.0%} too fast"
             )
         if beam.approach == "undeformed" and beam.initial_velocity_slope != 0.0:
             energy = beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
             found.append(
-                f'[beam] fidelity = "quasi_static": the beam arrives without its kinetic energy, {energy:.3g} J; its '
-                "blow, and the vibration it leaves, are not in the result"
+                f'[beam] fidelity = "quasi_static": the beam arrives without its kinetic energy, {energy:.3g} J; the '
+                "result lacks its impact and the vibration that follows"
             )
     return found

@@ -49,7 +49,7 @@ class SweepError(RuntimeError):
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is swept. Raises SceneError if some of the axes would play no part."""
+    """The definition of a sweep. Raises SceneError if one of the axes has no effect."""
 
     scene: Scene
     axes: tuple[Axis, ...]
