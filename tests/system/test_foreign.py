@@ -10,8 +10,8 @@ import pytest
 from commands import command
 from scipy.linalg import expm
 
-from springbeam import SceneError, resume, simulate, with_changes
-from springbeam.bodies import probe
+from springbeam import SceneError, load_scene, resume, simulate, with_changes
+from springbeam.bodies import examination
 from springbeam.bodies.factory import findings
 from springbeam.bodies.fmu import FmuError
 from springbeam.results.directory import RunDirectory
@@ -119,6 +119,42 @@ def test_two_foreign_fmus_are_the_elements_that_they_describe(fmu):
         assert run.summary["max_energy_residual"] < 1e-12
 
 
+BEAM_NAMES = {
+    "force": "tip_force",
+    "displacement": "tip_displacement",
+    "velocity": "tip_velocity",
+    "impulse": "tip_impulse",
+    "integral": "tip_displacement_integral",
+    "integral_2": "tip_displacement_integral_2",
+    "kinetic_energy": "kinetic_energy",
+    "potential_energy": "strain_energy",
+    "dissipated_energy": "dissipated_energy",
+}
+SPRING_NAMES = {
+    "force": "contact_force",
+    "displacement": "displacement",
+    "velocity": "velocity",
+    "impulse": "impulse",
+    "kinetic_energy": "kinetic_energy",
+    "potential_energy": "potential_energy",
+}
+
+
+def test_our_own_fmus_named_as_foreign_ones_give_our_own_run(fmu_folder):
+    """Three events of `soft`, with masses that are measured, and moments of the spring by substeps of IDA (1e-12)."""
+    soft = with_changes(load_scene("soft"), time={"t_end": 0.2}, coupling={"degree": 2, "macro_step": 1e-3})
+    own, data = simulate(soft), soft.model_dump(exclude_none=True)
+    left_out = ("approach", "approach_speed", "fidelity", "integrator", "mass_matrix", "initial_velocity")
+    for table, names in (("beam", BEAM_NAMES), ("spring", SPRING_NAMES)):
+        parameters = {key: value for key, value in data[table].items() if key not in left_out and value != 0.0}
+        data[table] = {**names, "fmu": str(fmu_folder / f"{table}.fmu"), "parameters": parameters}
+    run = simulate(scene_from_dict(data))
+    assert [event.kind for event in run.events] == [event.kind for event in own.events]
+    assert np.abs(run.u_tip - own.u_tip).max() < 1e-12
+    assert np.abs(run.y - own.y).max() < 1e-12
+    assert run.summary["warnings"] == []
+
+
 def test_the_seated_force_is_the_body_s(fmu):
     """A mass of weight 8 N on the foundation: it comes to rest, and the foundation bears it; k1 there is none."""
     scene = pair(
@@ -193,7 +229,7 @@ def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
 
 
 def test_an_fmu_that_hangs_is_given_up(fmu, monkeypatch):
-    monkeypatch.setattr(probe, "PATIENCE", 4.0)
+    monkeypatch.setattr(examination, "PATIENCE", 4.0)
     with pytest.raises(FmuError, match="fmi2DoStep has not returned within 4 s"):
         simulate(pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["hang"]}}))
 

@@ -13,6 +13,7 @@ from ..scene.tables import ORDINARY_SCHEMES
 from .abilities import refusals
 from .archive import fmu_directory
 from .elements import ELEMENTS
+from .examination import examined
 from .fmu import FmuError
 from .fmu_bodies import FmuBeam, FmuSpring
 from .foreign import Findings, ForeignBody
@@ -75,10 +76,6 @@ def _body(scene: Scene, spec: Beam | Spring | Partner, start_time: float, found:
 
 def findings(scene: Scene) -> dict[str, Findings]:
     """Examine the foreign FMUs of ``scene`` (`springbeam.bodies.probe`), by table. Raises FmuError."""
-    if not scene.foreign:
-        return {}
-    from .probe import examined  # a module that is also a program
-
     H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
     return {table: examined(spec, table == "beam", 0.0, H) for table, spec in scene.foreign.items()}
 

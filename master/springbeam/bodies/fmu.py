@@ -143,7 +143,7 @@ class Fmu(Memory):
             kind = "co-simulation" if description.coSimulation else "model exchange"
             raise FmuError(
                 f"{self.path}: not an FMI 2.0 co-simulation FMU but one of FMI {description.fmiVersion}, {kind}; "
-                "export it as that"
+                "export it as FMI 2.0 for co-simulation"
             )
         identifier = description.coSimulation.modelIdentifier
         if self._own and identifier != self._name:

@@ -1,20 +1,16 @@
-"""A short check of a foreign FMU before the run, in a process of its own: it may crash, hang, or not do what it says.
+"""A short check of a foreign FMU before the run: is it what it and the scene say?
 
-``examined`` starts the process, which runs this module, and caches what it found. Each check is tried on steps of
-H, H/10, … and holds if it does for one of them: an FMU may need short steps, or have steps of its own that are not
-shorter than some. Each starts from the FMU's initial state, by a restored state or a new instance.
+A program that `springbeam.bodies.examination` starts. Each check is tried on steps of H, H/10, … and holds if it does
+for one of them: an FMU may need short steps, or have steps of its own that are not shorter than some. Each starts from
+the FMU's initial state, by a restored state or a new instance.
 """
 
 from __future__ import annotations
 
 import json
-import signal
-import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from functools import lru_cache
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
@@ -26,8 +22,6 @@ from .fmu import Fmu, FmuError, Reals
 from .foreign import Findings, check_names
 from .protocol import BodyFailed, Force, StepRefused
 
-#: Longest time that the check may take [s].
-PATIENCE = 20.0
 #: Sizes tried, over H; steps of a record.
 _SIZES, _RECORD = (1.0, 0.1, 1e-2, 1e-3, 1e-4), 64
 #: How far, relatively, an output may be from what it should be: of integrators of order 1 less is left of 64 steps.
@@ -355,52 +349,6 @@ def _velocity(bench: Bench) -> float:
         return (whole - x0) / h
     half = bench.run(0.5 * h, [_NONE])[1].x
     return (4.0 * half - whole - 3.0 * x0) / h
-
-
-def examined(spec: ForeignFmu, upper: bool, start_time: float, H: float) -> Findings:
-    """Return what `examine` finds, in a process of its own.
-
-    Raises
-    ------
-    FmuError
-        If the FMU cannot be used as the scene says, crashes, or does not return within `PATIENCE`.
-    """
-    path = Path(spec.fmu)
-    if not path.is_file():
-        raise FmuError(f"{path}: not found")
-    return _examined(spec.model_dump_json(), path.stat().st_mtime_ns, upper, start_time, H)
-
-
-@lru_cache(maxsize=64)
-def _examined(spec: str, modified: int, upper: bool, start_time: float, H: float) -> Findings:
-    path = json.loads(spec)["fmu"]
-    with tempfile.TemporaryDirectory(prefix="springbeam-") as folder:
-        stages, result = Path(folder) / "stages", Path(folder) / "result"
-        stages.write_text("loading\n")
-        task = json.dumps({"spec": spec, "upper": upper, "start_time": start_time, "H": H, "folder": folder})
-        command = [sys.executable, "-m", __name__]
-        try:
-            ended = subprocess.run(
-                command, input=task, text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, timeout=PATIENCE
-            )
-        except subprocess.TimeoutExpired:
-            last = stages.read_text().split("\n")[-2]
-            raise FmuError(
-                f"{path}: {last} has not returned within {PATIENCE:g} s, in the check before the run"
-            ) from None
-        if not result.exists():
-            last = stages.read_text().split("\n")[-2]
-            code = ended.returncode
-            cause = (
-                signal.Signals(-code).name
-                if code < 0
-                else (ended.stderr.strip().splitlines() or [f"exit code {code}"])[-1]
-            )
-            raise FmuError(f"{path}: crashed ({cause}) in {last}, in the check before the run")
-        found = json.loads(result.read_text())
-    if "error" in found:
-        raise FmuError(found["error"])
-    return Findings(Abilities(**found["abilities"]), found["mass"], found["velocity"], tuple(found["faults"]))
 
 
 def main() -> None:

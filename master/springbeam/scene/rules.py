@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterator
 
 from .loads import MOST_POINTS
-from .partners import PARTNERS, RigidWall, kind_of
+from .partner_rules import partners_fit
 from .scene import TABLES, Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
 from .suspicions import suspicions
-from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Table
+from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam
 from .well import largest_load, spring_energy, well_depth
 
 #: More are a mistyped macro step: two weeks at a microsecond a step.
@@ -22,17 +22,11 @@ def _extreme(scene: Scene) -> str:
     places = {
         f"[{table}] {key}": float(value)
         for table in TABLES
-        for key, value in (_content(scene, table) or ())
+        for key, value in (scene.under(table) or ())
         if isinstance(value, (int, float)) and value != 0.0
     }
     place = max(places, key=lambda name: abs(math.log10(abs(places[name]))))
     return f"{place} = {places[place]!r}"
-
-
-def _content(scene: Scene, table: str) -> Table | None:
-    """Return what the scene has under ``[table]``, whatever body that is."""
-    content: Table | None = getattr(scene, {"beam": "upper", "spring": "lower"}.get(table, table))
-    return content
 
 
 def impossible(scene: Scene) -> list[str]:
@@ -65,33 +59,6 @@ def _bodies(scene: Scene) -> Iterator[str]:
             f"[stop] position = {scene.stop.position}: the foundation must lie below "
             f"[spring] equilibrium = {scene.spring.equilibrium}"
         )
-
-
-def _partners_fit(scene: Scene) -> Iterator[str]:
-    """What only our own bodies can do, and what makes no sense with the others."""
-    contact, stop, lower, upper = scene.contact, scene.stop, scene.lower, scene.upper
-    for table, body in (("beam", upper), ("spring", lower)):
-        if (kind := kind_of(body)) not in PARTNERS:
-            continue
-        name = f"[{table}] fmu" if kind == "fmu" else f'[{table}] element = "{kind}"'
-        if contact.law == "paper":
-            yield f'{name}: [contact] law = "paper" is Algorithm 1, which needs our own bodies; take another law'
-        if scene.coupling.feedback != "two_way":
-            yield (
-                f'{name}: [coupling] feedback = "{scene.coupling.feedback}" bounds what it neglects for our own bodies '
-                'only; use "two_way"'
-            )
-        if scene.beam is not None and scene.beam.fidelity == "quasi_static":
-            yield f'{name}: [beam] fidelity = "quasi_static" needs our own spring; use fidelity = "dynamic"'
-    if isinstance(upper, RigidWall) and (lower is None or isinstance(lower, RigidWall)):
-        yield '[beam] element = "rigid_wall": nothing moves in this scene; give it a body in [spring]'
-    elif isinstance(lower, RigidWall) and (upper is None or stop is not None):
-        what = "nothing moves in this scene; give it a body in [beam]" if upper is None else "leave [stop] out"
-        yield f'[spring] element = "rigid_wall": {what}'
-    if stop is not None and lower is not None and scene.spring is None:
-        top = scene.initial_top
-        if top is not None and stop.position >= top:
-            yield f"[stop] position = {stop.position}: the foundation must lie below [spring] displacement = {top}"
 
 
 def _spring_holds(scene: Scene) -> Iterator[str]:
@@ -131,13 +98,9 @@ def _spring_holds(scene: Scene) -> Iterator[str]:
 
 def _tip_arrives(scene: Scene) -> Iterator[str]:
     beam, target, clearance = scene.beam, scene.tip_target, scene.initial_clearance
-    if target is None or clearance is None:
+    if beam is None or target is None or clearance is None:
         return
     name, height = target
-    if beam is None:
-        if clearance < 0.0:
-            yield f"[beam] displacement: starts {-clearance:.6g} m below {name} = {height}; let it start there or above"
-        return
     if clearance < 0.0:
         yield (
             f"[beam] initial_deflection_slope = {beam.initial_deflection_slope}: the tip starts {-clearance:.6g} m "
@@ -152,20 +115,19 @@ def _tip_arrives(scene: Scene) -> Iterator[str]:
 
 
 def _ends_can_be_joined(scene: Scene) -> Iterator[str]:
-    beam, contact = scene.beam, scene.contact
+    beam, contact, tip, top = scene.beam, scene.contact, scene.initial_tip, scene.initial_top
     name = f'[contact] law = "{contact.law}"'
     if contact.damping > 0.0 and contact.law not in ("compliance", "link"):
         yield f'[contact] damping = {contact.damping}: law = "{contact.law}" has none; use 0.0, "compliance" or "link"'
     if not contact.lasting:
         return
     for table in ("beam", "spring"):
-        if _content(scene, table) is None and not scene.elastic_stop:
+        if scene.under(table) is None and not scene.elastic_stop:
             yield f"{name}: joins a [beam] and a [spring]; this scene has no [{table}]"
     if contact.law == "link" and contact.stiffness == contact.damping == 0.0:
         yield f"[contact] stiffness = 0.0: {name} needs a stiffness or a damping greater than 0"
     if contact.law == "tie" and contact.impact != "inelastic":
         yield f'[contact] impact = "{contact.impact}": law = "tie" gives both ends one velocity; use "inelastic"'
-    tip, top = scene.initial_tip, scene.initial_top
     if contact.law == "tie" and tip is not None and top is not None and not math.isclose(tip, top, rel_tol=1e-12):
         key = f"initial_deflection_slope = {beam.initial_deflection_slope}" if beam else "displacement"
         other = "equilibrium" if scene.spring else "displacement"
@@ -179,7 +141,7 @@ def _law_applies(scene: Scene) -> Iterator[str]:
     beam, contact, coupling = scene.beam, scene.contact, scene.coupling
     if contact.law == "paper":
         for table in ("beam", "spring", "stop"):
-            if _content(scene, table) is None:
+            if scene.under(table) is None:
                 yield f'[contact] law = "paper": Algorithm 1 needs a [{table}]'
         if beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf != 1.0:
             yield f'[beam] rho_inf = {beam.rho_inf}: [contact] law = "paper" is the midpoint rule, rho_inf = 1'
@@ -327,10 +289,8 @@ def _loads_act(scene: Scene) -> Iterator[str]:
         name = f"[loads.{number}]"
         on = f'{name} on = "{load.on}"'
         for table, acts in (("beam", load.on in ("beam", "tip")), ("spring", load.on == "spring")):
-            if acts and _content(scene, table) is None:
+            if acts and scene.under(table) is None:
                 yield f"{on}: acts on a [{table}], and this scene has none"
-            elif kind_of(_content(scene, table)) in PARTNERS and (acts or load.on == "base"):
-                yield f"{on}: acts on our own bodies, and [{table}] is none; take the load out"
         if beam is not None and beam.fidelity == "quasi_static" and load.on != "spring":
             yield (
                 f'{on}: [beam] fidelity = "quasi_static" takes no loads that vary; use fidelity = "dynamic", or '
@@ -345,7 +305,7 @@ def _loads_act(scene: Scene) -> Iterator[str]:
 #: Checks of what cannot be run although each value is allowed; each yields ``[table] key = value: reason and remedy``.
 _CHECKS = (
     _bodies,
-    _partners_fit,
+    partners_fit,
     _spring_holds,
     _tip_arrives,
     _ends_can_be_joined,

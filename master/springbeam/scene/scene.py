@@ -56,6 +56,11 @@ class Scene(Table):
         """Our spring, if it is the lower body."""
         return self.lower if isinstance(self.lower, Spring) else None
 
+    def under(self, table: str) -> Table | None:
+        """Return what the scene has under ``[table]``, whatever body that is."""
+        content: Table | None = getattr(self, {"beam": "upper", "spring": "lower"}.get(table, table))
+        return content
+
     @property
     def joins(self) -> bool:
         """Whether there are two bodies."""
