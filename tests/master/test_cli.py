@@ -409,3 +409,18 @@ def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch
     assert Path("p.png").stat().st_size > 10_000
     assert "spring.mass" in command("compare", "a", "b", "--no-plots").stdout
     assert command("compare", "a").exit_code == 2
+
+
+def test_a_run_that_stopped_names_what_goes_on_with_it(here, monkeypatch):
+    def stopping(scene, recorder, *args, **kwargs):
+        fake_run(scene, recorder)
+        recorder.directory.checkpoint.write_bytes(b"")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(springbeam.run.runner, "run", stopping)
+    result = command("run", "soft", "--no-plots")
+    assert result.exit_code == 3
+    assert "interrupted" in result.stderr
+    assert result.stderr.endswith(
+        "what was computed is in results/soft; springbeam resume results/soft goes on from the last checkpoint\n"
+    )

@@ -191,7 +191,14 @@ def carry_out(
     elif quiet:
         typer.echo(directory.path)
     if error is not None:
-        fail(STOPPED, f"{error}\nwhat was computed is in {directory.path}")
+        fail(STOPPED, f"{error}\nwhat was computed is in {directory.path}{_goes_on(directory)}")
+
+
+def _goes_on(directory: RunDirectory) -> str:
+    """Return how a run that stopped can go on, in words."""
+    if directory.checkpoint.exists():
+        return f"; springbeam resume {directory.path} goes on from the last checkpoint"
+    return ""
 
 
 def _draw(console: Console, directory: RunDirectory) -> str | None:

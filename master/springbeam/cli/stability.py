@@ -174,6 +174,8 @@ def stability(
     with bad_input_reported():
         fingerprints(load_scene("soft"))  # else each cell would say that an FMU is missing
         out.mkdir(parents=True, exist_ok=True)
+    console = console_for(silent=quiet or as_json)
+    console.print(f"{len(cells)} cells, each of a second or less; --samples and --resolution set their number")
     garbage = 0
 
     def count(outcome: Outcome) -> None:
@@ -202,7 +204,6 @@ def stability(
         print_json({"cells": len(cells), "classes": Counter(o.kind for o in outcomes), "garbage": bad})
     elif quiet:
         typer.echo(out)
-    console = console_for(silent=quiet or as_json)
     console.print(_outcome_table(cells, outcomes))
     console.print(_reason_table(outcomes))
     for number, reason in bad.items():

@@ -42,6 +42,12 @@ def tradeoff(
         int,
         typer.Option("--repeats", metavar="N", min=1, help="Timings per configuration; the median is used."),
     ] = 3,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Every third configuration of a kind, timed once; the slow ones are left out sooner."
+        ),
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Where tradeoff.csv and tradeoff.png go. Default: results/…"),
@@ -67,6 +73,13 @@ def tradeoff(
             else RunDirectory.create(out or default, replace=force)
         )
         name = TextColumn("{task.fields[name]}")
+        console = console_for(silent=quiet or as_json)
+
+        def show(done: int, total: int, name: str) -> None:
+            if done == 1:
+                console.print(f"{total} runs; finer ones of a kind are left out after one that takes too long")
+            bar.update(task, completed=done, total=total, name=name)
+
         bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), name, quiet=quiet)
         try:
             with bar:
@@ -75,7 +88,8 @@ def tradeoff(
                     what,
                     until,
                     repeats,
-                    lambda done, total, name: bar.update(task, completed=done, total=total, name=name),
+                    show,
+                    quick=quick,
                 )
         except FmuError as error:
             directory.discard()
@@ -92,7 +106,6 @@ def tradeoff(
         print_json({"directory": directory.path, **_as_json(found)})
     elif quiet:
         typer.echo(directory.path)
-    console = console_for(silent=quiet or as_json)
     console.print(
         Text(f"{found.scene.title}: up to t = {found.scene.time.t_end:.6g} s, {len(found.points)} configurations")
     )
