@@ -152,22 +152,22 @@ def _law_applies(scene: Scene) -> Iterator[str]:
         )
     if scene.elastic_stop and scene.stop is not None and scene.stop.restitution != 1.0:
         yield (
-            f'[stop] restitution = {scene.stop.restitution}: [contact] law = "{contact.law}" makes the stop elastic, '
-            "and its loss is [contact] damping; leave restitution out"
+            f'[stop] restitution = {scene.stop.restitution}: [contact] law = "{contact.law}" makes the stop elastic; '
+            "leave restitution out, and give its loss by [contact] damping"
         )
     if coupling.scheme in ORDINARY_SCHEMES and contact.law not in ("compliance", "link"):
         yield (
-            f'[coupling] scheme = "{coupling.scheme}": exchanges the force of [contact] law = "compliance" or "link"; '
-            f'law = "{contact.law}" needs "energy" or "hermite"'
+            f'[coupling] scheme = "{coupling.scheme}": needs [contact] law = "compliance" or "link"; '
+            f'use scheme = "energy" or "hermite" with law = "{contact.law}"'
         )
     if coupling.scheme == "hermite" and contact.law in ("compliance", "link"):
         yield (
-            f'[coupling] scheme = "hermite": holds rigid ties; [contact] law = "{contact.law}" needs '
+            f'[coupling] scheme = "hermite": needs a rigid law; with [contact] law = "{contact.law}" use '
             'scheme = "energy", "gauss_seidel" or "jacobi"'
         )
     if coupling.scheme == "hermite" and contact.impact == "rest" and contact.rigid and scene.joins:
         yield (
-            '[coupling] scheme = "hermite": gives both ends one velocity, [contact] impact = "rest" leaves them two; '
+            '[coupling] scheme = "hermite": gives both ends one velocity, but [contact] impact = "rest" leaves two; '
             'use scheme = "energy" or impact = "inelastic"'
         )
 
@@ -182,18 +182,12 @@ def _feedback_negligible(scene: Scene) -> Iterator[str]:
     if beam is None or spring is None:
         return
     if contact.law != "compliance" or coupling.scheme not in ("energy", "auto"):
-        yield (
-            f'{name}: needs [contact] law = "compliance" and [coupling] scheme = "energy"; a tie is felt by both ends. '
-            'Use "two_way"'
-        )
+        yield f'{name}: needs [contact] law = "compliance" and [coupling] scheme = "energy"; use "two_way" otherwise'
     if contact.damping > 0.0:
-        yield (
-            f"{name}: what it neglects is bounded without damping of the contact only; use [contact] damping = 0.0, "
-            'or "two_way"'
-        )
+        yield f'{name}: its error is unknown for a damped contact; use [contact] damping = 0.0 or "two_way"'
     if coupling.feedback == "spring_drives" and (spring.cubic_stiffness != 0.0 or spring.linear_stiffness <= 0.0):
         yield (
-            f"{name}: what it neglects is bounded for a linear spring only; linear_stiffness must be greater than 0 "
+            f"{name}: its error is known only for a linear spring; linear_stiffness must be greater than 0 "
             'and cubic_stiffness 0.0, or use "two_way"'
         )
         return
@@ -212,16 +206,16 @@ def _inertia_needed(scene: Scene) -> Iterator[str]:
         return
     name = '[beam] fidelity = "quasi_static"'
     if scene.lower is None:
-        yield f'{name}: a beam without inertia moves with a [spring] or not at all; use fidelity = "dynamic"'
+        yield f'{name}: a beam without inertia needs a [spring]; use fidelity = "dynamic"'
     if contact.law == "compliance" and scene.coupling.feedback != "beam_drives":
         yield (
-            f'{name}: is in series with the compliance of [contact] law = "compliance", and what lies between them has '
-            'no inertia; use law = "transmission", fidelity = "dynamic", or neglect the force on the beam: '
+            f'{name}: the tip between the beam and [contact] law = "compliance" would have no '
+            'inertia; use law = "transmission", fidelity = "dynamic", or neglect the force on the beam: '
             '[coupling] feedback = "beam_drives"'
         )
     if contact.law == "link":
         yield (
-            f'{name}: is in series with the link of [contact] law = "link", and what lies between them has no inertia; '
+            f'{name}: the tip between the beam and [contact] law = "link" would have no inertia; '
             'use law = "tie" or fidelity = "dynamic"'
         )
     if contact.law == "paper":
