@@ -134,7 +134,7 @@ def _check_interval(interval: float, scene: Scene, checkpoint: float | None) -> 
     elif checkpoint is not None:
         cause = "--checkpoint goes on from rows at every step; leave one of the two out"
     elif scene.contact.law == "paper":
-        cause = 'contact.law = "paper" tells nothing of what lies between its steps; leave one of the two out'
+        cause = 'contact.law = "paper" has no data between its steps; leave one of the two out'
     elif scene.time.t_end / interval > _MOST_ROWS:
         cause = f"more than {_MOST_ROWS:,} rows up to time.t_end = {scene.time.t_end:g} s; take a longer one"
     if cause is not None:
