@@ -103,7 +103,7 @@ def test_the_reference_has_no_error_and_a_shifted_one_has():
 
 @pytest.mark.parametrize(
     ("tables", "word"),
-    [({"contact": {"law": "paper"}}, "Algorithm 1"), ({"contact": {"impact": "rest"}}, "rigid tie")],
+    [({"contact": {"law": "paper"}}, "Algorithm 1"), ({"contact": {"impact": "rest"}}, "no reference has it")],
 )
 def test_a_scene_without_a_reference_is_refused(tables, word):
     with pytest.raises(SceneError, match=word):
