@@ -11,6 +11,7 @@ usage() {
 ./build.sh win64                   also cross-compile for 64-bit Windows; the FMUs then carry both
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
 ./build.sh bench [GROUP]…          measure the speed and write the tables of docs/performance.md (minutes)
+./build.sh campaign [OPTION]…      run random scenes beside a reference: what is wrong, and what of that is said (minutes)
 ./build.sh browser                 install playwright and Chromium and look at the report in it
 ./build.sh docs                    make the pages of docs/ into a site, build/site/index.html
 ./build.sh wheel                   build a source archive, and from that a wheel, into dist/, and test the wheel
@@ -178,6 +179,10 @@ case $command in
   bench)
     build fmus beam_bench spring_bench
     exec $python tests/bench "$@"
+    ;;
+  campaign)
+    build fmus
+    exec $python tests/campaign "$@"
     ;;
   browser)
     build fmus

@@ -44,7 +44,7 @@ NOT_RUN = {
     "./build.sh bench": "measures for minutes; tests/bench/test_bench.py sees that it runs",
     ".venv/bin/python docs/accuracy.py": "takes minutes",
     ".venv/bin/python docs/paper_figures.py": "takes minutes",
-    ".venv/bin/python docs/promise.py": "takes minutes; test_accuracy.py judges some scenes with it",
+    "./build.sh campaign": "takes minutes; test_accuracy.py judges a scene with it",
     "springbeam animate results/soft": "draws for half a minute; the command is in test_animation.py",
     "springbeam sweep vibro-impact": "takes a minute; the command is in test_sweep.py",
     "springbeam stability": "takes minutes; parts of it are run in test_stability_grid.py, test_critical_steps.py",

@@ -20,6 +20,8 @@ PAST_THE_HILLTOP = {
 GRAZING = {
     "time": {"t_end": 0.25},
     "beam": {
+        "density": 1.0,
+        "shear_coefficient": 1.0,
         "area": 1.1948,
         "second_moment_of_area": 0.00356077,
         "young_modulus": 70526.88,

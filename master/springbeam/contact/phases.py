@@ -14,7 +14,7 @@ from math import inf
 from ..bodies.memory import Memory
 from ..bodies.protocol import Motion
 from ..scene import Scene, Spring
-from ..scene.resolution import MISMATCH
+from ..scene.resolution import VIBRATION
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .laws import Law
 
@@ -235,6 +235,6 @@ class Transitions(Memory):
         parting = tip.velocity - low.velocity
         if self._mass is None or self._tip_mass is None or opened.seated or parting == 0.0:
             return Impact()
-        if parting > MISMATCH * self._fastest():
+        if parting > VIBRATION * self._fastest():
             return Impact()
         return meeting("inelastic", tip.velocity, low.velocity, self._tip_mass, self._mass)

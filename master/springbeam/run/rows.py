@@ -16,7 +16,7 @@ from ..results.recording import Recorder
 from ..results.steps import packed
 from ..results.trajectory import COLUMNS, load_units
 from ..scene import Scene
-from ..scene.resolution import MISMATCH
+from ..scene.resolution import VIBRATION
 from .ledger import Ledger
 from .stepping import Pair, State
 
@@ -106,7 +106,7 @@ class Rows(Memory):
 
         It is 0 as well of a link whose ends move as one: however stiff, it does not swing.
         """
-        still = self._pair.law.lasting and self._relative_speed <= MISMATCH * self.largest_speed
+        still = self._pair.law.lasting and self._relative_speed <= VIBRATION * self.largest_speed
         return 0.0 if still or self._stiffest <= 0.0 else sqrt(self._stiffest * self._inverse_mass)
 
     def _diagnostic(self, p: float) -> float:

@@ -38,8 +38,6 @@ _MOST, _MOST_STOPPED = 50_000, 6
 _SAFETY = 1.5
 #: Runs that differ by more are both unresolved, whatever their order [of the motion].
 _UNRESOLVED = 0.02
-#: By how much the finer one of two runs of different events is trusted to be better.
-_DOUBTED = 30.0
 #: The coupling's and IDA's tolerance over the accuracy, and the bounds of the latter.
 _COUPLING_SHARE, _IDA_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-4, 1e-12, 1e-8
 #: IDA's absolute tolerance over its relative one and the range of the spring top.
@@ -90,7 +88,10 @@ class Picked:
 
     def trajectory(self) -> Trajectory:
         """Return the run, with what was picked and found in its summary."""
-        return replace(self.run, summary={**self.run.summary, "accuracy": self.summary()})
+        found = self.run.summary
+        # What a run says of its steps is a guess; two runs that agree know better.
+        warnings = [warning for warning in found["warnings"] if not warning.startswith("not resolved")]
+        return replace(self.run, summary={**found, "resolved": True, "warnings": warnings, "accuracy": self.summary()})
 
     def summary(self) -> dict[str, Any]:
         """Return what goes into ``summary.json``."""
@@ -260,7 +261,7 @@ class _Search:
     def _second(self, first: _Pilot) -> float:
         growth = _SECOND if self._softly else _LEAST_GROWTH
         if self._scheme == "hermite":
-            amplified = _AMPLIFIED if len({change.time for change in contact_changes(first.run, 0.0)}) > 1 else 1.0
+            amplified = _AMPLIFIED if _parts(first.run) else 1.0
             growth = math.pow(amplified * first.residual / self._accuracy, 1.0 / _ORDER)
         return self._grown(first, growth)
 
@@ -308,12 +309,13 @@ class _Search:
         event, events = contact_time_difference(coarse.run, fine.run, 2.0 * self._span / coarse.steps)
         event /= self._span
         better, of_event = self._better(coarse, fine)
+        if not self._softly and _parts(fine.run):  # what follows has the errors of the times at which ends part
+            better = of_event
         expected = displacement / (better - 1.0)
         kinds, others = ([e.kind for e in pilot.run.events] for pilot in (coarse, fine))
         doubted = expected
         if kinds != others:  # no order holds through an event that only one of the two has
-            lowest = fine.steps / coarse.steps - 1.0 if self._softly else _DOUBTED
-            doubted = max(expected, displacement / lowest)
+            doubted = max(expected, displacement / (fine.steps / coarse.steps - 1.0))
         return _Estimate(doubted, expected, event / (of_event - 1.0), events, max(displacement, event))
 
     def _better(self, coarse: _Pilot, fine: _Pilot) -> tuple[float, float]:
@@ -325,21 +327,30 @@ class _Search:
         return ratio**order, ratio ** min(order, _OF_EVENTS)
 
     def _difference(self, coarse: _Pilot, fine: _Pilot) -> float:
-        """Return the largest difference of tip or spring top at the times that are rows of both, but for rounding.
+        """Return the largest difference of tip or spring top, each relative to its own largest change.
 
-        Each is relative to its own largest change.
+        Compared are the rows of both, with soft laws all rows of ``coarse``: no step ends on an event, so that the
+        dense output of ``fine`` is as smooth as the motion.
         """
         times, wanted = fine.run.time, coarse.run.time
         index = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
         index -= np.abs(times[index - 1] - wanted) < np.abs(times[index] - wanted)
         common = np.abs(times[index] - wanted) <= 1e-9 * self._span
+        values, others = fine.run.columns, coarse.run.columns
+        if self._softly:
+            values, index = fine.run.at(np.clip(wanted, times[0], times[-1])).columns, np.arange(len(wanted))
+            common = np.full(len(wanted), True)
         worst = 0.0
         for name in fine.displacements:
-            values = fine.run[name]
-            scale = float(np.abs(values - values[0]).max()) or 1.0
-            difference = np.abs(coarse.run[name][common] - values[index[common]])
+            scale = float(np.abs(fine.run[name] - fine.run[name][0]).max()) or 1.0
+            difference = np.abs(others[name][common] - values[name][index[common]])
             worst = max(worst, float(difference.max(initial=0.0)) / scale)
         return worst
+
+
+def _parts(run: Trajectory) -> bool:
+    """Whether anything happens after the first contact."""
+    return len({change.time for change in contact_changes(run, 0.0)}) > 1
 
 
 def _rung(steps: float) -> float:

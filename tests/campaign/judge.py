@@ -1,0 +1,160 @@
+"""One scene, run in each way, beside the event-driven reference."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+from draw import KINDS, drawn
+
+from springbeam import simulate, with_changes
+from springbeam.monolithic import event_driven
+from springbeam.results.contact_times import contact_time_difference
+from springbeam.results.trajectory import Trajectory
+from springbeam.run.outcome import RunStopped
+from springbeam.scene import Scene, SceneError
+from springbeam.scene.suspicions import suspicions
+from springbeam.studies.tradeoff.errors import errors
+
+#: Ways to run a scene: an accuracy, or [coupling] at the scene's own macro step.
+WAYS: dict[str, dict[str, Any]] = {
+    "--accuracy 1e-3": {"accuracy": 1e-3},
+    "--accuracy 1e-4": {"accuracy": 1e-4},
+    "energy 0": {"scheme": "energy", "degree": 0},
+    "energy 1": {"scheme": "energy", "degree": 1},
+    "energy 2": {"scheme": "energy", "degree": 2},
+    "hermite 2": {"scheme": "hermite", "degree": 2},
+    "auto": {"scheme": "auto"},
+}
+#: What a run at a fixed step may be wrong by.
+FIXED = 1e-2
+#: Rows of a run that are judged, about; seconds that a reference may take.
+ROWS, TIME_LIMIT = 25, 30.0
+#: Relative changes of a stiffness that show the conditioning, and how many times larger the motion's may be.
+PERTURBATIONS, WELL_CONDITIONED = (1e-5, 1e-3, -1e-3), 30.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a run. Errors are over the largest change of the reference, times over the time that is run."""
+
+    seed: int
+    number: int
+    way: str
+    outcome: str  #: "done", "stopped", "refused", "no reference"
+    condition: float = 0.0  #: change of the motion or of a time over that of a stiffness
+    told: bool = False  #: not resolved, or a warning that the scene alone does not give
+    u_tip: float = 0.0
+    y: float = 0.0
+    time: float = 0.0  #: of contact
+    impulse: float = 0.0  #: of all impacts
+    calls: int = 0  #: doStep calls of both FMUs, of all pilot runs
+    why: str = ""
+
+    @property
+    def kind(self) -> str:
+        return KINDS[self.number % len(KINDS)]
+
+    @property
+    def bound(self) -> float:
+        return float(WAYS[self.way].get("accuracy", FIXED))
+
+    @property
+    def factor(self) -> float:
+        """Error over what it may be."""
+        motion = max(self.u_tip, self.y)
+        return max(motion, self.time, self.impulse) / self.bound if "accuracy" in self.way else motion / self.bound
+
+    @property
+    def judged(self) -> bool:
+        return self.outcome == "done" and self.condition <= WELL_CONDITIONED
+
+    @property
+    def silent(self) -> bool:
+        return self.judged and self.factor > 1.0 and not self.told
+
+    def as_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def from_dict(values: dict[str, Any]) -> Verdict:
+    return Verdict(**{field.name: values[field.name] for field in fields(Verdict)})
+
+
+def judge(seed: int, number: int, ways: list[str]) -> list[Verdict]:
+    """Run scene ``number`` of ``seed`` in each of ``ways``."""
+    scene = drawn(seed, number)
+    runs = {way: _run(scene, way) for way in ways}
+    done = {way: run for way, run in runs.items() if isinstance(run, Trajectory)}
+    found = [
+        Verdict(seed, number, way, *_failure(failed))
+        for way, failed in runs.items()
+        if not isinstance(failed, Trajectory)
+    ]
+    if not done:
+        return found
+    times = {way: run.time[:: len(run) // ROWS + 1] for way, run in done.items()}
+    try:
+        reference = event_driven.simulate(
+            scene, sample_times=np.unique(np.concatenate(list(times.values()))), time_limit=TIME_LIMIT
+        )
+        condition = _condition(scene, float(reference.time[-1] - reference.time[0]))
+    except (event_driven.ReferenceFailure, RunStopped, ValueError) as failed:
+        return [*found, *(Verdict(seed, number, way, "no reference", why=str(failed)) for way in done)]
+    return [*found, *(_verdict(seed, number, way, run, reference, condition) for way, run in done.items())]
+
+
+def _run(scene: Scene, way: str) -> Trajectory | Exception:
+    settings = WAYS[way]
+    try:
+        if "accuracy" in settings:
+            return simulate(scene.model_copy(update=settings))
+        return simulate(with_changes(scene, coupling=settings))
+    except (SceneError, RunStopped) as failed:
+        return failed
+
+
+def _failure(failed: Exception) -> tuple[str, float, bool, float, float, float, float, int, str]:
+    outcome = "refused" if isinstance(failed, SceneError) else "stopped"
+    return outcome, 0.0, True, 0.0, 0.0, 0.0, 0.0, 0, str(failed)
+
+
+def _verdict(seed: int, number: int, way: str, run: Trajectory, reference: Trajectory, condition: float) -> Verdict:
+    span = float(run.time[-1] - run.time[0])
+    picked = run.summary.get("accuracy")
+    found = errors(run, reference, span / run.summary["macro_steps"])
+    wrong = (found.u_tip_max, found.y_max, found.event_time / span, found.impulse)
+    said = set(run.summary["warnings"]) - set(suspicions(run.scene))
+    return Verdict(
+        seed, number, way, "done", condition, bool(said) or not run.summary["resolved"],
+        *(float(np.nan_to_num(value)) for value in wrong),
+        calls=run.do_steps + (picked["pilot_steps"] if picked else 0), why="; ".join(said),
+    )  # fmt: skip
+
+
+def _condition(scene: Scene, span: float) -> float:
+    """Return how many times larger than that of a stiffness the change of the motion or of a time is.
+
+    By runs with short steps, since it need not be exact.
+    """
+    body, key = ("beam", "young_modulus") if scene.spring is None else ("spring", "linear_stiffness")
+    sharp = {"scheme": "energy", "degree": 2, "macro_step": scene.coupling.H / 4.0}
+    stiffness, worst = getattr(getattr(scene, body), key), 0.0
+
+    def run(share: float) -> Trajectory:
+        return simulate(with_changes(scene, coupling=sharp, **{body: {key: stiffness * (1.0 + share)}}))
+
+    exact = run(0.0)
+    for share in PERTURBATIONS:
+        moved = run(share)
+        rows = np.searchsorted(moved.time, exact.time * (1.0 - 1e-12)).clip(max=len(moved) - 1)
+        same = np.abs(moved.time[rows] - exact.time) <= 1e-9 * span
+        for name in ("u_tip", "y"):
+            if name in exact.columns:
+                scale = np.abs(exact[name] - exact[name][0]).max() or 1.0
+                change = np.abs(moved[name][rows[same]] - exact[name][same]).max(initial=0.0)
+                worst = max(worst, float(change / (abs(share) * scale)))
+        late, _ = contact_time_difference(moved, exact, 2.0 * scene.coupling.H)
+        worst = max(worst, late / (abs(share) * span))
+    return worst
