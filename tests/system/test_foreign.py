@@ -185,6 +185,16 @@ def test_without_state_saving_values_are_exchanged(fmu, scheme):
     assert 0.9 < np.log2(errors[0] / errors[1]) < 1.1
 
 
+def test_steps_of_one_size_stay_of_one_size(fmu):
+    tie = {"law": "tie", "stiffness": 1e4, "damping": 0.0}
+    run = simulate(pair(fmu("fixed", variable=False), contact=tie, coupling={"degree": 0}))
+    assert run.events[0].kind == "impact"  # where steps may have any size, the next one is short
+    assert np.diff(run.time[run.time > 0.0]) == pytest.approx(0.02, rel=1e-9)
+    assert run.summary["max_interface_residual"] < 1e-12
+    with pytest.raises(SceneError, match=r"t_end = 0\.99: .*use a multiple of 0\.02"):
+        simulate(pair(fmu("fixed", variable=False), time={"t_end": 0.99}, coupling={"degree": 0}))
+
+
 REFUSED = {
     "state": ({"coupling": {"degree": 0}}, '[coupling] scheme = "energy"', "canGetAndSetFMUstate"),
     "slopes": ({"coupling": {"scheme": "jacobi", "degree": 1}}, "[coupling] degree = 1", "canInterpolateInputs"),

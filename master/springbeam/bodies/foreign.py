@@ -68,7 +68,8 @@ class ForeignBody(FmuBody):
 
     def __init__(self, spec: ForeignFmu, start_time: float, found: Findings, by_substeps: bool) -> None:
         self._spec, self._found, self._by_substeps = spec, found, by_substeps
-        self.abilities, self.repeatable = found.abilities, found.abilities.state
+        self.abilities = found.abilities
+        self.repeatable, self.any_size = found.abilities.state, found.abilities.any_size
         names = (spec.displacement, spec.velocity, spec.integral, spec.integral_2)
         self._MOTION = tuple(name for name in names if name is not None)
         self._at = [None if name is None else self._MOTION.index(name) for name in names]

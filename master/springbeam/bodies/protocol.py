@@ -60,6 +60,8 @@ class Body(Memory):
 
     #: Whether `rewind` works; if not, a step is made once, by the schemes that never repeat one.
     repeatable: bool = True
+    #: Whether steps may have any size.
+    any_size: bool = True
 
     def take_place(self, *, upper: bool) -> None:
         """Learn, before the run, whether it is the upper body; one that fits in either place needs to know."""

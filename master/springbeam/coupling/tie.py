@@ -47,7 +47,7 @@ class Tie(StepSolver):
         if self._scheme == "hermite":
             of_length, order = hermite.gap_inside(gaps[1], size, degree) / scales.span, hermite.ORDER_INSIDE[degree]
             work = abs(force.work(step.contact, gaps[1], size))
-            of_energy = work / scales.energy if work > 0.0 else 0.0
+            of_energy = work / scales.energy if scales.energy > 0.0 else 0.0
             return [(of_length, order), (of_energy, order + 1)]
         # Relative to the motion's energy, and to its length (all that a massless tip has).
         created, order = energy.created_mismatch(gaps[0], gaps[1], degree), energy.ORDER_CREATED[degree]

@@ -183,7 +183,7 @@ class Detector:
     def _touched_inside(self, state: State, step: Step) -> Step:
         """Compliance: a contact that closes and opens inside the step would be missed; it is cut to its middle."""
         start, end = gap(step.start), gap(step.end)
-        if start[0] < 0.0 or end[0] < 0.0 or any(step.contact) or not self._pair.repeatable:
+        if start[0] < 0.0 or end[0] < 0.0 or any(step.contact) or not self._pair.divides:
             return step
         path = Path.through(start, end, step.size, gap.means(step.end, step.size))
         inside = path.lowest_inside()

@@ -190,8 +190,9 @@ class Simulation(Memory):
                 pair.rewind()
                 size = self._steps.size
             except (StepRefused, OverflowError) as refused:
-                pair.rewind()
-                if halvings == _MAX_HALVINGS:
+                if pair.repeatable:
+                    pair.rewind()
+                if halvings == _MAX_HALVINGS or not pair.divides:
                     residual = refused.residual if isinstance(refused, NotConverged) else None
                     cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
                     raise RunStopped(cause, state.time, residual) from refused
@@ -258,7 +259,7 @@ class Simulation(Memory):
         kind, phase, impact = self._transitions.after(
             kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
         )
-        if kind in ("impact", "stop_impact"):
+        if kind in ("impact", "stop_impact") and pair.divides:
             self._steps.shorten_after_impact()
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.follow_phase(phase)

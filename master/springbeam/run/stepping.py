@@ -93,6 +93,8 @@ class Pair(Memory):
         for body in self._bodies:
             body.take_place(upper=body is beam)
         self.repeatable = all(body.repeatable for body in self._bodies)
+        #: Whether a step can be repeated with another size.
+        self.divides = self.repeatable and all(body.any_size for body in self._bodies)
         #: Ψ: where the ends of a rigid law are tied below [m].
         self.equilibrium = scene.spring.equilibrium if scene.spring is not None else self.lower.motion().displacement
         #: Where the ends are; looked up once, since every step asks a few times.
