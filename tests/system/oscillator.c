@@ -84,7 +84,7 @@ API Status fmi2DoStep(void *c, double time, double H, int no_set) {
             if (j) v = v * h + j * a[j];
         }
         once *= h, twice *= h * h;
-        /* the integral of v^2, by 12-point sums of the Taylor coefficients */
+        /* the integral of v^2, from the product of its series */
         for (int j = 40; j >= 0; --j) {
             double s = 0;
             for (int k = j > 24 ? j - 24 : 0; k <= j && k <= 24; ++k) s += (k + 1) * a[k + 1] * (j - k + 1) * a[j - k + 1];
