@@ -15,7 +15,7 @@ from ..bodies.memory import Memory
 from ..bodies.protocol import NO_FORCE, Body, BodyFailed, StepRefused
 from ..contact.events import gap
 from ..contact.phases import Joint, Phase, Transitions
-from ..coupling.protocol import Ends, NotConverged, Step
+from ..coupling.protocol import NotConverged, Step
 from ..results.recording import NonFiniteValue, Recorder
 from ..results.trajectory import Event
 from ..scene import Scene
@@ -243,7 +243,8 @@ class Simulation(Memory):
         pair.mark()
         # The bodies are recorded as they arrive: the ledger starts before the impact.
         self._ledger.book(*pair.energies(start))
-        self._judge(start)
+        if self._interface is not self._ledger:
+            self._interface.book(*pair.exchanged(start))
         at_start = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
         self._act("impact" if pair.joinable else "stop_impact", at_start)
 
@@ -296,17 +297,14 @@ class Simulation(Memory):
 
     def _record(self, step: Step | None) -> None:
         self._rows.write(self._state, step)
-        self._judge(self._pair.ends())
+        if self._interface is not self._ledger:
+            self._interface.book(*self._pair.exchanged(self._pair.ends()))
         # What numerical damping takes is not an error; what it brings is.
         judged = self._interface
         if (judged.gain if self._numerically_damped else judged.relative) > self._energy_stops:
             raise RunStopped(self._energy_cause(), self._state.time)
         if self._scene.coupling.feedback != "two_way":
             self._refuse_neglect()
-
-    def _judge(self, ends: Ends) -> None:
-        if self._interface is not self._ledger:
-            self._interface.book(*self._pair.exchanged(ends))
 
     def _refuse_neglect(self) -> None:
         """Raise RunStopped where a one-way coupling neglects more than the scene allows."""
