@@ -12,9 +12,10 @@ from commands import command
 
 from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene.automatic import STABLE, choice, decided
+from springbeam.scene import suspicions
+from springbeam.scene.automatic import choice, decided
 from springbeam.scene.linearised import spring_frequency
-from springbeam.scene.resolution import mesh_frequency, slowest_frequency
+from springbeam.scene.resolution import STABLE, mesh_frequency, slowest_frequency
 from springbeam.scene.unit import unit_beam
 from springbeam.studies.stability.linear import LinearBody, LinearPair, spectral_radius
 
@@ -138,3 +139,10 @@ def test_the_command_says_what_it_took(tmp_path):
     assert result.exit_code == 0
     assert "coupling  hermite 2: ω_max H = 0.433 <= 3" in result.stdout
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["coupling"]["scheme"] == "hermite"
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.9, False), (1.5, True)])
+def test_hermite_beyond_its_limit_is_told(share, told):
+    H = share * STABLE / mesh_frequency(PAIR.beam)
+    scene = with_changes(PAIR, coupling={"scheme": "hermite", "degree": 2, "macro_step": H})
+    assert any('scheme = "hermite"' in text for text in suspicions(scene)) == told

@@ -9,12 +9,8 @@ from typing import NamedTuple
 
 from .linearised import spring_frequency
 from .reading import with_changes
-from .resolution import TURN, mesh_frequency, slowest_frequency
+from .resolution import STABLE, TURN, mesh_frequency, slowest_frequency
 from .scene import Scene
-
-#: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
-#: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
-STABLE = 3.0
 
 
 class Choice(NamedTuple):

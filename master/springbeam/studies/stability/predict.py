@@ -14,9 +14,10 @@ import numpy as np
 from ...contact.laws import Transmission, law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene, suspicions
-from ...scene.automatic import STABLE, Choice, choice
+from ...scene.automatic import Choice, choice
 from ...scene.estimates import Estimates, estimates
 from ...scene.linearised import contact_depth, spring_frequency, spring_stiffness
+from ...scene.resolution import STABLE
 from ...scene.statics import shear_stiffness
 from .linear import LinearBody, LinearPair, spectral_radius
 
