@@ -24,21 +24,23 @@ inline constexpr int max_elements = 1000000;
 /// Most unknowns of a dense eigenproblem: of the mesh (two per element and degree) where all modes are wanted, of the
 /// reduced basis where some are.
 inline constexpr int max_dense_unknowns = 1000;
+/// Most modes without a mesh, 3 µs each; bounds memory, not the mathematics.
+inline constexpr int max_exact_modes = 10000;
 
 /// All in SI units; defaults are the unit beam of the paper's section 3.
 struct Parameters {
-  double density = 1.0;                             ///< ρ [kg/m³]
-  double area = 1.0;                                ///< A [m²]
-  double second_moment_of_area = 1.0;               ///< I [m⁴]
-  double young_modulus = 1.0;                       ///< E [Pa]
-  double shear_modulus = 1.0;                       ///< G [Pa]
-  double shear_coefficient = 1.0;                   ///< K [–]
-  double length = 1.0;                              ///< L [m]
-  double alpha_b = 0.0;                             ///< Kelvin–Voigt retardation time [s]
-  int n_elements = 50;                              ///< uniform elements
-  int element_degree = 1;                           ///< polynomial degree of u and θ in an element, 1 … 12; 1 = P1
-  int n_modes = 0;                                  ///< lowest modes kept by `modal`; 0 = all
-  bool reduced_integration = false;                 ///< p-point Gauss rule for the shear; false = exact (59)
+  double density = 1.0;                ///< ρ [kg/m³]
+  double area = 1.0;                   ///< A [m²]
+  double second_moment_of_area = 1.0;  ///< I [m⁴]
+  double young_modulus = 1.0;          ///< E [Pa]
+  double shear_modulus = 1.0;          ///< G [Pa]
+  double shear_coefficient = 1.0;      ///< K [–]
+  double length = 1.0;                 ///< L [m]
+  double alpha_b = 0.0;                ///< Kelvin–Voigt retardation time [s]
+  int n_elements = 50;                 ///< uniform elements; 0 = no mesh: the exact modes, see exact_modes.hpp
+  int element_degree = 1;              ///< polynomial degree of u and θ in an element, 1 … 12; 1 = P1
+  int n_modes = 0;                     ///< lowest modes kept by `modal`; 0 = all of the mesh's
+  bool reduced_integration = false;    ///< p-point Gauss rule for the shear; false = exact (59)
   MassMatrix mass_matrix = MassMatrix::consistent;  ///< see timoshenko.hpp
   Integrator integrator = Integrator::modal;
   double rho_inf = 1.0;                   ///< spectral radius at infinity of generalized-α; 1 = midpoint rule (62)

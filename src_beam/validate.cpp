@@ -53,14 +53,25 @@ void validate(const Parameters& p) {
   if (p.element_degree < 1 || p.element_degree > max_element_degree) {
     reject("element_degree", p.element_degree, "between 1 and " + std::to_string(max_element_degree));
   }
-  if (p.n_elements < 1 || p.n_elements > max_elements / p.element_degree) {
+  if (p.n_elements < 0 || p.n_elements > max_elements / p.element_degree) {
     reject("n_elements", p.n_elements,
-           "between 1 and " + std::to_string(max_elements / p.element_degree) + " (" + std::to_string(max_elements) +
-               " over element_degree)");
+           "0 (no mesh) or between 1 and " + std::to_string(max_elements / p.element_degree) + " (" +
+               std::to_string(max_elements) + " over element_degree)");
   }
   if (p.mass_matrix != MassMatrix::consistent && p.mass_matrix != MassMatrix::averaged) {
     reject("mass_matrix", static_cast<int>(p.mass_matrix),
            std::string("1 (") + mass_matrix_names[0] + ") or 2 (" + mass_matrix_names[1] + ")");
+  }
+  if (p.n_elements == 0) {
+    const std::string without = "without a mesh (n_elements = 0)";
+    if (p.n_modes < 1 || p.n_modes > max_exact_modes)
+      reject("n_modes", p.n_modes, "between 1 and " + std::to_string(max_exact_modes) + " " + without);
+    if (p.integrator != Integrator::modal)
+      reject("integrator", static_cast<int>(p.integrator), std::string("1 (") + integrator_names[0] + ") " + without);
+    if (p.mass_matrix != MassMatrix::consistent || p.reduced_integration)
+      reject(p.reduced_integration ? "reduced_integration" : "mass_matrix",
+             p.reduced_integration ? 1 : static_cast<int>(p.mass_matrix), "left at its default " + without);
+    return;
   }
   switch (p.integrator) {
     case Integrator::modal: {

@@ -33,6 +33,11 @@ struct BeamModel final : fmi::Model {
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
+    if (parameters.n_elements == 0 && parameters.tip_load_coefficient != 0.0) {
+      throw std::invalid_argument(
+          "beam: tip_load_coefficient is the load of the last element's hat function; it must be 0 without a mesh, "
+          "n_elements = 0");
+    }
     beam = beam::make_beam(parameters);
     loads.set(Loads::hat, {parameters.tip_load_coefficient, 0.0, 0.0});
     forecast = {};
@@ -146,12 +151,14 @@ fmi::Table make_table() {
   parameter("length", "m", &Parameters::length, "length L").positive();
   parameter("alpha_b", "s", &Parameters::alpha_b, "Kelvin-Voigt retardation time: damping = alpha_b * stiffness")
       .at_least(0);
-  parameter("n_elements", "", &Parameters::n_elements, "uniform elements").range(1, beam::max_elements);
+  parameter("n_elements", "", &Parameters::n_elements,
+            "uniform elements; 0 = no mesh: the exact modes of the continuous beam, n_modes of them")
+      .range(0, beam::max_elements);
   parameter("element_degree", "", &Parameters::element_degree,
             "polynomial degree of deflection and rotation in an element; 1 = linear elements")
       .range(1, beam::max_element_degree);
-  parameter("n_modes", "", &Parameters::n_modes, "lowest modes kept by the modal integrator; 0 = all")
-      .range(0, beam::max_dense_unknowns);
+  parameter("n_modes", "", &Parameters::n_modes, "lowest modes kept by the modal integrator; 0 = all of the mesh's")
+      .range(0, beam::max_exact_modes);
   parameter(
       "reduced_integration", "", &Parameters::reduced_integration,
       "as many Gauss points for the shear term as element_degree; false = exact integration, which locks for slender "

@@ -41,7 +41,8 @@ inline Parameters with_integrator(Parameters p, Integrator integrator, double rh
   return p;
 }
 
-/// Both integrators, degrees 1 and 5, with and without damping and truncation, in motion under a load.
+/// Both integrators, degrees 1 and 5, with and without damping and truncation, and without a mesh, in motion under a
+/// load.
 inline std::vector<Parameters> variants() {
   std::vector<Parameters> all;
   for (Parameters p : {general_beam(25), general_beam(3, 5)}) {
@@ -60,6 +61,9 @@ inline std::vector<Parameters> variants() {
       all.push_back(with_integrator(p, Integrator::generalized_alpha));
       p.mass_matrix = MassMatrix::consistent;
     }
+    p.n_elements = 0;
+    p.n_modes = 10;
+    all.push_back(p);
   }
   return all;
 }

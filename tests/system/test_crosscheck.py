@@ -31,6 +31,7 @@ def test_the_same_problem_passes(scheme, degree):
         {"n_elements": 6, "element_degree": 2, "reduced_integration": True, "tip_load_coefficient": -6.0},
         {"n_elements": 12, "mass_matrix": "averaged"},
         {"n_elements": 4, "element_degree": 3, "n_modes": 6, "mass_matrix": "averaged", "alpha_b": 1e-3},
+        {"mesh": "none", "n_modes": 12, "distributed_load": -2.0, "alpha_b": 1e-3},
         {"n_elements": 30, "element_degree": 10, "n_modes": 8, "distributed_load": -2.0, "alpha_b": 1e-3},
     ],
 )
@@ -41,7 +42,14 @@ def test_elements_of_higher_degree_pass(beam):
     assert report.horizon == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize("beam", [{}, {"n_elements": 6, "element_degree": 3, "n_modes": 8, "mass_matrix": "averaged"}])
+@pytest.mark.parametrize(
+    "beam",
+    [
+        {},
+        {"mesh": "none", "n_modes": 8},
+        {"n_elements": 6, "element_degree": 3, "n_modes": 8, "mass_matrix": "averaged"},
+    ],
+)
 @pytest.mark.parametrize("degree", [0, 2])
 def test_loads_pass(degree, beam):
     """The reference takes loads on a mesh of its own and samples their signals."""

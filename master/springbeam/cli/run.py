@@ -359,7 +359,8 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
             f"{found['estimated_event_error']:.1e} (times of {found['events_compared']} events)"
         )
         if "estimated_mesh_error" in found:
-            mesh = f"{found['picked']['n_elements']} elements"
+            picked = found["picked"]
+            mesh = f"{picked['n_elements']} elements" if "n_elements" in picked else f"{picked['n_modes']} exact modes"
             console.print(f"mesh      {mesh}: error {found['estimated_mesh_error']:.1e} beside the continuous beam")
     for warning in summary.get("warnings", ()):
         console.print(Text(f"warning   {warning}"))

@@ -39,7 +39,7 @@ class Loads:
         mesh = assemble(scene.beam) if scene.loads and scene.beam is not None else None
         for i, load in enumerate(scene.loads):
             if beam is not None and mesh is not None and load.on != "spring":
-                self.patterns[i] = beam.basis.T @ _nodal(scene, mesh, load)
+                self.patterns[i] = beam.tip if load.on == "tip" else beam.force(_nodal(scene, mesh, load))
             if load.on in ("spring", "base"):
                 self.on_spring[i] = 1.0 if load.on == "spring" else -mass
         self.kinks = sorted({float(time) for load in scene.loads for time in _kinks(load)})
@@ -84,8 +84,6 @@ def _rate(load: Load) -> float:
 def _nodal(scene: Scene, mesh: SemiDiscreteBeam, load: Load) -> np.ndarray:
     """Return the load vector of the mesh, (2N,), of a unit of ``load``."""
     assert scene.beam is not None
-    if load.on == "tip":
-        return mesh.tip_vector
     if load.at is not None:
         return np.asarray(mesh.deflection_sampler(np.array([load.at])).toarray()[0])
     shape = load.shape or [1.0]

@@ -143,8 +143,9 @@ def allowed(field: FieldInfo) -> str:
         return "a list of 1 to 4 finite numbers"
     if get_origin(field.annotation) is dict:
         return "a table, as { k = 3.0e4 }"
-    if get_origin(field.annotation) is Literal:
-        return " or ".join(_toml(choice) for choice in get_args(field.annotation))
+    for part in _alternatives(field.annotation):
+        if get_origin(part) is Literal:
+            return " or ".join(_toml(choice) for choice in get_args(part))
     nouns: dict[Any, str] = {bool: "true or false", str: "a text in quotes", int: "a whole number"}
     noun = next((nouns[part] for part in _alternatives(field.annotation) if part in nouns), "a finite number")
     bounds = {

@@ -169,6 +169,11 @@ def fastest_frequency(beam: Beam) -> float:
     high = mesh_frequency(beam)
     if beam.integrator != "modal" or beam.n_modes == 0 or modes_below(beam, high) <= beam.n_modes:
         return high
+    return _nth_frequency(beam, high)
+
+
+def _nth_frequency(beam: Beam, high: float) -> float:
+    """Return the frequency below which ``n_modes`` waves are, at most ``high`` [rad/s]."""
     low = 0.0
     while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
@@ -177,7 +182,12 @@ def fastest_frequency(beam: Beam) -> float:
 
 
 def mesh_frequency(beam: Beam) -> float:
-    """Return an estimate of the highest frequency of the mesh [rad/s]."""
+    """Return an estimate of the highest frequency of the mesh [rad/s], without one of the ``n_modes``-th wave."""
+    if beam.mesh == "none":
+        high = lowest_frequency(beam)
+        while modes_below(beam, high) <= beam.n_modes:
+            high *= 2.0
+        return _nth_frequency(beam, high)
     bending, shear = bending_stiffness(beam), shear_stiffness(beam)
     inertia, mass = beam.density * beam.second_moment_of_area, beam.density * beam.area
     return sqrt(_gradient(beam) * max(bending / inertia, shear / mass) + shear / inertia)
@@ -185,6 +195,8 @@ def mesh_frequency(beam: Beam) -> float:
 
 def shear_frequency(beam: Beam) -> float:
     """Return an estimate of the highest frequency of shear waves on the mesh [rad/s], which an impact sets off."""
+    if beam.mesh == "none":
+        return mesh_frequency(beam)
     return sqrt(_gradient(beam) * shear_stiffness(beam) / (beam.density * beam.area))
 
 

@@ -143,6 +143,8 @@ def _law_applies(scene: Scene) -> Iterator[str]:
         for table in ("beam", "spring", "stop"):
             if scene.under(table) is None:
                 yield f'[contact] law = "paper": Algorithm 1 needs a [{table}]'
+        if beam is not None and beam.mesh == "none":
+            yield '[beam] mesh = "none": [contact] law = "paper" integrates the beam by (62), which needs a mesh'
         if beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf != 1.0:
             yield f'[beam] rho_inf = {beam.rho_inf}: [contact] law = "paper" is the midpoint rule, rho_inf = 1'
     if contact.law == "compliance" and contact.stiffness == 0.0:

@@ -29,6 +29,10 @@ ALL_MODES_UP_TO = 1000
 MOST_MODES = 1000
 
 
+#: Most modes of the continuous beam.
+MOST_EXACT_MODES = 10_000
+
+
 #: Most modes times unknowns: 40 bytes each while the modes are found, so 1 GB.
 MOST_MODE_VALUES = 25_000_000
 
@@ -75,7 +79,7 @@ class Table(BaseModel):
     _followed: frozenset[str] = PrivateAttr(frozenset())
 
     @classmethod
-    def _follows(cls, data: dict[str, Any]) -> dict[str, float]:
+    def _follows(cls, data: dict[str, Any]) -> dict[str, Any]:
         """Return the values of keys that follow from those given."""
         return {}
 
@@ -128,6 +132,9 @@ class Beam(Table):
         "–", "shear coefficient K", gt=0.0, otherwise="5/6 with width and height, 9/10 with diameter; needed with area"
     )
     alpha_b: float = key("s", "Kelvin–Voigt retardation time α_b", 0.0, ge=0.0)
+    mesh: Literal["none"] | None = key(
+        "–", "none: the n_modes lowest modes of the continuous beam", None, otherwise="elements of equal length"
+    )
     n_elements: int = key("–", "number of elements", 50, ge=1, le=MOST_ELEMENTS)
     element_degree: int = key("–", "degree of u and θ in an element; 1 is the paper's", 1, ge=1, le=12)
     n_modes: int = key("–", "number of lowest modes kept; 0 keeps all", 0, ge=0)
@@ -156,6 +163,7 @@ class Beam(Table):
     WAYS = (
         Ways("section", (("area", "second_moment_of_area"), ("width", "height"), ("diameter",))),
         Ways("shear stiffness", (("shear_modulus",), ("poisson_ratio",))),
+        Ways("mesh", (("n_elements", "element_degree", "reduced_integration", "mass_matrix"), ("mesh",))),
         Ways("velocity at the start", (("initial_velocity_slope",), ("approach_speed",))),
     )
     SCALES = (
@@ -164,11 +172,11 @@ class Beam(Table):
     )
     #: Keys that are not the FMU's.
     GIVEN_ONLY: ClassVar[frozenset[str]] = frozenset(
-        ("width", "height", "diameter", "poisson_ratio", "approach_speed", "approach", "fidelity")
+        ("width", "height", "diameter", "poisson_ratio", "approach_speed", "approach", "fidelity", "mesh")
     )
 
     @classmethod
-    def _follows(cls, data: dict[str, Any]) -> dict[str, float]:
+    def _follows(cls, data: dict[str, Any]) -> dict[str, Any]:
         """Return what follows from the given keys: A, I, K of a section, G, s₁; a bad value is reported as such."""
 
         def number(name: str) -> float | None:
@@ -177,12 +185,14 @@ class Beam(Table):
                 return value
             return 1.0
 
-        follows: dict[str, float] = {}
+        follows: dict[str, Any] = {}
+        if data.get("mesh") == "none":
+            follows |= {"n_elements": 1, "element_degree": 1, "reduced_integration": False, "mass_matrix": "consistent"}
         b, h, d = number("width"), number("height"), number("diameter")
         if b is not None and h is not None:
-            follows = {"area": b * h, "second_moment_of_area": b * h * h * h / 12.0, "shear_coefficient": 5.0 / 6.0}
+            follows |= {"area": b * h, "second_moment_of_area": b * h * h * h / 12.0, "shear_coefficient": 5.0 / 6.0}
         elif d is not None:
-            follows = {"area": pi * d * d / 4.0, "second_moment_of_area": pi * d * d * d * d / 64.0}
+            follows |= {"area": pi * d * d / 4.0, "second_moment_of_area": pi * d * d * d * d / 64.0}
             follows["shear_coefficient"] = 9.0 / 10.0
         elif data.get("area") is None:
             follows["shear_coefficient"] = 1.0  # what is missing is the section
@@ -200,6 +210,13 @@ class Beam(Table):
 
     @model_validator(mode="after")
     def _modes_exist(self) -> Beam:
+        if self.mesh == "none":
+            if self.integrator == "modal" and not 1 <= self.n_modes <= MOST_EXACT_MODES:
+                raise ValueError(f'n_modes = {self.n_modes}: with mesh = "none" give 1 … {MOST_EXACT_MODES}, say 100')
+            for name, value in (("integrator", "modal"), ("tip_load_coefficient", 0.0)):
+                if (given := getattr(self, name)) != value:
+                    raise ValueError(f'{name} = {given}: needs a mesh, and mesh = "none"; leave one of them out')
+            return self
         unknowns, degree = 2 * self.n_elements * self.element_degree, self.element_degree
         mesh = f"n_elements = {self.n_elements}" + (f" of element_degree = {degree}" if degree > 1 else "")
         if self.n_elements * degree > MOST_ELEMENTS:

@@ -131,14 +131,18 @@ def study(
         raise SceneError(f"{unknown[0]}: no such metric; there are {', '.join(METRICS)}")
     wanted = tuple(quantities) or QUANTITIES
 
+    beam = scene.beam
+    exact = beam.mesh == "none"
+
     def run(elements: int, modes: int, what: Scene = scene) -> Level:
         progress(f"{elements} elements, {modes or 'all'} modes")
-        return _level(with_changes(what, beam={"n_elements": elements, "n_modes": modes}), wanted)
+        mesh = {} if exact else {"n_elements": elements}
+        return _level(with_changes(what, beam={**mesh, "n_modes": modes}), wanted)
 
-    beam = scene.beam
-    by_elements = [run(beam.n_elements * RATIO**k, beam.n_modes) for k in range(levels)]
-    sequences = [Refinement("elements", by_elements)]
-    most = _modes(scene)
+    more = [RATIO**k for k in range(levels)]
+    by_elements = [run(0, beam.n_modes * k) if exact else run(beam.n_elements * k, beam.n_modes) for k in more]
+    sequences = [Refinement("modes" if exact else "elements", by_elements)]
+    most = 0 if exact else _modes(scene)
     if beam.integrator == "modal" and most >= RATIO ** (levels - 1):
         kept = [run(beam.n_elements, most // RATIO**k) for k in range(levels - 1, 0, -1)]
         sequences.append(Refinement("modes", [*kept, by_elements[0]]))
@@ -156,7 +160,7 @@ def _modes(scene: Scene) -> int:
 
 def _level(scene: Scene, quantities: Sequence[str]) -> Level:
     assert scene.beam is not None
-    mesh = (scene.beam.n_elements, scene.beam.n_modes, _modes(scene))
+    mesh = (0 if scene.beam.mesh == "none" else scene.beam.n_elements, scene.beam.n_modes, _modes(scene))
     began = perf_counter()
     try:
         made = simulate(scene)

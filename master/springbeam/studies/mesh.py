@@ -44,8 +44,12 @@ def pick_mesh(scene: Scene) -> Trajectory:
     coarse: Trajectory | None = None
     before = error = math.inf
     factor = 1
-    while 2 * beam.n_elements * beam.element_degree * factor <= ALL_MODES_UP_TO:
-        mesh = {"n_elements": factor * beam.n_elements, "n_modes": factor * beam.n_modes}
+    exact = beam.mesh == "none"
+    unknowns = beam.n_modes if exact else 2 * beam.n_elements * beam.element_degree
+    while unknowns * factor <= ALL_MODES_UP_TO:
+        mesh = {"n_modes": factor * beam.n_modes}
+        if not exact:
+            mesh["n_elements"] = factor * beam.n_elements
         fine = pick(with_changes(scene, accuracy=None, beam=mesh).model_copy(update={"accuracy": _SHARE * asked}))
         made = fine.trajectory()
         if coarse is not None:
@@ -58,7 +62,8 @@ def pick_mesh(scene: Scene) -> Trajectory:
                 return replace(made, summary={**made.summary, "accuracy": accuracy})
             before = difference
         coarse, factor = made, RATIO * factor
-    reached = f"{factor // RATIO * beam.n_elements} elements still leave some {error:.1e}"
+    kind, count = ("modes", beam.n_modes) if exact else ("elements", beam.n_elements)
+    reached = f"{factor // RATIO * count} {kind} still leave some {error:.1e}"
     raise SceneError(
         f"accuracy = {asked:g} with the mesh: not reached, {reached}; ask for less, shorten [time] t_end, or take "
         "elements of a higher degree where the motion is smooth (springbeam converge shows what settles)"
