@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
+from springbeam.bodies.checkpointed import Checkpointed
 from springbeam.bodies.factory import load_bodies
-from springbeam.bodies.memory import Memory
 from springbeam.contact.phases import Phase
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.checkpoint import decoded, encoded
@@ -171,7 +171,11 @@ def attributes(part: Any, seen: dict[int, Any]) -> Iterator[tuple[str, bool, Any
             if id(value) not in seen and not isinstance(value, (BaseModel, MemoryRecorder)):
                 yield from attributes(value, seen)
         else:
-            yield f"{type(part).__name__}.{name}", isinstance(part, Memory) and name in part.remembered(), value
+            yield (
+                f"{type(part).__name__}.{name}",
+                isinstance(part, Checkpointed) and name in part.checkpointed_names(),
+                value,
+            )
 
 
 def snapshot(part: Any) -> list[tuple[str, bool, bytes]]:
@@ -184,7 +188,7 @@ def snapshot(part: Any) -> list[tuple[str, bool, bytes]]:
 
 @pytest.mark.parametrize("name", ["energy 2, damped", "compliance", "seated", "loads", "paper"])
 def test_everything_that_changes_is_remembered_or_set_anew(name):
-    """An attribute that is forgotten in REMEMBERED is named here, before a resumed run differs."""
+    """An attribute that is forgotten in CHECKPOINTED is named here, before a resumed run differs."""
     run = Run(SCENES[name])
     before = snapshot(run.simulation)
     run.simulation.run()

@@ -35,7 +35,7 @@ class SpringDamper(Body):
         f, constant, upward [N].
     """
 
-    REMEMBERED = ("_state", "_integrals", "_dissipated")
+    CHECKPOINTED = ("_state", "_integrals", "_dissipated")
 
     def __init__(
         self,

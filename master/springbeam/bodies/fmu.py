@@ -27,7 +27,7 @@ from fmpy.fmi2 import (
 from fmpy.model_description import ModelDescription, read_model_description
 
 from .archive import UnsafeArchive, unpack
-from .memory import Memory
+from .checkpointed import Checkpointed
 from .protocol import BodyFailed, StepRefused
 
 #: Types of variables: in C, and of the values that they take.
@@ -92,7 +92,7 @@ class Reals:
 Value = float | int | bool | str
 
 
-class Fmu(Memory):
+class Fmu(Checkpointed):
     """One instance of a co-simulation FMU and its state.
 
     Parameters
@@ -107,7 +107,7 @@ class Fmu(Memory):
         [s].
     """
 
-    REMEMBERED = ("steps", "rewinds")
+    CHECKPOINTED = ("steps", "rewinds")
 
     def __init__(self, name: str | None, path: Path, parameters: Mapping[str, Value], start_time: float) -> None:
         self.path, self._own = path, name is not None

@@ -27,7 +27,7 @@ _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__
 class FmuBody(Body):
     """What both bodies do alike; a subclass names its variables."""
 
-    REMEMBERED: ClassVar[tuple[str, ...]] = ("fmu", "_pending", "_current")
+    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("fmu", "_pending", "_current")
 
     _MOTION: tuple[str, ...]
     _ENERGIES: tuple[str, ...]
@@ -234,7 +234,7 @@ class FmuBeam(FmuBody, BeamBody):
 class FmuSpring(FmuBody):
     """``spring.fmu`` as a body; contact law and foundation are the master's."""
 
-    REMEMBERED = (*FmuBody.REMEMBERED, "_dissipated_before")
+    CHECKPOINTED = (*FmuBody.CHECKPOINTED, "_dissipated_before")
 
     _MOTION = ("displacement", "velocity", "displacement_integral", "displacement_integral_2")
     _ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy")

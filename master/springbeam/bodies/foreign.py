@@ -64,7 +64,7 @@ class ForeignBody(FmuBody):
         Whether moments are found by substeps.
     """
 
-    REMEMBERED = (*FmuBody.REMEMBERED, "received", "_size", "_time")
+    CHECKPOINTED = (*FmuBody.CHECKPOINTED, "received", "_size", "_time")
 
     def __init__(self, spec: ForeignFmu, start_time: float, found: Findings, by_substeps: bool) -> None:
         self._spec, self._found, self._by_substeps = spec, found, by_substeps

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..scene import Load, SceneError
-from .memory import Memory
+from .checkpointed import Checkpointed
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
@@ -42,7 +42,7 @@ class Energies(NamedTuple):
     load_potential: float
 
 
-class Body(Memory):
+class Body(Checkpointed):
     """A body with one interface end and a state that can be rewound; a body of one's own derives from it.
 
     ``advance`` prescribes the contact force C on the step: the upper body takes it as +C, the lower one as −C.

@@ -44,7 +44,7 @@ class QuasiStaticBeam(BeamBody):
         u_tip [m] and its rate [m/s] at the start.
     """
 
-    REMEMBERED = ("_w", "_velocity", "_integrals", "_dissipated")
+    CHECKPOINTED = ("_w", "_velocity", "_integrals", "_dissipated")
 
     #: An impulse meets nothing.
     mass = 0.0

@@ -8,7 +8,7 @@ from .protocol import NO_FORCE, Body, Force, Motion
 class RigidWall(Body):
     """An end held at rest at ``position`` [m]: the foundation, an elastic stop, or a seated spring."""
 
-    REMEMBERED = ("_size",)
+    CHECKPOINTED = ("_size",)
 
     mass = float("inf")
 

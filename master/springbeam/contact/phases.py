@@ -11,7 +11,7 @@ from enum import Enum
 from functools import cached_property
 from math import inf
 
-from ..bodies.memory import Memory
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Motion
 from ..scene import Scene, Spring
 from ..scene.resolution import VIBRATION
@@ -99,7 +99,7 @@ def spring_force(spring: Spring, y: float) -> float:
     return spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
 
 
-class Transitions(Memory):
+class Transitions(Checkpointed):
     """What each kind of event does to the phase and to the velocities.
 
     Parameters
@@ -114,7 +114,7 @@ class Transitions(Memory):
         Ψ: the height below which the ends are tied [m].
     """
 
-    REMEMBERED = ("_fastest_impact",)
+    CHECKPOINTED = ("_fastest_impact",)
 
     def __init__(
         self,

@@ -37,7 +37,7 @@ class OneWay(Coupling):
         k: static force per displacement of the driving end [N/m].
     """
 
-    REMEMBERED = ("_solver", "_variation", "_force", "_deepest", "_work")
+    CHECKPOINTED = ("_solver", "_variation", "_force", "_deepest", "_work")
 
     def __init__(
         self, law: SoftLaw, degree: int, tolerance: float, *, upper_drives: bool, driver_stiffness: float

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..bodies.memory import Memory
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, Body, Force, Motion, StepRefused
 
 #: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
@@ -62,7 +62,7 @@ class Scales(NamedTuple):
     reduced_mass: float  #: of both ends [kg]
 
 
-class Coupling(Memory):
+class Coupling(Checkpointed):
     """Finds the contact force of a step and advances both bodies under it."""
 
     #: Degree of the contact force over a step.

@@ -46,7 +46,7 @@ class SoftSolver(Coupling):
         Tolerance as of `StepSolver`.
     """
 
-    REMEMBERED = ("_solver", "_simpler", "_simplified", "_reduced", "dissipated")
+    CHECKPOINTED = ("_solver", "_simpler", "_simplified", "_reduced", "dissipated")
 
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
         self.law, self.degree = law, degree

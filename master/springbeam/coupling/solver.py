@@ -83,7 +83,7 @@ class StepSolver(Coupling):
         A displacement that is to be expected [m]: modes whose sum, the tip, is held at 0 are as large.
     """
 
-    REMEMBERED = ("_sizes", "_last_size", "_reach", "_corrections")
+    CHECKPOINTED = ("_sizes", "_last_size", "_reach", "_corrections")
 
     def __init__(self, conditions: Conditions, degree: int, tolerance: float, expected: float = 0.0) -> None:
         self._conditions = conditions

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ..bodies.memory import Memory
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Motion
 from ..contact.phases import Joint, Phase
 from ..results.file_recorder import FileRecorder
@@ -46,7 +46,7 @@ class Checkpoint:
     seconds: float  #: between checkpoints [s]
     wall_time: float  #: so far [s]
     results: dict[str, Any]  #: `springbeam.results.file_recorder.FileRecorder.save`
-    simulation: dict[str, Any]  #: `springbeam.bodies.memory.Memory.save`
+    simulation: dict[str, Any]  #: `springbeam.bodies.checkpointed.Checkpointed.save`
 
     def write(self, path: Path) -> None:
         """Replace the file ``path``. Raises OSError; the file is then as before."""
@@ -114,7 +114,7 @@ class Checkpoints:
         self._began = perf_counter() - wall_time
         self._due = self._began + wall_time
 
-    def take_when_due(self, simulation: Memory) -> None:
+    def take_when_due(self, simulation: Checkpointed) -> None:
         """To be called between two steps. Raises OSError if the disk refuses; the last checkpoint stays then."""
         now = perf_counter()
         if now < self._due:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import NamedTuple
 
-from ..bodies.memory import Memory
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Energies
 from ..coupling.protocol import Booking
 from ..scene import Scene
@@ -44,7 +44,7 @@ class Booked(NamedTuple):
 
 
 @dataclass
-class Ledger(Memory):
+class Ledger(Checkpointed):
     """E_beam + E_spring + E_contact + dissipated + impact losses − work of external loads = constant."""
 
     impact_loss: float = 0.0  #: [J], by whoever applies an impact

@@ -6,7 +6,7 @@ step has them anyway (``docs/coupling.md``, "Adaptive macro steps").
 
 from __future__ import annotations
 
-from ..bodies.memory import Memory
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Motion
 from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Scales, Step
@@ -21,10 +21,10 @@ _ULPS, _EPS = 16.0, 2.0**-52
 _CUBIC = 4
 
 
-class LocalError(Memory):
+class LocalError(Checkpointed):
     """Estimates relative to the tolerances of a scene, and the scales that these are relative to."""
 
-    REMEMBERED = ("_lowest", "_highest", "_fastest")
+    CHECKPOINTED = ("_lowest", "_highest", "_fastest")
 
     def __init__(self, scene: Scene, pair: Pair) -> None:
         self._scene, self._pair = scene, pair

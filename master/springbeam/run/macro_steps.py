@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import ceil, inf, log2
 
-from ..bodies.memory import Memory
+from ..bodies.checkpointed import Checkpointed
 
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
 _SHORT_REMAINDER = 0.25
@@ -21,10 +21,10 @@ _FIRST, _LONGEST, _SHORTEST = 14, 2, 40
 _SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
 
 
-class MacroGrid(Memory):
+class MacroGrid(Checkpointed):
     """The grid t₀ + k H up to t_end [s]."""
 
-    REMEMBERED = ("_index", "_struck")
+    CHECKPOINTED = ("_index", "_struck")
 
     def __init__(self, start: float, end: float, macro_step: float) -> None:
         self._start, self._end = start, end
@@ -69,7 +69,7 @@ class MacroGrid(Memory):
         self._struck = True
 
 
-class AdaptiveSteps(Memory):
+class AdaptiveSteps(Checkpointed):
     """Sizes that keep the error of each step at its tolerance.
 
     The error of a step of size H goes as H^order, so the next one is 0.9 (tolerance/error)^(1/order) times as long,
@@ -82,7 +82,7 @@ class AdaptiveSteps(Memory):
         The run [s].
     """
 
-    REMEMBERED = ("_rung", "_just_rejected", "rejections")
+    CHECKPOINTED = ("_rung", "_just_rejected", "rejections")
 
     def __init__(self, start: float, end: float) -> None:
         self._end, self._length = end, end - start

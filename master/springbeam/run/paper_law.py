@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.fmu_bodies import FmuSpring
-from ..bodies.memory import Memory
 from ..bodies.protocol import NO_FORCE, BeamBody, BodyFailed, StepRefused
 from ..contact.laws import Compliance
 from ..coupling.protocol import NOTHING_BOOKED
@@ -30,10 +30,10 @@ _MAX_ITERATIONS = 50
 _TOLERANCE = 1e-12
 
 
-class PaperLaw(Memory):
+class PaperLaw(Checkpointed):
     """One run of Algorithm 1 with given bodies; parameters as of `springbeam.run.simulation.Simulation`."""
 
-    REMEMBERED = (
+    CHECKPOINTED = (
         "_beam",
         "_spring",
         "time",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from operator import itemgetter
 
-from ..bodies.memory import Memory
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, BeamBody
 from ..contact.events import gap
 from ..contact.laws import Compliance
@@ -31,10 +31,10 @@ NOT_SHOWN = (
 )
 
 
-class Rows(Memory):
+class Rows(Checkpointed):
     """Writes rows and shapes of a pair into a recorder, and keeps their extremes."""
 
-    REMEMBERED = (
+    CHECKPOINTED = (
         *("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed", "_relative_speed", "_stiffest"),
         "not_shown",
     )

@@ -9,10 +9,10 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.factory import findings, fingerprints, load_bodies
 from ..bodies.fmu import FmuError
 from ..bodies.fmu_bodies import FmuBeam, FmuBody, FmuSpring
-from ..bodies.memory import Memory
 from ..bodies.protocol import Body
 from ..results.directory import RunDirectory
 from ..results.file_recorder import FileRecorder
@@ -146,7 +146,7 @@ def run(
                 body.close()
 
 
-def _go_on(simulation: Memory, recorder: Recorder, start: Checkpoint) -> None:
+def _go_on(simulation: Checkpointed, recorder: Recorder, start: Checkpoint) -> None:
     if not isinstance(recorder, FileRecorder):
         raise TypeError("a run goes on in the directory of its results")
     try:

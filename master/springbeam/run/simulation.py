@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from ..bodies.memory import Memory
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, Body, BodyFailed, StepRefused
 from ..contact.events import gap
 from ..contact.phases import Joint, Phase, Transitions
@@ -41,7 +41,7 @@ _AT_ONCE, _MAX_EVENTS_AT_ONCE = 1e-6, 500
 _MAX_EVENTS_IN_STEP = 20_000
 
 
-class Simulation(Memory):
+class Simulation(Checkpointed):
     """One run of a scene with given bodies.
 
     Parameters
@@ -58,7 +58,7 @@ class Simulation(Memory):
         Called once per accepted step.
     """
 
-    REMEMBERED = (
+    CHECKPOINTED = (
         "_pair",
         "_state",
         "_steps",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..bodies import force
-from ..bodies.memory import Memory
+from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, Body, Energies, Force
 from ..bodies.rigid_wall import RigidWall
 from ..contact.laws import Transmission, law_of
@@ -20,7 +20,7 @@ _REACH_OF_FORCE = 4.0
 
 
 @dataclass
-class State(Memory):
+class State(Checkpointed):
     """Where the run is, and what of the last steps the next one needs."""
 
     time: float
@@ -69,7 +69,7 @@ class State(Memory):
 _ABSENT = RigidWall(0.0)
 
 
-class Pair(Memory):
+class Pair(Checkpointed):
     """Both bodies of a scene, one of them possibly missing, and what couples them in each phase.
 
     Parameters
@@ -80,7 +80,7 @@ class Pair(Memory):
         The bodies; ``None`` where the scene has none.
     """
 
-    REMEMBERED = ("beam", "spring", "_held", "_joined")
+    CHECKPOINTED = ("beam", "spring", "_held", "_joined")
 
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self.beam, self.spring = beam, spring

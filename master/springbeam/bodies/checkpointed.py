@@ -1,6 +1,6 @@
 """What a run carries from one step to the next, so that a checkpoint can hold it.
 
-Every part of a run that changes while it runs is a `Memory` and names the attributes that change. Whatever is not
+Every part of a run that changes while it runs is a `Checkpointed` and names the attributes that change. Whatever is not
 named must follow from the scene or be computed anew to the same bits.
 """
 
@@ -10,34 +10,34 @@ from dataclasses import fields, is_dataclass
 from typing import Any, ClassVar
 
 
-class Memory:
+class Checkpointed:
     """Mixin for a part of a run whose future depends on its past."""
 
     #: The attributes that a checkpoint holds: further parts, or plain values (`springbeam.run.checkpoint` lists their
     #: types).
-    REMEMBERED: ClassVar[tuple[str, ...]] = ()
+    CHECKPOINTED: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
-    def remembered(cls) -> tuple[str, ...]:
-        """`REMEMBERED`, or all fields of a dataclass."""
-        return tuple(field.name for field in fields(cls)) if is_dataclass(cls) else cls.REMEMBERED
+    def checkpointed_names(cls) -> tuple[str, ...]:
+        """`CHECKPOINTED`, or all fields of a dataclass."""
+        return tuple(field.name for field in fields(cls)) if is_dataclass(cls) else cls.CHECKPOINTED
 
     def save(self) -> dict[str, Any]:
-        """The remembered attributes by name, parts as nested dicts; lists and arrays are the run's own."""
-        return {name: _saved(getattr(self, name)) for name in self.remembered()}
+        """The attributes that are checkpointed, by name, parts as nested dicts; lists and arrays are the run's own."""
+        return {name: _saved(getattr(self, name)) for name in self.checkpointed_names()}
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Continue from what `save` of an equal part returned. Raises ValueError if it was another kind of part."""
-        names = self.remembered()
+        names = self.checkpointed_names()
         if not isinstance(saved, dict) or saved.keys() != set(names):
-            raise ValueError(f"{type(self).__name__} remembers {', '.join(names)}; not found")
+            raise ValueError(f"{type(self).__name__} checkpoints {', '.join(names)}; not found")
         for name in names:
             part = getattr(self, name)
-            if isinstance(part, Memory):
+            if isinstance(part, Checkpointed):
                 part.restore(saved[name])
             else:
                 setattr(self, name, saved[name])
 
 
 def _saved(value: Any) -> Any:
-    return value.save() if isinstance(value, Memory) else value
+    return value.save() if isinstance(value, Checkpointed) else value
