@@ -68,8 +68,7 @@ def test_the_closed_forms_are_those_of_the_oscillator_and_of_the_quadrature() ->
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("chi", [0.1, 0.5, 3.0])
-@pytest.mark.parametrize("q", [1.0, 1.5, 3.0])
+@pytest.mark.parametrize(("q", "chi"), [(1.0, 0.1), (1.5, 0.5), (3.0, 3.0)])
 def test_hunt_and_crossley_rebound(method: str, q: float, chi: float) -> None:
     """χw − ln(1 + χw) is the same before and after; what the speeds lose is what is booked as dissipated."""
     hit = exact.impact(REDUCED, 1.0, STIFFNESS, q, chi)
@@ -289,8 +288,8 @@ PAIRS = {
 @pytest.mark.parametrize("name", PAIRS)
 def test_two_integrators_agree_and_the_ledger_closes(name: str) -> None:
     scene = PAIRS[name]
-    samples = np.linspace(0.02, scene.time.t_end, 20)
-    one, two = (simulate(scene, method=method, sample_times=samples) for method in METHODS)
+    samples = np.linspace(0.02, 0.3, 20)
+    one, two = (simulate(scene, method=method, sample_times=samples, t_end=0.3) for method in METHODS)
     assert kinds(one) == kinds(two)
     for a, b in zip(one.events, two.events, strict=True):
         assert a.time == pytest.approx(b.time, abs=1e-9)

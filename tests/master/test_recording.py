@@ -289,21 +289,6 @@ def test_memory_does_not_grow_with_the_run(tmp_path):
     assert grown < 20_000  # 3000 rows are 500 kB as doubles
 
 
-def test_an_error_leaves_what_was_computed_and_its_cause(tmp_path):
-    def run():
-        with FileRecorder(PAIR, RunDirectory.create(tmp_path)) as recorder:
-            record(recorder, rows=5)
-            raise ZeroDivisionError("of what")
-
-    with pytest.raises(ZeroDivisionError):
-        run()
-    result = load_trajectory(tmp_path)
-    assert len(result) == 5
-    assert result.summary["status"] == "stopped"
-    assert "ZeroDivisionError" in result.summary["cause"]
-    assert result.summary["time"] == 0.4
-
-
 # -- damaged files ------------------------------------------------------------------------------------------------
 
 

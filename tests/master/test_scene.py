@@ -15,28 +15,6 @@ from springbeam.scene import Scene, SceneError, load_scene, reference, shipped_s
 from springbeam.scene.partners import PARTNERS
 from springbeam.scene.unit import UNIT_BEAM
 
-PAIR = """
-[time]
-t_end = 0.6
-[beam]
-density = 1.0
-length = 1.0
-area = 1.0
-second_moment_of_area = 1.0
-shear_coefficient = 1.0
-young_modulus = 100.0
-shear_modulus = 100.0
-initial_velocity_slope = -1.0
-[spring]
-mass = 1.0
-linear_stiffness = 3.0
-cubic_stiffness = -0.2
-[stop]
-position = -0.015
-[coupling]
-macro_step = 0.001
-"""
-
 
 def changed(**tables):
     """The dictionary of `PAIR` with keys changed; ``None`` takes a table or a key out."""
@@ -166,61 +144,10 @@ def test_shipped_scenes_are_valid_and_titled():
         assert suspicions(scene) == []
 
 
-def test_a_file_means_what_its_text_says(tmp_path):
-    path = tmp_path / "pair.toml"
-    path.write_text(PAIR, encoding="utf-8")
-    assert load_scene(path) == load_scene(str(path)) == scene_from_dict(load_pair())
-
-
-def test_a_byte_order_mark_is_no_obstacle(tmp_path):
-    path = tmp_path / "windows.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + PAIR.replace("\n", "\r\n").encode())
-    assert load_scene(path) == scene_from_dict(load_pair())
-
-
 def test_a_name_is_the_shipped_scene_even_beside_a_folder_of_that_name(tmp_path, monkeypatch):
     (tmp_path / "soft").mkdir()
     monkeypatch.chdir(tmp_path)
     assert load_scene("soft").title == load_scene(shipped_scenes()["soft"]).title
-
-
-@pytest.mark.parametrize(
-    ("content", "fragments"),
-    [
-        (b"[time\nt_end = 1", ["not TOML", "line 1"]),
-        (b"[time]\nt_end = 1\n[time]\n", ["not TOML", "line 3"]),
-        (b"[time]\nt_end = 1,5\n", ["not TOML", "line 2"]),
-        (b"[time]\nt_end = .5\n", ["not TOML", "line 2"]),
-        (b"\xff\xfe[\x00t\x00", ["not TOML"]),
-        (b"", ["[time]", "missing table"]),
-    ],
-)
-def test_unreadable_files(tmp_path, content, fragments):
-    path = tmp_path / "broken.toml"
-    path.write_bytes(content)
-    with pytest.raises(SceneError) as refusal:
-        load_scene(path)
-    for fragment in ["broken.toml: ", *fragments]:
-        assert fragment in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    ("name", "fragments"),
-    [
-        ("sotf", ["sotf: no such file", "did you mean soft?", "shipped scenes:"]),
-        ("soft.toml", ["soft.toml: no such file", "did you mean soft?"]),
-        ("no/where.toml", ["no/where.toml: no such file"]),
-        ("folder", ["folder: is a directory"]),
-        ("", ["shipped scenes:"]),
-    ],
-)
-def test_scenes_that_are_not_there(tmp_path, monkeypatch, name, fragments):
-    (tmp_path / "folder").mkdir()
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(SceneError) as refusal:
-        load_scene(name)
-    for fragment in fragments:
-        assert fragment in str(refusal.value)
 
 
 @pytest.mark.parametrize(

@@ -138,6 +138,7 @@ def test_what_is_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         "circle.toml": "no such file",
         "nowhere.toml": "no such file",
         "missing.toml": "no such file",
+        "soft.toml": "no such file; did you mean soft? shipped scenes: …",
         "sotf": "no such file, and not a shipped scene; did you mean soft? shipped scenes: …",
         "/dev/zero": "not a file, and not a shipped scene",
     }.items():

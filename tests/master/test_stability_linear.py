@@ -163,6 +163,10 @@ def test_hermite_is_stable_where_the_search_for_its_bound_begins(degree):
         highest = max(omega_max(p), float(np.sqrt(p.spring.omega2[0])))
         for frequency in random.uniform(0.05, 2.5, 6):
             assert spectral_radius(p, "hermite", degree, frequency / highest) < 1.0 + 1e-8
+    # ω_max·H is 2 and 4 at its bounds: well above, motions grow by a tenth and more in a step.
+    for mass in (1.0, 100.0):
+        p = pair(4, mass)
+        assert spectral_radius(p, "hermite", degree, (8.0, 10.0)[degree - 1] / omega_max(p)) > 1.1
 
 
 @pytest.mark.parametrize(("scheme", "degree"), EXCHANGES)

@@ -23,7 +23,7 @@ import springbeam
 from springbeam.bodies.fmu import FmuError
 from springbeam.bodies.protocol import Motion
 from springbeam.contact.phases import Joint, Phase
-from springbeam.results.directory import ResultsUnreadable, RunDirectory
+from springbeam.results.directory import RunDirectory
 from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.reading import load_trajectory
 from springbeam.results.recording import MemoryRecorder
@@ -226,18 +226,6 @@ def test_another_fmu_is_refused(interrupted, tmp_path, fmu_folder, monkeypatch, 
     (tmp_path / f"{name}.fmu").unlink()
     with pytest.raises(FmuError, match=rf"{name}\.fmu"):
         springbeam.resume(interrupted)
-
-
-@pytest.mark.parametrize("name", ["trajectory.csv", "events.csv", "shapes.csv"])
-def test_changed_results_are_refused_and_not_touched(interrupted, name):
-    path = interrupted / name
-    content = bytearray(path.read_bytes())
-    content[200] = ord("7") if content[200] != ord("7") else ord("8")
-    path.write_bytes(content)
-    before = files(interrupted)
-    with pytest.raises(ResultsUnreadable, match=rf"{name}: changed since it was written"):
-        springbeam.resume(interrupted)
-    assert files(interrupted) == before
 
 
 def test_checkpoints_of_a_run_that_picks_its_accuracy_are_refused(tmp_path, monkeypatch):
