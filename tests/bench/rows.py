@@ -77,6 +77,12 @@ def ratio_row(group: str, what: str, times: Times, limit: float, against: str, *
     )
 
 
+def below(group: str, what: str, values: list[float], goal: float, unit: str, against: str = "") -> Row:
+    """``goal`` bounds the median of the values from above, all in ``unit``."""
+    met = statistics.median(values) <= goal
+    return Row(group, what, f"≤ {goal:g} {unit}", f"{median_and_spread(values)} {unit}", met, against)
+
+
 def _time(seconds: float) -> str:
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if seconds >= size:
@@ -108,15 +114,9 @@ def beam(effort: Effort) -> Iterator[Row]:
     )
     for key, what, goal in (("", "", 1.0), (" repeated", " and the state set back before", 0.35)):
         modal = _of(found["modal fmu" + key])
-        microseconds = [1e6 * s for s in modal.ours]
-        yield Row(
-            "1",
-            f"beam step of the FMU, 64 modes{what}, called from C",
-            f"≤ {goal:g} µs",
-            f"{median_and_spread(microseconds)} µs",
-            statistics.median(microseconds) <= goal,
-            f"64 products of 2 × 2 matrices: {_time(statistics.median(modal.rival))}",
-        )
+        rival = f"64 products of 2 × 2 matrices: {_time(statistics.median(modal.rival))}"
+        name = f"beam step of the FMU, 64 modes{what}, called from C"
+        yield below("1", name, [1e6 * s for s in modal.ours], goal, "µs", rival)
     yield from _initialisation(effort, found)
     for modes, name in ((0, "generalized-α"), (64, "64 modes")):
         line = found[f"scaling {modes}"]
@@ -166,14 +166,8 @@ def _initialisation(effort: Effort, found: dict[str, Any]) -> Iterator[Row]:
 
         times = compare(ours, arpack, rounds) if n == 1000 else Times([ours()], [arpack()])
         scaled = [seconds * {"ms": 1e3, "s": 1.0}[unit] for seconds in times.ours]
-        yield Row(
-            "2",
-            f"initialisation of beam.fmu, {n} elements, 64 modes",
-            f"≤ {goal:g} {unit}",
-            f"{median_and_spread(scaled)} {unit}",
-            statistics.median(scaled) <= goal,
-            f"scipy's eigsh (ARPACK) for the same modes: {_time(statistics.median(times.rival))}",
-        )
+        rival = f"scipy's eigsh (ARPACK) for the same modes: {_time(statistics.median(times.rival))}"
+        yield below("2", f"initialisation of beam.fmu, {n} elements, 64 modes", scaled, goal, unit, rival)
     if not effort.quick:
         line = found["scaling 64"]
         yield Row(
@@ -197,16 +191,9 @@ def spring(effort: Effort) -> Iterator[Row]:
         ("fig4 1e-12", "`paper-fig4`, H = 4e-3, tolerance 1e-12"),
     ):
         counts, errors = found[f"{name} counts"], found[f"{name} errors"]
-        row = ratio_row("3", f"spring step, {what}", _of(found[name]), 1.2, "")
-        yield Row(
-            row.group,
-            row.what,
-            row.goal,
-            row.measured,
-            row.met,
-            f"{bare}: {counts['rival'][0]} internal steps, ours {counts['ours'][0]}; error "
-            f"{errors['rival'][0]:.0e} m, ours {errors['ours'][0]:.0e} m",
-        )
+        against = f"{bare}: {counts['rival'][0]} internal steps, ours {counts['ours'][0]}; error "
+        against += f"{errors['rival'][0]:.0e} m, ours {errors['ours'][0]:.0e} m"
+        yield ratio_row("3", f"spring step, {what}", _of(found[name]), 1.2, against)
     yield ratio_row("3", "the same of the FMU, state restored before", _of(found["fmu"]), 1.2, bare)
 
 
@@ -304,14 +291,8 @@ def master(effort: Effort) -> Iterator[Row]:
             # The first steps of each size, H/8 after the impact, what is left of H, and H, measure what is remembered.
             per_step = (summary[f"{body}_steps"] - 3 * (degree + 1)) / summary["macro_steps"]
             yield Row("4", f"{name}: {body} doSteps per macro step", f"≤ {goal}", f"{per_step:.3f}", per_step <= goal)
-        yield Row(
-            "4",
-            f"{name}: time outside the FMUs per macro step",
-            "≤ 40 µs",
-            f"{median_and_spread(outside)} µs",
-            statistics.median(outside) <= 40.0,
-            f"inside {median_and_spread(within)} µs",
-        )
+        inner = f"inside {median_and_spread(within)} µs"
+        yield below("4", f"{name}: time outside the FMUs per macro step", outside, 40.0, "µs", inner)
         if effort.quick:
             return
 

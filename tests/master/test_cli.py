@@ -95,21 +95,6 @@ def test_what_rounding_leaves_of_a_zero_is_shown_as_0(here, monkeypatch):
     assert event.split() == ["release", "0.20000000", "0", "0.25"]
 
 
-def test_no_plots(here):
-    result = command("run", "soft", "--no-plots")
-    assert result.exit_code == 0
-    assert not list((here / "results" / "soft").glob("*.png"))
-    assert "pictures" not in result.stdout
-
-
-def test_settings_reach_the_run_and_the_summary(here):
-    settings = ["--set", "time.t_end=2", "--set", "contact.law=compliance"]
-    assert command("run", "soft", "--no-plots", *settings).exit_code == 0
-    result = load_trajectory(here / "results" / "soft")
-    assert result.time[-1] == 2.0
-    assert result.scene.contact.law == "compliance"
-
-
 def test_a_second_run_does_not_touch_the_first(here):
     command("run", "soft", "--no-plots")
     first = (here / "results" / "soft" / "summary.json").stat().st_mtime_ns

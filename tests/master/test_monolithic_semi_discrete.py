@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
-from scipy.optimize import brentq
 from scipy.sparse.linalg import spsolve
 
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam
 from springbeam.scene.statics import SHAPE_POINTS
 from springbeam.scene.unit import unit_beam
+from springbeam.studies.verify.beam import clamped_free_frequencies
 
 
 def beam(bending: float = 1.0, shear: float = 1.0, **changes: object) -> Beam:
@@ -52,30 +51,8 @@ def test_one_element_of_degree_three_or_more_is_statically_exact(degree: int, re
     assert u == pytest.approx(1.5**3 / 6.0 + 1.5 / 7.0, rel=1e-11)
 
 
-def exact_frequencies(count: int) -> list[float]:
-    """Clamped–free Timoshenko beam with all constants 1: zeros of det X_MM X_MQ; X_QM X_QQ, X = exp(A)."""
-
-    def determinant(w: float) -> float:
-        A = np.zeros((4, 4))  # (θ, M, u, Q)' = A (θ, M, u, Q)
-        A[0, 1] = 1.0
-        A[1, 3], A[1, 0] = -1.0, -(w**2)
-        A[2, 3], A[2, 0] = 1.0, 1.0
-        A[3, 2] = -(w**2)
-        X = expm(A)
-        return float(X[1, 1] * X[3, 3] - X[1, 3] * X[3, 1])
-
-    grid = np.linspace(0.5, 8.5, 81)
-    values = [determinant(w) for w in grid]
-    zeros = [
-        brentq(determinant, a, b, xtol=1e-14)
-        for a, b, fa, fb in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True)
-        if fa * fb < 0.0
-    ]
-    return zeros[:count]
-
-
 def test_frequencies_converge_to_the_exact_ones_at_second_order() -> None:
-    exact = np.array(exact_frequencies(6))
+    exact = np.array(clamped_free_frequencies()[:6])
     assert exact[0] == pytest.approx(1.27396492100357, abs=1e-12)
     errors = [modal_beam(beam(n_elements=n)).omega[:6] / exact - 1.0 for n in (40, 80)]
     orders = np.log2(errors[0] / errors[1])
@@ -86,7 +63,7 @@ def test_frequencies_converge_to_the_exact_ones_at_second_order() -> None:
 @pytest.mark.parametrize(("degree", "n"), [(2, 16), (3, 8), (4, 5)])
 @pytest.mark.parametrize("reduced", [False, True])
 def test_the_order_of_the_frequencies_is_twice_the_degree(degree: int, n: int, reduced: bool) -> None:
-    exact = np.array(exact_frequencies(4))[2:]
+    exact = np.array(clamped_free_frequencies()[2:4])
     elements = {"element_degree": degree, "reduced_integration": reduced}
     errors = [modal_beam(beam(n_elements=m, **elements)).omega[2:4] / exact - 1.0 for m in (n, 2 * n)]
     orders = np.log2(errors[0] / errors[1])

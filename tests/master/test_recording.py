@@ -11,6 +11,7 @@ import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from fractions import Fraction
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -56,28 +57,21 @@ def filed(path, scene=PAIR, **arguments):
 # -- columns ------------------------------------------------------------------------------------------------------
 
 
+OF_CONTACT = {
+    *("contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction", "velocity_mismatch", "e_contact"),
+}
+
+
 @pytest.mark.parametrize(
     ("scene", "without"),
     [
         (PAIR, set()),
         (with_changes(PAIR, stop=None), {"foundation_force"}),
-        (
-            BEAM_AND_STOP,
-            {"y", "z", "e_spring", "contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction",
-             "velocity_mismatch", "e_contact"},
-        ),
-        (
-            BEAM,
-            {"y", "z", "e_spring", "contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction",
-             "velocity_mismatch", "e_contact", "gap", "foundation_force"},
-        ),
-        (
-            SPRING,
-            {"u_tip", "v_tip", "e_beam", "contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction",
-             "velocity_mismatch", "e_contact", "gap", "foundation_force"},
-        ),
+        (BEAM_AND_STOP, {"y", "z", "e_spring", *OF_CONTACT}),
+        (BEAM, {"y", "z", "e_spring", *OF_CONTACT, "gap", "foundation_force"}),
+        (SPRING, {"u_tip", "v_tip", "e_beam", *OF_CONTACT, "gap", "foundation_force"}),
     ],
-)  # fmt: skip
+)
 def test_columns_of_absent_bodies_are_left_out_in_order(scene, without):
     assert columns_of(scene) == tuple(name for name in COLUMNS if name not in without)
 
@@ -144,8 +138,10 @@ def test_columns_may_be_chosen(make):
     assert {name: values.tolist() for name, values in result.columns.items()} == {"time": [0, 1], "y": [1.5, 0.25]}
 
 
-@pytest.mark.parametrize("column", [name for name in COLUMNS if name not in ("phase", "time")])
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, np.float64("nan")])
+NUMBERS = [name for name in COLUMNS if name not in ("phase", "time")]
+
+
+@pytest.mark.parametrize(("column", "value"), [*zip(NUMBERS, cycle((math.nan, math.inf, -math.inf)))])
 def test_a_row_that_is_not_finite_is_refused_by_column_and_time(column, value):
     recorder = MemoryRecorder(PAIR)
     recorder.row(a_row())

@@ -399,15 +399,7 @@ def test_a_scene_of_ones_own_is_run_from_the_page():
 
 @pytest.fixture
 def directory(tmp_path):
-    run = a_trajectory(events=EVERY_EVENT)
-    with FileRecorder(run.scene, RunDirectory.create(tmp_path / "run")) as recorder:
-        for i in range(len(run)):
-            recorder.row({name: values[i] for name, values in run.columns.items()})
-            recorder.shape(run.time[i], run.shapes[1][i])
-        for event in run.events:
-            recorder.event(event)
-        recorder.finish({"status": "done", "warnings": []})
-    return tmp_path / "run"
+    return a_trajectory(events=EVERY_EVENT).save(tmp_path / "run")
 
 
 def test_the_command_writes_the_page_into_the_directory_and_says_where(directory):
@@ -452,12 +444,6 @@ def test_a_damaged_directory_is_one_clear_error(directory, damage, message):
     assert message in result.stderr
     assert result.stderr.count("\n") == 1
     assert not (directory / REPORT).exists()
-
-
-def test_no_directory_is_one_clear_error(tmp_path):
-    result = command("report", tmp_path / "nowhere")
-    assert result.exit_code == 2
-    assert "nowhere: no such directory" in result.stderr
 
 
 def test_a_place_that_cannot_be_written_is_one_clear_error(directory):

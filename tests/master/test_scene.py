@@ -257,21 +257,6 @@ def outcome(data):
 
 @settings(deadline=None)
 @given(
-    table=st.sampled_from(["time", "beam", "spring", "stop", "contact", "coupling"]),
-    key=st.text(min_size=1, max_size=12),
-    value=st.one_of(
-        st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.lists(st.integers(), max_size=2)
-    ),
-)
-def test_whatever_is_in_a_table_is_a_scene_or_a_scene_error(table, key, value):
-    data = load_pair()
-    data.setdefault(table, {})[key] = value
-    result = outcome(data)
-    assert isinstance(result, Scene) or result.startswith("scene: ")
-
-
-@settings(deadline=None)
-@given(
     key=st.sampled_from(list(load_scene("soft").beam.model_dump())),
     value=st.one_of(st.booleans(), st.integers(), st.floats(), st.text(max_size=5)),
 )

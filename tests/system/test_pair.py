@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from functools import lru_cache
 
@@ -93,18 +92,10 @@ def test_hermite_keeps_its_order_through_events():
 # -- energy ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("name", ["soft", "steel-bumper", "beam-on-stop", *(f"paper-fig{k}" for k in (2, 3, 4, 5))])
 @pytest.mark.parametrize("factor", [1.0, 5.0, 0.2])
-@pytest.mark.parametrize(
-    ("name", "bound"),
-    [
-        ("soft", 1e-9),
-        ("steel-bumper", 1e-9),
-        ("beam-on-stop", 1e-9),
-        *((f"paper-fig{k}", 1e-7) for k in (2, 3, 4, 5)),
-    ],
-)
-def test_energy_is_conserved_at_any_macro_step(name, factor, bound):
-    scene = load_scene(name)
+def test_energy_is_conserved_at_any_macro_step(name, factor):
+    scene, bound = load_scene(name), 1e-7 if name.startswith("paper") else 1e-9
     trajectory = run(name, scene.coupling.macro_step * factor)
     assert trajectory.time[-1] == scene.time.t_end
     assert trajectory.summary["max_energy_residual"] <= bound
@@ -265,26 +256,18 @@ def test_bar_impact_converges_to_the_exact_impulse():
 # -- the command ----------------------------------------------------------------------------------------------------
 
 
-def test_run_leaves_the_promised_files(tmp_path):
-    out = tmp_path / "out"
-    result = command("run", "soft", "--out", out, "--set", "time.t_end=0.1")
+def test_run_leaves_the_promised_columns_and_numbers(tmp_path):
+    result = command("run", "soft", "--out", tmp_path / "out", "--set", "time.t_end=0.1", "--no-plots")
     assert result.exit_code == 0, result.output
-    header = next(csv.reader((out / "trajectory.csv").open()))
+    header, events = ((tmp_path / "out" / name).read_text().split("\n")[0] for name in ("trajectory.csv", "events.csv"))
     promised = (
         "time,u_tip,v_tip,y,z,contact_force,foundation_force,gap,phase,e_beam,e_spring,e_contact,e_dissipated,"
         "e_impact_loss,e_total,energy_residual"
     )
-    assert set(promised.split(",")) <= set(header)
-    assert (
-        (out / "events.csv")
-        .read_text()
-        .startswith("time,kind,y,z,u_tip,v_tip,impulse_contact,impulse_foundation,energy_loss\n")
-    )
-    summary = json.loads((out / "summary.json").read_text())
-    assert {"scene", "version", "wall_time", "macro_steps", "beam_steps", "spring_steps", "events", "warnings"} <= set(
-        summary
-    )
-    assert len(list(out.glob("*.png"))) == 5
+    assert set(promised.split(",")) <= set(header.split(","))
+    assert events == "time,kind,y,z,u_tip,v_tip,impulse_contact,impulse_foundation,energy_loss"
+    told = {"scene", "version", "wall_time", "macro_steps", "beam_steps", "spring_steps", "events", "warnings"}
+    assert told <= json.loads((tmp_path / "out" / "summary.json").read_text()).keys()
 
 
 def test_a_cantilever_under_a_sudden_force_meets_an_elastic_stop():

@@ -11,13 +11,14 @@ import pytest
 from commands import command
 from rich.console import Console
 from scipy.integrate import quad
-from scipy.linalg import eigh
 from scipy.special import airy
 
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.bodies.protocol import StepRefused
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.tie import SCHEMES
+from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.scene.unit import unit_beam
 from springbeam.studies import verify
 from springbeam.studies.verify.beam import _mesh_error, clamped_free_frequencies
 from springbeam.studies.verify.check import Check
@@ -158,13 +159,6 @@ def test_json_is_the_checks(monkeypatch: pytest.MonkeyPatch):
     assert json.loads(result.stdout)["passed"] is False
 
 
-def test_missing_fmus_are_bad_input(tmp_path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
-    result = command("verify")
-    assert result.exit_code == 2
-    assert str(tmp_path / "beam.fmu") in result.output
-
-
 def test_what_cannot_be_computed_fails_with_its_cause(monkeypatch: pytest.MonkeyPatch):
     def refused() -> list[Check]:
         raise StepRefused("spring: too stiff")
@@ -192,26 +186,10 @@ def test_a_check_passes_within_its_bound_only(check: Check, passed: bool | None)
     assert check.passed is passed
 
 
-def p1_frequencies(n: int) -> np.ndarray:
-    """The lowest six of P1 elements, EI = KAG = ρA = ρI = L = 1, in the unknowns (θ, u) of each node."""
-    h = 1.0 / n
-    gradient, mean = np.array([-1.0, 1.0]) / h, np.array([[2.0, 1.0], [1.0, 2.0]]) * h / 6.0
-    M, K = np.zeros((2, 2 * n + 2, 2 * n + 2))
-    for e in range(n):
-        theta, u = [2 * e, 2 * e + 2], [2 * e + 1, 2 * e + 3]
-        for field in (theta, u):
-            M[np.ix_(field, field)] += mean
-            K[np.ix_(field, field)] += h * np.outer(gradient, gradient)
-        K[np.ix_(theta, theta)] += mean
-        cross = -0.5 * h * np.outer(gradient, np.ones(2))
-        K[np.ix_(u, theta)] += cross
-        K[np.ix_(theta, u)] += cross.T
-    return np.sqrt(eigh(K[2:, 2:], M[2:, 2:], eigvals_only=True, subset_by_index=[0, 5]))
-
-
 def test_frequencies_of_the_transfer_matrix_are_the_limit_of_the_mesh():
     """And its leading error is the predicted one: extrapolation leaves O((kh)⁴), 0.05⁴ relative at n = 160."""
-    w, coarse, fine = np.array(clamped_free_frequencies()[:6]), p1_frequencies(80), p1_frequencies(160)
+    w = np.array(clamped_free_frequencies()[:6])
+    coarse, fine = (modal_beam(unit_beam(n_elements=n)).omega[:6] for n in (80, 160))
     assert (4.0 * fine - coarse) / 3.0 == pytest.approx(w, rel=(8.4 / 80.0) ** 4)
     predicted = np.array([_mesh_error(x) for x in w]) / 160**2
     assert fine - w == pytest.approx(predicted, rel=(8.4 / 160.0) ** 2)
