@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ..bodies.protocol import Motion
+from ..bodies.protocol import Motion, StepRefused
 from ..contact.events import (
     EventFunction,
     EventFunctions,
@@ -28,6 +28,8 @@ from .stepping import Pair, State
 
 #: A path may be wrong by this share of its distance from the cubic; trial steps to the bottom of a dip.
 _UNSURE, _MAX_DIP_TRIALS = 0.25, 4
+#: Position tolerances by which the motion at a located event may be off before it is none.
+_JUMP = 1e5
 #: An event closer to the start of a step than this fraction of H happens at the start.
 _NO_TIME = 1e-9
 #: Rounding of a velocity, relative to the largest so far.
@@ -169,6 +171,7 @@ class Detector:
         return None
 
     def _located(self, state: State, function: EventFunction, bracket: Step) -> Step:
+        """Return the step that ends where ``function`` is 0. Raises StepRefused if none does."""
         last = bracket
 
         def evaluate(size: float) -> Sample:
@@ -178,6 +181,9 @@ class Detector:
 
         tolerance = 0.25 * self.tolerance(bracket.end)
         locate(evaluate, function(bracket.start), function(bracket.end), bracket.size, tolerance, state.time)
+        missed = abs(function(last.end)[0])
+        if missed > _JUMP * self.tolerance(last.end):
+            raise StepRefused(f"an event is not found: the motion jumps by {missed:.3g} m with the size of the step")
         return last
 
     def _touched_inside(self, state: State, step: Step) -> Step:
