@@ -73,9 +73,11 @@ def refusal(folder: Path) -> str:
     return message
 
 
-@pytest.mark.parametrize("name", BROKEN)
-def test_broken_content_is_named(folder: Path, name: str) -> None:
-    damage, cause = BROKEN[name]
+@pytest.mark.parametrize("name", [*BROKEN, "library of the other FMU"])
+def test_broken_content_is_named(folder: Path, fmu_folder: Path, name: str) -> None:
+    with zipfile.ZipFile(fmu_folder / "spring.fmu") as other:
+        library = replaced(BINARY, other.read("binaries/linux64/spring.so"))
+    damage, cause = BROKEN.get(name, (library, "is not that of this FMU"))
     path = folder / "beam.fmu"
     with zipfile.ZipFile(path) as archive:
         files = {entry: archive.read(entry) for entry in archive.namelist()}
@@ -86,29 +88,16 @@ def test_broken_content_is_named(folder: Path, name: str) -> None:
     assert re.search(cause, refusal(folder).replace(str(path), ""))
 
 
-def test_missing_file_is_named(folder: Path) -> None:
-    (folder / "beam.fmu").unlink()
-    assert "not found" in refusal(folder)
-
-
-@pytest.mark.parametrize("content", [b"", b"not a zip"])
-def test_file_that_is_no_archive_is_named(folder: Path, content: bytes) -> None:
-    (folder / "beam.fmu").write_bytes(content)
-    assert "zip" in refusal(folder).lower()
-
-
-def test_truncated_archive_is_named(folder: Path) -> None:
-    path = folder / "beam.fmu"
-    path.write_bytes(path.read_bytes()[:-2000])
-    assert "zip" in refusal(folder).lower()
-
-
-def test_library_of_the_other_fmu_is_refused(folder: Path, fmu_folder: Path) -> None:
-    path = folder / "beam.fmu"
-    with zipfile.ZipFile(path) as archive, zipfile.ZipFile(fmu_folder / "spring.fmu") as other:
-        files = {entry: archive.read(entry) for entry in archive.namelist()}
-        files[BINARY] = other.read("binaries/linux64/spring.so")
-    with zipfile.ZipFile(path, "w") as archive:
-        for entry, content in files.items():
-            archive.writestr(entry, content)
-    assert "is not that of this FMU" in refusal(folder)
+@pytest.mark.parametrize(
+    ("damage", "cause"),
+    [
+        (lambda path: path.unlink(), "not found"),
+        (lambda path: path.write_bytes(b""), "zip"),
+        (lambda path: path.write_bytes(b"not a zip"), "zip"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-2000]), "zip"),
+    ],
+    ids=["missing", "empty", "no archive", "truncated"],
+)
+def test_a_file_that_is_no_archive_is_named(folder: Path, damage: Callable[[Path], None], cause: str) -> None:
+    damage(folder / "beam.fmu")
+    assert cause in refusal(folder).lower()

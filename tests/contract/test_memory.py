@@ -25,19 +25,8 @@ class MallocInfo(ct.Structure):
     """glibc's struct mallinfo2."""
 
     _fields_ = [
-        (name, ct.c_size_t)
-        for name in [
-            "arena",
-            "ordblks",
-            "smblks",
-            "hblks",
-            "hblkhd",
-            "usmblks",
-            "fsmblks",
-            "uordblks",
-            "fordblks",
-            "keepcost",
-        ]
+        *((name, ct.c_size_t) for name in ("arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks")),
+        *((name, ct.c_size_t) for name in ("uordblks", "fordblks", "keepcost")),
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from commands import command
 
-from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import suspicions
 from springbeam.scene.automatic import choice, decided
@@ -126,11 +126,6 @@ def test_a_run_is_that_of_the_scheme_it_takes_and_says_so():
     assert found.summary["coupling"] == {"scheme": "hermite", "degree": 2, "because": "ω_max H = 1.73 <= 3"}
     assert found.scene.coupling.scheme == "auto"
     assert "coupling" not in named.summary
-
-
-def test_a_degree_beside_auto_is_refused():
-    with pytest.raises(SceneError, match=r'degree = 1: scheme = "auto" picks the degree'):
-        with_changes(PAIR, coupling={"scheme": "auto", "degree": 1})
 
 
 def test_the_command_says_what_it_took(tmp_path):

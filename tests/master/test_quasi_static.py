@@ -260,11 +260,6 @@ def test_a_snap_back_is_booked() -> None:
 # -- what is refused, and what is said -------------------------------------------------------------------------------
 
 REFUSED: dict[str, tuple[dict[str, Any], list[str]]] = {
-    "compliance": ({"contact": {"law": "compliance"}}, ["in series", '"transmission"', '"dynamic"']),
-    "paper": ({"contact": {"law": "paper"}, "stop": {"position": -1.0}}, ['law = "paper"', '"dynamic"']),
-    "tip": ({"contact": {"impact": "tip"}}, ['impact = "tip"', '"inelastic"']),
-    "hermite": ({"coupling": {"scheme": "hermite", "degree": 1}}, ['"hermite"', '"energy"']),
-    "velocity": ({"beam": {"approach": "elastic"}}, ["initial_velocity_slope = -1.0", "carries", "0.0"]),
     "deflection": (
         {"beam": {"approach": "elastic", "initial_velocity_slope": 0.0, "initial_deflection_slope": 0.3}},
         ["initial_deflection_slope = 0.3", "static deflection", "alpha_b > 0"],
@@ -283,11 +278,6 @@ def test_scenes_that_need_inertia_are_refused(what: str) -> None:
         scene(**changes)
     for word in words:
         assert word in str(refused.value)
-
-
-def test_a_beam_alone_needs_inertia() -> None:
-    with pytest.raises(SceneError, match="moves with a \\[spring\\] or not at all"):
-        scene_from_dict({"time": {"t_end": 1.0}, "beam": {"fidelity": "quasi_static"}, "coupling": {"macro_step": 0.1}})
 
 
 def test_what_is_left_out_is_said_with_its_size() -> None:

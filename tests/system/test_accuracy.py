@@ -157,12 +157,6 @@ def test_the_papers_law_has_no_accuracy():
         simulate(scene_from_dict(scene))
 
 
-@pytest.mark.parametrize("value", [0.0, 1.0, -1e-3])
-def test_an_impossible_accuracy_is_refused(value):
-    with pytest.raises(SceneError, match="accuracy"):
-        scene_from_dict({**WITH_STOP, "accuracy": value})
-
-
 @pytest.mark.parametrize("reach", [1e3, 1.0, 1e-9, 1e-12])
 def test_the_size_of_the_motion_does_not_matter(reach):
     """IDA's absolute tolerance was 1e-10 m whatever the scene: a motion of 1 nm had its energy changed, and stopped."""

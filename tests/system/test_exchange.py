@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
+from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
 
 ORDINARY = [("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
@@ -23,12 +23,6 @@ def test_a_stiff_contact_gains_energy_and_the_run_says_so(scheme, degree):
         simulate(soft(1e8, 0.004, scheme, degree, 0.2))
 
 
-def test_the_energy_scheme_does_not():
-    trajectory = simulate(soft(1e8, 0.004, "energy", 0, 0.2))
-    assert trajectory.summary["max_energy_residual"] < 1e-9
-    assert trajectory.time[-1] == 0.2
-
-
 @pytest.mark.parametrize(("scheme", "degree"), ORDINARY)
 def test_order_is_degree_plus_one_where_the_contact_is_resolved(scheme, degree):
     """λ = 100 N/m: ω_contact H = √(λ/m_tip) H ≤ 0.07; displacement of the spring while the contact lasts."""
@@ -39,8 +33,3 @@ def test_order_is_degree_plus_one_where_the_contact_is_resolved(scheme, degree):
         reference = event_driven.simulate(scene, sample_times=trajectory.time)
         errors.append(np.abs(trajectory.y - reference.y).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(degree + 1, abs=0.4)
-
-
-def test_they_are_for_the_compliance_law_only():
-    with pytest.raises(SceneError, match="compliance"):
-        with_changes(load_scene("soft"), coupling={"scheme": "jacobi"})

@@ -9,7 +9,6 @@ import pytest
 from scenes import scene_from_dict
 
 from springbeam import simulate, with_changes
-from springbeam.bodies import fmu
 from springbeam.bodies.fmu_bodies import FmuBeam
 from springbeam.bodies.protocol import NO_FORCE
 from springbeam.monolithic.semi_discrete import modal_beam
@@ -64,23 +63,6 @@ def test_without_inertia_is_the_limit_of_a_light_beam():
     assert differences[0] / differences[1] == pytest.approx(10.0, rel=0.01)
     assert differences[1] / differences[2] == pytest.approx(10.0, rel=0.01)
     assert differences[2] < 1e-6
-
-
-def test_without_inertia_no_beam_fmu_is_loaded(monkeypatch):
-    loaded: list[str] = []
-    load = fmu.Fmu.__init__
-
-    def counted(self: fmu.Fmu, name: str, *rest: object) -> None:
-        loaded.append(name)
-        load(self, name, *rest)
-
-    monkeypatch.setattr(fmu.Fmu, "__init__", counted)
-    run = simulate(quasi_static())
-    assert loaded == ["spring"]
-    assert "beam_steps" not in run.summary
-    assert run.shapes[1].shape[1] == 21
-    assert run.summary["max_energy_residual"] < 1e-11
-    assert any("without its kinetic energy" in warning for warning in run.summary["warnings"])
 
 
 def test_crosscheck_knows_the_beam_without_inertia():
