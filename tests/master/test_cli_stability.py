@@ -29,9 +29,3 @@ def test_json_is_the_prediction():
     assert printed["omega_max"] == expected.omega_max
     assert printed["schemes"][3]["critical_step"] == expected.schemes[3].critical_step
     assert printed["auto"][:2] == ["hermite", 2]
-
-
-def test_a_scene_that_cannot_be_read_is_bad_input():
-    result = command("predict", "sotf")
-    assert result.exit_code == 2
-    assert "did you mean soft?" in result.stderr
