@@ -63,6 +63,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON documen
 QuietOption = Annotated[
     bool, typer.Option("--quiet", "-q", help="No progress bar and no tables; print only the path of the results.")
 ]
+ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace what is already there.")]
 NoPlotsOption = Annotated[bool, typer.Option("--no-plots", help="Draw no pictures.")]
 
 
@@ -139,6 +140,13 @@ def results_directory(path: Path) -> Path:
             remedy = f"did you mean {meant[0]}?" if meant else f"runs here: {', '.join(map(str, there[:8]))}"
         fail(BAD_INPUT, f"{path}: {what}; {remedy}")
     return path
+
+
+def new_directory(default: Path, out: Path | None, force: bool) -> RunDirectory:
+    """Return the directory ``out`` for results; without one ``default``, or ``default``-2, … if that has some."""
+    if out is None and not force:
+        return RunDirectory.create_numbered(default)
+    return RunDirectory.create(out or default, replace=force)
 
 
 @contextmanager

@@ -11,15 +11,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
 
-from ..results.directory import RunDirectory
 from ..scene import load_scene
 from .common import (
+    ForceOption,
     JsonOption,
     QuietOption,
     SceneArgument,
     SettingsOption,
     bad_input_reported,
     console_for,
+    new_directory,
     print_json,
     progress_bar,
 )
@@ -41,7 +42,7 @@ def converge(
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Where converge.csv and converge.png go. Default: results/…"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", "-f", help="Replace what is already there.")] = False,
+    force: ForceOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -53,9 +54,7 @@ def converge(
 
     with bad_input_reported():
         what = load_scene(scene, settings or ())
-        default = Path("results") / f"{Path(scene).stem}-converge"
-        new = out is None and not force
-        directory = RunDirectory.create_numbered(default) if new else RunDirectory.create(out or default, replace=force)
+        directory = new_directory(Path("results") / f"{Path(scene).stem}-converge", out, force)
         name = TextColumn("{task.fields[name]}")
         bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), name, quiet=quiet)
         try:

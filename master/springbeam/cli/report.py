@@ -11,9 +11,16 @@ from rich.progress import BarColumn, MofNCompleteColumn
 
 from ..results.directory import ANIMATIONS, REPORT
 from ..results.reading import load_trajectory
-from .common import BAD_INPUT, QuietOption, RunArgument, bad_input_reported, fail, progress_bar, results_directory
-
-ForceOption = Annotated[bool, typer.Option("--force", "-f", help="Replace a file that is already there.")]
+from .common import (
+    BAD_INPUT,
+    ForceOption,
+    QuietOption,
+    RunArgument,
+    bad_input_reported,
+    fail,
+    progress_bar,
+    results_directory,
+)
 
 
 def report(

@@ -29,6 +29,7 @@ from ..scene.estimates import implausible
 from .common import (
     BAD_INPUT,
     STOPPED,
+    ForceOption,
     JsonOption,
     NoPlotsOption,
     QuietOption,
@@ -37,6 +38,7 @@ from .common import (
     bad_input_reported,
     console_for,
     fail,
+    new_directory,
     print_json,
     progress_bar,
 )
@@ -88,7 +90,7 @@ def run(
         ),
     ] = None,
     no_plots: NoPlotsOption = False,
-    force: Annotated[bool, typer.Option("--force", "-f", help="Replace results that are already there.")] = False,
+    force: ForceOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -114,7 +116,7 @@ def run(
             typer.echo(f"warning: {line}", err=True)
         made = picked(what, mesh)
         what = what if made is None else made.scene
-        directory = _run_directory(scene, out, force)
+        directory = new_directory(Path("results") / Path(scene).stem, out, force)
     carry_out(
         what,
         directory,
@@ -223,13 +225,6 @@ def _thin_out(directory: RunDirectory, interval: float) -> str | None:
     except OSError as error:
         return f"rows of every step: {error.filename or directory.path}: {error.strerror or error}"
     return None
-
-
-def _run_directory(scene: str, out: Path | None, force: bool) -> RunDirectory:
-    default = Path("results") / Path(scene).stem
-    if out is None and not force:
-        return RunDirectory.create_numbered(default)
-    return RunDirectory.create(out or default, replace=force)
 
 
 def _run_into(

@@ -23,6 +23,7 @@ from .common import (
     BAD_INPUT,
     DISAGREES,
     STOPPED,
+    ForceOption,
     JsonOption,
     QuietOption,
     SceneArgument,
@@ -148,7 +149,7 @@ def stability(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="DIR", help="Where the table and the pictures go.")
     ] = Path("results/stability"),
-    force: Annotated[bool, typer.Option("--force", "-f", help="Replace what is already there.")] = False,
+    force: ForceOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -175,7 +176,7 @@ def stability(
         fingerprints(load_scene("soft"))  # else each cell would say that an FMU is missing
         out.mkdir(parents=True, exist_ok=True)
     console = console_for(silent=quiet or as_json)
-    console.print(f"{len(cells)} cells, each of a second or less; --samples and --resolution set their number")
+    console.print(f"{len(cells)} cells, mostly below a second each; --samples and --resolution set how many")
     garbage = 0
 
     def count(outcome: Outcome) -> None:

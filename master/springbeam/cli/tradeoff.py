@@ -11,11 +11,11 @@ from rich.table import Table
 from rich.text import Text
 
 from ..bodies.fmu import FmuError
-from ..results.directory import RunDirectory
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,
     STOPPED,
+    ForceOption,
     JsonOption,
     QuietOption,
     SceneArgument,
@@ -23,6 +23,7 @@ from .common import (
     bad_input_reported,
     console_for,
     fail,
+    new_directory,
     print_json,
     progress_bar,
 )
@@ -52,7 +53,7 @@ def tradeoff(
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Where tradeoff.csv and tradeoff.png go. Default: results/…"),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", "-f", help="Replace what is already there.")] = False,
+    force: ForceOption = False,
     quiet: QuietOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -66,12 +67,7 @@ def tradeoff(
 
     with bad_input_reported():
         what = load_scene(scene, settings or ())
-        default = Path("results") / f"{Path(scene).stem}-tradeoff"
-        directory = (
-            RunDirectory.create_numbered(default)
-            if out is None and not force
-            else RunDirectory.create(out or default, replace=force)
-        )
+        directory = new_directory(Path("results") / f"{Path(scene).stem}-tradeoff", out, force)
         name = TextColumn("{task.fields[name]}")
         console = console_for(silent=quiet or as_json)
 

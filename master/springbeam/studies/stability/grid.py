@@ -171,7 +171,8 @@ def _overlap(run: Trajectory) -> float:
     if scene.contact.rigid and scene.beam is not None and scene.spring is not None:
         joined = np.isin(run.phase, ("tied", "touch"))
         overlap = float(np.max(np.where(joined, np.abs(run.gap), np.where(run.phase == "free", -run.gap, 0.0))))
-    if scene.stop is not None and scene.contact.law != "paper":
+    elastic = scene.spring is None and not scene.contact.rigid  # a stop with a soft law
+    if scene.stop is not None and scene.contact.law != "paper" and not elastic:
         overlap = max(overlap, float(np.max(scene.stop.position - (run.y if scene.spring is not None else run.u_tip))))
     return max(overlap, 0.0) / motion if motion > 0.0 else 0.0
 
