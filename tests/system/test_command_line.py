@@ -36,7 +36,7 @@ TABLES = {
     "converge": "soft --levels 3 --set beam.n_elements=4 --set time.t_end=0.05 --out meshes",
     "tradeoff": "duffing --until 0.5 --quick --out traded",
     "crosscheck": "soft --set time.t_end=0.1",
-    "stability": "--samples 2 --resolution 0 --workers 1 --out grid",
+    "stability": "--samples 4 --resolution 0 --workers 1 --out grid",
     "doctor": "",
 }
 
@@ -162,7 +162,7 @@ def test_json_is_one_document_and_all_of_stdout(place, tmp_path, monkeypatch, na
     elif name == "predict":
         assert document["macro_step"] == load_scene("soft").coupling.macro_step
     elif name == "stability":
-        assert sum(document["classes"].values()) == document["cells"] == 2
+        assert sum(document["classes"].values()) == document["cells"] == 4
     else:
         assert Path(document["directory"], f"{name}.csv").exists()
 
