@@ -12,6 +12,7 @@ import tomli_w
 from commands import command
 from scenes import completed, scene_from_dict
 
+from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_time_difference
 from springbeam.results.reading import load_trajectory
 from springbeam.results.recording import MemoryRecorder
@@ -71,6 +72,22 @@ SCENES = {
     "one contact": ONE_CONTACT,
     "ties": TIES,
 }
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5])
+@pytest.mark.parametrize("tables", SCENES.values(), ids=SCENES)
+def test_the_promise_is_kept(tables, accuracy):
+    found = simulate(scene_from_dict({**tables, "accuracy": accuracy}))
+    reference = event_driven.simulate(scene_from_dict(tables), sample_times=np.unique(found.time))
+    name = "u_tip" if "beam" in tables else "y"
+    exact = reference[name]
+    error = np.abs(found[name] - exact[np.searchsorted(reference.time, found.time)]).max()
+    assert error <= accuracy * np.abs(exact - exact[0]).max()
+    picked = found.summary["accuracy"]
+    assert max(picked["estimated_displacement_error"], picked["estimated_event_error"]) <= accuracy
+    strikes = [[e.time for e in t.events if e.kind == "stop_impact"] for t in (found, reference)]
+    if strikes[1]:
+        assert abs(strikes[0][0] - strikes[1][0]) <= accuracy * tables["time"]["t_end"]
 
 
 SHORT_CONTACTS = {  # y moves 13 times as far as the tip
