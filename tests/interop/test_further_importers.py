@@ -116,8 +116,9 @@ def test_java(system: System, java: str, importer: str) -> None:
         *(f"{name}={str(value).lower() if isinstance(value, bool) else value}" for name, value in values.items()),
         *(f"{start}>{end}" for start, end in system.connections),
     )
-    rows = np.array(output.split("ROWS ")[1].split(), dtype=float)
-    system.check(rows)
+    # The spring alone warns that its tip is not where it was foreseen; FMI4j prints that in between.
+    (rows,) = (line.removeprefix("ROWS ") for line in output.splitlines() if line.startswith("ROWS "))
+    system.check(np.array(rows.split(), dtype=float))
 
 
 def test_fmucontainer(system: System, tmp_path: Path) -> None:
