@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from ctypes import byref, c_double, c_int, c_size_t, c_uint, sizeof
 from math import isfinite
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 
@@ -155,12 +155,11 @@ class FmuBody(Body):
             raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
 
     def _read_motion(self) -> Motion:
-        return self._finite(_motion_of(Motion, self._motion.get()))
+        motion = _motion_of(Motion, self._motion.get())
+        return motion if isfinite(sum(motion)) else self._refused(motion)
 
-    def _finite(self, motion: Motion) -> Motion:
-        if not isfinite(sum(motion)):
-            raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
-        return motion
+    def _refused(self, motion: Motion) -> NoReturn:
+        raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
 
     def _stored(self) -> tuple[float, ...]:
         """The energies [J]; the kinetic one with the impulse that is still pending."""

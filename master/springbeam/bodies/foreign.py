@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from math import sqrt
+from math import isfinite, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -162,7 +162,7 @@ class ForeignBody(FmuBody):
             first = size * 0.5 * (w0 + w) + size**2 * (v0 - v) / 12.0
             second = size**2 * (7.0 * w0 + 3.0 * w) / 20.0 + size**3 * (v0 / 20.0 - v / 30.0)
             motion = Motion(w, v, first if once is None else once, second if twice is None else twice)
-        return self._finite(motion)
+        return motion if isfinite(sum(motion)) else self._refused(motion)
 
     def energies(self) -> Energies:
         if not self.abilities.energies:
