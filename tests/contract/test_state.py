@@ -56,7 +56,7 @@ def test_pending_inputs_belong_to_the_state(case: Any) -> None:
 
 @pytest.mark.parametrize("overwritten", [False, True])
 def test_inputs_that_were_not_set_yet_belong_to_the_state(case: Any, overwritten: bool) -> None:
-    """Of a state from outside that knows a force, or in its place one of an instance that does not."""
+    """A state from outside may know a force, or come from an instance that does not."""
     k, other = case.running(), case.running()
     other.set(case.force, 0.7)
     _, token = k.try_deserialize(other.serialized())

@@ -123,7 +123,7 @@ def test_the_ledger_closes_under_all_kinds_of_loads(scheme, degree, law):
 
 
 def test_steps_end_where_a_load_jumps_or_bends_and_none_is_a_sliver():
-    """Of two kinks that differ by rounding one is a row, every other to the last bit; no step is shorter than H/4."""
+    """Kinks that differ by rounding give one row, all others theirs to the last bit; no step is shorter than H/4."""
     scene = with_changes(soft("step", "linear", "burst", t_end=0.06, macro_step=1e-3), stop=None)
     scene = with_changes(scene, beam={"approach": "elastic"}, spring={"equilibrium": -1.0})
     run = simulate(scene)

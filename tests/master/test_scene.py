@@ -333,7 +333,7 @@ def test_every_key_is_explained():
 
 
 def test_bodies_without_any_scale_are_dimensionless():
-    """As in the paper's section 6, where κ1 and κ2 say all of the beam; the scene stays as it was given."""
+    """All scales are 1, as in the paper's section 6, where κ1 and κ2 say all; the scene stays as it was given."""
     given = {"young_modulus": 3.6e10, "shear_modulus": 3.6e10}
     scene = springbeam.scene.scene_from_dict({"time": {"t_end": 1.0}, "beam": given, "spring": {}})
     beam, spring = scene.beam, scene.spring

@@ -109,7 +109,7 @@ def test_orders_are_those_of_the_scheme_also_where_moments_come_from_substeps(fm
 
 
 def test_two_foreign_fmus_are_the_elements_that_they_describe(fmu):
-    """The same pair four ways: either body an FMU or an element."""
+    """One pair gives one motion four ways: either body an FMU or an element."""
     above = {"fmu": fmu(), **oscillator.ALL, "parameters": {"m": M1, "v0": V}}
     below = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
     scenes = [pair(fmu()), pair(fmu(), spring=below), pair(fmu(), beam=above), pair(fmu(), beam=above, spring=below)]
