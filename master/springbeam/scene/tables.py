@@ -208,6 +208,16 @@ class Beam(Table):
         """Whether the integrator takes energy that nothing books."""
         return self.fidelity == "dynamic" and self.integrator == "generalized_alpha" and self.rho_inf < 1.0
 
+    @property
+    def unknowns(self) -> int:
+        """Unknowns of the mesh; without a mesh its modes."""
+        return self.n_modes if self.mesh == "none" else 2 * self.n_elements * self.element_degree
+
+    @property
+    def modes_kept(self) -> int:
+        """Number of modes that take part, all of the mesh if the scene names none."""
+        return self.n_modes or self.unknowns
+
     @model_validator(mode="after")
     def _modes_exist(self) -> Beam:
         if self.mesh == "none":
@@ -217,7 +227,7 @@ class Beam(Table):
                 if (given := getattr(self, name)) != value:
                     raise ValueError(f'{name} = {given}: needs a mesh, and mesh = "none"; leave one of them out')
             return self
-        unknowns, degree = 2 * self.n_elements * self.element_degree, self.element_degree
+        unknowns, degree = self.unknowns, self.element_degree
         mesh = f"n_elements = {self.n_elements}" + (f" of element_degree = {degree}" if degree > 1 else "")
         if self.n_elements * degree > MOST_ELEMENTS:
             raise ValueError(

@@ -142,7 +142,7 @@ def study(
     more = [RATIO**k for k in range(levels)]
     by_elements = [run(0, beam.n_modes * k) if exact else run(beam.n_elements * k, beam.n_modes) for k in more]
     sequences = [Refinement("modes" if exact else "elements", by_elements)]
-    most = 0 if exact else _modes(scene)
+    most = 0 if exact else beam.modes_kept
     if beam.integrator == "modal" and most >= RATIO ** (levels - 1):
         kept = [run(beam.n_elements, most // RATIO**k) for k in range(levels - 1, 0, -1)]
         sequences.append(Refinement("modes", [*kept, by_elements[0]]))
@@ -153,14 +153,9 @@ def study(
     return Study(scene, found, sequences, halved)
 
 
-def _modes(scene: Scene) -> int:
-    assert scene.beam is not None
-    return scene.beam.n_modes or 2 * scene.beam.n_elements * scene.beam.element_degree
-
-
 def _level(scene: Scene, quantities: Sequence[str]) -> Level:
     assert scene.beam is not None
-    mesh = (0 if scene.beam.mesh == "none" else scene.beam.n_elements, scene.beam.n_modes, _modes(scene))
+    mesh = (0 if scene.beam.mesh == "none" else scene.beam.n_elements, scene.beam.n_modes, scene.beam.modes_kept)
     began = perf_counter()
     try:
         made = simulate(scene)

@@ -45,8 +45,7 @@ def pick_mesh(scene: Scene) -> Trajectory:
     before = error = math.inf
     factor = 1
     exact = beam.mesh == "none"
-    unknowns = beam.n_modes if exact else 2 * beam.n_elements * beam.element_degree
-    while unknowns * factor <= ALL_MODES_UP_TO:
+    while beam.unknowns * factor <= ALL_MODES_UP_TO:
         mesh = {"n_modes": factor * beam.n_modes}
         if not exact:
             mesh["n_elements"] = factor * beam.n_elements

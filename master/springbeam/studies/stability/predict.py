@@ -143,9 +143,7 @@ def predict(scene: Scene) -> Prediction:
 
 
 def _reduced(beam: Beam) -> tuple[Beam, bool]:
-    kept = 2 * beam.n_elements * beam.element_degree
-    if beam.integrator == "modal" and beam.n_modes > 0:
-        kept = beam.n_modes
+    kept = beam.modes_kept if beam.integrator == "modal" else beam.unknowns
     if kept <= MOST_MODES:
         return beam, False
     return beam.model_copy(update={"n_modes": MOST_MODES}), True

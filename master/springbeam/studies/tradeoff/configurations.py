@@ -50,7 +50,7 @@ class Configuration:
     def unknowns(self) -> int:
         """Unknowns of the beam as integrated: modes kept, or all degrees of freedom of the mesh."""
         beam = self.scene.beam
-        return 0 if beam is None else beam.n_modes or 2 * beam.n_elements * beam.element_degree
+        return 0 if beam is None else beam.modes_kept
 
     @property
     def monolithic(self) -> bool:
@@ -139,7 +139,7 @@ def _models(scene: Scene) -> Iterator[Configuration]:
         return
     limit = fine.beam.n_elements * fine.beam.element_degree
     for modes in _MODES:
-        if modes < 2 * beam.n_elements * beam.element_degree:
+        if modes < beam.unknowns:
             for changed in _changed(scene, beam={"n_modes": modes}):
                 yield Configuration("modes", f"{modes}", changed, refined=True)
     for degree in _DEGREES:
