@@ -11,7 +11,7 @@ import pytest
 
 import springbeam
 from springbeam.bodies.factory import load_bodies
-from springbeam.bodies.fmu import FmuError
+from springbeam.bodies.protocol import FmuError
 
 Files = dict[str, bytes]
 XML = "modelDescription.xml"

@@ -20,8 +20,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import springbeam
-from springbeam.bodies.fmu import FmuError
-from springbeam.bodies.protocol import Motion
+from springbeam.bodies.protocol import FmuError, Motion
 from springbeam.contact.phases import Joint, Phase
 from springbeam.results.directory import RunDirectory
 from springbeam.results.file_recorder import FileRecorder

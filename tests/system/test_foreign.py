@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from springbeam import SceneError, load_scene, resume, simulate, with_changes
 from springbeam.bodies import examination
 from springbeam.bodies.factory import findings
-from springbeam.bodies.fmu import FmuError
+from springbeam.bodies.protocol import FmuError
 from springbeam.results.directory import RunDirectory
 from springbeam.results.file_recorder import FileRecorder
 from springbeam.run import runner

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.linalg import expm
 
 from .protocol import NO_FORCE, Body, Energies, Force, Motion
 from .rigid_wall import RigidWall
@@ -77,6 +76,8 @@ class SpringDamper(Body):
 
     def _map(self, size: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Return the rows of exp(A H) of x, ẋ, ∫x, ∫∫x, shape (4, 7), and W, shape (7, 7), ``None`` undamped."""
+        from scipy.linalg import expm  # takes a tenth of a second to load: only for who has such a body
+
         A = np.zeros((7, 7))
         A[0, 1] = A[2, 3] = A[3, 4] = A[5, 0] = A[6, 5] = 1.0
         A[1, :3] = -self._stiffness / self.mass, -self._damping / self.mass, 1.0 / self.mass

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from ..scene.partners import ForeignFmu
 from .abilities import Abilities
-from .fmu import FmuError
 from .foreign import Findings
+from .protocol import FmuError
 
 #: Longest time that it may take [s].
 PATIENCE = 20.0

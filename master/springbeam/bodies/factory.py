@@ -14,10 +14,9 @@ from .abilities import refusals
 from .archive import fmu_directory
 from .elements import ELEMENTS
 from .examination import examined
-from .fmu import FmuError
 from .fmu_bodies import FmuBeam, FmuSpring
 from .foreign import Findings, ForeignBody
-from .protocol import Body
+from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
 
 #: Velocities closer than this share are one where an end takes no impulse: told, and measured from displacements.

@@ -28,7 +28,7 @@ from fmpy.model_description import ModelDescription, read_model_description
 
 from .archive import UnsafeArchive, unpack
 from .checkpointed import Checkpointed
-from .protocol import BodyFailed, StepRefused
+from .protocol import FmuError, StepRefused
 
 #: Types of variables: in C, and of the values that they take.
 _KINDS: dict[str, tuple[Any, tuple[type, ...]]] = {
@@ -40,10 +40,6 @@ _KINDS: dict[str, tuple[Any, tuple[type, ...]]] = {
 #: Values of fmi2Status.
 WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
-
-
-class FmuError(BodyFailed):
-    """An FMU cannot be found, loaded or initialised, or a call has failed; the message names file and cause."""
 
 
 @lru_cache(maxsize=8)

@@ -12,9 +12,9 @@ import numpy as np
 from ..scene import Beam, Load, Spring
 from ..scene.statics import SHAPE_POINTS
 from .archive import fmu_directory
-from .fmu import WARNING, Fmu, FmuError, Reals
+from .fmu import WARNING, Fmu, Reals
 from .force import combined
-from .protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion, StepRefused
+from .protocol import NO_FORCE, BeamBody, Body, Energies, FmuError, Force, Motion, StepRefused
 
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}

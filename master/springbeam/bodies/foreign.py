@@ -22,9 +22,9 @@ import numpy as np
 from ..scene.partners import ForeignFmu
 from . import force
 from .abilities import Abilities
-from .fmu import Fmu, FmuError
+from .fmu import Fmu
 from .fmu_bodies import FmuBody
-from .protocol import NO_FORCE, Body, BodyFailed, Energies, Force, Motion
+from .protocol import NO_FORCE, Body, BodyFailed, Energies, FmuError, Force, Motion
 
 #: Corrections of a holding force; the velocity that it may leave, and the displacement, over those without it.
 _MAX_CORRECTIONS, _AT_REST, _STAYS = 20, 1e-12, 1e-6

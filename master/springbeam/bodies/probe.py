@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 from ..scene.partners import ForeignFmu
 from .abilities import Abilities
-from .fmu import Fmu, FmuError, Reals
+from .fmu import Fmu, Reals
 from .foreign import Findings, check_names
-from .protocol import BodyFailed, Force, StepRefused
+from .protocol import BodyFailed, FmuError, Force, StepRefused
 
 #: Sizes tried, over H; steps of a record.
 _SIZES, _RECORD = (1.0, 0.1, 1e-2, 1e-3, 1e-4), 64

@@ -24,6 +24,10 @@ class BodyFailed(RuntimeError):
     """A body cannot go on, whatever the step (fmi2Error of any other call, fmi2Fatal)."""
 
 
+class FmuError(BodyFailed):
+    """An FMU cannot be found, loaded or initialised, or a call has failed; the message names file and cause."""
+
+
 class Motion(NamedTuple):
     """The interface end of a body at the end of its last step."""
 

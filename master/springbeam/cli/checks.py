@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from ..bodies.fmu import FmuError
+from ..bodies.protocol import FmuError
 from ..results.trajectory import COLUMN_UNITS
 from ..scene import load_scene
 from .common import (

@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import Progress, ProgressColumn
 from typer.core import TyperCommand, TyperGroup
 
-from ..bodies.fmu import FmuError
+from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
 from ..results.file_recorder import json_ready
 from ..run.checkpoint import CheckpointRefused

@@ -16,11 +16,8 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from ..bodies.abilities import OFFERED, refusals
 from ..bodies.archive import fmu_directory
-from ..bodies.factory import findings
-from ..bodies.fmu import FmuError
-from ..bodies.fmu_bodies import FmuBeam, FmuSpring
+from ..bodies.protocol import FmuError
 from ..scene import Scene, load_scene
 from ..scene.partners import kind_of
 from ..scene.unit import unit_beam, unit_spring
@@ -88,6 +85,9 @@ def doctor(
 
 def _examine(scene: Scene, as_json: bool) -> None:
     """Print what the bodies of ``scene`` can do; end the command if the scene cannot be run with them."""
+    from ..bodies.abilities import OFFERED, refusals
+    from ..bodies.factory import findings
+
     found = findings(scene)
     bodies = {"beam": scene.upper, "spring": scene.lower}
     console = console_for(silent=as_json)
@@ -121,6 +121,8 @@ def _examine(scene: Scene, as_json: bool) -> None:
 
 def _found() -> dict[str, Any]:
     """Return everything that `doctor` prints."""
+    from ..bodies.fmu_bodies import FmuBeam, FmuSpring
+
     fmus = {}
     for name in ("beam", "spring"):
         path = fmu_directory() / f"{name}.fmu"

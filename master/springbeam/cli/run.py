@@ -17,7 +17,7 @@ from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemaini
 from rich.table import Table
 from rich.text import Text
 
-from ..bodies.fmu import FmuError
+from ..bodies.protocol import FmuError
 from ..results.directory import RunDirectory
 from ..results.file_recorder import FileRecorder, leave_rows_at_multiples
 from ..results.reading import load_events, load_summary, load_trajectory
@@ -43,7 +43,6 @@ from .common import (
     progress_bar,
 )
 from .totals import totals_in_words
-from .watchdog import watched
 
 _FIRST_EVENTS, _LAST_EVENTS = 10, 3
 #: Most rows that --output-interval may ask for.
@@ -150,6 +149,7 @@ def picked(scene: Scene, mesh: bool = False) -> Trajectory | None:
     from ..run.outcome import RunStopped
     from ..studies.accuracy import pick
     from ..studies.mesh import pick_mesh
+    from .watchdog import watched
 
     try:
         with watched(lambda cause: f"a pilot run for accuracy = {scene.accuracy:g}: {cause}"):
@@ -241,6 +241,7 @@ def _run_into(
     """
     from ..run.outcome import RunStopped
     from ..run.runner import run as run_scene
+    from .watchdog import watched
 
     t_end = recorder.scene.time.t_end
 

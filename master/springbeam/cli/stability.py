@@ -17,7 +17,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 from rich.table import Table
 from rich.text import Text
 
-from ..bodies.factory import fingerprints
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,
@@ -162,6 +161,7 @@ def stability(
         return
     from concurrent.futures.process import BrokenProcessPool
 
+    from ..bodies.factory import fingerprints
     from ..studies.stability.cells import sampled_cells, slice_cells
     from ..studies.stability.grid import run_cells, write_csv, write_scene
     from ..studies.stability.picture import draw

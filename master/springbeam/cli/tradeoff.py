@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.table import Table
 from rich.text import Text
 
-from ..bodies.fmu import FmuError
+from ..bodies.protocol import FmuError
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,

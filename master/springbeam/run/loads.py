@@ -14,7 +14,6 @@ from itertools import pairwise
 from math import cos, inf, pi, sin
 
 import numpy as np
-from scipy.special import spherical_jn
 
 from ..bodies import force
 from ..bodies.protocol import NO_FORCE, Body, Force
@@ -105,6 +104,8 @@ def _wave(amplitude: float, omega: float, elapsed: float, phase: float, size: fl
 
 @lru_cache(maxsize=256)
 def _bessel(theta: float) -> tuple[float, float, float]:
+    from scipy.special import spherical_jn  # takes a tenth of a second to load: only for who has a sine
+
     return tuple(spherical_jn([0, 1, 2], theta).tolist())
 
 

@@ -11,9 +11,8 @@ from typing import Any
 
 from ..bodies.checkpointed import Checkpointed
 from ..bodies.factory import findings, fingerprints, load_bodies
-from ..bodies.fmu import FmuError
 from ..bodies.fmu_bodies import FmuBeam, FmuBody, FmuSpring
-from ..bodies.protocol import Body
+from ..bodies.protocol import Body, FmuError
 from ..results.directory import RunDirectory
 from ..results.file_recorder import FileRecorder
 from ..results.reading import load_summary, load_trajectory

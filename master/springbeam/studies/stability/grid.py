@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from ...bodies.fmu import FmuError
+from ...bodies.protocol import FmuError
 from ...results.recording import MemoryRecorder
 from ...results.trajectory import Trajectory
 from ...run.ledger import EXACT, bounds

@@ -17,7 +17,7 @@ from pathlib import Path
 from time import monotonic, perf_counter
 from typing import TYPE_CHECKING, Any
 
-from ...bodies.fmu import FmuError
+from ...bodies.protocol import FmuError
 from ...run.outcome import RunStopped
 from ...scene import Scene, SceneError, scene_from_dict
 from ..accuracy import simulate

@@ -9,9 +9,9 @@ from math import nan, pi, sqrt
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from ...bodies.fmu import FmuError, Reals
+from ...bodies.fmu import Reals
 from ...bodies.fmu_bodies import FmuSpring
-from ...bodies.protocol import NO_FORCE, StepRefused
+from ...bodies.protocol import NO_FORCE, FmuError, StepRefused
 from ...scene.unit import unit_spring
 from .check import Check
 
