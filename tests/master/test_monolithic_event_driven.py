@@ -13,7 +13,7 @@ from scipy.special import ellipj, ellipk
 from springbeam.monolithic.event_driven import ReferenceFailure, simulate
 from springbeam.monolithic.hybrid_system import HybridSystem
 from springbeam.monolithic.laws import Phase
-from springbeam.monolithic.semi_discrete import assemble
+from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.results.trajectory import COLUMNS, EVENT_KINDS, Trajectory
 from springbeam.scene import Scene, load_scene, with_changes
 
@@ -381,7 +381,7 @@ def test_jacobian_is_the_derivative_of_the_right_hand_side(law, damping, phase):
         spring={"damping": 0.3},
         contact={"law": law, "exponent": 1.5, "damping": damping},
     )
-    system = HybridSystem(soft)
+    system = HybridSystem(soft, modal_beam(soft.beam))
     X = np.random.default_rng(1).standard_normal(system.size)
     X[system.Y] = X[system.A] @ system.b + 0.1  # penetrating
     direction = np.random.default_rng(2).standard_normal(system.size)

@@ -227,7 +227,7 @@ LIFE = {
 
 @pytest.mark.parametrize("what", LIFE)
 def test_the_whole_life_is_that_of_the_reference(what: str) -> None:
-    """`monolithic.quasi_static` integrates each phase as one ODE; degree 2 at H = 0.01 s leaves 1e-10 m in y.
+    """The reference integrates each phase as one ODE; degree 2 at H = 0.01 s leaves 1e-10 m in y.
 
     A tip that is let go is so where the force polynomial of the step vanishes, which is of order 3.
     """

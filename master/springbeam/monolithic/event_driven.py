@@ -23,14 +23,17 @@ from .hybrid_system import HybridSystem, ReferenceFailure
 from .laws import Phase
 from .location import EventLocator
 from .propagators import SCIPY_METHODS, Propagator, RungeKuttaPropagator, Segment
-from .quasi_static import simulate as simulate_quasi_static
+from .quasi_static import QuasiStaticSystem
 from .rows import Rows
+from .semi_discrete import modal_beam
 from .transitions import HybridState
 
 __all__ = ["ReferenceFailure", "simulate"]
 
 #: More events than this at one time are a fault, not physics.
 _AT_ONCE = 20
+#: More events than this in one run are given up.
+_MOST_EVENTS = 100_000
 #: Rows of a scene that gives tolerances instead of a macro step.
 _SAMPLES = 1000
 
@@ -44,8 +47,6 @@ def simulate(
     nodes: int = 10,
     sample_times: Sequence[float] | np.ndarray | None = None,
     velocity_perturbation: float = 0.0,
-    seat_height: float | None = None,
-    max_events: int = 100_000,
     t_end: float | None = None,
     time_limit: float | None = None,
 ) -> Trajectory:
@@ -55,25 +56,21 @@ def simulate(
     ----------
     method
         ``"exponential"``: exact modal form of each phase, for soft and stiff beams alike. ``"DOP853"``, ``"LSODA"``,
-        ``"Radau"``: scipy on the same equations, for soft beams, with ``rtol`` and ``atol``. A scene with a
-        quasi-static beam is left to `quasi_static.simulate`.
+        ``"Radau"``: scipy on the same equations, for soft beams, with ``rtol`` and ``atol``. A quasi-static beam is
+        integrated by DOP853.
     nodes
         Points of a scipy step at which events are looked for; 2, its ends, is what `scipy.integrate.solve_ivp` does.
     sample_times
         Times of the rows [s]. Default: multiples of ``coupling.macro_step`` from the start (1000 of them where
         the scene gives tolerances instead), and a row before and after each event.
     velocity_perturbation
-        Added to ``initial_velocity_slope`` [1/s], or to the spring's initial velocity [m/s] without a beam: two runs
+        Added to ``initial_velocity_slope`` [1/s], or to the spring's initial velocity [m/s] without a beam that has
+        inertia: two runs
         that differ by it show how long a trajectory can be compared at all.
-    seat_height
-        An impact after which the flight would rise less than this [m] is taken as the last one (e = 0), and the
-        spring or tip as seated. Default 1e-12 of the distance |Ψ − φ|, or of the tip's largest deflection if larger.
-        What is cut off changes no impulse, and the displacement by less than (velocity × remaining time) of the
-        bounces left out. At e = 1 bounces can be damped without end, ever smaller; then give a larger height.
     t_end
         Ends the run earlier than the scene does [s].
     time_limit
-        Wall time after which it is given up [s]; not of a quasi-static beam.
+        Wall time after which it is given up [s].
 
     Returns
     -------
@@ -90,12 +87,10 @@ def simulate(
     if scene.beam is not None and scene.beam.fidelity == "quasi_static":
         if method not in ("exponential", "DOP853"):
             raise ValueError(f"method = {method!r}: a scene with a quasi-static beam is integrated by DOP853")
-        return simulate_quasi_static(
-            scene, sample_times=sample_times, velocity_perturbation=velocity_perturbation, t_end=t_end
-        )
+        method = "DOP853"
     if method not in ("exponential", *SCIPY_METHODS):
         raise ValueError(f"method = {method!r}: one of exponential, {', '.join(SCIPY_METHODS)}")
-    run = _Run(scene, method, rtol, atol, nodes, velocity_perturbation, seat_height, max_events, t_end)
+    run = _Run(scene, method, rtol, atol, nodes, velocity_perturbation, t_end)
     return run.execute(sample_times, time_limit)
 
 
@@ -108,14 +103,11 @@ class _Run:
         atol: float,
         nodes: int,
         velocity_perturbation: float,
-        seat_height: float | None,
-        max_events: int,
         t_end: float | None,
     ) -> None:
         self.scene = scene
-        self.system = HybridSystem(scene)
+        self.system = _system(scene)
         self.method, self.rtol, self.atol, self._nodes = method, rtol, atol, nodes
-        self.max_events = max_events
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
         if self.system.two_ends and self.system.law.rigid and scene.contact.impact == "rest":
             raise ValueError(
@@ -125,7 +117,7 @@ class _Run:
         self._forms: dict[Phase, LinearForm] = {}
         self.counts = {"steps": 0, "phases": 0}
         time, X = _start(self.system, velocity_perturbation)
-        self.state = HybridState(self.system, time, X, seat_height)
+        self.state = HybridState(self.system, time, X)
         self.rows = Rows(self.system)
         self._happened: list[float] = []  #: times of what has ended a phase [s]
 
@@ -176,7 +168,7 @@ class _Run:
             self._happened.append(state.time)
             if every_event:
                 self._record()
-            if len(state.events) > self.max_events or self._chatters():
+            if len(state.events) > _MOST_EVENTS or self._chatters():
                 raise ReferenceFailure(f"{len(state.events)} events by t = {state.time!r} s: they do not end")
             propagator, locator, phase_start = self._propagator(), self._locator(), state.time
         self.system.loads.whole()
@@ -232,12 +224,23 @@ def _at(segment: Segment, tau: float) -> np.ndarray:
     return segment.states[-1].copy() if tau == segment.size else segment.state(tau)
 
 
+def _system(scene: Scene) -> HybridSystem:
+    if scene.beam is None:
+        return HybridSystem(scene, None)
+    return (
+        QuasiStaticSystem(scene)
+        if scene.beam.fidelity == "quasi_static"
+        else HybridSystem(scene, modal_beam(scene.beam))
+    )
+
+
 def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     """Time [s] and state at the start, where an undeformed tip arrives; ``perturbation`` as in `simulate`."""
     scene, X, time = s.scene, np.zeros(s.size), 0.0
+    inertia = s.inverse_tip_mass not in (0.0, np.inf)
     if s.has_spring:
         X[s.Y] = s.spring.equilibrium
-        X[s.Z] = s.spring.initial_velocity + (perturbation if s.beam is None else 0.0)
+        X[s.Z] = s.spring.initial_velocity + (0.0 if inertia else perturbation)
     if scene.elastic_stop and scene.stop is not None:
         X[s.Y] = scene.stop.position
     if scene.beam is not None and s.beam is not None:
@@ -258,6 +261,8 @@ def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
                 time = -gap / (rate * scene.beam.length)
                 slope = obstacle / scene.beam.length
         X[s.A] = slope * s.beam.slope_shape
-        X[s.V] = (rate + perturbation) * s.beam.slope_shape
+        X[s.V] = (rate + perturbation * inertia) * s.beam.slope_shape
+        if scene.beam.approach == "elastic":
+            s.settle(Phase("free"), X)
     X[s.T] = time
     return time, X

@@ -22,7 +22,7 @@ import numpy as np
 from ..scene import Scene, Spring
 from .laws import Motion, Phase, law_of
 from .loads import Loads
-from .semi_discrete import ModalBeam, modal_beam
+from .semi_discrete import ModalBeam
 
 #: What rounding leaves of a sum that is exactly zero, as a share of its terms.
 _NOISE = 16.0 * float(np.finfo(float).eps)
@@ -33,11 +33,10 @@ class ReferenceFailure(RuntimeError):
 
 
 class HybridSystem:
-    """Equations of motion, energies and interface forces of a scene, phase by phase."""
+    """Equations of motion, energies and interface forces of a scene, phase by phase; ``beam`` is its beam's modes."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene, self.law = scene, law_of(scene)
-        self.beam: ModalBeam | None = None if scene.beam is None else modal_beam(scene.beam)
+    def __init__(self, scene: Scene, beam: ModalBeam | None) -> None:
+        self.scene, self.law, self.beam = scene, law_of(scene), beam
         self.has_spring = scene.spring is not None
         #: Without a spring its terms vanish: no stiffness, and 1/m = 0.
         self.spring = scene.spring or Spring(mass=1.0, linear_stiffness=0.0)
@@ -48,6 +47,7 @@ class HybridSystem:
         self.load = empty if self.beam is None else self.beam.load
         self.alpha_b = 0.0 if self.beam is None else self.beam.alpha
         self.stiffness = self.omega**2
+        #: eᵀM⁻¹e [1/kg]; infinite for a beam without inertia.
         self.inverse_tip_mass = float(self.b @ self.b)
         self.loads = Loads(scene, self.beam)
         self.r = len(self.omega)
@@ -174,6 +174,14 @@ class HybridSystem:
             X[..., self.Z] = X[..., self.V] @ self.b
         return X
 
+    def settle(self, phase: Phase, X: np.ndarray) -> float:
+        """Bring what has no inertia to its place in a phase that begins; return the energy [J] that this takes."""
+        return 0.0
+
+    def shapes(self, states: np.ndarray) -> np.ndarray | None:
+        """Return the deflection [m] at `SHAPE_POINTS` of states of shape (k, 2r + 5); ``None`` without a beam."""
+        return None if self.beam is None else np.asarray(states[:, self.A] @ self.beam.sampler.T)
+
     def energies(self, X: np.ndarray, phase: Phase) -> dict[str, np.ndarray]:
         """Energies [J] of states of shape (k, 2r + 5); ``e_load`` is minus the work of the loads."""
         a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
@@ -213,4 +221,4 @@ class HybridSystem:
         p = self.spring
         spring = abs(p.external_force) + p.damping * abs(float(X[self.Z])) + abs(p.linear_stiffness * float(X[self.Y]))
         weight = self.inverse_tip_mass + self.inverse_mass
-        return _NOISE * (beam / weight + spring)
+        return _NOISE * ((beam if weight == np.inf else beam / weight) + spring)

@@ -43,7 +43,8 @@ class Rows:
         summary["largest_energy_residual"] = largest
         summary["largest_relative_energy_residual"] = largest / scale if scale > 0.0 else 0.0
         summary["seat_height"] = None if s.scene.stop is None else state.seat_height()
-        shapes = None if s.beam is None else (columns["time"], states[:, s.A] @ s.beam.sampler.T)
+        deflection = s.shapes(states)
+        shapes = None if deflection is None else (columns["time"], deflection)
         for name in self._absent():
             columns.pop(name, None)
         loads = self._system.loads.values(columns["time"])

@@ -8,7 +8,7 @@ stop_impact    y = φ with z < 0: z → −e z, and the joined tip likewise, by 
 release        tied, y rises through Ψ; goes on as `touch` if C > 0 there, else as `free`
 retie          touch, y falls through Ψ
 separation     touch, C becomes negative (a law that is a force: the penetration ends); at once where a meeting above
-               Ψ leaves C < 0
+               Ψ leaves C < 0. A tip without inertia loses what it springs back with, here and at a release
 seated         the impact after which bounces have died out: the flight would rise less than ``seat_height``
 unseated       seated, N becomes negative; without a spring this is the tip's `separation`
 =============  ====================================================================================================
@@ -25,20 +25,13 @@ from .laws import Phase, Watch
 
 
 class HybridState:
-    """Time, state and phase of a run, what impacts have lost so far [J], and its events.
+    """Time, state and phase of a run, what impacts have lost so far [J], and its events."""
 
-    Parameters
-    ----------
-    seat_height
-        See `event_driven.simulate`.
-    """
-
-    def __init__(self, system: HybridSystem, time: float, X: np.ndarray, seat_height: float | None) -> None:
+    def __init__(self, system: HybridSystem, time: float, X: np.ndarray) -> None:
         self.system, self.time, self.X = system, time, X
         self.phase = Phase("free")
         self.loss = 0.0
         self.events: list[Event] = []
-        self._seat_height = seat_height
         m = system.motion(self.phase, X)
         if not (system.law.rigid and abs(float(m.v - m.z)) > system.velocity_noise(X)):
             self.phase = Phase(system.law.start)
@@ -110,8 +103,9 @@ class HybridState:
     def _go_on(self, happened: str) -> None:
         contact, kind = self.system.law.after(happened, self)
         self.phase = Phase(contact, self.phase.seated)
+        lost = self.system.settle(self.phase, self.X)
         if kind is not None:
-            self._emit(kind)
+            self._emit(kind, energy_loss=lost)
 
     def _meet(self) -> None:
         s, X = self.system, self.X
@@ -137,7 +131,7 @@ class HybridState:
         self._emit(kind, impulse_contact=impulse, energy_loss=before - self._mechanical_energy())
         if was_seated:  # the spring already stands on the foundation
             self._hit_stop()
-        elif contact == "touch" and float(s.motion(self.phase, X).C) < 0.0:
+        elif contact == "touch" and float(s.motion(self.phase, X).C) < -s.force_noise(X):
             self._go_on("separate")
 
     # Foundation -----------------------------------------------------------------------------------------------------
@@ -187,6 +181,7 @@ class HybridState:
             of_foundation += -(1.0 + e) * s.spring.mass * X[s.Z]
             X[s.Z] = -e * X[s.Z]
             speed = float(X[s.Z])
+        s.settle(self.phase, X)
         return on_tip, of_foundation, speed
 
     def _seat(self) -> None:
@@ -202,9 +197,11 @@ class HybridState:
         self._emit("unseated" if self.system.has_spring else "separation")
 
     def seat_height(self) -> float:
-        """Return the height [m] below which a flight after an impact on the foundation does not take place."""
-        if self._seat_height is not None:
-            return self._seat_height
+        """Return the height [m] below which a flight after an impact on the foundation does not take place.
+
+        It is 1e-12 of the distance |Ψ − φ|, or of the tip's deflection if larger. What is cut off changes no impulse,
+        and the displacement by less than (velocity × remaining time) of the bounces left out.
+        """
         s, stop = self.system, self._stop
         assert stop is not None
         reach = abs(s.spring.equilibrium - stop.position) if s.has_spring else 0.0

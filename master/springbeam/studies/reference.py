@@ -24,8 +24,6 @@ def refuse_without_reference(scene: Scene) -> None:
         raise SceneError("contact.impact = 'rest': no reference has it; use 'inelastic' or 'tip'")
     if scene.contact.law == "compliance" and scene.beam and scene.beam.fidelity == "quasi_static":
         raise SceneError("beam.fidelity = 'quasi_static': no reference has it with law 'compliance'; use 'dynamic'")
-    if scene.loads and scene.beam and scene.beam.fidelity == "quasi_static":
-        raise SceneError("beam.fidelity = 'quasi_static': no reference has it with [[loads]]; use 'dynamic'")
 
 
 def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:
