@@ -228,7 +228,7 @@ def test_seated_pair_rests_on_the_static_forces() -> None:
         beam={"alpha_b": 0.02, "distributed_load": -20.0},
         spring={"damping": 8.0, "external_force": -1.0},
         stop={"restitution": 0.2},
-        time={"t_end": 12.0},
+        time={"t_end": 7.0},
         coupling={"macro_step": 0.5},
     )
     result = simulate(scene)

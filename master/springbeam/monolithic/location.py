@@ -63,14 +63,16 @@ def _dip(g: Callable[[float], float], nodes: np.ndarray, values: np.ndarray, noi
 
     The parabola through them tells whether to look: it misses a smooth minimum by less than it varies.
     """
-    if values.min() < 0.0:
+    (x0, x1, x2), (g0, g1, g2) = nodes.tolist(), values.tolist()
+    left, right = (g1 - g0) / (x1 - x0), (g2 - g1) / (x2 - x1)
+    curvature = (right - left) / (x2 - x0)
+    if min(g0, g1, g2) < 0.0 or curvature <= 0.0:
         return None
-    parabola = np.polynomial.Polynomial.fit(nodes, values, 2)
-    low, high = float(nodes[0]), float(nodes[-1])
-    turns = parabola.deriv().roots()
-    if len(turns) != 1 or not low < float(turns[0].real) < high or float(parabola(turns[0].real)) > np.ptp(values):
+    turn = 0.5 * (x0 + x1 - left / curvature)
+    bottom = g0 + (turn - x0) * (left + (turn - x1) * curvature)
+    if not x0 < turn < x2 or bottom > max(g0, g1, g2) - min(g0, g1, g2):
         return None
-    found = minimize_scalar(g, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * (high - low)})
+    found = minimize_scalar(g, bounds=(x0, x2), method="bounded", options={"xatol": 1e-9 * (x2 - x0)})
     return float(found.x) if found.fun < -noise else None
 
 
