@@ -23,6 +23,10 @@ constexpr double start_energy_tolerance = 0.05;
 constexpr std::size_t powers = Loads::point - Loads::distributed;
 using Moments = std::array<double, powers>;  ///< ∫ x^j f dx over the length
 
+[[noreturn]] void throw_out_of_range() {
+  throw std::runtime_error("beam: the parameters leave the range of floating-point numbers");
+}
+
 double length(const std::array<double, 2>& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1]); }
 
 /// cosh √σ and sinh √σ/√σ, divided by e^{√σ} where σ > 0, and what 1 becomes by that.
@@ -134,7 +138,10 @@ class Cantilever {
       // Where N changes by definition rounding decides; a little aside it does not.
       double low = i == 0 ? 0.5 * sines[0] : sines[i - 1], high = sines[i + 1];
       for (double aside = 1e-13; waves(low).count() >= k; aside *= 4.0) low *= 1.0 - std::min(aside, 0.5);
-      for (double aside = 1e-13; waves(high).count() < k; aside *= 4.0) high *= 1.0 + aside;
+      for (double aside = 1e-13; waves(high).count() < k; aside *= 4.0) {
+        high *= 1.0 + aside;
+        if (!(high < std::numeric_limits<double>::max())) throw_out_of_range();
+      }
       omega[i] = frequency(k, low, high);
     }
     return omega;
@@ -157,6 +164,7 @@ class Cantilever {
       omega.push_back(k2 * std::sqrt(2.0 / (sum + root)));
       omega.push_back(std::sqrt((sum + root) / (2.0 * a * b)));
     }
+    if (!std::all_of(omega.begin(), omega.end(), [](double w) { return std::isnormal(w); })) throw_out_of_range();
     std::sort(omega.begin(), omega.end());
     return omega;
   }
@@ -328,9 +336,7 @@ Modes exact_modes(const Parameters& p) {
   const double kept = (modes.tip.array().square() / omega2.array()).sum();
   const double share = (weight.array() * modes.tip.array().square() / omega2.array()).sum();
   const double lacking = influence(1.0) - kept;
-  if (!(lacking > -1e-9 * kept && std::isfinite(lacking / share))) {
-    throw std::runtime_error("beam: the parameters leave the range of floating-point numbers");
-  }
+  if (!(lacking > -1e-9 * kept && std::isfinite(lacking / share))) throw_out_of_range();
   modes.tip.array() *= (1.0 + std::max(lacking, 0.0) / share * weight.array()).sqrt();
   modes.deflection.row(shape_points - 1) = modes.tip.transpose();
 

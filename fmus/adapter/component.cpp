@@ -60,14 +60,8 @@ const char* Component::phase_text() const {
   return p == instantiated     ? "before initialization"
          : p == initialization ? "in initialization mode"
          : p == step_complete  ? "between steps"
-         : p == step_failed    ? "after a discarded step (restore a state or reset first)"
          : p == terminated     ? "after termination"
                                : "after an error (restore a state or reset first)";
-}
-
-Status Component::discard(const char* function, const char* why) const {
-  log(Status::discard, "logStatusDiscard", std::string(function) + ": " + why);
-  return Status::discard;
 }
 
 Status Component::fail(const char* function, const char* why) {

@@ -20,9 +20,9 @@ namespace fmi {
 
 enum class Status { ok, warning, discard, error };  ///< numbered as in every version of FMI
 
-constexpr unsigned any_phase = instantiated | initialization | step_complete | step_failed | terminated | error;
+constexpr unsigned any_phase = instantiated | initialization | step_complete | terminated | error;
 constexpr unsigned after_instantiation = any_phase & ~static_cast<unsigned>(instantiated);
-constexpr unsigned stepped = step_complete | step_failed | terminated | error;
+constexpr unsigned stepped = step_complete | terminated | error;
 // Inputs are accepted before initialization too: several importers set them there.
 constexpr unsigned settable = instantiated | initialization | step_complete;
 
@@ -75,11 +75,9 @@ class Component {
         if ((instance.phase & legal) == 0) throw std::logic_error(std::string("not allowed ") + phase_text());
         body();
         return Status::ok;
-      } catch (const Unavailable& e) {
-        return discard(function, e.what());
-      } catch (const StepDiscarded& e) {
-        instance.phase = step_failed;
-        return discard(function, e.what());
+      } catch (const Discarded& e) {
+        log(Status::discard, "logStatusDiscard", std::string(function) + ": " + e.what());
+        return Status::discard;
       } catch (const std::exception& e) {
         return fail(function, e.what());
       } catch (...) {
@@ -93,7 +91,6 @@ class Component {
 
  private:
   const char* phase_text() const;
-  Status discard(const char* function, const char* why) const;
   Status fail(const char* function, const char* why);
 
   Logger logger_;

@@ -18,7 +18,6 @@ using fmi::Component;
 using fmi::require;
 using fmi::Status;
 using fmi::Type;
-using fmi::Unavailable;
 
 // Some importers treat the message as a printf format, some print it as it is: both get a readable text.
 void report(const fmi2CallbackFunctions& callbacks, const std::string& name, Status status, const char* category,
@@ -122,7 +121,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-  return guard(c, "fmi2Terminate", fmi::step_complete | fmi::step_failed, [](Component& k) {
+  return guard(c, "fmi2Terminate", fmi::step_complete, [](Component& k) {
     k.instance.terminate();
     k.log(Status::ok, "logEvents", "terminated");
   });
@@ -274,7 +273,7 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status* value) {
   return guard(c, "fmi2GetStatus", fmi::stepped, [&](Component& k) {
     require(value, "value");
-    if (s != fmi2DoStepStatus) throw Unavailable("only fmi2DoStepStatus is a status");
+    if (s != fmi2DoStepStatus) throw fmi::Discarded("only fmi2DoStepStatus is a status");
     *value = static_cast<fmi2Status>(k.instance.last_status);
   });
 }
@@ -282,7 +281,7 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status* va
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real* value) {
   return guard(c, "fmi2GetRealStatus", fmi::stepped, [&](Component& k) {
     require(value, "value");
-    if (s != fmi2LastSuccessfulTime) throw Unavailable("only fmi2LastSuccessfulTime is a Real");
+    if (s != fmi2LastSuccessfulTime) throw fmi::Discarded("only fmi2LastSuccessfulTime is a Real");
     *value = k.instance.time();
   });
 }
@@ -290,14 +289,14 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real* 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind, fmi2Integer* value) {
   return guard(c, "fmi2GetIntegerStatus", fmi::stepped, [&](Component&) {
     require(value, "value");
-    throw Unavailable("no status is an Integer");
+    throw fmi::Discarded("no status is an Integer");
   });
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean* value) {
   return guard(c, "fmi2GetBooleanStatus", fmi::stepped, [&](Component&) {
     require(value, "value");
-    if (s != fmi2Terminated) throw Unavailable("only fmi2Terminated is a Boolean");
+    if (s != fmi2Terminated) throw fmi::Discarded("only fmi2Terminated is a Boolean");
     *value = fmi2False;  // the slave never ends a simulation by itself
   });
 }
@@ -305,7 +304,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String* value) {
   return guard(c, "fmi2GetStringStatus", fmi::stepped, [&](Component&) {
     require(value, "value");
-    if (s != fmi2PendingStatus) throw Unavailable("only fmi2PendingStatus is a String");
+    if (s != fmi2PendingStatus) throw fmi::Discarded("only fmi2PendingStatus is a String");
     *value = "no step is pending";
   });
 }

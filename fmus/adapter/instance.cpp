@@ -15,7 +15,7 @@ const char* name(Type type) { return type_names[static_cast<int>(type)]; }
 
 double finite(const Variable& v, double value) {
   if (!std::isfinite(value)) {
-    throw Unavailable("'" + v.name + "' = " + text(value) + " is not finite: the inputs are too large");
+    throw Discarded("'" + v.name + "' = " + text(value) + " is not finite: the inputs are too large");
   }
   return value;
 }
@@ -119,6 +119,12 @@ void Instance::push_inputs() {
   for (const std::size_t i : used_) inputs_[i]->set(*model_, values_[i]);
 }
 
+void Instance::show(const Variable& v, std::size_t input) {
+  if (!built_) return;
+  v.set(*model_, values_[input]);
+  model_->observe();
+}
+
 Polynomial& Instance::use(std::size_t input) {
   if (std::find(used_.begin(), used_.end(), input) == used_.end()) used_.push_back(input);
   return values_[input];
@@ -166,10 +172,7 @@ void Instance::set(unsigned reference, Type type, double value) {
     return;
   }
   use(place)[0] = value;
-  if (built_) {
-    v.set(*model_, values_[place]);
-    model_->observe();
-  }
+  show(v, place);
 }
 
 void Instance::set_derivative(unsigned reference, int order, double value) {
@@ -182,14 +185,16 @@ void Instance::set_derivative(unsigned reference, int order, double value) {
   if (!std::isfinite(value)) {
     throw std::invalid_argument("derivative of '" + v.name + "' = " + text(value) + " is not finite");
   }
-  use(place_[reference])[static_cast<std::size_t>(order)] = value;
+  const std::size_t place = place_[reference];
+  use(place)[static_cast<std::size_t>(order)] = value;
+  show(v, place);
 }
 
 double Instance::output_derivative(unsigned reference, int order) {
   const Variable& v = variable(reference, Type::real, "get a derivative of");
   if (order < 1) throw std::invalid_argument("derivative order " + std::to_string(order) + ": they begin with 1");
   if (order > max_output_derivative_order || !v.derivative) {
-    throw Unavailable("derivative of order " + std::to_string(order) + " of '" + v.name + "' is not available");
+    throw Discarded("derivative of order " + std::to_string(order) + " of '" + v.name + "' is not available");
   }
   ensure_built();
   return finite(v, v.derivative(*model_));
@@ -205,7 +210,7 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
     if (d.input != by.name) continue;
     const double partial = d.partial(*model_);
     if (!std::isfinite(partial))
-      throw Unavailable("the derivative of '" + of.name + "' by '" + by.name + "' is not known");
+      throw Discarded("the derivative of '" + of.name + "' by '" + by.name + "' is not known");
     return partial;
   }
   return 0.0;

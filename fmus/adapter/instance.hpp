@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <limits>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,20 +13,13 @@
 
 namespace fmi {
 
-/// Asked for what there is not: becomes fmi2Discard without any change of phase.
-class Unavailable : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
-
 /// The states of section 4.2.4 that a slave which completes every step at once can be in, as bits.
 enum Phase : unsigned {
   instantiated = 1U << 0,
   initialization = 1U << 1,
   step_complete = 1U << 2,
-  step_failed = 1U << 3,
-  terminated = 1U << 4,
-  error = 1U << 5,
+  terminated = 1U << 3,
+  error = 1U << 4,
 };
 
 class Instance {
@@ -43,17 +35,17 @@ class Instance {
   void terminate();
   void reset();
 
-  /// @throws Unavailable if an output has no finite value under the inputs that were set since the last step
+  /// @throws Discarded if an output has no finite value under the inputs that were set since the last step
   double get(unsigned reference, Type type);
   void set(unsigned reference, Type type, double value);
   void set_derivative(unsigned reference, int order, double value);
-  /// @throws Unavailable if it is not known
+  /// @throws Discarded if it is not known
   double output_derivative(unsigned reference, int order);
   /// ∂unknown/∂known, of an output by a continuous input, at the present instant.
-  /// @throws Unavailable if it is not known
+  /// @throws Discarded if it is not known
   double partial_derivative(unsigned unknown, unsigned known);
 
-  /// @throws StepDiscarded (nothing changed), std::invalid_argument
+  /// @throws Discarded, std::invalid_argument
   void step(double time, double size);
   double time() const { return time_; }
   /// What the model has to say after a step; empty if nothing.
@@ -72,6 +64,7 @@ class Instance {
   void ensure_built();
   void push_inputs();
   Polynomial& use(std::size_t input);
+  void show(const Variable& v, std::size_t input);  ///< to the model, if there is one
 
   const Table& table_;
   std::unique_ptr<Model> model_;

@@ -15,8 +15,9 @@ using Polynomial = std::array<double, 3>;
 /// In place of a derivative that the importer has not set.
 inline constexpr double unset = std::numeric_limits<double>::quiet_NaN();
 
-/// The step could not be completed and the model is as before it: becomes fmi2Discard.
-class StepDiscarded : public std::runtime_error {
+/// What was asked for cannot be had, and nothing has changed: becomes fmi2Discard, after which the instance goes on.
+/// So FMI 3.0 has it; an importer that follows FMI 2.0 restores a state before it repeats a step, which does no harm.
+class Discarded : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
@@ -34,7 +35,7 @@ class Model {
   virtual void observe() {}
 
   /// Called by fmi2DoStep, the inputs having been set.
-  /// @throws StepDiscarded (model unchanged)
+  /// @throws Discarded
   virtual void step(double size) = 0;
 
   /// Called for every saved state; the vector is flat and holds everything that build() does not make.

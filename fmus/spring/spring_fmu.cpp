@@ -66,14 +66,14 @@ struct SpringModel final : fmi::Model {
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
     const bool goes_on = held && size > rounding * held->size();
     if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
-      throw fmi::StepDiscarded("a step of " + spring::number(size) + " s, but communication_step = " +
-                               spring::number(held->size()) + " s: steps must have that size, or the parameter be 0");
+      throw fmi::Discarded("a step of " + spring::number(size) + " s, but communication_step = " +
+                           spring::number(held->size()) + " s: steps must have that size, or the parameter be 0");
     }
     std::vector<double> before;
     if (impulse != 0.0 || held) save(before);
     const auto discard = [&](const std::string& why) {
       if (!before.empty()) restore(before);
-      throw fmi::StepDiscarded(why);
+      throw fmi::Discarded(why);
     };
     if (held && !std::isfinite(held->force())) discard(no_force);
     const spring::Inputs inputs = acting();

@@ -318,3 +318,18 @@ def test_a_derivative_of_the_tip_that_is_set_counts_even_if_it_is_zero(spring: A
         k.step(0.0, 0.1)
         reactions.append(k.get("reaction"))
     assert reactions == pytest.approx([120.0, 100.0, 75.0, 90.0], rel=1e-6)
+
+
+def test_derivatives_of_inputs_are_seen_as_soon_as_they_are_set(spring: Any) -> None:
+    """C = k δ (1 + χ δ̇) with k = 100 N/m, χ = 0.5 s/m, δ = 0.05 m; the tip of velocity 1 and acceleration −3."""
+    law = {"contact_law": 2, "compliance_stiffness": 100.0, "compliance_exponent": 1.0, "compliance_damping": 0.5}
+    k = spring.running(**law, displacement=0.1, tip_displacement=0.05)
+    assert k.get("reaction") == pytest.approx(5.0)
+    assert k.derive("tip_displacement", 1, 1.0) == OK
+    force = k.get("reaction")
+    assert force == pytest.approx(5.0 * (1.0 - 0.5))
+    assert k.derive("tip_displacement", 2, -3.0) == OK
+    rise = -1.0  # of the depth
+    acceleration = -(0.1 + force) + 3.0
+    rate = 100.0 * rise * (1.0 + 0.5 * rise) + 5.0 * 0.5 * acceleration
+    assert k.derivative("reaction") == (OK, pytest.approx(rate))

@@ -96,5 +96,14 @@ TEST(ExactModes, AStartThatTheModesDoNotHoldIsRefused) {
   EXPECT_THROW(exact_modes(p), std::invalid_argument);
 }
 
+// Where numbers overflow, no frequency is ever bracketed.
+TEST(ExactModes, ParametersOutOfRangeAreRefused) {
+  for (const double length : {1e70, 1e100, 1e200, 1e-70, 1e-200}) {
+    Parameters p = without_mesh(unit_beam(1), 5);
+    p.length = length;
+    EXPECT_THROW(exact_modes(p), std::runtime_error) << length;
+  }
+}
+
 }  // namespace
 }  // namespace beam

@@ -10,7 +10,7 @@
 //   * every fmi2Error, fmi2Discard and fmi2Warning comes with a message that names the function, fmi2OK with none
 //     but a warning of fmi2DoStep;
 //   * a value that fmi2GetReal delivers is finite; after fmi2DoStep returned fmi2OK every output can be had;
-//   * a discarded step leaves every output, and the time, as they were;
+//   * a discarded step leaves every output, and the time, as they were, and the instance goes on;
 //   * restoring a state restores every output to the last bit, and the same step from it gives the same bits, also in
 //     another instance that got the state as bytes; bytes that are not a state of this FMU are refused.
 #include <sys/time.h>
@@ -164,9 +164,9 @@ class Random {
 
 // -- one instance and what is known of it --------------------------------------------------------------------------
 
-enum Phase : unsigned { instantiated = 1, initialization = 2, complete = 4, failed = 8, terminated = 16, error = 32 };
-constexpr unsigned any_phase = 63, settable = instantiated | initialization | complete;
-constexpr unsigned stepped = complete | failed | terminated | error;
+enum Phase : unsigned { instantiated = 1, initialization = 2, complete = 4, terminated = 8, error = 16 };
+constexpr unsigned any_phase = 31, settable = instantiated | initialization | complete;
+constexpr unsigned stepped = complete | terminated | error;
 
 const char* name_of(unsigned phase) {
   switch (phase) {
@@ -176,8 +176,6 @@ const char* name_of(unsigned phase) {
       return "initialization";
     case complete:
       return "step complete";
-    case failed:
-      return "step failed";
     case terminated:
       return "terminated";
     default:
@@ -450,8 +448,7 @@ class Episode {
   }
 
   void terminate(Instance& k) {
-    if (k.call("fmi2Terminate", complete | failed, ok, "", [&] { return fmi2Terminate(k.c); }) == fmi2OK)
-      k.phase = terminated;
+    if (k.call("fmi2Terminate", complete, ok, "", [&] { return fmi2Terminate(k.c); }) == fmi2OK) k.phase = terminated;
   }
 
   void reset(Instance& k) {
@@ -728,7 +725,6 @@ class Episode {
       k.time = time + size;
       read_outputs(k, after, ok);
     } else if (status == fmi2Discard) {
-      k.phase = failed;
       if (read_outputs(k, after, known ? ok : ok | discard) == fmi2OK && known)
         compare(before, after, "after a discarded step");
       double last = 0.0;
