@@ -12,12 +12,11 @@ from springbeam.bodies.protocol import Motion
 from springbeam.contact.events import (
     EventFunctions,
     clearance,
-    cubic_crossing,
     locate,
 )
 from springbeam.contact.laws import Transmission
 from springbeam.contact.phases import Joint, Phase, common_velocity
-from springbeam.results.paths import Sample
+from springbeam.results.paths import Path, Sample
 from springbeam.scene import load_scene
 
 SIZE = 0.02
@@ -42,17 +41,17 @@ def test_a_cubic_lies_in_its_hull(coefficients):
 
 @pytest.mark.parametrize("x", [1e-6, 0.25, 0.5, 0.999])
 @pytest.mark.parametrize("bend", [0.0, 2.0, -0.5])
-def test_cubic_crossing_is_the_falling_root(x, bend):
-    """(x* − x)(1 + bend x²) falls through zero once in (0, 1); bisection ends at the ulp of H."""
+def test_a_path_falls_through_zero_at_its_root(x, bend):
+    """(x* − x)(1 + bend x²) falls through zero once in (0, 1); 40 bisections find it to 1e-12."""
     p = Polynomial((x, -1.0)) * Polynomial((1.0, 0.0, bend))
     _, start, end = ends(p.coef)
-    assert cubic_crossing(start, end, SIZE) == pytest.approx(x * SIZE, abs=4e-16 * SIZE)
+    assert Path.through(start, end, SIZE).falls_through_zero() == pytest.approx(x, abs=1e-12)
 
 
 def test_crossing_of_a_start_on_zero_that_rises_first():
     """x (1 − 2x) starts on zero, rises, and is through at 1/2: zero at the start is not the event."""
     _, start, end = ends((0.0, 1.0, -2.0))
-    assert cubic_crossing(start, end, SIZE) == pytest.approx(0.5 * SIZE, rel=1e-12)
+    assert Path.through(start, end, SIZE).falls_through_zero() == pytest.approx(0.5, abs=1e-12)
 
 
 class Counted:
@@ -68,10 +67,16 @@ class Counted:
         return math.cos(angle) - self.level, -self.slope_sign * self.omega * math.sin(angle)
 
 
+def located(f, size: float, tolerance: float, time: float) -> float:
+    """`locate`, from where the cubic through both ends falls through zero."""
+    guess = Path.through(f(0.0), f(size), size).falls_through_zero() * size
+    return locate(f, guess, size, tolerance, time)
+
+
 @pytest.mark.parametrize("level", [0.999, 0.3, -0.9])
 def test_locate_finds_the_event_to_the_tolerance(level):
     f = Counted(1.0, level)
-    h = locate(f, f(0.0), f(3.0), 3.0, 1e-14, 0.0)
+    h = located(f, 3.0, 1e-14, 0.0)
     # δτ = δf/|ḟ|
     assert h == pytest.approx(math.acos(level), abs=2e-14 / math.sin(math.acos(level)))
     assert f.sizes[-1] == h  # the bodies are left there
@@ -84,15 +89,15 @@ def test_locate_does_not_take_a_zero_that_the_function_rises_from():
     def f(size: float) -> Sample:
         return size**2 * math.cos(size), 2.0 * size * math.cos(size) - size**2 * math.sin(size)
 
-    assert cubic_crossing(f(0.0), f(math.pi), math.pi) < 1e-12
+    assert Path.through(f(0.0), f(math.pi), math.pi).falls_through_zero() < 1e-12
     # ḟ(π/2) = −(π/2)²
-    assert locate(f, f(0.0), f(math.pi), math.pi, 1e-14, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-14)
+    assert located(f, math.pi, 1e-14, 0.0) == pytest.approx(0.5 * math.pi, abs=1e-14)
 
 
 def test_locate_survives_a_rate_of_the_wrong_sign():
     """Without a usable rate it bisects: 52 halvings to rounding at most."""
     f = Counted(1.0, 0.3, slope_sign=-1.0)
-    h = locate(f, f(0.0), f(3.0), 3.0, 1e-15, 0.0)
+    h = located(f, 3.0, 1e-15, 0.0)
     assert h == pytest.approx(math.acos(0.3), abs=1e-14)
     assert len(f.sizes) - 2 <= 55
 
@@ -102,7 +107,7 @@ def test_locate_with_a_rate_that_is_not_the_slope(share):
     """ḟ of a motion that itself depends on h is df/dh but for a factor: secants find the root nevertheless, where
     Newton's method with that factor converges linearly or not at all."""
     f = Counted(1.0, 0.3, slope_sign=share)
-    h = locate(f, f(0.0), f(3.0), 3.0, 1e-15, 0.0)
+    h = located(f, 3.0, 1e-15, 0.0)
     assert h == pytest.approx(math.acos(0.3), abs=3e-15)
     assert len(f.sizes) - 2 <= 25
 
@@ -110,7 +115,7 @@ def test_locate_with_a_rate_that_is_not_the_slope(share):
 def test_locate_gives_up_where_time_itself_is_rounded():
     """At t = 1e6 steps that differ by 4 ulp of t are one: no more evaluations are spent on a tolerance of zero."""
     f = Counted(1.0, 0.3)
-    h = locate(f, f(0.0), f(3.0), 3.0, 0.0, 1e6)
+    h = located(f, 3.0, 0.0, 1e6)
     assert abs(h - math.acos(0.3)) <= 4.0 * np.finfo(float).eps * 1e6
     assert len(f.sizes) - 2 <= 35  # 3/(4 ulp of 1e6) = 2^31.6
 

@@ -156,6 +156,18 @@ def test_a_spring_alone_is_right_with_an_accuracy_and_says_so(number):
     assert judge.from_dict(verdict.as_dict()) == verdict
 
 
+@pytest.mark.parametrize(("seed", "number"), [(2, 1), (3, 12)])
+def test_impulses_are_part_of_the_promise(seed, number):
+    """Two impacts: in (2, 1) a tenth of a step after the first, in (3, 12) 1.3 steps after a release.
+
+    Runs that miss the second one, or meet with another speed, agree in u_tip and y to 1e-4.
+    """
+    (verdict,) = judge.judge(seed, number, ["--accuracy 1e-3"])
+    assert verdict.judged
+    assert 0.0 < verdict.impulse <= 1e-3
+    assert verdict.factor <= 1.0
+
+
 def test_more_accuracy_costs_more_steps():
     steps = [simulate(scene_from_dict({**WITH_STOP, "accuracy": a})).summary["macro_steps"] for a in (1e-2, 1e-4, 1e-6)]
     assert steps[0] < steps[1] < steps[2]

@@ -352,7 +352,7 @@ def _report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         console.print(
             f"accuracy  {picked_in_words(found)}\n"
             f"          errors {found['estimated_displacement_error']:.1e} (displacement), "
-            f"{found['estimated_event_error']:.1e} (times of {found['events_compared']} events)"
+            f"{found['estimated_event_error']:.1e} (times and impulses of {found['events_compared']} events)"
         )
         if "estimated_mesh_error" in found:
             picked = found["picked"]

@@ -157,35 +157,16 @@ def clearance(start: Sample, end: Sample, size: float) -> tuple[float, float]:
     return min(points), max(points)
 
 
-def cubic_crossing(start: Sample, end: Sample, size: float) -> float:
-    """τ where the cubic falls through zero, by bisection; f(size) < 0."""
-    d0, d1, rise = start[1] * size, end[1] * size, end[0] - start[0]
-    f0, b, a = start[0], 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise
-    low, high = 0.0, size
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        x = middle / size
-        value = f0 + x * (d0 + x * (b + x * a))
-        # Starting on zero and rising is still "before": only the side that ends below counts.
-        if value > 0.0 or (value == 0.0 and middle < 0.5 * size):
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
-
-
-def locate(
-    evaluate: Callable[[float], Sample], start: Sample, end: Sample, size: float, tolerance: float, time: float
-) -> float:
+def locate(evaluate: Callable[[float], Sample], guess: float, size: float, tolerance: float, time: float) -> float:
     """Step size at which f = 0 to ``tolerance``, by Newton's method inside a bracket, then by secants.
 
     ``evaluate(h)`` repeats the step with size h and returns f, ḟ at its end; the last size evaluated is the one
-    returned, so the bodies are left there. f(0) ≥ 0 > f(size); ``time`` is the step's start (its rounding bounds what
-    can be told apart). A zero that f rises from, as it may at the start, is none of these. ḟ is only the first guess of
-    df/dh: where both ends differ in velocity, the force of a step, and with it the motion, changes with h.
+    returned, so the bodies are left there. ``guess`` is the first one. f(0) ≥ 0 > f(size); ``time`` is the step's start
+    (its rounding bounds what can be told apart). A zero that f rises from, as it may at the start, is none of these. ḟ
+    is only the first guess of df/dh: where both ends differ in velocity, the force of a step, and with it the motion,
+    changes with h.
     """
-    low, high = 0.0, size
-    h = cubic_crossing(start, end, size)
+    low, high, h = 0.0, size, guess
     last: tuple[float, float] | None = None
     for _ in range(_MAX_EVALUATIONS):
         value, rate = evaluate(h)

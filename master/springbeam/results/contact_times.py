@@ -1,4 +1,4 @@
-"""When contact opens and closes and the foundation is struck, and how far two runs are apart in it.
+"""When contact opens and closes and the foundation is struck, how hard, and how far two runs are apart in it.
 
 What lasts less than a window of a few macro steps is no evidence either way: whether a contact opens and closes again
 within a macro step is decided by rounding.
@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
+
+import numpy as np
 
 from .trajectory import Event, Trajectory
 
@@ -58,6 +60,21 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
         worst = max(worst, _furthest(lasting, ours, end))
         number += sum(t < end for interval in lasting for t in set(interval))
     return worst, number
+
+
+def impulse_difference(run: Trajectory, reference: Trajectory) -> float:
+    """Return how far the sums of all impacts' impulses are apart, over those of ``reference``; NaN if it has none.
+
+    The sums are of what the tip gets and of what the foundation gives.
+    """
+
+    def total(trajectory: Trajectory) -> np.ndarray:
+        events = [(e.impulse_contact, e.impulse_foundation) for e in trajectory.events]
+        return np.asarray(np.sum(np.reshape(events, (-1, 2)), axis=0))
+
+    exact = total(reference)
+    scale = float(np.abs(exact).sum())
+    return float(np.abs(total(run) - exact).sum()) / scale if scale > 0.0 else nan
 
 
 def _contacts(run: Trajectory, end: float) -> list[Interval]:

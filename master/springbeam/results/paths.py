@@ -58,9 +58,10 @@ class Path(NamedTuple):
         return a1 + s * (2.0 * a2 + 3.0 * a3 * s) - 2.0 * bubble * tilt * turning + 2.0 * bubble * bubble * self.odd
 
     def falls_through_zero(self) -> float:
-        """Return s in [0, 1] where f, below zero at the end, last was above it, by bisection."""
-        if self.at(0.0) <= 0.0 and self.slope(0.0) <= 0.0:
-            return 0.0
+        """Return s in [0, 1] where f, not below zero at the start but at the end, falls through it, by bisection.
+
+        A path that starts on zero and rises falls later; one that only falls, at once.
+        """
         low, high = 0.0, 1.0
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)

@@ -13,7 +13,6 @@ from ..contact.events import (
     EventFunction,
     EventFunctions,
     clearance,
-    cubic_crossing,
     gap,
     locate,
     position_tolerance,
@@ -126,12 +125,13 @@ class Detector:
                 bracket = self._bracket(state, function, step, floor, start, end)
                 if bracket is None or (kind == found and bracket is step):
                     continue
-                crossing = cubic_crossing(start, function(bracket.end), bracket.size)
-                candidates.append((crossing, kind, function, bracket))
+                means = function.means(bracket.end, bracket.size)
+                path = Path.through(start, function(bracket.end), bracket.size, means)
+                candidates.append((path.falls_through_zero() * bracket.size, kind, function, bracket))
             if not candidates:
                 break
-            _, found, function, bracket = min(candidates, key=lambda c: c[0])
-            step = self._located(state, function, bracket)
+            guess, found, function, bracket = min(candidates, key=lambda c: c[0])
+            step = self._located(state, function, bracket, guess)
             if step.size < _NO_TIME * self._steps.size:
                 # Too short for a contact force: velocities that differ would be turned round by an infinite one.
                 return self._separation.no_step(step), found
@@ -170,8 +170,8 @@ class Detector:
             path, unsure = Path.through(start, end, whole - before), unsure * shrunk**4
         return None
 
-    def _located(self, state: State, function: EventFunction, bracket: Step) -> Step:
-        """Return the step that ends where ``function`` is 0. Raises StepRefused if none does."""
+    def _located(self, state: State, function: EventFunction, bracket: Step, guess: float) -> Step:
+        """Return the step that ends where ``function`` is 0, near ``guess`` [s]. Raises StepRefused if none does."""
         last = bracket
 
         def evaluate(size: float) -> Sample:
@@ -180,7 +180,7 @@ class Detector:
             return function(last.end)
 
         tolerance = 0.25 * self.tolerance(bracket.end)
-        locate(evaluate, function(bracket.start), function(bracket.end), bracket.size, tolerance, state.time)
+        locate(evaluate, guess, bracket.size, tolerance, state.time)
         missed = abs(function(last.end)[0])
         if missed > _JUMP * self.tolerance(last.end):
             raise StepRefused(f"an event is not found: the motion jumps by {missed:.3g} m with the size of the step")

@@ -12,12 +12,15 @@ from typing import NamedTuple
 
 from ..bodies import force
 from ..bodies.protocol import Force
+from ..contact.events import gap
 from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Step
 from .stepping import Pair, State
 
 #: Trial steps to find where the contact force vanishes, and the shortest of them as a share of the macro step.
 _MAX_LOOKS, _SHORTEST_LOOK = 8, 0.25
+#: Share of a step after which ends that are let go, and meet again before its end, are looked at.
+_EARLY = 0.1
 
 
 class Push(NamedTuple):
@@ -116,8 +119,12 @@ class Separation:
             low = self._pair.attempt(state, step.size, step.start, Phase(phase.joint)).end[1]
             return low.displacement > self._pair.stop
         let_go = Phase(Joint.FREE, phase.seated and self._pair.spring is not None)
-        tip, low = self._pair.attempt(state, step.size, step.start, let_go).end
-        return tip.displacement > low.displacement
+        drift = abs(gap(step.start)[1])  # what the scheme leaves open of the ends' velocities, no parting
+        for share, least in ((1.0, 0.0), (_EARLY, drift)):
+            size = share * step.size
+            if gap(self._pair.attempt(state, size, step.start, let_go).end)[0] > least * size:
+                return True
+        return False
 
 
 def _mean(first: float, second: float) -> float:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..bodies.protocol import Body
-from ..results.contact_times import contact_changes, contact_time_difference
+from ..results.contact_times import contact_changes, contact_time_difference, impulse_difference
 from ..results.recording import MemoryRecorder
 from ..results.trajectory import Trajectory
 from ..run import runner
@@ -75,7 +75,9 @@ class Picked:
     asked: float
     run: Trajectory  #: the last pilot run, which keeps it
     displacement_error: float  #: estimate, relative to the largest change of the tip (or spring top)
-    event_error: float  #: estimate of the largest error of a change of contact, relative to the time that is run
+    #: Estimate of the largest error of a change of contact, relative to the time that is run, and of the sums of the
+    #: impacts' impulses, relative to these.
+    event_error: float
     events: int  #: changes of contact that this is about, those further apart than two steps of the coarser run
     pilot_runs: int
     pilot_steps: int  #: doStep calls of the pilot runs before the last
@@ -188,7 +190,7 @@ class _Pilot:
 
 @dataclass(frozen=True)
 class _Estimate:
-    """Errors of the finer one of two runs, over the largest change of tip or spring top and the time that is run."""
+    """Errors of the finer one of two runs, as in `Picked`."""
 
     displacement: float
     expected: float  #: ``displacement`` if the order of convergence holds
@@ -307,8 +309,8 @@ class _Search:
 
     def _estimate(self, coarse: _Pilot, fine: _Pilot) -> _Estimate:
         displacement = self._difference(coarse, fine)
-        event, events = contact_time_difference(coarse.run, fine.run, 2.0 * self._span / coarse.steps)
-        event /= self._span
+        late, events = contact_time_difference(coarse.run, fine.run, 2.0 * self._span / coarse.steps)
+        event = max(late / self._span, float(np.nan_to_num(impulse_difference(coarse.run, fine.run))))
         better, of_event = self._better(coarse, fine)
         if not self._softly and _parts(fine.run):  # what follows has the errors of the times at which ends part
             better = of_event

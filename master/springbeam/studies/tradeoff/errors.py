@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...results.contact_times import contact_time_difference
+from ...results.contact_times import contact_time_difference, impulse_difference
 from ...results.trajectory import Trajectory
 
 #: Contacts shorter than this many macro steps are no evidence either way.
@@ -57,19 +57,9 @@ def errors(run: Trajectory, reference: Trajectory, macro_step: float) -> Errors:
     return Errors(
         **values,
         event_time=contact_time_difference(run, reference, _SHORT * macro_step)[0],
-        impulse=_impulse(run, reference),
+        impulse=impulse_difference(run, reference),
         energy=_energy(run.summary),
     )
-
-
-def _impulse(run: Trajectory, reference: Trajectory) -> float:
-    def total(trajectory: Trajectory) -> np.ndarray:
-        events = [(e.impulse_contact, e.impulse_foundation) for e in trajectory.events]
-        return np.asarray(np.sum(np.reshape(events, (-1, 2)), axis=0))
-
-    exact = total(reference)
-    scale = float(np.abs(exact).sum())
-    return float(np.abs(total(run) - exact).sum()) / scale if scale > 0.0 else float("nan")
 
 
 def _energy(summary: dict[str, Any]) -> float:
