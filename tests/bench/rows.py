@@ -21,13 +21,16 @@ import numpy as np
 import printed
 import scipy.sparse.linalg as spla
 import sweeps
+from fmpy import extract, read_model_description
+from fmpy.simulation import instantiate_fmu
 from measure import Times, compare, median_and_spread, timed
 from scipy.interpolate import CubicHermiteSpline
 
 from springbeam import load_scene, simulate, with_changes
-from springbeam.bodies import fmu
+from springbeam.bodies.archive import fmu_directory
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
+from springbeam.bodies.functions import Functions
 from springbeam.monolithic import algorithm1, event_driven
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.recording import MemoryRecorder
@@ -201,10 +204,7 @@ def spring(effort: Effort) -> Iterator[Row]:
 
 
 #: The calls of a macro step; those before the first one are set-up.
-STEPPING = (
-    *("fmi2DoStep", "fmi2GetReal", "fmi2SetReal", "fmi2SetRealInputDerivatives"),
-    *("fmi2GetFMUstate", "fmi2SetFMUstate"),
-)
+STEPPING = (*("DoStep", "GetReal", "SetReal", "SetRealInputDerivatives", "GetFMUState", "SetFMUState"),)
 
 
 class Inside:
@@ -212,12 +212,12 @@ class Inside:
 
     def __init__(self) -> None:
         self.seconds, self.calls = 0.0, 0
-        self._prepared = fmu.Fmu.prepared
+        self._prepared = Functions.prepared
 
     def __enter__(self) -> Inside:
         inside, prepared = self, self._prepared
 
-        def timed_call(self: fmu.Fmu, name: str, *arguments: Any) -> Callable[[], int]:
+        def timed_call(self: Functions, name: str, *arguments: Any) -> Callable[[], int]:
             function = prepared(self, name, *arguments)
             if name not in STEPPING:
                 return function
@@ -231,18 +231,18 @@ class Inside:
 
             return call
 
-        fmu.Fmu.prepared = timed_call  # type: ignore[method-assign]
+        Functions.prepared = timed_call  # type: ignore[method-assign]
         return self
 
     def __exit__(self, *_: object) -> None:
-        fmu.Fmu.prepared = self._prepared  # type: ignore[method-assign]
+        Functions.prepared = self._prepared  # type: ignore[method-assign]
 
 
 def nothing(times: int = 20_000) -> float:
     """Seconds that `Inside` sees of a call that does nothing."""
     with Inside() as inside:
         body = FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
-        call = body.fmu.prepared("fmi2GetReal", None, c_size_t(0), None)
+        call = body.fmu.prepared("GetReal", None, c_size_t(0), None)
         inside.seconds, inside.calls = 0.0, 0
         for _ in range(times):
             call()
@@ -264,10 +264,13 @@ def tied_phase(scene: Scene) -> tuple[float, int]:
 
 def through_fmpy(effort: Effort, calls: int = 20_000) -> Row:
     """What a call costs through FMPy's own methods: says how fast Python is on this machine."""
-    body = FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
-    read, references = body.fmu._slave.getReal, [body.fmu.reference("displacement", "Real")]
+    path = str(fmu_directory() / "spring.fmu")
+    description = read_model_description(path)
+    slave = instantiate_fmu(extract(path), description, fmi_type="CoSimulation")
+    references = [next(v.valueReference for v in description.modelVariables if v.name == "displacement")]
+    read = slave.getReal
     costs = [1e6 * timed(lambda: [read(references) for _ in range(calls)]) / calls for _ in range(effort.rounds)]
-    body.close()
+    slave.freeInstance()
     return Row("4", "for scale: one variable read by FMPy's getReal", "", f"{median_and_spread(costs)} µs")
 
 

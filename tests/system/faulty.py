@@ -1,7 +1,6 @@
 """FMUs that fail on cue: the real ones, with every call of their C functions written down, and one of them faulted.
 
-The script is below FMPy and the master, in place of the functions of the shared library, so that whatever is called is
-seen: also what FMPy calls by itself.
+The script is below the master, in place of the functions of the shared library, so that whatever is called is seen.
 """
 
 from __future__ import annotations
@@ -12,9 +11,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-import fmpy.fmi1
 import pytest
 
+from springbeam.bodies import functions
 from springbeam.run import detection, simulation
 from springbeam.run.paper_law import PaperLaw
 from springbeam.run.rows import Rows
@@ -160,7 +159,7 @@ class Library:
         return self[name]
 
 
-real_cdll = fmpy.fmi1.cdll
+real_cdll = functions.cdll
 
 
 class Loader:
@@ -178,7 +177,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
     the bodies go back to the mark, "row" while a row is written, "event" while one acts; in Algorithm 1 "paper".
     """
     script = Script(faults)
-    monkeypatch.setattr(fmpy.fmi1, "cdll", Loader(script))
+    monkeypatch.setattr(functions, "cdll", Loader(script))
     attempt, rewind, write, locate = Pair.attempt, Pair.rewind, Rows.write, detection.locate
     act, algorithm = simulation.Simulation._act, PaperLaw._step
 

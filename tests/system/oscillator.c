@@ -1,17 +1,16 @@
-/* A mass on a spring and damper, m a + c v + k x = sign * F + load, as an FMI 2.0 co-simulation FMU in plain C.
- * Taylor series of the linear equation: exact to rounding for a force quadratic in time. `lie` makes it lie. */
+/* A mass on a spring and damper, m a + c v + k x = sign * F + load, as a co-simulation FMU of FMI 2.0 and 3.0 in plain C.
+ * Taylor series of the linear equation: exact to rounding for a force quadratic in time. `lie` makes it lie.
+ * It exports what a run calls and nothing else that the standards ask for. */
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef enum { OK, WARNING, DISCARD, ERROR } Status;
 enum { FORCE, IMPULSE, X, V, I1, I2, KINETIC, POTENTIAL, DISSIPATED, LOAD_POTENTIAL, MASS, K, C, LOAD, X0, V0, SIGN, LIE, N };
-enum { HONEST, STATE, VELOCITY, INTEGRAL, SLOPES, HANG, CRASH, NAN_OUT, ENERGY, INTEGRAL_2 };
+enum { HONEST, STATE, VELOCITY, INTEGRAL, SLOPES, HANG, CRASH, NAN_OUT, ENERGY, INTEGRAL_2, EARLY, EVENT, END };
 typedef struct { double r[N], slope, bend; unsigned calls; } Fmu;
 
 #define API __attribute__((visibility("default")))
-API const char *fmi2GetTypesPlatform(void) { return "default"; }
-API const char *fmi2GetVersion(void) { return "2.0"; }
-API Status fmi2SetDebugLogging(void *c, int on, size_t n, const char *const names[]) { return OK; }
 static void initial(Fmu *f) {
     memset(f, 0, sizeof *f);
     f->r[MASS] = f->r[SIGN] = 1.0;
@@ -36,7 +35,6 @@ API Status fmi2ExitInitializationMode(void *c) {
     outputs(f);
     return OK;
 }
-API Status fmi2Terminate(void *c) { return OK; }
 API Status fmi2Reset(void *c) { initial(c); return OK; }
 API Status fmi2GetReal(void *c, const unsigned vr[], size_t n, double value[]) {
     Fmu *f = c;
@@ -54,17 +52,12 @@ API Status fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
     for (size_t i = 0; i < n; ++i) f->r[vr[i]] = value[i];
     return OK;
 }
-#define NONE(kind, type) \
-    API Status fmi2Get##kind(void *c, const unsigned vr[], size_t n, type value[]) { return ERROR; } \
-    API Status fmi2Set##kind(void *c, const unsigned vr[], size_t n, const type value[]) { return ERROR; }
-NONE(Integer, int) NONE(Boolean, int) NONE(String, char *)
 API Status fmi2SetRealInputDerivatives(void *c, const unsigned vr[], size_t n, const int order[], const double value[]) {
     Fmu *f = c;
     if (f->r[LIE] == SLOPES) return OK;
     for (size_t i = 0; i < n; ++i) *(order[i] == 1 ? &f->slope : &f->bend) = value[i];
     return OK;
 }
-API Status fmi2GetRealOutputDerivatives(void *c, const unsigned vr[], size_t n, const int o[], double v[]) { return ERROR; }
 API Status fmi2DoStep(void *c, double time, double H, int no_set) {
     Fmu *f = c;
     double *r = f->r, h = H, rate = (r[C] + 1.0) / r[MASS] + r[K] / r[MASS] + 1.0;
@@ -98,12 +91,6 @@ API Status fmi2DoStep(void *c, double time, double H, int no_set) {
     outputs(f);
     return OK;
 }
-API Status fmi2CancelStep(void *c) { return ERROR; }
-API Status fmi2GetStatus(void *c, int k, int *v) { return DISCARD; }
-API Status fmi2GetRealStatus(void *c, int k, double *v) { return DISCARD; }
-API Status fmi2GetIntegerStatus(void *c, int k, int *v) { return DISCARD; }
-API Status fmi2GetBooleanStatus(void *c, int k, int *v) { return DISCARD; }
-API Status fmi2GetStringStatus(void *c, int k, const char **v) { return DISCARD; }
 API Status fmi2GetFMUstate(void *c, void **state) {
     if (!*state) *state = malloc(sizeof(Fmu));
     memcpy(*state, c, sizeof(Fmu));
@@ -123,4 +110,34 @@ API Status fmi2DeSerializeFMUstate(void *c, const char bytes[], size_t n, void *
     memcpy(*state, bytes, n);
     return OK;
 }
-API Status fmi2GetDirectionalDerivative(void *c, const unsigned u[], size_t n, const unsigned k[], size_t m, const double d[], double v[]) { return ERROR; }
+
+API void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *where, bool v, bool l, bool event_mode,
+                                      bool early, const unsigned vr[], size_t n, void *e, void *log, void *update) {
+    return event_mode || early ? NULL : fmi2Instantiate(name, 1, token, where, log, v, l);
+}
+API void fmi3FreeInstance(void *c) { fmi2FreeInstance(c); }
+API Status fmi3EnterInitializationMode(void *c, bool t, double tol, double start, bool s, double stop) { return OK; }
+API Status fmi3ExitInitializationMode(void *c) { return fmi2ExitInitializationMode(c); }
+API Status fmi3GetFloat64(void *c, const unsigned vr[], size_t n, double value[], size_t m) {
+    return n == m ? fmi2GetReal(c, vr, n, value) : ERROR;
+}
+API Status fmi3SetFloat64(void *c, const unsigned vr[], size_t n, const double value[], size_t m) {
+    return n == m ? fmi2SetReal(c, vr, n, value) : ERROR;
+}
+API Status fmi3DoStep(void *c, double time, double H, bool no_set, bool *event, bool *end, bool *early, double *last) {
+    Fmu *f = c;
+    int lie = (int)f->r[LIE];
+    *last = lie == EARLY ? time + 0.5 * H : time + H;
+    *event = lie == EVENT, *end = lie == END, *early = lie == EARLY;
+    return fmi2DoStep(c, time, *last - time, no_set);
+}
+API Status fmi3GetFMUState(void *c, void **state) { return fmi2GetFMUstate(c, state); }
+API Status fmi3SetFMUState(void *c, void *state) { return fmi2SetFMUstate(c, state); }
+API Status fmi3FreeFMUState(void *c, void **state) { return fmi2FreeFMUstate(c, state); }
+API Status fmi3SerializedFMUStateSize(void *c, void *state, size_t *n) { return fmi2SerializedFMUstateSize(c, state, n); }
+API Status fmi3SerializeFMUState(void *c, void *state, unsigned char bytes[], size_t n) {
+    return fmi2SerializeFMUstate(c, state, (char *)bytes, n);
+}
+API Status fmi3DeserializeFMUState(void *c, const unsigned char bytes[], size_t n, void **state) {
+    return fmi2DeSerializeFMUstate(c, (const char *)bytes, n, state);
+}

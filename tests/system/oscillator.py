@@ -15,7 +15,10 @@ _PARAMETERS = {"m": 1.0, "k": 0.0, "c": 0.0, "load": 0.0, "x0": 0.0, "v0": 0.0, 
 LIES = {
     name: float(number)
     for number, name in enumerate(
-        ("none", "state", "velocity", "integral", "slopes", "hang", "crash", "nan", "energy", "integral_2")
+        (
+            *("none", "state", "velocity", "integral", "slopes", "hang", "crash", "nan", "energy", "integral_2"),
+            *("early", "event", "end"),
+        )
     )
 }
 #: All that a scene may name, for `springbeam.scene.partners.ForeignFmu`.
@@ -34,47 +37,58 @@ ALL = {
 
 
 @functools.cache
-def _library() -> bytes:
+def _library(lacks: str | None) -> bytes:
     folder = Path(tempfile.mkdtemp(prefix="springbeam-oscillator-"))
     source, library = Path(__file__).with_suffix(".c"), folder / "oscillator.so"
-    subprocess.run(["cc", "-O1", "-shared", "-fPIC", "-o", library, source], check=True)
+    renamed = [] if lacks is None else [f"-D{lacks}=renamed"]
+    subprocess.run(["cc", "-O1", "-shared", "-fPIC", *renamed, "-o", library, source], check=True)
     content = library.read_bytes()
     library.unlink()
     folder.rmdir()
     return content
 
 
-def _description(**flags: bool) -> str:
-    names = [*_INPUTS, *_OUTPUTS, *_PARAMETERS]
-    variables = []
-    for number, name in enumerate(names):
+def _description(version: str, **flags: bool) -> str:
+    variables, outputs = [], ""
+    for number, name in enumerate([*_INPUTS, *_OUTPUTS, *_PARAMETERS]):
+        said, start = f'name="{name}" valueReference="{number}" ', ""
         if name in _PARAMETERS:
-            kind, start = 'causality="parameter" variability="fixed"', f' start="{_PARAMETERS[name]}"'
+            said, start = f'{said} causality="parameter" variability="fixed"', f' start="{_PARAMETERS[name]}"'
         elif name in _INPUTS:
-            kind, start = 'causality="input"', ' start="0"'
+            said, start = f'{said} causality="input"', ' start="0"'
         else:
-            kind, start = 'causality="output"', ""
-        variables.append(
-            f'<ScalarVariable name="{name}" valueReference="{number}" {kind}><Real{start}/></ScalarVariable>'
-        )
-    outputs = "".join(f'<Unknown index="{len(_INPUTS) + i + 1}"/>' for i in range(len(_OUTPUTS)))
+            said += 'causality="output"'
+        if version == "2.0":
+            variables.append(f"<ScalarVariable {said}><Real{start}/></ScalarVariable>")
+        else:
+            variables.append(f"<Float64 {said}{start}/>")
+        if name in _OUTPUTS:
+            outputs += f'<Unknown index="{number + 1}"/>' if version == "2.0" else f"<Output {said.split()[1]}/>"
+    if version == "3.0":
+        variables.append('<Float64 name="time" valueReference="99" causality="independent" variability="continuous"/>')
+    else:
+        outputs = f"<Outputs>{outputs}</Outputs><InitialUnknowns>{outputs}</InitialUnknowns>"
     said = " ".join(f'{flag}="{str(value).lower()}"' for flag, value in flags.items())
+    token = "guid" if version == "2.0" else "instantiationToken"
     return (
-        '<?xml version="1.0"?><fmiModelDescription fmiVersion="2.0" modelName="oscillator" guid="{1}">'
+        f'<?xml version="1.0"?><fmiModelDescription fmiVersion="{version}" modelName="oscillator" {token}="{{1}}">'
         f'<CoSimulation modelIdentifier="oscillator" {said}/><ModelVariables>{"".join(variables)}</ModelVariables>'
-        f"<ModelStructure><Outputs>{outputs}</Outputs><InitialUnknowns>{outputs}</InitialUnknowns></ModelStructure></fmiModelDescription>"
+        f"<ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"
     )
 
 
-def made(path: Path, *, state: bool = True, slopes: bool = True, variable: bool = True) -> Path:
-    """Write the FMU ``path`` with these capabilities and return the path."""
-    flags = {
-        "canGetAndSetFMUstate": state,
-        "canSerializeFMUstate": state,
-        "canInterpolateInputs": slopes,
-        "canHandleVariableCommunicationStepSize": variable,
-    }
+def made(path: Path, *, version: str = "2.0", lacks: str | None = None, slopes: bool = True, **flags: bool) -> Path:
+    """Write the FMU ``path`` of a version of FMI, without one of its functions, and return the path.
+
+    ``flags`` are "state" and "variable", of the size of its steps; it can do what is not said.
+    """
+    said = dict.fromkeys(("canGetAndSetFMUstate", "canSerializeFMUstate"), flags.get("state", True))
+    said["canHandleVariableCommunicationStepSize"] = flags.get("variable", True)
+    if version == "2.0":
+        folder, said["canInterpolateInputs"] = "linux64", slopes
+    else:
+        folder, said = "x86_64-linux", {name.replace("state", "State"): value for name, value in said.items()}
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", _description(**flags))
-        archive.writestr("binaries/linux64/oscillator.so", _library())
+        archive.writestr("modelDescription.xml", _description(version, **said))
+        archive.writestr(f"binaries/{folder}/oscillator.so", _library(lacks))
     return path

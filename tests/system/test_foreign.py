@@ -35,8 +35,8 @@ def fmu(tmp_path_factory):
     folder = tmp_path_factory.mktemp("foreign")
 
     @functools.cache
-    def make(name: str = "oscillator", **flags: bool) -> str:
-        return str(oscillator.made(folder / f"{name}.fmu", **flags))
+    def make(name: str = "oscillator", **said: object) -> str:
+        return str(oscillator.made(folder / f"{name}.fmu", **said))
 
     return make
 
@@ -172,9 +172,32 @@ def test_the_seated_force_is_the_body_s(fmu):
     assert run.summary["max_energy_residual"] < 1e-9
 
 
+@pytest.mark.parametrize("law", ["link", "tie"])
+def test_an_fmu_of_fmi_3_is_as_good_as_one_of_fmi_2(fmu, law):
+    """FMI 3.0 has no input derivatives: degree 0, of order 2, and to the rounding of one of FMI 2.0."""
+    contact = {"law": law, "stiffness": STIFFNESS if law == "link" else 1e4, "damping": DAMPING * (law == "link")}
+    common = M1 * V / (M1 + M2)
+
+    def run(path: str, size: float) -> tuple[float, object]:
+        scene = pair(path, contact=contact, time={"t_end": 0.1}, coupling={"degree": 0, "macro_step": size})
+        run = simulate(scene)
+        due = linked(run.time) if law == "link" else np.array([tied(run.time, common)] * 2)
+        return float(np.abs(np.array([run.u_tip, run.y]) - due).max()), run
+
+    errors = [run(fmu("three", version="3.0"), size)[0] for size in (4e-3, 2e-3)]
+    assert 1.8 < np.log2(errors[0] / errors[1]) < (2.2 if law == "link" else 4.2)
+    fine, three = run(fmu("three", version="3.0"), 5e-5 if law == "link" else 5e-4)
+    assert fine < 1e-9
+    assert three.summary["max_energy_residual"] < 1e-12
+    _, two = run(fmu(), 2e-3)
+    _, three = run(fmu("three", version="3.0"), 2e-3)
+    assert np.abs(three.y - two.y).max() < 1e-15
+
+
 @pytest.mark.parametrize("scheme", ["jacobi", "gauss_seidel"])
-def test_without_state_saving_values_are_exchanged(fmu, scheme):
-    path, spring = fmu("plain", state=False, slopes=False), dict.fromkeys(ENERGIES)
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_without_state_saving_values_are_exchanged(fmu, scheme, version):
+    path, spring = fmu(f"plain{version}", version=version, state=False, slopes=False), dict.fromkeys(ENERGIES)
     errors = []
     for size in (2e-3, 1e-3):
         coupling = {"scheme": scheme, "degree": 0, "macro_step": size}
@@ -231,11 +254,23 @@ def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
         "crash": "crashed (SIGSEGV) in fmi2DoStep",
         "nan": "not finite",
         "energy": "energies named do not account",
+        "early": "fmi3DoStep returned early, which it was not allowed to",
+        "event": "fmi3DoStep asks for event mode",
+        "end": "fmi3DoStep asks that the simulation end",
     }
+    path = fmu("three", version="3.0") if "fmi3" in said[lie] else fmu()
     with pytest.raises(FmuError) as caught:
-        simulate(pair(fmu(), spring={"parameters": parameters}))
+        simulate(pair(path, spring={"parameters": parameters}, coupling={"degree": 0}))
     assert said[lie] in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("version", "lacks"), [("2.0", "fmi2DoStep"), ("3.0", "fmi3SetFMUState")])
+def test_a_function_that_is_needed_and_missing_is_named(fmu, version, lacks):
+    """Functions that no run needs are missing in every FMU of these tests."""
+    path = fmu(f"without {lacks}", version=version, lacks=lacks)
+    with pytest.raises(FmuError, match=f"its library lacks {lacks}; export it"):
+        simulate(pair(path, coupling={"degree": 0}))
 
 
 def test_an_fmu_that_hangs_is_given_up(fmu, monkeypatch):

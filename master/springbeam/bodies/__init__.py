@@ -1,8 +1,8 @@
 """What moves: bodies with one interface end, which a contact force and impulses act on.
 
 Imports `scene` only. ``protocol`` says what every body does, ``force`` is the language in which a force over a step is
-given, ``fmu`` holds one FMU (the only FMPy import), ``fmu_bodies`` makes bodies of the two FMUs, ``quasi_static`` is a
-beam without inertia, ``elements`` are masses and springs, ``rigid_wall`` is an end that nothing moves; ``foreign`` is
-an FMU that others made, ``probe`` examines it, ``abilities`` says what that allows. Start at ``protocol``; ``factory``
-makes the bodies of a scene.
+given, ``fmu`` holds one FMU and ``functions`` its C functions in either version of FMI, ``fmu_bodies`` makes bodies of
+the two FMUs, ``quasi_static`` is a beam without inertia, ``elements`` are masses and springs, ``rigid_wall`` is an end
+that nothing moves; ``foreign`` is an FMU that others made, ``probe`` examines it, ``abilities`` says what that allows.
+Start at ``protocol``; ``factory`` makes the bodies of a scene.
 """

@@ -40,7 +40,7 @@ class Need(NamedTuple):
 
 _STATE = "its state cannot be saved (canGetAndSetFMUstate = false)"
 _SIZES = "its steps have one size (canHandleVariableCommunicationStepSize = false)"
-_SLOPES = "its input takes no derivatives (canInterpolateInputs = false)"
+_SLOPES = "its input takes no derivatives (canInterpolateInputs = false; FMI 3.0 has none)"
 _VELOCITY, _IMPULSE, _INTEGRALS = "it has no velocity", "it has no impulse", "it has not integral and integral_2"
 
 

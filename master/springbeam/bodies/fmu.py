@@ -1,4 +1,4 @@
-"""One instance of a co-simulation FMU: the only module that imports FMPy."""
+"""One instance of a co-simulation FMU and its state."""
 
 from __future__ import annotations
 
@@ -6,39 +6,21 @@ import atexit
 import difflib
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from collections.abc import Mapping, Sequence
+from ctypes import byref, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
 from functools import lru_cache, partial
 from pathlib import Path
 from struct import Struct
 from types import FrameType
 from typing import Any
 
-from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    defaultCallbacks,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-    fmi2FMUstate,
-    fmi2LastSuccessfulTime,
-)
 from fmpy.model_description import ModelDescription, read_model_description
 
 from .archive import UnsafeArchive, unpack
 from .checkpointed import Checkpointed
+from .functions import DISCARD, ERROR, FATAL, VERSIONS, WARNING, Call, Functions
 from .protocol import FmuError, StepRefused
 
-#: Types of variables: in C, and of the values that they take.
-_KINDS: dict[str, tuple[Any, tuple[type, ...]]] = {
-    "Real": (c_double, (int, float)),
-    "Integer": (c_int, (int,)),
-    "Boolean": (c_int, (bool, int)),
-    "String": (c_char_p, (str,)),
-}
-#: Values of fmi2Status.
-WARNING, DISCARD, ERROR, FATAL = 1, 2, 3, 4
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 
 
@@ -58,7 +40,7 @@ def _unpacked(path: Path, modified: int) -> tuple[Path, ModelDescription]:
 
 
 class Reals:
-    """Some Real variables of an FMU, read and written together; the arguments are converted to C once."""
+    """Real numbers of an FMU, read and written together; the arguments are converted to C once."""
 
     def __init__(self, fmu: Fmu, *names: str) -> None:
         n = len(names)
@@ -66,9 +48,7 @@ class Reals:
         self._fmu = fmu
         self.values: Any = (c_double * n)()  #: as last read or written
         self._unpacked = partial(Struct(f"{n}d").unpack, self.values)
-        references = (c_uint * n)(*[fmu.reference(name, "Real") for name in names])
-        self._read = fmu.prepared("fmi2GetReal", references, c_size_t(n), self.values)
-        self._write = fmu.prepared("fmi2SetReal", references, c_size_t(n), self.values)
+        self._read, self._write = (fmu.accessor(verb, names, self.values) for verb in ("Get", "Set"))
         if names:
             self.get()  # a wrong reference is found before the run
 
@@ -109,37 +89,40 @@ class Fmu(Checkpointed):
         self.path, self._own = path, name is not None
         self._name = path.stem if name is None else name
         self._messages: list[str] = []
-        self._slave = self._load()
-        self._state = fmi2FMUstate()
+        self._functions: Functions | None = None
+        self._functions = functions = self._load()
+        self.prepared, self.real = functions.prepared, functions.REAL
+        self._state = c_void_p()
         self._worst = 0  #: status of the calls that have failed for good
         #: Whether anything happened since the state was marked.
         self.moved = False
         #: doStep calls, and how often the state was set back.
         self.steps = self.rewinds = 0
-        self._time, self._size = c_double(), c_double()
-        self._do_step = self.prepared("fmi2DoStep", self._time, self._size, c_int(0))
-        self._get_state = self.prepared("fmi2GetFMUstate", byref(self._state))
-        self._set_state = self.prepared("fmi2SetFMUstate", self._state)
-        self._free_state = self.prepared("fmi2FreeFMUstate", byref(self._state))
-        self._reached = c_double()
-        self._get_reached = self.prepared("fmi2GetRealStatus", c_int(fmi2LastSuccessfulTime), byref(self._reached))
+        self._time, self._size, self._start_time = c_double(), c_double(), c_double()
+        self._do_step = functions.stepping(self._time, self._size)
+        if self.says.canGetAndSetFMUstate:
+            self._get_state = self.prepared("GetFMUState", byref(self._state))
+            self._set_state = self.prepared("SetFMUState", self._state)
+        self._before, self._enter = functions.entering(self._start_time)
+        self._exit = self.prepared("ExitInitializationMode")
         try:
-            self._prepare_start(parameters)
+            self._prepare_parameters(parameters)
             self.initialise(start_time)
         except BaseException:
             self.close()
             raise
 
-    def _load(self) -> FMU2Slave:
+    def _load(self) -> Functions:
         if not self.path.is_file():
             remedy = "; ./build.sh fmus builds it, SPRINGBEAM_FMUS names another folder" if self._own else ""
             raise FmuError(f"{self.path}: not found{remedy}")
         folder, description = _unpacked(self.path, self.path.stat().st_mtime_ns)
-        if description.coSimulation is None or description.fmiVersion != "2.0":
+        version = VERSIONS.get(description.fmiVersion)
+        if description.coSimulation is None or version is None:
             kind = "co-simulation" if description.coSimulation else "model exchange"
             raise FmuError(
-                f"{self.path}: not an FMI 2.0 co-simulation FMU but one of FMI {description.fmiVersion}, {kind}; "
-                "export it as FMI 2.0 for co-simulation"
+                f"{self.path}: an FMU for {kind} of FMI {description.fmiVersion}; export it for co-simulation, as FMI "
+                f"{' or '.join(VERSIONS)}"
             )
         identifier = description.coSimulation.modelIdentifier
         if self._own and identifier != self._name:
@@ -147,59 +130,46 @@ class Fmu(Checkpointed):
         #: What it says it can do.
         self.says = description.coSimulation
         self._variables = {v.name: v for v in description.modelVariables}
-        # The callbacks must outlive the instance.
-        self._logger = fmi2CallbackLoggerTYPE(self._log)
-        self._callbacks = fmi2CallbackFunctions()
-        self._callbacks.logger = self._logger
-        self._callbacks.allocateMemory = defaultCallbacks.allocateMemory
-        self._callbacks.freeMemory = defaultCallbacks.freeMemory
         try:
-            slave = FMU2Slave(
-                guid=description.guid,
-                unzipDirectory=str(folder),
-                modelIdentifier=identifier,
-                instanceName=self._name,
-            )
-            slave.instantiate(callbacks=self._callbacks)
-        except Exception as error:  # FMPy raises bare Exceptions for a missing or foreign binary
+            return version(description, folder, self._name, self._log)
+        except OSError as error:
             raise FmuError(f"{self.path}: cannot be instantiated: {self._cause(error)}") from error
-        return slave
 
-    def _prepare_start(self, parameters: Mapping[str, Value]) -> None:
-        """Calls that initialise, with the parameters in their arguments."""
-        self._start_time = c_double()
-        no = c_int(0)
-        self._set_up = self.prepared("fmi2SetupExperiment", no, c_double(0.0), self._start_time, no, c_double(0.0))
-        self._enter = self.prepared("fmi2EnterInitializationMode")
-        self._exit = self.prepared("fmi2ExitInitializationMode")
-        self._reset = self.prepared("fmi2Reset")
+    def _prepare_parameters(self, parameters: Mapping[str, Value]) -> None:
+        """Calls that set the parameters."""
+        assert self._functions is not None
+        kinds = self._functions.KINDS
         #: Where the value of a parameter is.
         self._parameters: dict[str, tuple[Any, int]] = {}
-        self._set_parameters = []
+        self._set_parameters: list[Call] = []
         for name in parameters:
             variable = self.variable(name)
-            if variable.type not in _KINDS:
+            if variable.type not in kinds:
                 raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, which cannot be set here")
             if variable.causality not in ("parameter", "input") and variable.initial != "exact":
                 raise FmuError(f"{self.path}: variable {name!r} is {variable.causality}, not a parameter")
-        for kind, (ctype, taken) in _KINDS.items():
+        for kind, (_, ctype, taken) in kinds.items():
             names = [name for name in parameters if self.variable(name).type == kind]
             if not names:
                 continue
-            n = len(names)
-            for name in names:
-                if not isinstance(parameters[name], taken):
-                    raise FmuError(f"{self.path}: {name} = {parameters[name]!r}: variable {name!r} is {kind}")
             given = [parameters[name] for name in names]
-            values: Any = (ctype * n)(*[value.encode() if isinstance(value, str) else value for value in given])
-            references = (c_uint * n)(*[self.reference(name, kind) for name in names])
-            self._set_parameters.append(self.prepared(f"fmi2Set{kind}", references, c_size_t(n), values))
+            for name, value in zip(names, given, strict=True):
+                fits = isinstance(value, taken)
+                if fits and isinstance(value, int) and ctype(value).value != value:
+                    raise FmuError(f"{self.path}: {name} = {value!r}: variable {name!r} is {kind}, too small for it")
+                if not fits:
+                    raise FmuError(f"{self.path}: {name} = {value!r}: variable {name!r} is {kind}")
+            values: Any = (ctype * len(names))(
+                *[value.encode() if isinstance(value, str) else value for value in given]
+            )
+            references = self.references(names, kind)
+            self._set_parameters.append(self._functions.accessor("Set", kind, references, values))
             self._parameters.update((name, (values, i)) for i, name in enumerate(names))
 
     def initialise(self, time: float) -> None:
         """Set parameters and start values and leave initialization mode at ``time`` [s]."""
         self._start_time.value = time
-        for call in (self._set_up, *self._set_parameters, self._enter, self._exit):
+        for call in (*self._before, *self._set_parameters, self._enter, self._exit):
             if (status := call()) > WARNING:
                 raise self.failed(status, "cannot be initialised")
 
@@ -208,7 +178,7 @@ class Fmu(Checkpointed):
         for name, value in changed.items():
             values, i = self._parameters[name]
             values[i] = value
-        if (status := self._reset()) > WARNING:
+        if (status := self.prepared("Reset")()) > WARNING:
             raise self.failed(status, "cannot be reset")
         self.initialise(time)
         self.moved = True
@@ -216,17 +186,12 @@ class Fmu(Checkpointed):
     @property
     def usable(self) -> bool:
         """Whether no call has failed for good."""
-        return self._slave is not None and self._worst <= WARNING
+        return self._functions is not None and self._worst <= WARNING
 
-    def prepared(self, name: str, *arguments: Any) -> Callable[[], int]:
-        """An FMI function of this instance with its arguments, which are converted to C once; returns its status.
-
-        A pointer of our own to the function that FMPy has loaded: FMPy's wrapper converts and checks types at each
-        call, which costs as much as the call.
-        """
-        function = self._slave.dll[name]
-        function.restype = c_int
-        return partial(function, c_void_p(self._slave.component), *arguments)
+    def accessor(self, verb: str, names: Sequence[str], values: Any) -> Call:
+        """Return what gets or sets (``verb``) variables that are real numbers by ``values``, an array of C."""
+        assert self._functions is not None
+        return self._functions.accessor(verb, self.real, self.references(names, self.real), values)
 
     def variable(self, name: str) -> Any:
         """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""
@@ -237,25 +202,22 @@ class Fmu(Checkpointed):
             meant = f"; did you mean {close[0]!r}?" if close else ""
             raise FmuError(f"{self.path}: has no variable {name!r}{meant}") from None
 
-    def reference(self, name: str, kind: str) -> int:
-        """Value reference of a variable of type ``kind``."""
-        variable = self.variable(name)
-        if variable.type != kind:
-            raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, expected {kind}")
-        return int(variable.valueReference)
+    def references(self, names: Sequence[str], kind: str) -> Any:
+        """Value references of variables of one type, as an array of C."""
+        for name in names:
+            if (variable := self.variable(name)).type != kind:
+                raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, expected {kind}")
+            if variable.shape:
+                raise FmuError(f"{self.path}: variable {name!r} is an array; only single numbers can be used")
+        return (c_uint * len(names))(*[int(self.variable(name).valueReference) for name in names])
 
-    def input_derivative(self, name: str, order: int) -> Callable[[float], None]:
-        """Return what sets the derivative of an input over the next step."""
-        value = c_double()
-        reference, orders = (c_uint * 1)(self.reference(name, "Real")), (c_int * 1)(order)
-        call = self.prepared("fmi2SetRealInputDerivatives", reference, c_size_t(1), orders, byref(value))
-
-        def set_to(derivative: float) -> None:
-            value.value, self.moved = derivative, True
-            if (status := call()) > WARNING:
-                raise self.failed(status, f"cannot set derivative {order} of {name}")
-
-        return set_to
+    def input_derivatives(self, names: Sequence[str], orders: int, values: Any) -> Call:
+        """Return what sets derivatives 1 … ``orders`` of inputs over the next step, those of one after another."""
+        n = len(names) * orders
+        each = [name for name in names for _ in range(orders)]
+        number = (c_int * n)(*list(range(1, orders + 1)) * len(names))
+        references = self.references(each, self.real)
+        return self.prepared("SetRealInputDerivatives", references, c_size_t(n), number, values)
 
     def mark(self) -> None:
         if (status := self._get_state()) > WARNING:
@@ -277,12 +239,14 @@ class Fmu(Checkpointed):
             return
         if status not in (DISCARD, ERROR):
             raise self.failed(status, f"cannot step at t = {time:.9g} s")
-        cause = self._cause(f"fmi2DoStep returned {_STATUS[status]}")
+        assert self._functions is not None
+        cause = self._cause(f"{self._functions.spelt('DoStep')} returned {_STATUS[status]}")
         reached = ""
         if status == DISCARD:
-            if (known := self._get_reached()) >= ERROR:
+            known, time_reached = self._functions.reached()
+            if known >= ERROR:
                 raise self.failed(known, f"{cause}, and does not say how far it came")
-            reached = f" (reached t = {self._reached.value:.9g} s)" if known <= WARNING else ""
+            reached = f" (reached t = {time_reached:.9g} s)" if known <= WARNING else ""
         # Also after fmi2Error a saved state may be restored and the step tried again (FMI 2.0.4, section 2.1.3).
         raise StepRefused(f"{self._name}: {cause}{reached}")
 
@@ -291,43 +255,44 @@ class Fmu(Checkpointed):
         self._worst = max(self._worst, status)
         return FmuError(f"{self.path}: {what}: {self._cause(f'it returned {_STATUS[status]}')}")
 
-    @contextmanager
-    def _calling(self, what: str) -> Iterator[None]:
-        try:
-            yield
-        except FMICallException as error:
-            raise self.failed(error.status, what) from error
+    def _must(self, what: str, name: str, *arguments: Any) -> None:
+        """Call a function that is called seldom. Raises FmuError."""
+        if (status := self.prepared(name, *arguments)()) > WARNING:
+            raise self.failed(status, what)
 
     def save(self) -> dict[str, Any]:
-        with self._calling("cannot save the state"):
-            state = self._slave.getFMUstate()
-            serialized = self._slave.serializeFMUstate(state)
-            self._slave.freeFMUstate(state)
-        return {**super().save(), "state": serialized}
+        what, state, size = "cannot save the state", c_void_p(), c_size_t()
+        self._must(what, "GetFMUState", byref(state))
+        self._must(what, "SerializedFMUStateSize", state, byref(size))
+        content = (c_char * size.value)()
+        self._must(what, "SerializeFMUState", state, content, size)
+        self._must(what, "FreeFMUState", byref(state))
+        return {**super().save(), "state": content.raw}
 
     def restore(self, saved: dict[str, Any]) -> None:
         counts = dict(saved)
-        with self._calling("cannot restore the state"):
-            state = self._slave.deSerializeFMUstate(counts.pop("state", b""), fmi2FMUstate())
-            self._slave.setFMUstate(state)
-            self._slave.freeFMUstate(state)
+        content = counts.pop("state", b"")
+        what, state, size = "cannot restore the state", c_void_p(), c_size_t(len(content))
+        self._must(what, "DeserializeFMUState", (c_char * len(content)).from_buffer_copy(content), size, byref(state))
+        self._must(what, "SetFMUState", state)
+        self._must(what, "FreeFMUState", byref(state))
         super().restore(counts)
 
     def close(self) -> None:
         """Free the instance, unless it has returned fmi2Fatal: then none of its library may be called again."""
-        slave, self._slave = self._slave, None
-        if slave is None:
+        functions, self._functions = self._functions, None
+        if functions is None:
             return
         if self._state and self._worst < FATAL:
-            self._worst = self._free_state()
+            self._worst = self.prepared("FreeFMUState", byref(self._state))()
         if self._worst == FATAL:
             _unpacked.cache_clear()  # the next instance takes a copy of the library of its own
         else:
-            slave.freeInstance()
+            functions.free()
 
-    def _log(self, environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+    def _log(self, status: int, text: str) -> None:
         if status > 0:
-            self._messages = [*self._messages[-3:], message.decode("utf-8", "replace")]
+            self._messages = [*self._messages[-3:], text]
 
     def _cause(self, otherwise: Exception | str) -> str:
         messages, self._messages = self._messages, []

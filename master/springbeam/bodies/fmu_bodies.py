@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from ctypes import byref, c_double, c_int, c_size_t, c_uint, sizeof
+from ctypes import byref, c_double, sizeof
 from math import isfinite
 from typing import Any, ClassVar, NoReturn
 
@@ -12,8 +12,9 @@ import numpy as np
 from ..scene import Beam, Load, Spring
 from ..scene.statics import SHAPE_POINTS
 from .archive import fmu_directory
-from .fmu import WARNING, Fmu, Reals
+from .fmu import Fmu, Reals
 from .force import combined
+from .functions import WARNING
 from .protocol import NO_FORCE, BeamBody, Body, Energies, FmuError, Force, Motion, StepRefused
 
 #: The numbers by which the beam FMU knows its alternatives.
@@ -63,19 +64,13 @@ class FmuBody(Body):
     def _prepare_inputs(self, loads: Sequence[str]) -> None:
         """Calls that set the forces and ``loads``, inputs of the FMU, and their derivatives."""
         fmu, names = self.fmu, (*self._FORCES, *loads)
-        n, orders = len(names), self._SLOPES
-        self._number = n
-        forces = [fmu.reference(name, "Real") for name in names]
+        n = self._number = len(names)
         Reals(fmu, *names)  # a wrong reference is found before the run
         self._inputs: Any = (c_double * (3 * n))()  # the forces and loads, then the two derivatives of each
-        self._set_forces = fmu.prepared("fmi2SetReal", (c_uint * n)(*forces), c_size_t(n), self._inputs)
-        self._set_slopes = fmu.prepared(
-            "fmi2SetRealInputDerivatives",
-            (c_uint * (orders * n))(*[reference for reference in forces for _ in range(orders)]),
-            c_size_t(orders * n),
-            (c_int * (orders * n))(*[1, 2][:orders] * n),
-            byref(self._inputs, n * sizeof(c_double)),
-        )
+        self._set_forces = fmu.accessor("Set", names, self._inputs)
+        if self._SLOPES > 0:
+            slopes = byref(self._inputs, n * sizeof(c_double))
+            self._set_slopes = fmu.input_derivatives(names, self._SLOPES, slopes)
         #: The loads of a step, and two derivatives of each.
         self._loads: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,) * len(loads), (0.0,) * (2 * len(loads)))
 

@@ -224,7 +224,7 @@ def check_names(fmu: Fmu, spec: ForeignFmu) -> None:
                 if name is None:
                     continue
                 try:
-                    fmu.reference(name, "Real")
+                    fmu.references([name], fmu.real)
                     causality = fmu.variable(name).causality
                 except FmuError as error:
                     raise FmuError(f"{error}; it is the scene's {key}") from None

@@ -10,16 +10,18 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Sequence
+from ctypes import c_double
 from dataclasses import asdict
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..scene.partners import ForeignFmu
 from .abilities import Abilities
 from .fmu import Fmu, Reals
 from .foreign import Findings, check_names
+from .functions import WARNING
 from .protocol import BodyFailed, FmuError, Force, StepRefused
 
 #: Sizes tried, over H; steps of a record.
@@ -80,7 +82,9 @@ class Bench:
         self._outputs = Reals(fmu, *(name for name in (*motion, *spec.energies) if name is not None))
         self._force = Reals(fmu, spec.force)
         self._impulse = None if spec.impulse is None else Reals(fmu, spec.impulse)
-        self._derivatives = [fmu.input_derivative(spec.force, order) for order in (1, 2)]
+        self._slopes: Any = (c_double * 2)()
+        if fmu.says.canInterpolateInputs:
+            self._set_slopes = {n: fmu.input_derivatives((spec.force,), n, self._slopes) for n in (1, 2)}
         self._fresh, self._marked = True, False
         return fmu
 
@@ -123,8 +127,10 @@ class Bench:
         self.stage("fmi2DoStep")
         for i, (value, *slopes) in enumerate(forces):
             self._force.set((value,))
-            for derivative, slope in zip(self._derivatives[: self.slopes], slopes, strict=False):
-                derivative(slope)
+            if self.slopes > 0:
+                self._slopes[:] = slopes
+                if (status := self._set_slopes[self.slopes]()) > WARNING:
+                    raise self.fmu.failed(status, f"cannot set derivatives of {self.spec.force}")
             self.fmu.step(self._start + i * size, size)
             if impulse and self._impulse is not None:
                 self._impulse.set((0.0,))
