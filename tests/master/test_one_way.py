@@ -107,7 +107,7 @@ def test_both_ends_known_leave_nothing_to_solve() -> None:
     one_way = OneWay(law, 0, 1e-12, upper_drives=True, driver_stiffness=1e6)
     ends = (beam.motion()._replace(displacement=-start), RigidWall(0.0).motion())
     force = one_way.solve(beam, RigidWall(0.0), Window(0.0, 0.01, ends), (5.0, 0.0, 0.0))
-    assert force == (Projection(law, 0)(start, [-beam.motion().displacement], 0.01).a[0], 0.0, 0.0)
+    assert force == (Projection(law, 0).force(start, 0.01, [-beam.motion().displacement])[0], 0.0, 0.0)
     assert beam.steps == 1
 
 

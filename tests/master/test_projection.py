@@ -51,7 +51,7 @@ def test_the_work_is_what_the_law_stores(degree, q, shape):
     law = Compliance(1e4, q)
     projection = Projection(law, degree)
     start, x = numbers(shape, degree)
-    a = projection(start, x, SIZE).a
+    a = projection.force(start, SIZE, x)
     stored = [law.potential(p) for p in (start, x[0])]
     parts = np.abs(a).sum() * (abs(start) + np.abs(x).sum())
     assert work(projection, a, start, x) == pytest.approx(stored[1] - stored[0], abs=16 * EPS * (max(stored) + parts))
@@ -67,7 +67,7 @@ def test_it_is_the_projection_of_the_force(degree, q, shape):
     start, x = numbers(shape, degree)
     c = series(projection, start, x)
     largest = law.force(float(np.abs(legendre.legval(np.linspace(-1, 1, 50), c)).max()))
-    for k, value in enumerate(projection(start, x, SIZE).a):
+    for k, value in enumerate(projection.force(start, SIZE, x)):
         unit = [0.0] * k + [1.0]
         exact = (k + 0.5) * integral(lambda s, e=unit: law.force(legendre.legval(s, c)) * legendre.legval(s, e), c)
         assert value == pytest.approx(exact, abs=1e-7 * largest)
@@ -80,13 +80,13 @@ def test_slopes_are_those_of_the_force(law, degree, shape):
     """Central differences, second order in 1e-5 of the penetration; the correction along p̃′ is not differentiated."""
     projection = Projection(law, degree)
     start, x = numbers(shape, degree)
-    slope = np.array(projection(start, x, SIZE).slope)
+    slope = np.array(projection.slope(start, SIZE, x))
     for j in range(degree + 1):
         ends = []
         for sign in (1.0, -1.0):
             moved = list(x)
             moved[j] += sign * 1e-8
-            ends.append(np.array(projection(start, moved, SIZE).a))
+            ends.append(np.array(projection.force(start, SIZE, moved)))
         assert (ends[0] - ends[1]) / 2e-8 == pytest.approx(slope[:, j], rel=1e-4, abs=1e-4 * np.abs(slope).max())
 
 
@@ -98,11 +98,11 @@ def test_damping_never_gives_energy(start, end, mean, skew, degree, q, chi):
     law = Compliance(1e4, q, chi)
     projection = Projection(law, degree)
     x = [end, mean, skew][: degree + 1]
-    a = projection(start, x, SIZE).a
+    a = projection.force(start, SIZE, x)
     gained = law.potential(end) - law.potential(start)
     largest = abs(start) + sum(map(abs, x))  # whether less than a rounding of it touches is not told
     scale = abs(gained) + sum(map(abs, a)) * largest + law.potential(largest)
-    dissipated = projection.dissipated(start, x, SIZE) if law.damped else 0.0
+    dissipated = projection.dissipated(start, SIZE, x) if law.damped else 0.0
     assert dissipated >= -64 * EPS * scale
     assert work(projection, a, start, x) - gained == pytest.approx(dissipated, abs=64 * EPS * scale)
 
@@ -115,7 +115,7 @@ def test_a_link_dissipates_its_dashpots_work(degree):
     start, x = numbers("in", degree)
     rate = 2.0 / SIZE * legendre.legder(series(projection, start, x))
     exact = 20.0 * 0.5 * SIZE * quad(lambda s: legendre.legval(s, rate) ** 2, -1.0, 1.0)[0]
-    assert projection.dissipated(start, x, SIZE) == pytest.approx(exact, rel=1e-13)
+    assert projection.dissipated(start, SIZE, x) == pytest.approx(exact, rel=1e-13)
 
 
 # -- degree 0: the discrete gradient ----------------------------------------------------------------------------------
@@ -128,7 +128,7 @@ def test_small_changes_do_not_cancel(change, q):
     p, law = 2e-3, Compliance(1e4, q)
     exact = law.force(p) * (1.0 + q * change / 2 + q * (q - 1.0) * change**2 / 6)
     # The next term is q(q−1)(q−2) δ³/24 ≤ δ³/4.
-    found = Projection(law, 0)(p, [p * (1.0 + change)], SIZE).a[0]
+    found = Projection(law, 0).force(p, SIZE, [p * (1.0 + change)])[0]
     assert found == pytest.approx(exact, rel=8 * EPS + abs(change) ** 3)
 
 
@@ -136,13 +136,13 @@ def test_small_changes_do_not_cancel(change, q):
 def test_both_branches_meet(q):
     """Change of 10 % of the larger p, from either side: the branches agree to the quotient's cancellation."""
     p1, projection = 1e-3 / 0.9, Projection(Compliance(1e4, q), 0)
-    sides = [projection(1e-3, [p1 * (1.0 + s)], SIZE).a[0] for s in (-1e-12, 1e-12)]
+    sides = [projection.force(1e-3, SIZE, [p1 * (1.0 + s)])[0] for s in (-1e-12, 1e-12)]
     assert sides[0] == pytest.approx(sides[1], rel=1e-11)
 
 
 @pytest.mark.parametrize(("p0", "p1"), PAIRS)
 def test_it_is_symmetric_in_time_and_vanishes_out_of_contact(p0, p1):
     projection = Projection(Compliance(1e4, 2.0), 0)
-    there, back = (projection(a, [b], SIZE).a[0] for a, b in ((p0, p1), (p1, p0)))
+    there, back = (projection.force(a, SIZE, [b])[0] for a, b in ((p0, p1), (p1, p0)))
     assert there == pytest.approx(back, rel=1e-13)
     assert (there == 0.0) == (max(p0, p1) <= 0.0)

@@ -16,8 +16,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal, Protocol
 
-import numpy as np
-
 from ..scene import Contact
 
 
@@ -60,11 +58,8 @@ class SoftLaw(Protocol):
     def slope(self, p: float) -> float:
         """Return F′(p) [N/m]."""
 
-    def elastic(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return F [N] and F′ [N/m] of an array of penetrations [m], where F does not vanish."""
-
-    def resistance(self, p: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return D [N], ∂D/∂p [N/m] and ∂D/∂ṗ [N·s/m] of arrays, where F does not vanish."""
+    def resistance(self, p: float, rate: float) -> tuple[float, float, float]:
+        """Return D [N], ∂D/∂p [N/m] and ∂D/∂ṗ [N·s/m]; asked for only if `damped`."""
 
 
 @dataclass(frozen=True)
@@ -106,14 +101,9 @@ class Compliance:
     def slope(self, p: float) -> float:
         return float(self.exponent * self.stiffness * p ** (self.exponent - 1.0)) if p > 0.0 else 0.0
 
-    def elastic(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        slope = self.stiffness * p ** (self.exponent - 1.0)
-        return slope * p, self.exponent * slope
-
-    def resistance(self, p: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        force, slope = self.elastic(p)
-        share = np.maximum(self.damping * rate, -1.0)
-        return force * share, slope * share, np.where(share > -1.0, self.damping * force, 0.0)
+    def resistance(self, p: float, rate: float) -> tuple[float, float, float]:
+        force, share = self.force(p), max(self.damping * rate, -1.0)
+        return force * share, self.slope(p) * share, self.damping * force if share > -1.0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -148,11 +138,8 @@ class Link:
     def slope(self, p: float) -> float:
         return self.stiffness
 
-    def elastic(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return self.stiffness * p, np.full_like(p, self.stiffness)
-
-    def resistance(self, p: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return self.damping * rate, np.zeros_like(p), np.full_like(p, self.damping)
+    def resistance(self, p: float, rate: float) -> tuple[float, float, float]:
+        return self.damping * rate, 0.0, self.damping
 
 
 Law = RigidLaw | SoftLaw

@@ -64,7 +64,7 @@ class OneWay(Coupling):
             driven.advance(window.time, window.size, guess)
             ends = (end.motion(), driven.motion()) if self._upper_drives else (driven.motion(), end.motion())
             start, x = penetration(Step(window.time, window.size, guess, guess, window.ends, ends), self.degree)
-            return force.derivatives(self._projection(start, x, window.size).a, window.size)
+            return force.derivatives(self._projection.force(start, window.size, x), window.size)
         upper, lower = (end, driven) if self._upper_drives else (driven, end)
         return self._solver.solve(upper, lower, window, guess)
 

@@ -7,204 +7,255 @@ moments, and let C be the projection of F(p̃) + D(p̃, p̃′) onto degree d in
 
 whatever the bodies, the law and the size of the step (``docs/coupling.md``, "Soft laws"). With d = 0 it is the
 discrete gradient C = ΔΦ/Δp (Gonzalez 1996).
+
+Polynomials are in powers of s = 2τ/H − 1, numbers are plain floats: most steps have six points of quadrature, and
+numpy's overhead would be most of their time.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
-from math import comb, isfinite
-from typing import NamedTuple
+from math import isfinite
+from operator import mul
 
 import numpy as np
-from numpy.polynomial import legendre
 
 from ..contact.laws import SoftLaw
-from .small import Matrix, Vector
+from .small import Matrix, Vector, transposed
+
+#: p̃ by its coefficients in powers of s, up to degree 3.
+_Path = tuple[float, float, float, float]
+#: Points s of a quadrature on [−1, 1], and their weights.
+_Rule = Sequence[tuple[float, float]]
 
 _EPS = 2.0**-52
-#: Gauss–Legendre points of a step whose penetration stays off zero, and of pieces between zeros.
-_POINTS, _POINTS_OF_PIECES = 8, 16
-#: Relative change of p over a step up to which the quotient ΔΦ/Δp would lose digits to cancellation.
+#: p̃ keeps its size, or keeps off zero, if the least of its Bézier points is above this share of the largest.
+_STEADY, _OFF_ZERO = 0.9, 0.3
+#: Relative change of p over a step up to which the quotient ΔΦ/Δp would lose digits.
 _SMALL_CHANGE = 0.1
-#: p̃ is near zero somewhere if one of its Bernstein coefficients is below this share of the largest.
-_NEAR_ZERO = 0.3
-#: Bisections to a zero of p̃: to a millionth of the step, beside which the law is a rounding of itself.
-_BISECTIONS = 40
+#: How well zeros of p̃ are found, and steps to them at most.
+_ZERO, _MAX_STEPS_TO_ZERO = 1e-12, 40
 
 
-class Projected(NamedTuple):
-    """The force of a step."""
-
-    a: Vector  #: Legendre coefficients of C [N]
-    slope: Matrix  #: ∂a/∂x, x the penetration's numbers [N/m]
+def _gauss(points: int) -> list[tuple[float, float]]:
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    return list(zip(nodes.tolist(), weights.tolist(), strict=True))
 
 
-class _Points(NamedTuple):
-    """Quadrature points of a step, at s in (−1, 1)."""
-
-    V: np.ndarray  #: P_0 … P_{d+1} there, shape (n, d + 2)
-    W: np.ndarray  #: (2k + 1)/2 P_k for k ≤ d, times the weights, shape (d + 1, n)
+#: Rules for a p̃ that keeps its size and for one that keeps off zero.
+_FEW, _MANY = _gauss(6), _gauss(8)
+#: The rule for a piece between zeros, from 0 to 1. It is graded towards both ends, 3t² − 2t³ of the length: a power of
+#: p beside p = 0 becomes smooth.
+_GRADED = [
+    (t * t * (3.0 - 2.0 * t), 3.0 * t * (1.0 - t) * weight)
+    for t, weight in [(0.5 * (s + 1.0), weight) for s, weight in _gauss(16)]
+]
 
 
 class Projection:
     """Projects ``law`` onto polynomials of ``degree`` over a step.
 
-    The penetration's numbers x [m] are its value at the end of the step, its mean, and the mean of s p with
-    s = 2τ/H − 1, the first d + 1 of them: minus the conditions of `springbeam.coupling.energy`.
+    A step is told by the penetration at its start [m] and the penetration's numbers x [m]: its value at the end of the
+    step, its mean, and the mean of s p, the first d + 1 of them: minus the conditions of `springbeam.coupling.energy`.
     """
 
     def __init__(self, law: SoftLaw, degree: int) -> None:
         self.law, self.degree = law, degree
-        n = degree + 2
-        self._whole = _points(*legendre.leggauss(_POINTS), degree)
-        nodes, weights = legendre.leggauss(_POINTS_OF_PIECES)
-        t = 0.5 * (nodes + 1.0)
-        # Graded towards both ends of a piece, 3t² − 2t³ of its length: a power of p beside p = 0 becomes smooth.
-        self._graded, self._graded_weights = t * t * (3.0 - 2.0 * t), 3.0 * t * (1.0 - t) * weights
-        self._unit, self._unit_weights = t, 0.5 * weights
-        self._from_x, self._from_start = numbers_to_legendre(degree)
-        self._derivative = legendre.legder(np.eye(n))  # coefficients of dp̃/ds from those of p̃
-        self._norms = [2.0 / (2.0 * k + 1.0) for k in range(degree + 1)]
-        self._bernstein = np.array([_bernstein(k, n - 1) for k in range(n)]).T
+        units = np.eye(degree + 1).tolist()
+        #: ∂p̃/∂x_j, and the Legendre coefficients of its projection, by rows.
+        self._by_x = [_path(0.0, unit) for unit in units]
+        self._by_x_projected = transposed(penetration_series(0.0, unit)[: degree + 1] for unit in units)
 
-    def __call__(self, start: float, x: Vector, size: float) -> Projected:
-        """Return the force over a step of ``size`` [s] with the penetration ``start`` [m] at its start.
+    def force(self, start: float, size: float, x: Vector) -> Vector:
+        """Return the Legendre coefficients of C [N] over a step of ``size`` [s].
 
         Raises OverflowError where no double holds it.
         """
-        if self.degree == 0 and not self.law.damped:
-            return self._discrete_gradient(start, x[0])
-        c = self._coefficients(start, x)
-        points = self._where_it_acts(c)
-        if points is None:
-            return Projected([0.0] * (self.degree + 1), [[0.0] * (self.degree + 1)] * (self.degree + 1))
-        V, W = points
-        p = V @ c
-        F, slope = self.law.elastic(p)
-        a = self._balanced((W @ F).tolist(), c, start, x[0])
-        by_x = (W * slope) @ (V @ self._from_x)
+        if self._tells_by_ends(start, x[0]):
+            return [(self.law.potential(x[0]) - self.law.potential(start)) / (x[0] - start)]
+        path = b0, b1, b2, b3 = _path(start, x)
+        rule = self._where_it_acts(path, start, x[0])
+        law = self.law.force
+        m0 = m1 = m2 = 0.0
+        for s, weight in rule:
+            m = weight * law(b0 + s * (b1 + s * (b2 + s * b3)))
+            m0 += m
+            m *= s
+            m1 += m
+            m2 += s * m
+        share = self._missing(path, (m0, m1, m2), start, x[0]) if rule else 0.0
         if self.law.damped:
-            rate = (2.0 / size) * (V[:, :-1] @ self._derivative)
-            D, by_p, by_rate = self.law.resistance(p, rate @ c)
-            a = [elastic + damped for elastic, damped in zip(a, (W @ D).tolist(), strict=True)]
-            by_x += ((W * by_p) @ V + (W * by_rate) @ rate) @ self._from_x
-        if not all(map(isfinite, a)):
+            for s, weight in rule:
+                m = weight * self.law.resistance(*_at(path, s, size))[0]
+                m0 += m
+                m1 += s * m
+                m2 += s * s * m
+        a = _legendre(m0, m1, m2)
+        if share != 0.0:
+            a = [a[0] + share * (b1 + b3), a[1] + share * 2.0 * b2, a[2] + share * 2.0 * b3]
+        if not isfinite(sum(a)):
             raise OverflowError
-        return Projected(a, by_x.tolist())
+        return a[: self.degree + 1]
 
-    def dissipated(self, start: float, x: Vector, size: float) -> float:
-        """Return ∫ D ṗ dτ ≥ 0 [J] over a step of ``size`` [s] with the penetration's numbers ``x``."""
-        c = self._coefficients(start, x)
-        points = self._where_it_acts(c)
-        if points is None:
-            return 0.0
-        V, W = points
-        derivative = self._derivative @ c
-        D, _, _ = self.law.resistance(V @ c, (2.0 / size) * (V[:, :-1] @ derivative))
-        return float(np.dot(self._norms * (W @ D), derivative))
+    def slope(self, start: float, size: float, x: Vector) -> Matrix:
+        """Return ∂a/∂x [N/m] of `force`; where p keeps its size, with F′ as it is in the middle of the step."""
+        if self._tells_by_ends(start, x[0]):
+            return [[(self.law.force(x[0]) - self.force(start, size, x)[0]) / (x[0] - start)]]
+        path = _path(start, x)
+        rule = self._where_it_acts(path, start, x[0])
+        law = self.law
+        if rule is _FEW and not law.damped:
+            in_middle = law.slope(path[0] + path[1] / 3.0 if self.degree == 0 else path[0])
+            return [[in_middle * value for value in row] for row in self._by_x_projected]
+        places = [_at(path, s, size) for s, _ in rule]
+        slopes = [law.slope(p) for p, _ in places]
+        rows = []
+        if law.damped:
+            resistances = [law.resistance(p, rate) for p, rate in places]
+            slopes = [slope + by_p for slope, (_, by_p, _) in zip(slopes, resistances, strict=True)]
+            by_rate = _moments(rule, [by_rate for _, _, by_rate in resistances])
+        by_p = _moments(rule, slopes)
+        for change in self._by_x:
+            moments = [_product(change, by_p[k:]) for k in range(3)]
+            if law.damped:
+                rate = [2.0 / size * i * b for i, b in enumerate(change)][1:]
+                moments = [m + _product(rate, by_rate[k:]) for k, m in enumerate(moments)]
+            rows.append(_legendre(*moments)[: self.degree + 1])
+        return transposed(rows)
+
+    def dissipated(self, start: float, size: float, x: Vector) -> float:
+        """Return ∫ D ṗ dτ ≥ 0 [J] over a step of ``size`` [s]."""
+        path = _path(start, x)
+        total = 0.0
+        for s, weight in self._where_it_acts(path, start, x[0]):
+            p, rate = _at(path, s, size)
+            total += weight * self.law.resistance(p, rate)[0] * rate
+        return 0.5 * size * total
 
     def left_out(self, start: float, x: Vector) -> float:
         """Return the Legendre coefficient of F(p̃) of degree d + 1 [N], the first that C leaves out."""
-        c = self._coefficients(start, x)
-        points = self._where_it_acts(c)
-        if points is None:
-            return 0.0
-        V, W = points
+        path = _path(start, x)
         k = self.degree + 1
-        return float((2 * k + 1) * (W[0] * V[:, k]) @ self.law.elastic(V @ c)[0])
+        polynomial = ([0.0, 1.0], [-0.5, 0.0, 1.5], [0.0, -1.5, 0.0, 2.5])[self.degree]
+        total = 0.0
+        for s, weight in self._where_it_acts(path, start, x[0]):
+            value = sum(c * s**i for i, c in enumerate(polynomial))
+            total += weight * value * self.law.force(_at(path, s)[0])
+        return (k + 0.5) * total
 
-    def _coefficients(self, start: float, x: Vector) -> np.ndarray:
-        """Return the d + 2 Legendre coefficients of p̃ [m]."""
-        return np.asarray(self._from_x @ x + self._from_start * start)
+    def _tells_by_ends(self, start: float, end: float) -> bool:
+        """Whether C is ΔΦ/Δp, and that loses no digits to cancellation."""
+        return self.degree == 0 and not self.law.damped and abs(end - start) > _SMALL_CHANGE * max(abs(start), abs(end))
 
-    def _discrete_gradient(self, start: float, end: float) -> Projected:
-        law, change = self.law, end - start
-        largest = max(abs(start), abs(end))
-        if abs(change) > _SMALL_CHANGE * largest:
-            mean = (law.potential(end) - law.potential(start)) / change
-            return Projected([mean], [[(law.force(end) - mean) / change]])
-        if largest == 0.0 or (law.one_sided and start <= 0.0):
-            return Projected([law.force(end)], [[0.5 * law.slope(end)]])
-        # One sign throughout: the quotient is the mean of F over the straight path.
-        F, slope = law.elastic(start + change * self._unit)
-        return Projected([float(self._unit_weights @ F)], [[float(self._unit_weights @ (self._unit * slope))]])
-
-    def _balanced(self, a: Vector, c: np.ndarray, start: float, end: float) -> Vector:
-        """Correct ``a`` along p̃′ so that ∫ C p̃′ is ΔΦ to rounding: quadrature of a power is not exact."""
-        rates = (self._derivative @ c).tolist()
-        parts = [norm * value * rate for norm, value, rate in zip(self._norms, a, rates, strict=True)]
+    def _missing(self, path: _Path, moments: tuple[float, float, float], start: float, end: float) -> float:
+        """Return by how much of p̃′ C is to be corrected for ∫ C p̃′ = ΔΦ: quadrature of a power is not exact."""
+        _, b1, b2, b3 = path
+        w0, w1, w2 = b1 * moments[0], 2.0 * b2 * moments[1], 3.0 * b3 * moments[2]
         before, after = self.law.potential(start), self.law.potential(end)
-        missing = after - before - sum(parts)
-        square = sum(norm * rate * rate for norm, rate in zip(self._norms, rates, strict=True))
-        if abs(missing) <= 8.0 * _EPS * (before + after + sum(map(abs, parts))) or square == 0.0:
-            return a
-        return [value + missing / square * rate for value, rate in zip(a, rates, strict=True)]
+        missing = after - before - w0 - w1 - w2
+        if abs(missing) <= 8.0 * _EPS * (before + after + abs(w0) + abs(w1) + abs(w2)):
+            return 0.0
+        square = 2.0 * (b1 + b3) ** 2 + 8.0 / 3.0 * b2 * b2 + 1.6 * b3 * b3
+        return missing / square if square > 0.0 else 0.0
 
-    def _where_it_acts(self, c: np.ndarray) -> _Points | None:
-        """Return quadrature points of the pieces of the step where the law acts, ``None`` if there are none."""
+    def _where_it_acts(self, path: _Path, start: float, end: float) -> _Rule:
+        """Return a rule for the pieces of the step where the law acts, without points if there are none."""
         if not self.law.one_sided:
-            return self._whole
-        hull = (self._bernstein @ c).tolist()
-        largest = max(hull)
-        if largest <= 0.0:
-            return None
-        if min(hull) > _NEAR_ZERO * largest:
-            return self._whole
-        places, weights = [], []
-        cuts = [-1.0, *_zeros_inside(c.tolist()), 1.0]
-        for low, high in pairwise(cuts):
-            if _series(c.tolist(), 0.5 * (low + high)) > 0.0:
-                places.append(low + (high - low) * self._graded)
-                weights.append((high - low) * self._graded_weights)
-        if not places:
-            return None
-        V, W = points = _points(np.concatenate(places), np.concatenate(weights), self.degree)
-        inside = V @ c > 0.0
-        return points if inside.all() else _Points(V[inside], W[:, inside])  # rounding beside a zero
+            return _FEW
+        _, b1, b2, b3 = path
+        second, third = start + (b1 - 2.0 * b2 + 3.0 * b3) / 1.5, end - (b1 + 2.0 * b2 + 3.0 * b3) / 1.5
+        low, high = min(start, second, third, end), max(start, second, third, end)  # of the Bézier points
+        if high <= 0.0:
+            return ()
+        if low > _OFF_ZERO * high:
+            return _FEW if low > _STEADY * high else _MANY
+        rule: list[tuple[float, float]] = []
+        for left, right in pairwise([-1.0, *_zeros_inside(path), 1.0]):
+            if _at(path, 0.5 * (left + right))[0] > 0.0:
+                length = right - left
+                rule += [(left + length * t, length * weight) for t, weight in _GRADED]
+        return rule
 
 
-def _points(s: np.ndarray, weights: np.ndarray, degree: int) -> _Points:
-    V = np.empty((len(s), degree + 2))
-    V[:, 0], V[:, 1] = 1.0, s
-    for k in range(1, degree + 1):
-        V[:, k + 1] = ((2 * k + 1) * s * V[:, k] - k * V[:, k - 1]) / (k + 1)
-    return _Points(V, (V[:, : degree + 1] * weights[:, None]).T * (np.arange(degree + 1) + 0.5)[:, None])
+def penetration_series(start: float, x: Vector) -> Vector:
+    """Return the Legendre coefficients of p̃ [m], d + 2 of them."""
+    mean, half_change = 0.5 * (start + x[0]), 0.5 * (x[0] - start)
+    if len(x) == 1:
+        return [mean, half_change]
+    if len(x) == 2:
+        return [x[1], half_change, mean - x[1]]
+    return [x[1], 3.0 * x[2], mean - x[1], half_change - 3.0 * x[2]]
 
 
-def _series(c: Vector, s: float) -> float:
-    """Return Σ c_k P_k(s) of a series of degree 1 to 3."""
-    total = c[0] + c[1] * s
-    if len(c) > 2:
-        total += c[2] * 0.5 * (3.0 * s * s - 1.0)
-    if len(c) > 3:
-        total += c[3] * 0.5 * (5.0 * s * s - 3.0) * s
+def _legendre(m0: float, m1: float, m2: float) -> Vector:
+    """Return the first three Legendre coefficients of what has the moments ∫ sᵏ … ds."""
+    return [0.5 * m0, 1.5 * m1, 3.75 * m2 - 1.25 * m0]
+
+
+def _moments(rule: _Rule, values: Vector) -> Vector:
+    """Return the moments ∫ sᵏ … ds, k = 0 … 5, of what has ``values`` at the points of ``rule``."""
+    m0 = m1 = m2 = m3 = m4 = m5 = 0.0
+    for (s, weight), value in zip(rule, values, strict=True):
+        m = weight * value
+        m0 += m
+        m *= s
+        m1 += m
+        m *= s
+        m2 += m
+        m *= s
+        m3 += m
+        m *= s
+        m4 += m
+        m5 += s * m
+    return [m0, m1, m2, m3, m4, m5]
+
+
+def _product(path: Sequence[float], moments: Vector) -> float:
+    """Return ∫ of ``path`` times what has the ``moments``."""
+    total: float = sum(map(mul, path, moments))
     return total
 
 
-def _zeros_inside(c: Vector) -> list[float]:
-    """Return the zeros in (−1, 1) of the Legendre series ``c``, of degree 1 to 3, where its sign changes; ascending."""
-    marks = [-1.0, *_turns_inside(c), 1.0]
+def _path(start: float, x: Vector) -> _Path:
+    c = penetration_series(start, x)
+    if len(c) == 2:
+        return (c[0], c[1], 0.0, 0.0)
+    if len(c) == 3:
+        return (c[0] - 0.5 * c[2], c[1], 1.5 * c[2], 0.0)
+    return (c[0] - 0.5 * c[2], c[1] - 1.5 * c[3], 1.5 * c[2], 2.5 * c[3])
+
+
+def _at(path: _Path, s: float, size: float = 2.0) -> tuple[float, float]:
+    """Return p̃ [m] and its rate over a step of ``size`` [m/s]."""
+    b0, b1, b2, b3 = path
+    return b0 + s * (b1 + s * (b2 + s * b3)), 2.0 / size * (b1 + s * (2.0 * b2 + 3.0 * b3 * s))
+
+
+def _zeros_inside(path: _Path) -> list[float]:
+    """Return the zeros in (−1, 1) of ``path`` where its sign changes, ascending."""
     found = []
-    for low, high in pairwise(marks):
-        at_low, at_high = _series(c, low), _series(c, high)
-        if at_low * at_high >= 0.0:
+    for low, high in pairwise([-1.0, *_turns_inside(path), 1.0]):
+        at_low = _at(path, low)[0]
+        if at_low * _at(path, high)[0] >= 0.0:
             continue
-        for _ in range(_BISECTIONS):
-            middle = 0.5 * (low + high)
-            if _series(c, middle) * at_low > 0.0:
-                low = middle
-            else:
-                high = middle
-        found.append(0.5 * (low + high))
+        s, change = 0.5 * (low + high), 1.0
+        for _ in range(_MAX_STEPS_TO_ZERO):
+            if abs(change) <= _ZERO:
+                break
+            value, slope = _at(path, s)
+            low, high = (s, high) if value * at_low > 0.0 else (low, s)
+            newton = s - value / slope if slope != 0.0 else low
+            change, s = s, newton if low < newton < high else 0.5 * (low + high)
+            change -= s
+        found.append(s)
     return found
 
 
-def _turns_inside(c: Vector) -> list[float]:
-    """Return where in (−1, 1) the series turns: zeros of its derivative c₁ + 3 c₂ s + 3 c₃ (5 s² − 1)/2."""
-    if len(c) < 3:
-        return []
-    third = c[3] if len(c) > 3 else 0.0
-    quadratic, linear, constant = 7.5 * third, 3.0 * c[2], c[1] - 1.5 * third
+def _turns_inside(path: _Path) -> list[float]:
+    """Return where in (−1, 1) ``path`` turns: zeros of b₁ + 2 b₂ s + 3 b₃ s²."""
+    _, constant, b2, b3 = path
+    quadratic, linear = 3.0 * b3, 2.0 * b2
     discriminant = linear * linear - 4.0 * quadratic * constant
     if discriminant < 0.0:
         return []
@@ -213,23 +264,3 @@ def _turns_inside(c: Vector) -> list[float]:
         numerator / denominator for numerator, denominator in ((q, quadratic), (constant, q)) if denominator != 0.0
     ]
     return sorted(s for s in zeros if -1.0 < s < 1.0)
-
-
-def _bernstein(k: int, degree: int) -> np.ndarray:
-    """Return the Bernstein coefficients on [−1, 1] of P_k, raised to ``degree``."""
-    x = np.linspace(-1.0, 1.0, degree + 1)
-    u = 0.5 * (x + 1.0)
-    B = np.array([[comb(degree, i) * v**i * (1.0 - v) ** (degree - i) for i in range(degree + 1)] for v in u])
-    return np.asarray(np.linalg.solve(B, legendre.legval(x, [0.0] * k + [1.0])))
-
-
-def numbers_to_legendre(degree: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return what takes x, shape (d + 2, d + 1), and p at the start, (d + 2,), to the Legendre coefficients of p̃."""
-    n = degree + 2
-    rows = np.zeros((n, n))
-    rows[0] = 1.0  # p̃(1)
-    for j in range(degree):
-        rows[1 + j, j] = 1.0 / (2 * j + 1)  # mean of P_j p̃
-    rows[-1] = (-1.0) ** np.arange(n)  # p̃(−1)
-    inverse = np.linalg.inv(rows)
-    return inverse[:, :-1], inverse[:, -1]

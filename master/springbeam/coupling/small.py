@@ -16,7 +16,13 @@ def times(A: Matrix, x: Vector) -> Vector:
     """Return A x."""
     if len(x) == 1:
         return [A[0][0] * x[0]]
-    return [sum(map(mul, row, x)) for row in A]
+    if len(x) == 2:
+        (a, b), (c, d) = A
+        x0, x1 = x
+        return [a * x0 + b * x1, c * x0 + d * x1]
+    (a, b, c), (d, e, f), (g, h, i) = A
+    x0, x1, x2 = x
+    return [a * x0 + b * x1 + c * x2, d * x0 + e * x1 + f * x2, g * x0 + h * x1 + i * x2]
 
 
 def transposed(rows: Iterable[Iterable[float]]) -> Matrix:

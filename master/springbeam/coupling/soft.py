@@ -6,29 +6,32 @@ body:
 
     f(x) = E (x − x_k) + A(x) − a_k = 0,     E = (−∂x/∂a)⁻¹,
 
-x_k being what the bodies did under a_k. For degree 0 f rises and has one root; above, Newton's method is damped, and
-starts from the law softened where it does not find the root. `StepSolver` then tries the crossing on the bodies.
+x_k being what the bodies did under a_k. Newton's method is damped, and starts from the law softened where it does not
+find the root. `StepSolver` then tries the crossing on the bodies.
 """
 
 from __future__ import annotations
 
-from operator import sub
+from functools import partial
+from operator import add, neg, sub
 
 import numpy as np
 
 from ..bodies.protocol import Body, Force
 from ..contact.laws import SoftLaw
 from . import energy
-from .projection import Projected, Projection
+from .projection import Projection
 from .protocol import Booking, Coupling, Ends, ErrorEstimate, NotConverged, Scales, Step, Window
-from .small import Matrix, Vector, inverse, inverse_by_minors, times
+from .small import Matrix, Vector, inverse_by_minors, times
 from .solver import StepSolver
 
 _MAX_NEWTON, _MAX_DAMPING = 60, 8
 #: A correction smaller than this share of the penetration's numbers changes nothing.
 _SETTLED = 4.0 * 2.0**-52
-#: The crossing is known to this share of a correction before Newton's last, quadratic step.
-_LAST_STEP = 1e-9
+#: A correction that leaves more than this share of itself asks for the law's slope anew.
+_SLOW = 1e-3
+#: Corrections below this share of the penetration's numbers may be roundings, which do not become shorter.
+_ROUNDING = 1e-12
 #: A softened law is this much stiffer from one crossing to the next.
 _STIFFER = 16.0
 
@@ -77,7 +80,7 @@ class SoftSolver(Coupling):
         self._reduced += self._simplified
         if self.law.damped:
             start, x = penetration(step, self.degree)
-            self.dissipated += self._solver.projection.dissipated(start, x, step.size)
+            self.dissipated += self._solver.projection.dissipated(start, step.size, x)
 
     def booking(self, ends: Ends) -> Booking:
         tip, low = ends
@@ -111,105 +114,95 @@ class _Crossing(StepSolver):
         if any(a):
             return False
         tip, low = window.ends
-        start = low.displacement - tip.displacement
-        return not any(self.projection(start, [-g for g in gap], window.size).a)
+        return not any(self.projection.force(low.displacement - tip.displacement, window.size, list(map(neg, gap))))
 
     def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> tuple[Vector, Vector]:
         tip, low = window.ends
-        line = _Line(self.projection, low.displacement - tip.displacement, window.size, [-g for g in gap], a, descent)
-        x, projected = line.crossing()
-        return [-value for value in x], projected.a
+        x = list(map(neg, gap))
+        try:
+            found = _Line(self.projection, low.displacement - tip.displacement, window.size, x, a, descent).crossing()
+        except np.linalg.LinAlgError:
+            found = None
+        if found is None:
+            raise NotConverged(max(map(abs, x)), _MAX_NEWTON)
+        x, a = found
+        return list(map(neg, x)), a
 
 
 class _Line:
     """The crossing of one step's law and responses; ``descent`` is −E."""
 
+    __slots__ = ("_a", "_descent", "_force", "_slope", "_start", "_x")
+
     def __init__(
         self, projection: Projection, start: float, size: float, x: Vector, a: Vector, descent: Matrix
     ) -> None:
-        self._projection, self._start, self._size = projection, start, size
-        self._x, self._a, self._descent = x, a, descent
+        self._force, self._slope = partial(projection.force, start, size), partial(projection.slope, start, size)
+        self._start, self._x, self._a, self._descent = start, x, a, descent
 
-    def crossing(self) -> tuple[Vector, Projected]:
-        """Raises NotConverged."""
-        if self._projection.degree == 0:
-            return self._bracketed()
-        try:
-            found = self._newton(self._x, 1.0) or self._stiffened()
-        except np.linalg.LinAlgError:
-            found = None
-        if found is None:
-            raise NotConverged(max(map(abs, self._x)), _MAX_NEWTON)
-        return found
+    def crossing(self) -> tuple[Vector, Vector] | None:
+        """Return x and A(x), ``None`` if they are not found. Raises numpy.linalg.LinAlgError."""
+        return self._newton(self._x, 1.0) or self._stiffened()
 
-    def _law(self, x: Vector) -> Projected:
-        return self._projection(self._start, x, self._size)
-
-    def _residual(self, x: Vector, a: Vector, softness: float) -> Vector:
-        """Return −f of the law times ``softness``."""
+    def _missing(self, x: Vector, a: Vector, softness: float) -> Vector:
+        """Return −f of the law times ``softness``, whose force is ``a``."""
+        if x is self._x and softness == 1.0:
+            return list(map(sub, self._a, a))
         moved = times(self._descent, list(map(sub, x, self._x)))
         return [m - softness * new + old for m, new, old in zip(moved, a, self._a, strict=True)]
 
-    def _flexibility(self, slope: Matrix, softness: float) -> Matrix:
+    def _flexibility(self, x: Vector, softness: float) -> Matrix:
         """Return (E + A′)⁻¹ [m/N], of the law times ``softness``."""
         return inverse_by_minors(
             [
                 [softness * s - d for s, d in zip(row, line, strict=True)]
-                for row, line in zip(slope, self._descent, strict=True)
+                for row, line in zip(self._slope(x), self._descent, strict=True)
             ]
         )
 
-    def _bracketed(self) -> tuple[Vector, Projected]:
-        """Degree 0: Newton's method, kept between bounds that f's sign tells."""
-        low, high = -float("inf"), float("inf")
-        E = -self._descent[0][0]
-        x = self._x[0]
-        for _ in range(_MAX_NEWTON):
-            projected = self._law([x])
-            residual = self._residual([x], projected.a, 1.0)[0]
-            low, high = (x, high) if residual > 0.0 else (low, x)
-            rise = E + projected.slope[0][0]
-            if not rise > 0.0:  # responses that rounding has spoilt
-                raise NotConverged(abs(x), _MAX_NEWTON)
-            change = residual / rise
-            if abs(change) <= _SETTLED * max(abs(x), abs(self._start)) or high <= low:
-                return [x], projected
-            x += change
-            if not low < x < high:
-                x = 0.5 * (low + high)
-        return [x], self._law([x])
+    def _newton(self, x: Vector, softness: float) -> tuple[Vector, Vector] | None:
+        """Return the crossing with the law times ``softness``, ``None`` if it is not found.
 
-    def _newton(self, x: Vector, softness: float) -> tuple[Vector, Projected] | None:
-        """Damped Newton iteration from ``x``, a correction being accepted where the next one would be shorter."""
-        projected = self._law(x)
-        residual = self._residual(x, projected.a, softness)
+        Damped Newton iteration from ``x``, a correction being accepted where the next one would be shorter; the slope
+        of the law is kept where that is much shorter (Deuflhard 2004, section 2.1).
+        """
+        force, start = self._force, self._start
+        missing = self._missing(x, force(x), softness)
+        flexibility = self._flexibility(x, softness)
+        change = times(flexibility, missing)
+        length = max(map(abs, change))
         for _ in range(_MAX_NEWTON):
-            flexibility = self._flexibility(projected.slope, softness)
-            change = times(flexibility, residual)
-            length = max(map(abs, change))
-            scale = max(abs(self._start), *map(abs, x))
             share = 1.0
             for _ in range(_MAX_DAMPING):
-                tried = [value + share * step for value, step in zip(x, change, strict=True)]
-                there = self._law(tried)
-                left = self._residual(tried, there.a, softness)
-                if length <= _LAST_STEP * scale:
-                    return tried, there
-                following = max(map(abs, times(flexibility, left)))
-                if following <= (1.0 - 0.25 * share) * length:
+                tried = list(map(add, x, change if share == 1.0 else [share * step for step in change]))
+                a = force(tried)
+                missing = self._missing(tried, a, softness)
+                following = times(flexibility, missing)
+                left = max(map(abs, following))
+                scale = max(abs(start), *map(abs, tried))
+                if left <= (1.0 - 0.25 * share) * length or length <= _ROUNDING * scale:
                     break
                 share *= 0.5
             else:
                 return None
-            x, projected, residual = tried, there, left
-            if following <= _SETTLED * scale:
-                return x, projected
+            x = tried
+            if left * left <= _SETTLED * scale * length or length <= _ROUNDING * scale:
+                # The correction after the next would be left²/length. For the next one the law's slope tells the force.
+                felt = times(self._descent, following)
+                return list(map(add, x, following)), [c + m + d for c, m, d in zip(a, missing, felt, strict=True)]
+            if left > _SLOW * length:
+                flexibility = self._flexibility(x, softness)
+                following = times(flexibility, missing)
+                left = max(map(abs, following))
+            change, length = following, left
         return None
 
-    def _stiffened(self) -> tuple[Vector, Projected] | None:
+    def _stiffened(self) -> tuple[Vector, Vector] | None:
         """Start from the law so soft that the bodies hardly feel it, and stiffen it from crossing to crossing."""
-        alone = [value - step for value, step in zip(self._x, times(inverse(self._descent), self._a), strict=True)]
-        slope = self._law(alone).slope
+        alone = [
+            value - step for value, step in zip(self._x, times(inverse_by_minors(self._descent), self._a), strict=True)
+        ]
+        slope = self._slope(alone)
         gain = max(abs(value) for row in slope for value in row) / max(abs(e) for row in self._descent for e in row)
         softness = min(1.0, 1.0 / gain) if gain > 0.0 else 1.0
         x = alone

@@ -21,7 +21,7 @@ from numpy.polynomial import legendre
 
 from ...bodies import force
 from ...bodies.protocol import Motion
-from ...coupling.projection import numbers_to_legendre
+from ...coupling.projection import penetration_series
 from ...coupling.tie import SCHEMES
 
 #: S₋₁ … S₅: what a quadratic force and two integrals of the displacement need.
@@ -211,7 +211,8 @@ def projected_step(pair: LinearPair, degree: int, h: float) -> CoupledStep:
     """Return the step of a soft law by ``energy``: C has the first Legendre coefficients of k p̃ + c p̃′."""
     n = degree + 1
     law = pair.stiffness * np.eye(n, n + 1) + pair.damping * 2.0 / h * legendre.legder(np.eye(n + 1))
-    from_numbers, from_start = (law @ part for part in numbers_to_legendre(degree))
+    from_numbers = law @ np.transpose([penetration_series(0.0, unit) for unit in np.eye(n).tolist()])
+    from_start = law @ penetration_series(1.0, [0.0] * n)
     condition = SCHEMES["energy"][degree]
     T = np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
     beam, spring = Step(pair.beam, h), Step(pair.spring, h)

@@ -168,8 +168,7 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
     if not law.soft:
         return LinearPair(beam, low)
     depth = contact_depth(scene) if law.one_sided else 0.0
-    damping = law.resistance(np.array([depth]), np.zeros(1))[2]
-    return LinearPair(beam, low, law.slope(depth), float(damping[0]))
+    return LinearPair(beam, low, law.slope(depth), law.resistance(depth, 0.0)[2] if law.damped else 0.0)
 
 
 def contact_frequency(scene: Scene) -> float:
