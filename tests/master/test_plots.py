@@ -22,8 +22,10 @@ from springbeam.pictures.drawing import (
     decimated,
     phase_intervals,
     readable_unit,
+    shaded_phases,
 )
-from springbeam.pictures.plots import plot_run
+from springbeam.pictures.panels import panels
+from springbeam.pictures.plots import figure_of, plot_run
 from springbeam.results.directory import PICTURES
 from springbeam.results.trajectory import Event, columns_of
 from springbeam.scene import with_changes
@@ -105,25 +107,23 @@ def texts(figure):
     return [text for text in found if text]
 
 
-@pytest.mark.parametrize("draw", [plots._positions, plots._velocities_and_forces, plots._gap_and_energy])
-def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(draw):
-    figure = draw(a_trajectory(events=EVERY_EVENT))
-    axes = figure.axes
-    assert axes[-1].get_xlabel() == "time t [s]"
+FIGURES = ["shapes_after_contact", "shapes_later", "positions", "velocities_and_forces", "gap_and_energy"]
+
+
+@pytest.mark.parametrize("picture", FIGURES)
+def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(picture):
+    figure = figure_of(a_trajectory(events=EVERY_EVENT), picture)
+    if picture.startswith("shapes"):
+        axes = figure.axes[:2]
+        assert {ax.get_xlabel() for ax in axes} == {"position along the beam x [m]"}
+        assert any(text.startswith("time t [") for text in texts(figure))
+    else:
+        axes = figure.axes
+        assert axes[-1].get_xlabel() == "time t [s]"
+        key = {text.get_text() for text in figure.legends[0].get_texts()}
+        assert {"free", "tied (u = y < Ψ)", *(f"{look.words} (1)" for look in EVENT_LOOKS.values())} <= key
     for ax in axes:
         assert ax.get_ylabel().endswith("]")
-    key = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert {"free", "tied (u = y < Ψ)"} <= set(key)
-    assert {f"{look.words} (1)" for look in EVENT_LOOKS.values()} <= set(key)
-
-
-@pytest.mark.parametrize("draw", [plots._shapes_after_contact, plots._shapes_later])
-def test_shapes_have_quantities_and_units(draw):
-    figure = draw(a_trajectory())
-    for ax in figure.axes[:2]:
-        assert ax.get_xlabel() == "position along the beam x [m]"
-        assert ax.get_ylabel().endswith("]")
-    assert any(text.startswith("time t [") for text in texts(figure))
 
 
 def test_shapes_start_at_first_contact():
@@ -144,13 +144,6 @@ def test_mean_velocity_of_shapes():
         assert np.allclose(curve[:, 1], -2.0 * SHAPE_POINTS**2, rtol=1e-12)
 
 
-def test_a_motion_lost_in_the_other_is_enlarged():
-    t = np.linspace(0.0, 0.6, 400)
-    figure = plots._positions(a_trajectory(u_tip=2e-6 * np.sin(9.0 * t), y=-1e-2 * np.sin(5.0 * t)))
-    assert [ax.get_ylabel() for ax in figure.axes] == ["position [mm]", "position [µm]", "velocity [mm/s]"]
-    assert len(plots._positions(a_trajectory()).axes) == 2
-
-
 def test_shapes_too_far_apart_for_the_motion_say_so():
     slow = a_trajectory()
     assert not any("faster than the steps" in text for text in texts(plots._shapes_after_contact(slow)))
@@ -165,13 +158,6 @@ def test_a_tip_that_bounces_while_the_beam_moves_as_fast_is_not_called_too_fast(
     assert not any("faster than the steps" in text for text in texts(plots._shapes_after_contact(bouncing)))
 
 
-def test_equilibrium_and_foundation_are_drawn_unless_far_outside():
-    figure = plots._positions(a_trajectory())
-    assert {"Ψ", "φ"} <= set(texts(figure))
-    deep = with_changes(PAIR, stop={"position": -100.0})
-    assert "φ" not in texts(plots._positions(a_trajectory(deep)))
-
-
 @pytest.mark.parametrize("draw", [plots._positions, plots._shapes_later])
 def test_names_of_levels_that_are_near_do_not_overprint(draw):
     figure = draw(a_trajectory(with_changes(PAIR, stop={"position": -1e-5})))
@@ -183,21 +169,6 @@ def test_names_of_levels_that_are_near_do_not_overprint(draw):
     assert psi.y0 >= phi.y1
 
 
-@pytest.mark.parametrize(
-    ("law", "words"),
-    [
-        ("compliance", {"in contact (u < y)", "of the law λ(y − u)₊ᵖ"}),
-        ("link", {"joined by the link", "of the link λ(y − u)"}),
-        ("tie", {"tied (u = y)"}),
-        ("transmission", {"touch (y ≥ Ψ)", "part λ(Ψ − u)₊ᵖ"}),
-    ],
-)
-def test_phases_and_forces_have_the_words_of_the_law(law, words):
-    scene = with_changes(PAIR, contact={"law": law})
-    phase = np.where(np.arange(400) < 200, "touch" if law in ("compliance", "transmission") else "tied", "free")
-    assert words <= set(texts(plots._velocities_and_forces(a_trajectory(scene, phase=phase))))
-
-
 def test_many_events_become_ticks_in_rows():
     events = [Event(0.6 * i / 100, "impact" if i % 2 else "separation") for i in range(100)]
     figure = plots._positions(a_trajectory(events=events))
@@ -206,57 +177,107 @@ def test_many_events_become_ticks_in_rows():
     assert len({line.get_ydata()[0] for line in marks}) == 2
 
 
-def test_what_alternates_is_said_to_do_so():
-    flips = np.where(np.arange(400) % 2, 1.0, -1.0)
-    remark = "alternates from step\nto step"
-    assert remark in texts(plots._positions(a_trajectory(v_tip=flips)))
-    assert remark not in texts(plots._positions(a_trajectory()))
+FLIPS = np.where(np.arange(400) % 2, 1.0, -1.0)
+
+
+def test_shapes_that_alternate_are_drawn_in_pairs():
     unresolved = a_trajectory()
-    unresolved.shapes[1][:] = np.outer(flips, SHAPE_POINTS)
+    unresolved.shapes[1][:] = np.outer(FLIPS, SHAPE_POINTS)
     figure = plots._shapes_later(unresolved)
     assert any("they alternate" in text for text in texts(figure))
-    tips = [curve[-1, 1] for curve in figure.axes[0].collections[0].get_segments()]
-    assert {-1.0, 1.0} == set(tips)
+    assert {curve[-1, 1] for curve in figure.axes[0].collections[0].get_segments()} == {-1.0, 1.0}
 
 
-def test_every_picture_of_a_run_that_is_not_resolved_carries_the_mark():
-    drawings = (plots._shapes_after_contact, plots._shapes_later, plots._positions, plots._velocities_and_forces,
-                plots._gap_and_energy)  # fmt: skip
+@pytest.mark.parametrize("picture", FIGURES)
+def test_every_picture_of_a_run_that_is_not_resolved_carries_the_mark(picture):
     for resolved in (True, False):
         run = dataclasses.replace(a_trajectory(), summary={"resolved": resolved})
-        for draw in drawings:
-            assert (NOT_RESOLVED in texts(draw(run))) is not resolved
+        assert (NOT_RESOLVED in texts(figure_of(run, picture))) is not resolved
+
+
+def test_panels_are_painted_with_all_that_they_say():
+    run = a_trajectory(contact_force=FLIPS, compliance_force=np.full(400, 1e-9))
+    (forces,) = (ax for ax in figure_of(run, "velocities_and_forces").axes if ax.get_ylabel() == "force [N]")
+    (remark,) = [text.get_text() for text in forces.texts]
+    assert remark.count("alternates") == remark.count("too small to draw") == 1
+    assert {"Ψ", "φ"} <= set(texts(figure_of(run, "positions")))
+    energies = figure_of(run, "gap_and_energy").axes[1]
+    assert len(energies.collections) > 3
+    assert [line.get_label() for line in energies.lines if line.get_label()[0] != "_"] == ["total"]
+
+
+# -- panels: what plots and report draw over time ---------------------------------------------------------------------
+
+
+def panel(name, run):
+    (found,) = (panel for panel in panels(run) if panel.name == name)
+    return found
+
+
+def words_in(found):
+    return {curve.look.words for curve in found.curves}
+
+
+def test_a_motion_lost_in_the_other_is_enlarged():
+    t = np.linspace(0.0, 0.6, 400)
+    run = a_trajectory(u_tip=2e-6 * np.sin(9.0 * t), y=-1e-2 * np.sin(5.0 * t))
+    assert [p.axis for p in panels(run)][:3] == ["position [mm]", "position [µm]", "velocity [mm/s]"]
+    assert [p.axis for p in panels(a_trajectory())][:2] == ["position [mm]", "velocity [mm/s]"]
+
+
+def test_equilibrium_and_foundation_are_drawn_unless_far_outside():
+    assert panel("positions", a_trajectory()).levels == {"Ψ": 0.0, "φ": -0.015}
+    assert panel("positions", a_trajectory(with_changes(PAIR, stop={"position": -100.0}))).levels == {"Ψ": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("law", "phase", "force"),
+    [
+        ("compliance", "in contact (u < y)", "of the law λ(y − u)₊ᵖ"),
+        ("link", "joined by the link", "of the link λ(y − u)"),
+        ("tie", "tied (u = y)", "part λ(Ψ − u)₊ᵖ"),
+        ("transmission", "touch (y ≥ Ψ)", "part λ(Ψ − u)₊ᵖ"),
+    ],
+)
+def test_phases_and_forces_have_the_words_of_the_law(law, phase, force):
+    scene = with_changes(PAIR, contact={"law": law})
+    joined = "touch" if law in ("compliance", "transmission") else "tied"
+    run = a_trajectory(scene, phase=np.where(np.arange(400) < 200, joined, "free"))
+    assert [look.words for look, _ in shaded_phases(run)] == [phase, "free"]
+    assert force in words_in(panel("forces", run))
+
+
+def test_what_alternates_is_said_to_do_so():
+    assert panel("velocities", a_trajectory(v_tip=FLIPS)).remarks == ["tip v(t, L) alternates from step to step"]
+    assert panel("velocities", a_trajectory()).remarks == []
 
 
 def test_small_forces_are_named_rather_than_drawn_on_the_axis():
-    figure = plots._velocities_and_forces(a_trajectory(compliance_force=np.full(400, 1e-9)))
-    assert any("too small to draw" in text and "1e-09 N" in text for text in texts(figure))
+    found = panel("forces", a_trajectory(compliance_force=np.full(400, 1e-9)))
+    assert found.remarks == ["too small to draw: part λ(Ψ − u)₊ᵖ ≤ 1e-09\u00a0N"]
+    assert "part λ(Ψ − u)₊ᵖ" not in words_in(found)
 
 
-def test_energies_are_stacked_and_those_too_small_are_named():
-    assert len(plots._gap_and_energy(a_trajectory()).axes[1].collections) > 3
-    stiff = plots._gap_and_energy(a_trajectory(e_beam=np.full(400, 4.5e9)))
-    assert stiff.axes[1].get_ylabel() == "energy [GJ]"
-    assert any("spring ≤ 0.01 J" in text for text in texts(stiff))
+def test_energies_are_stacked_to_the_total_and_those_too_small_are_named():
+    found = panel("energies", a_trajectory())
+    *parts, total = found.curves
+    assert [curve.stacked for curve in found.curves] == [True] * 5 + [False]  # all but the loads, which are zero
+    assert np.allclose(sum(curve.values for curve in parts), total.values, rtol=1e-14)
+    stiff = panel("energies", a_trajectory(e_beam=np.full(400, 4.5e9)))
+    assert stiff.axis == "energy [GJ]"
+    assert "spring ≤ 0.01\u00a0J" in stiff.remarks[0]
 
 
 def test_energies_that_become_negative_are_lines():
-    figure = plots._gap_and_energy(a_trajectory(e_spring=np.linspace(-1.0, 1.0, 400)))
-    assert "spring" in [line.get_label() for line in figure.axes[1].lines]
-
-
-def test_remarks_add_up():
-    flips = np.where(np.arange(400) % 2, 1.0, -1.0)
-    figure = plots._velocities_and_forces(a_trajectory(contact_force=flips, compliance_force=np.full(400, 1e-9)))
-    (remark,) = [text.get_text() for text in figure.axes[1].texts]
-    assert remark.count("alternates") == remark.count("too small to draw") == 1
+    found = panel("energies", a_trajectory(e_spring=np.linspace(-1.0, 1.0, 400)))
+    assert "spring" in words_in(found)
+    assert not any(curve.stacked for curve in found.curves)
 
 
 def test_residual_is_relative_to_the_largest_energy():
     trajectory = a_trajectory(e_beam=np.full(400, 3.0), energy_residual=np.full(400, -6e-12))
-    line = plots._gap_and_energy(trajectory).axes[2].lines[-1]
     stored = np.abs(trajectory.e_beam) + np.abs(trajectory.e_spring) + np.abs(trajectory.e_contact)
-    assert np.allclose(line.get_ydata(), 6e-12 / stored.max(), rtol=1e-12)
+    assert np.allclose(panel("residual", trajectory).curves[0].values, 6e-12 / stored.max(), rtol=1e-12)
 
 
 # -- thinning -----------------------------------------------------------------------------------------------------
@@ -292,12 +313,6 @@ def test_one_wild_row_of_a_million_is_in_the_picture():
     values = np.zeros_like(time)
     values[123_456] = -7.0
     assert 123_456 in decimated(time, values)
-
-
-def test_a_long_run_is_drawn_from_few_points(tmp_path):
-    figure = plots._positions(a_trajectory(n=200_000))
-    for ax in figure.axes:
-        assert all(len(line.get_xdata()) <= 4 * PIXEL_COLUMNS for line in ax.lines)
 
 
 def test_phases_hold_until_the_next_row():

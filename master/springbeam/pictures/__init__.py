@@ -1,5 +1,6 @@
 """Pictures of a run: plots, animation, and the report that opens in a browser.
 
-Imports `results` and `scene` only. ``drawing`` holds looks, units and scales that all of them share, ``timeline`` the
-axes over time and ``frames`` the run as it moves. Start at ``plots``.
+Imports `results` and `scene` only. ``panels`` says what is drawn over time and ``frames`` what moves; ``timeline``,
+``plots`` and ``animation`` draw it with matplotlib, ``report`` with plotly. ``drawing`` holds looks, units and scales.
+Start at ``panels``.
 """

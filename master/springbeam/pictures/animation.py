@@ -17,29 +17,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from ..results.trajectory import Trajectory
-from ..scene.statics import SHAPE_POINTS
-from .drawing import (
-    BLACK,
-    BLUE,
-    GREY,
-    LEVEL_LINES,
-    LINES,
-    POSITIONS,
-    STONE,
-    VERMILLION,
-    Unit,
-    decimated,
-    length_along,
-    level_side,
-    mark,
-    much_smaller,
-    near_levels,
-    present,
-    readable_unit,
-    shaded_phases,
-)
-from .frames import COIL_ACROSS, COIL_WIDTH, STOP_WIDTH, Frames, frames_of
-from .timeline import STYLE, line_style
+from .drawing import BLACK, GREY, LEVEL_LINES, STONE, VERMILLION, level_side, mark, time_unit
+from .frames import Frames, Part, Sketch, frames_of, sketches
+from .panels import positions
+from .timeline import STYLE, line_style, paint, shade
 
 SUFFIXES = (".gif", ".mp4")
 _SIZE, _DPI = (8.0, 5.0), 100
@@ -115,34 +96,26 @@ class _Picture:
 
     def __init__(self, trajectory: Trajectory, frames: Frames) -> None:
         self.trajectory, self.frames = trajectory, frames
-        lost = frames.deflection is not None and "u_tip" in much_smaller(trajectory, present(trajectory, POSITIONS))
         self.figure = Figure(figsize=_SIZE, dpi=_DPI, layout="constrained")
-        heights = [3.0, *[1.5] * lost, 1.5]
-        above, *close, below = self.figure.subplots(len(heights), 1, height_ratios=heights)
-        self._moving: list[tuple[Line2D, str, float]] = []
-        self._bodies(above)
-        for ax in close:
-            self._beam_enlarged(ax)
-        self._clock = readable_unit([trajectory["time"]], "s")
+        shown = [sketch for sketch in sketches(trajectory, frames) if sketch.name != "motion-contact"]
+        heights = [*(sketch.height for sketch in shown), 1.5]
+        *axes, below = self.figure.subplots(len(heights), 1, height_ratios=heights)
+        self._moving: list[tuple[Line2D, Part, float]] = []
+        for ax, sketch in zip(axes, shown, strict=True):
+            self._sketch(ax, sketch)
+        self._clock = time_unit(trajectory)
         self._positions(below)
         self._cursor = below.axvline(0.0, color=BLACK, lw=1.0, ls=":")
         self.figure.suptitle(trajectory.scene.title, fontsize=10.0, x=0.01, ha="left")
         self._words = self.figure.text(0.99, 0.985, "", fontsize=9.0, ha="right", va="top", family="monospace")
         if words := mark(trajectory):
-            above.set_title(words, fontsize=9.0, loc="right", color=VERMILLION, y=1.0)
+            axes[0].set_title(words, fontsize=9.0, loc="right", color=VERMILLION, y=1.0)
         self._freeze()
 
     def show(self, frame: int) -> None:
         frames = self.frames
         for line, part, factor in self._moving:
-            if part == "beam":
-                assert frames.deflection is not None
-                line.set_ydata(factor * frames.deflection[frame])
-            elif part == "coil":
-                line.set_ydata(factor * frames.coil(frame))
-            else:
-                assert frames.y is not None
-                line.set_ydata(factor * np.full(2, frames.y[frame]))
+            line.set_ydata(factor * frames.heights(part, frame))
         time = self._clock.factor * frames.time[frame]
         self._cursor.set_xdata([time, time])
         phase = str(self.trajectory["phase"][frames.row[frame]])
@@ -162,81 +135,29 @@ class _Picture:
         still = np.array(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
         self.figure.figimage(still, zorder=-1.0)
 
-    def _bodies(self, ax: Axes) -> None:
-        frames = self.frames
-        unit = readable_unit([np.array([frames.low, frames.high])], "m")
-        low, high = unit.factor * frames.low, unit.factor * frames.high
-        along, length = length_along(self.trajectory.scene)
-        if self.trajectory.scene.beam is None:
-            ax.set_xlim(0.5 * length, 1.5 * length)
+    def _sketch(self, ax: Axes, sketch: Sketch) -> None:
+        for block in sketch.blocks:
+            size = block.right - block.left, block.top - block.bottom
+            ax.add_patch(Rectangle((block.left, block.bottom), *size, color=STONE, lw=0.0))
+        if sketch.rest is None:
             ax.xaxis.set_visible(False)
         else:
-            self._wall(ax, along, length, low, high)
-        self._stand(ax, length, unit, low)
-        ax.set_ylim(low, high)
-        ax.set_ylabel(f"height [{unit.name}]")
-        if frames.y is not None:
-            half = COIL_WIDTH * length
-            (coil,) = ax.plot(length + half * COIL_ACROSS, unit.factor * frames.coil(0), color=VERMILLION, lw=1.3)
-            (top,) = ax.plot(
-                [length - 1.6 * half, length + 1.6 * half], [0.0, 0.0], color=VERMILLION, lw=4.0, solid_capstyle="butt"
-            )
-            self._moving += [(coil, "coil", unit.factor), (top, "top", unit.factor)]
-        if frames.deflection is not None:
-            self._beam(ax, length, unit)
-
-    def _stand(self, ax: Axes, length: float, unit: Unit, low: float) -> None:
-        """Draw Ψ and φ beside the tip; the foundation as one block, or two with the spring between them."""
-        for symbol, value in self.frames.levels.items():
-            level = unit.factor * value
-            ends = length * (1.0 - STOP_WIDTH), length * (1.0 + STOP_WIDTH)
-            if symbol == "φ":
-                inner = 1.2 * COIL_WIDTH * length if self.frames.y is not None else 0.0
-                for begin, end in ((ends[0], length - inner), (length + inner, ends[1])):
-                    ax.add_patch(Rectangle((begin, low), end - begin, level - low, color=STONE, lw=0.0))
-            ax.plot(ends, [level, level], color=BLACK, **line_style(LEVEL_LINES[symbol]))
-            ax.annotate(symbol, (ends[1], level), xytext=(3.0, 0.0), textcoords="offset points",
-                        va=level_side(symbol, self.frames.levels))  # fmt: skip
-
-    def _beam_enlarged(self, ax: Axes) -> None:
-        assert self.frames.deflection is not None
-        unit = readable_unit([self.frames.deflection], "m")
-        along, length = length_along(self.trajectory.scene)
-        reach = 1.1 * unit.factor * float(np.max(np.abs(self.frames.deflection)))
-        self._wall(ax, along, length, -reach, reach)
-        ax.set_ylim(-reach, reach)
-        ax.set_ylabel(f"beam alone\nu [{unit.name}]")
-        self._beam(ax, length, unit)
-
-    def _beam(self, ax: Axes, length: float, unit: Unit) -> None:
-        (beam,) = ax.plot(length * SHAPE_POINTS, np.zeros(len(SHAPE_POINTS)), color=BLUE, lw=3.5)
-        self._moving.append((beam, "beam", unit.factor))
-
-    @staticmethod
-    def _wall(ax: Axes, along: Unit, length: float, low: float, high: float) -> None:
-        ax.add_patch(Rectangle((-0.02 * length, low), 0.02 * length, high - low, color=STONE, lw=0.0))
-        ax.plot([0.0, length], [0.0, 0.0], color=GREY, lw=0.6, ls=":")
-        ax.set_xlim(-0.02 * length, 1.12 * length)
-        ax.set_xlabel(f"position along the beam x [{along.name}]")
+            ax.plot(sketch.rest, [0.0, 0.0], color=GREY, lw=0.6, ls=":")
+        for symbol, level in sketch.levels.items():
+            ax.plot(sketch.level_ends, [level, level], color=BLACK, **line_style(LEVEL_LINES[symbol]))
+            ax.annotate(symbol, (sketch.level_ends[1], level), xytext=(3.0, 0.0), textcoords="offset points",
+                        va=level_side(symbol, sketch.levels))  # fmt: skip
+        for part, x, look, width in sketch.moving:
+            (line,) = ax.plot(x, np.zeros(len(x)), color=look.colour, lw=width, solid_capstyle="butt")
+            self._moving.append((line, part, sketch.unit.factor))
+        ax.set_xlim(sketch.x)
+        ax.set_ylim(sketch.y)
+        ax.set_xlabel(f"position along the beam x [{sketch.along.name}]")
+        ax.set_ylabel(f"{sketch.quantity} [{sketch.unit.name}]")
 
     def _positions(self, ax: Axes) -> None:
-        trajectory, clock = self.trajectory, self._clock.factor
-        time = trajectory["time"]
-        names = present(trajectory, POSITIONS)
-        unit = readable_unit([trajectory[name] for name in names], "m")
-        for look, spans in shaded_phases(trajectory):
-            for start, end in spans:
-                ax.axvspan(clock * start, clock * end, color=look.colour, lw=0.0, zorder=0)
-        for name in names:
-            rows = decimated(time, trajectory[name])
-            colour, words = POSITIONS[name]
-            ax.plot(
-                clock * time[rows], unit.factor * trajectory[name][rows], color=colour, label=words,
-                **line_style(LINES[name]),
-            )  # fmt: skip
-        for symbol, height in near_levels(trajectory.scene, [trajectory[name] for name in names]).items():
-            ax.axhline(unit.factor * height, color=BLACK, **line_style(LEVEL_LINES[symbol]))
-        ax.set_xlim(clock * time[0], clock * time[-1])
-        ax.set_xlabel(f"time t [{self._clock.name}]")
-        ax.set_ylabel(f"position [{unit.name}]")
-        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, handlelength=1.4)
+        time, clock = self.trajectory["time"], self._clock
+        shade(ax, self.trajectory, clock)
+        paint(ax, positions(self.trajectory), clock)
+        ax.set_xlim(clock.factor * time[0], clock.factor * time[-1])
+        ax.set_xlabel(f"time t [{clock.name}]")

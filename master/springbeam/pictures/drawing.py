@@ -5,7 +5,7 @@ Colours are those of Okabe and Ito, told apart with any colour vision. Widths an
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -79,7 +79,7 @@ VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)"), "z": Look(VERMILLION, "spring 
 FORCES = {
     "contact_force": Look(SKY, "contact C, as applied"),
     "contact_force_smoothed": Look(BLUE, "contact C, smoothed"),
-    "compliance_force": Look(GREEN, "part λ(Ψ − u)₊ᵖ"),  # `forces_of` has those of other laws
+    "compliance_force": Look(GREEN, "part λ(Ψ − u)₊ᵖ"),  # `panels.forces` has those of other laws
     "foundation_force": Look(BLACK, "foundation N"),
 }
 ENERGIES = {
@@ -127,8 +127,6 @@ LEVEL_WORDS = {"Ψ": "rest of the spring Ψ", "φ": "foundation φ"}
 ALTERNATES = "alternates from step to step"
 #: Columns of pixels of a time axis, roughly; more points than a few per column cannot be seen.
 PIXEL_COLUMNS = 1000
-#: Forces and energies below this part of the largest one are not seen beside it.
-INVISIBLE = 5e-3
 
 
 class Unit(NamedTuple):
@@ -161,6 +159,30 @@ def decimated(time: np.ndarray, values: np.ndarray, columns: int = PIXEL_COLUMNS
             part = values[span]
             keep += [span[0], span[int(np.argmin(part))], span[int(np.argmax(part))], span[-1]]
     return np.unique(keep)
+
+
+class EventMark(NamedTuple):
+    """The events of one kind: look with how many they are, shape, times [s] and what each lost [J]."""
+
+    kind: str
+    look: Look
+    marker: Marker
+    times: np.ndarray
+    losses: np.ndarray
+
+
+def event_marks(trajectory: Trajectory) -> list[EventMark]:
+    """Return the events of a run by kind, thinned; kinds that did not happen are left out."""
+    found = []
+    for kind, look in EVENT_LOOKS.items():
+        events = [event for event in trajectory.events if event.kind == kind]
+        if events:
+            times = np.array([event.time for event in events])
+            rows = decimated(times, times)
+            losses = np.array([event.energy_loss for event in events])[rows]
+            counted = look._replace(words=f"{look.words} ({len(events)})")
+            found.append(EventMark(kind, counted, EVENT_MARKERS[kind], times[rows], losses))
+    return found
 
 
 def alternates(values: np.ndarray) -> bool:
@@ -227,29 +249,6 @@ def present(trajectory: Trajectory, names: Iterable[str]) -> list[str]:
     return [name for name in names if name in trajectory.columns]
 
 
-def present_and_not_zero(trajectory: Trajectory, names: Iterable[str]) -> list[str]:
-    """Return those of ``names`` that the run has columns of with other values than 0."""
-    return [name for name in present(trajectory, names) if np.any(trajectory[name] != 0.0)]
-
-
-def forces_of(trajectory: Trajectory) -> dict[str, Look]:
-    """Return the forces that a run has and that are not zero throughout, in the words of its law."""
-    contact = trajectory.scene.contact
-    words = {
-        "compliance": "of the law λ(y − u)₊ᵖ" + " (1 + χ ṗ)" * (contact.damping > 0.0),
-        "link": "of the link λ(y − u)" + " + c(z − v)" * (contact.damping > 0.0),
-    }
-    looks = dict(FORCES)
-    if contact.law in words:
-        looks["compliance_force"] = Look(GREEN, words[contact.law])
-    return {name: looks[name] for name in present_and_not_zero(trajectory, looks)}
-
-
-def gap_look(trajectory: Trajectory) -> Look:
-    """Return the look of the gap: above the spring, or above the foundation."""
-    return Look(BLUE, "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ")
-
-
 def length_along(scene: Scene) -> tuple[Unit, float]:
     """Return the unit of positions along the beam, and its length in that unit; 1 m without a beam."""
     if scene.beam is None:
@@ -258,26 +257,27 @@ def length_along(scene: Scene) -> tuple[Unit, float]:
     return unit, unit.factor * scene.beam.length
 
 
-def levels(scene: Scene) -> dict[str, float]:
-    """Return the heights [m] of the spring's rest Ψ and the foundation φ, those that the scene has."""
-    heights = {}
-    if scene.spring is not None:
-        heights["Ψ"] = scene.spring.equilibrium
-    if scene.stop is not None:
-        heights["φ"] = scene.stop.position
-    return heights
-
-
 def level_side(symbol: str, beside: Collection[str]) -> Literal["bottom", "top", "center"]:
     """Return where the name of a level stands: Ψ above and φ below, alone in the middle."""
     return "center" if len(beside) < 2 else "bottom" if symbol == "Ψ" else "top"
 
 
+def time_unit(trajectory: Trajectory) -> Unit:
+    """Return the unit of the time axes."""
+    return readable_unit([trajectory["time"]], "s")
+
+
 def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
-    """Return those of `levels` that lie within 1.5 times the range of the motion [m]."""
+    """Return the heights [m] of the spring's rest Ψ and the foundation φ, of those within 1.5 times the range of the
+    motion [m]."""
+    heights = {}
+    if scene.spring is not None:
+        heights["Ψ"] = scene.spring.equilibrium
+    if scene.stop is not None:
+        heights["φ"] = scene.stop.position
     low, high = min(float(np.min(part)) for part in moving), max(float(np.max(part)) for part in moving)
     reach = 1.5 * (high - low)
-    return {symbol: height for symbol, height in levels(scene).items() if low - reach <= height <= high + reach}
+    return {symbol: height for symbol, height in heights.items() if low - reach <= height <= high + reach}
 
 
 def first_contact_time(trajectory: Trajectory) -> float:
@@ -290,58 +290,3 @@ def much_smaller(trajectory: Trajectory, names: list[str]) -> list[str]:
     """Return the one of two whose motion cannot be seen beside the other's, if it moves at all."""
     ranges = {name: float(np.ptp(trajectory[name])) for name in names}
     return [name for name, size in ranges.items() if 0.0 < size < 0.02 * max(ranges.values())]
-
-
-def relative_residual(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows to draw, and |energy residual| over the largest energy in them; rows where it is 0 left out."""
-    relative = np.abs(trajectory["energy_residual"]) / energy_scale(trajectory)
-    rows = decimated(trajectory["time"], relative)
-    rows = rows[relative[rows] > 0.0]
-    return rows, relative[rows]
-
-
-def energy_scale(trajectory: Trajectory) -> float:
-    """Return the largest energy of the run [J], against which its residual is judged; 1 if there is none."""
-    columns = trajectory.columns
-    stored = sum(np.abs(columns[name]) for name in ("e_beam", "e_spring", "e_contact") if name in columns)
-    return float(max(np.max(stored), abs(columns["e_total"][0]))) or 1.0
-
-
-def sizes_beside_the_largest(trajectory: Trajectory, names: Iterable[str]) -> tuple[list[str], dict[str, float]]:
-    """Return the columns that can be seen beside the largest of them, and the largest value of each that cannot."""
-    sizes = {name: float(np.max(np.abs(trajectory[name]))) for name in names}
-    seen = [name for name, size in sizes.items() if size >= INVISIBLE * max(sizes.values())]
-    return seen, {name: size for name, size in sizes.items() if size > 0.0 and name not in seen}
-
-
-def too_small(unseen: Mapping[str, float], looks: Mapping[str, Look], unit: str) -> list[str]:
-    """Return words and sizes of what `sizes_beside_the_largest` says cannot be seen."""
-    return [f"{looks[name].words} ≤ {size:.2g} {unit}" for name, size in unseen.items()]
-
-
-def stackable(trajectory: Trajectory, parts: Iterable[str]) -> bool:
-    """Tell whether the energies ``parts`` can be stacked: there are some, and none is negative but by rounding."""
-    least = min((float(np.min(trajectory[name])) for name in parts), default=-1.0)
-    return least >= -1e-9 * float(np.max(trajectory["e_total"]))
-
-
-def impulses(trajectory: Trajectory) -> tuple[dict[str, np.ndarray], Unit, float | None]:
-    """Return time [s] and size [N·s] of the impulses of each of `IMPULSES`, shape (n, 2), their unit and their foot.
-
-    The foot is that of `stem_foot`; with one the axis is logarithmic, and no prefix is wanted.
-    """
-    points = {name: [(e.time, getattr(e, name)) for e in trajectory.events if getattr(e, name)] for name in IMPULSES}
-    found = {name: np.array(some) for name, some in points.items() if some}
-    sizes = np.concatenate([some[:, 1] for some in found.values()])
-    foot = stem_foot(sizes)
-    return found, readable_unit([sizes], "N·s") if foot is None else Unit(1.0, "N·s"), foot
-
-
-def stem_foot(sizes: np.ndarray) -> float | None:
-    """Return where stems of ``sizes`` begin on a logarithmic axis; ``None`` where a linear one shows them all.
-
-    Impulses of rounding size would stretch the axis over the ones that matter.
-    """
-    if np.any(sizes <= 0.0) or np.max(sizes) <= 30.0 * np.min(sizes):
-        return None
-    return 0.3 * max(float(np.min(sizes)), 1e-8 * float(np.max(sizes)))

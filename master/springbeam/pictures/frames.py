@@ -1,14 +1,28 @@
-"""The run as a sequence of frames: where beam and spring are, and how the spring is drawn. For report and animation."""
+"""The run as a sequence of frames, and the sketches of beam and spring that move with it. For report and animation."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from ..results.trajectory import Trajectory
 from ..scene.statics import SHAPE_POINTS
-from .drawing import near_levels
+from .drawing import (
+    BLUE,
+    POSITIONS,
+    VERMILLION,
+    Look,
+    Unit,
+    length_along,
+    much_smaller,
+    near_levels,
+    present,
+    readable_unit,
+)
+
+Part = Literal["beam", "coil", "top"]
 
 #: More frames than this are thinned.
 MOST_FRAMES = 600
@@ -16,9 +30,12 @@ _TURNS = 6
 #: Room around what moves, and height of a coil that nothing carries, as parts of the range of motion.
 _ROOM, _COIL = 0.08, 0.4
 #: A coil of unit height and half-width, from its foot up; only the heights follow the spring.
-COIL_ACROSS = np.array([0.0, 0.0, *(-1.0, 1.0) * _TURNS, 0.0, 0.0])
+_COIL_ACROSS = np.array([0.0, 0.0, *(-1.0, 1.0) * _TURNS, 0.0, 0.0])
 #: Half-widths of coil and stop, as parts of the beam's length.
-COIL_WIDTH, STOP_WIDTH = 0.035, 0.08
+_COIL_WIDTH, _STOP_WIDTH = 0.035, 0.08
+#: The contact is drawn once more where its heights are a smaller part than this of the whole picture's, with as much
+#: room around; from so far along the beam.
+_SMALL, _ROOM_AROUND, _NEAR_TIP = 0.2, 0.3, 0.8
 COIL_HEIGHTS = np.array([0.0, 0.12, *np.linspace(0.12, 0.92, 2 * _TURNS + 2)[1:-1], 0.92, 1.0])
 
 
@@ -44,10 +61,119 @@ class Frames:
         """Return the last frame not after ``time`` [s]; the first, before it."""
         return max(0, int(np.searchsorted(self.time, time, side="right")) - 1)
 
-    def coil(self, frame: int) -> np.ndarray:
-        """Return the heights [m] of the coil's corners."""
+    def heights(self, part: Part, frame: int) -> np.ndarray:
+        """Return the heights [m] of the corners of a part."""
+        if part == "beam":
+            assert self.deflection is not None
+            return np.asarray(self.deflection[frame])
         assert self.y is not None
+        if part == "top":
+            return np.full(2, self.y[frame])
         return self.foot + float(self.y[frame] - self.foot) * COIL_HEIGHTS
+
+
+class Moving(NamedTuple):
+    """A line that moves up and down: where its corners are along the beam, in the sketch's unit, and its width [pt]."""
+
+    part: Part
+    x: np.ndarray
+    look: Look
+    width: float
+
+
+class Block(NamedTuple):
+    """A rectangle that stands still, in the sketch's units."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+
+@dataclass
+class Sketch:
+    """Beam and spring as a picture shows them; heights in ``unit``, positions along the beam in ``along``."""
+
+    name: str
+    heading: str
+    quantity: str  #: what the heights are
+    unit: Unit
+    along: Unit
+    height: float  #: [inch]
+    x: tuple[float, float]
+    y: tuple[float, float]
+    blocks: list[Block] = field(default_factory=list)
+    rest: tuple[float, float] | None = None  #: ends of the line of the undeformed beam
+    levels: dict[str, float] = field(default_factory=dict)  #: heights of Ψ and φ
+    level_ends: tuple[float, float] = (0.0, 0.0)
+    moving: list[Moving] = field(default_factory=list)
+
+
+def sketches(trajectory: Trajectory, frames: Frames) -> list[Sketch]:
+    """Return beam and spring; once more, enlarged, what is too small to be seen in that picture."""
+    found = [_bodies("motion", "Motion", trajectory, frames, (frames.low, frames.high), -0.02)]
+    if contact := _contact_heights(trajectory, frames):
+        found.append(_bodies("motion-contact", "The contact, enlarged", trajectory, frames, contact, _NEAR_TIP))
+    if frames.deflection is not None and "u_tip" in much_smaller(trajectory, present(trajectory, POSITIONS)):
+        reach = 1.1 * float(np.max(np.abs(frames.deflection)))
+        alone = _empty("motion-beam", "The beam alone, enlarged", trajectory, (-reach, reach), -0.02)
+        alone.quantity, alone.height = "beam alone u", 1.5
+        alone.moving = [_beam(trajectory)]
+        found.append(alone)
+    return found
+
+
+def _contact_heights(trajectory: Trajectory, frames: Frames) -> tuple[float, float] | None:
+    """Return the heights [m] between which tip and spring touch, with room; ``None`` if the whole picture shows it."""
+    touching = trajectory["phase"] != "free"
+    heights = [trajectory[name][touching] for name in present(trajectory, POSITIONS)]
+    if len(heights) < 2 or not touching.any():
+        return None
+    low, high = min(float(part.min()) for part in heights), max(float(part.max()) for part in heights)
+    room = _ROOM_AROUND * (high - low)
+    return (low - room, high + room) if 0.0 < high - low < _SMALL * (frames.high - frames.low) else None
+
+
+def _empty(name: str, heading: str, trajectory: Trajectory, heights: tuple[float, float], begin: float) -> Sketch:
+    """Return the clamp and the undeformed beam between ``heights`` [m], from ``begin`` (a part of its length) on."""
+    unit = readable_unit([np.array(heights)], "m")
+    low, high = unit.factor * heights[0], unit.factor * heights[1]
+    along, length = length_along(trajectory.scene)
+    sketch = Sketch(name, heading, "height", unit, along, 3.0, (begin * length, 1.12 * length), (low, high))
+    if trajectory.scene.beam is None:
+        sketch.x = (0.5 * length, 1.5 * length)
+    else:
+        sketch.blocks, sketch.rest = [Block(-0.02 * length, 0.0, low, high)], (0.0, length)
+    return sketch
+
+
+def _bodies(
+    name: str, heading: str, trajectory: Trajectory, frames: Frames, heights: tuple[float, float], begin: float
+) -> Sketch:
+    sketch = _empty(name, heading, trajectory, heights, begin)
+    _, length = length_along(trajectory.scene)
+    low, high = sketch.y
+    inside = {symbol: sketch.unit.factor * height for symbol, height in frames.levels.items()}
+    sketch.levels = {symbol: height for symbol, height in inside.items() if low <= height <= high}
+    sketch.level_ends = length * (1.0 - _STOP_WIDTH), length * (1.0 + _STOP_WIDTH)
+    if "φ" in sketch.levels:
+        # Two blocks where a spring stands between them.
+        inner = 1.2 * _COIL_WIDTH * length if frames.y is not None else 0.0
+        left, right = sketch.level_ends
+        for edges in ((left, length - inner), (length + inner, right)):
+            sketch.blocks.append(Block(*edges, low, sketch.levels["φ"]))
+    if frames.y is not None:
+        half = _COIL_WIDTH * length
+        ends = np.array([length - 1.6 * half, length + 1.6 * half])
+        sketch.moving.append(Moving("coil", length + half * _COIL_ACROSS, Look(VERMILLION, "spring"), 1.2))
+        sketch.moving.append(Moving("top", ends, Look(VERMILLION, "its top y"), 3.5))
+    if frames.deflection is not None:
+        sketch.moving.append(_beam(trajectory))
+    return sketch
+
+
+def _beam(trajectory: Trajectory) -> Moving:
+    return Moving("beam", length_along(trajectory.scene)[1] * SHAPE_POINTS, Look(BLUE, "beam u"), 3.0)
 
 
 def frames_of(trajectory: Trajectory) -> Frames | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,25 +13,24 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator
 
 from ..results.trajectory import Trajectory
 from .drawing import (
-    ALTERNATES,
-    EVENT_LOOKS,
-    EVENT_MARKERS,
+    BLACK,
     GREY,
-    LINES,
+    LEVEL_LINES,
     MANY_EVENTS,
     VERMILLION,
     Line,
-    Look,
     Unit,
-    alternates,
-    decimated,
+    event_marks,
+    level_side,
     mark,
-    readable_unit,
     shaded_phases,
+    time_unit,
 )
+from .panels import Curve, Panel
 
 _DASHES = (0, (4, 2))
 
@@ -52,6 +52,8 @@ DPI = 160
 WIDTH = 8.2  # inches
 _MARK_HEIGHT, _MARK_ROW = 1.045, 0.04
 _KEY_COLUMNS = 4
+#: Characters of a line of a remark beside a panel.
+_NOTE_WIDTH = 24
 
 
 @dataclass
@@ -64,11 +66,19 @@ class Timeline:
     unit: Unit
 
     @classmethod
+    def drawn(cls, trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Figure:
+        """Return the figure of ``panels``, one below the other."""
+        timeline = cls.of(trajectory, title, [panel.height for panel in panels])
+        for ax, panel in zip(timeline.axes, panels, strict=True):
+            paint(ax, panel, timeline.unit)
+        return timeline.figure
+
+    @classmethod
     def of(cls, trajectory: Trajectory, title: str, heights: Sequence[float]) -> Timeline:
         """Make the figure with a panel of each of ``heights`` [inch], empty but for phases and events."""
         figure = figure_for(trajectory, title, 1.0 + sum(heights))
         axes = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
-        unit = readable_unit([trajectory["time"]], "s")
+        unit = time_unit(trajectory)
         timeline = cls(trajectory, figure, axes, unit)
         axes[-1].set_xlabel(f"time t [{unit.name}]")
         axes[0].set_xlim(unit.factor * trajectory["time"][0], unit.factor * trajectory["time"][-1])
@@ -79,52 +89,98 @@ class Timeline:
             figure.legend(handles=keys, loc="outside lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
         return timeline
 
-    def line(self, ax: Axes, unit: Unit, name: str, look: Look, **style: Any) -> None:
-        """Draw a column over time; where it alternates from step to step, as dots on a faint line."""
-        style = {"color": look.colour, "label": look.words, **line_style(LINES.get(name, Line())), **style}
-        values = self.trajectory[name]
-        rows = decimated(self.trajectory["time"], values)
-        t, v = self.unit.factor * self.trajectory["time"][rows], unit.factor * values[rows]
-        if alternates(values):
-            style = {**style, "linewidth": 0.25, "marker": ".", "markersize": 1.6, "markeredgewidth": 0.0}
-            note(ax, ALTERNATES.replace(" to", "\nto"))
-        ax.plot(t, v, **style)
-
     def _shade(self) -> list[Patch]:
-        patches = []
-        for look, spans in shaded_phases(self.trajectory):
-            intervals = [(self.unit.factor * start, self.unit.factor * (end - start)) for start, end in spans]
-            for ax in self.axes:
-                ax.broken_barh(
-                    intervals, (0.0, 1.0), transform=ax.get_xaxis_transform(), color=look.colour, lw=0.0, zorder=0
-                )
-            patches.append(Patch(facecolor=look.colour, edgecolor=GREY, linewidth=0.5, label=look.words))
-        return patches
+        for ax in self.axes:
+            shade(ax, self.trajectory, self.unit)
+        looks = [look for look, _ in shaded_phases(self.trajectory)]
+        return [Patch(facecolor=look.colour, edgecolor=GREY, linewidth=0.5, label=look.words) for look in looks]
 
     def _mark_events(self) -> list[Line2D]:
         """Mark events above the first panel and by lines through all; many only by ticks, a row for each kind."""
-        events = self.trajectory.events
-        many = len(events) > MANY_EVENTS
+        many = len(self.trajectory.events) > MANY_EVENTS
         handles: list[Line2D] = []
-        for kind, (colour, words) in EVENT_LOOKS.items():
-            times = self.unit.factor * np.array([event.time for event in events if event.kind == kind])
-            if not len(times):
-                continue
+        for event in event_marks(self.trajectory):
             height = _MARK_HEIGHT + (_MARK_ROW * len(handles) if many else 0.0)
-            shape, size = ("|", 4.0) if many else (EVENT_MARKERS[kind].matplotlib, EVENT_MARKERS[kind].size)
-            look: dict[str, Any] = {"color": colour, "marker": shape, "markersize": size, "ls": "none"}
-            visible = times[decimated(times, times)]
-            first = self.axes[0]
-            first.plot(
-                visible, np.full(len(visible), height), transform=first.get_xaxis_transform(), clip_on=False, **look
-            )
+            shape, size = ("|", 4.0) if many else (event.marker.matplotlib, event.marker.size)
+            look: dict[str, Any] = {"color": event.look.colour, "marker": shape, "markersize": size, "ls": "none"}
+            times, first = self.unit.factor * event.times, self.axes[0]
+            first.plot(times, np.full(len(times), height), transform=first.get_xaxis_transform(), clip_on=False, **look)
             for ax in [] if many else self.axes:
-                ax.vlines(
-                    visible, 0.0, 1.0, transform=ax.get_xaxis_transform(), color=colour, lw=0.4, alpha=0.6, zorder=1
-                )
+                across = ax.get_xaxis_transform()
+                ax.vlines(times, 0.0, 1.0, transform=across, color=event.look.colour, lw=0.4, alpha=0.6, zorder=1)
             key = {"markersize": 8.0, "markeredgewidth": 1.5} if many else {}
-            handles.append(Line2D([], [], label=f"{words} ({len(times)})", **(look | key)))
+            handles.append(Line2D([], [], label=event.look.words, **(look | key)))
         return handles
+
+
+def shade(ax: Axes, trajectory: Trajectory, clock: Unit) -> None:
+    """Shade the phases of the run behind an axis over time."""
+    for look, spans in shaded_phases(trajectory):
+        intervals = [(clock.factor * start, clock.factor * (end - start)) for start, end in spans]
+        ax.broken_barh(intervals, (0.0, 1.0), transform=ax.get_xaxis_transform(), color=look.colour, lw=0.0, zorder=0)
+
+
+def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
+    """Draw ``panel`` over time in the unit ``clock``."""
+    factor = panel.unit.factor
+    stack = [curve for curve in panel.curves if curve.stacked]
+    if stack:
+        ax.stackplot(
+            clock.factor * stack[0].time,
+            *(factor * curve.values for curve in stack),
+            colors=[curve.look.colour for curve in stack],
+            labels=[curve.look.words for curve in stack],
+            linewidth=0.0,
+        )
+    for curve in panel.curves:
+        if not curve.stacked:
+            _paint_curve(ax, curve, clock.factor * curve.time, factor * curve.values, panel)
+    paint_levels(ax, {symbol: factor * height for symbol, height in panel.levels.items()}, whole_width=True)
+    if panel.logarithmic is not None:
+        ax.set_yscale("log")
+        ax.set_ylim(panel.logarithmic)
+        ax.yaxis.set_major_locator(LogLocator(numticks=6))
+    elif stack:
+        ax.set_ylim(bottom=0.0)
+    elif ax.get_ylim()[0] < 0.0 < ax.get_ylim()[1]:
+        ax.axhline(0.0, color=GREY, lw=0.5, zorder=1)
+    ax.set_ylabel(panel.axis)
+    put_key(ax)
+    if panel.remarks:
+        note = "\n".join(textwrap.fill(remark, _NOTE_WIDTH) for remark in panel.remarks)
+        ax.text(1.012, 0.0, note, transform=ax.transAxes, va="bottom", **REMARK)
+
+
+def _paint_curve(ax: Axes, curve: Curve, time: np.ndarray, values: np.ndarray, panel: Panel) -> None:
+    colour, words = curve.look
+    if curve.marker is not None:
+        foot = 0.0 if panel.logarithmic is None else panel.logarithmic[0]
+        ax.vlines(time, foot, values, color=colour, lw=1.0)
+        face = "none" if curve.marker.sign == "○" else colour
+        ax.plot(time, values, color=colour, linestyle="none", label=words, marker=curve.marker.matplotlib,
+                markersize=curve.marker.size, markerfacecolor=face)  # fmt: skip
+        return
+    style = line_style(curve.line)
+    if curve.alternates:
+        style |= {"linewidth": 0.25, "marker": ".", "markersize": 1.6, "markeredgewidth": 0.0}
+    ax.plot(time, values, color=colour, label=words, **style)
+
+
+def paint_levels(ax: Axes, heights: Mapping[str, float], *, whole_width: bool = False) -> None:
+    """Draw Ψ and φ, at ``heights`` in the unit of the axis, across the panel or as ticks at its right edge."""
+    for symbol, height in heights.items():
+        ax.axhline(height, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **line_style(LEVEL_LINES[symbol]))
+        # One above and one below: however near the two levels are, their names are apart.
+        side: str = level_side(symbol, heights)
+        place: dict[str, Any] = {"xytext": (3.0, 0.0), "va": side}
+        if whole_width:  # beside the panel is the key
+            place = {
+                "xytext": (-2.0, -1.5 if side == "top" else 1.5),
+                "ha": "right",
+                "va": side.replace("center", "bottom"),
+            }
+        ax.annotate(symbol, (1.0, height), xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=8.0,
+                    **place)  # fmt: skip
 
 
 def line_style(line: Line) -> dict[str, Any]:
@@ -142,15 +198,6 @@ def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
     return figure
 
 
-def key(ax: Axes) -> None:
+def put_key(ax: Axes) -> None:
     """Put the key beside the panel."""
     ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), frameon=False, borderaxespad=0.0, handlelength=1.6)
-
-
-def note(ax: Axes, text: str) -> None:
-    """Put a remark beside the panel, under its key; once, however often it is made."""
-    notes = [note for note in ax.texts if note.get_gid() == "note"]
-    if not notes:
-        ax.text(1.012, 0.0, text, transform=ax.transAxes, va="bottom", gid="note", **REMARK)
-    elif text not in notes[0].get_text():
-        notes[0].set_text(f"{notes[0].get_text()}\n{text}")

@@ -26,15 +26,18 @@ from ..drawing import (
     FORCES,
     POSITIONS,
     alternating,
+    event_marks,
     mark,
     present,
     readable_unit,
+    shaded_phases,
+    time_unit,
 )
-from ..frames import Frames, frames_of
+from ..frames import Frames, Sketch, frames_of, sketches
 from .chart import Chart
 from .described import described
-from .moving import MovingChart, moving_charts, moving_parts
-from .over_time import backdrop, charts, event_key, phase_key, time_unit
+from .moving import moving_chart, moving_parts
+from .over_time import backdrop, charts
 
 _HERE = Path(__file__).parent
 #: Rows of the table of events.
@@ -59,7 +62,8 @@ def page(trajectory: Trajectory) -> str:
     drawable = len(time) > 1 and time[-1] > time[0]
     over_time = charts(trajectory) if drawable else []
     frames = frames_of(trajectory) if drawable else None
-    moving = moving_charts(trajectory, frames) if frames is not None else []
+    shown = [] if frames is None else sketches(trajectory, frames)
+    moving = [] if frames is None else [moving_chart(sketch, frames) for sketch in shown]
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_HERE), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True,
         lstrip_blocks=True,
@@ -75,8 +79,8 @@ def page(trajectory: Trajectory) -> str:
         moving=moving,
         frames=0 if frames is None else len(frames.time),
         charts=over_time,
-        phases=phase_key(trajectory) if drawable else [],
-        event_key=event_key(trajectory),
+        phases=[look for look, _ in shaded_phases(trajectory)] if drawable else [],
+        event_key=event_marks(trajectory),
         numbers=list(_numbers(trajectory)),
         described=list(described(scene)),
         results=list(_results(trajectory.summary)),
@@ -90,7 +94,7 @@ def page(trajectory: Trajectory) -> str:
         points=max((chart.points for chart in over_time), default=0),
         toml=tomli_w.dumps(scene.model_dump(exclude_none=True)),
         command=shipped_command(scene),
-        data=_as_script(_data(trajectory, over_time, moving, frames) if drawable else None),
+        data=_as_script(_data(trajectory, [*moving, *over_time], shown, frames) if drawable else None),
         plotly=get_plotlyjs(),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
         style=(_HERE / "page.css").read_text(encoding="utf-8"),
@@ -203,15 +207,13 @@ def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
             yield extreme(name, f"highest {look.words}", "m", np.argmax)
 
 
-def _data(
-    trajectory: Trajectory, over_time: list[Chart], moving: list[MovingChart], frames: Frames | None
-) -> dict[str, Any]:
+def _data(trajectory: Trajectory, drawn: list[Chart], moving: list[Sketch], frames: Frames | None) -> dict[str, Any]:
     unit = time_unit(trajectory)
     data: dict[str, Any] = {
         "unit": {"factor": unit.factor, "name": unit.name},
         "backdrop": backdrop(trajectory),
-        "charts": {chart.name: chart.figure.to_dict() for chart in [*moving, *over_time]},
-        "overTime": [chart.name for chart in over_time],
+        "charts": {chart.name: chart.figure.to_dict() for chart in drawn},
+        "overTime": [chart.name for chart in drawn[len(moving) :]],
     }
     if frames is not None:
         data["motion"] = {
@@ -220,7 +222,7 @@ def _data(
             "readings": list(_readings(trajectory, frames)),
             "deflection": frames.deflection,
             "y": frames.y,
-            "parts": {chart.name: moving_parts(frames, chart) for chart in moving},
+            "parts": {sketch.name: moving_parts(frames, sketch) for sketch in moving},
         }
     return data
 

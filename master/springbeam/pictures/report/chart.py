@@ -12,6 +12,8 @@ from ..drawing import BLACK, GREY, Line, Marker
 _GRID = "#E3E3E3"
 #: Pixels of the page for a point of the pictures.
 _PIXELS = 1.8
+#: Pixels of a chart's height: for each inch of its picture, and for what stands around it.
+_PIXELS_PER_INCH, _PIXELS_BESIDE = 82, 110
 
 
 def line_style(line: Line) -> dict[str, Any]:
@@ -34,6 +36,11 @@ class Chart:
     remarks: list[str] = field(default_factory=list)
     #: Rows drawn, the most of any curve.
     points: int = 0
+
+
+def height_of(inches: float) -> int:
+    """Return the height of a chart [px] whose picture has ``inches``."""
+    return round(_PIXELS_BESIDE + _PIXELS_PER_INCH * inches)
 
 
 def layout(height: int) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from ...pictures.drawing import (
     present,
     readable_unit,
 )
-from ...pictures.timeline import DPI, STYLE, Timeline, key
+from ...pictures.timeline import DPI, STYLE, Timeline, put_key
 from . import Report
 
 
@@ -42,7 +42,7 @@ def draw(report: Report, path: Path) -> None:
                 label=f"{name}, reference",
             )  # fmt: skip
         above.set_ylabel(f"position [{unit.name}]")
-        key(above)
+        put_key(above)
         colours = (BLUE, SKY, VERMILLION, ORANGE, GREEN, PURPLE, GREY)
         for row, colour in zip(report.rows, colours, strict=False):
             time = timeline.unit.factor * row.times
@@ -55,5 +55,5 @@ def draw(report: Report, path: Path) -> None:
         below.set_ylim(max(low, 1e-18), 10.0 * high)
         below.axvline(timeline.unit.factor * report.horizon, color=BLACK, lw=0.8, ls="--")
         below.set_ylabel("error (lines), bound (dots)\n[unit of the quantity]")
-        key(below)
+        put_key(below)
         timeline.figure.savefig(path, dpi=DPI)

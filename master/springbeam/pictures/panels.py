@@ -1,0 +1,239 @@
+"""What is drawn of a run over time: panels of curves, with units, limits and remarks.
+
+``timeline`` paints them with matplotlib, ``report.over_time`` makes plotly's charts of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..results.trajectory import Trajectory
+from .drawing import (
+    ALTERNATES,
+    BLACK,
+    BLUE,
+    ENERGIES,
+    FORCES,
+    GREEN,
+    IMPULSE_MARKERS,
+    IMPULSES,
+    LINES,
+    POSITIONS,
+    VELOCITIES,
+    VERMILLION,
+    Line,
+    Look,
+    Marker,
+    Unit,
+    alternates,
+    decimated,
+    much_smaller,
+    near_levels,
+    present,
+    readable_unit,
+)
+
+#: Forces and energies below this part of the largest one are not seen beside it.
+_INVISIBLE = 5e-3
+_PLAIN = Line()
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve over time, thinned; with a ``marker``, points on stems."""
+
+    name: str  #: column of the run, or field of its events
+    look: Look
+    time: np.ndarray  #: [s]
+    values: np.ndarray  #: in SI units
+    line: Line = _PLAIN
+    alternates: bool = False  #: drawn as dots on a faint line
+    stacked: bool = False  #: drawn as an area on top of those before it
+    marker: Marker | None = None
+
+
+@dataclass
+class Panel:
+    """Curves of one quantity."""
+
+    name: str
+    heading: str
+    quantity: str
+    unit: Unit
+    curves: list[Curve]
+    height: float = 1.6  #: [inch]
+    levels: dict[str, float] = field(default_factory=dict)  #: heights [m] of Ψ and φ
+    logarithmic: tuple[float, float] | None = None  #: limits of a logarithmic axis; stems begin at the lower one
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def axis(self) -> str:
+        """What stands along the axis."""
+        return f"{self.quantity} [{self.unit.name}]"
+
+
+def panels(trajectory: Trajectory) -> list[Panel]:
+    """Return all panels that the run has something to show for; it has at least two rows at different times."""
+    return [
+        positions(trajectory),
+        *enlarged(trajectory),
+        velocities(trajectory, VELOCITIES),
+        *forces(trajectory),
+        *impulses(trajectory),
+        *gap(trajectory),
+        energies(trajectory),
+        residual(trajectory),
+    ]
+
+
+def positions(trajectory: Trajectory) -> Panel:
+    """Return tip and spring top, with the levels that are near what moves."""
+    panel = _lines(trajectory, "positions", "Positions", POSITIONS, "position", "m")
+    panel.height = 2.4
+    panel.levels = near_levels(trajectory.scene, [trajectory[name] for name in present(trajectory, POSITIONS)])
+    return panel
+
+
+def enlarged(trajectory: Trajectory) -> list[Panel]:
+    """Return a panel of its own for the one of two positions whose motion is lost beside the other's."""
+    found = []
+    for name in much_smaller(trajectory, present(trajectory, POSITIONS)):
+        look = POSITIONS[name]._replace(words=f"{POSITIONS[name].words}, enlarged")
+        panel = _lines(trajectory, f"position-{name}", "The smaller one, enlarged", {name: look}, "position", "m")
+        panel.curves = [_curve(trajectory, name, look, _PLAIN)]
+        panel.height = 1.2
+        found.append(panel)
+    return found
+
+
+def velocities(trajectory: Trajectory, names: Iterable[str]) -> Panel:
+    """Return those of `VELOCITIES` that are named."""
+    return _lines(trajectory, "velocities", "Velocities", {name: VELOCITIES[name] for name in names}, "velocity", "m/s")
+
+
+def forces(trajectory: Trajectory) -> list[Panel]:
+    """Return the forces that are not zero throughout, in the words of the run's law; none if there are none."""
+    contact = trajectory.scene.contact
+    words = {
+        "compliance": "of the law λ(y − u)₊ᵖ" + " (1 + χ ṗ)" * (contact.damping > 0.0),
+        "link": "of the link λ(y − u)" + " + c(z − v)" * (contact.damping > 0.0),
+    }
+    looks = dict(FORCES)
+    if contact.law in words:
+        looks["compliance_force"] = Look(GREEN, words[contact.law])
+    looks = _not_zero(trajectory, looks)
+    if not looks:
+        return []
+    seen, remarks = _seen(trajectory, looks, "N")
+    panel = _lines(trajectory, "forces", "Forces", seen, "force", "N")
+    panel.height = 2.0
+    panel.remarks += remarks
+    return [panel]
+
+
+def impulses(trajectory: Trajectory) -> list[Panel]:
+    """Return the impulses of the events, on a logarithmic axis where a linear one would not show them all."""
+    points = {name: [(e.time, getattr(e, name)) for e in trajectory.events if getattr(e, name)] for name in IMPULSES}
+    found = {name: np.array(some) for name, some in points.items() if some}
+    if not found:
+        return []
+    sizes = np.concatenate([some[:, 1] for some in found.values()])
+    foot = _stem_foot(sizes)
+    # A logarithmic axis needs no prefix.
+    unit = readable_unit([sizes], "N·s") if foot is None else Unit(1.0, "N·s")
+    curves = []
+    for name, every in found.items():
+        time, values = every[decimated(every[:, 0], every[:, 1])].T
+        curves.append(Curve(name, IMPULSES[name], time, values, marker=IMPULSE_MARKERS[name]))
+    limits = None if foot is None else (foot, 3.0 * float(np.max(sizes)))
+    return [Panel("impulses", "Impulses", "impulse", unit, curves, 1.2, logarithmic=limits)]
+
+
+def _stem_foot(sizes: np.ndarray) -> float | None:
+    """Return where stems of ``sizes`` begin on a logarithmic axis; ``None`` where a linear one shows them all.
+
+    Impulses of rounding size would stretch the axis over the ones that matter.
+    """
+    if np.any(sizes <= 0.0) or np.max(sizes) <= 30.0 * np.min(sizes):
+        return None
+    return 0.3 * max(float(np.min(sizes)), 1e-8 * float(np.max(sizes)))
+
+
+def gap(trajectory: Trajectory) -> list[Panel]:
+    """Return the gap above the spring, or above the foundation; nothing of a scene without one."""
+    if "gap" not in trajectory.columns:
+        return []
+    look = Look(BLUE, "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ")
+    return [_lines(trajectory, "gap", "Gap", {"gap": look}, "gap", "m")]
+
+
+def energies(trajectory: Trajectory) -> Panel:
+    """Return the energies, stacked where no part is negative but by rounding."""
+    parts, remarks = _seen(trajectory, _not_zero(trajectory, ENERGIES), "J")
+    panel = _lines(trajectory, "energies", "Energy ledger", parts | {"e_total": Look(BLACK, "total")}, "energy", "J")
+    panel.height = 2.2
+    panel.remarks += remarks
+    least = min((float(np.min(trajectory[name])) for name in parts), default=-1.0)
+    if least < -1e-9 * float(np.max(trajectory["e_total"])):
+        panel.heading += " (lines: a part is negative)"
+        return panel
+    time = trajectory["time"]
+    rows = np.unique(np.concatenate([decimated(time, trajectory[name]) for name in [*parts, "e_total"]]))
+    stack = [Curve(name, look, time[rows], trajectory[name][rows], stacked=True) for name, look in parts.items()]
+    panel.curves = [*stack, panel.curves[-1]]
+    return panel
+
+
+def residual(trajectory: Trajectory) -> Panel:
+    """Return |energy residual| over the largest energy; rows where it is 0 are left out."""
+    relative = np.abs(trajectory["energy_residual"]) / _energy_scale(trajectory)
+    rows = decimated(trajectory["time"], relative)
+    rows = rows[relative[rows] > 0.0]
+    look = Look(VERMILLION, "over the largest energy")
+    curve = Curve("energy_residual", look, trajectory["time"][rows], relative[rows], Line(0.8))
+    heading = "Energy residual: what the sum of all energies has changed by since the start"
+    panel = Panel("residual", heading, "energy residual", Unit(1.0, "–"), [curve], 1.4)
+    if len(rows):
+        panel.logarithmic = 0.3 * max(float(np.min(curve.values)), 1e-18), 3.0 * float(np.max(curve.values))
+    else:
+        panel.remarks.append("zero throughout")
+    return panel
+
+
+def _energy_scale(trajectory: Trajectory) -> float:
+    """Return the largest energy of the run [J], against which its residual is judged; 1 if there is none."""
+    columns = trajectory.columns
+    stored = sum(np.abs(columns[name]) for name in ("e_beam", "e_spring", "e_contact") if name in columns)
+    return float(max(np.max(stored), abs(columns["e_total"][0]))) or 1.0
+
+
+def _lines(
+    trajectory: Trajectory, name: str, heading: str, looks: Mapping[str, Look], quantity: str, unit: str
+) -> Panel:
+    """Return a panel of those columns of ``looks`` that the run has."""
+    there = present(trajectory, looks)
+    curves = [_curve(trajectory, column, looks[column], LINES.get(column, _PLAIN)) for column in there]
+    readable = readable_unit([trajectory[column] for column in there], unit)
+    remarks = [f"{curve.look.words} {ALTERNATES}" for curve in curves if curve.alternates]
+    return Panel(name, heading, quantity, readable, curves, remarks=remarks)
+
+
+def _curve(trajectory: Trajectory, name: str, look: Look, line: Line) -> Curve:
+    values = trajectory[name]
+    rows = decimated(trajectory["time"], values)
+    return Curve(name, look, trajectory["time"][rows], values[rows], line, alternates(values))
+
+
+def _not_zero(trajectory: Trajectory, looks: Mapping[str, Look]) -> dict[str, Look]:
+    return {name: looks[name] for name in present(trajectory, looks) if np.any(trajectory[name] != 0.0)}
+
+
+def _seen(trajectory: Trajectory, looks: Mapping[str, Look], unit: str) -> tuple[dict[str, Look], list[str]]:
+    """Return the columns that can be seen beside the largest of them, and words for those that cannot."""
+    sizes = {name: float(np.max(np.abs(trajectory[name]))) for name in looks}
+    seen = {name: looks[name] for name, size in sizes.items() if size >= _INVISIBLE * max(sizes.values())}
+    unseen = [f"{looks[name].words} ≤ {size:.2g}\u00a0{unit}" for name, size in sizes.items() if name not in seen]
+    return seen, [f"too small to draw: {', '.join(unseen)}"] if unseen else []
