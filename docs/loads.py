@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -12,18 +13,19 @@ from pages import IMAGES, shrink  # beside this script
 from springbeam import load_scene, simulate
 from springbeam.pictures.drawing import BLACK, BLUE, VERMILLION
 from springbeam.studies import sweep
-from springbeam.studies.sweep.design import design, parse_axis
+from springbeam.studies.study import record_all
 
 
 def bifurcation() -> None:
     """Draw what `springbeam sweep vibro-impact --vary loads.0.frequency=25:65:81 --stroboscopic` draws."""
-    axes = (parse_axis("loads.0.frequency=25:65:81"),)
     todo = sweep.Sweep(
-        load_scene("vibro-impact"), axes, design(axes, 0, 0, "random"), ("u_tip_max",), stroboscopic=True
+        scene=load_scene("vibro-impact"),
+        vary=("loads.0.frequency=25:65:81",),
+        metric=("u_tip_max",),
+        stroboscopic=True,
     )
-    with tempfile.TemporaryDirectory() as folder, sweep.cluster(None, None) as client:
-        sweep.run(todo, Path(folder), client)
-        sweep.stroboscopic.draw(sweep.rows(folder), axes, Path(folder))
+    with tempfile.TemporaryDirectory() as folder:
+        todo.write(record_all(todo, workers=os.cpu_count() or 1), Path(folder), pictures=True)
         shutil.copy(Path(folder) / sweep.stroboscopic.PICTURE, IMAGES / "vibro-impact.png")
 
 

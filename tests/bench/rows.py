@@ -578,17 +578,17 @@ def _scipy(scene: Scene, method: str, rtol: float, scale: float, times: np.ndarr
 
 
 def sweep(effort: Effort) -> Iterator[Row]:
-    """Throughput of a sweep, cluster and pool warm."""
+    """Throughput of a sweep, its workers warm."""
     for workers in (1,) if effort.quick else (1, 2):
-        with sweeps.both(workers) as (client, pool):
+        with sweeps.warm(workers) as pool:
             for t_end, runs in sweeps.SIZES[-1:] if effort.quick else sweeps.SIZES:
                 todo = sweeps.plan(t_end, 4 if effort.quick else runs)
                 times = compare(
-                    partial(sweeps.on_dask, todo, client),
+                    partial(sweeps.recorded, todo, pool),
                     partial(sweeps.in_a_pool, todo, pool),
                     min(effort.rounds, 5),
                 )
-                each = statistics.median(times.rival) * workers / len(todo.values)
+                each = statistics.median(times.rival) * workers / len(todo.cases())
                 yield ratio_row(
                     "9",
                     f"a sweep on {workers} worker{'s' * (workers > 1)}, runs of {_time(each)}",

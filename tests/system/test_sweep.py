@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import os
-import signal
-import socket
-import threading
-import time
-
 import numpy as np
-import psutil
 import pytest
 from commands import command
 
 from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
 from springbeam.studies import sweep
+from springbeam.studies.study import Records, dask_cluster, record_all
 from springbeam.studies.sweep.design import Axis, design, parse_axis, varied
 
 METRICS = ("y_min", "first_stop_impact", "energy_residual")
-
-
-@pytest.fixture(scope="module")
-def client():
-    with sweep.cluster(None, workers=2) as client:
-        yield client
 
 
 def small(t_end=0.08, macro_step=2e-3):
@@ -33,9 +20,8 @@ def small(t_end=0.08, macro_step=2e-3):
     return with_changes(load_scene("soft"), **changes)
 
 
-def planned(*texts, samples=0, seed=0, sampling="latin_hypercube", scene=None, metrics=METRICS):
-    axes = tuple(parse_axis(text) for text in texts)
-    return sweep.Sweep(scene or small(), axes, design(axes, samples, seed, sampling), metrics)
+def planned(*texts, scene=None, **options):
+    return sweep.Sweep(scene=scene or small(), vary=texts, metric=METRICS, **options)
 
 
 @pytest.mark.parametrize(
@@ -93,12 +79,12 @@ def test_the_product_has_the_last_axis_fastest():
 def test_a_macro_step_beside_a_tolerance_is_refused_with_both_named(tolerance, order):
     texts = ["coupling.macro_step=1e-3,2e-3", f"coupling.{tolerance}=1e-3,1e-4"]
     with pytest.raises(SceneError, match=rf"--vary coupling\.macro_step.* --vary coupling\.{tolerance}"):
-        planned(*texts[::order])
+        planned(*texts[::order]).cases()
 
 
 def test_what_the_accuracy_picks_cannot_be_varied():
     with pytest.raises(SceneError, match=r"--vary coupling\.degree: accuracy = 0\.001 picks"):
-        planned("coupling.degree=0,1", scene=with_changes(small(), accuracy=1e-3))
+        planned("coupling.degree=0,1", scene=with_changes(small(), accuracy=1e-3)).cases()
 
 
 def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
@@ -111,103 +97,31 @@ def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
     assert design(axes, 30, 8, "latin_hypercube") != values
 
 
-def test_rows_are_what_single_runs_give_and_failures_are_rows(client, tmp_path):
+def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
     plan = planned("spring.mass=0.5,1,-1", "spring.linear_stiffness=1:100:3:log")
-    counts = sweep.run(plan, tmp_path / "s", client)
-    assert counts == {"done": 6, "stopped": 0, "refused": 3, "lost": 0}
-    rows = sweep.rows(tmp_path / "s")
+    records = record_all(plan)
+    assert plan.found(records).document["runs"] == {"done": 6, "stopped": 0, "refused": 3, "lost": 0}
+    plan.write(records, tmp_path, pictures=False)
+    rows = sweep.rows(tmp_path)
     assert rows["index"] == list(range(9))
-    for k in range(9):
+    for k, values in enumerate(plan.cases().values()):
         if rows["status"][k] == "refused":
             assert rows["spring.mass"][k] == -1
             assert "[spring] mass = -1" in rows["error"][k]
             assert rows["y_min"][k] is None
             continue
-        run = simulate(varied(plan.scene, plan.axes, plan.values[k]))
+        run = simulate(varied(plan.scene, plan.axes, values))
         assert rows["y_min"][k] == run.y.min()
         assert rows["energy_residual"][k] == run.summary["max_energy_residual"]
         assert rows["first_stop_impact"][k] == next(e.time for e in run.events if e.kind == "stop_impact")
 
 
-def test_a_sweep_goes_on_where_it_was_left_and_does_not_depend_on_workers(client, tmp_path):
+def test_rows_do_not_depend_on_the_number_of_workers(tmp_path):
     plan = planned("spring.mass=0.5:2", "spring.damping=0:1", samples=12)
-    whole, parted = tmp_path / "whole", tmp_path / "parted"
-    sweep.run(plan, whole, client)
-
-    class Enough(Exception):
-        pass
-
-    def stop(done, total, failed):
-        if done == 5:
-            raise Enough
-
-    with pytest.raises(Enough):
-        sweep.run(plan, parted, client, stop)
-    # What had come was not yet written: only rows on disk count as finished.
-    parts = sweep._Parts(plan, parted / "parts")
-    for index in range(4):
-        parts.add(index, sweep.row(plan.scene, plan.axes, plan.values[index], plan.metrics))
-    parts.flush()
-    seen = []
-    with sweep.cluster(None, workers=1) as one:
-        sweep.run(plan, parted, one, lambda done, total, failed: seen.append(done))
-    assert seen == list(range(4, 13))
-    assert (whole / sweep.TABLE).read_bytes() == (parted / sweep.TABLE).read_bytes()
-    again = []
-    sweep.run(plan, parted, client, lambda done, total, failed: again.append(done))
-    assert again == [12]
-
-
-def test_a_finished_sweep_opens_without_workers(client, tmp_path, monkeypatch):
-    plan = planned("spring.mass=0.5,-1")
-    assert sweep.finished(plan, tmp_path) is None
-    counts = sweep.run(plan, tmp_path, client)
-    assert sweep.finished(plan, tmp_path) == counts == {"done": 1, "stopped": 0, "refused": 1, "lost": 0}
-    with pytest.raises(sweep.SweepError):
-        sweep.finished(planned("spring.mass=0.5,2"), tmp_path)
-
-
-def test_another_sweep_is_not_mixed_in(client, tmp_path):
-    sweep.run(planned("spring.mass=1,2"), tmp_path / "s", client)
-    with pytest.raises(sweep.SweepError, match="another sweep"):
-        sweep.run(planned("spring.mass=1,3"), tmp_path / "s", client)
-    (tmp_path / "t").mkdir()
-    (tmp_path / "t" / "thesis.txt").write_text("mine")
-    with pytest.raises(sweep.SweepError, match="not empty"):
-        sweep.run(planned("spring.mass=1,2"), tmp_path / "t", client)
-
-
-def test_a_killed_worker_loses_no_row(tmp_path):
-    plan = planned("spring.damping=0:1:12", scene=small(0.5, 1e-3))
-    with sweep.cluster(None, workers=2) as client:
-        workers = [int(pid) for pid in client.run(os.getpid).values()]
-        reached = threading.Event()
-
-        def kill():
-            reached.wait(60.0)
-            os.kill(workers[0], signal.SIGKILL)
-
-        killer = threading.Thread(target=kill)
-        killer.start()
-        counts = sweep.run(plan, tmp_path / "s", client, lambda done, total, failed: done < 3 or reached.set())
-        killer.join()
-        assert workers[0] not in [int(pid) for pid in client.run(os.getpid).values()]
-    assert counts["done"] == 12
-    with sweep.cluster(None, workers=1) as client:
-        sweep.run(plan, tmp_path / "calm", client)
-    assert (tmp_path / "s" / sweep.TABLE).read_bytes() == (tmp_path / "calm" / sweep.TABLE).read_bytes()
-
-
-def test_nothing_listens_beyond_loopback(client):
-    ours = psutil.Process()
-    listening = [
-        connection.laddr.ip
-        for process in (ours, *ours.children(recursive=True))
-        for connection in process.net_connections(kind="inet")
-        if connection.status == psutil.CONN_LISTEN
-    ]
-    assert listening
-    assert set(listening) == {"127.0.0.1"}
+    for workers in (0, 2):
+        (tmp_path / str(workers)).mkdir()
+        plan.write(record_all(plan, workers=workers), tmp_path / str(workers), pictures=False)
+    assert (tmp_path / "0" / sweep.TABLE).read_bytes() == (tmp_path / "2" / sweep.TABLE).read_bytes()
 
 
 def test_command(tmp_path):
@@ -217,7 +131,6 @@ def test_command(tmp_path):
     result = command(*arguments)
     assert result.exit_code == 0, result.output
     assert "8 done" in result.stdout
-    assert json.loads((out / "sweep.json").read_text())["runs"] == 8
     assert (out / "sweep.png").stat().st_size > 10_000
     assert len(sweep.rows(out)["index"]) == 8
 
@@ -237,7 +150,7 @@ def test_bad_input(tmp_path, arguments, words):
     assert words in result.stderr
 
 
-def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period(client, tmp_path):
+def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period(tmp_path):
     """A damped oscillator: A sin(2πft) at phase 0 is −A sin φ, its peak A; the bumper doubles the period at 45 Hz."""
     drive = {"on": "spring", "signal": "harmonic", "frequency": 2.0, "amplitude": 3.0, "start": 0.05}
     spring = {"mass": 1.0, "linear_stiffness": 40.0, "damping": 4.0}
@@ -250,34 +163,28 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
     assert len(found["stroboscopic"]) == 20
     assert found["stroboscopic"] == pytest.approx([exact.imag] * 20, abs=1e-9)
     assert found["peak_response"] == pytest.approx(abs(exact), rel=8e-3)  # of rows: (ωH)²/8 of it
-    axes = (parse_axis("loads.0.frequency=35,45"),)
     todo = sweep.Sweep(
-        load_scene("vibro-impact"), axes, design(axes, 0, 0, "random"), ("u_tip_max",), stroboscopic=True
+        scene=load_scene("vibro-impact"),
+        vary=("loads.0.frequency=35,45",),
+        metric=("u_tip_max",),
+        stroboscopic=True,
     )
-    assert sweep.run(todo, tmp_path, client)["done"] == 2
+    todo.write(record_all(todo), tmp_path, pictures=True)
     columns = sweep.rows(tmp_path)
     once, doubled = (np.unique(np.round(np.array(points), 5)) for points in columns["stroboscopic"])
     assert (len(once), len(doubled)) == (1, 2)
-    assert sweep.stroboscopic.draw(columns, axes, tmp_path)
     assert (tmp_path / "bifurcation.png").stat().st_size > 5000
     with pytest.raises(SceneError, match=r"--stroboscopic: the scene has no drive"):
-        sweep.Sweep(load_scene("pulse"), axes, [(1.0,)], (), stroboscopic=True)
+        planned("spring.mass=1,2", scene=load_scene("pulse"), stroboscopic=True).cases()
 
 
 def test_an_existing_cluster_is_used(tmp_path):
     from distributed import LocalCluster
 
+    plan = planned("spring.mass=1,2")
     with (
         LocalCluster(n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as local,
-        sweep.cluster(local.scheduler_address, None) as client,
+        dask_cluster(local.scheduler_address) as cluster,
+        Records(plan, tmp_path / "s") as records,
     ):
-        assert sweep.run(planned("spring.mass=1,2"), tmp_path / "s", client)["done"] == 2
-    with socket.socket() as nobody:
-        nobody.bind(("127.0.0.1", 0))
-        began = time.monotonic()
-        with (
-            pytest.raises(sweep.SweepError, match="cannot be reached"),
-            sweep.cluster(f"127.0.0.1:{nobody.getsockname()[1]}", None),
-        ):
-            pass
-        assert time.monotonic() - began < 60.0
+        assert record_all(plan, records, cluster=cluster) == record_all(plan)

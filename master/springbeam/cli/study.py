@@ -1,0 +1,135 @@
+"""The frame of all commands that compute a study: where records go, cost, progress, how it stops and goes on."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import nullcontext
+from itertools import count
+from math import ceil
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.text import Text
+
+from ..results.directory import ResultsExist
+from .common import BAD_INPUT, DISAGREES, STOPPED, bad_input_reported, console_for, fail, print_json, progress_bar
+from .watchdog import watched
+
+if TYPE_CHECKING:
+    from ..studies.study import Record, Records, Study
+
+StudyOption = Annotated[
+    Path | None,
+    typer.Option("--out", "-o", metavar="DIR", help="Directory of the results; a study that was begun there goes on."),
+]
+WorkersOption = Annotated[
+    int | None, typer.Option("--workers", metavar="N", min=1, help="Local processes. Default: one per core.")
+]
+QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]
+#: A study that takes longer says how long the rest will take, where no bar does [s].
+_LONG = 10.0
+
+
+def carry_out(
+    study: Study | Callable[[], Study],
+    default: str,
+    *,
+    out: Path | None = None,
+    force: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    no_plots: bool = False,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Compute what of a study is not yet in its directory, write its files, and show what was found.
+
+    The directory is ``out``, else ``results/default``, or with -2, -3, … behind it where another study is.
+    """
+    console = console_for(silent=quiet or as_json)
+    with bad_input_reported():
+        study = study() if callable(study) else study
+        study.cases()
+        records = _opened(study, default, out, force)
+        directory = records.path.parent
+        computed = _computed(study, records, console, workers, scheduler, quiet=quiet or as_json)
+        files = study.write(computed, directory, pictures=not no_plots)
+        found = study.found(computed)
+    if as_json:
+        print_json({"directory": directory, "files": files, **found.document})
+    elif quiet:
+        typer.echo(directory)
+    for part in found.shown:
+        console.print(part)
+    for file in files:
+        console.print(Text(f"results   {file}"), soft_wrap=True)
+    if not found.passed:
+        raise typer.Exit(DISAGREES)
+
+
+def _opened(study: Study, default: str, out: Path | None, force: bool) -> Records:
+    from ..studies.study import Records
+
+    if out is not None or force:
+        return Records(study, out or Path("results") / default, replace=force)
+    for number in count(1):
+        try:
+            return Records(study, Path("results") / (default if number == 1 else f"{default}-{number}"))
+        except ResultsExist:
+            continue
+    raise AssertionError("unreachable")
+
+
+def _computed(
+    study: Study, records: Records, console: Console, workers: int | None, scheduler: str | None, *, quiet: bool
+) -> dict[str, Record]:
+    """Return all records; where the study stops, end the command with the cause and how it goes on."""
+    from ..monolithic.hybrid_system import ReferenceFailure
+    from ..run.outcome import RunStopped
+    from ..studies.study import dask_cluster, record_all
+
+    directory, total = records.path.parent, len(study.cases())
+    there = len(records.found)
+    if there == total:
+        return record_all(study, records)
+    console.print(Text(f"{study.cost()}{f', {there} of them are there' if there else ''}"))
+
+    def cut_short(cause: str) -> str:
+        if not records.found:
+            return cause
+        done = f"{len(records.found)} of {total} records are in {directory}"
+        return f"{cause}; {done}; springbeam resume {directory} goes on"
+
+    state, left = TextColumn("{task.fields[failed]} failed"), TimeRemainingColumn()
+    bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), state, left, quiet=quiet)
+    began, failed, said = monotonic(), 0, False
+
+    def report(record: Record) -> None:
+        nonlocal failed, said
+        failed += study.failed(record)
+        bar.update(task, advance=1, failed=failed)
+        spent, done = monotonic() - began, len(records.found) - there
+        if bar.disable and not said and spent > _LONG and done:
+            said = True
+            console.print(f"some {ceil(spent / done * (total - there - done))} s more")
+
+    try:
+        with records, dask_cluster(scheduler) if scheduler else nullcontext() as cluster, bar, watched(cut_short):
+            task = bar.add_task("", total=total, completed=there, failed=0)
+            processes = (workers or os.cpu_count() or 1) if study.parallel else 0
+            return record_all(study, records, processes, cluster, report)
+    except ConnectionError as error:
+        fail(BAD_INPUT, str(error))
+    except KeyboardInterrupt:
+        fail(STOPPED, cut_short("interrupted"))
+    except (RunStopped, ReferenceFailure) as error:
+        fail(STOPPED, cut_short(str(error)))
+    except OSError as error:
+        if not records.found:
+            raise
+        fail(STOPPED, cut_short(f"{error.filename or records.path}: {error.strerror or error}"))

@@ -1,0 +1,135 @@
+"""Studies, whichever: records as they come, what goes on and what does not, workers that die, Ctrl-C, a full disk."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from commands import Interrupt, command
+
+from springbeam.results.directory import ResultsExist, ResultsInUse
+from springbeam.scene import load_scene
+from springbeam.studies import sweep
+from springbeam.studies.study import FILE, Records, record_all
+
+pytestmark = pytest.mark.usefixtures("fmu_folder")
+
+SWEEP = ["sweep", "duffing", "--vary", "spring.mass=1:2:5", "--metric", "y_min", "--set", "time.t_end=0.1"]
+
+
+class Deadly(sweep.Sweep):
+    """A sweep that kills its worker where the mass is 3 kg: the first time only if there is a place to note it."""
+
+    note: str = ""
+
+    def record(self, case: Any) -> dict[str, Any]:
+        if case[0] == 3.0 and not (self.note and Path(self.note).exists()):
+            if self.note:
+                Path(self.note).touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().record(case)
+
+
+def plan(kind=sweep.Sweep, masses="1,2", **options):
+    return kind(scene=load_scene("duffing"), vary=(f"spring.mass={masses}",), metric=("y_min",), **options)
+
+
+def test_only_cases_without_a_record_are_computed(tmp_path):
+    study, seen = plan(masses="1,2,4"), []
+    with Records(study, tmp_path) as records:
+        whole = record_all(study, records)
+    lines = (tmp_path / FILE).read_bytes().splitlines(keepends=True)
+    assert len(lines) == 4
+    (tmp_path / FILE).write_bytes(b"".join(lines[:2]) + lines[2][:-9])  # killed while it wrote
+    with Records(study, tmp_path) as records:
+        assert list(records.found) == ["0"]
+        assert record_all(study, records, report=seen.append) == whole
+    assert len(seen) == 2
+    assert (tmp_path / FILE).read_bytes() == b"".join(lines)
+
+
+def test_another_study_is_not_mixed_in(tmp_path):
+    with Records(plan(), tmp_path / "s") as records:
+        record_all(plan(), records)
+        with pytest.raises(ResultsInUse), Records(plan(), tmp_path / "s"):
+            pass
+    with pytest.raises(ResultsExist, match="another study"):
+        Records(plan(masses="1,3"), tmp_path / "s")
+    (tmp_path / "t").mkdir()
+    (tmp_path / "t" / "thesis.txt").write_text("mine")
+    with pytest.raises(ResultsExist, match="not empty"):
+        Records(plan(), tmp_path / "t")
+
+
+@pytest.mark.parametrize("always", [True, False])
+def test_a_killed_worker_loses_its_own_case_alone_and_only_if_it_dies_again(tmp_path, always):
+    study = plan(Deadly, "1,3,2,4", note="" if always else str(tmp_path / "note"))
+    with Records(study, tmp_path / "s") as records:
+        found = record_all(study, records, workers=2)
+    assert [record["status"] for record in found.values()] == ["done", "lost" if always else "done", "done", "done"]
+    assert len(records.found) == (3 if always else 4)
+
+
+def test_an_interrupted_study_says_how_it_goes_on_and_does(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    whole = command(*SWEEP, "--workers", "2", "--out", "whole")
+    assert whole.exit_code == 0, whole.output
+    monkeypatch.setattr(sweep.Sweep, "parallel", False)
+    interrupt, row = Interrupt(3), sweep.row
+    monkeypatch.setattr(sweep, "row", lambda *arguments: interrupt() or row(*arguments))
+    cut = command(*SWEEP)
+    assert cut.exit_code == 3
+    there = "2 of 5 records are in results/duffing-sweep"
+    assert f"error: interrupted; {there}; springbeam resume results/duffing-sweep goes on" in cut.stderr
+    assert command("resume", "results/duffing-sweep").exit_code == 0
+    assert Path("results/duffing-sweep", sweep.TABLE).read_bytes() == Path("whole", sweep.TABLE).read_bytes()
+    again = command(*SWEEP, "--json")  # shows what is there
+    assert json.loads(again.stdout)["directory"] == "results/duffing-sweep"
+    assert interrupt.left < 0
+    calls = interrupt.left
+    other = command(*SWEEP, "--seed", "3", "--json")  # another study does not take its place
+    assert json.loads(other.stdout)["directory"] == "results/duffing-sweep-2"
+    assert interrupt.left == calls - 5
+
+
+def test_a_full_disk_names_the_cause_and_the_command_that_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(sweep.Sweep, "parallel", False)
+    write, left = Records._write, [3]
+
+    def full(self, line):
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError(28, "No space left on device")
+        write(self, line)
+
+    monkeypatch.setattr(Records, "_write", full)
+    cut = command(*SWEEP, "--out", tmp_path / "s")
+    assert cut.exit_code == 3
+    assert "No space left on device; 2 of 5 records are in" in cut.stderr
+    assert "springbeam resume" in cut.stderr
+
+
+@pytest.mark.parametrize("fmus", ["empty", "broken"])
+def test_nothing_stays_of_a_study_that_could_not_begin(tmp_path, monkeypatch, fmus):
+    """A missing FMU is told before anything is written, one that does not load by the first case."""
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "spring.fmu").write_bytes(b"no archive")
+    monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path / fmus))
+    result = command(*SWEEP, "--workers", "1", "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "spring.fmu" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_results_of_another_springbeam_are_not_gone_on_with(tmp_path):
+    with Records(plan(), tmp_path) as records:
+        record_all(plan(), records)
+    text = (tmp_path / FILE).read_text()
+    (tmp_path / FILE).write_text(text.replace('"springbeam": "', '"springbeam": "9.', 1))
+    result = command("resume", tmp_path)
+    assert result.exit_code == 2
+    assert "another springbeam or other FMUs" in result.stderr
