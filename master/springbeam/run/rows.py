@@ -36,7 +36,7 @@ class Rows(Checkpointed):
 
     CHECKPOINTED = (
         *("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed", "_relative_speed", "_stiffest"),
-        "not_shown",
+        *("contact_steps", "not_shown"),
     )
 
     def __init__(self, scene: Scene, pair: Pair, ledger: Ledger, recorder: Recorder, start_time: float) -> None:
@@ -53,6 +53,7 @@ class Rows(Checkpointed):
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
         self._relative_speed = 0.0  #: |v_tip − z| of ends that a soft law couples [m/s]
         self._stiffest = 0.0  #: slope of a soft law at the deepest penetration [N/m]
+        self.contact_steps = 0  #: with a force of a soft law
         #: [1/kg] of what a contact force moves.
         self._inverse_mass = sum(1.0 / body.mass for body in (pair.upper, pair.lower) if body.mass > 0.0)
         self.largest_speed = 0.0  #: of tip and lower end [m/s]
@@ -92,6 +93,7 @@ class Rows(Checkpointed):
     def reached(self, step: Step) -> None:
         """Note how deep the ends of a soft law have sunk into each other on ``step``, also inside it."""
         assert self._pair.law.soft
+        self.contact_steps += any(step.contact)
         start, end = gap(step.start), gap(step.end)
         deepest = -min(start[0], end[0])
         if deepest <= 0.0 and any(step.contact):

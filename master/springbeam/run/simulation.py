@@ -350,7 +350,9 @@ class Simulation(Checkpointed):
                 f"{self._pair.joined.degree}; they were made at degree 0, which keeps the energy but has order 2. The "
                 "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
             )
-        unresolved = not_resolved(self._scene, rows.largest_mismatch, rows.largest_speed, rows.contact_frequency)
+        unresolved = not_resolved(
+            self._scene, rows.largest_mismatch, rows.largest_speed, rows.contact_frequency, rows.contact_steps
+        )
         doubt = unresolved or peak_force_doubt(self._scene)
         if doubt is not None:
             warnings.append(doubt)

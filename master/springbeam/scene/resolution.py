@@ -3,7 +3,8 @@
 A run is called *not resolved* if (``docs/coupling.md``, "Is the motion resolved?")
 
 * the slowest oscillation of a body, or a load, turns more than `TURN` in a macro step: its rows are aliased;
-* tip and lower end turn more than `CONTACT_TURN` against each other on a soft contact law; or
+* tip and lower end turn more than `CONTACT_TURN` against each other on a soft contact law, or with degree 0 in all
+  steps together more than `CONTACT_LAG` too little; or
 * the velocities of the joined ends differ by more than `MISMATCH` of their largest speed.
 
 Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
@@ -24,6 +25,9 @@ TURN = 1.0
 #: Largest angle [rad] that a soft contact may turn in a macro step, where its force is of degree 0, 1, 2 in time: there
 #: velocities are up to a fifth off (docs/coupling.md has them).
 CONTACT_TURN = (0.5, 2.0, 4.0)
+#: What all steps of degree 0 together may turn it too little [rad], one that turns it by x by x³/12 as the midpoint
+#: rule does; at higher degrees the limit of one step is reached first.
+CONTACT_LAG = 0.5
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
@@ -38,7 +42,9 @@ SETTLED = 2.5
 WINDOW = 0.02
 
 
-def not_resolved(scene: Scene, mismatch: float, speed: float, contact_frequency: float = 0.0) -> str | None:
+def not_resolved(
+    scene: Scene, mismatch: float, speed: float, contact_frequency: float = 0.0, contact_steps: int = 0
+) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
     Parameters
@@ -49,6 +55,8 @@ def not_resolved(scene: Scene, mismatch: float, speed: float, contact_frequency:
         The largest difference of the joined ends' velocities, and the largest speed of an end [m/s].
     contact_frequency
         Of tip and lower end on a soft contact law at the deepest penetration reached [rad/s], 0 without one.
+    contact_steps
+        Steps with a contact force of a soft law.
     """
     H = scene.coupling.macro_step
     if H is not None:  # steps that follow from tolerances are judged by their error
@@ -59,20 +67,30 @@ def not_resolved(scene: Scene, mismatch: float, speed: float, contact_frequency:
                     f"Velocities, forces and times of events are samples of a faster motion; coupling.macro_step <= "
                     f"{_rounded_down(TURN / omega)} resolves it{else_}"
                 )
-        projected = scene.coupling.scheme == "energy"
-        turn = CONTACT_TURN[scene.coupling.degree if projected else 0]
-        if contact_frequency * H > turn:
-            higher = ", a higher coupling.degree allows longer ones" if projected and turn < CONTACT_TURN[-1] else ""
-            return (
-                f"not resolved: tip and lower end turn {contact_frequency * H:.3g} rad in a macro step on the contact "
-                f"law at its deepest penetration. Velocities, forces and times of contact are samples of a faster "
-                f"motion; coupling.macro_step <= {_rounded_down(turn / contact_frequency)} resolves it{higher}"
-            )
+        if contact_frequency > 0.0 and (lost := _contact_lost(scene, contact_frequency, H, contact_steps)):
+            return lost
     if mismatch <= MISMATCH[scene.coupling.degree] * speed:
         return None
     return (
         f"not resolved: the joined ends' velocities differ by up to {mismatch:.3g} m/s of {speed:.3g} m/s; velocities "
         f"and forces alternate from step to step. {_remedy(scene)}"
+    )
+
+
+def _contact_lost(scene: Scene, omega: float, H: float, steps: int) -> str | None:
+    """Return in words why ``steps`` of H [s] do not follow a soft contact of ``omega`` [rad/s]; ``None`` if they do."""
+    projected = scene.coupling.scheme == "energy"
+    degree = scene.coupling.degree if projected else 0
+    turn = CONTACT_TURN[degree]
+    if degree == 0 and steps > 0:
+        turn = min(turn, sqrt(12.0 * CONTACT_LAG / (steps * omega * H)))
+    if omega * H <= turn:
+        return None
+    higher = ", a higher coupling.degree allows longer ones" if projected and degree < len(CONTACT_TURN) - 1 else ""
+    return (
+        f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step, {steps * omega * H:.2g} rad in all,"
+        f" on the contact law at its deepest penetration. Velocities, forces and times of contact are samples of a "
+        f"faster motion; coupling.macro_step <= {_rounded_down(turn / omega)} resolves it{higher}"
     )
 
 
