@@ -2,12 +2,13 @@
  * Taylor series of the linear equation: exact to rounding for a force quadratic in time. `lie` makes it lie.
  * It exports what a run calls and nothing else that the standards ask for. */
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef enum { OK, WARNING, DISCARD, ERROR } Status;
 enum { FORCE, IMPULSE, X, V, I1, I2, KINETIC, POTENTIAL, DISSIPATED, LOAD_POTENTIAL, MASS, K, C, LOAD, X0, V0, SIGN, LIE, N };
-enum { HONEST, STATE, VELOCITY, INTEGRAL, SLOPES, HANG, CRASH, NAN_OUT, ENERGY, INTEGRAL_2, EARLY, EVENT, END };
+enum { HONEST, STATE, VELOCITY, INTEGRAL, SLOPES, HANG, CRASH, NAN_OUT, ENERGY, INTEGRAL_2, EARLY, EVENT, END, LATE_CRASH, LATE_ABORT, LATE_EXIT, LATE_HANG };
 typedef struct { double r[N], slope, bend; unsigned calls; } Fmu;
 
 #define API __attribute__((visibility("default")))
@@ -61,8 +62,11 @@ API Status fmi2SetRealInputDerivatives(void *c, const unsigned vr[], size_t n, c
 API Status fmi2DoStep(void *c, double time, double H, int no_set) {
     Fmu *f = c;
     double *r = f->r, h = H, rate = (r[C] + 1.0) / r[MASS] + r[K] / r[MASS] + 1.0;
-    if (++f->calls > 2 && r[LIE] == HANG) for (volatile int i = 1; i;) {}
-    if (f->calls > 2 && r[LIE] == CRASH) *(volatile int *)0 = 0;
+    bool begun = ++f->calls > 2, late = time > 1.49;
+    if ((begun && r[LIE] == HANG) || (late && r[LIE] == LATE_HANG)) for (volatile int i = 1; i;) {}
+    if ((begun && r[LIE] == CRASH) || (late && r[LIE] == LATE_CRASH)) *(volatile int *)0 = 0;
+    if (late && r[LIE] == LATE_EXIT) exit(7);
+    if (late && r[LIE] == LATE_ABORT) fputs("nobody expected this\n", stderr), abort();
     r[V] += r[IMPULSE] / r[MASS];
     r[IMPULSE] = r[I1] = r[I2] = 0.0;
     double at = r[SIGN] * r[FORCE] + r[LOAD], slope = r[SIGN] * f->slope, bend = r[SIGN] * f->bend;

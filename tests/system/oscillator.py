@@ -17,7 +17,7 @@ LIES = {
     for number, name in enumerate(
         (
             *("none", "state", "velocity", "integral", "slopes", "hang", "crash", "nan", "energy", "integral_2"),
-            *("early", "event", "end"),
+            *("early", "event", "end", "late crash", "late abort", "late exit", "late hang"),
         )
     )
 }

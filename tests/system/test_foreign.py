@@ -7,15 +7,17 @@ import functools
 import numpy as np
 import oscillator
 import pytest
+import tomli_w
 from commands import command
 from scipy.linalg import expm
 
 from springbeam import SceneError, load_scene, resume, simulate, with_changes
-from springbeam.bodies import examination
+from springbeam.bodies import isolated
 from springbeam.bodies.factory import findings
 from springbeam.bodies.protocol import FmuError
 from springbeam.results.directory import RunDirectory
 from springbeam.results.file_recorder import FileRecorder
+from springbeam.results.reading import load_summary
 from springbeam.run import runner
 from springbeam.scene import scene_from_dict
 
@@ -26,6 +28,13 @@ WITHOUT = {
     "nothing": (),
     "integrals": ("integral", "integral_2"),
     "integrals, velocity, impulse": ("integral", "integral_2", "velocity", "impulse"),
+}
+#: What an FMU does after 1.5 s, and the cause that is told.
+LATE = {
+    "late crash": "crashed (SIGSEGV) in its step at t = 1.5",
+    "late abort": "crashed (SIGABRT: nobody expected this) in its step at t = 1.5",
+    "late exit": "crashed (exit code 7) in its step at t = 1.5",
+    "late hang": "has not returned within 2 s from its step at t = 1.5",
 }
 ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy", "load_potential")
 
@@ -242,7 +251,7 @@ def test_what_a_missing_name_takes_is_refused(fmu):
         simulate(tie)
 
 
-@pytest.mark.parametrize("lie", [name for name in oscillator.LIES if name not in ("none", "hang")])
+@pytest.mark.parametrize("lie", [name for name in oscillator.LIES if name not in ("none", "hang", *LATE)])
 def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
     parameters = {"m": M2, "k": K, "lie": oscillator.LIES[lie]}
     said = {
@@ -251,7 +260,7 @@ def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
         "integral": "integral 'ix' is not that",
         "integral_2": "integral_2 'ix2' is not that",
         "slopes": "canInterpolateInputs = true, but",
-        "crash": "crashed (SIGSEGV) in fmi2DoStep",
+        "crash": "crashed (SIGSEGV) in a step of the check before the run",
         "nan": "not finite",
         "energy": "energies named do not account",
         "early": "fmi3DoStep returned early, which it was not allowed to",
@@ -274,9 +283,28 @@ def test_a_function_that_is_needed_and_missing_is_named(fmu, version, lacks):
 
 
 def test_an_fmu_that_hangs_is_given_up(fmu, monkeypatch):
-    monkeypatch.setattr(examination, "PATIENCE", 4.0)
-    with pytest.raises(FmuError, match="fmi2DoStep has not returned within 4 s"):
+    monkeypatch.setattr(isolated, "CHECK_PATIENCE", 4.0)
+    with pytest.raises(FmuError, match="has not returned within 4 s from a step of the check before the run"):
         simulate(pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["hang"]}}))
+
+
+@pytest.mark.parametrize("lie", LATE)
+def test_a_crash_in_mid_run_loses_nothing(fmu, tmp_path, monkeypatch, lie):
+    monkeypatch.setattr(isolated, "CALL_PATIENCE", 2.0)
+    rows = {}
+    for name in ("none", lie):
+        scene = pair(fmu(), spring={"parameters": {"m": M2, "k": K, "lie": oscillator.LIES[name]}}, time={"t_end": 2.0})
+        (tmp_path / "scene.toml").write_text(tomli_w.dumps(scene.model_dump(exclude_none=True)))
+        done = command("run", tmp_path / "scene.toml", "--out", tmp_path / name, "--no-plots", "-q")
+        rows[name] = (tmp_path / name / "trajectory.csv").read_bytes()
+    assert done.exit_code == 3
+    assert LATE[lie] in done.stderr
+    summary = load_summary(tmp_path / lie)
+    assert summary["status"] == "stopped"
+    assert LATE[lie] in summary["cause"]
+    assert summary["time"] == pytest.approx(1.5, abs=0.02)
+    assert rows["none"].startswith(rows[lie])
+    assert rows[lie].count(b"\n") == pytest.approx(1.5 / 0.02, abs=3)
 
 
 NAMES = {

@@ -13,9 +13,9 @@ from ..scene.tables import ORDINARY_SCHEMES
 from .abilities import refusals
 from .archive import fmu_directory
 from .elements import ELEMENTS
-from .examination import examined
 from .fmu_bodies import FmuBeam, FmuSpring
-from .foreign import Findings, ForeignBody
+from .foreign import Findings
+from .isolated import IsolatedBody, examined
 from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
 
@@ -56,8 +56,9 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[Body | None, Body | No
 def _body(scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None) -> Body:
     if isinstance(spec, ForeignFmu):
         assert found is not None
-        by_substeps = scene.coupling.degree > found.abilities.integrals
-        return ForeignBody(spec, start_time, found, by_substeps and scene.coupling.scheme not in ORDINARY_SCHEMES)
+        coupling = scene.coupling
+        by_substeps = coupling.degree > found.abilities.integrals and coupling.scheme not in ORDINARY_SCHEMES
+        return IsolatedBody(spec, spec is scene.upper, start_time, found, by_substeps)
     if isinstance(spec, Spring):
         return FmuSpring(spec, start_time)
     if not isinstance(spec, Beam):
@@ -103,7 +104,7 @@ def _refuse_speeds(upper: Body, lower: Body) -> None:
     """Raise SceneError if ends that are to be tied start with two velocities, and one takes no impulse."""
     v, z = upper.motion().velocity, lower.motion().velocity
     for table, body, other in (("beam", upper, lower), ("spring", lower, upper)):
-        if not isinstance(body, ForeignBody) or body.abilities.impulse:
+        if not isinstance(body, IsolatedBody) or body.abilities.impulse:
             continue
         same = _SAME_SPEED if body.abilities.velocity else _SAME_SPEED_MEASURED
         if abs(v - z) > same * max(abs(v), abs(z)):
@@ -112,7 +113,7 @@ def _refuse_speeds(upper: Body, lower: Body) -> None:
                 f"which the FMU in [{table}] has no input for; name its impulse, let both start with one velocity, or "
                 'use "link"'
             )
-        body.start_as_fast_as(other)
+        body.start_as_fast_as(other.motion().velocity)
 
 
 def fingerprints(scene: Scene) -> dict[str, str]:

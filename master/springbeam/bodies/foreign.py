@@ -24,7 +24,7 @@ from . import force
 from .abilities import Abilities
 from .fmu import Fmu
 from .fmu_bodies import FmuBody
-from .protocol import NO_FORCE, Body, BodyFailed, Energies, FmuError, Force, Motion
+from .protocol import NO_FORCE, BodyFailed, Energies, FmuError, Force, Motion
 
 #: Corrections of a holding force; the velocity that it may leave, and the displacement, over those without it.
 _MAX_CORRECTIONS, _AT_REST, _STAYS = 20, 1e-12, 1e-6
@@ -54,8 +54,8 @@ class ForeignBody(FmuBody):
 
     Parameters
     ----------
-    spec
-        Its table.
+    spec, upper
+        Its table, and whether it is the upper body.
     start_time
         [s].
     found
@@ -66,7 +66,7 @@ class ForeignBody(FmuBody):
 
     CHECKPOINTED = (*FmuBody.CHECKPOINTED, "received", "_size", "_time")
 
-    def __init__(self, spec: ForeignFmu, start_time: float, found: Findings, by_substeps: bool) -> None:
+    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings, by_substeps: bool) -> None:
         self._spec, self._found, self._by_substeps = spec, found, by_substeps
         self.abilities = found.abilities
         self.repeatable, self.any_size = found.abilities.state, found.abilities.any_size
@@ -77,7 +77,7 @@ class ForeignBody(FmuBody):
         self._IMPULSE = () if spec.impulse is None else (spec.impulse,)
         self._FORCES, self._SLOPES = (spec.force,), found.abilities.slopes
         self._KEEPS_SLOPES = self._SLOPES > 0
-        self._upward = 1.0
+        self._upward = 1.0 if upper else -1.0
         #: Work of all forces and impulses on the end so far [J].
         self.received = self._marked_received = 0.0
         self._size = 0.0  #: of the last step [s]
@@ -86,13 +86,14 @@ class ForeignBody(FmuBody):
         check_names(fmu := Fmu(None, Path(spec.fmu), spec.parameters, start_time), spec)
         super().__init__(fmu)
 
-    def take_place(self, *, upper: bool) -> None:
-        self._upward = 1.0 if upper else -1.0
+    def told(self) -> tuple[Motion, float, int, int]:
+        """Return motion, `received`, doStep calls, and how often the state was set back."""
+        return self._current, self.received, self.steps, self.rewinds
 
-    def start_as_fast_as(self, other: Body) -> None:
-        """Start with the velocity of ``other``, to which it is tied, where its own is not told but measured."""
+    def start_as_fast_as(self, velocity: float) -> None:
+        """Start with the ``velocity`` [m/s] of what it is tied to, where its own is not told but measured."""
         if not self.abilities.velocity:
-            self._current = self._current._replace(velocity=other.motion().velocity)
+            self._current = self._current._replace(velocity=velocity)
 
     def _mass(self) -> float:
         return self._spec.mass or self._found.mass

@@ -1,17 +1,14 @@
 """A short check of a foreign FMU before the run: is it what it and the scene say?
 
-A program that `springbeam.bodies.examination` starts. Each check is tried on steps of H, H/10, … and holds if it does
-for one of them: an FMU may need short steps, or have steps of its own that are not shorter than some. Each starts from
-the FMU's initial state, by a restored state or a new instance.
+Each check is tried on steps of H, H/10, … and holds if it does for one of them: an FMU may need short steps, or have
+steps of its own that are not shorter than some. Each starts from the FMU's initial state, by a restored state or a new
+instance. The process in which that happens may not come to its end (`springbeam.bodies.isolated`).
 """
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Callable, Sequence
 from ctypes import c_double
-from dataclasses import asdict
 from itertools import pairwise
 from math import isfinite
 from pathlib import Path
@@ -22,7 +19,7 @@ from .abilities import Abilities
 from .fmu import Fmu, Reals
 from .foreign import Findings, check_names
 from .functions import WARNING
-from .protocol import BodyFailed, FmuError, Force, StepRefused
+from .protocol import FmuError, Force
 
 #: Sizes tried, over H; steps of a record.
 _SIZES, _RECORD = (1.0, 0.1, 1e-2, 1e-3, 1e-4), 64
@@ -56,12 +53,14 @@ class Bench:
         The table, and whether it is that of the upper body.
     start_time, H
         Of the run, and a macro step [s].
-    stages
-        File for what is being done.
+    stage
+        Takes a note of what is done next.
     """
 
-    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, H: float, stages: Path) -> None:
-        self.spec, self._start, self._stages = spec, start_time, stages
+    def __init__(
+        self, spec: ForeignFmu, upper: bool, start_time: float, H: float, stage: Callable[[str], None]
+    ) -> None:
+        self.spec, self._start, self.stage = spec, start_time, stage
         #: Upward force over the value of the input.
         self.upward = spec.force_sign * (1.0 if upper else -1.0)
         self.fmu = self._new()
@@ -88,11 +87,6 @@ class Bench:
         self._fresh, self._marked = True, False
         return fmu
 
-    def stage(self, name: str) -> None:
-        """Note what is done next: the parent names it if this process does not come to its end."""
-        with self._stages.open("a") as file:
-            file.write(f"{name}\n")
-
     def again(self) -> None:
         """Return to the initial state."""
         if self._fresh:
@@ -118,13 +112,13 @@ class Bench:
         """Return the samples at the start and after each step of ``size`` [s] under values and slopes of its input."""
         self.again()
         if self.state and not self._marked:
-            self.stage("fmi2GetFMUstate")
+            self.stage("saving the state")
             self.fmu.mark()
             self._marked = True
         samples, self._fresh = [self.read()], False
         if impulse and self._impulse is not None:
             self._impulse.set((impulse,))
-        self.stage("fmi2DoStep")
+        self.stage("a step")
         for i, (value, *slopes) in enumerate(forces):
             self._force.set((value,))
             if self.slopes > 0:
@@ -294,7 +288,7 @@ def _slopes_followed(bench: Bench, impetus: float) -> int:
     """Return the highest derivative of the force over a step that the motion follows."""
     if not bench.fmu.says.canInterpolateInputs:
         return 0
-    bench.stage("fmi2SetRealInputDerivatives")
+    bench.stage("input derivatives")
     #: Responses to F τ/h and F τ²/h² over that to F: of the velocity, of the displacement.
     due = {1: 0.5, 2: 1.0 / 3.0} if bench.spec.velocity else {1: 1.0 / 3.0, 2: 1.0 / 6.0}
     followed, seen = 0, 0.0
@@ -355,19 +349,3 @@ def _velocity(bench: Bench) -> float:
         return (whole - x0) / h
     half = bench.run(0.5 * h, [_NONE])[1].x
     return (4.0 * half - whole - 3.0 * x0) / h
-
-
-def main() -> None:
-    """Examine the FMU that standard input describes; the result goes into a file."""
-    task = json.load(sys.stdin)
-    folder = Path(task["folder"])
-    try:
-        spec = ForeignFmu.model_validate_json(task["spec"])
-        found = asdict(examine(Bench(spec, task["upper"], task["start_time"], task["H"], folder / "stages")))
-    except (BodyFailed, StepRefused) as error:
-        found = {"error": str(error)}
-    (folder / "result").write_text(json.dumps(found))
-
-
-if __name__ == "__main__":
-    main()

@@ -12,6 +12,7 @@ from typing import Any
 from ..bodies.checkpointed import Checkpointed
 from ..bodies.factory import findings, fingerprints, load_bodies
 from ..bodies.fmu_bodies import FmuBeam, FmuBody, FmuSpring
+from ..bodies.isolated import IsolatedBody
 from ..bodies.protocol import Body, FmuError
 from ..results.directory import RunDirectory
 from ..results.file_recorder import FileRecorder
@@ -255,7 +256,7 @@ def _totals(simulation: Simulation | PaperLaw, scene: Scene, recorder: Recorder)
 def _calls(**bodies: Body | None) -> dict[str, int]:
     counts = {}
     for name, body in bodies.items():
-        if isinstance(body, FmuBody):
+        if isinstance(body, (FmuBody, IsolatedBody)):
             counts[f"{name}_steps"] = body.steps
             counts[f"{name}_rollbacks"] = body.rewinds
         if isinstance(body, FmuSpring):
