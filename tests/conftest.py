@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from pathlib import Path
+from typing import Any
 
 # Before numpy is imported, and for the processes that tests start. The matrices are small, and tests run on all cores:
 # more threads of OpenBLAS only wait for each other, and spin meanwhile.
@@ -13,6 +14,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import springbeam
 from springbeam.monolithic import event_driven
@@ -34,6 +36,23 @@ def fmu_folder() -> Path:
     if missing:
         pytest.fail(f"{', '.join(missing)} not in {folder}: run ./build.sh fmus")
     return folder
+
+
+@pytest.fixture
+def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are composed and their files made, but nothing is painted: that is most of the time a command takes.
+
+    tests/master/test_plots.py and the tests of each study look at pictures.
+    """
+    paint = Figure.savefig
+
+    def save(figure: Figure, file: Any, **options: Any) -> None:
+        if isinstance(file, Path):
+            file.touch()
+        else:  # the frames of an animation
+            paint(figure, file, **options)
+
+    monkeypatch.setattr(Figure, "savefig", save)
 
 
 #: `soft` with the compliance law: what the pair of FMUs runs where only ports are connected.

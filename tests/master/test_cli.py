@@ -70,7 +70,7 @@ def replace_run(monkeypatch, error, after=fake_run):
 # -- a run that ends well -----------------------------------------------------------------------------------------
 
 
-def test_a_run_leaves_results_and_pictures_and_says_where(here):
+def test_a_run_leaves_results_and_pictures_and_says_where(here, unpainted):
     result = command("run", "soft")
     assert result.exit_code == 0
     assert result.stderr == ""
@@ -91,7 +91,7 @@ def test_what_rounding_leaves_of_a_zero_is_shown_as_0(here, monkeypatch):
         fake_run(scene, recorder)
 
     monkeypatch.setattr(springbeam.run.runner, "run", released)
-    (event,) = [line for line in command("run", "soft").stdout.splitlines() if line.startswith("release")]
+    (event,) = [line for line in command("run", "soft", "--no-plots").stdout.splitlines() if line.startswith("release")]
     assert event.split() == ["release", "0.20000000", "0", "0.25"]
 
 
@@ -110,7 +110,7 @@ def test_results_are_named_after_the_file(here):
     assert (here / "results" / "mine" / "trajectory.csv").exists()
 
 
-def test_force_replaces(here):
+def test_force_replaces(here, unpainted):
     command("run", "soft", "--out", "here", "--set", "time.t_end=1")
     assert command("run", "soft", "--out", "here", "--force", "--no-plots").exit_code == 0
     assert load_trajectory(here / "here").time[-1] == 0.6
@@ -143,7 +143,7 @@ def test_warnings_are_shown_as_they_are(here, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["duffing", "beam-on-stop"])
-def test_scenes_without_a_body(here, name):
+def test_scenes_without_a_body(here, name, unpainted):
     result = command("run", name)
     assert result.exit_code == 0
     assert "impact" in result.stdout
@@ -172,7 +172,7 @@ def test_a_place_that_cannot_be_written_is_bad_input(here):
     ],
     ids=["stopped", "interrupted", "disk full"],
 )
-def test_a_run_that_stops_early(here, monkeypatch, error, status, fragments):
+def test_a_run_that_stops_early(here, unpainted, monkeypatch, error, status, fragments):
     replace_run(monkeypatch, error)
     result = command("run", "soft")
     assert result.exit_code == 3

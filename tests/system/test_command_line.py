@@ -13,12 +13,16 @@ from pathlib import Path
 
 import pytest
 import typer
-from commands import command
+from commands import Interrupt, command
+from typer.testing import CliRunner
 
 from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
+from springbeam.cli.run import _ProgressBar
 from springbeam.results.reading import load_summary
 from springbeam.scene import load_scene, scene_keys, shipped_scenes
+
+pytestmark = pytest.mark.usefixtures("unpainted")
 
 COMMAND = typer.main.get_command(app)
 #: Arguments of each command that make it print its tables within a second or two. `verify` is in test_verify.py.
@@ -28,7 +32,7 @@ TABLES = {
     "new": "my_scene",
     "run": "soft --no-plots",
     "resume": "cut --no-plots",
-    "sweep": "duffing --vary spring.mass=0.5,1 --set time.t_end=1 --workers 1 --out varied",
+    "sweep": "duffing --vary spring.mass=0.5,1 --set time.t_end=1 --scheduler {scheduler} --out varied",
     "compare": "done done --out compared.png",
     "report": "done --out page.html",
     "animate": "done --seconds 0.2 --fps 10 --out moving.gif",
@@ -43,32 +47,23 @@ TABLES = {
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
-    """A folder with a run that is done, and one that was cut short after its first checkpoint."""
-    folder = tmp_path_factory.mktemp("place")
-    script = """
-import os, sys
-from springbeam import cli
-from springbeam.run import checkpoint
-save = checkpoint.Checkpoints.take_when_due
-taken = []
-def take(self, simulation):
-    save(self, simulation)
-    taken.append(0)
-    if len(taken) == 40:
-        os._exit(9)
-checkpoint.Checkpoints.take_when_due = take
-sys.argv[1:] = "run soft --checkpoint 1000 --no-plots --out cut".split()
-cli.main()
-"""
-    subprocess.run([sys.executable, "-c", script], cwd=folder, capture_output=True, timeout=60)
-    assert load_summary(folder / "cut")["status"] == "running"
-    before = Path.cwd()
-    os.chdir(folder)
-    try:
+    """A folder with a run that is done, and one that was interrupted after its first checkpoint."""
+    with pytest.MonkeyPatch.context() as there:
+        there.chdir(tmp_path_factory.mktemp("place"))
         assert command("run", "soft", "--no-plots", "--out", "done").exit_code == 0
-        yield folder
-    finally:
-        os.chdir(before)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_ProgressBar, "__call__", Interrupt(40))
+            assert command("run", "soft", "--checkpoint", "1000", "--no-plots", "--out", "cut").exit_code == 3
+        yield Path.cwd()
+
+
+@pytest.fixture(scope="module")
+def arguments():
+    """The words of a line; sweeps run on a cluster in this process."""
+    from distributed import LocalCluster
+
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as local:
+        yield lambda line: line.format(scheduler=local.scheduler_address).split()
 
 
 def lines_without_paths(text):
@@ -84,8 +79,8 @@ def test_every_command_is_looked_at():
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_what_a_command_prints_fits_80_columns(place, name):
-    result = command(name, *TABLES[name].split())
+def test_what_a_command_prints_fits_80_columns(place, arguments, name):
+    result = command(name, *arguments(TABLES[name]))
     assert result.exit_code == 0, result.output
     assert result.stderr == ""
     assert max(map(len, lines_without_paths(result.stdout))) <= 80
@@ -136,9 +131,9 @@ def test_the_command_alone_shows_how_to_start():
 @pytest.mark.parametrize(
     "name", [name for name in TABLES if name not in ("new", "compare", "report", "animate", "resume")]
 )
-def test_json_is_one_document_and_all_of_stdout(place, tmp_path, monkeypatch, name):
+def test_json_is_one_document_and_all_of_stdout(arguments, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
-    result = command(name, *TABLES[name].split(), "--json")
+    result = command(name, *arguments(TABLES[name]), "--json")
     assert result.exit_code == 0
     assert result.stderr == ""
     document = json.loads(result.stdout)
@@ -185,10 +180,10 @@ def test_json_of_bad_input_is_nothing():
     ("name", "printed"),
     [("run", "results/soft"), ("sweep", "varied"), ("tradeoff", "traded"), ("report", "page.html")],
 )
-def test_quiet_prints_only_where_the_results_are(place, tmp_path, monkeypatch, name, printed):
+def test_quiet_prints_only_where_the_results_are(place, arguments, tmp_path, monkeypatch, name, printed):
     (tmp_path / "done").symlink_to(place / "done")
     monkeypatch.chdir(tmp_path)
-    result = command(name, *TABLES[name].split(), *(() if name == "report" else ("--quiet",)))
+    result = command(name, *arguments(TABLES[name]), *(() if name == "report" else ("--quiet",)))
     assert (result.exit_code, result.stdout, result.stderr) == (0, f"{printed}\n", "")
     assert Path(printed).exists()
 
@@ -197,12 +192,13 @@ FORCING = ("NO_COLOR", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS")
 COLOUR = re.compile(r"\x1b\[(?:\d+;)*(?:3[0-8]|9[0-7])(?:;\d+)*m")
 
 
-def on_a_terminal(*arguments, **environment):
+def on_a_terminal(**environment):
+    """What ``springbeam --help`` shows there."""
     ours, theirs = os.openpty()
     own = {key: value for key, value in os.environ.items() if key not in FORCING}
     environment = {**own, "TERM": "xterm-256color", "COLUMNS": "80"} | environment
-    command = [sys.executable, "-m", "springbeam", *arguments]
-    process = subprocess.Popen(command, stdout=theirs, stderr=theirs, stdin=theirs, env=environment)
+    program = [sys.executable, "-m", "springbeam", "--help"]
+    process = subprocess.Popen(program, stdout=theirs, stderr=theirs, stdin=theirs, env=environment)
     os.close(theirs)
     seen = b""
     try:
@@ -217,49 +213,54 @@ def on_a_terminal(*arguments, **environment):
 
 @pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals")
 def test_colours_are_for_terminals_and_can_be_turned_off():
-    assert COLOUR.search(on_a_terminal("--help"))
-    assert not COLOUR.search(on_a_terminal("--help", NO_COLOR="1"))
+    assert COLOUR.search(on_a_terminal())
+    assert not COLOUR.search(on_a_terminal(NO_COLOR="1"))
+    script = """
+from springbeam.cli import app
+from springbeam.cli.run import _ProgressBar
+for line in ("--help", "scenes", "run sotf", "rnu"):
+    try:
+        app(line.split())
+    except SystemExit as end:
+        print("code", end.code)
+"""
     environment = {key: value for key, value in os.environ.items() if key not in FORCING}
-    for arguments in (["--help"], ["scenes"], ["run", "sotf"], ["rnu"]):
-        command = [sys.executable, "-m", "springbeam", *arguments]
-        ran = subprocess.run(command, capture_output=True, env=environment, text=True, timeout=60)
-        assert ran.stdout + ran.stderr
-        assert "\x1b" not in ran.stdout + ran.stderr
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, env=environment, text=True, timeout=60)
+    assert re.findall(r"^code (\d)", ran.stdout, re.M) == ["0", "0", "2", "2"]
+    assert "\x1b" not in ran.stdout + ran.stderr
 
 
 # -- completion -----------------------------------------------------------------------------------------------------
 
 
-def completed(line, shell="bash"):
-    words = line.split(" ")
-    environment = {**os.environ, "_SPRINGBEAM_COMPLETE": f"complete_{shell}"}
-    if shell == "bash":
-        environment |= {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-    else:
-        environment |= {"_TYPER_COMPLETE_ARGS": line}
-    # Typer names the variable after the program.
-    script = "import sys; sys.argv[0] = 'springbeam'; from springbeam.cli import main; main()"
-    ran = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, timeout=60)
-    return ran.stdout.split()
+def asked_by_a_shell(what, **environment):
+    """What the command prints for the shell that asks it for ``what``; typer names the variable after the program."""
+    environment = {**environment, "_SPRINGBEAM_COMPLETE": what}
+    return CliRunner(env=environment).invoke(app, prog_name="springbeam").stdout
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
 def test_there_is_a_completion_script_for(shell):
-    script = "import sys; sys.argv[0] = 'springbeam'; from springbeam.cli import main; main()"
-    environment = {**os.environ, "_SPRINGBEAM_COMPLETE": f"source_{shell}"}
-    ran = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, timeout=60)
-    assert "_SPRINGBEAM_COMPLETE" in ran.stdout
-    assert f"complete_{shell}" in ran.stdout
+    script = asked_by_a_shell(f"source_{shell}")
+    assert "_SPRINGBEAM_COMPLETE" in script
+    assert f"complete_{shell}" in script
     if shell == "bash":
-        assert subprocess.run(["bash", "-n"], input=ran.stdout, text=True).returncode == 0
+        assert subprocess.run(["bash", "-n"], input=script, text=True).returncode == 0
 
 
-def test_commands_scenes_and_keys_are_completed():
-    assert completed("springbeam cr") == ["crosscheck"]
-    assert completed("springbeam run so") == ["soft"]
-    assert completed("springbeam run soft --set coupling.sch") == ["coupling.scheme="]
-    assert completed("springbeam sweep soft --vary stop.") == ["stop.position=", "stop.restitution="]
-    assert completed("springbeam run my_scene") == []  # the shell goes on with files
+@pytest.mark.parametrize(
+    ("line", "completed"),
+    [
+        ("springbeam cr", ["crosscheck"]),
+        ("springbeam run so", ["soft"]),
+        ("springbeam run soft --set coupling.sch", ["coupling.scheme="]),
+        ("springbeam sweep soft --vary stop.", ["stop.position=", "stop.restitution="]),
+        ("springbeam run my_scene", []),  # the shell goes on with files
+    ],
+)
+def test_commands_scenes_and_keys_are_completed(line, completed):
+    asked = asked_by_a_shell("complete_bash", COMP_WORDS=line, COMP_CWORD=str(len(line.split()) - 1))
+    assert asked.split() == completed
 
 
 # -- the likeliest mistakes: one error with place and remedy, exit code 2, nothing done --------------------------------
@@ -349,13 +350,13 @@ def test_a_mistake_is_one_error_with_place_and_remedy(desk, mistake):
     assert contents(desk) == before
 
 
-@pytest.mark.parametrize("line", ["run soft", "verify", "crosscheck soft", "sweep soft --vary spring.mass=1,2"])
-def test_without_fmus_the_error_says_what_builds_them(desk, monkeypatch, line):
+@pytest.mark.parametrize("line", ["run soft", "verify", "crosscheck soft", f"sweep {TABLES['sweep']}"])
+def test_without_fmus_the_error_says_what_builds_them(desk, arguments, monkeypatch, line):
     monkeypatch.setenv("SPRINGBEAM_FMUS", str(desk / "empty"))
     before = contents(desk).keys()
-    result = command(*line.split(), "--workers", "1") if line.startswith("sweep") else command(*line.split())
+    result = command(*arguments(line))
     assert result.exit_code == 2
-    assert str(desk / "empty" / "beam.fmu") in result.stderr
+    assert str(desk / "empty") in result.stderr
     assert "./build.sh fmus builds it" in result.stderr
     assert len(re.findall(r"\berror:", result.stderr)) == 1
     assert fmu_directory() == desk / "empty"

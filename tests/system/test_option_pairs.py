@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 import tomli_w
 from commands import Interrupt, command
-from matplotlib.figure import Figure
 from scenes import completed
 
 from springbeam.cli.run import _ProgressBar
@@ -18,7 +17,7 @@ from springbeam.results.reading import load_trajectory
 from springbeam.run.ledger import bounds
 from springbeam.scene import with_changes
 
-pytestmark = pytest.mark.usefixtures("fmu_folder")
+pytestmark = pytest.mark.usefixtures("fmu_folder", "unpainted")
 
 #: Meets the spring at once and the foundation at 0.07 s.
 SCENE = {
@@ -66,8 +65,6 @@ OPTIONS = {
 @pytest.mark.parametrize("pair", combinations(OPTIONS, 2), ids=" + ".join)
 def test_a_pair_runs_or_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pair: tuple[str, str]) -> None:
     monkeypatch.chdir(tmp_path)
-    # Composed, not painted: tests/master/test_plots.py looks at the pictures.
-    monkeypatch.setattr(Figure, "savefig", lambda self, path, **options: Path(path).touch())
     words = " ".join(OPTIONS[name] for name in pair).split()
     left_out = {word.removeprefix("no-") for word in words if word.startswith("no-")}
     Path("scene.toml").write_text(tomli_w.dumps(completed({k: v for k, v in SCENE.items() if k not in left_out})))
