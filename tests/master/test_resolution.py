@@ -62,7 +62,9 @@ def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
 
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
 def test_the_limit_of_the_mismatch_is_that_of_the_degree(share, resolved):
-    assert (not_resolved(PAIR, 3.0 * share * MISMATCH[PAIR.coupling.degree], 3.0) is None) is resolved
+    limit = share * MISMATCH[PAIR.coupling.degree]
+    assert (not_resolved(PAIR, 3.0 * limit, 3.0) is None) is resolved
+    assert (not_resolved(PAIR, 0.0, 3.0, mismatch_at_stop=limit) is None) is resolved
 
 
 def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
@@ -125,7 +127,7 @@ STIFF = with_changes(
 def test_the_limit_of_a_contact_depends_on_the_degree(degree, share, resolved):
     scene = with_changes(STIFF, coupling={"degree": degree})
     turn = share * CONTACT_TURN[degree]
-    assert (not_resolved(scene, 0.0, 1.0, turn / 1e-3) is None) is resolved
+    assert (not_resolved(scene, 0.0, 1.0, contact_frequency=turn / 1e-3) is None) is resolved
 
 
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
@@ -134,7 +136,8 @@ def test_what_steps_of_degree_0_turn_a_contact_too_little_adds_up(share, resolve
     turn = (12.0 * CONTACT_LAG / 1000.0) ** (1.0 / 3.0)
     for degree, said in ((0, not resolved), (1, False)):
         scene = with_changes(STIFF, coupling={"degree": degree})
-        assert (not_resolved(scene, 0.0, 1.0, share * turn / 1e-3, 1000) is not None) is said
+        lost = not_resolved(scene, 0.0, 1.0, contact_frequency=share * turn / 1e-3, contact_steps=1000)
+        assert (lost is not None) is said
 
 
 @pytest.mark.parametrize(("size", "degree"), [(1e-3, 0), (1e-3, 2), (7.8125e-4, 2)])

@@ -168,6 +168,17 @@ def test_impulses_are_part_of_the_promise(seed, number):
     assert verdict.factor <= 1.0
 
 
+@pytest.mark.parametrize(
+    ("seed", "number", "degree", "words"),
+    [(4, 13, 2, "of the speed with which they strike the foundation"), (5, 8, 0, "rad in all, on the contact law")],
+)
+def test_what_a_campaign_found_wrong_is_told(seed, number, degree, words):
+    """At fixed steps y is off by 3.7 and 1.5 %; velocities that differ by 5 %, and 0.2 rad a step, do not show it."""
+    run = simulate(with_changes(judge.drawn(seed, number), coupling={"degree": degree}))
+    assert run.summary["resolved"] is False
+    assert any(words in warning for warning in run.summary["warnings"])
+
+
 def test_more_accuracy_costs_more_steps():
     steps = [simulate(scene_from_dict({**WITH_STOP, "accuracy": a})).summary["macro_steps"] for a in (1e-2, 1e-4, 1e-6)]
     assert steps[0] < steps[1] < steps[2]

@@ -9,7 +9,7 @@ from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, BeamBody
 from ..contact.events import gap
 from ..contact.laws import Compliance
-from ..contact.phases import Joint
+from ..contact.phases import Joint, common_velocity
 from ..coupling.protocol import Step
 from ..results.paths import Path
 from ..results.recording import Recorder
@@ -36,7 +36,7 @@ class Rows(Checkpointed):
 
     CHECKPOINTED = (
         *("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed", "_relative_speed", "_stiffest"),
-        *("contact_steps", "not_shown"),
+        *("contact_steps", "not_shown", "mismatch_at_stop", "_last_strike"),
     )
 
     def __init__(self, scene: Scene, pair: Pair, ledger: Ledger, recorder: Recorder, start_time: float) -> None:
@@ -51,6 +51,8 @@ class Rows(Checkpointed):
         known = (*COLUMNS, *load_units(scene))
         self._present = itemgetter(*(known.index(name) for name in recorder.columns))
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
+        self.mismatch_at_stop = 0.0  #: the same over the speed with which the joined ends strike the foundation
+        self._last_strike = -inf  #: [s]
         self._relative_speed = 0.0  #: |v_tip − z| of ends that a soft law couples [m/s]
         self._stiffest = 0.0  #: slope of a soft law at the deepest penetration [N/m]
         self.contact_steps = 0  #: with a force of a soft law
@@ -89,6 +91,21 @@ class Rows(Checkpointed):
             early = joined and self._shapes_left > 0
             if early or time >= self._next_shape:
                 self._shape(pair.beam, time, early)
+
+    def struck(self, state: State, macro_step: float) -> None:
+        """Note how far the velocities of joined ends differ as they strike the foundation.
+
+        Impacts less than ``macro_step`` [s] after another one, or at the start of a phase, are left out: they may be as
+        slow as one likes.
+        """
+        pair, first = self._pair, state.time - self._last_strike > macro_step and state.steps_in_phase > 0
+        self._last_strike = state.time
+        if not first or pair.law.soft or not pair.joinable or state.phase.joint is Joint.FREE:
+            return
+        v, z = (end.velocity for end in pair.ends())
+        speed = abs(common_velocity(v, z, pair.upper.mass, pair.lower.mass))
+        if speed > 0.0:
+            self.mismatch_at_stop = max(self.mismatch_at_stop, abs(v - z) / speed)
 
     def reached(self, step: Step) -> None:
         """Note how deep the ends of a soft law have sunk into each other on ``step``, also inside it."""

@@ -255,6 +255,8 @@ class Simulation(Checkpointed):
             self._last_opening = state.time
         if kind == "impact":
             state.reclosed = state.time - self._last_opening <= _AT_ONCE * self._steps.size
+        if kind == "stop_impact":
+            self._rows.struck(state, self._steps.size)
         ends = pair.ends()
         tolerance = self._detector.simultaneity_tolerance(ends) if kind == "impact" else self._detector.tolerance(ends)
         kind, phase, impact = self._transitions.after(
@@ -351,7 +353,12 @@ class Simulation(Checkpointed):
                 "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
             )
         unresolved = not_resolved(
-            self._scene, rows.largest_mismatch, rows.largest_speed, rows.contact_frequency, rows.contact_steps
+            self._scene,
+            rows.largest_mismatch,
+            rows.largest_speed,
+            rows.mismatch_at_stop,
+            rows.contact_frequency,
+            rows.contact_steps,
         )
         doubt = unresolved or peak_force_doubt(self._scene)
         if doubt is not None:

@@ -5,7 +5,8 @@ A run is called *not resolved* if (``docs/coupling.md``, "Is the motion resolved
 * the slowest oscillation of a body, or a load, turns more than `TURN` in a macro step: its rows are aliased;
 * tip and lower end turn more than `CONTACT_TURN` against each other on a soft contact law, or with degree 0 in all
   steps together more than `CONTACT_LAG` too little; or
-* the velocities of the joined ends differ by more than `MISMATCH` of their largest speed.
+* the velocities of the joined ends differ by more than `MISMATCH` of their largest speed, or of that with which they
+  strike the foundation.
 
 Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
 `springbeam.studies.stability.predict` has the mesh's.
@@ -43,7 +44,12 @@ WINDOW = 0.02
 
 
 def not_resolved(
-    scene: Scene, mismatch: float, speed: float, contact_frequency: float = 0.0, contact_steps: int = 0
+    scene: Scene,
+    mismatch: float,
+    speed: float,
+    mismatch_at_stop: float = 0.0,
+    contact_frequency: float = 0.0,
+    contact_steps: int = 0,
 ) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
@@ -53,6 +59,8 @@ def not_resolved(
         The scene as run.
     mismatch, speed
         The largest difference of the joined ends' velocities, and the largest speed of an end [m/s].
+    mismatch_at_stop
+        The largest difference of these velocities as the ends strike the foundation, over the speed of the stroke.
     contact_frequency
         Of tip and lower end on a soft contact law at the deepest penetration reached [rad/s], 0 without one.
     contact_steps
@@ -69,11 +77,16 @@ def not_resolved(
                 )
         if contact_frequency > 0.0 and (lost := _contact_lost(scene, contact_frequency, H, contact_steps)):
             return lost
-    if mismatch <= MISMATCH[scene.coupling.degree] * speed:
+    allowed = MISMATCH[scene.coupling.degree]
+    if mismatch > allowed * speed:
+        differ = f"up to {mismatch:.3g} m/s of {speed:.3g} m/s"
+    elif mismatch_at_stop > allowed:
+        differ = f"{mismatch_at_stop:.2g} of the speed with which they strike the foundation"
+    else:
         return None
     return (
-        f"not resolved: the joined ends' velocities differ by up to {mismatch:.3g} m/s of {speed:.3g} m/s; velocities "
-        f"and forces alternate from step to step. {_remedy(scene)}"
+        f"not resolved: the joined ends' velocities differ by {differ}; velocities and forces alternate from step to "
+        f"step. {_remedy(scene)}"
     )
 
 
