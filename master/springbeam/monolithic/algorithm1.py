@@ -30,7 +30,7 @@ import scipy.sparse.linalg as spla
 
 from ..results.trajectory import Event, Trajectory
 from ..scene import Scene
-from .algorithm1_ledger import StepLedger
+from .algorithm1_ledger import PairState, StepLedger
 from .semi_discrete import SemiDiscreteBeam, assemble
 
 StartVelocity = Literal["rest", "tip", "average"]
@@ -152,76 +152,59 @@ class _Algorithm:
 
     def _spring_step(self, y: float, z: float, guess: float, stiffness: float, solve: str) -> float:
         """yˡ⁺¹ from (53) and (54), N = 0."""
+        return self._newton(lambda Y: self._foundation_force(y, z, Y, stiffness), guess, solve)
+
+    def _foundation_force(self, y: float, z: float, Y: float, stiffness: float) -> tuple[float, float]:
+        """N of (53) for a step from (y, z) that ends at ``Y``, and its derivative by ``Y``."""
         p, h = self.spring, self.h
-        before = self._compliance(y, stiffness)[0]
-
-        def f(Y: float) -> tuple[float, float]:
-            force, slope = self._compliance(Y, stiffness)
-            value = (
-                2.0 * p.mass * ((Y - y) / h - z) / h
-                + p.damping * (Y - y) / h
-                + 0.5 * p.linear_stiffness * (Y + y)
-                + 0.25 * p.cubic_stiffness * (Y**2 + y**2) * (Y + y)
-                + 0.5 * (force + before)
-                - p.external_force
-            )
-            tangent = (
-                2.0 * p.mass / h**2
-                + p.damping / h
-                + 0.5 * p.linear_stiffness
-                + 0.25 * p.cubic_stiffness * (3.0 * Y**2 + 2.0 * Y * y + y**2)
-                + 0.5 * slope
-            )
-            return value, tangent
-
-        return self._newton(f, guess, solve)
-
-    def _foundation_force(self, y: float, z: float, y_new: float, stiffness: float) -> float:
-        """N of (53) for a step that ends on the foundation."""
-        p, h = self.spring, self.h
-        z_new = 2.0 * (y_new - y) / h - z
-        contact = 0.5 * (self._compliance(y_new, stiffness)[0] + self._compliance(y, stiffness)[0])
-        return (
-            p.mass * (z_new - z) / h
-            + p.damping * (y_new - y) / h
-            + 0.5 * p.linear_stiffness * (y_new + y)
-            + 0.25 * p.cubic_stiffness * (y_new**2 + y**2) * (y_new + y)
-            + contact
+        force, slope = self._compliance(Y, stiffness)
+        value = (
+            2.0 * p.mass * ((Y - y) / h - z) / h
+            + p.damping * (Y - y) / h
+            + 0.5 * p.linear_stiffness * (Y + y)
+            + 0.25 * p.cubic_stiffness * (Y**2 + y**2) * (Y + y)
+            + 0.5 * (force + self._compliance(y, stiffness)[0])
             - p.external_force
         )
+        tangent = (
+            2.0 * p.mass / h**2
+            + p.damping / h
+            + 0.5 * p.linear_stiffness
+            + 0.25 * p.cubic_stiffness * (3.0 * Y**2 + 2.0 * Y * y + y**2)
+            + 0.5 * slope
+        )
+        return value, tangent
 
     # Algorithm ------------------------------------------------------------------------------------------------------
 
     def run(self) -> Trajectory:
         self.time = 0.0
-        q, v = self._initial_beam()
-        y, z = self.spring.equilibrium, self.spring.initial_velocity
+        self._events: list[Event] = []
+        state = PairState(*self._initial_beam(), self.spring.equilibrium, self.spring.initial_velocity)
         touched = self.beam.approach == "undeformed"
         if touched:  # nothing to integrate before t_c
-            z = self._velocity_at_contact(v)
-        self.ledger.record(self.time, q, v, y, z, "tied" if touched else "free")
+            state = self._first_contact(state)
+        self.ledger.record(self.time, state, "tied" if touched else "free")
         stiffness = self.scene.contact.stiffness if touched else 0.0
         whole, rest = self.scene.equal_steps
         steps = whole + (rest > 0.0)
         begin, began = self.time, clock.perf_counter()
-        self._events = [self._first_contact(q, v, y, z)] if touched else []
         for step in range(1, steps + 1):
             if step > whole:
                 self._set_step(rest)
             self.time = begin + step * self.h if step <= whole else self.scene.time.t_end
             if touched:
                 try:
-                    q, v, y, z, stiffness = self._contact_step(q, v, y, z, stiffness)
+                    state, stiffness = self._contact_step(state, stiffness)
                 except AlgorithmFailure as failure:
                     failure.trajectory = self._trajectory((clock.perf_counter() - began) / step)
                     raise
                 continue
-            q, v = self._free_beam_step(q, v)  # lines 1–4
-            if q[-1] <= self.spring.equilibrium:
+            state = self._free_beam_step(state)  # lines 1–4
+            if state.q[-1] <= self.spring.equilibrium:
                 touched, stiffness = True, self.scene.contact.stiffness  # line 6
-                y, z = self.spring.equilibrium, self._velocity_at_contact(v)  # line 5
-                self._events.append(self._first_contact(q, v, y, z))
-            self.ledger.record(self.time, q, v, y, z, "tied" if touched else "free")
+                state = self._first_contact(state)  # line 5
+            self.ledger.record(self.time, state, "tied" if touched else "free")
         return self._trajectory((clock.perf_counter() - began) / max(steps, 1))
 
     def _initial_beam(self) -> tuple[np.ndarray, np.ndarray]:
@@ -236,22 +219,26 @@ class _Algorithm:
         shape = self.discrete.slope_shape
         return slope * shape, rate * shape
 
-    def _velocity_at_contact(self, v: np.ndarray) -> float:
-        return 0.0 if self.start_velocity == "rest" else float(v[-1])
+    def _first_contact(self, state: PairState) -> PairState:
+        state = state._replace(z=0.0 if self.start_velocity == "rest" else float(state.v[-1]))
+        self._note("impact", state)
+        return state
 
-    def _first_contact(self, q: np.ndarray, v: np.ndarray, y: float, z: float) -> Event:
-        return Event(self.time, "impact", y, z, float(q[-1]), float(v[-1]))
+    def _note(self, kind: str, state: PairState, **impulse: float) -> None:
+        q, v, y, z = state
+        self._events.append(Event(self.time, kind, y, z, float(q[-1]), float(v[-1]), **impulse))
 
     def _right_side(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the right side of (62) without a force on the tip."""
         right: np.ndarray = self.B @ q + 4.0 * self.h * (self.discrete.M @ v) + 2.0 * self.h**2 * self.load
         return right
 
-    def _free_beam_step(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        h = self.h
+    def _free_beam_step(self, before: PairState) -> PairState:
+        q, v, *_ = before
         new = self.solve(self._right_side(q, v))
-        self.ledger.dissipate(h, q, new, 0.0)
-        return new, 2.0 * (new - q) / h - v
+        after = before._replace(q=new, v=2.0 * (new - q) / self.h - v)
+        self.ledger.dissipate(self.h, before, after)
+        return after
 
     def _tip(self, q: np.ndarray, v: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
         """u_tip by (62), which is nonlinear only there, and what the beam would do without a force on it."""
@@ -273,11 +260,9 @@ class _Algorithm:
         force = (u - known[-1]) / response[-1]
         return known + response * force, float(force / (2.0 * h**2))
 
-    def _contact_step(
-        self, q: np.ndarray, v: np.ndarray, y: float, z: float, stiffness: float
-    ) -> tuple[np.ndarray, np.ndarray, float, float, float]:
+    def _contact_step(self, before: PairState, stiffness: float) -> tuple[PairState, float]:
         """Lines 8–30: the state at l + 1 and λ_nc as the step leaves it."""
-        h, psi = self.h, self.spring.equilibrium
+        h, psi, (q, v, y, z) = self.h, self.spring.equilibrium, before
         u_new, known = self._tip(q, v, stiffness)  # line 9
         y_new = self._spring_step(y, z, y, stiffness, "predicted")  # line 10
         case, foundation, y_used = 0, 0.0, y
@@ -293,7 +278,7 @@ class _Algorithm:
             u_new = y_new  # line 18
             if y_new <= self.phi:  # lines 20–24
                 u_new = y_new = self.phi
-                foundation = self._foundation_force(y, z, y_new, stiffness)
+                foundation, _ = self._foundation_force(y, z, y_new, stiffness)
         q_new, on_tip = self._beam(known, u_new)  # lines 13, 19, 22
         v_new = 2.0 * (q_new - q) / h - v  # line 29
         z_base = y_used if self.y_temp == "both" and case == 14 else y
@@ -302,16 +287,14 @@ class _Algorithm:
             raise AlgorithmFailure(f"the solution overflows at t = {self.time:.6g} s")
         inside = 0.5 * (self._compliance(u_new, acting)[0] + self._compliance(q[-1], acting)[0])
         pressing = 0.5 * (self._compliance(y_new, acting)[0] + self._compliance(y, acting)[0])
-        self.ledger.book(h, q, q_new, y, z, y_new, z_new, on_tip - inside, pressing, foundation)
+        after = PairState(q_new, v_new, y_new, z_new)
+        self.ledger.book(h, before, after, on_tip - inside, pressing, foundation)
         seated = case == 14 and y_new == self.phi
         phase = "seated" if seated else "tied" if case == 14 else "free"
         if seated:
-            tip_state = (float(q_new[-1]), float(v_new[-1]))
-            self._events.append(
-                Event(self.time, "stop_impact", y_new, z_new, *tip_state, impulse_foundation=self.h * foundation)
-            )
-        self.ledger.record(self.time, q_new, v_new, y_new, z_new, phase, on_tip, inside, foundation, case)
-        return q_new, v_new, y_new, z_new, stiffness
+            self._note("stop_impact", after, impulse_foundation=h * foundation)
+        self.ledger.record(self.time, after, phase, on_tip, inside, foundation, case)
+        return after, stiffness
 
     # Result ---------------------------------------------------------------------------------------------------------
 

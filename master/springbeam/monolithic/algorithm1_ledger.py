@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..results.trajectory import COLUMNS, Event, Trajectory
+from ..results.trajectory import Event, Trajectory, columns_of
 from ..scene import Scene
 from .semi_discrete import SemiDiscreteBeam
+
+
+class PairState(NamedTuple):
+    """Beam and spring between two steps."""
+
+    q: np.ndarray  #: unknowns of the mesh [rad, m], their last the tip's deflection
+    v: np.ndarray
+    y: float  #: [m]
+    z: float  #: [m/s]
 
 
 class StepLedger:
@@ -31,21 +40,17 @@ class StepLedger:
         self._shapes: list[np.ndarray] = []
         self._totals = {"e_dissipated": 0.0, "e_injected_beam": 0.0, "e_injected_spring": 0.0}
 
-    def dissipate(self, h: float, q: np.ndarray, q_new: np.ndarray, dy: float) -> None:
-        """Book what the dampers take in a step of ``h`` [s], of the beam from ``q`` and of the spring by ``dy`` [m]."""
-        rate = (q_new - q) / h
+    def dissipate(self, h: float, before: PairState, after: PairState) -> None:
+        """Book what the dampers take in a step of ``h`` [s]."""
+        rate, dy = (after.q - before.q) / h, after.y - before.y
         beam = self._alpha * float(rate @ (self._discrete.K @ rate)) if self._alpha else 0.0
         self._totals["e_dissipated"] += h * beam + self._spring.damping * dy**2 / h
 
     def book(
         self,
         h: float,
-        q: np.ndarray,
-        q_new: np.ndarray,
-        y: float,
-        z: float,
-        y_new: float,
-        z_new: float,
+        before: PairState,
+        after: PairState,
         injected: float,
         pressing: float,
         foundation: float,
@@ -57,24 +62,21 @@ class StepLedger:
         ``injected`` is the part of the force on the tip that no law gives, ``pressing`` the law's force on the spring,
         ``foundation`` N; means over the step [N].
         """
-        dy = y_new - y
-        self.dissipate(h, q, q_new, dy)
-        self._totals["e_injected_beam"] += injected * float(q_new[-1] - q[-1])
-        gained = self._spring_energy(y_new, z_new) - self._spring_energy(y, z)
+        dy = after.y - before.y
+        self.dissipate(h, before, after)
+        self._totals["e_injected_beam"] += injected * float(after.q[-1] - before.q[-1])
+        gained = self._spring_energy(after) - self._spring_energy(before)
         worked = (foundation - pressing + self._spring.external_force) * dy - self._spring.damping * dy**2 / h
         self._totals["e_injected_spring"] += gained - worked
 
-    def _spring_energy(self, y: float, z: float) -> float:
-        p = self._spring
+    def _spring_energy(self, state: PairState) -> float:
+        p, y, z = self._spring, state.y, state.z
         return 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
 
     def record(
         self,
         time: float,
-        q: np.ndarray,
-        v: np.ndarray,
-        y: float,
-        z: float,
+        state: PairState,
         phase: str,
         on_tip: float = 0.0,
         inside: float = 0.0,
@@ -82,9 +84,9 @@ class StepLedger:
         case: int = 0,
     ) -> None:
         """Add a row; the forces are means over the step that ends in it [N]."""
-        d = self._discrete
+        d, (q, v, y, z) = self._discrete, state
         e_beam = 0.5 * float(v @ (d.M @ v)) + 0.5 * float(np.sum((d.B @ q) ** 2))
-        e_spring = self._spring_energy(y, z)
+        e_spring = self._spring_energy(state)
         e_load = -float(self._load @ q) - self._spring.external_force * y
         row = {
             "time": time,
@@ -117,10 +119,8 @@ class StepLedger:
         columns: dict[str, np.ndarray] = {name: np.array(values) for name, values in self._rows.items()}
         columns["phase"] = np.array(self._phases, dtype="<U8")
         columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
-        if self._scene.stop is None:
-            del columns["foundation_force"]
-        ordered = {name: columns[name] for name in COLUMNS if name in columns}
-        ordered.update((name, columns[name]) for name in columns if name not in ordered)
+        extra = ("case", "e_injected_beam", "e_injected_spring")
+        ordered = {name: columns[name] for name in (*columns_of(self._scene), *extra) if name in columns}
         after_contact = columns["case"][1:]
         summary["steps_apart"] = int(np.sum(after_contact == 11))
         summary["steps_joined"] = int(np.sum(after_contact == 14))

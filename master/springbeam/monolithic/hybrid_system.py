@@ -200,24 +200,13 @@ class HybridSystem:
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
         """What rounding leaves of a displacement, velocity or contact force that is exactly zero."""
-        if unit == "N":
-            return self.force_noise(X)
-        return self.displacement_noise(X) if unit == "m" else self.velocity_noise(X)
-
-    def displacement_noise(self, X: np.ndarray) -> float:
-        """What rounding leaves of a displacement that is exactly zero [m]."""
-        stop = 0.0 if self.scene.stop is None else abs(self.scene.stop.position)
-        size = float(np.abs(X[self.A]) @ np.abs(self.b)) + abs(float(X[self.Y])) + stop
-        return _NOISE * size
-
-    def velocity_noise(self, X: np.ndarray) -> float:
-        """What rounding leaves of a velocity that is exactly zero [m/s]."""
-        return _NOISE * (float(np.abs(X[self.V]) @ np.abs(self.b)) + abs(float(X[self.Z])))
-
-    def force_noise(self, X: np.ndarray) -> float:
-        """What rounding leaves of a contact force that is exactly zero [N]."""
-        a, v = np.abs(X[self.A]), np.abs(X[self.V])
-        beam = float(np.abs(self.b) @ (self.stiffness * (a + self.alpha_b * v) + np.abs(self.load)))
+        a, v, b = np.abs(X[self.A]), np.abs(X[self.V]), np.abs(self.b)
+        if unit == "m":
+            stop = 0.0 if self.scene.stop is None else abs(self.scene.stop.position)
+            return _NOISE * (float(a @ b) + abs(float(X[self.Y])) + stop)
+        if unit == "m/s":
+            return _NOISE * (float(v @ b) + abs(float(X[self.Z])))
+        beam = float(b @ (self.stiffness * (a + self.alpha_b * v) + np.abs(self.load)))
         p = self.spring
         spring = abs(p.external_force) + p.damping * abs(float(X[self.Z])) + abs(p.linear_stiffness * float(X[self.Y]))
         weight = self.inverse_tip_mass + self.inverse_mass

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..results.trajectory import COLUMNS, Trajectory, load_units
+from ..results.trajectory import Trajectory, columns_of, load_units
 from .hybrid_system import HybridSystem
 from .laws import Phase
 from .transitions import HybridState
@@ -45,11 +45,9 @@ class Rows:
         summary["seat_height"] = None if s.scene.stop is None else state.seat_height()
         deflection = s.shapes(states)
         shapes = None if deflection is None else (columns["time"], deflection)
-        for name in self._absent():
-            columns.pop(name, None)
-        loads = self._system.loads.values(columns["time"])
+        loads = s.loads.values(columns["time"])
         columns |= {name: loads[:, i] for i, name in enumerate(load_units(s.scene))}
-        ordered = {name: columns[name] for name in (*COLUMNS, *load_units(s.scene)) if name in columns}
+        ordered = {name: columns[name] for name in columns_of(s.scene) if name in columns}
         return Trajectory(s.scene, ordered, state.events, shapes, summary)
 
     def _columns(self, states: np.ndarray) -> dict[str, np.ndarray]:
@@ -91,17 +89,3 @@ class Rows:
             columns["foundation_force"] = columns["contact_force"]
         columns["e_total"] = np.sum([columns[name] for name in _ENERGIES], axis=0)
         columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
-
-    def _absent(self) -> tuple[str, ...]:
-        """Columns that the scene does not have."""
-        s = self._system
-        absent: tuple[str, ...] = ()
-        if s.beam is None:
-            absent += ("u_tip", "v_tip", "e_beam")
-        if not s.has_spring:
-            absent += ("y", "z", "e_spring")
-        if not s.two_ends:
-            absent += ("contact_force", "e_contact")
-        if s.scene.stop is None or s.scene.elastic_stop:
-            absent += ("foundation_force",)
-        return absent

@@ -33,7 +33,7 @@ class HybridState:
         self.loss = 0.0
         self.events: list[Event] = []
         m = system.motion(self.phase, X)
-        if not (system.law.rigid and abs(float(m.v - m.z)) > system.velocity_noise(X)):
+        if not (system.law.rigid and abs(float(m.v - m.z)) > system.noise("m/s", X)):
             self.phase = Phase(system.law.start)
             system.synchronise(self.phase, X)
 
@@ -72,7 +72,7 @@ class HybridState:
                 self._meet()
             return
         m = s.motion(self.phase, X)
-        noise = s.displacement_noise(X)
+        noise = s.noise("m", X)
         if s.two_ends and float(m.u - m.y) <= noise:
             if m.v <= m.z:
                 self._meet()
@@ -90,7 +90,7 @@ class HybridState:
         s, X = self.system, self.X
         m = s.motion(Phase("tied"), X)
         height = float(m.y) - s.spring.equilibrium
-        if abs(height) <= s.displacement_noise(X):
+        if abs(height) <= s.noise("m", X):
             height = float(m.z) if m.z != 0.0 else float(m.z_dot)
         return height < 0.0
 
@@ -131,7 +131,7 @@ class HybridState:
         self._emit(kind, impulse_contact=impulse, energy_loss=before - self._mechanical_energy())
         if was_seated:  # the spring already stands on the foundation
             self._hit_stop()
-        elif contact == "touch" and float(s.motion(self.phase, X).C) < -s.force_noise(X):
+        elif contact == "touch" and float(s.motion(self.phase, X).C) < -s.noise("N", X):
             self._go_on("separate")
 
     # Foundation -----------------------------------------------------------------------------------------------------
