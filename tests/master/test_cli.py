@@ -32,7 +32,7 @@ def fake_run(scene, recorder, progress=None, **checkpoints):
     """Steps, as the real runner reports them."""
     for i in range(31):
         t = i / 30 * scene.time.t_end
-        recorder.row(dict.fromkeys(recorder.columns, 0.1 * i) | {"time": t, "phase": "free"})
+        recorder.row([{"time": t, "phase": "free"}.get(name, 0.1 * i) for name in recorder.columns])
         if scene.beam is not None:
             recorder.shape(t, np.full(21, 0.1 * i))
         if progress is not None:
@@ -176,7 +176,7 @@ def test_a_run_that_stops_early(here, unpainted, monkeypatch, error, status, fra
     replace_run(monkeypatch, error)
     result = command("run", "soft")
     assert result.exit_code == 3
-    for fragment in [*fragments, "what was computed is in results/soft"]:
+    for fragment in [*fragments, "what was computed is in results/soft; a run begun with --checkpoint SECONDS can"]:
         assert fragment in result.stderr
     assert "Traceback" not in result.output
     trajectory = load_trajectory(here / "results" / "soft")
@@ -188,7 +188,7 @@ def test_a_run_that_stops_early(here, unpainted, monkeypatch, error, status, fra
 def test_a_value_that_is_not_finite_stops_the_run(here, monkeypatch):
     def run(scene, recorder, progress=None, **checkpoints):
         fake_run(scene, recorder)
-        recorder.row(dict.fromkeys(recorder.columns, float("nan")) | {"time": 0.7, "phase": "free"})
+        recorder.row([{"time": 0.7, "phase": "free"}.get(name, float("nan")) for name in recorder.columns])
 
     monkeypatch.setattr(springbeam.run.runner, "run", run)
     result = command("run", "soft", "--no-plots")
@@ -212,7 +212,7 @@ from springbeam import cli
 def run(scene, recorder, progress=None, **checkpoints):
     for i in range(60_000):  # a minute, should nobody interrupt it
         t = 1e-5 * i
-        recorder.row(dict.fromkeys(recorder.columns, 0.5) | {"time": t, "phase": "tied"})
+        recorder.row([{"time": t, "phase": "tied"}.get(name, 0.5) for name in recorder.columns])
         if progress is not None:
             progress(t, "tied", i)
         if i == 50:

@@ -34,8 +34,9 @@ SHAPE = np.linspace(0.0, 1.0, 21) ** 2
 
 
 def a_row(scene=PAIR, time=0.25, **values):
+    """A row in the order of the scene's columns."""
     numbers = {name: (i + 1) / 7.0 for i, name in enumerate(columns_of(scene))}
-    return {**numbers, "time": time, "phase": "tied", **values}
+    return tuple({**numbers, "time": time, "phase": "tied", **values}.values())
 
 
 def record(recorder, rows=3, event=None):
@@ -117,22 +118,10 @@ def test_what_is_recorded_comes_back(make, scene):
         assert np.array_equal(shapes, np.outer(np.arange(300), SHAPE))
 
 
-def test_rows_may_be_sequences_in_column_order(make):
-    recorder = make()
-    row = a_row()
-    recorder.row([row[name] for name in recorder.columns])
-    recorder.row(tuple(row[name] for name in recorder.columns))
-    recorder.row({**row, "not a column": math.nan})
-    recorder.finish({})
-    result = make.trajectory(recorder)
-    for name in recorder.columns:
-        assert len(set(result[name])) == 1
-
-
 def test_columns_may_be_chosen(make):
     recorder = make(PAIR, ("time", "y"))
     recorder.row((0.0, 1.5))
-    recorder.row({"time": np.float64(1.0), "y": np.float32(0.25), "z": 3.0})
+    recorder.row([np.float64(1.0), np.float32(0.25)])
     recorder.finish({})
     result = make.trajectory(recorder)
     assert {name: values.tolist() for name, values in result.columns.items()} == {"time": [0, 1], "y": [1.5, 0.25]}
@@ -176,7 +165,6 @@ def test_nothing_that_is_not_finite_reaches_a_file(make):
 @pytest.mark.parametrize(
     "bad",
     [
-        lambda r: r.row({"time": 0.0}),
         lambda r: r.row((0.0, 1.0)),
         lambda r: r.row(a_row(phase="a,b")),
         lambda r: r.row(a_row(phase="a\nb")),
@@ -185,7 +173,7 @@ def test_nothing_that_is_not_finite_reaches_a_file(make):
         lambda r: r.event(Event(0.0, "bang")),
         lambda r: r.shape(0.0, np.zeros(20)),
     ],
-    ids=["missing", "short", "comma", "newline", "empty", "long", "kind", "points"],
+    ids=["short", "comma", "newline", "empty", "long", "kind", "points"],
 )
 def test_what_a_file_cannot_hold_is_refused(make, bad):
     recorder = make()

@@ -172,7 +172,8 @@ def test_a_run_shows_itself(run):
     assert len(repr(run)) < 120
     assert f"{len(run)} rows, t = 0 … 0.2 s, 3 events, done" in repr(run)
     html = run._repr_html_()
-    assert f"<th>contact_impulse</th><td>{run.summary['contact_impulse']:.4g} N·s</td>" in html
+    contact = "impulse of the contact, ∫ C dt and impacts"
+    assert f"<th>{contact}</th><td>{run.summary['contact_impulse']:.5g} N·s</td>" in html
     titled = with_changes(SOFT, time={"t_end": 0.01}).model_copy(update={"title": "<b>"})
     assert "&lt;b&gt;" in simulate(titled)._repr_html_()
     assert {"u_tip", "at", "to_pandas"} <= set(dir(run))

@@ -184,23 +184,18 @@ def carry_out(
         if not recorder.begun:
             directory.discard()
     _report(console, directory, scene)
-    if not no_plots:
-        error = _draw(console, directory) or error
-    if interval is not None:
-        error = _thin_out(directory, interval) or error
+    left = (
+        None if no_plots else _draw(console, directory),
+        None if interval is None else _thin_out(directory, interval),
+    )
+    for trouble in filter(None, left):
+        error = error or f"{trouble}; what was computed is in {directory.path}"
     if as_json:
         print_json({"directory": directory.path, **load_summary(directory.path)})
     elif quiet:
         typer.echo(directory.path)
     if error is not None:
-        fail(STOPPED, f"{error}\nwhat was computed is in {directory.path}{_goes_on(directory)}")
-
-
-def _goes_on(directory: RunDirectory) -> str:
-    """Return how a run that stopped can go on, in words."""
-    if directory.checkpoint.exists():
-        return f"; springbeam resume {directory.path} goes on from the last checkpoint"
-    return ""
+        fail(STOPPED, error)
 
 
 def _draw(console: Console, directory: RunDirectory) -> str | None:
@@ -245,18 +240,25 @@ def _run_into(
 
     t_end = recorder.scene.time.t_end
 
-    def last_words(cause: str) -> str:
-        progress.__exit__()
-        if not recorder.begun:
-            recorder.directory.discard()
-            return cause
+    def ended(status: str, cause: str) -> str:
+        """Close the results of a run that ends early; return why, how far it came, and how it can go on."""
         reached = 0.0 if recorder.time is None else recorder.time
         if not recorder.finished:
-            with suppress(OSError):
-                recorder.finish({"status": "interrupted", "cause": cause, "time": reached})
-        return (
-            f"{cause} (reached t = {reached:.9g} s of {t_end:g} s); what was computed is in {recorder.directory.path}"
-        )
+            with suppress(OSError):  # on a full disk: the rows that fit are there, and the cause is reported
+                recorder.finish({"status": status, "cause": cause, "time": reached})
+        there = f"what was computed is in {recorder.directory.path}"
+        if recorder.directory.checkpoint.exists():
+            there += f"; springbeam resume {recorder.directory.path} goes on from the last checkpoint"
+        elif seconds is None and made is None:
+            there += "; a run begun with --checkpoint SECONDS can go on after it has ended early"
+        return f"{cause} (reached t = {reached:.9g} s of {t_end:g} s); {there}"
+
+    def last_words(cause: str) -> str:
+        progress.__exit__()
+        if recorder.begun:
+            return ended("interrupted", cause)
+        recorder.directory.discard()
+        return cause
 
     with recorder, _ProgressBar(t_end, quiet=quiet) as progress, watched(last_words):
         try:
@@ -265,29 +267,19 @@ def _run_into(
             else:
                 run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start)
             return None
-        except RunStopped as stopped:
-            status, cause = "stopped", str(stopped)
-        except NonFiniteValue as error:
-            status, cause = "stopped", str(error)
-        except OSError as error:
+        except (RunStopped, NonFiniteValue) as error:
+            return f"the run stopped early: {ended('stopped', str(error))}"
+        except (OSError, FmuError) as error:
             if not recorder.begun:
                 raise
-            status = "stopped"
-            cause = f"{error.filename or recorder.directory.path}: {error.strerror or error}"
-        except FmuError as error:
-            if not recorder.begun:
-                raise
-            status, cause = "stopped", str(error)
+            cause = str(error)
+            if isinstance(error, OSError):
+                cause = f"{error.filename or recorder.directory.path}: {error.strerror or error}"
+            return f"the run stopped early: {ended('stopped', cause)}"
         except KeyboardInterrupt:
             if not recorder.begun:
                 raise
-            status, cause = "interrupted", "interrupted"
-        reached = 0.0 if recorder.time is None else recorder.time
-        if not recorder.finished:
-            with suppress(OSError):  # on a full disk: the rows that fit are there, and the cause is reported
-                recorder.finish({"status": status, "cause": cause, "time": reached})
-    where = f"{cause} (reached t = {reached:.9g} s of {t_end:g} s)"
-    return where if status == "interrupted" else f"the run stopped early: {where}"
+            return ended("interrupted", "interrupted")
 
 
 class _ProgressBar:

@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ..scene.statics import SHAPE_POINTS
-from .totals import LOSS_NAMES, TOTALS
-from .trajectory import Trajectory, rounded, units_of
+from .totals import in_words
+from .trajectory import Trajectory, units_of
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -59,12 +59,7 @@ def as_html(run: Trajectory) -> str:
     rows = [
         ("rows, events", f"{len(run)}, {len(run.events)}"),
         ("status", str(summary.get("status", "no summary"))),
-        *((name, f"{rounded(summary[name], 1.0)} {unit}") for name, (_, unit) in TOTALS.items() if name in summary),
-        *(
-            (f"lost: {words}", f"{rounded(summary[name], 1.0)} J")
-            for name, words in LOSS_NAMES.items()
-            if name in summary
-        ),
+        *in_words(summary),
         *(("warning", str(warning)) for warning in summary.get("warnings", ())),
     ]
     body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)

@@ -86,7 +86,7 @@ class FileRecorder(CheckedRecorder):
         """Whether the directory holds results of this run."""
         return bool(self._files)
 
-    def row(self, values: Mapping[str, Any] | Sequence[Any], step: bytes | None = None) -> None:
+    def row(self, values: Sequence[Any], step: bytes | None = None) -> None:
         row, phase = self._checked_row(values)
         if step is not None:
             self._waiting += step

@@ -41,8 +41,8 @@ class Recorder(Protocol):
 
     columns: tuple[str, ...]
 
-    def row(self, values: Mapping[str, Any] | Sequence[Any], step: bytes | None = None) -> None:
-        """Record an accepted step: a value per column, by name (further names are ignored) or in column order.
+    def row(self, values: Sequence[Any], step: bytes | None = None) -> None:
+        """Record an accepted step: a value per column, in their order.
 
         ``step`` is `springbeam.results.steps.packed`; a run gives it with every row or with none. Its numbers are
         looked at later, many at a time.
@@ -91,14 +91,9 @@ class CheckedRecorder:
         self._numbers = [name for name in self.columns if name != "phase"]
         self._phases: set[str] = set()
 
-    def _checked_row(self, values: Mapping[str, Any] | Sequence[Any]) -> tuple[list[float], str]:
+    def _checked_row(self, values: Sequence[Any]) -> tuple[list[float], str]:
         """Return the numbers of the row, and its phase."""
-        if not isinstance(values, tuple) and isinstance(values, Mapping):  # the first is the quicker to tell
-            try:
-                values = [values[name] for name in self.columns]
-            except KeyError as missing:
-                raise ValueError(f"row without column {missing}") from None
-        elif len(values) != len(self.columns):
+        if len(values) != len(self.columns):
             raise ValueError(f"row of {len(values)} values for {len(self.columns)} columns")
         values = list(values)
         phase = ""
@@ -154,7 +149,7 @@ class MemoryRecorder(CheckedRecorder):
         self._shapes, self._steps = bytearray(), bytearray()
         self._summary: dict[str, Any] = {}
 
-    def row(self, values: Mapping[str, Any] | Sequence[Any], step: bytes | None = None) -> None:
+    def row(self, values: Sequence[Any], step: bytes | None = None) -> None:
         row, phase = self._checked_row(values)
         if step is not None:
             self._steps += step
@@ -192,9 +187,8 @@ class MemoryRecorder(CheckedRecorder):
 def replay(trajectory: Trajectory, recorder: Recorder) -> None:
     """Record a finished run row by row and event by event."""
     steps = trajectory.steps
-    for i in range(len(trajectory)):
-        step = None if steps is None else steps[i].tobytes()
-        recorder.row({name: values[i] for name, values in trajectory.columns.items()}, step)
+    for i, row in enumerate(zip(*(trajectory[name] for name in recorder.columns), strict=True)):
+        recorder.row(row, None if steps is None else steps[i].tobytes())
     for event in trajectory.events:
         recorder.event(event)
     for time, deflection in zip(*(trajectory.shapes or ((), ())), strict=True):

@@ -6,8 +6,8 @@ polynomial that was applied, so its integral, and its mean over any window, are 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -46,10 +46,24 @@ LOSS_NAMES = {
     "loss_impact": "impacts of tip and spring",
     "loss_stop": "impacts on the stop",
 }
+#: Numbers of `TOTALS` that say something only beside others.
+_BESIDE = ("contact_force_window", "deepest_tip_time")
 #: Gauss–Legendre nodes and weights on [0, 1].
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(3)[0] + 1) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
 #: Windows that are looked at together.
 _CHUNK = 65536
+
+
+def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield words and values of the numbers in a ``summary`` that are not 0, and of any count."""
+    for name, (words, unit) in TOTALS.items():
+        if name in summary and name not in _BESIDE and (summary[name] or not unit):
+            if name == "contact_force_max":
+                words = words.replace("the window", f"{summary['contact_force_window']:.4g} s")
+            yield words, f"{summary[name]:.5g} {unit}".rstrip()
+    for name, words in LOSS_NAMES.items():
+        if summary.get(name):
+            yield f"energy lost by {words}", f"{summary[name]:.4g} J"
 
 
 def totals(

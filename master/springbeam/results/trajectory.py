@@ -17,39 +17,33 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
-#: Columns of a whole pair, in file order; those of an absent body are left out. Loads follow, `load_units`.
-COLUMNS = (
-    "time",
-    "u_tip",
-    "v_tip",
-    "y",
-    "z",
-    "contact_force",
-    "contact_force_smoothed",
-    "compliance_force",
-    "tie_reaction",
-    "foundation_force",
-    "gap",
-    "velocity_mismatch",
-    "phase",
-    "e_beam",
-    "e_spring",
-    "e_contact",
-    "e_dissipated",
-    "e_impact_loss",
-    "e_load",
-    "e_total",
-    "energy_residual",
-)
-#: Units of the columns; ``phase`` has none.
-COLUMN_UNITS = {
-    "time": "s",
-    **dict.fromkeys(("u_tip", "y", "gap"), "m"),
-    **dict.fromkeys(("v_tip", "z", "velocity_mismatch"), "m/s"),
-    **{name: "N" for name in COLUMNS if name.startswith("contact_force")},
-    **dict.fromkeys(("compliance_force", "tie_reaction", "foundation_force"), "N"),
-    **{name: "J" for name in COLUMNS if name.startswith("e")},
+#: Columns of a whole pair, in file order: the unit of each, and the part of a scene without which it is left out.
+#: ``phase`` has no unit; loads follow, `load_units`.
+_COLUMNS = {
+    "time": ("s", ""),
+    "u_tip": ("m", "beam"),
+    "v_tip": ("m/s", "beam"),
+    "y": ("m", "spring"),
+    "z": ("m/s", "spring"),
+    "contact_force": ("N", "pair"),
+    "contact_force_smoothed": ("N", "pair"),
+    "compliance_force": ("N", "pair"),
+    "tie_reaction": ("N", "pair"),
+    "foundation_force": ("N", "stop"),
+    "gap": ("m", "gap"),
+    "velocity_mismatch": ("m/s", "pair"),
+    "phase": ("", ""),
+    "e_beam": ("J", "beam"),
+    "e_spring": ("J", "spring"),
+    "e_contact": ("J", "pair"),
+    "e_dissipated": ("J", ""),
+    "e_impact_loss": ("J", ""),
+    "e_load": ("J", ""),
+    "e_total": ("J", ""),
+    "energy_residual": ("J", ""),
 }
+COLUMNS = tuple(_COLUMNS)
+COLUMN_UNITS = {name: unit for name, (unit, _) in _COLUMNS.items() if unit}
 EVENT_COLUMNS = (
     "time",
     "kind",
@@ -66,11 +60,6 @@ EVENT_KINDS = ("impact", "stop_impact", "release", "retie", "separation", "seate
 SHAPE_COLUMNS = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
 #: Most characters of a phase's name.
 PHASE_WIDTH = 32
-_BEAM_COLUMNS = frozenset({"u_tip", "v_tip", "e_beam"})
-_SPRING_COLUMNS = frozenset({"y", "z", "e_spring"})
-_PAIR_COLUMNS = frozenset(
-    {"contact_force", "contact_force_smoothed", "compliance_force", "tie_reaction", "velocity_mismatch", "e_contact"}
-)
 #: A number below this share of its table's largest is a zero, rounded.
 _NOISE = 1e-13
 
@@ -96,18 +85,15 @@ def columns_of(scene: Scene) -> tuple[str, ...]:
     ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
     """
     beam, spring, stop = scene.upper is not None, scene.lower is not None, scene.stop is not None
-    absent: set[str] = set()
-    if not beam:
-        absent |= _BEAM_COLUMNS
-    if not spring:
-        absent |= _SPRING_COLUMNS
-    if not scene.coupled:
-        absent |= _PAIR_COLUMNS
-    if not stop or scene.elastic_stop:
-        absent.add("foundation_force")
-    if not (beam and (spring or stop)):
-        absent.add("gap")
-    return (*(name for name in COLUMNS if name not in absent), *load_units(scene))
+    there = {
+        "": True,
+        "beam": beam,
+        "spring": spring,
+        "pair": scene.coupled,
+        "stop": stop and not scene.elastic_stop,
+        "gap": beam and (spring or stop),
+    }
+    return (*(name for name, (_, part) in _COLUMNS.items() if there[part]), *load_units(scene))
 
 
 def load_units(scene: Scene) -> dict[str, str]:

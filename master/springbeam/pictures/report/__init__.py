@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ import numpy as np
 import tomli_w
 from plotly.offline import get_plotlyjs
 
-from ...results.totals import LOSS_NAMES, TOTALS
+from ...results.totals import in_words
 from ...results.trajectory import Event, Trajectory, rounded
 from ...scene import Scene, load_scene, shipped_scenes
 from ..drawing import (
@@ -46,8 +46,6 @@ _EVENT_UNITS = {"y": "m", "z": "m/s", "u_tip": "m", "v_tip": "m/s"}
 _FORCES_READ = ("contact_force", "foundation_force")
 #: So many events of a kind in succession are a cascade.
 _CASCADE = 4
-#: Numbers of a run that say something only beside others.
-_BESIDE = ("contact_force_window", "deepest_tip_time")
 
 
 def page(trajectory: Trajectory) -> str:
@@ -83,7 +81,7 @@ def page(trajectory: Trajectory) -> str:
         event_key=event_marks(trajectory),
         numbers=list(_numbers(trajectory)),
         described=list(described(scene)),
-        results=list(_results(trajectory.summary)),
+        results=list(in_words(trajectory.summary)),
         events=list(_folded(events)),
         event_values=values,
         event_scales={name: max((abs(getattr(e, name) or 0.0) for e in events), default=0.0) for name in values},
@@ -143,18 +141,6 @@ def _warnings(trajectory: Trajectory) -> list[str]:
     if len(trajectory) and (words := alternating(trajectory)):
         found.append(f"{', '.join(words)}: {ALTERNATES}. Single values and frames mean little there.")
     return found
-
-
-def _results(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Return words and values of what the run amounts to (`springbeam.results.totals`)."""
-    for name, (words, unit) in TOTALS.items():
-        if name in summary and name not in _BESIDE and (summary[name] or not unit):
-            if name == "contact_force_max":
-                words = words.replace("the window", f"{summary['contact_force_window']:.4g} s")
-            yield words, f"{summary[name]:.5g} {unit}".rstrip()
-    for name, words in LOSS_NAMES.items():
-        if summary.get(name):
-            yield f"energy lost by {words}", f"{summary[name]:.4g} J"
 
 
 class _Folded(NamedTuple):
