@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
+
+import typer
+from typer import testing
 from typer.testing import CliRunner, Result
 
 from springbeam.cli import app
+
+# Made once: for a command that does little this is most of its time.
+testing._get_command = cache(typer.main.get_command)
+COMMAND = testing._get_command(app)
 
 #: What a terminal or a CI service may have set.
 PLAIN = {"COLUMNS": "80", "TERMINAL_WIDTH": None, "FORCE_COLOR": None, "PY_COLORS": None, "GITHUB_ACTIONS": None}

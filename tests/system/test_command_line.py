@@ -12,8 +12,7 @@ from importlib import util
 from pathlib import Path
 
 import pytest
-import typer
-from commands import Interrupt, command
+from commands import COMMAND, Interrupt, command
 from typer.testing import CliRunner
 
 from springbeam.bodies.archive import fmu_directory
@@ -24,7 +23,6 @@ from springbeam.scene import load_scene, scene_keys, shipped_scenes
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
-COMMAND = typer.main.get_command(app)
 #: Arguments of each command that make it print its tables within a second or two. `verify` is in test_verify.py.
 TABLES = {
     "scenes": "",

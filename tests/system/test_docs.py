@@ -13,12 +13,8 @@ import sys
 from pathlib import Path
 
 import pytest
-import typer
-from commands import command
+from commands import COMMAND, command
 
-from springbeam.cli import app
-
-COMMAND = typer.main.get_command(app)
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
