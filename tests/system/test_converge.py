@@ -39,7 +39,7 @@ def test_linear_elements_converge_by_order_two(tmp_path):
     assert [level["n_elements"] for level in found["elements"]["levels"]] == [20, 40, 80, 160]
     assert [level["n_modes"] for level in found["modes"]["levels"]] == [1, 3, 6, 12]
     assert found["elements"]["settled"]["first_separation"]["limit"] is None  # there is none
-    assert {file.name for file in (tmp_path / "found").iterdir()} == {"converge.csv", "converge.png"}
+    assert {file.name for file in (tmp_path / "found").iterdir()} == {"study.jsonl", "converge.csv", "converge.png"}
 
 
 def test_an_accuracy_with_the_mesh_is_kept_beside_a_mesh_that_is_much_finer():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -19,7 +20,9 @@ from springbeam.run.simulation import Simulation
 from springbeam.scene import Contact, Coupling, SceneError
 from springbeam.studies.stability import grid
 from springbeam.studies.stability.cells import COUPLINGS, PARAMETERS, SLICES, sampled_cells, scene_dict, slice_cells
-from springbeam.studies.stability.grid import CLASSES, Outcome, judged, run_cell, run_cells, write_csv
+from springbeam.studies.stability.grid import Grid
+from springbeam.studies.stability.outcome import CLASSES, Outcome, judged, run_cell
+from springbeam.studies.study import record_all
 
 SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro_step": 2e-3}}
 
@@ -173,49 +176,43 @@ def test_slices_reach_both_ends(s):
 # -- a part of it ---------------------------------------------------------------------------------------------------
 
 
+class Part(Grid):
+    """Cells of the hypercube and corners of the slices."""
+
+    def cases(self):
+        return {str(k): cell for k, cell in enumerate([*sampled_cells(20, 3)[:16], *slice_cells(2)[::3]])}
+
+
 def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else(tmp_path):
-    """Cells of the hypercube and corners of the slices; the same bytes from one process and from two."""
-    cells = [*sampled_cells(20, 3)[:16], *slice_cells(2)[::3]]
-    one, two = [run_cell(cell) for cell in cells], run_cells(cells, 2)
-    assert [(o.kind, o.reason) for o in one if o.kind == "garbage"] == []
-    assert {o.kind for o in one} >= {"conserved", "dissipative", "approximate", "stopped"}
-    for outcomes, name in ((one, "one"), (two, "two")):
-        write_csv(cells, outcomes, tmp_path / name)
-    assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
-    with (tmp_path / "one").open(newline="") as file:
+    """The same records from this process and from two."""
+    records = record_all(Part())
+    assert record_all(Part(), workers=2) == records
+    assert [(r["kind"], r["reason"]) for r in records.values() if r["kind"] == "garbage"] == []
+    assert {r["kind"] for r in records.values()} >= {"conserved", "dissipative", "approximate", "stopped"}
+    (table,) = Part().write(records, tmp_path, pictures=False)
+    with table.open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["class"] for row in rows] == [o.kind for o in one]
-    for row, outcome in zip(rows, one, strict=True):
-        if outcome.kind in ("conserved", "dissipative") and row["integrator"] != "damped":
+    assert [row["class"] for row in rows] == [r["kind"] for r in records.values()]
+    for row in rows:
+        if row["class"] in ("conserved", "dissipative") and row["integrator"] != "damped":
             assert float(row["residual"]) <= EXACT
-        if outcome.kind in ("refused", "stopped"):
+        if row["class"] in ("refused", "stopped"):
             assert row["reason"]
 
 
 # -- the command ----------------------------------------------------------------------------------------------------
 
 
-def outcomes_of(kinds: tuple[str, ...]):
-    def run_cells(cells, processes, report):
-        found = [Outcome(kinds[i % len(kinds)], "y = 1.5 m", 1e-9, 0.0, 3, 1) for i in range(len(cells))]
-        for outcome in found:
-            report(outcome)
-        return found
-
-    return run_cells
-
-
 @pytest.mark.parametrize(("kinds", "code"), [(CLASSES[:-1], 0), (CLASSES, 1)])
 def test_command(tmp_path, monkeypatch, kinds, code):
-    monkeypatch.setattr(grid, "run_cells", outcomes_of(kinds))
+    ends = itertools.cycle(kinds)
+    monkeypatch.setattr(Grid, "parallel", False)
+    monkeypatch.setattr(grid, "run_cell", lambda cell: Outcome(next(ends), "y = 1.5 m", 1e-9, 0.0, 3, 1))
     out = tmp_path / "grid"
-    arguments = ["stability", "--samples", "30", "--resolution", "3", "--out", str(out)]
-    result = command(*arguments)
+    result = command("stability", "--samples", "30", "--resolution", "3", "--out", out)
     assert result.exit_code == code, result.output
     assert "garb." in result.stdout
-    table = (
-        result.stdout[: result.stdout.index("garbage  ")] if code else result.stdout[: result.stdout.index("cells  ")]
-    )
+    table = result.stdout[: result.stdout.index("garbage  " if code else "results  ")]
     assert max(map(len, table.splitlines())) <= 80
     assert len((out / "stability.csv").read_text().splitlines()) == 1 + 30 + 9 * len(SLICES)
     assert all((out / name).stat().st_size > 10_000 for name in ("classes.png", "residuals.png"))
@@ -223,9 +220,11 @@ def test_command(tmp_path, monkeypatch, kinds, code):
     assert len(scenes) == (0 if code == 0 else (30 + 9 * len(SLICES)) // len(CLASSES))
     for path in scenes[:3]:
         assert load_scene(path).time.t_end > 0.0
-    again = command(*arguments)
-    assert again.exit_code == 2
-    assert "--force" in again.stderr
+
+
+def test_a_quick_grid_is_a_smaller_one():
+    """A fifth of the hypercube, and slices of 3 × 3 cells."""
+    assert len(Grid(quick=True).cases()) == 60 + 9 * len(SLICES)
 
 
 def test_command_without_cells_is_refused():

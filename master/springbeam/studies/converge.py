@@ -6,20 +6,23 @@ shows how fast each quantity settles (Richardson 1911, Roache 1994).
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any, ClassVar
 
 import matplotlib.pyplot as plt
+from rich.text import Text
 
 from ..pictures.drawing import BLACK
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, with_changes
 from .accuracy import simulate
+from .study import Found, Record, Study
 from .sweep.metrics import METRICS, heading
+from .tables import table, write_csv
 
 #: Quantities that are compared unless others are asked for, those that a scene has.
 QUANTITIES = (
@@ -32,6 +35,19 @@ RATIO = 2
 _LEAST_ORDER = 0.5
 #: Changes below this part of the value are rounding.
 _ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """What a run differs in."""
+
+    n_elements: int  #: 0: exact modes without a mesh
+    n_modes: int  #: kept; 0: all
+    halved: bool = False  #: with half the macro step: what the time steps change
+
+    @property
+    def name(self) -> str:
+        return f"{self.n_elements} elements, {self.n_modes or 'all'} modes{', half the step' * self.halved}"
 
 
 @dataclass(frozen=True)
@@ -88,100 +104,139 @@ def settled(values: Sequence[float]) -> Settled:
     return Settled(change, order, values[-1] + rest, abs(rest))
 
 
-@dataclass(frozen=True)
-class Study:
-    """What `study` found."""
+class Converge(Study):
+    """A scene on finer and finer meshes, and with more and more modes of its own mesh."""
+
+    kind: ClassVar[str] = "converge"
 
     scene: Scene
-    quantities: tuple[str, ...]
-    sequences: list[Refinement]
-    halved: Level  #: the finest mesh with half the macro step: what the time steps change
+    levels: int = 4  #: of each sequence: n, 2n, 4n, … elements; modes by halves down from those that the scene keeps
+    metric: tuple[str, ...] = ()  #: those of `QUANTITIES` that the scene has if there are none
 
-    @property
-    def as_given(self) -> Level:
-        """Return the run of the scene's own mesh."""
-        return self.sequences[0].levels[0]
+    def sequences(self) -> dict[str, list[Mesh]]:
+        """Return the meshes by what is refined.
+
+        Raises
+        ------
+        SceneError
+            If the scene has no beam with a mesh, or a quantity is unknown.
+        """
+        beam = self.scene.beam
+        if beam is None:
+            raise SceneError("[beam]: the scene has no mesh to refine")
+        if beam.fidelity == "quasi_static":
+            raise SceneError('beam.fidelity = "quasi_static": a beam without inertia has no mesh to refine')
+        if unknown := [name for name in self.metric if name not in METRICS]:
+            raise SceneError(f"{unknown[0]}: no such metric; there are {', '.join(METRICS)}")
+        levels = 3 if self.quick else self.levels
+        more = [RATIO**k for k in range(levels)]
+        if beam.mesh == "none":
+            return {"modes": [Mesh(0, beam.n_modes * k) for k in more]}
+        found = {"elements": [Mesh(beam.n_elements * k, beam.n_modes) for k in more]}
+        if beam.integrator == "modal" and beam.modes_kept >= more[-1]:
+            fewer = [Mesh(beam.n_elements, beam.modes_kept // k) for k in more[:0:-1]]
+            found["modes"] = [*fewer, found["elements"][0]]
+        return found
+
+    def cases(self) -> dict[str, Mesh]:
+        """Return all meshes, the finest one with half the macro step too."""
+        sequences = self.sequences()
+        finest = next(iter(sequences.values()))[-1]
+        meshes = [mesh for sequence in sequences.values() for mesh in sequence]
+        return {mesh.name: mesh for mesh in [*meshes, replace(finest, halved=True)]}
+
+    def record(self, case: Mesh) -> Record:
+        """Run one mesh."""
+        mesh = {"n_elements": case.n_elements} if case.n_elements else {}
+        scene = with_changes(self.scene, beam={**mesh, "n_modes": case.n_modes})
+        if case.halved and scene.accuracy is None:
+            scene = with_changes(scene, coupling={"macro_step": 0.5 * scene.coupling.H})
+        assert scene.beam is not None
+        quantities, cause, began = self.metric or QUANTITIES, "", perf_counter()
+        try:
+            made = simulate(scene)
+            values = {name: METRICS[name](made) for name in quantities}
+        except RunStopped as stopped:
+            values, cause = dict.fromkeys(quantities), stopped.cause
+        seconds = perf_counter() - began
+        return asdict(Level(case.n_elements, case.n_modes, scene.beam.modes_kept, values, seconds, cause))
+
+    def refinements(self, records: Mapping[str, Record]) -> list[Refinement]:
+        """Return the sequences as they were run."""
+        return [
+            Refinement(refined, [Level(**records[mesh.name]) for mesh in meshes])
+            for refined, meshes in self.sequences().items()
+        ]
+
+    def quantities(self, records: Mapping[str, Record]) -> list[str]:
+        """Return what is compared: what was asked for, or what the scene has."""
+        given = next(iter(records.values()))["values"]
+        return [name for name, value in given.items() if self.metric or value is not None]
+
+    def found(self, records: Mapping[str, Record]) -> Found:
+        """Judge how the quantities settle."""
+        quantities, halved = self.quantities(records), Level(**list(records.values())[-1])
+        document: dict[str, Any] = {"halved_macro_step": asdict(halved)}
+        shown: list[Any] = [Text(self.scene.title or "(untitled scene)", style="bold")]
+        refinements = self.refinements(records)
+        for refinement in refinements:
+            settled = {name: asdict(refinement.settled(name)) for name in quantities}
+            levels = [asdict(level) for level in refinement.levels]
+            document[refinement.refined] = {"levels": levels, "settled": settled}
+            rows = [_row(name, refinement, refinements[0].levels, halved) for name in quantities]
+            names = ("", "as given", "extrapolated", "error", "order", "by H/2")
+            shown.append(table(names, rows, f"more {refinement.refined}"))
+            meshes = (f"{x.n_elements} el. {x.unknowns} modes {x.seconds:.2g} s" for x in refinement.levels)
+            shown.append(Text(f"runs      {', '.join(meshes)}"))
+        shown += [Text(f"stopped   {name}: {r['cause']}") for name, r in records.items() if r["cause"]]
+        shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
+        shown.append("by H/2: what half the macro step changes on the finest mesh")
+        return Found(document, shown)
+
+    def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
+        """Write a row per run, and draw how far each quantity is from its limit."""
+        quantities, refinements = self.quantities(records), self.refinements(records)
+        levels = [(sequence.refined, level) for sequence in refinements for level in sequence.levels]
+        levels.append(("macro step halved", Level(**list(records.values())[-1])))
+        rows = [
+            {"refined": refined, "n_elements": level.n_elements, "n_modes": level.n_modes, "unknowns": level.unknowns}
+            | {"wall_time": level.seconds, **{name: level.values[name] for name in quantities}, "stopped": level.cause}
+            for refined, level in levels
+        ]
+        files = [write_csv(directory / "converge.csv", rows)]
+        if pictures:
+            files.append(draw(self.scene.title, refinements, quantities, directory / "converge.png"))
+        return files
 
 
-#: ``progress(what)`` before each run.
-Progress = Callable[[str], None]
+def _row(name: str, refinement: Refinement, elements: Sequence[Level], halved: Level) -> tuple[str, ...]:
+    """Return a quantity for a terminal: of the mesh as given, and where finer ones or more modes lead."""
+    given, last, by_time = elements[0].values[name], elements[-1].values[name], halved.values[name]
+    settled = refinement.settled(name)
+    error = "" if settled.change is None else f"({settled.change:.1e})"
+    if given is not None and settled.limit is not None:
+        error = f"{given - settled.limit:.1e}"
+    return (
+        heading(name),
+        _number(given, ".6g"),
+        _number(settled.limit, ".6g"),
+        error,
+        _number(settled.order, ".1f"),
+        "" if last is None or by_time is None else f"{by_time - last:.1e}",
+    )
 
 
-def study(
-    scene: Scene, levels: int = 4, quantities: Sequence[str] = (), progress: Progress = lambda what: None
-) -> Study:
-    """Run ``scene`` on finer and finer meshes, and with more and more modes of its own mesh.
-
-    Parameters
-    ----------
-    levels
-        Runs of each sequence, at least 3: n, 2n, 4n, … elements; modes by halves down from those that the scene keeps.
-    quantities
-        Names of `METRICS`; those of `QUANTITIES` that the scene has if there are none.
-
-    Raises
-    ------
-    SceneError
-        If the scene has no beam with a mesh, or a quantity is unknown.
-    """
-    if scene.beam is None or scene.beam.fidelity == "quasi_static":
-        raise SceneError("[beam]: the scene has no mesh to refine" if scene.beam is None else
-                         'beam.fidelity = "quasi_static": a beam without inertia has no mesh to refine')  # fmt: skip
-    if unknown := [name for name in quantities if name not in METRICS]:
-        raise SceneError(f"{unknown[0]}: no such metric; there are {', '.join(METRICS)}")
-    wanted = tuple(quantities) or QUANTITIES
-
-    beam = scene.beam
-    exact = beam.mesh == "none"
-
-    def run(elements: int, modes: int, what: Scene = scene) -> Level:
-        progress(f"{elements} elements, {modes or 'all'} modes")
-        mesh = {} if exact else {"n_elements": elements}
-        return _level(with_changes(what, beam={**mesh, "n_modes": modes}), wanted)
-
-    more = [RATIO**k for k in range(levels)]
-    by_elements = [run(0, beam.n_modes * k) if exact else run(beam.n_elements * k, beam.n_modes) for k in more]
-    sequences = [Refinement("modes" if exact else "elements", by_elements)]
-    most = 0 if exact else beam.modes_kept
-    if beam.integrator == "modal" and most >= RATIO ** (levels - 1):
-        kept = [run(beam.n_elements, most // RATIO**k) for k in range(levels - 1, 0, -1)]
-        sequences.append(Refinement("modes", [*kept, by_elements[0]]))
-    finest = by_elements[-1]
-    finer = with_changes(scene, coupling={"macro_step": 0.5 * scene.coupling.H}) if scene.accuracy is None else scene
-    halved = run(finest.n_elements, finest.n_modes, finer)
-    found = tuple(name for name in wanted if name in quantities or by_elements[0].values[name] is not None)
-    return Study(scene, found, sequences, halved)
+def _number(value: float | None, form: str) -> str:
+    return "" if value is None else format(value, form)
 
 
-def _level(scene: Scene, quantities: Sequence[str]) -> Level:
-    assert scene.beam is not None
-    mesh = (0 if scene.beam.mesh == "none" else scene.beam.n_elements, scene.beam.n_modes, scene.beam.modes_kept)
-    began = perf_counter()
-    try:
-        made = simulate(scene)
-    except RunStopped as stopped:
-        return Level(*mesh, dict.fromkeys(quantities), perf_counter() - began, stopped.cause)
-    return Level(*mesh, {name: METRICS[name](made) for name in quantities}, perf_counter() - began)
-
-
-def write_csv(found: Study, path: Path) -> None:
-    """Write a row per run."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(("refined", "n_elements", "n_modes", "unknowns", "wall_time", *found.quantities, "stopped"))
-        levels = [(s.refined, level) for s in found.sequences for level in s.levels]
-        for refined, level in [*levels, ("macro step halved", found.halved)]:
-            mesh = (refined, level.n_elements, level.n_modes, level.unknowns, level.seconds)
-            writer.writerow((*mesh, *(level.values[name] for name in found.quantities), level.cause))
-
-
-def draw(found: Study, path: Path) -> None:
+def draw(title: str, sequences: Sequence[Refinement], quantities: Sequence[str], path: Path) -> Path:
     """Draw to ``path`` how far each quantity is from its limit over the size of the mesh, a panel a sequence."""
     figure, panels = plt.subplots(
-        1, len(found.sequences), figsize=(6.0 * len(found.sequences), 5.0), squeeze=False, layout="constrained"
+        1, len(sequences), figsize=(6.0 * len(sequences), 5.0), squeeze=False, layout="constrained"
     )
-    for ax, sequence in zip(panels.flat, found.sequences, strict=True):
-        for name, sizes, errors in _errors(found, sequence):
+    for ax, sequence in zip(panels.flat, sequences, strict=True):
+        for name, sizes, errors in _errors(sequence, quantities):
             ax.loglog(sizes, errors, ".-", label=name)
         ax.set(xlabel=f"{sequence.refined} of the beam", title=f"more {sequence.refined}")
         sizes = [_size(sequence, level) for level in sequence.levels]
@@ -193,13 +248,14 @@ def draw(found: Study, path: Path) -> None:
             ax.legend(fontsize="small")
         else:
             ax.text(0.5, 0.5, "no quantity converges monotonically", transform=ax.transAxes, ha="center", color=BLACK)
-    figure.suptitle(f"{found.scene.title}: convergence with the mesh")
+    figure.suptitle(f"{title}: convergence with the mesh")
     figure.savefig(path, dpi=110)
     plt.close(figure)
+    return path
 
 
-def _errors(found: Study, sequence: Refinement) -> Iterator[tuple[str, list[int], list[float]]]:
-    for name in found.quantities:
+def _errors(sequence: Refinement, quantities: Sequence[str]) -> Iterator[tuple[str, list[int], list[float]]]:
+    for name in quantities:
         limit = sequence.settled(name).limit
         if not limit:
             continue

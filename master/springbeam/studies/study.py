@@ -14,6 +14,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import multiprocessing
 import os
@@ -40,6 +41,9 @@ FILE = "study.jsonl"
 #: Where `study_in` finds each kind.
 _STUDIES = {
     "sweep": ".sweep:Sweep",
+    "converge": ".converge:Converge",
+    "stability": ".stability.grid:Grid",
+    "critical": ".stability.critical:Critical",
 }
 Record = dict[str, Any]
 #: ``report(record)``, called for each record that is new.
@@ -88,8 +92,8 @@ class Study(BaseModel, ABC):
         """Write tables and pictures into ``directory``; return the files, the main table first."""
 
     def lost(self, cause: str) -> Record:
-        """Return the record of a case whose worker process has died."""
-        raise NotImplementedError(cause)
+        """Return the record of a case whose worker process has died. Raises ChildProcessError if there is none."""
+        raise ChildProcessError(errno.ECHILD, cause)
 
     def failed(self, record: Record) -> bool:
         """Tell whether the progress bar counts a record as failed."""

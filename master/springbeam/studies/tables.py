@@ -1,8 +1,11 @@
-"""Tables for a terminal, all of one look."""
+"""Tables of what was found: for a terminal, all of one look, and as CSV files."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+import csv
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 from rich.text import Text
@@ -17,3 +20,12 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = ""
     for row in rows:
         made.add_row(*map(Text, row))
     return made
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+    """Write rows with the keys of the first as header, ``None`` left empty; return the path."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return path

@@ -27,6 +27,7 @@ class Parameter:
     """
 
     name: str
+    rest: Any  #: where slices leave it: the scene ``soft``, coarser
     low: float = 0.0
     high: float = 1.0
     zero: float = 0.0
@@ -57,80 +58,46 @@ COUPLINGS = (
 )
 
 PARAMETERS = (
-    Parameter("coupling", choices=COUPLINGS),
-    Parameter("stiffness", 1.0, 3.6e10),  # √(EI·KAG)
-    Parameter("shear_ratio", 1e-6, 1e6),  # KAG/EI
-    Parameter("macro_step", 1e-6, 0.1),
-    Parameter("mass", 1e-6, 1e6),
-    Parameter("k1", 1e-2, 1e6),
-    Parameter("k2_kind", choices=("hardening", "hardening", "softening", "linear")),
-    Parameter("k2", 1e-2, 1e8),
-    Parameter("escape", 0.3, 30.0),  # hilltop of the softening spring / the deflection that takes the beam's energy
-    Parameter("contact_stiffness", 1.0, 1e12),
-    Parameter("exponent", 1.0, 5.0, linear=True),
-    Parameter("contact_damping", 1e-3, 1e3, zero=0.5),
-    Parameter("alpha_b", 1e-9, 1.0, zero=0.4),
-    Parameter("alpha_s", 1e-3, 1e3, zero=0.4),
-    Parameter("speed", 1e-6, 1e3),
-    Parameter("restitution", 0.0, 1.0, linear=True),
-    Parameter("elasticity", choices=("given", "plastic", "elastic")),
-    Parameter("stop_depth", 1e-12, 0.1, zero=0.2),  # Ψ − φ; 0: no stop
-    Parameter("equilibrium", -0.1, 0.1, linear=True),
-    Parameter("clearance", 1e-9, 0.1, zero=0.6),  # tip above the spring at the start
-    Parameter("approach", choices=("undeformed", "elastic")),
-    Parameter("impact", choices=("inelastic", "inelastic", "rest", "tip")),
-    Parameter("bodies", choices=("both", "both", "both", "both", "both", "both", "beam", "spring")),
-    Parameter("fidelity", choices=("dynamic", "dynamic", "dynamic", "dynamic", "quasi_static")),
-    Parameter("n_elements", choices=(1, 2, 5, 10, 20, 50)),
-    Parameter("element_degree", choices=(1, 1, 1, 2, 5, 12)),
-    Parameter("n_modes", choices=(0, 0, 1, 4)),
-    Parameter("integrator", choices=("modal", "modal", "modal", "midpoint", "damped")),
-    Parameter("reduced_integration", choices=(False, True)),
-    Parameter("distributed_load", 1e-3, 1e3, zero=0.6),
-    Parameter("external_force", 1e-3, 1e3, zero=0.6),
-    Parameter("steps", 100, 400),
+    Parameter("coupling", ("transmission", "energy", 0), choices=COUPLINGS),
+    Parameter("stiffness", 100.0, 1.0, 3.6e10),  # √(EI·KAG)
+    Parameter("shear_ratio", 1.0, 1e-6, 1e6),  # KAG/EI
+    Parameter("macro_step", 1e-3, 1e-6, 0.1),
+    Parameter("mass", 1.0, 1e-6, 1e6),
+    Parameter("k1", 3.0, 1e-2, 1e6),
+    Parameter("k2_kind", "softening", choices=("hardening", "hardening", "softening", "linear")),
+    Parameter("k2", 1.0, 1e-2, 1e8),
+    Parameter(
+        "escape", 6.7, 0.3, 30.0
+    ),  # hilltop of the softening spring / the deflection that takes the beam's energy
+    Parameter("contact_stiffness", 1e4, 1.0, 1e12),
+    Parameter("exponent", 1.5, 1.0, 5.0, linear=True),
+    Parameter("contact_damping", 0.0, 1e-3, 1e3, zero=0.5),
+    Parameter("alpha_b", 0.0, 1e-9, 1.0, zero=0.4),
+    Parameter("alpha_s", 0.0, 1e-3, 1e3, zero=0.4),
+    Parameter("speed", 1.0, 1e-6, 1e3),
+    Parameter("restitution", 1.0, 0.0, 1.0, linear=True),
+    Parameter("elasticity", "given", choices=("given", "plastic", "elastic")),
+    Parameter("stop_depth", 0.015, 1e-12, 0.1, zero=0.2),  # Ψ − φ; 0: no stop
+    Parameter("equilibrium", 0.0, -0.1, 0.1, linear=True),
+    Parameter("clearance", 0.0, 1e-9, 0.1, zero=0.6),  # tip above the spring at the start
+    Parameter("approach", "undeformed", choices=("undeformed", "elastic")),
+    Parameter("impact", "inelastic", choices=("inelastic", "inelastic", "rest", "tip")),
+    Parameter("bodies", "both", choices=("both", "both", "both", "both", "both", "both", "beam", "spring")),
+    Parameter("fidelity", "dynamic", choices=("dynamic", "dynamic", "dynamic", "dynamic", "quasi_static")),
+    Parameter("n_elements", 20, choices=(1, 2, 5, 10, 20, 50)),
+    Parameter("element_degree", 1, choices=(1, 1, 1, 2, 5, 12)),
+    Parameter("n_modes", 0, choices=(0, 0, 1, 4)),
+    Parameter("integrator", "modal", choices=("modal", "modal", "modal", "midpoint", "damped")),
+    Parameter("reduced_integration", False, choices=(False, True)),
+    Parameter("distributed_load", 0.0, 1e-3, 1e3, zero=0.6),
+    Parameter("external_force", 0.0, 1e-3, 1e3, zero=0.6),
+    Parameter("steps", 200, 100, 400),
 )
-
-#: The cell that slices vary: the scene ``soft``, coarser.
-BASE: dict[str, Any] = {
-    "coupling": ("transmission", "energy", 0),
-    "stiffness": 100.0,
-    "shear_ratio": 1.0,
-    "macro_step": 1e-3,
-    "mass": 1.0,
-    "k1": 3.0,
-    "k2_kind": "softening",
-    "k2": 1.0,
-    "escape": 6.7,
-    "contact_stiffness": 1e4,
-    "exponent": 1.5,
-    "contact_damping": 0.0,
-    "alpha_b": 0.0,
-    "alpha_s": 0.0,
-    "speed": 1.0,
-    "restitution": 1.0,
-    "elasticity": "given",
-    "stop_depth": 0.015,
-    "equilibrium": 0.0,
-    "clearance": 0.0,
-    "approach": "undeformed",
-    "impact": "inelastic",
-    "bodies": "both",
-    "fidelity": "dynamic",
-    "n_elements": 20,
-    "element_degree": 1,
-    "n_modes": 0,
-    "integrator": "modal",
-    "reduced_integration": False,
-    "distributed_load": 0.0,
-    "external_force": 0.0,
-    "steps": 200,
-}
 
 
 @dataclass(frozen=True)
 class Slice:
-    """Two axes over their ranges, everything else as in `BASE` but for ``fixed``."""
+    """Two axes over their ranges, everything else at rest but for ``fixed``."""
 
     name: str
     x: str
@@ -166,10 +133,10 @@ def sampled_cells(count: int, seed: int) -> list[dict[str, Any]]:
 
 def slice_cells(resolution: int) -> list[dict[str, Any]]:
     """Return ``resolution``² cells of each of `SLICES`, both ends of the ranges included."""
-    by_name = {p.name: p for p in PARAMETERS}
+    by_name, at_rest = {p.name: p for p in PARAMETERS}, {p.name: p.rest for p in PARAMETERS}
     ends = np.linspace(0.0, 1.0, resolution)
     return [
-        {"slice": s.name, **BASE, **s.fixed, s.x: _spread(by_name[s.x], i), s.y: _spread(by_name[s.y], j)}
+        {"slice": s.name, **at_rest, **s.fixed, s.x: _spread(by_name[s.x], i), s.y: _spread(by_name[s.y], j)}
         for s in SLICES
         for i in ends
         for j in ends

@@ -8,8 +8,10 @@ two-sided one: the bodies are counted from where a preload holds them in equilib
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, ClassVar
 
 from ...bodies import force
 from ...bodies.factory import load_bodies
@@ -19,6 +21,8 @@ from ...coupling import coupling_of
 from ...coupling.protocol import Window
 from ...monolithic.semi_discrete import modal_beam
 from ...scene import Scene, load_scene, with_changes
+from ..study import Found, Record, Study
+from ..tables import table, write_csv
 from .linear import LinearPair, spectral_radius
 from .predict import RIGID, SOFT, THRESHOLD, critical_step, linear_pair
 
@@ -162,28 +166,92 @@ class Comparison:
     radius: float
     growth: float
 
+    @property
+    def stable(self) -> bool:
+        """Whether amplitudes do not grow at `LARGE_STEP`, measured."""
+        return self.growth <= 1.0 + THRESHOLD
+
+    @property
+    def differ(self) -> float | None:
+        """How much longer the measured critical macro step is, relatively."""
+        return self.measured / self.predicted - 1.0 if self.predicted and self.measured else None
+
+    @property
+    def agrees(self) -> bool:
+        """Whether prediction and measurement say the same."""
+        if self.stable != (self.radius <= 1.0 + THRESHOLD):
+            return False
+        if self.predicted is None:
+            return self.stable
+        return self.differ is not None and abs(self.differ) <= _AGREEMENT
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the row for a terminal."""
+        predicted, measured = ("none" if step is None else f"{step:.4g}" for step in (self.predicted, self.measured))
+        differ = "" if self.differ is None else f"{100.0 * self.differ:+.2f} %"
+        return (
+            f"{self.scheme} {self.degree}",
+            f"{self.stiffness:g}" if self.law == "compliance" else "tie",
+            predicted,
+            "" if self.predicted is None else measured,
+            differ,
+            "stable" if self.stable else "unstable",
+        )
+
 
 #: λ [N/m] at which ordinary exchanges are compared, and a macro step at which they are not stable [s].
 STIFFNESSES, LARGE_STEP = (1e4, 1e8), 0.004
-
-
+#: Predicted and measured critical macro steps agree if they differ by less than this, relatively.
+_AGREEMENT = 0.05
 #: Search for the narrow bands of ``hermite``.
 _FINE = 1.005
 
 
-def comparisons(n_elements: int = 10) -> Iterator[Comparison]:
-    """Compare every scheme on the scene ``soft`` with so many elements, linear spring and contact."""
-    soft = with_changes(load_scene("soft"), stop=None, beam={"n_elements": n_elements}, spring={"cubic_stiffness": 0.0})
-    assert soft.beam is not None
-    modal = modal_beam(soft.beam)
-    for law, stiffness in (*(("compliance", value) for value in STIFFNESSES), ("transmission", 0.0)):
-        for scheme, degree in SOFT if stiffness else RIGID:
-            contact = {"law": law, "stiffness": stiffness or 1.0, "exponent": 1.0}
-            coupling = {"scheme": scheme, "degree": degree, "macro_step": LARGE_STEP}
-            scene = with_changes(soft, contact=contact, coupling=coupling)
-            pair = linear_pair(scene, modal)
-            assert pair is not None
-            yield comparison(scene, pair)
+class Critical(Study):
+    """Every scheme on the scene ``soft``, with linear spring and contact."""
+
+    kind: ClassVar[str] = "critical"
+    parallel: ClassVar[bool] = True
+
+    n_elements: int = 10  #: of the beam; 4 if quick
+
+    def cases(self) -> dict[str, tuple[str, float, str, int]]:
+        """Return law, λ [N/m], scheme and degree."""
+        ends = [*(("compliance", value) for value in STIFFNESSES), ("transmission", 0.0)]
+        return {
+            f"{law}, {stiffness:g} N/m, {scheme} {degree}": (law, stiffness, scheme, degree)
+            for law, stiffness in ends
+            for scheme, degree in (SOFT if stiffness else RIGID)
+        }
+
+    def record(self, case: Sequence[Any]) -> Record:
+        """Compare one coupling."""
+        law, stiffness, scheme, degree = case
+        scene = with_changes(
+            load_scene("soft"),
+            stop=None,
+            beam={"n_elements": 4 if self.quick else self.n_elements},
+            spring={"cubic_stiffness": 0.0},
+            contact={"law": law, "stiffness": stiffness or 1.0, "exponent": 1.0},
+            coupling={"scheme": scheme, "degree": degree, "macro_step": LARGE_STEP},
+        )
+        assert scene.beam is not None
+        pair = linear_pair(scene, modal_beam(scene.beam))
+        assert pair is not None
+        return asdict(comparison(scene, pair))
+
+    def found(self, records: Mapping[str, Record]) -> Found:
+        """Judge whether predicted and measured agree."""
+        couplings = [Comparison(**record) for record in records.values()]
+        agree = all(c.agrees for c in couplings)
+        names = ("coupling", "λ [N/m]", "predicted [s]", "measured [s]", "differ by", f"at {LARGE_STEP:g} s")
+        shown = table(names, [c.cells() for c in couplings], "critical macro steps")
+        listed = [{**asdict(c), "stable": c.stable} for c in couplings]
+        return Found({"agree": agree, "couplings": listed}, [shown], agree)
+
+    def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
+        """Write a row per coupling."""
+        return [write_csv(directory / "critical.csv", list(records.values()))]
 
 
 def comparison(scene: Scene, pair: LinearPair) -> Comparison:

@@ -1,226 +1,138 @@
-"""Run the grid of extreme scenes, and put the outcome of every cell into a class.
+"""The grid of extreme scenes: which cells it has, and what their outcomes amount to.
 
-===========  ==========================================================================================================
-conserved    done, energy constant to `ledger.EXACT`, nothing lost
-dissipative  done, energy plus booked losses constant to `ledger.EXACT`; or a numerically damped beam (``rho_inf`` < 1)
-             that has only lost energy
-approximate  done, energy changed by more: within the bound of its scheme (`ledger.bounds`), or the run says so
-refused      a scene that cannot be run, with the reason
-stopped      ended early, with the cause
-garbage      anything else: energy changed without a warning, numbers that are not finite, bodies that overlap, damping
-             that returns energy, a crash
-===========  ==========================================================================================================
-
-The same cells give the same outcomes, in whatever order and in however many processes they run.
+The same settings give the same cells and outcomes, in whatever order and in however many processes they run.
 """
 
 from __future__ import annotations
 
-import csv
-import math
-import multiprocessing
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+import re
+import textwrap
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-import numpy as np
 import tomli_w
+from rich.table import Table
+from rich.text import Text
 
-from ...bodies.protocol import FmuError
-from ...results.recording import MemoryRecorder
-from ...results.trajectory import Trajectory
-from ...run.ledger import EXACT, bounds
-from ...run.outcome import RunStopped
-from ...run.runner import run
-from ...scene import Scene, SceneError, scene_from_dict
-from ...scene.automatic import decided
-from .cells import PARAMETERS, scene_dict
+from ...scene import SceneError
+from ..study import Found, Record, Study
+from ..tables import table, write_csv
+from .cells import COUPLINGS, sampled_cells, scene_dict, slice_cells
+from .outcome import CLASSES, Outcome, run_cell
 
-#: In the order in which pictures and tables show them; the last must stay empty.
-CLASSES = ("conserved", "dissipative", "approximate", "refused", "stopped", "garbage")
-#: A run is cut after this many accepted steps: a contact that opens and closes in every macro step.
-_MOST_STEPS = 600
-#: Bodies may overlap or, joined, part by so much of their motion.
-_OVERLAP = 1e-9
-#: Rounding of a sum of energies, of the largest so far.
-_SLACK = 1e-10
+#: How many reasons the summary lists, and how many characters of each.
+_REASONS, _REASON_WIDTH = 12, 66
+#: Quick: the hypercube has so many times fewer cells, each axis of a slice half as many.
+_QUICK = 5
 
 
-class _Enough(BaseException):
-    """The cell has taken all the steps that it may; no error, which a run would turn into a stop."""
+class Grid(Study):
+    """A Latin hypercube over all parameters, and slices through two of them."""
+
+    kind: ClassVar[str] = "stability"
+    parallel: ClassVar[bool] = True
+
+    samples: int = 300
+    resolution: int = 6  #: values of each parameter of a slice
+    seed: int = 1
+
+    def cases(self) -> dict[str, dict[str, Any]]:
+        """Return the cells."""
+        samples, resolution = self.samples, self.resolution
+        if self.quick:
+            samples, resolution = -(-samples // _QUICK), -(-resolution // 2)
+        cells = [*sampled_cells(samples, self.seed), *slice_cells(resolution)]
+        if not cells:
+            raise SceneError("no cells: --samples and --resolution are both 0")
+        return {str(number): cell for number, cell in enumerate(cells)}
+
+    def cost(self) -> str:
+        """Say how many cells there are."""
+        return f"{len(self.cases())} cells, mostly below a second each; --samples and --resolution set how many"
+
+    def record(self, case: Mapping[str, Any]) -> Record:
+        """Run a cell."""
+        return asdict(run_cell(dict(case)))
+
+    def lost(self, cause: str) -> Record:
+        """Return the outcome of a cell that crashes."""
+        return asdict(Outcome("garbage", f"crashed: {cause}"))
+
+    def failed(self, record: Record) -> bool:
+        """Tell whether a cell is garbage."""
+        return bool(record["kind"] == "garbage")
+
+    def found(self, records: Mapping[str, Record]) -> Found:
+        """Count classes and reasons; passed if no cell is garbage."""
+        bad = {name: record["reason"] for name, record in records.items() if self.failed(record)}
+        classes = Counter(record["kind"] for record in records.values())
+        garbage = [Text(f"garbage   garbage-{name}.toml: {reason}") for name, reason in bad.items()]
+        shown = [self._classes(records), _reasons(records), *garbage]
+        return Found({"cells": len(records), "classes": classes, "garbage": bad}, shown, not bad)
+
+    def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
+        """Write a row per cell, the scenes of garbage, and the pictures."""
+        from .picture import draw
+
+        cells = self.cases()
+        rows = [_row(name, cells[name], record) for name, record in records.items()]
+        files = [write_csv(directory / "stability.csv", rows)]
+        for stale in directory.glob("garbage-*.toml"):
+            stale.unlink()
+        for name, record in records.items():
+            if self.failed(record):
+                text = tomli_w.dumps(scene_dict(cells[name]))
+                (directory / f"garbage-{name}.toml").write_text(text, encoding="utf-8")
+        if pictures:
+            files += draw([(cells[name], Outcome(**record)) for name, record in records.items()], directory)
+        return files
+
+    def _classes(self, records: Mapping[str, Record]) -> Table:
+        """Return a row per coupling, with the largest residual of the runs that were done."""
+        cells, rows = self.cases(), []
+        for coupling in (*COUPLINGS, None):
+            mine = [r for name, r in records.items() if coupling in (cells[name]["coupling"], None)]
+            counts = Counter(record["kind"] for record in mine)
+            done = [
+                r["residual"] for r in mine if r["kind"] not in ("refused", "stopped") and r["residual"] is not None
+            ]
+            name = "all" if coupling is None else " ".join(map(str, coupling)).removeprefix("transmission ")
+            numbers = [str(counts[kind] or "") for kind in CLASSES]
+            rows.append((name, *numbers, f"{max(done):.0e}" if done else ""))
+        names = ("coupling", *(f"{kind[:4]}." for kind in CLASSES), "residual")
+        return table(names, rows, f"{len(records)} cells")
 
 
-@dataclass
-class Outcome:
-    """How a cell ended."""
-
-    kind: str  #: one of `CLASSES`
-    reason: str = ""  #: refused, stopped, garbage: why; approximate: the run's warnings
-    residual: float = float("nan")  #: largest energy residual over the largest energy until then
-    overlap: float = float("nan")  #: of bodies, or the gap of joined ones, over the largest motion
-    macro_steps: int = 0
-    events: int = 0
-
-
-def run_cell(cell: dict[str, Any]) -> Outcome:
-    """Run a cell and say how it ended."""
-    try:
-        scene = scene_from_dict(scene_dict(cell), source="cell")
-    except SceneError as error:
-        return Outcome("refused", str(error))
-    recorder = MemoryRecorder(scene)
-    accepted = 0
-
-    def count(*_: object) -> None:
-        nonlocal accepted
-        accepted += 1
-        if accepted >= _MOST_STEPS:
-            raise _Enough
-
-    cause = ""
-    try:
-        run(scene, recorder, count)
-    except FmuError as error:
-        return Outcome("refused", str(error))
-    except RunStopped as stopped:
-        cause = stopped.cause
-    except _Enough:
-        pass
-    found = recorder.trajectory()
-    if "traceback" in found.summary:  # an error that nobody foresaw
-        return Outcome("garbage", f"crashed: {cause}")
-    return judged(found, cause)
+def _reasons(records: Mapping[str, Record]) -> Table:
+    """Return why cells were refused or stopped, without numbers, the most frequent reasons first."""
+    counts = Counter(
+        (record["kind"], _without_numbers(record["reason"]))
+        for record in records.values()
+        if record["kind"] in ("refused", "stopped")
+    )
+    rows = [
+        (kind, str(number), textwrap.shorten(reason, _REASON_WIDTH, placeholder=" …"))
+        for (kind, reason), number in counts.most_common(_REASONS)
+    ]
+    if len(counts) > _REASONS:
+        rows.append(("", "", f"and {len(counts) - _REASONS} further reasons, see the table"))
+    return table(("", "cells", "why"), rows, words=("why",))
 
 
-def judged(run: Trajectory, cause: str = "") -> Outcome:
-    """Return the class of a run that is done, or has stopped for ``cause``, from what it recorded."""
-    summary = run.summary
-    outcome = Outcome("stopped" if cause else "", cause, macro_steps=summary["macro_steps"], events=summary["events"])
-    if len(run.time) == 0:
-        return outcome
-    scale = _energy_scale(run)
-    relative = np.divide(run.energy_residual, scale, out=np.zeros_like(scale), where=scale > 0.0)
-    outcome.residual = float(np.abs(relative).max())
-    outcome.overlap = _overlap(run)
-    if cause:
-        return outcome
-    if faults := list(_faults(run, outcome, scale)):
-        outcome.kind, outcome.reason = "garbage", "; ".join(faults)
-        return outcome
-    scene, _ = decided(run.scene)
-    bound, _ = bounds(scene)
-    said = [text for text in summary["warnings"] if "energy" in text]
-    lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
-    if outcome.residual <= EXACT:
-        outcome.kind = "dissipative" if lost > EXACT * scale[-1] else "conserved"
-    elif _only_damped_numerically(scene) and relative.max() <= EXACT:
-        outcome.kind = "dissipative"
-    elif outcome.residual <= bound or said:
-        outcome.kind, outcome.reason = "approximate", "; ".join(said)
-    else:
-        outcome.kind, outcome.reason = "garbage", f"energy residual {outcome.residual:.1e}, and nothing says so"
-    return outcome
+def _without_numbers(reason: str) -> str:
+    return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", " ".join(reason.removeprefix("cell: ").split()))
 
 
-def _only_damped_numerically(scene: Scene) -> bool:
-    beam, scheme, law = scene.beam, scene.coupling.scheme, scene.contact.law
-    return beam is not None and beam.damped_numerically and scheme == "energy" and law != "paper"
-
-
-def _energy_scale(run: Trajectory) -> np.ndarray:
-    """Return the largest energy until each row [J], as in `ledger.Ledger`."""
-    mechanical = sum(np.abs(run[name]) for name in ("e_beam", "e_spring", "e_contact") if name in run.columns)
-    return np.maximum.accumulate(np.maximum(mechanical, abs(run.e_total[0])))
-
-
-def _faults(run: Trajectory, outcome: Outcome, scale: np.ndarray) -> Iterator[str]:
-    """Yield what must not be, whatever the scene."""
-    for name, values in run.columns.items():
-        if name != "phase" and not np.all(np.isfinite(values)):
-            yield f"{name} is not finite"
-    beam = run.scene.beam
-    # What damping takes over an unresolved generalized-α step is exact, but of no sign.
-    if beam is None or not beam.damped_numerically:
-        yield from _given_back("damping gives", run.e_dissipated, scale)
-    if run.scene.contact.impact != "tip":
-        yield from _given_back("impacts give", run.e_impact_loss, scale)
-    if np.any(np.diff(run.time) < 0.0):
-        yield "time runs backwards"
-    if outcome.overlap > _OVERLAP:
-        yield f"the bodies overlap or part by {outcome.overlap:.1e} of their motion"
-
-
-def _given_back(what: str, booked: np.ndarray, scale: np.ndarray) -> Iterator[str]:
-    change = np.diff(booked)
-    if np.any(change < -_SLACK * scale[1:]):
-        yield f"{what} energy back: {change.min() / scale[-1]:.1e} of the largest"
-
-
-def _overlap(run: Trajectory) -> float:
-    """Return the largest overlap of bodies that may not, over the largest deflection or motion in a step."""
-    scene = run.scene
-    positions = [run[name] for name in ("u_tip", "y") if name in run.columns]
-    if run.shapes is not None and len(run.shapes[0]):
-        positions.append(run.shapes[1])  # the tip is as exact as the largest deflection, however little it moves
-    speeds = [run[name] for name in ("v_tip", "z") if name in run.columns]
-    motion = max(float(np.abs(p).max()) for p in positions)
-    motion += scene.coupling.H * max(float(np.abs(v).max()) for v in speeds)
-    overlap = 0.0
-    if scene.contact.rigid and scene.beam is not None and scene.spring is not None:
-        joined = np.isin(run.phase, ("tied", "touch"))
-        overlap = float(np.max(np.where(joined, np.abs(run.gap), np.where(run.phase == "free", -run.gap, 0.0))))
-    elastic = scene.spring is None and not scene.contact.rigid  # a stop with a soft law
-    if scene.stop is not None and scene.contact.law != "paper" and not elastic:
-        overlap = max(overlap, float(np.max(scene.stop.position - (run.y if scene.spring is not None else run.u_tip))))
-    return max(overlap, 0.0) / motion if motion > 0.0 else 0.0
-
-
-def run_cells(
-    cells: Sequence[dict[str, Any]], processes: int, report: Callable[[Outcome], None] = lambda outcome: None
-) -> list[Outcome]:
-    """Run all cells in ``processes`` processes; report each outcome when it is there; return all in the cells' order.
-
-    Raises
-    ------
-    concurrent.futures.process.BrokenProcessPool
-        If a worker process dies.
-    """
-    outcomes = []
-    with ProcessPoolExecutor(processes, multiprocessing.get_context("spawn")) as pool:
-        for outcome in pool.map(run_cell, cells):
-            report(outcome)
-            outcomes.append(outcome)
-    return outcomes
-
-
-#: Columns of the CSV file.
-COLUMNS = (
-    *("cell", "slice", "law", "scheme", "degree"), *(p.name for p in PARAMETERS if p.name != "coupling"),
-    *("class", "residual", "overlap", "macro_steps", "events", "reason"),
-)  # fmt: skip
-
-
-def write_csv(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], path: Path) -> None:
-    """Write a row per cell in their order; missing numbers are left empty."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, COLUMNS)
-        writer.writeheader()
-        for number, (cell, outcome) in enumerate(zip(cells, outcomes, strict=True)):
-            law, scheme, degree = cell["coupling"]
-            measured = {
-                name: "" if math.isnan(value := getattr(outcome, name)) else f"{value:.3e}"
-                for name in ("residual", "overlap")
-            }
-            writer.writerow(
-                {**{name: value for name, value in cell.items() if name != "coupling"},
-                 "cell": number, "law": law, "scheme": scheme, "degree": degree, "class": outcome.kind,
-                 **measured, "macro_steps": outcome.macro_steps, "events": outcome.events,
-                 "reason": " ".join(outcome.reason.split())}
-            )  # fmt: skip
-
-
-def write_scene(cell: dict[str, Any], path: Path) -> None:
-    """Write the scene of ``cell`` as a file that `springbeam run` takes."""
-    path.write_text(tomli_w.dumps(scene_dict(cell)), encoding="utf-8")
+def _row(name: str, cell: Mapping[str, Any], record: Record) -> dict[str, Any]:
+    """Return a cell with its outcome, as a row of the table."""
+    law, scheme, degree = cell["coupling"]
+    values = {key: value for key, value in cell.items() if key not in ("slice", "coupling")}
+    coupling = {"slice": cell["slice"], "law": law, "scheme": scheme, "degree": degree}
+    outcome = {
+        "class": record["kind"],
+        **{key: value for key, value in record.items() if key not in ("kind", "reason")},
+    }
+    return {"cell": name, **coupling, **values, **outcome, "reason": " ".join(record["reason"].split())}

@@ -16,17 +16,18 @@ from matplotlib.patches import Patch
 
 from ...pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
 from .cells import COUPLINGS, PARAMETERS, SLICES, Slice
-from .grid import CLASSES, Outcome
+from .outcome import CLASSES, Outcome
 
 _COLOURS = dict(zip(CLASSES, (BLUE, SKY, GREEN, STONE, ORANGE, BLACK), strict=True))
 _LOG = {p.name for p in PARAMETERS if not p.linear and not p.choices}
 #: Residuals outside are drawn in the colours of the ends.
 _RESIDUALS = (1e-16, 1.0)
 
-Grid = list[list[tuple[dict[str, Any], Outcome]]]
+Ended = tuple[dict[str, Any], Outcome]  #: a cell, and how it ended
+Rows = list[list[Ended]]
 
 
-def draw(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], directory: Path) -> list[Path]:
+def draw(ended: Sequence[Ended], directory: Path) -> list[Path]:
     """Draw ``classes.png`` and ``residuals.png`` into ``directory``; returns their paths."""
     paths = []
     for name, panel, legend in (
@@ -37,10 +38,10 @@ def draw(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], directory
         high = -(-(len(SLICES) + 1) // wide)
         figure, axes = plt.subplots(high, wide, figsize=(4.2 * wide, 3.6 * high), squeeze=False, layout="constrained")
         for ax, s in zip(axes.flat, SLICES, strict=False):
-            _map(ax, s, _grid(s, cells, outcomes), panel)
+            _map(ax, s, _rows(s, ended), panel)
         for ax in axes.flat[len(SLICES) :]:
             ax.set_visible(False)
-        _samples(axes.flat[-1], cells, outcomes, name)
+        _samples(axes.flat[-1], ended, name)
         legend(figure, axes)
         paths.append(directory / f"{name}.png")
         figure.savefig(paths[-1], dpi=100)
@@ -48,14 +49,14 @@ def draw(cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], directory
     return paths
 
 
-def _grid(s: Slice, cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome]) -> Grid:
+def _rows(s: Slice, ended: Sequence[Ended]) -> Rows:
     """Return the cells of a slice: a row per value of y, a column per value of x, both ascending."""
-    mine = [(cell, outcome) for cell, outcome in zip(cells, outcomes, strict=True) if cell["slice"] == s.name]
+    mine = [(cell, outcome) for cell, outcome in ended if cell["slice"] == s.name]
     rows = sorted({cell[s.y] for cell, _ in mine})
     return [sorted((c for c in mine if c[0][s.y] == y), key=lambda c: float(c[0][s.x])) for y in rows]
 
 
-def _map(ax: Axes, s: Slice, grid: Grid, panel: Callable[[Axes, Grid], None]) -> None:
+def _map(ax: Axes, s: Slice, grid: Rows, panel: Callable[[Axes, Rows], None]) -> None:
     ax.set_title(s.name, fontsize="medium")
     ax.set(xlabel=s.x, ylabel=s.y)
     if not grid:
@@ -71,7 +72,7 @@ def _map(ax: Axes, s: Slice, grid: Grid, panel: Callable[[Axes, Grid], None]) ->
         ax.tick_params(labelsize="small")
 
 
-def _classes(ax: Axes, grid: Grid) -> None:
+def _classes(ax: Axes, grid: Rows) -> None:
     numbers = np.array([[CLASSES.index(outcome.kind) for _, outcome in row] for row in grid])
     ax.imshow(numbers, ListedColormap([_COLOURS[name] for name in CLASSES]), vmin=-0.5, vmax=len(CLASSES) - 0.5,
               origin="lower", aspect="auto")  # fmt: skip
@@ -86,8 +87,8 @@ def _class_legend(figure: Figure, axes: np.ndarray) -> None:
     figure.legend(handles=patches, loc="outside upper center", ncols=len(patches))
 
 
-def _residuals(ax: Axes, grid: Grid) -> None:
-    residuals = np.array([[outcome.residual for _, outcome in row] for row in grid])
+def _residuals(ax: Axes, grid: Rows) -> None:
+    residuals = np.array([[outcome.residual for _, outcome in row] for row in grid], dtype=float)
     ax.set_facecolor(STONE)  # nothing was run
     ax.imshow(np.maximum(residuals, _RESIDUALS[0]), "cividis", norm=LogNorm(*_RESIDUALS), origin="lower", aspect="auto")
 
@@ -98,9 +99,9 @@ def _residual_legend(figure: Figure, axes: np.ndarray) -> None:
                     shrink=0.6)  # fmt: skip
 
 
-def _samples(ax: Axes, cells: Sequence[dict[str, Any]], outcomes: Sequence[Outcome], what: str) -> None:
+def _samples(ax: Axes, ended: Sequence[Ended], what: str) -> None:
     """Draw the hypercube's cells by coupling: shares of the classes, or the residuals."""
-    mine = [(c["coupling"], o) for c, o in zip(cells, outcomes, strict=True) if not c["slice"]]
+    mine = [(cell["coupling"], outcome) for cell, outcome in ended if not cell["slice"]]
     ax.set_visible(bool(mine))
     names = [f"{scheme} {degree}" if law == "transmission" else f"{law}: {scheme} {degree}"
              for law, scheme, degree in COUPLINGS]  # fmt: skip
@@ -115,7 +116,7 @@ def _samples(ax: Axes, cells: Sequence[dict[str, Any]], outcomes: Sequence[Outco
         ax.set(xlabel="cells")
     else:
         for place, coupling in enumerate(COUPLINGS):
-            x = [max(o.residual, _RESIDUALS[0]) for c, o in mine if c == coupling and not np.isnan(o.residual)]
+            x = [max(o.residual, _RESIDUALS[0]) for c, o in mine if c == coupling and o.residual is not None]
             ax.plot(x, [place] * len(x), "|", color=BLUE)
         ax.set(xscale="log", xlabel="energy residual")
     ax.set_title(f"hypercube, {len(mine)} cells", fontsize="medium")

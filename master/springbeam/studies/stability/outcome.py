@@ -1,0 +1,169 @@
+"""Run a cell of the grid of extreme scenes, and put its outcome into a class.
+
+===========  ==========================================================================================================
+conserved    done, energy constant to `ledger.EXACT`, nothing lost
+dissipative  done, energy plus booked losses constant to `ledger.EXACT`; or a numerically damped beam (``rho_inf`` < 1)
+             that has only lost energy
+approximate  done, energy changed by more: within the bound of its scheme (`ledger.bounds`), or the run says so
+refused      a scene that cannot be run, with the reason
+stopped      ended early, with the cause
+garbage      anything else: energy changed without a warning, numbers that are not finite, bodies that overlap, damping
+             that returns energy, a crash
+===========  ==========================================================================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...bodies.protocol import FmuError
+from ...results.recording import MemoryRecorder
+from ...results.trajectory import Trajectory
+from ...run.ledger import EXACT, bounds
+from ...run.outcome import RunStopped
+from ...run.runner import run
+from ...scene import Scene, SceneError, scene_from_dict
+from ...scene.automatic import decided
+from .cells import scene_dict
+
+#: In the order in which pictures and tables show them; the last must stay empty.
+CLASSES = ("conserved", "dissipative", "approximate", "refused", "stopped", "garbage")
+#: A run is cut after this many accepted steps: a contact that opens and closes in every macro step.
+_MOST_STEPS = 600
+#: Bodies may overlap or, joined, part by so much of their motion.
+_OVERLAP = 1e-9
+#: Rounding of a sum of energies, of the largest so far.
+_SLACK = 1e-10
+
+
+class _Enough(BaseException):
+    """The cell has taken all the steps that it may; no error, which a run would turn into a stop."""
+
+
+@dataclass
+class Outcome:
+    """How a cell ended."""
+
+    kind: str  #: one of `CLASSES`
+    reason: str = ""  #: refused, stopped, garbage: why; approximate: the run's warnings
+    residual: float | None = None  #: largest energy residual over the largest energy until then
+    overlap: float | None = None  #: of bodies, or the gap of joined ones, over the largest motion
+    macro_steps: int = 0
+    events: int = 0
+
+
+def run_cell(cell: dict[str, Any]) -> Outcome:
+    """Run a cell and say how it ended."""
+    try:
+        scene = scene_from_dict(scene_dict(cell), source="cell")
+    except SceneError as error:
+        return Outcome("refused", str(error))
+    recorder = MemoryRecorder(scene)
+    accepted = 0
+
+    def count(*_: object) -> None:
+        nonlocal accepted
+        accepted += 1
+        if accepted >= _MOST_STEPS:
+            raise _Enough
+
+    cause = ""
+    try:
+        run(scene, recorder, count)
+    except FmuError as error:
+        return Outcome("refused", str(error))
+    except RunStopped as stopped:
+        cause = stopped.cause
+    except _Enough:
+        pass
+    found = recorder.trajectory()
+    if "traceback" in found.summary:  # an error that nobody foresaw
+        return Outcome("garbage", f"crashed: {cause}")
+    return judged(found, cause)
+
+
+def judged(run: Trajectory, cause: str = "") -> Outcome:
+    """Return the class of a run that is done, or has stopped for ``cause``, from what it recorded."""
+    summary = run.summary
+    outcome = Outcome("stopped" if cause else "", cause, macro_steps=summary["macro_steps"], events=summary["events"])
+    if len(run.time) == 0:
+        return outcome
+    scale = _energy_scale(run)
+    relative = np.divide(run.energy_residual, scale, out=np.zeros_like(scale), where=scale > 0.0)
+    outcome.residual = float(np.abs(relative).max())
+    outcome.overlap = _overlap(run)
+    if cause:
+        return outcome
+    if faults := list(_faults(run, outcome.overlap, scale)):
+        outcome.kind, outcome.reason = "garbage", "; ".join(faults)
+        return outcome
+    scene, _ = decided(run.scene)
+    bound, _ = bounds(scene)
+    said = [text for text in summary["warnings"] if "energy" in text]
+    lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
+    if outcome.residual <= EXACT:
+        outcome.kind = "dissipative" if lost > EXACT * scale[-1] else "conserved"
+    elif _only_damped_numerically(scene) and relative.max() <= EXACT:
+        outcome.kind = "dissipative"
+    elif outcome.residual <= bound or said:
+        outcome.kind, outcome.reason = "approximate", "; ".join(said)
+    else:
+        outcome.kind, outcome.reason = "garbage", f"energy residual {outcome.residual:.1e}, and nothing says so"
+    return outcome
+
+
+def _only_damped_numerically(scene: Scene) -> bool:
+    beam, scheme, law = scene.beam, scene.coupling.scheme, scene.contact.law
+    return beam is not None and beam.damped_numerically and scheme == "energy" and law != "paper"
+
+
+def _energy_scale(run: Trajectory) -> np.ndarray:
+    """Return the largest energy until each row [J], as in `ledger.Ledger`."""
+    mechanical = sum(np.abs(run[name]) for name in ("e_beam", "e_spring", "e_contact") if name in run.columns)
+    return np.maximum.accumulate(np.maximum(mechanical, abs(run.e_total[0])))
+
+
+def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]:
+    """Yield what must not be, whatever the scene."""
+    for name, values in run.columns.items():
+        if name != "phase" and not np.all(np.isfinite(values)):
+            yield f"{name} is not finite"
+    beam = run.scene.beam
+    # What damping takes over an unresolved generalized-α step is exact, but of no sign.
+    if beam is None or not beam.damped_numerically:
+        yield from _given_back("damping gives", run.e_dissipated, scale)
+    if run.scene.contact.impact != "tip":
+        yield from _given_back("impacts give", run.e_impact_loss, scale)
+    if np.any(np.diff(run.time) < 0.0):
+        yield "time runs backwards"
+    if overlap > _OVERLAP:
+        yield f"the bodies overlap or part by {overlap:.1e} of their motion"
+
+
+def _given_back(what: str, booked: np.ndarray, scale: np.ndarray) -> Iterator[str]:
+    change = np.diff(booked)
+    if np.any(change < -_SLACK * scale[1:]):
+        yield f"{what} energy back: {change.min() / scale[-1]:.1e} of the largest"
+
+
+def _overlap(run: Trajectory) -> float:
+    """Return the largest overlap of bodies that may not, over the largest deflection or motion in a step."""
+    scene = run.scene
+    positions = [run[name] for name in ("u_tip", "y") if name in run.columns]
+    if run.shapes is not None and len(run.shapes[0]):
+        positions.append(run.shapes[1])  # the tip is as exact as the largest deflection, however little it moves
+    speeds = [run[name] for name in ("v_tip", "z") if name in run.columns]
+    motion = max(float(np.abs(p).max()) for p in positions)
+    motion += scene.coupling.H * max(float(np.abs(v).max()) for v in speeds)
+    overlap = 0.0
+    if scene.contact.rigid and scene.beam is not None and scene.spring is not None:
+        joined = np.isin(run.phase, ("tied", "touch"))
+        overlap = float(np.max(np.where(joined, np.abs(run.gap), np.where(run.phase == "free", -run.gap, 0.0))))
+    elastic = scene.spring is None and not scene.contact.rigid  # a stop with a soft law
+    if scene.stop is not None and scene.contact.law != "paper" and not elastic:
+        overlap = max(overlap, float(np.max(scene.stop.position - (run.y if scene.spring is not None else run.u_tip))))
+    return max(overlap, 0.0) / motion if motion > 0.0 else 0.0
