@@ -269,9 +269,9 @@ def test_crosscheck_compares_the_scene_that_was_picked(asking):
     assert "accuracy 0.0001 asked: hermite 2, H = " in command("crosscheck", asking).stdout
 
 
-def test_orders_are_those_of_the_scheme_that_was_picked(asking):
+def test_orders_are_those_of_the_scheme_that_was_picked(asking, tmp_path):
     """`hermite` 2 has order 6 in the displacement, until rounding and IDA's looser tolerance take over."""
-    result = command("crosscheck", asking, "--orders", "--json")
+    result = command("crosscheck", asking, "--orders", "--json", "--out", tmp_path / "orders")
     (tip,) = [row for row in json.loads(result.stdout)["orders"] if row["quantity"] == "u_tip"]
     assert 4.5 <= tip["orders"][0] <= 7.0
 

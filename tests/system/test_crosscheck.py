@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import json
+
 import pytest
 from commands import command
 
@@ -122,6 +125,17 @@ def test_the_paper_law_goes_up_to_t_end(t_end, steps):
         assert (len(run) - 1, run.time[-1]) == (steps, t_end)
     assert report.horizon == t_end
     assert report.passed
+
+
+def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    settings = ["--set", "time.t_end=0.2", "--set", "coupling.macro_step=1e-3", "--quick", "--json"]
+    found = json.loads(command("crosscheck", "soft", *settings).stdout)
+    assert (found["passed"], found["scene"]["time"]["t_end"]) == (True, 0.05)
+    found = json.loads(command("crosscheck", "soft", *settings, "--orders").stdout)
+    assert {len(row["errors"]) for row in found["orders"]} == {3}
+    rows = list(csv.DictReader((tmp_path / found["files"][0]).open()))
+    assert [float(row["order from H"]) for row in rows] == [row["orders"][0] for row in found["orders"]]
 
 
 def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):

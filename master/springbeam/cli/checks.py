@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,13 +11,12 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from ..bodies.protocol import FmuError
 from ..results.trajectory import COLUMN_UNITS
-from ..scene import load_scene
+from ..scene import load_scene, with_changes
 from .common import (
-    BAD_INPUT,
     DISAGREES,
     STOPPED,
+    ForceOption,
     JsonOption,
     SceneArgument,
     SettingsOption,
@@ -26,9 +26,10 @@ from .common import (
     print_json,
 )
 from .run import picked, picked_in_words
+from .study import carry_out
 
 if TYPE_CHECKING:
-    from ..studies.crosscheck import OrderRow, Report
+    from ..studies.crosscheck import Report
 
 
 def crosscheck(
@@ -37,20 +38,29 @@ def crosscheck(
     with_orders: Annotated[
         bool, typer.Option("--orders", help="Repeat the run at H/2, H/4, H/8; print observed orders instead.")
     ] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Compare only the first quarter of the time; with --orders, not H/8.")
+    ] = False,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="PNG", help="Draw both runs and their errors into this file."),
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="PATH",
+            help="Draw both runs and their errors into this file; with --orders the directory of the results.",
+        ),
     ] = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare the co-simulation with the monolithic reference of its law. Exit code 1 if they disagree.
 
     Example: springbeam crosscheck soft --set coupling.scheme=hermite --set coupling.degree=2 --orders
     """
-    from ..monolithic.event_driven import ReferenceFailure
+    from ..monolithic.hybrid_system import ReferenceFailure
     from ..run.outcome import RunStopped
+    from ..studies.crosscheck import Orders
     from ..studies.crosscheck import crosscheck as compare
-    from ..studies.crosscheck import orders
     from ..studies.crosscheck.picture import draw
 
     console = console_for(silent=as_json)
@@ -60,27 +70,24 @@ def crosscheck(
         if made is not None:
             what, how = made.scene, picked_in_words(made.summary["accuracy"])
             console.print(Text(f"accuracy {how}"))
+        if with_orders:
+            study, default = Orders(scene=what, quick=quick), f"{Path(scene).stem}-orders"
+            carry_out(study, default, out=out, force=force, quiet=False, as_json=as_json)
+            return
+        if quick:
+            start = what.contact_time or 0.0
+            what = with_changes(what, time={"t_end": start + 0.25 * (what.time.t_end - start)})
+        console.print("2 runs and 2 references, more where the motion is not resolved")
         try:
-            if with_orders:
-                found = orders(what)
-                if as_json:
-                    print_json({"orders": [asdict(row) for row in found]})
-                console.print(_orders_table(found))
-                return
             report = compare(what)
-        except FmuError as error:
-            fail(BAD_INPUT, str(error))
         except (RunStopped, ReferenceFailure) as error:
             fail(STOPPED, str(error))
         if out is not None:
             draw(report, out)
     if as_json:
         print_json(_as_json(report))
-    for note in report.notes:
-        console.print(Text(note))
-    console.print(_error_table(report))
-    if report.events:
-        console.print(_event_errors_table(report))
+    for part in (*map(Text, report.notes), *_tables(report)):
+        console.print(part)
     begin, end = report.trajectory["time"][0], report.trajectory["time"][-1]
     console.print(Text(
         f"comparable from {begin:.9g} to {report.horizon:.9g} s of {end:.9g} s; there a perturbation of the reference "
@@ -99,7 +106,7 @@ def verify(as_json: JsonOption = False) -> None:
     from ..studies import verify as checks
     from ..studies.verify.table import report
 
-    try:
+    with bad_input_reported():
         if as_json:
             sections = list(checks.verify())
             passed = all(check.passed is not False for _, section in sections for check in section)
@@ -110,8 +117,6 @@ def verify(as_json: JsonOption = False) -> None:
             print_json({"passed": passed, "sections": described})
         else:
             passed = report(console_for(silent=False))
-    except FmuError as error:
-        fail(BAD_INPUT, str(error))
     if not passed:
         raise typer.Exit(DISAGREES)
 
@@ -132,47 +137,25 @@ def _as_json(report: Report) -> dict[str, Any]:
     }
 
 
-def _error_table(report: Report) -> Table:
-    table = Table("quantity", box=None, pad_edge=False, header_style="bold")
-    for name in ("max error", "at t [s]", "L2 error", "bound", ""):
-        table.add_column(Text(name), justify="right", no_wrap=True)
-    for row in report.rows:
-        verdict, unit = "ok" if row.passed else "FAILED", COLUMN_UNITS[row.quantity]
-        numbers = (f"{row.error:.2e}", f"{row.at:.6g}", f"{row.l2:.1e}", f"{row.bound:.1e}")
-        table.add_row(Text(f"{row.quantity} [{unit}]"), *numbers, verdict)
-    return table
+def _tables(report: Report) -> Iterator[Table]:
+    """Yield what was compared: quantities, and changes of contact."""
+    from ..studies.tables import table
 
-
-def _event_errors_table(report: Report) -> Table:
-    table = Table("contact", box=None, pad_edge=False, header_style="bold")
-    for name in ("t [s]", "reference [s]", "error [s]", "bound [s]", ""):
-        table.add_column(Text(name), justify="right", no_wrap=True)
-    for row in report.events:
-        error, verdict = row.time - row.reference, "ok" if row.passed else "FAILED"
-        table.add_row(
-            row.kind, f"{row.time:.10f}", f"{row.reference:.10f}", f"{error:.1e}", f"{row.bound:.1e}", verdict
+    quantities = [
+        (
+            f"{row.quantity} [{COLUMN_UNITS[row.quantity]}]",
+            *(f"{row.error:.2e}", f"{row.at:.6g}", f"{row.l2:.1e}", f"{row.bound:.1e}"),
+            "ok" if row.passed else "FAILED",
         )
-    return table
-
-
-def _orders_table(rows: list[OrderRow]) -> Table:
-    table = Table(
-        "phase",
-        r"from \[s]",
-        "quantity",
-        box=None,
-        pad_edge=False,
-        header_style="bold",
-        title="max errors at H, H/2, …",
-        title_justify="left",
-    )
-    count = len(rows[0].errors) if rows else 0
-    for column in table.columns:
-        column.no_wrap = True
-    for k in range(count):
-        table.add_column(f"H/{2**k}" if k else "H", justify="right", no_wrap=True)
-    table.add_column("orders", justify="right", no_wrap=True)
-    for row in rows:
-        observed = " ".join(f"{order:.1f}" for order in row.orders)
-        table.add_row(row.phase, f"{row.begin:.4f}", row.quantity, *[f"{error:.1e}" for error in row.errors], observed)
-    return table
+        for row in report.rows
+    ]
+    yield table(("quantity", "max error", "at t [s]", "L2 error", "bound", ""), quantities)
+    changes = [
+        (
+            *(row.kind, f"{row.time:.10f}", f"{row.reference:.10f}"),
+            *(f"{row.time - row.reference:.1e}", f"{row.bound:.1e}", "ok" if row.passed else "FAILED"),
+        )
+        for row in report.events
+    ]
+    if changes:
+        yield table(("contact", "t [s]", "reference [s]", "error [s]", "bound [s]", ""), changes)

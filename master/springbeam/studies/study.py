@@ -43,6 +43,7 @@ _STUDIES = {
     "sweep": ".sweep:Sweep",
     "converge": ".converge:Converge",
     "stability": ".stability.grid:Grid",
+    "orders": ".crosscheck.orders:Orders",
     "critical": ".stability.critical:Critical",
 }
 Record = dict[str, Any]

@@ -33,12 +33,12 @@ from ...scene.automatic import decided
 from ...scene.resolution import mesh_frequency
 from ...scene.statics import tip_compliance
 from ..reference import PERTURBATION, reference_and_perturbed, refuse_without_reference
-from .orders import OrderRow, orders
+from .orders import OrderRow, Orders, orders
 from .paper_law import crosscheck_paper
 from .report import IDA_TOLERANCE, SAFETY, EventRow, QuantityRow, Report
 from .sampling import DISPLACEMENTS, SHORT, VELOCITIES, Sample, at, away_from, macro_points, quantities
 
-__all__ = ["EventRow", "OrderRow", "QuantityRow", "Report", "crosscheck", "orders"]
+__all__ = ["EventRow", "OrderRow", "Orders", "QuantityRow", "Report", "crosscheck", "orders"]
 
 #: A scene whose comparable window is shorter than this many macro steps is resolved further, 4 times at a go.
 _ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 16

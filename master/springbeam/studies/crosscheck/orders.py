@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,7 +14,9 @@ from ...monolithic import event_driven
 from ...results.contact_times import contact_changes
 from ...run.runner import simulate
 from ...scene import Scene, SceneError, with_changes
-from .sampling import SHORT, away_from, macro_points, quantities
+from ..study import Found, Record, Study, record_all
+from ..tables import table, write_csv
+from .sampling import SHORT, away_from, quantities
 
 
 @dataclass(frozen=True)
@@ -26,35 +31,96 @@ class OrderRow:
     orders: tuple[float, ...]  #: between neighbours
 
 
-def orders(scene: Scene, halvings: int = 3) -> list[OrderRow]:
-    """Return the observed orders in H of displacement, velocity and contact force.
+class Orders(Study):
+    """A scene at H, H/2, H/4, … beside the event-driven reference.
 
-    Errors are in the max norm against the event-driven reference, at the macro points that all runs share and two
-    macro steps away from the events.
+    Errors of displacement, velocity and contact force are in the max norm, at the macro points that all runs share and
+    two macro steps away from the events.
     """
-    size = scene.coupling.H
-    if scene.contact.law == "paper":
-        raise SceneError("contact.law = 'paper': Algorithm 1 does not converge; --orders needs another law")
-    runs = [simulate(with_changes(scene, coupling={"macro_step": size / 2**k})) for k in range(halvings + 1)]
-    times = macro_points(runs[0], scene)
-    reference = event_driven.simulate(scene, sample_times=times)
-    changes = [change.time for change in contact_changes(reference, SHORT * size)]
-    edges = [scene.contact_time or 0.0, *changes, float(runs[0].time[-1])]
-    found: list[OrderRow] = []
-    for begin, end in itertools.pairwise(edges):
-        inside = times[(times > begin) & (times < end) & away_from(times, (begin, end), size)]
-        if len(inside) < 4:
-            continue
-        phase = str(reference.phase[np.searchsorted(reference.time, inside[len(inside) // 2])])
-        for name, sample in quantities(scene):
-            if name in ("e_beam", "e_spring") or (name == "contact_force" and phase == "free"):
+
+    kind: ClassVar[str] = "orders"
+
+    scene: Scene
+    halvings: int = 3  #: one less if quick
+
+    def cases(self) -> dict[str, int | None]:
+        """Return the halvings, ``None`` for the reference. Raises SceneError if the law does not converge."""
+        if self.scene.contact.law == "paper":
+            raise SceneError("contact.law = 'paper': Algorithm 1 does not converge; --orders needs another law")
+        halvings = range(self.halvings + 1 - self.quick)
+        return {"reference": None, **{f"H/{2**k}" if k else "H": k for k in halvings}}
+
+    @property
+    def times(self) -> np.ndarray:
+        """The macro points [s]."""
+        start, H = self.scene.contact_time or 0.0, self.scene.coupling.H
+        return start + H * np.arange(np.floor((self.scene.time.t_end - start) / H * (1.0 + 1e-9)) + 1.0)
+
+    def record(self, case: int | None) -> Record:
+        """Return the values at the macro points of a run, and when the reference changes contact."""
+        size, times = self.scene.coupling.H, self.times
+        if case is None:
+            run = event_driven.simulate(self.scene, sample_times=times)
+        else:
+            run = simulate(with_changes(self.scene, coupling={"macro_step": size / 2**case}))
+        found: Record = {"values": {name: sample(run, times).tolist() for name, sample in quantities(self.scene)}}
+        if case is None:
+            found["phases"] = run.phase[np.searchsorted(run.time, times)].tolist()
+            found["changes"] = [change.time for change in contact_changes(run, SHORT * size)]
+        return found
+
+    def rows(self, records: Mapping[str, Record]) -> list[OrderRow]:
+        """Return the observed orders in H."""
+        times, (reference, *runs) = self.times, records.values()
+        edges = [self.scene.contact_time or 0.0, *reference["changes"], self.scene.time.t_end]
+        found: list[OrderRow] = []
+        for begin, end in itertools.pairwise(edges):
+            inside = np.flatnonzero(
+                (times > begin) & (times < end) & away_from(times, (begin, end), self.scene.coupling.H)
+            )
+            if len(inside) < 4:
                 continue
-            exact = sample(reference, inside)
-            errors = []
-            for run in runs:
-                difference = np.abs(sample(run, inside) - exact)
-                errors.append(float(np.nanmax(difference)) if np.isfinite(difference).any() else float("nan"))
-            with np.errstate(divide="ignore", invalid="ignore"):
-                observed = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
-            found.append(OrderRow(phase, begin, end, name, tuple(errors), tuple(observed.tolist())))
-    return found
+            phase = reference["phases"][inside[len(inside) // 2]]
+            for name, exact in reference["values"].items():
+                if name in ("e_beam", "e_spring") or (name == "contact_force" and phase == "free"):
+                    continue
+                values = np.array([run["values"][name] for run in runs], dtype=float)[:, inside]
+                difference = np.abs(values - np.array(exact, dtype=float)[inside])
+                none = np.isnan(difference).all(axis=1)
+                errors = np.where(none, np.nan, np.where(np.isnan(difference), 0.0, difference).max(axis=1))
+                with np.errstate(divide="ignore", invalid="ignore"):
+                    observed = np.log2(errors[:-1] / errors[1:])
+                found.append(OrderRow(phase, begin, end, name, tuple(errors.tolist()), tuple(observed.tolist())))
+        return found
+
+    def found(self, records: Mapping[str, Record]) -> Found:
+        """Show the errors and the orders."""
+        rows, steps = self.rows(records), list(records)[1:]
+        cells = [
+            (
+                *(row.phase, f"{row.begin:.4f}", row.quantity),
+                *(f"{error:.1e}" for error in row.errors),
+                " ".join(f"{order:.1f}" for order in row.orders),
+            )
+            for row in rows
+        ]
+        names = ("phase", "from [s]", "quantity", *steps, "orders")
+        shown = table(names, cells, "max errors at H, H/2, …", words=("from [s]", "quantity"))
+        return Found({"orders": [asdict(row) for row in rows]}, [shown])
+
+    def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
+        """Write a row per stretch and quantity."""
+        steps = list(records)[1:]
+        rows = [
+            {"phase": row.phase, "begin": row.begin, "end": row.end, "quantity": row.quantity}
+            | {f"error at {step}": error for step, error in zip(steps, row.errors, strict=True)}
+            | {f"order from {step}": order for step, order in zip(steps[:-1], row.orders, strict=True)}
+            for row in self.rows(records)
+        ]
+        return [write_csv(directory / "orders.csv", rows)]
+
+
+def orders(scene: Scene) -> list[OrderRow]:
+    """Return the observed orders in H of displacement, velocity and contact force."""
+    study = Orders(scene=scene)
+    return study.rows(record_all(study))
