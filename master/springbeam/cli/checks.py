@@ -62,6 +62,7 @@ def crosscheck(
     from ..studies.crosscheck import Orders
     from ..studies.crosscheck import crosscheck as compare
     from ..studies.crosscheck.picture import draw
+    from ..studies.reference import refuse_without_reference
 
     console = console_for(silent=as_json)
     with bad_input_reported():
@@ -77,7 +78,9 @@ def crosscheck(
         if quick:
             start = what.contact_time or 0.0
             what = with_changes(what, time={"t_end": start + 0.25 * (what.time.t_end - start)})
-        console.print("2 runs and 2 references, more where the motion is not resolved")
+        if what.contact.law != "paper":
+            refuse_without_reference(what)
+            console.print("2 runs and 2 references, more where the motion is not resolved")
         try:
             report = compare(what)
         except (RunStopped, ReferenceFailure) as error:

@@ -105,7 +105,7 @@ class Orders(Study):
             for row in rows
         ]
         names = ("phase", "from [s]", "quantity", *steps, "orders")
-        shown = table(names, cells, "max errors at H, H/2, …", words=("from [s]", "quantity"))
+        shown = table(names, cells, "largest errors", words=("from [s]", "quantity"))
         return Found({"orders": [asdict(row) for row in rows]}, [shown])
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
