@@ -164,12 +164,33 @@ def test_our_own_fmus_named_as_foreign_ones_give_our_own_run(fmu_folder):
     assert run.summary["warnings"] == []
 
 
-def test_the_seated_force_is_the_body_s(fmu):
+def test_a_beam_without_inertia_is_tied_to_partners(fmu):
+    """An element, an FMU and our own spring give one run; IDA keeps 1e-12."""
+    own = {"mass": M2, "linear_stiffness": K, "damping": C, "initial_velocity": V}
+    element = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C, "velocity": V}
+    foreign = {**oscillator.ALL, "fmu": fmu(), "force_sign": -1, "parameters": {"m": M2, "k": K, "c": C, "v0": V}}
+    data = {
+        "time": {"t_end": 1.0},
+        "beam": {"young_modulus": 30.0, "shear_modulus": 30.0, "alpha_b": 0.01, "fidelity": "quasi_static"},
+        "stop": {"position": -0.02, "restitution": 0.7},
+        "contact": {"law": "tie"},
+        "coupling": {"degree": 2, "macro_step": 0.01},
+    }
+    runs = [simulate(scene_from_dict({**data, "spring": spring})) for spring in (own, element, foreign)]
+    for run in runs:
+        assert "stop_impact" in {event.kind for event in run.events}
+        assert run.y[-1] == pytest.approx(runs[0].y[-1], abs=1e-11)
+        assert run.summary["max_energy_residual"] < 1e-11
+
+
+@pytest.mark.parametrize("weight", ["in the FMU", "a load"])
+def test_the_seated_force_is_the_body_s(fmu, weight):
     """A mass of weight 8 N on the foundation: it comes to rest, and the foundation bears it; k1 there is none."""
     scene = pair(
         fmu(),
         beam={"element": "point_mass", "mass": 1e-3, "displacement": 5.0, "velocity": 0.0},
-        spring={"parameters": {"m": M2, "load": -8.0}},
+        spring={"parameters": {"m": M2, "load": 0.0 if weight == "a load" else -8.0}},
+        loads=[{"on": "spring", "amplitude": -8.0}] if weight == "a load" else [],
         stop={"position": -0.01, "restitution": 0.5},
         contact={"law": "compliance", "stiffness": 1e4, "damping": 0.0, "exponent": 1.0},
         coupling={"degree": 0},
@@ -201,6 +222,55 @@ def test_an_fmu_of_fmi_3_is_as_good_as_one_of_fmi_2(fmu, law):
     _, two = run(fmu(), 2e-3)
     _, three = run(fmu("three", version="3.0"), 2e-3)
     assert np.abs(three.y - two.y).max() < 1e-15
+
+
+def shaken(times: np.ndarray, upper: float, lower: float, rate: float) -> np.ndarray:
+    """The exact displacements of both ends from V and rest under amplitude·sin(rate t) on each, shape (2, n)."""
+    k, c = STIFFNESS, DAMPING
+    A = np.zeros((6, 6))
+    A[:2, 2:4] = np.eye(2)
+    A[2:4, :2] = np.array([[-k, k], [k, -k - K]]) / [[M1], [M2]]
+    A[2:4, 2:4] = np.array([[-c, c], [c, -c - C]]) / [[M1], [M2]]
+    A[2:4, 4] = upper / M1, lower / M2
+    A[4, 5], A[5, 4] = rate, -rate
+    return np.array([(expm(A * t) @ [0.0, 0.0, V, 0.0, 0.0, 1.0])[:2] for t in times]).T
+
+
+@pytest.mark.parametrize("kind", ["elements", "an FMU", "an FMU without derivatives"])
+def test_loads_act_on_the_ends_of_partners(fmu, kind):
+    """A force on each end; of degree 2, and of order 2 where only its mean over a step can be followed."""
+    signal = {"signal": "harmonic", "frequency": 1.3}
+    loads = [{"on": "tip", "amplitude": 3.0, **signal}, {"on": "spring", "amplitude": -5.0, **signal}]
+    element = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
+    errors = []
+    for size in (0.02, 0.01):
+        scene = pair(fmu(), loads=loads, coupling={"macro_step": size})
+        if kind == "elements":
+            scene = pair(fmu(), loads=loads, coupling={"macro_step": size}, spring=element)
+        elif kind != "an FMU":
+            coupling = {"macro_step": size, "degree": 0}
+            scene = pair(fmu("three", version="3.0"), loads=loads, coupling=coupling)
+        run = simulate(scene)
+        exact = shaken(run.time, 3.0, -5.0, 2.0 * np.pi * 1.3)
+        errors.append(float(np.abs(np.array([run.u_tip, run.y]) - exact).max()))
+        assert run.summary["max_energy_residual"] < 1e-11
+        assert run.summary.get("max_interface_residual", 0.0) < 1e-11
+        assert np.abs(run.e_load).max() > 0.1
+    order = np.log2(errors[0] / errors[1])
+    if kind == "an FMU without derivatives":
+        assert 1.9 < order < 2.1
+    else:
+        assert errors[1] < 1e-10
+        assert 5.7 < order < 6.3
+
+
+def test_a_moving_base_is_a_force_on_each_mass(fmu):
+    element = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
+    moving = [{"on": "base", "amplitude": 4.0, "signal": "half_sine", "duration": 0.3}]
+    forces = [{**moving[0], "on": on, "amplitude": -4.0 * m} for on, m in (("tip", M1), ("spring", M2))]
+    runs = [simulate(pair(fmu(), spring=element, loads=loads)) for loads in (moving, forces)]
+    assert np.abs(runs[0].y - runs[1].y).max() < 1e-15
+    assert np.abs(runs[0].u_tip - runs[1].u_tip).max() < 1e-15
 
 
 @pytest.mark.parametrize("scheme", ["jacobi", "gauss_seidel"])

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from .end_loaded import EndLoaded
 from .protocol import NO_FORCE, Body, Energies, Force, Motion
 from .rigid_wall import RigidWall
 
@@ -19,8 +20,8 @@ _SIZES_REMEMBERED = 64
 _TERMS = 20
 
 
-class SpringDamper(Body):
-    """m ẍ + c ẋ + k (x − x₀) = F + f, F being the force of the other body and of the foundation, upward.
+class SpringDamper(EndLoaded):
+    """m ẍ + c ẋ + k (x − x₀) = F + f, F being the force of other body, foundation and loads, upward.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ class SpringDamper(Body):
         f, constant, upward [N].
     """
 
-    CHECKPOINTED = ("_state", "_integrals", "_dissipated")
+    CHECKPOINTED = ("_state", "_integrals", "_dissipated", "_load_work")
 
     def __init__(
         self,
@@ -58,13 +59,14 @@ class SpringDamper(Body):
         self._sign = 1.0 if upper else -1.0
 
     def mark(self) -> None:
-        self._marked = (self._state, self._integrals, self._dissipated)
+        self._marked = (self._state, self._integrals, self._dissipated, self._load_work)
 
     def rewind(self) -> None:
-        self._state, self._integrals, self._dissipated = self._marked
+        self._state, self._integrals, self._dissipated, self._load_work = self._marked
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        forces = [self._sign * c + n for c, n in zip(contact, foundation, strict=True)]
+        before, on_end = self.motion(), self._on_end
+        forces = [self._sign * c + n + q for c, n, q in zip(contact, foundation, on_end, strict=True)]
         forces[0] += self._load + self._stiffness * self._rest
         step, lost = self._maps.get(size) or self._map(size)
         start = np.array([*self._state, *forces, 0.0, 0.0])
@@ -72,7 +74,9 @@ class SpringDamper(Body):
         if lost is not None:
             self._dissipated += float(start @ lost @ start)
         self._state, self._integrals = (x, v), (once, twice)
-        return self.motion()
+        end = self.motion()
+        self._book_load(on_end, before, end, size)
+        return end
 
     def _map(self, size: float) -> tuple[np.ndarray, np.ndarray | None]:
         """Return the rows of exp(A H) of x, ẋ, ∫x, ∫∫x, shape (4, 7), and W, shape (7, 7), ``None`` undamped."""
@@ -104,9 +108,8 @@ class SpringDamper(Body):
     def energies(self) -> Energies:
         x, v = self._state
         stretched = x - self._rest
-        return Energies(
-            0.5 * self.mass * v * v, 0.5 * self._stiffness * stretched**2, self._dissipated, -self._load * x
-        )
+        kinetic, potential = 0.5 * self.mass * v * v, 0.5 * self._stiffness * stretched**2
+        return Energies(kinetic, potential, self._dissipated, -self._load * x - self._load_work)
 
     def apply_impulse(self, impulse: float) -> None:
         x, v = self._state

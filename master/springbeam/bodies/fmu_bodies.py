@@ -12,6 +12,7 @@ import numpy as np
 from ..scene import Beam, Load, Spring
 from ..scene.statics import SHAPE_POINTS
 from .archive import fmu_directory
+from .end_loaded import EndLoaded
 from .fmu import Fmu, Reals
 from .force import combined
 from .functions import WARNING
@@ -225,7 +226,7 @@ class FmuBeam(FmuBody, BeamBody):
         return np.array(np.frombuffer(self._shape.values))
 
 
-class FmuSpring(FmuBody):
+class FmuSpring(FmuBody, EndLoaded):
     """``spring.fmu`` as a body; contact law and foundation are the master's."""
 
     CHECKPOINTED = (*FmuBody.CHECKPOINTED, "_dissipated_before")
@@ -241,7 +242,6 @@ class FmuSpring(FmuBody):
         parameters["displacement"] = spring.equilibrium
         parameters["velocity"] = spring.initial_velocity
         self._dissipated_before = 0.0  #: before the last `restart` [J]
-        self._on_end = NO_FORCE
         super().__init__(Fmu("spring", fmu_directory() / "spring.fmu", parameters, start_time))
 
     def _mass(self) -> float:
@@ -260,16 +260,12 @@ class FmuSpring(FmuBody):
         return [("base_acceleration" if load.on == "base" else "external_force", 1.0)]
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
-        super().expect_loads(loads)
-        #: What a unit of each load is at the top [N].
-        self._at_top = [-self._spring.mass if load.on == "base" else 1.0 for load in loads]
+        FmuBody.expect_loads(self, loads)
+        EndLoaded.expect_loads(self, loads)
 
     def set_loads(self, forces: Sequence[Force]) -> None:
-        super().set_loads(forces)
-        self._on_end = combined(self._at_top, forces)
-
-    def load_on_end(self) -> Force:
-        return self._on_end
+        FmuBody.set_loads(self, forces)
+        EndLoaded.set_loads(self, forces)
 
     def energies(self) -> Energies:
         kinetic, potential, dissipated, *work = self._stored()

@@ -22,6 +22,7 @@ import numpy as np
 from ..scene.partners import ForeignFmu
 from . import force
 from .abilities import Abilities
+from .end_loaded import EndLoaded
 from .fmu import Fmu
 from .fmu_bodies import FmuBody
 from .protocol import NO_FORCE, BodyFailed, Energies, FmuError, Force, Motion
@@ -49,7 +50,7 @@ _TWICE = _ONCE * (1.0 - _NODES)
 _SLOPE = np.linalg.solve(np.vander(_NODES, increasing=True).T, np.arange(5.0))
 
 
-class ForeignBody(FmuBody):
+class ForeignBody(FmuBody, EndLoaded):
     """A foreign FMU in either place.
 
     Parameters
@@ -64,7 +65,10 @@ class ForeignBody(FmuBody):
         Whether moments are found by substeps.
     """
 
-    CHECKPOINTED = (*FmuBody.CHECKPOINTED, "received", "_size", "_time")
+    CHECKPOINTED = (*FmuBody.CHECKPOINTED, "received", "_load_work", "_size", "_time")
+
+    #: Loads act on the end, and no input of the FMU is for them.
+    expect_loads, set_loads = EndLoaded.expect_loads, EndLoaded.set_loads
 
     def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings, by_substeps: bool) -> None:
         self._spec, self._found, self._by_substeps = spec, found, by_substeps
@@ -78,10 +82,10 @@ class ForeignBody(FmuBody):
         self._FORCES, self._SLOPES = (spec.force,), found.abilities.slopes
         self._KEEPS_SLOPES = self._SLOPES > 0
         self._upward = 1.0 if upper else -1.0
-        #: Work of all forces and impulses on the end so far [J].
-        self.received = self._marked_received = 0.0
+        #: Work of all forces and impulses on the end so far, but not of loads [J].
+        self.received = 0.0
         self._size = 0.0  #: of the last step [s]
-        self._time = self._marked_time = start_time  #: of the present state [s]
+        self._time = start_time  #: of the present state [s]
         self._held: dict[float, float] = {}  #: holding forces [N] by displacement [m]
         check_names(fmu := Fmu(None, Path(spec.fmu), spec.parameters, start_time), spec)
         super().__init__(fmu)
@@ -103,24 +107,31 @@ class ForeignBody(FmuBody):
             super().mark()
         else:
             self.fmu.moved = False
-        self._marked_received, self._marked_time = self.received, self._time
+        self._marked = (self.received, self._load_work, self._time)
 
     def rewind(self) -> None:
         if self.fmu.moved:
             if not self.repeatable:
                 raise BodyFailed(f"{self.fmu.path}: a step had to be repeated, and its state cannot be restored")
             super().rewind()
-            self.received, self._time = self._marked_received, self._marked_time
+            self.received, self._load_work, self._time = self._marked
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        c, dc, ddc = (x - y for x, y in zip(contact, foundation, strict=True))
-        sign, start = self._spec.force_sign, self._current
-        inputs = (sign * c, sign * dc, sign * ddc)
+        up, sign, start = self._upward, self._spec.force_sign, self._current
+        load = self._followed(self._on_end, size)
+        exchanged = force.combined((up, 1.0), (contact, foundation))
+        inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
         end = self._in_parts(time, size, inputs) if self._by_substeps else self._part(time, size, inputs)
         self._time, self._size = time + size, size
-        up = self._upward
-        self.received += force.work_on((up * c, up * dc, up * ddc), start, end, size)
+        self.received += force.work_on(exchanged, start, end, size)
+        self._book_load(load, start, end, size)
         return end
+
+    def _followed(self, given: Force, size: float) -> Force:
+        """Return what of a force over a step the FMU can follow: its mean, or its slope too."""
+        if not any(given[self._SLOPES + 1 :]):
+            return given
+        return force.derivatives(force.legendre(given, size, self._SLOPES), size)
 
     def _part(self, time: float, size: float, inputs: Force) -> Motion:
         struck, self._size = self._pending != 0.0, size
@@ -169,7 +180,8 @@ class ForeignBody(FmuBody):
         if not self.abilities.energies:
             return self.exchanged()
         told = iter(self._stored())
-        return Energies(*(0.0 if name is None else next(told) for name in self._spec.energies))
+        energies = Energies(*(0.0 if name is None else next(told) for name in self._spec.energies))
+        return energies._replace(load_potential=energies.load_potential - self._load_work)
 
     def exchanged(self) -> Energies:
         return Energies(0.0, self.received, 0.0, 0.0)
@@ -183,6 +195,8 @@ class ForeignBody(FmuBody):
             return known
         size = self._size
 
+        load, self._on_end = self._on_end, NO_FORCE
+
         def pushed(upward: float) -> Motion:
             self.rewind()
             return self.advance(self._time, size, NO_FORCE, (upward, 0.0, 0.0))
@@ -195,6 +209,7 @@ class ForeignBody(FmuBody):
                 break
             last, left, found = found, end.velocity, found - end.velocity * (found - last) / (end.velocity - left)
         self.rewind()
+        self._on_end = load
         fallen = abs(let_go.displacement - displacement)
         if abs(end.displacement - displacement) > _STAYS * fallen and abs(end.velocity) > _STAYS * abs(let_go.velocity):
             raise BodyFailed(

@@ -23,10 +23,11 @@ from pathlib import Path
 from time import monotonic
 from typing import Any, ClassVar
 
-from ..scene import SceneError
+from ..scene import Load, SceneError
 from ..scene.partners import ForeignFmu
+from .end_loaded import EndLoaded
 from .foreign import Findings
-from .protocol import NO_FORCE, Body, BodyFailed, Energies, FmuError, Force, Motion, StepRefused
+from .protocol import NO_FORCE, BodyFailed, Energies, FmuError, Force, Motion, StepRefused
 
 #: Longest time that the check before the run may take, any call of the run, and the last one [s].
 CHECK_PATIENCE, CALL_PATIENCE, _FAREWELL = 20.0, 60.0, 2.0
@@ -181,7 +182,7 @@ def _examined(file: tuple[str, int, int], spec: str, upper: bool, start_time: fl
     return found
 
 
-class IsolatedBody(Body):
+class IsolatedBody(EndLoaded):
     """A `springbeam.bodies.foreign.ForeignBody` in a process of its own; parameters as of that."""
 
     _motion: Motion
@@ -223,6 +224,14 @@ class IsolatedBody(Body):
 
     def motion(self) -> Motion:
         return self._motion
+
+    def expect_loads(self, loads: Sequence[Load]) -> None:
+        super().expect_loads(loads)
+        self._waiting.append(("expect_loads", loads))
+
+    def set_loads(self, forces: Sequence[Force]) -> None:
+        super().set_loads(forces)
+        self._waiting.append(("set_loads", forces))
 
     def energies(self) -> Energies:
         if not self.abilities.energies:

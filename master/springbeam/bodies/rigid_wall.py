@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from ..scene import Load
 from .protocol import NO_FORCE, Body, Force, Motion
 
 
@@ -29,3 +32,5 @@ class RigidWall(Body):
         return Motion(w, 0.0, w * h, 0.5 * w * h * h)
 
     def apply_impulse(self, impulse: float) -> None: ...
+
+    def expect_loads(self, loads: Sequence[Load]) -> None: ...

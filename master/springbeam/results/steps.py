@@ -64,8 +64,8 @@ def impulse(steps: np.ndarray, tau: np.ndarray, of: Any = slice(None)) -> np.nda
 
 
 def load_on_spring(scene: Scene, times: np.ndarray) -> np.ndarray:
-    """Return what the loads of ``scene`` amount to on its spring [N] at ``times`` [s]."""
-    mass = 0.0 if scene.spring is None else scene.spring.mass
+    """Return what the loads of ``scene`` amount to on its lower end [N] at ``times`` [s]."""
+    mass = getattr(scene.lower, "mass", None) or 0.0
     shares = {"spring": 1.0, "base": -mass}
     parts = [shares[load.on] * load.value(times) for load in scene.loads if load.on in shares]
     return sum(parts, np.zeros_like(times))

@@ -171,7 +171,7 @@ def _of_foundation(scene: Scene, steps: np.ndarray) -> float:
     """Return ∫ N dt [N·s]: N is C of the step less the load and a constant, 0 unless the lower end is seated."""
     size, force = steps["size"], steps["foundation_force"]
     seated = np.where(force != 0.0, impulse(steps, size) + (force - steps["contact_force"]) * size, 0.0)
-    if any(load.on in ("spring", "base") for load in scene.loads) and scene.spring is not None:
+    if any(load.on in ("spring", "base") for load in scene.loads) and scene.lower is not None:
         start = steps["time"] - size
         # A macro step resolves its loads: three Gauss points are exact to degree 5.
         for share, weight in zip(_NODES, _WEIGHTS, strict=True):

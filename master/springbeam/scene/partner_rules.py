@@ -21,12 +21,20 @@ def partners_fit(scene: Scene) -> Iterator[str]:
                 f'{name}: [coupling] feedback = "{scene.coupling.feedback}" bounds what it neglects for our own bodies '
                 'only; use "two_way"'
             )
-        if scene.beam is not None and scene.beam.fidelity == "quasi_static":
-            yield f'{name}: [beam] fidelity = "quasi_static" needs our own spring; use fidelity = "dynamic"'
+        if scene.beam is not None and scene.beam.fidelity == "quasi_static" and contact.law == "transmission":
+            yield (
+                f'{name}: [contact] law = "transmission" needs our own spring below [beam] fidelity = "quasi_static"; '
+                'use law = "tie", or fidelity = "dynamic"'
+            )
+        end = "spring" if table == "spring" else "tip"
         for number, load in enumerate(scene.loads):
-            if load.on in ("base", *(("spring",) if table == "spring" else ("beam", "tip"))):
-                on = f'[loads.{number}] on = "{load.on}"'
-                yield f"{on}: acts on our own bodies, and [{table}] is none; take the load out"
+            on = f'[loads.{number}] on = "{load.on}"'
+            if load.on == "beam" and table == "beam":
+                yield f'{on}: acts along our own beam; on = "tip" acts on the end of another body in [beam]'
+            elif load.on == "base" and kind == "fmu":
+                yield f'{on}: which masses are in the FMU of [{table}] is not known; give a force, on = "{end}"'
+            elif load.on == end and kind == "rigid_wall":
+                yield f"{on}: {name} moves under no load; take the load out"
     target, clearance = scene.tip_target, scene.initial_clearance
     if scene.beam is None and target is not None and clearance is not None and clearance < 0.0:
         below = f"{-clearance:.6g} m below {target[0]} = {target[1]}"
