@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from ctypes import (
+    Array,
     byref,
     c_bool,
     c_char_p,
@@ -121,14 +122,22 @@ class Functions:
         """Return a function with its arguments, which are converted to C once.
 
         A pointer of our own to the function, without types: to convert and check arguments at each call costs as much
-        as the call.
+        as the call. An array stays where it is and a whole number what it is, so ctypes need not look at them again.
         """
         try:
             function = self._library[self.spelt(name)]
         except AttributeError:
             raise FmuError(f"its library lacks {self.spelt(name)}") from None
         function.restype = c_int
-        return partial(function, self._instance, *arguments)
+        fixed = (
+            byref(argument)
+            if isinstance(argument, Array)
+            else type(argument).from_param(argument.value)
+            if isinstance(argument, (c_int, c_size_t))
+            else argument
+            for argument in arguments
+        )
+        return partial(function, c_void_p.from_param(self._instance.value), *fixed)
 
     def accessor(self, verb: str, kind: str, references: Any, values: Any) -> Call:
         """Return what gets or sets (``verb`` "Get", "Set") variables of one kind, by arrays of C."""
