@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies import fmu
+from springbeam.bodies.functions import Functions
 from springbeam.contact.events import EventFunctions
 from springbeam.contact.laws import law_of
 from springbeam.contact.phases import Joint, Phase
@@ -23,23 +25,23 @@ SET_SLOPES = "fmi2SetRealInputDerivatives"
 def counted(monkeypatch: pytest.MonkeyPatch) -> Callable[[Scene], tuple[Trajectory, Counter[tuple[str, str]]]]:
     """Runs a scene and counts ``(FMU, FMI function)``; ``(FMU, "instance")`` for those loaded."""
     calls: Counter[tuple[str, str]] = Counter()
-    load, prepared = fmu.Fmu.__init__, fmu.Fmu.prepared
+    load, prepared = fmu.Fmu.__init__, Functions.prepared
 
     def counted_load(self: fmu.Fmu, name: str, *rest: Any) -> None:
         calls[name, "instance"] += 1
         load(self, name, *rest)
 
-    def counted_function(self: fmu.Fmu, name: str, *arguments: Any) -> Callable[[], int]:
-        function = prepared(self, name, *arguments)
+    def counted_function(self: Functions, name: str, *arguments: Any) -> Callable[[], int]:
+        function, body = prepared(self, name, *arguments), Path(self._library._name).stem
 
         def call() -> int:
-            calls[self._name, name] += 1
+            calls[body, self.spelt(name)] += 1
             return function()
 
         return call
 
     monkeypatch.setattr(fmu.Fmu, "__init__", counted_load)
-    monkeypatch.setattr(fmu.Fmu, "prepared", counted_function)
+    monkeypatch.setattr(Functions, "prepared", counted_function)
 
     def run(scene: Scene) -> tuple[Trajectory, Counter[tuple[str, str]]]:
         calls.clear()

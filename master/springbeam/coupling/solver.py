@@ -47,27 +47,6 @@ class _Response:
     descents: dict[str, Descent] = field(default_factory=dict)  #: by the kind of the lower body
 
 
-class _Enough:
-    """Up to which residual [m] the conditions count as met."""
-
-    __slots__ = ("_expected", "_noise", "_tolerance", "_unseen", "residual")
-
-    def __init__(self, rounding: float, expected: float) -> None:
-        self._tolerance = self.residual = rounding
-        self._noise, self._unseen, self._expected = 1.0, 0.0, expected
-
-    def follow(self, tolerance: float) -> None:
-        """Take the tolerance [m] of the motion under the force just tried."""
-        self._tolerance = tolerance
-        self.residual = max(self._noise * tolerance, self._unseen)
-
-    def rest_at(self, residual: float) -> None:
-        """Accept ``residual``, where iterations stagnate, if it is as small as the bodies' own rounding."""
-        if residual <= max(_NOISE * self._tolerance, _ROUNDING * self._expected):
-            self._noise, self._unseen = _NOISE, _ROUNDING * self._expected
-            self.follow(self._tolerance)
-
-
 class StepSolver(Coupling):
     """Solver of one set of conditions; keeps the responses of the bodies between steps.
 
@@ -149,21 +128,21 @@ class StepSolver(Coupling):
             length = max(self._expected, abs(upper_end.displacement), size * abs(upper_end.velocity))
             known = _Response(self._measure(upper, time, size, a, r_upper, length))
         self._remember(size, known)
-        B = known.B
-        kind = type(lower).__name__
-        first = kind not in known.descents
-        descent, measured = known.descents.get(kind) or (_descent(B, self._free_response(lower, size)), False)
-        # Rounding at least. What is asked is known once the motion is; that under the guess may be far from it.
-        enough = _Enough(_ROUNDING * max(self._reach, abs(start.displacement)), self._expected)
+        B, kind = known.B, type(lower).__name__
+        remembered = known.descents.get(kind)
+        descent, measured = remembered or (_descent(B, self._free_response(lower, size)), False)
         aim = self.aim(gap, a, descent, window)
         residual = gap if aim is None else list(map(sub, gap, aim[0]))
         norm = max(map(abs, residual))
+        # Rounding at least. What is asked is known once the motion is; that under the guess may be far from it.
+        enough = tolerance = _ROUNDING * max(self._reach, abs(start.displacement))
+        noisy = False  # the iteration has met the bodies' own rounding
         fresh = False  # S was measured for this step
         for iteration in range(_MAX_ITERATIONS):
             if not norm < inf:
                 raise NotConverged(norm, iteration)
             previous = norm
-            if norm <= enough.residual:
+            if norm <= enough:
                 if tried is a:
                     break
                 upper.rewind()
@@ -181,24 +160,25 @@ class StepSolver(Coupling):
                 lower.rewind()
                 lower_end = lower.advance(time, size, acting)
                 r_lower = conditions(lower_end, size)
-                enough.follow(self._absolute_tolerance(start, lower_end, size, times(B, a)))
+                tolerance = self._absolute_tolerance(start, lower_end, size, times(B, a))
+                enough = self._noise(tolerance) if noisy else tolerance
             gap = list(map(sub, r_upper, r_lower))
             residual = gap if aim is None else list(map(sub, gap, aim[0]))
             norm = max(map(abs, residual))
-            if not norm > enough.residual:
+            if not norm > enough:
                 continue
             if tried is not a:  # below, the difference is rounding and would spoil what is known
                 descent = broyden(descent, step, residual)
             stagnates = norm > _STAGNATES * previous
             # S is measured once, when a size comes again: it then saves a step of the lower body in most.
-            if (stagnates and not fresh) or not (first or measured):
+            if (stagnates and not fresh) or not (remembered is None or measured):
                 length = 1e-4 * max(abs(lower_end.displacement), size * abs(lower_end.velocity))
                 S = self._measure(lower, time, size, a, r_lower, length)
                 lower.rewind()
                 lower.advance(time, size, acting)
                 descent, measured, fresh = _descent(B, S), True, True
-            elif stagnates:
-                enough.rest_at(norm)
+            elif stagnates and norm <= self._noise(tolerance):
+                noisy, enough = True, self._noise(tolerance)
             if aim is not None:
                 aim = self.aim(gap, a, descent, window)
                 assert aim is not None
@@ -211,6 +191,10 @@ class StepSolver(Coupling):
         self._reach = max(self._reach, abs(upper_end.displacement), abs(lower_end.displacement))
         known.descents[kind] = (descent, measured)
         return acting
+
+    def _noise(self, tolerance: float) -> float:
+        """Return up to which residual [m] an iteration that stagnates may have met the bodies' own rounding."""
+        return max(_NOISE * tolerance, _ROUNDING * self._expected)
 
     def _remember(self, size: float, known: _Response) -> None:
         """Keep ``known`` as what was used last, and forget the size that was used least recently."""

@@ -60,10 +60,16 @@ class Detector:
         self._separation = Separation(pair, _NO_TIME)
         self._functions = EventFunctions(scene, pair.law, tip_share, pair.equilibrium)
         self._level = pair.stop or 0.0
+        #: The tolerance last asked for, and where: a step starts where the one before has ended.
+        self._tolerance_of: tuple[Ends, float] | None = None
+        self._tolerance = 0.0
 
     def tolerance(self, ends: Ends) -> float:
         """What positions can be told apart to [m]."""
-        return position_tolerance(ends, self._level, self._steps.size)
+        known = (ends, self._steps.size)
+        if known != self._tolerance_of:
+            self._tolerance_of, self._tolerance = known, position_tolerance(ends, self._level, self._steps.size)
+        return self._tolerance
 
     def simultaneity_tolerance(self, ends: Ends) -> float:
         """Position tolerance plus the distance covered in `_NO_TIME`·H [m]; events within it are simultaneous."""
@@ -81,9 +87,12 @@ class Detector:
 
     def at_start(self, state: State, start: Ends) -> str | None:
         """The event that is due before any step: its function is 0 and falling."""
-        for index, (value, rate) in enumerate(self._functions.samples(state.phase, start)):
+        phase = state.phase
+        for (kind, _), (value, rate) in zip(
+            self._functions.of(phase), self._functions.samples(phase, start), strict=True
+        ):
             if rate < 0.0 and value <= self.tolerance(start) and rate < -self._rest(start):
-                return self._functions.of(state.phase)[index][0]
+                return kind
         return None
 
     def first(self, state: State, step: Step) -> tuple[Step, str | None]:
@@ -112,16 +121,16 @@ class Detector:
         found: str | None = None
         functions = self._functions.of(state.phase)
         for _ in range(2 * len(functions) + 1):
-            candidates, tolerance, third = [], self.tolerance(step.end), step.size / 3.0
+            candidates, third = [], step.size / 3.0
             starts = self._functions.samples(state.phase, step.start)
             ends = self._functions.samples(state.phase, step.end)
             for (kind, function), start, end in zip(functions, starts, ends, strict=True):
-                # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
-                floor = min(start[0], 0.0) - tolerance
                 (f0, d0), (f1, d1) = start, end
-                change = abs(f1 - f0) + third * (abs(d0) + abs(d1))
-                if (f0 if f0 < f1 else f1) - floor > change:  # no dip is deeper than all that changes in the step
+                # No dip is deeper than all that changes in the step.
+                if (f0 if f0 < f1 else f1) > abs(f1 - f0) + third * (abs(d0) + abs(d1)):
                     continue
+                # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
+                floor = min(f0, 0.0) - self.tolerance(step.end)
                 bracket = self._bracket(state, function, step, floor, start, end)
                 if bracket is None or (kind == found and bracket is step):
                     continue
@@ -188,8 +197,10 @@ class Detector:
 
     def _touched_inside(self, state: State, step: Step) -> Step:
         """Compliance: a contact that closes and opens inside the step would be missed; it is cut to its middle."""
+        if any(step.contact) or not self._pair.divides:
+            return step
         start, end = gap(step.start), gap(step.end)
-        if start[0] < 0.0 or end[0] < 0.0 or any(step.contact) or not self._pair.divides:
+        if start[0] < 0.0 or end[0] < 0.0:
             return step
         path = Path.through(start, end, step.size, gap.means(step.end, step.size))
         inside = path.lowest_inside()
@@ -205,10 +216,10 @@ class Detector:
 
         Nothing special happens there: the zero is that of the path of the gap.
         """
-        before, after = gap(step.start), gap(step.end)
-        touching = after[0] < 0.0
-        if (before[0] < 0.0) == touching:
+        touched, touching = (tip.displacement < low.displacement for tip, low in (step.start, step.end))
+        if touched == touching:
             return None
+        before, after = gap(step.start), gap(step.end)
         sign = 1.0 if touching else -1.0  # opening, the penetration falls through zero
         start, end, means = (
             (sign * first, sign * second) for first, second in (before, after, gap.means(step.end, step.size))

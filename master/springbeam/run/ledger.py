@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
-from typing import NamedTuple
 
 from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Energies
@@ -30,19 +29,6 @@ def bounds(scene: Scene) -> tuple[float, float]:
     return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
 
 
-class Booked(NamedTuple):
-    """A row's energies [J], in the order of `springbeam.results.trajectory.COLUMNS`."""
-
-    e_beam: float
-    e_spring: float
-    e_contact: float
-    e_dissipated: float
-    e_impact_loss: float
-    e_load: float
-    e_total: float
-    energy_residual: float
-
-
 @dataclass
 class Ledger(Checkpointed):
     """E_beam + E_spring + E_contact + dissipated + impact losses − work of external loads = constant."""
@@ -55,8 +41,10 @@ class Ledger(Checkpointed):
     gain: float = 0.0  #: the same of the residuals that are positive
     dissipated: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: by the beam, the spring, the contact law [J]
 
-    def book(self, beam: Energies, spring: Energies, between: Booking) -> Booked:
-        """Return the next row; ``between`` is what the coupling adds.
+    def book(self, beam: Energies, spring: Energies, between: Booking) -> tuple[float, ...]:
+        """Return the energies of the next row [J], from ``e_beam`` to ``energy_residual`` as in a run's columns.
+
+        ``between`` is what the coupling adds.
 
         One that is not finite changes nothing: it is no row of the results.
         """
@@ -73,8 +61,11 @@ class Ledger(Checkpointed):
         if isfinite(residual):
             self.dissipated = lost_in
             self.scale = scale = max(self.scale, abs(initial), abs(e_beam) + abs(e_spring) + contact)
-            self.largest_residual = max(self.largest_residual, abs(residual))
-            if scale > 0.0:
-                self.relative = max(self.relative, abs(residual) / scale)
-                self.gain = max(self.gain, residual / scale)
-        return Booked(e_beam, e_spring, contact, dissipated, lost, load, total, residual)
+            share = residual / scale if scale > 0.0 else 0.0
+            if abs(residual) > self.largest_residual:
+                self.largest_residual = abs(residual)
+            if abs(share) > self.relative:
+                self.relative = abs(share)
+            if share > self.gain:
+                self.gain = share
+        return e_beam, e_spring, contact, dissipated, lost, load, total, residual

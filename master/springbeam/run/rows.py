@@ -35,7 +35,7 @@ class Rows(Checkpointed):
     """Writes rows and shapes of a pair into a recorder, and keeps their extremes."""
 
     CHECKPOINTED = (
-        *("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed", "_relative_speed", "_stiffest"),
+        *("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed", "_relative_speed", "_deepest"),
         *("contact_steps", "not_shown", "mismatch_at_stop", "_last_strike"),
     )
 
@@ -54,7 +54,7 @@ class Rows(Checkpointed):
         self.mismatch_at_stop = 0.0  #: the same over the speed with which the joined ends strike the foundation
         self._last_strike = -inf  #: [s]
         self._relative_speed = 0.0  #: |v_tip − z| of ends that a soft law couples [m/s]
-        self._stiffest = 0.0  #: slope of a soft law at the deepest penetration [N/m]
+        self._deepest = 0.0  #: penetration of ends that a soft law couples [m]
         self.contact_steps = 0  #: with a force of a soft law
         #: [1/kg] of what a contact force moves.
         self._inverse_mass = sum(1.0 / body.mass for body in (pair.upper, pair.lower) if body.mass > 0.0)
@@ -71,13 +71,17 @@ class Rows(Checkpointed):
         inside, reaction, mismatch = 0.0, contact, v - z if joined else 0.0
         if pair.law.soft:
             inside, reaction = pair.law.force(y - u, z - v), 0.0
-            self._relative_speed = max(self._relative_speed, abs(z - v))
+            if abs(z - v) > self._relative_speed:
+                self._relative_speed = abs(z - v)
         else:
-            self.largest_mismatch = max(self.largest_mismatch, abs(mismatch))
+            if abs(mismatch) > self.largest_mismatch:
+                self.largest_mismatch = abs(mismatch)
             if pair.joinable and not pair.law.lasting:
                 inside = self._diagnostic(pair.equilibrium - u)
                 reaction = contact - inside
-        self.largest_speed = max(self.largest_speed, abs(v), abs(z))
+        speed = max(abs(v), abs(z))
+        if speed > self.largest_speed:
+            self.largest_speed = speed
         forces = (contact, smoothed, inside, reaction, state.foundation[0])
         booked, loads = self._ledger.book(*pair.energies(ends)), pair.loads.values(time)
         row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *booked, *loads)
@@ -109,15 +113,17 @@ class Rows(Checkpointed):
 
     def reached(self, step: Step) -> None:
         """Note how deep the ends of a soft law have sunk into each other on ``step``, also inside it."""
-        assert self._pair.law.soft
-        self.contact_steps += any(step.contact)
-        start, end = gap(step.start), gap(step.end)
-        deepest = -min(start[0], end[0])
-        if deepest <= 0.0 and any(step.contact):
-            path = Path.through(start, end, step.size, gap.means(step.end, step.size))
+        if not any(step.contact):
+            return
+        self.contact_steps += 1
+        tip, low = step.end
+        depth = low.displacement - tip.displacement
+        if depth <= 0.0:
+            path = Path.through(gap(step.start), gap(step.end), step.size, gap.means(step.end, step.size))
             inside = path.lowest_inside()
-            deepest = 0.0 if inside is None else -path.at(inside)
-        self._stiffest = max(self._stiffest, self._pair.law.slope(deepest))
+            depth = 0.0 if inside is None else -path.at(inside)
+        if depth > self._deepest:
+            self._deepest = depth
 
     @property
     def contact_frequency(self) -> float:
@@ -125,8 +131,10 @@ class Rows(Checkpointed):
 
         It is 0 as well of a link whose ends move as one: however stiff, it does not swing.
         """
-        still = self._pair.law.lasting and self._relative_speed <= VIBRATION * self.largest_speed
-        return 0.0 if still or self._stiffest <= 0.0 else sqrt(self._stiffest * self._inverse_mass)
+        law = self._pair.law
+        if not law.soft or (law.lasting and self._relative_speed <= VIBRATION * self.largest_speed):
+            return 0.0
+        return sqrt(law.slope(self._deepest) * self._inverse_mass)
 
     def _diagnostic(self, p: float) -> float:
         """Return the normal-compliance part of a tied contact [N] at a penetration ``p`` [m]; it drives nothing."""

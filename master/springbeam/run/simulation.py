@@ -13,7 +13,6 @@ from typing import Any
 
 from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, Body, BodyFailed, StepRefused
-from ..contact.events import gap
 from ..contact.phases import Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
 from ..results.recording import NonFiniteValue, Recorder
@@ -288,8 +287,10 @@ class Simulation(Checkpointed):
         )
 
     def _note_soft_contact(self, step: Step) -> None:
-        touching = gap(step.end)[0] < 0.0
-        self._state.phase = Phase(Joint.TOUCH if touching else Joint.FREE, self._state.phase.seated)
+        state, (tip, low) = self._state, step.end
+        joint = Joint.TOUCH if tip.displacement < low.displacement else Joint.FREE
+        if joint is not state.phase.joint:
+            state.phase = Phase(joint, state.phase.seated)
         change = self._detector.soft_change(step)
         if change is not None:
             self._events += 1

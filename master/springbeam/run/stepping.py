@@ -36,14 +36,14 @@ class State(Checkpointed):
 
     def accept(self, step: Step, time: float) -> None:
         """The step that ends at ``time`` is made."""
-        held = force.mean(step.foundation, step.size)
-        self.middles = [*self.middles[-1:], (self.time + 0.5 * step.size, step.contact[0], held)]
-        self.time, self.last_size = time, step.size
-        first = self.steps_in_phase == 0
+        _, size, contact, foundation, _, _ = step
+        middle = (self.time + 0.5 * size, contact[0], force.mean(foundation, size))
+        self.middles = [*self.middles[-1:], middle]
+        self.time, self.last_size = time, size
         # At the macro point between two steps both forces are wrong by nearly the same, one up, one down.
-        self.smoothed = step.contact[0] if first else 0.5 * (step.contact[0] + self.contact[0])
-        self.contact = force.shifted(step.contact, step.size)
-        self.foundation = force.shifted(step.foundation, step.size)
+        self.smoothed = 0.5 * (contact[0] + self.contact[0]) if self.steps_in_phase else contact[0]
+        self.contact = force.shifted(contact, size)
+        self.foundation = force.shifted(foundation, size)
         self.steps_in_phase += 1
 
     def guess(self, size: float) -> Force:
