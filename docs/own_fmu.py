@@ -1,6 +1,6 @@
-"""Measure the tables of own_fmu.md: FMUs by PythonFMU and in plain C, against the elements that they describe.
+"""Measure the tables of own_fmu.md and draw its picture: FMUs of others against the elements that they describe.
 
-It needs `pip install pythonfmu` and a C compiler: python docs/own_fmu.py
+It needs `pip install pythonfmu pythonfmu3` and a C compiler: python docs/own_fmu.py   (about a minute)
 """
 
 from __future__ import annotations
@@ -12,9 +12,12 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
+from pages import IMAGES, shrink  # beside this script
 
 from springbeam import Trajectory, load_scene, simulate
+from springbeam.pictures.drawing import BLACK, BLUE, VERMILLION
 from springbeam.scene import scene_from_dict
 
 DOCS = Path(__file__).parent
@@ -29,13 +32,23 @@ LINK = {"law": "link", "stiffness": 1e3}
 TIE = {"law": "tie"}
 
 
-def built(folder: Path) -> dict[str, Any]:
-    """Build the FMU of the page by PythonFMU and return its table."""
-    source = re.search(r"```py\n(from pythonfmu .*?)```", (DOCS / "own_fmu.md").read_text("utf-8"), re.S)
-    assert source is not None
-    (folder / "msd.py").write_text(source[1], "utf-8")
-    subprocess.run(["pythonfmu", "build", "-f", "msd.py", "--handle-state"], cwd=folder, check=True)
-    return {"fmu": str(folder / "MassSpringDamper.fmu"), "force": "F", "displacement": "x", "velocity": "v"}
+def built(folder: Path, *, version: int) -> dict[str, Any]:
+    """Build the FMU of the page by PythonFMU, or by PythonFMU3 for FMI 3.0, and return its table."""
+    found = re.search(r"```py\n(from pythonfmu .*?)```", (DOCS / "own_fmu.md").read_text("utf-8"), re.S)
+    assert found is not None
+    source, tool = found[1], "pythonfmu"
+    if version == 3:
+        tool = "pythonfmu3"
+        for two, three in (("pythonfmu", tool), ("Fmi2", "Fmi3"), ("Real", "Float64")):
+            source = source.replace(two, three)
+        kinds = "causality=Fmi3Causality.independent, variability=Fmi3Variability.continuous"
+        clock = f'self.time = 0.0\n        self.register_variable(Float64("time", {kinds}))\n        '
+        source = source.replace("self.m = 1.0", f"{clock}self.m = 1.0")
+    (folder / tool).mkdir()
+    (folder / tool / "msd.py").write_text(source, "utf-8")
+    subprocess.run([tool, "build", "-f", "msd.py", "--handle-state"], cwd=folder / tool, check=True)
+    path = folder / tool / "MassSpringDamper.fmu"
+    return {"fmu": str(path), "force": "F", "displacement": "x", "velocity": "v"}
 
 
 def body(table: dict[str, Any], **parameters: float) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -45,36 +58,58 @@ def body(table: dict[str, Any], **parameters: float) -> tuple[dict[str, Any], di
     return {**table, "parameters": parameters}, element
 
 
-def compared(beam: Any, spring: Any, **tables: Any) -> tuple[Trajectory, float]:
-    """Run a scene with foreign bodies, and with elements in their places; return the run and their difference."""
+def compared(beam: Any, spring: Any, contact: dict[str, Any]) -> tuple[Trajectory, Trajectory, float]:
+    """Run a scene with foreign bodies, and with elements in their places; return both and how far they are apart."""
     runs = []
     for kind in (0, 1):
         bodies = [place[kind] if isinstance(place, tuple) else place for place in (beam, spring)]
         if kind == 0 and "fmu" in bodies[1]:
             bodies[1] = {**bodies[1], "force_sign": -1}
-        data = {"time": {"t_end": 0.3}, "coupling": {"macro_step": 1e-3}, **tables}
+        data = {"time": {"t_end": 1.5}, "coupling": {"macro_step": 1e-3}, "contact": contact}
         runs.append(simulate(scene_from_dict({**data, "beam": bodies[0], "spring": bodies[1]})))
     fmu, element = runs
-    return fmu, max(float(np.abs(fmu[name] - element[name]).max()) for name in ("u_tip", "y"))
+    return fmu, element, max(float(np.abs(fmu[name] - element[name]).max()) for name in ("u_tip", "y"))
 
 
-def main() -> None:
-    """Print the tables."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        python = built(folder)
+def by_python(folder: Path) -> None:
+    """Print the table of FMUs by PythonFMU and draw their motion."""
+    figure, axes = plt.subplots(2, 2, figsize=(8.0, 5.0), sharex=True, layout="constrained")
+    for version in (2, 3):
+        python = built(folder, version=version)
         below = body(python, m=1.0, k=30.0, c=0.5)
         above = body(python, m=2.0, k=30.0, c=0.5, v0=-0.5)
         together = body(python, m=1.0, k=9.0, c=0.5, v0=-0.5)
-        print("PythonFMU, degree 0, H = 1e-3 s")
-        for what, beam, spring, contact in (
+        pairs = (
             ("below our beam, compliance", BEAM, below, COMPLIANCE),
             ("above our spring, link", above, SPRING, LINK),
             ("two of them, link", above, below, LINK),
             ("two of them, tie", above, together, TIE),
-        ):
-            run, apart = compared(beam, spring, contact=contact)
+        )
+        print(f"PythonFMU, FMI {version}, degree 0, H = 1e-3 s")
+        for axis, (what, beam, spring, contact) in zip(axes.flat, pairs, strict=True):
+            run, exact, apart = compared(beam, spring, contact)
             print(f"{what:32} {apart:.0e}  {run.summary['max_interface_residual']:.0e}")
+            if version == 2:
+                axis.plot(run.time, 1e3 * run.u_tip, color=BLUE, linewidth=2.5, label="upper end")
+                axis.plot(run.time, 1e3 * run.y, color=VERMILLION, linewidth=2.5, label="lower end")
+                for column in (exact.u_tip, exact.y):
+                    axis.plot(exact.time, 1e3 * column, color=BLACK, linestyle=(0, (1, 4)), linewidth=1.0)
+                axis.set_title(f"{what}: {apart:.0e} m apart", fontsize="medium")
+    axes[0, 0].plot([], [], color=BLACK, linestyle=":", label="exact elements in their places")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    for axis in axes[1]:
+        axis.set_xlabel("time [s]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("ends [mm]")
+    figure.savefig(IMAGES / "own-fmu.png", dpi=100)
+    shrink(IMAGES / "own-fmu.png")
+
+
+def main() -> None:
+    """Print the tables and draw the picture."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        by_python(folder)
         names = {key: oscillator.ALL[key] for key in ("force", "displacement", "velocity")}
         plain = {**names, "fmu": str(oscillator.made(folder / "plain.fmu", state=False, slopes=False))}
         exact = {**names, "fmu": str(oscillator.made(folder / "exact.fmu"))}
