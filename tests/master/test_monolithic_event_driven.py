@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from scenes import scene_from_dict
-from scipy.linalg import expm
 from scipy.special import ellipj, ellipk
 
 from springbeam.monolithic.event_driven import ReferenceFailure, simulate
@@ -16,6 +15,7 @@ from springbeam.monolithic.laws import Phase
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.results.trajectory import COLUMNS, EVENT_KINDS, Trajectory
 from springbeam.scene import Scene, load_scene, with_changes
+from springbeam.studies import exact
 
 
 def soft(n_elements: int = 6, **tables: dict[str, Any]) -> Scene:
@@ -77,6 +77,11 @@ def test_soft_conserves_energy_and_visits_the_phases() -> None:
     np.testing.assert_allclose(shapes[:, -1], result.u_tip, atol=1e-15)
 
 
+def linear(**tables: dict[str, Any]) -> Scene:
+    """The scene `soft` on a coarser beam and a linear spring, with changes."""
+    return soft(**{**tables, "spring": {"cubic_stiffness": 0.0, **tables.get("spring", {})}})
+
+
 CASES = {
     "damped": soft(beam={"alpha_b": 2e-3}, spring={"damping": 0.7}),
     "overdamped": soft(beam={"alpha_b": 2e-2}, spring={"damping": 5.0}),
@@ -99,6 +104,32 @@ CASES = {
         contact={"law": "compliance", "stiffness": 1e3, "exponent": 1.0},
         spring={"damping": 1.0, "external_force": -5.0},
         stop={"restitution": 0.3},
+    ),
+    "tie, on a foundation": linear(
+        contact={"law": "tie"}, stop={"restitution": 0.6}, beam={"alpha_b": 1e-4}, spring={"cubic_stiffness": 50.0}
+    ),
+    "tie, seated": linear(
+        contact={"law": "tie"}, stop={"restitution": 0.0}, beam={"alpha_b": 1e-3}, spring={"external_force": -2.0}
+    ),
+    "link, seating": linear(
+        contact={"law": "link", "stiffness": 1e4, "damping": 1.0},
+        stop={"restitution": 0.3},
+        spring={"external_force": -3.0},
+        time={"t_end": 0.3},
+    ),
+    "link, damped as its modes": linear(
+        contact={"law": "link", "stiffness": 1e3, "damping": 1.0}, beam={"alpha_b": 1e-3}, stop={"restitution": 0.8}
+    ),
+    "link, unstable spring": linear(
+        contact={"law": "link"}, spring={"linear_stiffness": -3.0, "cubic_stiffness": 2000.0}
+    ),
+    "Hunt and Crossley": linear(
+        contact={"law": "compliance", "exponent": 1.5, "damping": 0.8}, beam={"alpha_b": 1e-3}, spring={"damping": 0.2}
+    ),
+    "Hunt and Crossley, seating": linear(
+        contact={"law": "compliance", "stiffness": 1e3, "exponent": 1.0, "damping": 2.0},
+        stop={"restitution": 0.3},
+        spring={"external_force": -5.0},
     ),
 }  # fmt: skip
 
@@ -138,25 +169,11 @@ def test_stiff_damped_beam_agrees_with_radau() -> None:
 def test_tied_phase_is_the_matrix_exponential() -> None:
     """With k2 = 0 the tied phase is linear: exp of the full first-order system in nodal unknowns."""
     scene = soft(6, beam={"alpha_b": 1e-3}, spring={"cubic_stiffness": 0.0, "damping": 0.4, "external_force": -0.5})
-    d = assemble(scene.beam)  # type: ignore[arg-type]
-    M, K = d.M.toarray(), d.K.toarray()
-    N = d.size
-    v = -d.slope_shape - np.linalg.inv(M)[:, -1] * (-1.0 / (np.linalg.inv(M)[-1, -1] + 1.0))
-    D = 1e-3 * K
-    M[-1, -1] += 1.0
-    D[-1, -1] += 0.4
-    K[-1, -1] += 3.0
-    F = -0.5 * d.tip_vector
-    A = np.zeros((2 * N + 1, 2 * N + 1))
-    A[:N, N : 2 * N] = np.eye(N)
-    A[N : 2 * N, :N], A[N : 2 * N, N : 2 * N] = -np.linalg.solve(M, K), -np.linalg.solve(M, D)
-    A[N : 2 * N, -1] = np.linalg.solve(M, F)
-    start = np.concatenate([np.zeros(N), v, [1.0]])
-    times = np.array([0.01, 0.02, 0.04])
-    exact = np.array([expm(A * t) @ start for t in times])
+    d, times = assemble(scene.beam), np.array([0.01, 0.02, 0.04])  # type: ignore[arg-type]
+    y, z = exact.tied(scene, d.M.toarray(), d.K.toarray(), -d.slope_shape, times)
     result = simulate(scene, sample_times=times, t_end=0.04)
-    np.testing.assert_allclose(result.y, exact[:, N - 1], atol=1e-13)
-    np.testing.assert_allclose(result.z, exact[:, 2 * N - 1], atol=1e-12)
+    np.testing.assert_allclose(result.y, y, atol=1e-13)
+    np.testing.assert_allclose(result.z, z, atol=1e-12)
 
 
 # Impacts ----------------------------------------------------------------------------------------------------------

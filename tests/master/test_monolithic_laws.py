@@ -202,8 +202,9 @@ def test_a_tie_swings_in_the_modes_of_the_joined_system(method: str) -> None:
     times = np.linspace(0.05, 2.0, 40)
     result = simulate(scene, method=method, sample_times=times)
     d = assemble(scene.beam)  # type: ignore[arg-type]
-    expected = exact.tied(scene, d.M.toarray(), d.K.toarray(), -d.slope_shape, times)
-    np.testing.assert_allclose(result.y, expected, atol=3e-12)
+    y, z = exact.tied(scene, d.M.toarray(), d.K.toarray(), -d.slope_shape, times)
+    np.testing.assert_allclose(result.y, y, atol=3e-12)
+    np.testing.assert_allclose(result.z, z, atol=3e-11)
     assert np.max(result.y) > 0.01
     assert np.min(result.y) < -0.01
     assert np.min(result.contact_force) < -0.1
@@ -254,49 +255,6 @@ def test_a_pair_at_rest_without_inertia_stays_at_rest() -> None:
 
 
 # All of them ------------------------------------------------------------------------------------------------------
-
-PAIRS = {
-    "tie, on a foundation": soft(
-        contact={"law": "tie"}, stop={"restitution": 0.6}, beam={"alpha_b": 1e-4}, spring={"cubic_stiffness": 50.0}
-    ),
-    "tie, seated": soft(
-        contact={"law": "tie"}, stop={"restitution": 0.0}, beam={"alpha_b": 1e-3}, spring={"external_force": -2.0}
-    ),
-    "link, seating": soft(
-        contact={"law": "link", "stiffness": 1e4, "damping": 1.0},
-        stop={"restitution": 0.3},
-        spring={"external_force": -3.0},
-        time={"t_end": 0.2},
-    ),
-    "link, damped as its modes": soft(
-        contact={"law": "link", "stiffness": 1e3, "damping": 1.0}, beam={"alpha_b": 1e-3}, stop={"restitution": 0.8}
-    ),
-    "link, unstable spring": soft(
-        contact={"law": "link"}, spring={"linear_stiffness": -3.0, "cubic_stiffness": 2000.0}
-    ),
-    "Hunt and Crossley": soft(
-        contact={"law": "compliance", "exponent": 1.5, "damping": 0.8}, beam={"alpha_b": 1e-3}, spring={"damping": 0.2}
-    ),
-    "Hunt and Crossley, seating": soft(
-        contact={"law": "compliance", "stiffness": 1e3, "exponent": 1.0, "damping": 2.0},
-        stop={"restitution": 0.3},
-        spring={"external_force": -5.0},
-    ),
-}
-
-
-@pytest.mark.parametrize("name", PAIRS)
-def test_two_integrators_agree_and_the_ledger_closes(name: str) -> None:
-    scene = PAIRS[name]
-    samples = np.linspace(0.02, 0.3, 20)
-    one, two = (simulate(scene, method=method, sample_times=samples, t_end=0.3) for method in METHODS)
-    assert kinds(one) == kinds(two)
-    for a, b in zip(one.events, two.events, strict=True):
-        assert a.time == pytest.approx(b.time, abs=1e-9)
-    np.testing.assert_allclose(one.y, two.y, atol=1e-10)
-    np.testing.assert_allclose(one.u_tip, two.u_tip, atol=1e-10)
-    for result in (one, two):
-        assert result.summary["largest_relative_energy_residual"] < 1e-11
 
 
 @pytest.mark.parametrize(("name", "contact"), [("compliance", "touch"), ("compliance", "slack"), ("link", "tied")])

@@ -47,7 +47,11 @@ class _Weights:
 
 
 class LinearForm:
-    """The linear part of a phase in M-orthonormal coordinates ξ.
+    """The linear part of a phase, in the modes ξ of what moves in it.
+
+    Beam and spring side by side have the coordinates x = (a, √m y), the spring only if it moves, in which the mass is 1
+    and the stiffness diagonal. A constraint g·x = const (g: u − y of joined ends, u of a held tip) leaves the space
+    orthogonal to g, and a linear law adds its stiffness: x = basis ξ + offset with the modes of both.
 
     Attributes
     ----------
@@ -64,34 +68,63 @@ class LinearForm:
         Stiffness [N/m] of a linear law that is part of the modes, damped like them.
     outputs : (o, p) array
         J: the interface displacements that r depends on: y, then u; each if it moves and matters.
-    watched : (w, p) array
-        Displacements that events depend on: y or u, or both.
+    watched : (2, p) array
+        Displacements that events depend on, u and y.
     pressing : (p,) array
         ω² × this is what a mode adds to the contact force that must not change sign; zeros if there is none.
     """
 
     def __init__(self, system: HybridSystem, phase: Phase) -> None:
         self.system, self.phase = system, phase
-        p = system.spring
-        self.root_mass = float(np.sqrt(p.mass))
-        self.joined = system.joined(phase)
-        self.held = phase.seated and (self.joined or not system.has_spring)
-        self.spring_moves = system.has_spring and not phase.seated
+        s, p = system, system.spring
+        joined = s.joined(phase)
+        held = phase.seated and (joined or not s.has_spring)
+        self.spring_moves = s.has_spring and not phase.seated
         self.linked, self.rest = self._split()
-        self.pressed = system.law.acts(phase.contact) and self.rest != (0.0, 0.0)
-        #: Modes of M ξ-space: a = basis ξ (+ offset), and back.
-        self.offset = np.zeros(system.r)
-        if self.held:
-            self._hold()
-        elif self.joined:
-            self._join()
-        else:
-            self._separate()
+        self.pressed = s.law.acts(phase.contact) and self.rest != (0.0, 0.0)
+        self.root_mass = float(np.sqrt(p.mass))
+        omega2, constant, loads, tip, top = s.stiffness, s.load, s.loads.patterns, s.b, np.zeros(s.r)
+        if self.spring_moves:
+            omega2 = np.append(omega2, p.linear_stiffness / p.mass)
+            constant = np.append(constant, p.external_force / self.root_mass)
+            loads = np.column_stack([loads, s.loads.on_spring / self.root_mass])
+            tip, top = np.append(tip, 0.0), np.append(top, 1.0 / self.root_mass)
+        self.offset, self.pressing = np.zeros(len(omega2)), np.zeros(len(omega2))
+        if held:
+            self.offset = tip * (self._stop() / s.inverse_tip_mass)
+            constant = constant - omega2 * self.offset
+            self.pressing = omega2 * tip
+        elif self.linked > 0.0 and not self.spring_moves:
+            constant = constant + tip * (self.linked * self._stop())
+        elif joined and phase.contact == "touch":
+            self.pressing = tip
+        #: `offset` + this @ ξ = x; ``None`` where x are the modes.
+        self.basis: np.ndarray | None = None
+        if held or joined or self.linked > 0.0:
+            space = scipy.linalg.null_space((tip - top)[None]) if held or joined else np.eye(len(omega2))
+            omega2, modes = _modes(omega2, space, self.linked, tip - top)
+            self.basis = space @ modes
+            constant, loads, tip, top, self.pressing = (
+                rows @ self.basis for rows in (constant, loads, tip, top, self.pressing)
+            )
+        if held:
+            self.pressing = self.pressing / omega2
+        self.omega2, self.constant, self.loads = omega2, constant, loads
+        inputs = [top] * self.spring_moves + [tip - top] * self.pressed
+        outputs = [top] * self.spring_moves + [tip] * self.pressed
+        self.inputs, self.outputs = (np.array(rows).reshape(len(rows), len(omega2)) for rows in (inputs, outputs))
+        self.watched = np.array([tip, top])
         #: Damping of the spring that α_b × stiffness does not hold yet [N·s/m].
-        self.extra_damping = p.damping - system.alpha_b * p.linear_stiffness
-        self.oscillators = Oscillators(self.omega2, system.alpha_b)
+        self.extra_damping = p.damping - s.alpha_b * p.linear_stiffness
+        self.oscillators = Oscillators(self.omega2, s.alpha_b)
         self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
         self._cache: dict[str, _Weights] = {}
+
+    def _stop(self) -> float:
+        stop = self.system.scene.stop
+        if stop is None:
+            raise ReferenceFailure("seated without a stop")
+        return stop.position
 
     def _split(self) -> tuple[float, tuple[float, float] | None]:
         """`linked`, and the (k, c) that it leaves of a linear law; ``None`` where the law is not linear."""
@@ -106,107 +139,23 @@ class LinearForm:
             return k, (0.0, left)
         return 0.0, (k, c)
 
-    def _hold(self) -> None:
-        """The tip at φ: coordinates orthogonal to b, about the multiple of b that has the tip there."""
-        s = self.system
-        if s.scene.stop is None:
-            raise ReferenceFailure("seated without a stop")
-        self.offset = s.b * (s.scene.stop.position / s.inverse_tip_mass)
-        tangent = scipy.linalg.null_space(s.b[None, :])
-        self.omega2, modes = _modes(s.omega[:, None] * tangent)
-        self.basis = tangent @ modes
-        self.constant = self.basis.T @ (s.load - s.stiffness * self.offset)
-        self.loads = s.loads.patterns @ self.basis
-        self.inputs = self.outputs = self.watched = np.zeros((0, len(self.omega2)))
-        self.pressing = self.basis.T @ s.b
-        self._to_modes = self.basis.T
-
-    def _join(self) -> None:
-        """u = y: M = I + m bbᵀ, K = ω² + k1 bbᵀ; M's root and inverse root are known."""
-        s, p = self.system, self.system.spring
-        identity, beta, m = np.eye(s.r), s.inverse_tip_mass, p.mass
-        growth = float(np.sqrt(1.0 + m * beta))
-        projector = np.outer(s.b, s.b) / beta
-        inverse_root = identity - (1.0 - 1.0 / growth) * projector
-        if p.linear_stiffness >= 0.0:
-            factor = np.vstack([np.diag(s.omega), np.sqrt(p.linear_stiffness) * s.b])
-            self.omega2, modes = _modes(factor @ inverse_root)
-        else:
-            K = np.diag(s.stiffness) + p.linear_stiffness * np.outer(s.b, s.b)
-            self.omega2, modes = np.linalg.eigh(inverse_root @ K @ inverse_root)
-        self.basis = inverse_root @ modes
-        self._to_modes = modes.T @ (identity + (growth - 1.0) * projector)
-        self.constant = self.basis.T @ (s.load + s.b * p.external_force)
-        self.loads = (s.loads.patterns + np.outer(s.loads.on_spring, s.b)) @ self.basis
-        tip = self.basis.T @ s.b
-        self.inputs = self.outputs = self.watched = tip[None, :]
-        self.pressing = tip if self.phase.contact == "touch" else np.zeros_like(tip)
-
-    def _separate(self) -> None:
-        """Beam and spring side by side, ξ = (a, √m y); the spring only if it moves."""
-        s, p = self.system, self.system.spring
-        self.omega2, self.constant, self.loads = s.stiffness, s.load, s.loads.patterns
-        spring_row, tip_row = np.zeros(s.r), s.b
-        if self.spring_moves:
-            self.omega2 = np.append(self.omega2, p.linear_stiffness / p.mass)
-            self.constant = np.append(self.constant, p.external_force / self.root_mass)
-            self.loads = np.column_stack([self.loads, s.loads.on_spring / self.root_mass])
-            spring_row = np.append(spring_row, 1.0 / self.root_mass)
-            tip_row = np.append(tip_row, 0.0)
-        inputs, outputs = [], []
-        if self.spring_moves:
-            inputs.append(spring_row)
-            outputs.append(spring_row)
-        if self.pressed:
-            inputs.append(tip_row - spring_row)
-            outputs.append(tip_row)
-        self.inputs = np.array(inputs).reshape(len(inputs), len(self.omega2))
-        self.outputs = np.array(outputs).reshape(len(outputs), len(self.omega2))
-        self.watched = np.array([tip_row, spring_row])
-        self.pressing = np.zeros(len(self.omega2))
-        if self.linked > 0.0:
-            self._link(tip_row, spring_row)
-
-    def _link(self, tip_row: np.ndarray, spring_row: np.ndarray) -> None:
-        """From beam and spring side by side to the modes of both with `linked` between them."""
-        s, k = self.system, self.linked
-        relative = spring_row - tip_row
-        if not self.spring_moves and s.scene.stop is not None:
-            self.constant = self.constant + tip_row * (k * s.scene.stop.position)
-        if np.all(self.omega2 >= 0.0):
-            self.omega2, self.basis = _modes(np.vstack([np.diag(np.sqrt(self.omega2)), np.sqrt(k) * relative]))
-        else:
-            self.omega2, self.basis = np.linalg.eigh(np.diag(self.omega2) + k * np.outer(relative, relative))
-        self._to_modes = self.basis.T
-        self.constant = self._to_modes @ self.constant
-        self.inputs, self.outputs, self.watched, self.loads = (
-            rows @ self.basis for rows in (self.inputs, self.outputs, self.watched, self.loads)
-        )
-
     def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(ξ, ξ̇) of a state."""
         s = self.system
-        a, v = X[s.A] - self.offset, X[s.V]
-        if self.joined or self.held:
-            return self._to_modes @ a, self._to_modes @ v
+        x, x_dot = X[s.A], X[s.V]
         if self.spring_moves:
-            a, v = np.append(a, self.root_mass * X[s.Y]), np.append(v, self.root_mass * X[s.Z])
-        return (self._to_modes @ a, self._to_modes @ v) if self.linked > 0.0 else (a, v)
+            x, x_dot = np.append(x, self.root_mass * X[s.Y]), np.append(x_dot, self.root_mass * X[s.Z])
+        return (x, x_dot) if self.basis is None else ((x - self.offset) @ self.basis, x_dot @ self.basis)
 
     def unpack(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
         """States of shape (k, 2r + 5) from modes of shape (k, p); X supplies what does not move."""
         s = self.system
+        x, x_dot = (xi, xi_dot) if self.basis is None else (xi @ self.basis.T + self.offset, xi_dot @ self.basis.T)
         states = np.repeat(X[None, :], len(xi), axis=0)
-        if self.joined or self.held:
-            states[:, s.A] = xi @ self.basis.T + self.offset
-            states[:, s.V] = xi_dot @ self.basis.T
-            return s.synchronise(self.phase, states)
-        if self.linked > 0.0:
-            xi, xi_dot = xi @ self.basis.T, xi_dot @ self.basis.T
-        states[:, s.A], states[:, s.V] = xi[:, : s.r], xi_dot[:, : s.r]
+        states[:, s.A], states[:, s.V] = x[:, : s.r], x_dot[:, : s.r]
         if self.spring_moves:
-            states[:, s.Y], states[:, s.Z] = xi[:, -1] / self.root_mass, xi_dot[:, -1] / self.root_mass
-        return states
+            states[:, s.Y], states[:, s.Z] = x[:, -1] / self.root_mass, x_dot[:, -1] / self.root_mass
+        return s.synchronise(self.phase, states)
 
     def load_at(self, times: np.ndarray) -> np.ndarray:
         """The loads on the modes at ``times`` [s] of shape (...), (..., p)."""
@@ -278,10 +227,17 @@ class LinearForm:
         return min(_STEP_PHASE / fastest if fastest > 0.0 else np.inf, self.system.loads.longest_step)
 
 
-def _modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """ω² and orthonormal modes of factorᵀfactor, from singular values (see `semi_discrete`)."""
-    _, sigma, vt = scipy.linalg.svd(factor, full_matrices=False)
-    return sigma[::-1] ** 2, vt[::-1].T
+def _modes(omega2: np.ndarray, space: np.ndarray, k: float, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return ω² and orthonormal modes in ``space`` of the stiffness diag(omega2) + k rowᵀrow.
+
+    By singular values of its factor (see `semi_discrete`), unless a part of it is negative.
+    """
+    if np.all(omega2 >= 0.0):
+        factor = np.vstack([np.sqrt(omega2)[:, None] * space, np.sqrt(k) * row @ space])
+        _, sigma, vt = scipy.linalg.svd(factor, full_matrices=False)
+        return sigma[::-1] ** 2, vt[::-1].T
+    omega2, modes = np.linalg.eigh(space.T @ (np.diag(omega2) + k * np.outer(row, row)) @ space)
+    return omega2, modes
 
 
 @dataclass

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh, expm
+from scipy.linalg import expm
 from scipy.special import beta, lambertw
 
 from ..scene import Scene, scene_from_dict
@@ -103,8 +103,7 @@ def linked(scene: Scene, M: np.ndarray, K: np.ndarray, q: np.ndarray, v: np.ndar
     """Return (u, y) [m] at ``times`` [s], shape (len(times), 2), of a beam on a linear spring and a link.
 
     ``M``, ``K`` are the matrices of the beam, whose last unknown is the tip; ``q``, ``v`` its state at the start.
-    Exact: the matrix exponential of M q̈ + (α_b K + c gᵀg) q̇ + (K + λ gᵀg) q = F with the spring's unknown added,
-    p = g q.
+    Exact: M q̈ + (α_b K + c gᵀg) q̇ + (K + λ gᵀg) q = F with the spring's unknown added, p = g q.
     """
     assert scene.beam is not None
     assert scene.spring is not None
@@ -116,28 +115,46 @@ def linked(scene: Scene, M: np.ndarray, K: np.ndarray, q: np.ndarray, v: np.ndar
     g[-1], g[-2] = 1.0, -1.0
     damping += law.damping * np.outer(g, g)
     stiffness += law.stiffness * np.outer(g, g)
-    load = np.zeros(n)
-    load[-1] = spring.external_force
-    A = np.zeros((2 * n + 1, 2 * n + 1))
-    A[:n, n : 2 * n] = np.eye(n)
-    A[n : 2 * n] = -np.linalg.solve(mass, np.hstack([stiffness, damping, -load[:, None]]))
-    start = np.concatenate([q, [spring.equilibrium], v, [spring.initial_velocity, 1.0]])
-    return np.array([(expm(A * t) @ start)[[n - 2, n - 1]] for t in times])
+    start = np.append(q, spring.equilibrium), np.append(v, spring.initial_velocity)
+    return _moved(mass, damping, stiffness, spring.external_force, *start, times)[0][:, [n - 2, n - 1]]
 
 
-def tied(scene: Scene, M: np.ndarray, K: np.ndarray, v: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return y [m] at ``times`` [s] of an undamped beam tied to a linear spring at y = Ψ = 0, by their common modes.
+def tied(scene: Scene, M: np.ndarray, K: np.ndarray, v: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return y [m] and z [m/s] at ``times`` [s] of a beam tied to a linear spring at y = Ψ = 0.
 
-    ``M``, ``K`` are the matrices of the beam, whose last unknown is the tip, at rest but for the velocities ``v``; the
+    ``M``, ``K`` are the matrices of the beam, whose last unknown is the tip, undeformed with the velocities ``v``; the
     inelastic impact gives tip and spring one velocity first.
     """
+    assert scene.beam is not None
     assert scene.spring is not None
-    M, K, spring = M.copy(), K.copy(), scene.spring
+    mass, damping, stiffness, spring = M.copy(), scene.beam.alpha_b * K, K.copy(), scene.spring
     response = np.linalg.inv(M)[:, -1]  # of the velocities to a tip impulse
     v = v + response * (spring.initial_velocity - v[-1]) / (response[-1] + 1.0 / spring.mass)
-    M[-1, -1] += spring.mass
-    K[-1, -1] += spring.linear_stiffness
-    squared, modes = eigh(K, M)
-    omega = np.sqrt(squared)
-    rates = modes.T @ M @ v
-    return np.asarray(np.sin(np.outer(times, omega)) / omega * rates @ modes[-1])
+    mass[-1, -1] += spring.mass
+    damping[-1, -1] += spring.damping
+    stiffness[-1, -1] += spring.linear_stiffness
+    q, rates = _moved(mass, damping, stiffness, spring.external_force, np.zeros(len(v)), v, times)
+    return q[:, -1], rates[:, -1]
+
+
+def _moved(
+    mass: np.ndarray,
+    damping: np.ndarray,
+    stiffness: np.ndarray,
+    force: float,
+    q: np.ndarray,
+    v: np.ndarray,
+    times: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the displacements and velocities, (len(times), n), of M q̈ + D q̇ + K q = (0, …, 0, ``force``) from q, v.
+
+    By the matrix exponential.
+    """
+    n = len(q)
+    load = np.zeros((n, 1))
+    load[-1] = force
+    A = np.zeros((2 * n + 1, 2 * n + 1))
+    A[:n, n : 2 * n] = np.eye(n)
+    A[n : 2 * n] = -np.linalg.solve(mass, np.hstack([stiffness, damping, -load]))
+    states = np.array([expm(A * t) @ np.concatenate([q, v, [1.0]]) for t in times])
+    return states[:, :n], states[:, n : 2 * n]
