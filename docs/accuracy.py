@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 from pages import IMAGES, shrink, table, write_section  # beside this script
 
 from springbeam import load_scene, with_changes
+from springbeam.scene import Scene
 from springbeam.scene.automatic import choice
-from springbeam.studies.tradeoff import Point, Study, study
+from springbeam.studies.study import record_all
+from springbeam.studies.tradeoff import Point, Points, Tradeoff
 from springbeam.studies.tradeoff.picture import draw
 
 
@@ -38,10 +40,10 @@ SCHEMES = ("energy 0", "energy 1", "energy 2", "hermite 1", "hermite 2")
 
 
 def cell(point: Point | None) -> str:
-    return "none" if point is None else f"{point.configuration.name}: {1e3 * point.solve:.3g}"
+    return "none" if point is None else f"{point.name}: {1e3 * point.solve:.3g}"
 
 
-def cheapest(found: Study) -> list[str]:
+def cheapest(found: Points) -> list[str]:
     rows = []
     for best in found.cheapest():
         ratio = f"{best.ratio:.3g}" if best.ours and best.scipy else ""
@@ -49,19 +51,15 @@ def cheapest(found: Study) -> list[str]:
     return table(["error", "cheapest here: solve [ms]", "cheapest of scipy: solve [ms]", "ratio"], rows)
 
 
-def side_by_side(found: Study, macro_step: float) -> list[str]:
+def side_by_side(found: Points, scene: Scene) -> list[str]:
     """Compare error, time of events [s], energy residual and solve time over that of `energy` 0."""
     rows = []
-    for H in (4.0 * macro_step, macro_step):
-        here = {
-            p.configuration.family: p
-            for p in found.points
-            if p.configuration.scene.coupling.macro_step == H and p.configuration.setting.startswith("H = ")
-        }
+    for H in (4.0 * scene.coupling.H, scene.coupling.H):
+        here = {p.family: p for p in found.points if p.macro_step == H and p.setting.startswith("H = ")}
         if "energy 0" not in here:
             continue
         cells = [compared(here.get(name), here["energy 0"]) for name in SCHEMES]
-        rows.append([f"{H:.3g}", *cells, taken(found, H)])
+        rows.append([f"{H:.3g}", *cells, taken(scene, H)])
     return table(["H [s]", *SCHEMES, "auto takes"], rows)
 
 
@@ -72,8 +70,8 @@ def compared(point: Point | None, base: Point) -> str:
     return f"{point.displacement:.0e}, {e.event_time:.0e}, {e.energy:.0e}, {point.solve / base.solve:.1f}"
 
 
-def taken(found: Study, H: float) -> str:
-    auto = choice(with_changes(found.scene, coupling={"macro_step": H}))
+def taken(scene: Scene, H: float) -> str:
+    auto = choice(with_changes(scene, coupling={"macro_step": H}))
     return f"`{auto.scheme}` {auto.degree}"
 
 
@@ -83,14 +81,16 @@ def main(names: list[str]) -> None:
     for name in names or list(WINDOWS):
         window = WINDOWS[name]
         scene = with_changes(load_scene(window.scene), **window.changes)
-        found = study(scene, window.until)
+        study = Tradeoff.of(scene, window.until)
+        records = record_all(study)
+        found, remarks = study.judged(records), study.notes(records)
         picture = IMAGES / f"tradeoff-{name}.png"
-        draw(found, picture)
+        draw(study.scene, found, remarks, picture)
         shrink(picture)
-        notes = [f"* {note}" for note in found.notes]
-        lines = [*cheapest(found), "", *side_by_side(found, scene.coupling.H), *([""] if notes else []), *notes]
+        notes = [f"* {note}" for note in remarks]
+        lines = [*cheapest(found), "", *side_by_side(found, study.scene), *([""] if notes else []), *notes]
         write_section("accuracy.md", name, lines)
-        print(f"{name}, up to t = {found.scene.time.t_end:.6g} s", *lines, "", sep="\n", flush=True)
+        print(f"{name}, up to t = {study.scene.time.t_end:.6g} s", *lines, "", sep="\n", flush=True)
 
 
 if __name__ == "__main__":

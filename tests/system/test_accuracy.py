@@ -22,7 +22,7 @@ from springbeam.studies.accuracy import simulate
 from springbeam.studies.crosscheck import crosscheck, orders
 from springbeam.studies.stability.predict import predict
 from springbeam.studies.sweep import row
-from springbeam.studies.tradeoff import study
+from springbeam.studies.tradeoff import Tradeoff
 
 sys.path.append(str(Path(__file__).parents[1] / "campaign"))
 import judge
@@ -293,10 +293,10 @@ def test_each_run_of_a_sweep_picks_its_own():
 
 def test_tradeoff_leaves_the_accuracy_out_and_says_so(asking):
     """Each configuration once had the name of one and the settings that were picked."""
-    found = study(load_scene(asking), repeats=1)
-    assert any("accuracy = 0.0001 is left out" in note for note in found.notes)
-    calls = {p.configuration.setting: p.macro_steps for p in found.points if p.configuration.family == "energy 0"}
-    assert len(set(calls.values())) == len(calls) == 4
+    study = Tradeoff.of(load_scene(asking), repeats=1)
+    assert study.remarks == ("accuracy = 0.0001 is left out: each configuration has its own scheme and steps",)
+    calls = [point["macro_steps"] for point in study.record(study.cases()["energy 0"])["points"]]
+    assert len(set(calls)) == len(calls) == 4
 
 
 def test_a_prediction_says_that_the_accuracy_picks_otherwise(asking):

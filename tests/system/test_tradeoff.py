@@ -13,6 +13,8 @@ from commands import command
 from springbeam.monolithic import event_driven
 from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.studies import tradeoff
+from springbeam.studies.study import record_all
+from springbeam.studies.tradeoff import Tradeoff
 from springbeam.studies.tradeoff.configurations import configurations
 from springbeam.studies.tradeoff.errors import errors
 
@@ -20,15 +22,16 @@ from springbeam.studies.tradeoff.errors import errors
 @pytest.fixture(scope="module")
 def found():
     scene = with_changes(load_scene("soft"), beam={"n_elements": 6}, coupling={"macro_step": 1e-3})
-    return tradeoff.study(scene, until=0.06, repeats=1)
+    study = Tradeoff.of(scene, until=0.06, repeats=1)
+    return study.judged(record_all(study))
 
 
 def by_family(found, family):
-    return [p for p in found.points if p.configuration.family == family]
+    return [p for p in found.points if p.family == family]
 
 
 def test_the_sweep_covers_every_axis(found):
-    families = {p.configuration.family for p in found.points}
+    families = {p.family for p in found.points}
     assert {"energy 0", "energy 1", "energy 2", "hermite 1", "hermite 2"} <= families
     assert {
         "energy 2, IDA 1e-04",
@@ -62,17 +65,13 @@ def test_no_point_beats_the_front(found):
     front = found.front()
     assert len(front) >= 3
     for point in found.points:
-        if not point.configuration.refined and point.displacement < 0.1:
+        if not point.refined and point.displacement < 0.1:
             assert any(f.solve <= point.solve and f.displacement <= point.displacement for f in front)
 
 
 def test_choices_are_the_cheapest_that_keep_the_error(found):
     for choice in found.cheapest():
-        good = [
-            p
-            for p in found.points
-            if p.displacement <= choice.target and not p.configuration.refined and not p.configuration.monolithic
-        ]
+        good = [p for p in found.points if p.displacement <= choice.target and not p.refined and not p.monolithic]
         assert (choice.ours is None) == (not good)
         if choice.ours is not None:
             assert choice.ours.solve == min(p.solve for p in good)
@@ -83,7 +82,7 @@ def test_choices_are_the_cheapest_that_keep_the_error(found):
 def test_modes_converge_to_the_mesh_and_not_beyond(found):
     modes = by_family(found, "modes")
     assert [p.displacement for p in modes] == sorted((p.displacement for p in modes), reverse=True)
-    own = next(p for p in by_family(found, "elements of degree 1") if p.configuration.setting == "6")
+    own = next(p for p in by_family(found, "elements of degree 1") if p.setting == "6")
     assert all(p.displacement > 0.5 * own.displacement for p in modes)
 
 
@@ -107,7 +106,7 @@ def test_the_reference_has_no_error_and_a_shifted_one_has():
 )
 def test_a_scene_without_a_reference_is_refused(tables, word):
     with pytest.raises(SceneError, match=word):
-        tradeoff.study(with_changes(load_scene("soft"), **tables))
+        Tradeoff.of(with_changes(load_scene("soft"), **tables))
 
 
 def test_compliance_is_swept_with_the_ordinary_exchanges():
@@ -154,21 +153,28 @@ def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
     """With no time at all every run is given up: one of each family is begun, and none is judged."""
     monkeypatch.setattr(tradeoff, "_LIMIT", 0.0)
     monkeypatch.setattr(tradeoff, "_LIMIT_FINER", 0.0)
-    scene = with_changes(load_scene("soft"), beam={"n_elements": 4})
-    late = tradeoff.study(scene, until=0.02, repeats=1)
-    same = [c for c in configurations(late.scene) if not c.refined and c.method != "Algorithm 1"]
-    families = {c.family for c in same}
-    points = [p for p in late.points if p.configuration in same]
-    assert sorted(p.configuration.family for p in points) == sorted(families)
-    assert all(p.errors is None for p in points)
-    assert all("takes more than 0 s" in p.cause or "diverges" in p.cause for p in points)
-    assert late.notes[0].startswith("given up after 0 s")
-    assert all(family in late.notes[0] for family in families)
+    late = Tradeoff.of(with_changes(load_scene("soft"), beam={"n_elements": 4}), until=0.02)
+    cases = late.cases()
+    records = {name: late.record(cases[name]) for name in cases if name != "Algorithm 1"}
+    models = records.pop("modes and elements")
+    assert models["points"] == [] or all(point["cause"] for point in models["points"])
+    for name, record in records.items():
+        (point,) = record["points"]
+        assert (point["family"], point["errors"]) == (name, None)
+        assert "takes more than 0 s" in point["cause"] or "diverges" in point["cause"]
+        assert record["notes"] == [f"given up after 0 s, finer ones of their kind not run: {name}, {point['setting']}"]
 
 
 def test_models_are_left_out_if_their_reference_takes_too_long(monkeypatch):
     monkeypatch.setattr(tradeoff, "_LIMIT_FINER", 0.0)
-    scene = with_changes(load_scene("soft"), beam={"n_elements": 4})
-    late = tradeoff.study(scene, until=0.02, repeats=1)
-    assert not [p for p in late.points if p.configuration.refined]
-    assert "the reference takes more than 0 s" in late.notes[-1]
+    late = Tradeoff.of(with_changes(load_scene("soft"), beam={"n_elements": 4}), until=0.02, repeats=1)
+    record = late.record(late.cases()["modes and elements"])
+    assert record["points"] == []
+    assert "the reference takes more than 0 s" in record["notes"][-1]
+
+
+def test_quick_takes_every_third_of_a_family():
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 6}, coupling={"macro_step": 1e-3})
+    whole, quick = (Tradeoff.of(scene, until=0.06, quick=quick).cases() for quick in (False, True))
+    assert quick["energy 0"] == whole["energy 0"][::3]
+    assert quick.keys() == whole.keys()

@@ -41,6 +41,7 @@ FILE = "study.jsonl"
 #: Where `study_in` finds each kind.
 _STUDIES = {
     "sweep": ".sweep:Sweep",
+    "tradeoff": ".tradeoff:Tradeoff",
     "converge": ".converge:Converge",
     "stability": ".stability.grid:Grid",
     "orders": ".crosscheck.orders:Orders",

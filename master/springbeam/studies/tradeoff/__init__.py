@@ -7,15 +7,15 @@ mesh. scipy's solvers and the paper's Algorithm 1 run in the same process on the
 
 from __future__ import annotations
 
-import csv
 import statistics
-from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+from rich.text import Text
 
 from ...monolithic import algorithm1, event_driven
 from ...results.trajectory import Trajectory
@@ -24,14 +24,15 @@ from ...run.runner import simulate
 from ...scene import Scene, SceneError, with_changes
 from ...scene.resolution import mesh_frequency
 from ..reference import comparable_until, refuse_without_reference
-from .configurations import ALGORITHM_1, Configuration, configurations, finer
+from ..study import Found, Record, Study
+from ..tables import write_csv
+from .configurations import ALGORITHM_1, SCIPY_TOLERANCES, Configuration, configurations, finer
 from .errors import Errors, errors
+from .points import Point, Points
 
-__all__ = ["TARGETS", "Cheapest", "Point", "Study", "study", "write_csv"]
+__all__ = ["Point", "Points", "Tradeoff"]
 
-#: Relative errors for which the table names the cheapest configuration.
-TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
-#: A run that takes longer than this is given up, and finer ones of its family are not begun [s].
+#: A run that takes longer than this is given up, and finer ones of its family are not begun [s]; quick: ten times less.
 _LIMIT = 10.0
 #: So long the reference on a finer mesh may take [s].
 _LIMIT_FINER = 60.0
@@ -41,154 +42,146 @@ _TIMED_ONCE = 3.0
 _EXPLICIT, _MOST_TURNS = ("DOP853", "LSODA"), 1e5
 #: Rows of a run of adaptive steps that are compared, about.
 _ADAPTIVE_ROWS = 60
+#: The case that holds all configurations whose model varies: they share one costly reference.
+_MODELS = "modes and elements"
 
 
-@dataclass(frozen=True)
-class Point:
-    """A configuration, its errors and its cost."""
+class Tradeoff(Study):
+    """All configurations of a scene; a case is a family of them, coarse to fine."""
 
-    configuration: Configuration
-    errors: Errors | None  #: ``None`` if the run stopped early
-    cause: str  #: why it stopped, or empty
-    solve: float  #: median wall time [s] from the start to the end of the window
-    solve_spread: float  #: largest minus smallest [s]
-    setup: float  #: wall time before the first step [s]: loading and initialising FMUs, or the modal decomposition
-    macro_steps: int = 0
-    beam_steps: int = 0  #: doStep calls, those that were rolled back included
-    spring_steps: int = 0
-    rollbacks: int = 0
-    ida_steps: int = 0
-
-    @property
-    def do_steps(self) -> int:
-        """doStep calls of both FMUs."""
-        return self.beam_steps + self.spring_steps
-
-    @property
-    def displacement(self) -> float:
-        return float("inf") if self.errors is None else self.errors.displacement
-
-
-@dataclass(frozen=True)
-class Cheapest:
-    """The cheapest ways to an error, by this package and by scipy's solvers; ``None`` where none gets there."""
-
-    target: float
-    ours: Point | None
-    scipy: Point | None
-
-    @property
-    def ratio(self) -> float:
-        if self.ours is None or self.scipy is None:
-            return float("nan")
-        return self.scipy.solve / self.ours.solve
-
-
-@dataclass
-class Study:
-    """What `study` found."""
+    kind: ClassVar[str] = "tradeoff"
 
     scene: Scene  #: ends with the compared window
-    points: list[Point]
-    notes: list[str] = field(default_factory=list)
+    repeats: int = 3  #: timings of each configuration, taken in turn; their median counts. 1 if quick
+    reach: float = 1.0  #: largest displacement [m]; scipy's absolute tolerances are relative to it
+    remarks: tuple[str, ...] = ()
 
-    def front(self) -> list[Point]:
-        """Return the Pareto front, the cheapest first: no other point is both quicker and more accurate.
+    @classmethod
+    def of(cls, scene: Scene, until: float | None = None, **settings: Any) -> Tradeoff:
+        """Return the study of ``scene`` up to ``until`` [s], or as far as it can be compared.
 
-        Errors of a tenth of the motion and more are no results.
+        Raises
+        ------
+        SceneError
+            If no reference is defined for the scene.
         """
-        best, front = 0.1, []
-        for point in sorted((p for p in self.points if not p.configuration.refined), key=lambda p: p.solve):
-            if point.displacement < best:
-                best = point.displacement
-                front.append(point)
-        return front
+        if scene.contact.law == "paper":
+            raise SceneError("[contact] law = \"paper\": Algorithm 1 has no exact solution to compare with; "
+                             'law = "transmission" or "compliance" has')  # fmt: skip
+        refuse_without_reference(scene)
+        window = comparable_until(scene) if until is None else min(until, scene.time.t_end)
+        remarks = []
+        if scene.accuracy is not None:
+            remarks.append(
+                f"accuracy = {scene.accuracy:g} is left out: each configuration has its own scheme and steps"
+            )
+        scene = with_changes(scene, accuracy=None, time={"t_end": window})
+        return cls(scene=scene, reach=_largest_displacement(scene), remarks=tuple(remarks), **settings)
 
-    def cheapest(self) -> list[Cheapest]:
-        """Return the cheapest configurations for each of `TARGETS`."""
+    def cases(self) -> dict[str, list[Configuration]]:
+        """Return the configurations by family, without those that would take too long; every third if quick."""
+        found: dict[str, list[Configuration]] = {}
+        families: dict[str, int] = {}
+        for configuration in configurations(self.scene):
+            place = families[configuration.family] = families.get(configuration.family, -1) + 1
+            if not _hopeless(configuration) and not (self.quick and place % 3):
+                found.setdefault(_MODELS if configuration.refined else configuration.family, []).append(configuration)
+        return found
 
-        def best(points: Iterable[Point], target: float) -> Point | None:
-            good = [p for p in points if p.displacement <= target]
-            return min(good, key=lambda p: p.solve, default=None)
+    def cost(self) -> str:
+        """Say how many configurations there are."""
+        cases, repeats = self.cases(), 1 if self.quick else self.repeats
+        return (
+            f"{sum(map(len, cases.values()))} configurations of {len(cases)} kinds, timed {repeats}×; finer ones of a "
+            "kind are left out after one that takes too long"
+        )
 
-        same = [p for p in self.points if not p.configuration.refined]
-        ours = [p for p in same if not p.configuration.monolithic]
-        theirs = [p for p in same if p.configuration.monolithic and p.configuration.method != ALGORITHM_1]
-        return [Cheapest(target, best(ours, target), best(theirs, target)) for target in TARGETS]
+    def record(self, case: Sequence[Configuration]) -> Record:
+        """Run, time and judge the configurations of a case."""
+        runs: dict[Configuration, Trajectory | str] = {}
+        timings: dict[Configuration, list[tuple[float, float]]] = {}
+        given_up: dict[str, Configuration] = {}
+        limit = 0.1 * _LIMIT if self.quick else _LIMIT
+        for repeat in range(1 if self.quick else self.repeats):
+            for configuration in case:
+                if repeat == 0 and configuration.family in given_up:
+                    continue
+                if repeat > 0 and (
+                    not isinstance(runs.get(configuration), Trajectory) or timings[configuration][0][0] > _TIMED_ONCE
+                ):
+                    continue
+                run, solve, setup = _run(configuration, self.reach)
+                runs.setdefault(configuration, run)
+                timings.setdefault(configuration, []).append((solve, setup))
+                if repeat == 0 and solve > limit:
+                    given_up[configuration.family] = configuration
+        notes = []
+        if given_up:
+            names = "; ".join(c.name for c in given_up.values())
+            notes.append(f"given up after {limit:g} s, finer ones of their kind not run: {names}")
+        points: list[Point] = []
+        try:
+            points = self._judged(runs, timings)
+        except event_driven.ReferenceFailure as failed:
+            if not case[0].refined:
+                raise
+            notes.append(f"modes and elements not judged: on a finer mesh the reference {failed}")
+        return {"points": [asdict(point) for point in points], "notes": notes}
 
+    def _judged(
+        self,
+        runs: dict[Configuration, Trajectory | str],
+        timings: dict[Configuration, list[tuple[float, float]]],
+    ) -> list[Point]:
+        # scipy is timed without rows; its errors are those of the same steps, sampled.
+        grid = np.linspace(self.scene.contact_time or 0.0, self.scene.time.t_end, 401)
+        found = {
+            c: _scipy(c, self.reach, grid) if isinstance(run, Trajectory) and c.method in SCIPY_TOLERANCES else run
+            for c, run in runs.items()
+        }
+        times = [_judged_times(c, run) for c, run in found.items() if isinstance(run, Trajectory)]
+        reference: Trajectory | None = None
+        if times:
+            refined = next(iter(runs)).refined
+            model = finer(self.scene) if refined else self.scene
+            assert model is not None
+            reference = event_driven.simulate(
+                model,
+                sample_times=np.unique(np.concatenate([grid, *times])),
+                time_limit=_LIMIT_FINER if refined else None,
+            )
+        return [_point(c, run, reference, timings[c]) for c, run in found.items()]
 
-#: ``progress(done, total, name)``.
-Progress = Callable[[int, int, str], None]
+    def judged(self, records: Mapping[str, Record]) -> Points:
+        """Return all points."""
+        return Points([Point.of(point) for record in records.values() for point in record["points"]])
 
+    def notes(self, records: Mapping[str, Record]) -> list[str]:
+        """Return what was left out, and why."""
+        notes = [*self.remarks, *(note for record in records.values() for note in record["notes"])]
+        if hopeless := dict.fromkeys(c.method for c in configurations(self.scene) if _hopeless(c)):
+            turns = f"explicit steps would follow the mesh's fastest mode over {_MOST_TURNS:g} rad"
+            notes.append(f"not run, {turns}: {', '.join(hopeless)}")
+        return notes
 
-def study(
-    scene: Scene, until: float | None = None, repeats: int = 3, progress: Progress | None = None, *, quick: bool = False
-) -> Study:
-    """Run ``scene`` in all its configurations, and judge and time each.
+    def found(self, records: Mapping[str, Record]) -> Found:
+        """Name the cheapest configurations, and those that nothing beats."""
+        found, notes, until = self.judged(records), self.notes(records), self.scene.time.t_end
+        title = f"{self.scene.title}: up to t = {until:.6g} s, {len(found.points)} configurations"
+        shown = [Text(title), *found.tables(), *(Text(f"note      {note}") for note in notes)]
+        return Found({"until": until, **found.document(), "notes": notes}, shown)
 
-    Parameters
-    ----------
-    scene
-        Any but one of law `paper`.
-    until
-        End of the compared window [s]; default `comparable_until`.
-    repeats
-        Timings of each configuration, taken in turn; their median counts.
-    progress
-        Called before each run.
-    quick
-        Takes every third configuration of each family only, times each once, and gives up a family ten times sooner.
+    def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
+        """Write a row per point, and draw the work–precision diagrams."""
+        from .picture import draw
 
-    Raises
-    ------
-    SceneError
-        If no reference is defined for the scene.
-    """
-    if scene.contact.law == "paper":
-        raise SceneError("[contact] law = \"paper\": Algorithm 1 has no exact solution to compare with; "
-                         'law = "transmission" or "compliance" has')  # fmt: skip
-    refuse_without_reference(scene)
-    window = comparable_until(scene) if until is None else min(until, scene.time.t_end)
-    notes = []
-    if scene.accuracy is not None:
-        notes.append(f"accuracy = {scene.accuracy:g} is left out: each configuration has its own scheme and steps")
-    scene = with_changes(scene, accuracy=None, time={"t_end": window})
-    every, limit = configurations(scene), _LIMIT
-    if quick:
-        families: dict[str, list[Configuration]] = {}
-        for configuration in every:
-            families.setdefault(configuration.family, []).append(configuration)
-        every, repeats, limit = [c for family in families.values() for c in family[::3]], 1, 0.1 * _LIMIT
-    hopeless = [c for c in every if _hopeless(c)]
-    todo = [c for c in every if c not in hopeless]
-    total, done = len(todo) * repeats, 0
-    runs: dict[Configuration, Trajectory | str] = {}
-    timings: dict[Configuration, list[tuple[float, float]]] = {}
-    given_up: dict[str, Configuration] = {}
-    reach = _largest_displacement(scene)
-    for repeat in range(repeats):
-        for configuration in todo:
-            done += 1
-            if progress is not None:
-                progress(done, total, configuration.name)
-            if repeat == 0 and configuration.family in given_up:
-                continue
-            if repeat > 0 and (
-                not isinstance(runs.get(configuration), Trajectory) or timings[configuration][0][0] > _TIMED_ONCE
-            ):
-                continue
-            run, solve, setup = _run(configuration, window, reach)
-            runs.setdefault(configuration, run)
-            timings.setdefault(configuration, []).append((solve, setup))
-            if repeat == 0 and solve > limit:
-                given_up[configuration.family] = configuration
-    if given_up:
-        names = "; ".join(c.name for c in given_up.values())
-        notes.append(f"given up after {limit:g} s, finer ones of their kind not run: {names}")
-    if hopeless:
-        names = ", ".join(dict.fromkeys(c.method for c in hopeless))
-        notes.append(f"not run, explicit steps would follow the mesh's fastest mode over {_MOST_TURNS:g} rad: {names}")
-    return _judged(scene, todo, runs, timings, reach, notes)
+        found = self.judged(records)
+        front = found.front()
+        rows = [{**point.row(), "on_front": point in front, "cause": point.cause} for point in found.points]
+        files = [write_csv(directory / "tradeoff.csv", rows)]
+        if pictures:
+            files.append(draw(self.scene, found, self.notes(records), directory / "tradeoff.png"))
+        return files
 
 
 def _hopeless(configuration: Configuration) -> bool:
@@ -205,7 +198,7 @@ def _largest_displacement(scene: Scene) -> float:
     return max((float(np.abs(run[name]).max()) for name in ("u_tip", "y") if name in run.columns), default=1.0) or 1.0
 
 
-def _run(configuration: Configuration, window: float, reach: float) -> tuple[Trajectory | str, float, float]:
+def _run(configuration: Configuration, reach: float) -> tuple[Trajectory | str, float, float]:
     """Return the result or why it stopped, the solve time [s] and the setup time [s]."""
     scene = configuration.scene
     began = perf_counter()
@@ -219,12 +212,8 @@ def _run(configuration: Configuration, window: float, reach: float) -> tuple[Tra
             run = algorithm1.simulate(scene)
             solve = float(run.summary["newton"]["time_per_step"]) * (len(run) - 1)
             return run, solve, perf_counter() - began - solve
-        if configuration.monolithic:
-            rtol = configuration.rtol
-            run = event_driven.simulate(
-                scene, method=configuration.method, rtol=rtol, atol=1e-3 * rtol * reach, nodes=2, sample_times=[window],
-                time_limit=_LIMIT,
-            )  # fmt: skip
+        if configuration.method in SCIPY_TOLERANCES:
+            run = _scipy(configuration, reach, [scene.time.t_end], _LIMIT)
             return run, float(run.summary["wall_time"]), perf_counter() - began - float(run.summary["wall_time"])
         run = simulate(scene, limited)
         return run, float(run.summary["wall_time"]), float(run.summary["setup_time"])
@@ -232,41 +221,14 @@ def _run(configuration: Configuration, window: float, reach: float) -> tuple[Tra
         return str(stopped), perf_counter() - began, 0.0
 
 
-def _judged(
-    scene: Scene,
-    todo: list[Configuration],
-    runs: dict[Configuration, Trajectory | str],
-    timings: dict[Configuration, list[tuple[float, float]]],
-    reach: float,
-    notes: list[str],
-) -> Study:
-    grid = np.linspace(scene.contact_time or 0.0, scene.time.t_end, 401)
-    results = {c: r for c, r in runs.items() if isinstance(r, Trajectory)}
-    references: dict[bool, Trajectory] = {}
-    for refined in (False, True):
-        model = finer(scene) if refined else scene
-        times = [_judged_times(c, r) for c, r in results.items() if c.refined == refined and not _scipy(c)]
-        if model is None or not (times or not refined):
-            continue
-        samples = np.unique(np.concatenate([grid, *times]))
-        try:
-            references[refined] = event_driven.simulate(
-                model, sample_times=samples, time_limit=_LIMIT_FINER if refined else None
-            )
-        except event_driven.ReferenceFailure as failed:
-            if not refined:
-                raise
-            notes.append(f"modes and elements not judged: on a finer mesh the reference {failed}")
-    points = []
-    for configuration in todo:
-        run = runs.get(configuration)
-        if run is None or configuration.refined not in references:
-            continue
-        if isinstance(run, Trajectory) and _scipy(configuration):
-            # Timed without rows; its errors are those of the same steps, sampled.
-            run = _sampled(configuration, grid, reach)
-        points.append(_point(configuration, run, references, timings[configuration]))
-    return Study(scene, points, notes)
+def _scipy(
+    configuration: Configuration, reach: float, times: Sequence[float] | np.ndarray, limit: float | None = None
+) -> Trajectory:
+    rtol = configuration.rtol
+    return event_driven.simulate(
+        configuration.scene, method=configuration.method, rtol=rtol, atol=1e-3 * rtol * reach, nodes=2,
+        sample_times=times, time_limit=limit,
+    )  # fmt: skip
 
 
 def _judged_times(configuration: Configuration, run: Trajectory) -> np.ndarray:
@@ -275,66 +237,40 @@ def _judged_times(configuration: Configuration, run: Trajectory) -> np.ndarray:
     return np.asarray(run.time[::every])
 
 
-def _scipy(configuration: Configuration) -> bool:
-    return configuration.monolithic and configuration.method != ALGORITHM_1
-
-
-def _sampled(configuration: Configuration, grid: np.ndarray, reach: float) -> Trajectory | str:
-    rtol = configuration.rtol
-    try:
-        return event_driven.simulate(
-            configuration.scene, method=configuration.method, rtol=rtol, atol=1e-3 * rtol * reach, nodes=2,
-            sample_times=grid,
-        )  # fmt: skip
-    except event_driven.ReferenceFailure as failed:
-        return str(failed)
-
-
 def _point(
     configuration: Configuration,
     run: Trajectory | str,
-    references: dict[bool, Trajectory],
+    reference: Trajectory | None,
     timing: list[tuple[float, float]],
 ) -> Point:
     solves = [solve for solve, _ in timing]
-    solve, spread = statistics.median(solves), max(solves) - min(solves)
-    setup = statistics.median(setup for _, setup in timing)
+    beam, size = configuration.scene.beam, configuration.scene.coupling.macro_step
+    counts, cause = {}, ""
+    found: Errors | None = None
     if isinstance(run, str):
-        return Point(configuration, None, run, solve, spread, setup)
-    summary = run.summary
-    size = configuration.scene.coupling.macro_step
-    if size is None:
-        size = float(run.time[-1] - run.time[0]) / max(1, int(summary["macro_steps"]))
-    found = errors(run, references[configuration.refined], size)
+        cause = run
+    elif reference is not None:
+        summary = run.summary
+        counts = {
+            "macro_steps": int(summary.get("macro_steps", 0)),
+            "beam_steps": int(summary.get("beam_steps", 0)),
+            "spring_steps": int(summary.get("spring_steps", 0)),
+            "rollbacks": int(summary.get("beam_rollbacks", 0)) + int(summary.get("spring_rollbacks", 0)),
+            "ida_steps": int(summary.get("spring_internal_steps", 0)),
+        }
+        mean = float(run.time[-1] - run.time[0]) / max(1, counts["macro_steps"])
+        found = errors(run, reference, mean if size is None else size)
     return Point(
-        configuration, found, "", solve, spread, setup,
-        macro_steps=int(summary.get("macro_steps", 0)),
-        beam_steps=int(summary.get("beam_steps", 0)),
-        spring_steps=int(summary.get("spring_steps", 0)),
-        rollbacks=int(summary.get("beam_rollbacks", 0)) + int(summary.get("spring_rollbacks", 0)),
-        ida_steps=int(summary.get("spring_internal_steps", 0)),
-    )  # fmt: skip
-
-
-def write_csv(found: Study, path: Path) -> None:
-    """Write one row per point; empty where a quantity does not apply."""
-    names = [*Errors.__dataclass_fields__]
-    costs = ["solve", "solve_spread", "setup", "macro_steps", "beam_steps", "spring_steps", "rollbacks", "ida_steps"]
-    front = found.front()
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["family", "setting", "against", *names, *costs, "on_front", "cause"])
-        for point in found.points:
-            values: dict[str, Any] = {} if point.errors is None else asdict(point.errors)
-            against = "finer mesh" if point.configuration.refined else "same model"
-            writer.writerow([
-                point.configuration.family, point.configuration.setting, against,
-                *(_cell(values.get(name)) for name in names),
-                *(_cell(getattr(point, name)) for name in costs), point in front, point.cause,
-            ])  # fmt: skip
-
-
-def _cell(value: float | None) -> str:
-    if value is None or (isinstance(value, float) and not np.isfinite(value)):
-        return ""
-    return str(value) if isinstance(value, int) else f"{value:.6g}"
+        family=configuration.family,
+        setting=configuration.setting,
+        method=configuration.method,
+        refined=configuration.refined,
+        unknowns=0 if beam is None else beam.modes_kept,
+        macro_step=size,
+        errors=found,
+        cause=cause,
+        solve=statistics.median(solves),
+        solve_spread=max(solves) - min(solves),
+        setup=statistics.median(setup for _, setup in timing),
+        **counts,
+    )

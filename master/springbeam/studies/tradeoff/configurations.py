@@ -46,16 +46,6 @@ class Configuration:
     def name(self) -> str:
         return f"{self.family}, {self.setting}"
 
-    @property
-    def unknowns(self) -> int:
-        """Unknowns of the beam as integrated: modes kept, or all degrees of freedom of the mesh."""
-        beam = self.scene.beam
-        return 0 if beam is None else beam.modes_kept
-
-    @property
-    def monolithic(self) -> bool:
-        return self.method != "co-simulation"
-
 
 def configurations(scene: Scene) -> list[Configuration]:
     """Return the configurations for a scene, without those that the scene cannot have."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +36,15 @@ class Errors:
     def displacement(self) -> float:
         """Return the larger of the maximum errors of u_tip and y."""
         return float(np.nanmax([self.u_tip_max, self.y_max]))
+
+    @classmethod
+    def of(cls, known: Mapping[str, float | None]) -> Errors:
+        """Return the errors whose `known` values are these."""
+        return cls(**{name: math.nan if value is None else value for name, value in known.items()})
+
+    def known(self) -> dict[str, float | None]:
+        """Return the errors, ``None`` in place of NaN."""
+        return {name: value if math.isfinite(value) else None for name, value in vars(self).items()}
 
 
 def errors(run: Trajectory, reference: Trajectory, macro_step: float) -> Errors:

@@ -1,0 +1,153 @@
+"""The points of a tradeoff: each a configuration with its errors and its cost, and what they say together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rich.table import Table
+
+from ..tables import table
+from .configurations import ALGORITHM_1
+from .errors import Errors
+
+#: Relative errors for which the cheapest configuration is named.
+TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
+#: Columns of the CSV file.
+_COSTS = ("solve", "solve_spread", "setup", "macro_steps", "beam_steps", "spring_steps", "rollbacks", "ida_steps")
+
+
+@dataclass(frozen=True)
+class Point:
+    """A configuration, its errors and its cost."""
+
+    family: str
+    setting: str
+    method: str
+    refined: bool  #: judged by the reference on a finer mesh
+    unknowns: int  #: of the beam as integrated
+    macro_step: float | None  #: H [s]; ``None`` where tolerances choose it
+    errors: Errors | None  #: ``None`` if the run stopped early
+    cause: str  #: why it stopped, or empty
+    solve: float  #: median wall time [s] from the start to the end of the window
+    solve_spread: float  #: largest minus smallest [s]
+    setup: float  #: wall time before the first step [s]: loading and initialising FMUs, or the modal decomposition
+    macro_steps: int = 0
+    beam_steps: int = 0  #: doStep calls, those that were rolled back included
+    spring_steps: int = 0
+    rollbacks: int = 0
+    ida_steps: int = 0
+
+    @property
+    def name(self) -> str:
+        return f"{self.family}, {self.setting}"
+
+    @property
+    def monolithic(self) -> bool:
+        return self.method != "co-simulation"
+
+    @property
+    def do_steps(self) -> int:
+        """doStep calls of both FMUs."""
+        return self.beam_steps + self.spring_steps
+
+    @property
+    def displacement(self) -> float:
+        return float("inf") if self.errors is None else self.errors.displacement
+
+    @classmethod
+    def of(cls, record: Mapping[str, Any]) -> Point:
+        """Return the point of a record."""
+        errors = record["errors"]
+        return cls(**{**record, "errors": None if errors is None else Errors.of(errors)})
+
+    def row(self) -> dict[str, Any]:
+        """Return the row of the CSV file."""
+        against = "finer mesh" if self.refined else "same model"
+        errors = dict.fromkeys(Errors.__dataclass_fields__) if self.errors is None else self.errors.known()
+        costs = {name: getattr(self, name) for name in _COSTS}
+        return {"family": self.family, "setting": self.setting, "against": against, **errors, **costs}
+
+    def summary(self) -> dict[str, Any]:
+        """Return what is said of it to programs."""
+        return {"name": self.name, "error": self.displacement, "solve": self.solve, "setup": self.setup}
+
+
+@dataclass(frozen=True)
+class Cheapest:
+    """The cheapest ways to an error, by this package and by scipy's solvers; ``None`` where none gets there."""
+
+    target: float
+    ours: Point | None
+    scipy: Point | None
+
+    @property
+    def ratio(self) -> float:
+        if self.ours is None or self.scipy is None:
+            return float("nan")
+        return self.scipy.solve / self.ours.solve
+
+
+@dataclass(frozen=True)
+class Points:
+    """The points of a tradeoff, judged together."""
+
+    points: list[Point]
+
+    def front(self) -> list[Point]:
+        """Return the Pareto front, the cheapest first: no other point is both quicker and more accurate.
+
+        Errors of a tenth of the motion and more are no results.
+        """
+        best, front = 0.1, []
+        for point in sorted((p for p in self.points if not p.refined), key=lambda p: p.solve):
+            if point.displacement < best:
+                best = point.displacement
+                front.append(point)
+        return front
+
+    def cheapest(self) -> list[Cheapest]:
+        """Return the cheapest configurations for each of `TARGETS`."""
+
+        def best(points: Iterable[Point], target: float) -> Point | None:
+            good = [p for p in points if p.displacement <= target]
+            return min(good, key=lambda p: p.solve, default=None)
+
+        same = [p for p in self.points if not p.refined]
+        ours = [p for p in same if not p.monolithic]
+        theirs = [p for p in same if p.monolithic and p.method != ALGORITHM_1]
+        return [Cheapest(target, best(ours, target), best(theirs, target)) for target in TARGETS]
+
+    def document(self) -> dict[str, Any]:
+        """Return what is said to programs: the cheapest, and the front."""
+        cheapest = [
+            {"error": choice.target, "co_simulation": choice.ours and choice.ours.summary()}
+            | {"scipy": choice.scipy and choice.scipy.summary()}
+            for choice in self.cheapest()
+        ]
+        return {"cheapest": cheapest, "front": [point.summary() for point in self.front()]}
+
+    def tables(self) -> Iterator[Table]:
+        """Yield for a terminal the cheapest, and the front."""
+        cheapest = []
+        for choice in self.cheapest():
+            both = [
+                cell
+                for point in (choice.ours, choice.scipy)
+                for cell in (("none gets there", "") if point is None else (point.name, f"{1e3 * point.solve:.3g}"))
+            ]
+            ratio = f"{choice.ratio:.1f}" if choice.ours and choice.scipy else ""
+            cheapest.append((f"{choice.target:.0e}", *both, ratio))
+        names = ("error", "co-simulation", "[ms]", "scipy", "[ms]", "ratio")
+        yield table(names, cheapest, "cheapest for an error (solve time)", words=("co-simulation", "scipy"))
+        front = [
+            (
+                *(point.name, f"{point.displacement:.1e}", f"{point.errors.event_time:.1e}" if point.errors else ""),
+                *(f"{1e3 * point.solve:.3g}", f"{1e3 * point.setup:.3g}", str(point.do_steps or "")),
+            )
+            for point in self.front()
+        ]
+        yield table(
+            ("configuration", "error", "event [s]", "solve [ms]", "set-up [ms]", "doSteps"), front, "Pareto front"
+        )
