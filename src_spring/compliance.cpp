@@ -15,9 +15,6 @@ double power(double x, double p) {
   return result;
 }
 
-/// c x^p, 0 where c = 0 whatever x^p is.
-double term(double c, double x, double p) { return c == 0.0 ? 0.0 : c * power(x, p); }
-
 }  // namespace
 
 double Compliance::elastic(double depth) const { return depth > 0.0 ? lambda_ * power(depth, p_) : 0.0; }
@@ -49,31 +46,39 @@ Compliance::Slopes Compliance::slopes(double depth, double rate) const {
   return {slope * factor, by_rate, slope * (factor - 1.0) * rate, elastic * (factor - 1.0) + by_rate * rate};
 }
 
-std::array<double, 4> Compliance::elastic_rates(const Depth& depth) const {
-  const auto& [d, v, a, j, s] = depth;
-  const double first = term(lambda_ * p_, d, p_ - 1.0);
-  const double second = term(lambda_ * p_ * (p_ - 1.0), d, p_ - 2.0);
-  const double third = term(lambda_ * p_ * (p_ - 1.0) * (p_ - 2.0), d, p_ - 3.0);
-  return {elastic(d), first * v, second * v * v + first * a, third * v * v * v + 3.0 * second * v * a + first * j};
+double Compliance::elastic_coefficient(Along& along, std::size_t n, const Series& depth) const {
+  if (polynomial()) {
+    const Series* last = &depth;
+    for (std::size_t j = 0; j + 2 <= static_cast<std::size_t>(p_); ++j) {
+      along.power[j][n] = 0.0;
+      for (std::size_t k = 0; k <= n; ++k) along.power[j][n] += depth[k] * (*last)[n - k];
+      last = &along.power[j];
+    }
+    return lambda_ * (*last)[n];
+  }
+  if (n == 0 || depth[0] <= 0.0) return elastic(depth[0]);
+  // δ f' = p δ' f for f = δ^p, coefficient by coefficient.
+  double sum = 0.0;
+  for (std::size_t k = 1; k <= n; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(n);
+    sum += (share * (p_ + 1.0) - 1.0) * depth[k] * along.elastic[n - k];
+  }
+  return sum / depth[0];
 }
 
-std::array<double, 4> Compliance::rates(const Depth& depth) const {
-  const auto E = elastic_rates(depth);
-  if (!damped()) return E;
-  const auto& [d, v, a, j, s] = depth;
-  const double G = damping_factor(v);
-  if (G == 0.0) return {};
-  return {E[0] * G, E[1] * G + E[0] * chi_ * a, E[2] * G + chi_ * (2.0 * E[1] * a + E[0] * j),
-          E[3] * G + chi_ * (3.0 * E[2] * a + 3.0 * E[1] * j + E[0] * s)};
-}
-
-Quadratic Compliance::dissipation(const Depth& depth) const {
-  if (!damped()) return {};
-  auto P = rates(depth);  // C − λ δ^p
-  const auto E = elastic_rates(depth);
-  for (std::size_t k = 0; k < 4; ++k) P[k] -= E[k];
-  const auto& [d, v, a, j, s] = depth;
-  return {P[0] * v, P[1] * v + P[0] * a, P[2] * v + 2.0 * P[1] * a + P[0] * j};
+void Compliance::extend(Along& along, std::size_t n, const Series& depth, double size) const {
+  auto& [elastic, damping, dissipation, power] = along;
+  elastic[n] = elastic_coefficient(along, n, depth);
+  if (!damped()) return;
+  const auto rate = [&](std::size_t k) { return static_cast<double>(k + 1) * depth[k + 1] / size; };
+  if (damping_factor(rate(0)) > 0.0) {
+    damping[n] = 0.0;
+    for (std::size_t k = 0; k <= n; ++k) damping[n] += chi_ * elastic[k] * rate(n - k);
+  } else {
+    damping[n] = -elastic[n];
+  }
+  dissipation[n] = 0.0;
+  for (std::size_t k = 0; k <= n; ++k) dissipation[n] += damping[k] * rate(n - k);
 }
 
 bool Compliance::analytic() const { return p_ == std::floor(p_); }

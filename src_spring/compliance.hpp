@@ -6,11 +6,13 @@
 #include <algorithm>
 #include <array>
 
-#include "polynomial.hpp"
+#include "taylor.hpp"
 
 namespace spring {
 
 class Compliance {
+  static constexpr int highest_power = 4;
+
  public:
   /// λ [N/m^p], p, χ [s/m]
   Compliance(double stiffness, double exponent, double damping = 0.0)
@@ -35,20 +37,24 @@ class Compliance {
   };
   Slopes slopes(double depth, double rate) const;
 
-  /// δ ≥ 0 and its first four time derivatives.
-  using Depth = std::array<double, 5>;
-  /// C and its first three time derivatives. Where the power law has no derivative (δ = 0, non-integer p) they may be
-  /// infinite or NaN.
-  std::array<double, 4> rates(const Depth& depth) const;
-  /// The dissipated power [W] and its first two time derivatives; as rates().
-  Quadratic dissipation(const Depth& depth) const;
+  /// Along a depth δ(s), s = τ/H: Taylor coefficients of λ δ^p, of what damping adds to it, and of the dissipated
+  /// power.
+  struct Along {
+    Series elastic{}, damping{}, dissipation{};     ///< [N], [N], [W]
+    std::array<Series, highest_power - 1> power{};  ///< δ², δ³, …
+  };
+  /// Sets coefficient `n` of each from δ's up to n + 1 and from the lower ones; `size` H [s].
+  /// @pre δ is well above 0 over the segment, polynomial(), analytic() and n < 3, or n < 2
+  void extend(Along& along, std::size_t n, const Series& depth, double size) const;
   /// p is an integer: the force is analytic in δ ≥ 0, also at δ = 0.
   bool analytic() const;
+  /// So small a one that extend() multiplies powers instead of dividing by δ.
+  bool polynomial() const { return analytic() && p_ <= highest_power; }
 
  private:
   double continued_elastic(double depth) const;
   double continued_slope(double depth) const;
-  std::array<double, 4> elastic_rates(const Depth& depth) const;
+  double elastic_coefficient(Along& along, std::size_t n, const Series& depth) const;
 
   double lambda_, p_, chi_;
 };

@@ -11,7 +11,7 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 
 // The tolerances hold for a step, IDA's are per internal step: what is asked of IDA is a tenth, and less where the
 // step spans more of the spring's motion and so more internal steps.
-constexpr double safety = 0.03, safety_per_rate = 10.0;
+constexpr double safety = 0.01, safety_per_rate = 10.0;
 // IDA's local error must stay this much above rounding in the contact force, or its error estimate is noise.
 constexpr double noise_margin = 20.0;
 // Taylor terms are used while H × (rate of the spring) is below this; beyond, they would only cancel.
@@ -19,8 +19,12 @@ constexpr double resolved_limit = 3.0;
 // No tolerance is finer than this: relative to y and z (a fraction of their rounding), and absolute.
 constexpr double finest = 0.01 * epsilon, smallest = 1e-150;
 // H / first step = 2ᵏ, so that it does not vary with the forces but in rare jumps. IDA doubles step and order until
-// order 5; k = 3 brings it to order 3 at least.
+// order 5; k = 3 brings it to order 3 at least, and to five instants at least at which events are looked for. Where
+// none can be and R is exact to a small part of the tolerance, one step does.
 constexpr int least_halvings = 3, most_halvings = 48;
+// How far below the tolerance the first step's deviation from R stays: backward Euler overrates it by R's order.
+constexpr double first_step_margin = 1000.0;
+constexpr std::size_t least_order = 4;  ///< of R, where the motion is resolved and smooth
 
 enum Unknown { q, p, A, B, e, unknowns };
 
@@ -40,57 +44,52 @@ Flight::Flight(const Motion& motion, const Laws& laws)
 
 void Flight::prepare(const FlightStart& start) {
   start_ = start;
-  const double H = start.size, y = start.y, z = start.z;
+  const double H = start.size, z = start.z;
   const Compliance& contact = motion_.compliance();
+  loads_ = start.loads.scaled(H);
 
-  auto d = motion_.derivatives(y, z, start.loads, false, 0.0);
+  Expansion motion(start.y, z, start.depth, loads_, H);
+  const auto extend_to = [&](std::size_t highest) {
+    while (motion.highest < highest) motion_.extend(motion, touching_, loads_, H);
+  };
   touching_ = false;
-  Compliance::Depth depth{};
+  extend_to(least_order + 1);
+  if (laws_.compliance && Watch::direction(motion.depth) > 0.0) {
+    touching_ = true;
+    motion = Expansion(start.y, z, start.depth, loads_, H);
+    extend_to(least_order + 1);
+  }
+  if (start.released) motion.y[2] = 0.0;
+  const Series &y = motion.y, &depth = motion.depth;
   if (laws_.compliance) {
-    const auto depths = [&] {
-      const auto& u = start.loads.tip;
-      return Compliance::Depth{start.depth, z - u[1], d[2] - u[2], d[3], d[4]};
-    };
-    touching_ = Watch::direction(depths()) > 0.0;
     contact_sign_ = touching_ ? 1.0 : -1.0;
-    if (touching_) d = motion_.derivatives(y, z, start.loads, true, start.depth);
-    depth = depths();
-    auto distance = depth;
-    for (double& value : distance) value *= contact_sign_;
+    Series distance = depth;
+    for (double& coefficient : distance) coefficient *= contact_sign_;
     contact_watch_ = Watch(distance);
   }
-  if (start.released) d[2] = 0.0;
-  if (laws_.stop) stop_watch_ = Watch({start.gap, z, d[2], d[3], d[4]});
+  if (laws_.stop) {
+    Series gap = y;
+    gap[0] = start.gap;
+    stop_watch_ = Watch(gap);
+  }
 
-  const double travel = std::abs(z) * H + std::abs(d[2]) * H * H / 2;
-  const double depth_travel = std::abs(depth[1]) * H + std::abs(depth[2]) * H * H / 2;
-  const double deepest = start.depth + depth_travel;
-  const double force = touching_ ? contact.force(start.depth, depth[1]) : 0.0;
+  const double travel = std::abs(y[1]) + std::abs(y[2]), acceleration = 2.0 * y[2] / H / H;
+  const double depth_travel = std::abs(depth[1]) + std::abs(depth[2]), depth_rate = depth[1] / H;
+  const double force = touching_ ? contact.force(start.depth, depth_rate) : 0.0;
   const double rate =
-      motion_.rate(std::abs(y) + travel, touching_ ? contact.slopes(deepest, depth[1]) : Compliance::Slopes{});
+      motion_.rate(std::abs(start.y) + travel,
+                   touching_ ? contact.slopes(start.depth + depth_travel, depth_rate) : Compliance::Slopes{});
   const bool resolved = H * rate <= resolved_limit;
-  const bool smooth = !touching_ || contact.analytic() || start.depth > 2.0 * depth_travel;
-  const int order = !resolved ? 0 : smooth ? 4 : 2;
-  R_ = Taylor({d[0], d[1], d[2], d[3], d[4]}, order);
-
-  remainder_ = motion_.remainder(R_, start.loads);
-  contact_taylor_ = dissipation_taylor_ = {};
+  const bool smooth = !touching_ || contact.polynomial() || start.depth > 2.0 * depth_travel;
+  const std::size_t most = smooth ? max_order : contact.analytic() ? least_order : 2;
   held_ = touching_ || start.loads.held;
   height_ = held_ ? runaway * laws_.hilltop : laws_.hilltop;
-  if (touching_ && order >= 2) {
-    const auto c = contact.rates(depth);
-    const auto lost = contact.dissipation(depth);
-    for (std::size_t k = 0; k <= static_cast<std::size_t>(order - 2); ++k) {
-      contact_taylor_[k] = c[k];
-      dissipation_taylor_[k] = lost[k];
-    }
-  }
 
   // Tolerances: of y and z by what they and their change over the step (or over 1/rate) are, then scaled.
   const double span = std::min(H, 1.0 / std::max(rate, std::numeric_limits<double>::min()));
   const double noise = noise_margin * epsilon * force / motion_.mass() * span;
-  const double velocity = std::abs(z) + std::abs(d[2]) * span;
-  const double displacement = std::abs(y) + velocity * span;
+  const double velocity = std::abs(z) + std::abs(acceleration) * span;
+  const double displacement = std::abs(start.y) + velocity * span;
   const double share = safety / (1.0 + safety_per_rate * std::min(H * rate, resolved_limit));
   const auto tolerance_of = [&](double size, double least) {
     return std::max({share * (laws_.relative_tolerance * size + laws_.absolute_tolerance), finest * size, least});
@@ -101,42 +100,60 @@ void Flight::prepare(const FlightStart& start) {
   double* tolerance = solver_.absolute_tolerance();
   tolerance[q] = tolerance[A] = tolerance[B] = tolerance_y;
   tolerance[p] = H * tolerance_z;
-  const double lost = touching_ ? contact.continued(start.depth, depth[1]).dissipation : 0.0;
+  const double lost = touching_ ? contact.continued(start.depth, depth_rate).dissipation : 0.0;
   tolerance[e] =
       motion_.mass() * (velocity + tolerance_z) * tolerance_z + noise_margin * epsilon * span * std::abs(lost);
 
-  // First step: the error of the low orders that IDA begins with, from the first derivative that R leaves out.
-  double h = H;
+  // R ends where the first term that it leaves out is small. The first step is as long as that keeps the error of the
+  // low orders that IDA begins with.
+  const double small = H * share * laws_.relative_tolerance * velocity / first_step_margin;
+  const auto neglected = [&] {
+    const auto k = static_cast<double>(motion.highest);
+    return k * std::abs(y[motion.highest]) + H * rate * (H * rate) * std::abs(y[motion.highest - 1]);
+  };
+  int order = resolved ? 2 : 0;
+  double h = 1.0;
   const auto limit = [&h](double bound, double exponent) {
     if (bound < std::numeric_limits<double>::max()) h = std::min(h, std::pow(bound, exponent));
   };
-  if (order == 4) {
-    const double neglected = std::abs(d[5]) + rate * rate * H * std::abs(d[4]);
-    limit(tolerance_z / (400.0 * neglected), 0.25);
+  if (resolved && most > 2) {
+    while (motion.highest <= most && neglected() > small) extend_to(motion.highest + 1);
+    order = static_cast<int>(motion.highest) - 1;
+    limit(tolerance[p] / (first_step_margin * neglected()), 1.0 / order);
   } else {
-    limit(tolerance_z / std::abs(d[3]), 0.5);
-    if (order == 0) limit(tolerance_y / std::abs(d[2]), 0.5);
+    limit(tolerance[p] / std::abs(6.0 * y[3]), 0.5);
+    if (order == 0) limit(tolerance_y / std::abs(2.0 * y[2]), 0.5);
   }
-  const double levels = std::ceil(std::log2(H / h));
+  const double levels = std::ceil(-std::log2(h));
   if (std::isnan(levels)) throw IdaError("values leave the range of floating-point numbers");
-  int halvings = static_cast<int>(std::clamp(levels, double{least_halvings}, double{most_halvings}));
-  if (touching_ && order < Taylor::max_order) {
+  const bool watched = laws_.stop || laws_.compliance;
+  const double least = order > 2 && !watched ? 0.0 : least_halvings;
+  int halvings = static_cast<int>(std::clamp(levels, least, double{most_halvings}));
+  if (touching_ && order <= 2) {
     // The power law has no second derivative or outgrows its rates at the start: the velocity from its growth instead.
-    const auto growth = [&](double t) {
-      const double deeper = start.depth + t * (std::abs(depth[1]) + t * std::abs(depth[2]) / 2);
-      return t * (contact.force(deeper, depth[1]) - force) / motion_.mass();
+    const auto growth = [&](double s) {
+      const double deeper = start.depth + s * (std::abs(depth[1]) + s * std::abs(depth[2]));
+      return s * H * (contact.force(deeper, depth_rate) - force) / motion_.mass();
     };
-    while (halvings < most_halvings && growth(std::ldexp(H, -halvings)) > tolerance_z) ++halvings;
+    while (halvings < most_halvings && growth(std::ldexp(1.0, -halvings)) > tolerance_z) ++halvings;
   }
   h0_ = std::ldexp(1.0, -halvings);
+
+  R_ = Taylor(y, order);
+  remainder_ = motion_.remainder(R_, loads_, H);
+  contact_order_ = touching_ ? order - 2 : -1;
+  for (std::size_t k = 0; static_cast<int>(k) <= contact_order_; ++k) {
+    contact_taylor_[k] = motion.contact.elastic[k] + motion.contact.damping[k];
+    dissipation_taylor_[k] = motion.contact.dissipation[k];
+  }
 
   double* Y = solver_.initial_value();
   double* Yp = solver_.initial_derivative();
   std::fill(Y, Y + unknowns, 0.0);
   std::fill(Yp, Yp + unknowns, 0.0);
-  Y[p] = Yp[q] = H * (z - R_.rate(0.0));
-  Yp[p] = H * H * (order == 0 ? d[2] : 0.0);
-  if (order == 0) Yp[e] = H * (motion_.damping() * z * z + contact.dissipation(depth)[0]);
+  Y[p] = Yp[q] = y[1] - R_.rate(0.0);
+  Yp[p] = order == 0 ? 2.0 * y[2] : 0.0;
+  if (order == 0) Yp[e] = H * (motion_.damping() * z * z + lost);
 }
 
 Flight::Event Flight::run(const FlightStart& start) {
@@ -163,56 +180,51 @@ Flight::Event Flight::run(const FlightStart& start) {
 /// Past the hilltop the spring pushes outwards: a top that moves outwards comes back only if something else pulls.
 bool Flight::escapes() const {
   const double outwards = y_ < 0.0 ? -1.0 : 1.0;
-  const double force = value(start_.loads.force, elapsed());
+  const double force = value(loads_.force, solver_.s());
   return held_ || (outwards * z_ > 0.0 && motion_.push_outwards(y_, outwards, force) >= 0.0);
 }
 
 double Flight::elapsed() const { return solver_.s() * start_.size; }
 
 void Flight::finish() {
-  const double H = start_.size, t = elapsed();
+  const double H = start_.size, s = solver_.s();
   const double* Y = solver_.value();
-  const double rise = R_.rise(t) + Y[q];
-  y_ = start_.y + rise;
-  z_ = R_.rate(t) + Y[p] / H;
-  integral_ = R_.integral(t) + H * Y[A];
-  integral_2_ = R_.integral_2(t) + H * H * Y[B];
-  dissipated_ = motion_.damping() * R_.squared_rate_integral(t) + spring::integral(dissipation_taylor_, t) + Y[e];
+  y_ = start_.y + (R_.rise(s) + Y[q]);
+  z_ = (R_.order() > 0 ? start_.z : 0.0) + (R_.rate_rise(s) + Y[p]) / H;
+  integral_ = H * (R_.integral(s) + Y[A]);
+  integral_2_ = H * H * (R_.integral_2(s) + Y[B]);
+  dissipated_ = Y[e];
+  if (motion_.damping() > 0.0) dissipated_ += motion_.damping() / H * R_.squared_rate_integral(s);
+  for (int k = 0; k <= contact_order_; ++k)
+    dissipated_ += H * dissipation_taylor_[static_cast<std::size_t>(k)] * std::pow(s, k + 1) / (k + 1);
 }
 
-double Flight::remainder(double t) const {
-  double sum = 0.0;
-  for (std::size_t k = remainder_.size(); k-- > 0;) sum = sum * t + remainder_[k];
-  return sum;
-}
-
-double Flight::contact_depth(double rise, double t) const {
-  const auto& u = start_.loads.tip;
-  return start_.depth + rise - t * (u[1] + t * u[2] / 2);
+double Flight::contact_depth(double rise, double s) const {
+  const auto& u = loads_.tip;
+  return start_.depth + rise - s * (u[1] + s * u[2] / 2);
 }
 
 bool Flight::residual(double s, const double* Y, const double* Yp, double* F) const noexcept {
-  const double H = start_.size, t = H * s;
-  const double w = Y[p] / H, z = R_.rate(t) + w;
+  const double H = start_.size, slope = R_.rate(s), w = Y[p] / H;
   Compliance::Effect contact{};  // in excess of the Taylor terms
   if (touching_) {
-    contact = motion_.compliance().continued(contact_depth(R_.rise(t) + Y[q], t), contact_rate(z, t));
-    contact.force -= spring::value(contact_taylor_, t);
-    contact.dissipation -= spring::value(dissipation_taylor_, t);
+    const double depth_rate = contact_rate(slope + Y[p], s) / H;
+    contact = motion_.compliance().continued(contact_depth(R_.rise(s) + Y[q], s), depth_rate);
+    contact.force -= sum_of_powers(contact_taylor_, s, 0, contact_order_);
+    contact.dissipation -= sum_of_powers(dissipation_taylor_, s, 0, contact_order_);
   }
   F[q] = Yp[q] - Y[p];
-  F[p] = Yp[p] - H * H * motion_.excess_acceleration(R_(t), Y[q], w, remainder(t), contact.force);
+  F[p] = Yp[p] - H * H * motion_.excess_acceleration(R_(s), Y[q], w, remainder_(s), contact.force);
   F[A] = Yp[A] - Y[q];
   F[B] = Yp[B] - Y[A];
-  F[e] = Yp[e] - H * (motion_.damping() * w * (R_.rate(t) + z) + contact.dissipation);
+  F[e] = Yp[e] - (motion_.damping() * w * (2.0 * slope + Y[p]) + H * contact.dissipation);
   return std::isfinite(F[p]) && std::isfinite(F[e]);
 }
 
 void Flight::jacobian(double s, double c, const double* Y, const double*, double* J) const noexcept {
-  const double H = start_.size, t = H * s;
-  const double rise = R_.rise(t) + Y[q], z = R_.rate(t) + Y[p] / H;
+  const double H = start_.size, rise = R_.rise(s) + Y[q], slope = R_.rate(s) + Y[p];
   Compliance::Slopes contact{};
-  if (touching_) contact = motion_.compliance().slopes(contact_depth(rise, t), contact_rate(z, t));
+  if (touching_) contact = motion_.compliance().slopes(contact_depth(rise, s), contact_rate(slope, s) / H);
   const auto at = [J](int row, int column) -> double& { return J[column * unknowns + row]; };
   for (int i = 0; i < unknowns; ++i) at(i, i) = c;
   at(q, p) = -1.0;
@@ -221,20 +233,19 @@ void Flight::jacobian(double s, double c, const double* Y, const double*, double
   at(A, q) = -1.0;
   at(B, A) = -1.0;
   at(e, q) = -H * contact.dissipation_by_depth;
-  at(e, p) = -2.0 * motion_.damping() * z - contact.dissipation_by_rate;
+  at(e, p) = -2.0 * motion_.damping() * slope / H - contact.dissipation_by_rate;
 }
 
 void Flight::events(double s, const double* Y, double* g) const noexcept {
-  const double H = start_.size, t = H * s;
-  const double rise = R_.rise(t) + Y[q], z = R_.rate(t) + Y[p] / H;
+  const double rise = R_.rise(s) + Y[q], slope = R_.rate(s) + Y[p];
   if (hilltop_ >= 0) g[hilltop_] = laws_.to(height_, start_.y + rise);
   if (stop_ >= 0) {
-    g[stop_] = stop_watch_.distance(start_.gap + rise, t);
-    g[stop_ + 1] = stop_watch_.rate(z, t);
+    g[stop_] = stop_watch_.distance(start_.gap + rise, s);
+    g[stop_ + 1] = stop_watch_.rate(slope, s);
   }
   if (contact_ >= 0) {
-    g[contact_] = contact_watch_.distance(contact_sign_ * contact_depth(rise, t), t);
-    g[contact_ + 1] = contact_watch_.rate(contact_sign_ * contact_rate(z, t), t);
+    g[contact_] = contact_watch_.distance(contact_sign_ * contact_depth(rise, s), s);
+    g[contact_ + 1] = contact_watch_.rate(contact_sign_ * contact_rate(slope, s), s);
   }
 }
 

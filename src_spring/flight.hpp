@@ -69,10 +69,9 @@ class Flight final : public ImplicitSystem {
 
  private:
   void prepare(const FlightStart& start);
-  double remainder(double t) const;
   bool escapes() const;  ///< once past `height_`
-  double contact_depth(double rise, double t) const;
-  double contact_rate(double z, double t) const { return z - rate(start_.loads.tip, t); }
+  double contact_depth(double rise, double s) const;
+  double contact_rate(double y_rate, double s) const { return y_rate - rate(loads_.tip, s); }  ///< both d/ds
   void finish();
 
   const Motion& motion_;
@@ -83,10 +82,11 @@ class Flight final : public ImplicitSystem {
   IdaSolver solver_;
   // The segment.
   FlightStart start_{};
+  Loads loads_;  ///< over s
   Taylor R_;
-  std::array<double, 13> remainder_{};  ///< of the equation of motion along R
-  Quadratic contact_taylor_{};          ///< of the contact force, as far as R accounts for it
-  Quadratic dissipation_taylor_{};      ///< d_R
+  Motion::Remainder remainder_;
+  Series contact_taylor_{}, dissipation_taylor_{};  ///< contact force and its loss d_R, as far as R accounts for them
+  int contact_order_ = -1;                          ///< of these
   bool touching_ = false, held_ = false;
   double height_ = 0.0;  ///< |y| from where it may escape
   double contact_sign_ = 1.0;

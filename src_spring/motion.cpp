@@ -3,6 +3,12 @@
 #include <cmath>
 
 namespace spring {
+namespace {
+
+/// Coefficient k of a force as a power series.
+double coefficient(const Quadratic& force, std::size_t k) { return k < 2 ? force[k] : k == 2 ? force[2] / 2 : 0.0; }
+
+}  // namespace
 
 Loads Loads::from(const Parameters& parameters, const Inputs& inputs) {
   Loads loads{load_of(parameters, inputs), inputs.tip_displacement};
@@ -37,41 +43,41 @@ double Motion::acceleration_by_displacement(double y, double contact_slope) cons
   return -(k1_ + 3.0 * k2_ * y * y + contact_slope) / mass_;
 }
 
-std::array<double, 6> Motion::derivatives(double y, double z, const Loads& loads, bool touching, double depth) const {
-  const double k = k1_ + 3.0 * k2_ * y * y;  // tangent stiffness
-  const auto& F = loads.force;
-  const auto& u = loads.tip;
-  std::array<double, 6> d{y, z};
-  double &a = d[2], &j = d[3], &s = d[4];
-  // The contact's n-th derivative needs the motion's (n+1)-th: each is known when it is its turn.
-  const auto contact = [&](std::size_t n) {
-    return touching ? compliance_.rates({depth, z - u[1], a - u[2], j, s})[n] : 0.0;
-  };
-  a = acceleration(y, z, F[0], contact(0));
-  j = (F[1] - damping_ * a - k * z - contact(1)) / mass_;
-  s = (F[2] - damping_ * j - k * a - 6.0 * k2_ * y * z * z - contact(2)) / mass_;
-  d[5] = (-damping_ * s - k * j - 18.0 * k2_ * y * z * a - 6.0 * k2_ * z * z * z - contact(3)) / mass_;
-  return d;
+Expansion::Expansion(double y, double z, double depth, const Loads& loads, double size)
+    : y{y, size * z}, depth{depth, size * z - loads.tip[1], -loads.tip[2] / 2} {}
+
+void Motion::extend(Expansion& motion, bool touching, const Loads& loads, double size) const {
+  auto& [y, square, depth, contact, highest] = motion;
+  const std::size_t k = highest - 1;
+  double cube = 0.0;
+  for (std::size_t i = 0; i <= k; ++i) square[k] += y[i] * y[k - i];
+  for (std::size_t i = 0; i <= k; ++i) cube += y[i] * square[k - i];
+  if (touching) compliance_.extend(contact, k, depth, size);
+  const double n = static_cast<double>(k);
+  const double force = coefficient(loads.force, k) - k1_ * y[k] - k2_ * cube - damping_ * (n + 1.0) * y[k + 1] / size -
+                       contact.elastic[k] - contact.damping[k];
+  y[++highest] = force / mass_ * size * size / ((n + 1.0) * (n + 2.0));
+  depth[highest] += y[highest];
 }
 
-std::array<double, 13> Motion::remainder(const Taylor& R, const Loads& loads) const {
-  constexpr std::size_t n = Taylor::max_order + 1;
-  const std::array<double, n> c = R.coefficients();
-  std::array<double, 2 * n - 1> square{};
-  std::array<double, 13> r{};
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j) square[i + j] += c[i] * c[j];
-  for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < square.size(); ++j) r[i + j] -= k2_ * c[i] * square[j];
-  for (std::size_t k = 0; k < n; ++k) r[k] -= k1_ * c[k];
-  for (std::size_t k = 1; k < n; ++k) r[k - 1] -= damping_ * static_cast<double>(k) * c[k];
-  for (std::size_t k = 2; k < n; ++k) r[k - 2] -= mass_ * static_cast<double>(k * (k - 1)) * c[k];
-  const auto& F = loads.force;
-  r[0] += F[0];
-  r[1] += F[1];
-  r[2] += F[2] / 2;
-  for (int k = 0; k < R.order() - 1; ++k) r[static_cast<std::size_t>(k)] = 0.0;
-  return r;
+Motion::Remainder Motion::remainder(const Taylor& R, const Loads& loads, double size) const {
+  const Series& c = R.coefficients();
+  const std::size_t order = static_cast<std::size_t>(R.order()), first = std::max<std::size_t>(order, 1) - 1;
+  Remainder remainder;
+  auto& r = remainder.r_;
+  if (k2_ != 0.0) {
+    std::array<double, std::size_t{2} * max_order + 1> square{};
+    for (std::size_t i = 0; i <= order; ++i)
+      for (std::size_t j = 0; j <= order; ++j) square[i + j] += c[i] * c[j];
+    for (std::size_t i = 0; i <= order; ++i)
+      for (std::size_t j = first > i ? first - i : 0; j <= 2 * order; ++j) r[i + j] -= k2_ * c[i] * square[j];
+  }
+  for (std::size_t k = first; k <= order; ++k) r[k] -= k1_ * c[k];
+  if (order > 0) r[first] -= damping_ * static_cast<double>(order) * c[order] / size;
+  for (std::size_t k = first; k < 3; ++k) r[k] += coefficient(loads.force, k);
+  remainder.first_ = static_cast<int>(first);
+  remainder.last_ = std::max(k2_ != 0.0 ? 3 * R.order() : R.order(), 2);
+  return remainder;
 }
 
 double Motion::acceleration_scale(double y, double z, double force, double contact) const {
@@ -86,10 +92,13 @@ double Motion::rate(double reach, const Compliance::Slopes& contact) const {
 }
 
 Quadratic Motion::holding_force(double y, const Loads& loads, bool touching, double depth) const {
-  std::array<double, 4> contact{};
-  if (touching) contact = compliance_.rates({depth, -loads.tip[1], -loads.tip[2], 0.0, 0.0});
-  return {(k1_ + k2_ * y * y) * y + contact[0] - loads.force[0], contact[1] - loads.force[1],
-          contact[2] - loads.force[2]};
+  Compliance::Along contact;
+  Quadratic force{(k1_ + k2_ * y * y) * y, 0.0, 0.0};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (touching) compliance_.extend(contact, k, {depth, -loads.tip[1], -loads.tip[2] / 2}, 1.0);
+    force[k] += (contact.elastic[k] + contact.damping[k]) * (k == 2 ? 2.0 : 1.0) - loads.force[k];
+  }
+  return force;
 }
 
 double Motion::potential_energy(double y) const { return (k1_ / 2 + k2_ / 4 * y * y) * y * y; }

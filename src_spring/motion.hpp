@@ -7,8 +7,8 @@
 #include <array>
 
 #include "compliance.hpp"
+#include "parameters.hpp"
 #include "polynomial.hpp"
-#include "spring.hpp"
 #include "taylor.hpp"
 
 namespace spring {
@@ -21,6 +21,18 @@ struct Loads {
 
   static Loads from(const Parameters& parameters, const Inputs& inputs);
   Loads from_time(double t) const { return {shifted(force, t), shifted(tip, t), held}; }
+  Loads scaled(double size) const { return {spring::scaled(force, size), spring::scaled(tip, size), held}; }
+};
+
+/// A motion near a segment's start: Taylor coefficients in s = τ/H of y, of y², of the depth y − u_tip and of the
+/// contact. Those of y are known up to `highest`.
+struct Expansion {
+  Series y{}, square{}, depth{};
+  Compliance::Along contact;
+  std::size_t highest = 1;
+
+  /// From y [m], z [m/s] and y − u_tip, under scaled loads, over a segment of size H [s].
+  Expansion(double y, double z, double depth, const Loads& loads, double size);
 };
 
 /// f_s − m a [N]
@@ -37,15 +49,23 @@ class Motion {
     return -(damping_ + contact_slope) / mass_;
   }  ///< ∂ÿ/∂ẏ
 
-  /// y and its first five derivatives at a segment's start; `depth` = y − u_tip ≥ 0 matters when touching.
-  /// Where the power law has no derivative they may be infinite or NaN.
-  std::array<double, 6> derivatives(double y, double z, const Loads& loads, bool touching, double depth) const;
+  /// Adds one coefficient to the motion; loads and size are those that it began with.
+  void extend(Expansion& motion, bool touching, const Loads& loads, double size) const;
 
   /// Remainder of the equation of motion along a Taylor polynomial R of the motion, without the contact force:
-  ///     r(τ) = F − α_s Ṙ − k1 R − k2 R³ − m R̈ = Σ rₖ τᵏ.
-  /// The terms below τ^{order−1} vanish by construction (with the contact's own Taylor terms, if it touches).
-  std::array<double, 13> remainder(const Taylor& R, const Loads& loads) const;
-  /// ÿ − R̈ for y = R + q, ẏ = Ṙ + w, given r(τ) and what the contact force has in excess of its Taylor terms:
+  ///     r(s) = F − α_s Ṙ − k1 R − k2 R³ − m R̈ = Σ rₖ sᵏ   [N].
+  /// The terms below s^{order−1} vanish by construction (with the contact's own Taylor terms, if it touches).
+  class Remainder {
+   public:
+    double operator()(double s) const { return sum_of_powers(r_, s, first_, last_); }
+
+   private:
+    friend class Motion;
+    std::array<double, std::size_t{3} * max_order + 1> r_{};
+    int first_ = 0, last_ = 0;
+  };
+  Remainder remainder(const Taylor& R, const Loads& loads, double size) const;
+  /// ÿ − R̈ for y = R + q, ẏ = Ṙ + w, given r(s) and what the contact force has in excess of its Taylor terms:
   /// the difference itself, free of cancellation.
   double excess_acceleration(double R, double q, double w, double remainder, double contact) const {
     return (remainder - damping_ * w - (k1_ + k2_ * (3.0 * R * (R + q) + q * q)) * q - contact) / mass_;

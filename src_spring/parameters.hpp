@@ -1,11 +1,41 @@
-// Checks of what comes from outside; messages name the quantity, its value and what is allowed.
+// What comes from outside, and its checks; messages name the quantity, its value and what is allowed.
 #pragma once
 
 #include <string>
 
-#include "spring.hpp"
+#include "polynomial.hpp"
 
 namespace spring {
+
+enum class ContactLaw { external = 1, normal_compliance = 2 };
+
+/// SI units.
+struct Parameters {
+  double mass = 1.0;              ///< m [kg]
+  double damping = 0.0;           ///< α_s [N·s/m]
+  double linear_stiffness = 1.0;  ///< k1 [N/m]
+  double cubic_stiffness = 0.0;   ///< k2 [N/m³]
+  double displacement = 0.0;      ///< y at the start [m]
+  double velocity = 0.0;          ///< ẏ at the start [m/s]
+  ContactLaw contact_law = ContactLaw::external;
+  double compliance_stiffness = 1.0e4;  ///< λ_nc [N/m^p]
+  double compliance_exponent = 3.0;     ///< p [–] ≥ 1
+  double compliance_damping = 0.0;      ///< χ [s/m]
+  bool stop_enabled = false;
+  double stop_position = -1.0;  ///< φ [m]
+  double restitution = 1.0;     ///< e in [0, 1]
+  double relative_tolerance = 1e-12;
+  double absolute_tolerance = 1e-14;
+};
+
+/// Held or polynomial over one step; τ from its start.
+struct Inputs {
+  Quadratic contact_force{};      ///< C [N], positive presses the spring down
+  Quadratic foundation_force{};   ///< N ≥ 0 [N], upward; used when the stop inside is not enabled
+  Quadratic external_force{};     ///< f_s [N]
+  Quadratic base_acceleration{};  ///< a of the foundation [m/s²]: y is relative to it, so that it acts as −m a
+  Quadratic tip_displacement{};   ///< u_tip [m]; read by normal_compliance only
+};
 
 std::string number(double value);
 

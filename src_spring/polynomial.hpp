@@ -16,6 +16,8 @@ inline double integral(const Quadratic& c, double t) { return t * (c[0] + t * (c
 inline double work(const Quadratic& p, double h, double rise, double I, double J) {
   return p[0] * rise + p[1] * (h * rise - I) + p[2] * (h * h / 2 * rise - h * I + J);
 }
+/// p over scaled time s = τ/h.
+inline Quadratic scaled(const Quadratic& c, double h) { return {c[0], h * c[1], h * h * c[2]}; }
 /// p with time counted from `t`.
 inline Quadratic shifted(const Quadratic& c, double t) { return {value(c, t), rate(c, t), c[2]}; }
 

@@ -24,7 +24,7 @@ Seated::Seated(const Motion& motion, const Laws& laws)
       solver_(unknowns, crossings_) {}
 
 bool Seated::holds(const Quadratic& holding_force) {
-  return Watch::direction({holding_force[0], holding_force[1], holding_force[2], 0.0, 0.0}) >= 0.0;
+  return Watch::direction({holding_force[0], holding_force[1], holding_force[2] / 2}) >= 0.0;
 }
 
 double Seated::contact_depth(double displacement, double t) const {
@@ -38,7 +38,7 @@ void Seated::prepare(const SeatedStart& start) {
   const Compliance& contact = motion_.compliance();
   const auto& u = start.loads.tip;
 
-  Compliance::Depth depth{start.depth, -u[1], -u[2], 0.0, 0.0};
+  const Series depth{start.depth, -u[1], -u[2] / 2};  // over τ
   touching_ = laws_.compliance && Watch::direction(depth) > 0.0;
   contact_sign_ = touching_ ? 1.0 : -1.0;
   auto distance = depth;
@@ -49,7 +49,7 @@ void Seated::prepare(const SeatedStart& start) {
   const double depth_travel = std::abs(u[1]) * H + std::abs(u[2]) * H * H / 2;
   const bool smooth = !touching_ || contact.analytic() || start.depth > 2.0 * depth_travel;
   if (!smooth) N[2] = 0.0;  // may be infinite
-  release_watch_ = Watch({N[0], N[1], N[2], 0.0, 0.0});
+  release_watch_ = Watch({N[0], N[1], N[2] / 2});
   N_ = N;
 
   const double force = touching_ ? contact.force(start.depth, depth[1]) : 0.0;
@@ -81,7 +81,7 @@ void Seated::prepare(const SeatedStart& start) {
   double* Yp = solver_.initial_derivative();
   std::fill(Y, Y + unknowns, 0.0);
   std::fill(Yp, Yp + unknowns, 0.0);
-  if (touching_) Yp[e] = H * contact.dissipation(depth)[0];
+  if (touching_) Yp[e] = H * contact.continued(start.depth, depth[1]).dissipation;
 }
 
 Seated::Event Seated::run(const SeatedStart& start) {

@@ -3,13 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "flat.hpp"
-#include "flight.hpp"
-#include "motion.hpp"
-#include "parameters.hpp"
-#include "seated.hpp"
 
 namespace spring {
 namespace {
@@ -20,65 +15,18 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr long most_work = 1'000'000, work_of_start = 20;
 constexpr long most_stalled = 100;  ///< events without progress
 
-/// Everything that a step changes; doubles only, see flat.hpp.
-struct State {
-  double y, z;
-  double integral = 0.0, integral_2 = 0.0;
-  double dissipated = 0.0, impact_loss = 0.0, load_work = 0.0;
-  double stop_force = 0.0, stop_impulse = 0.0;
-  double seated = 0.0;                            ///< 1 on the foundation
-  double force = 0.0, tip = 0.0, tip_rate = 0.0;  ///< F, u_tip and its rate where the step ended
-  double steps = 0.0;                             ///< IDA's, since the start
-};
-
 }  // namespace
 
-struct Spring::Impl {
-  const Parameters parameters;
-  const Motion motion;
-  const Laws laws;
-  Flight flight;
-  std::optional<Seated> seated;
-  State state;
-
-  explicit Impl(const Parameters& p)
-      : parameters(p),
-        motion(p),
-        laws{hilltop(p),           p.stop_enabled,      p.stop_position, p.contact_law == ContactLaw::normal_compliance,
-             p.relative_tolerance, p.absolute_tolerance},
-        flight(motion, laws),
-        state{p.displacement, p.velocity} {
-    if (laws.stop) seated.emplace(motion, laws);
-  }
-
-  double depth(const State& s) const { return laws.compliance ? s.y - s.tip : -1.0; }
-  double contact(const State& s) const {
-    return laws.compliance ? motion.compliance().force(depth(s), s.z - s.tip_rate) : 0.0;
-  }
-
-  State advanced(double size, const Inputs& inputs);
-};
-
-namespace {
-
-/// What acts at `t` is what accelerations and reactions refer to.
-void see(State& state, const Loads& loads, double t) {
-  state.force = value(loads.force, t);
-  state.tip = value(loads.tip, t);
-  state.tip_rate = rate(loads.tip, t);
-}
-
-/// One step: a sequence of segments, each smooth, joined by events.
-class Step {
+/// One step of a spring: a sequence of segments, each smooth, joined by events. Leaves the spring as it is.
+class Spring::Step {
  public:
-  Step(const Motion& motion, const Laws& laws, double restitution, Flight& flight, Seated* seat, State state,
-       double size, const Loads& loads)
-      : motion_(motion),
-        laws_(laws),
-        restitution_(restitution),
-        flight_(flight),
-        seat_(seat),
-        state_(state),
+  Step(Spring& spring, double size, const Loads& loads)
+      : motion_(spring.motion_),
+        laws_(spring.laws_),
+        restitution_(spring.parameters_.restitution),
+        flight_(spring.flight_),
+        seat_(spring.seat_),
+        state_(spring.state_),
         size_(size),
         loads_(loads) {}
 
@@ -96,13 +44,12 @@ class Step {
       now_ = loads_.from_time(t_);
       depth_ = !laws_.compliance ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
       if (laws_.stop) land();
-      if (seat_ != nullptr && state_.seated != 0.0)
+      if (seat_ && state_.seated != 0.0)
         held += sit(*seat_);
       else
         fly();
     }
     state_.stop_force = held / size_;
-    see(state_, loads_, size_);
     return state_;
   }
 
@@ -115,7 +62,7 @@ class Step {
 
   bool touching() const {
     const auto& u = now_.tip;
-    return laws_.compliance && Watch::direction({depth_, state_.z - u[1], -u[2], 0.0, 0.0}) > 0.0;
+    return laws_.compliance && Watch::direction({depth_, state_.z - u[1], -u[2] / 2}) > 0.0;
   }
 
   /// At the foundation: rebound, or come to rest, or leave.
@@ -206,7 +153,7 @@ class Step {
   const Laws& laws_;
   const double restitution_;
   Flight& flight_;
-  Seated* seat_;
+  std::optional<Seated>& seat_;
   State state_;
   const double size_;
   const Loads loads_;
@@ -218,34 +165,29 @@ class Step {
   bool released_ = false;         ///< has just left the foundation, N = 0
 };
 
-}  // namespace
-
-State Spring::Impl::advanced(double size, const Inputs& inputs) {
-  State reached = Step(motion, laws, parameters.restitution, flight, seated ? &*seated : nullptr, state, size,
-                       Loads::from(parameters, inputs))
-                      .run();
-  // Impacts turn the velocity around, y goes on: the step's integrals know the work through all of its events.
-  reached.load_work += work(load_of(parameters, inputs), size, reached.y - state.y, reached.integral - state.y * size,
-                            reached.integral_2 - state.y * size * size / 2);
-  return reached;
+Spring::Spring(const Parameters& p)
+    : parameters_((check(p), p)),
+      motion_(p),
+      laws_{hilltop(p),           p.stop_enabled,      p.stop_position, p.contact_law == ContactLaw::normal_compliance,
+            p.relative_tolerance, p.absolute_tolerance},
+      flight_(motion_, laws_),
+      state_{p.displacement, p.velocity} {
+  if (laws_.stop) seat_.emplace(motion_, laws_);
 }
-
-Spring::Spring(const Parameters& parameters) {
-  check(parameters);
-  impl_ = std::make_unique<Impl>(parameters);
-}
-Spring::~Spring() = default;
-Spring::Spring(Spring&&) noexcept = default;
-Spring& Spring::operator=(Spring&&) noexcept = default;
 
 void Spring::step(double size, const Inputs& inputs) {
   if (!(size > 0.0) || !std::isfinite(size))
     throw std::invalid_argument("spring: step size = " + number(size) + ": must be > 0 and finite");
   check(inputs);
-  const State before = impl_->state;
-  impl_->state = impl_->advanced(size, inputs);
+  const Loads loads = Loads::from(parameters_, inputs);
+  const State before = state_;
+  state_ = Step(*this, size, loads).run();
+  see(loads, size);
+  // Impacts turn the velocity around, y goes on: the step's integrals know the work through all of its events.
+  state_.load_work += work(load_of(parameters_, inputs), size, state_.y - before.y, state_.integral - before.y * size,
+                           state_.integral_2 - before.y * size * size / 2);
   if (!finite()) {
-    impl_->state = before;
+    state_ = before;
     throw StepFailure("spring: the motion leaves the range of floating-point numbers in a step of " + number(size) +
                           " s; use a smaller step size or smaller inputs",
                       0.0);
@@ -255,46 +197,40 @@ void Spring::step(double size, const Inputs& inputs) {
 bool Spring::finite() const {
   bool all = std::isfinite(acceleration()) && std::isfinite(reaction()) && std::isfinite(kinetic_energy()) &&
              std::isfinite(potential_energy()) && std::isfinite(contact_energy());
-  for (double value : flat(impl_->state)) all = all && std::isfinite(value);
+  for (double value : flat(state_)) all = all && std::isfinite(value);
   return all;
+}
+
+/// What acts at `t` is what accelerations and reactions refer to.
+void Spring::see(const Loads& loads, double t) {
+  state_.force = value(loads.force, t);
+  state_.tip = value(loads.tip, t);
+  state_.tip_rate = rate(loads.tip, t);
 }
 
 void Spring::observe(const Inputs& inputs) {
   check(inputs);
-  see(impl_->state, Loads::from(impl_->parameters, inputs), 0.0);
+  see(Loads::from(parameters_, inputs), 0.0);
 }
 
 void Spring::apply_impulse(double impulse) {
   if (!std::isfinite(impulse)) throw std::invalid_argument("spring: impulse = " + number(impulse) + ": must be finite");
-  impl_->state.z += impulse / impl_->parameters.mass;
-  if (impl_->state.z != 0.0) impl_->state.seated = 0.0;
+  state_.z += impulse / parameters_.mass;
+  if (state_.z != 0.0) state_.seated = 0.0;
 }
 
-double Spring::displacement() const { return impl_->state.y; }
-double Spring::velocity() const { return impl_->state.z; }
 double Spring::acceleration() const {
-  const State& s = impl_->state;
-  return seated() ? 0.0 : impl_->motion.acceleration(s.y, s.z, s.force, impl_->contact(s));
+  return seated() ? 0.0 : motion_.acceleration(state_.y, state_.z, state_.force, reaction());
 }
-double Spring::displacement_integral() const { return impl_->state.integral; }
-double Spring::displacement_integral_2() const { return impl_->state.integral_2; }
-double Spring::reaction() const { return impl_->contact(impl_->state); }
-Quadratic Spring::tip() const { return {impl_->state.tip, impl_->state.tip_rate, 0.0}; }
-double Spring::stop_force() const { return impl_->state.stop_force; }
-double Spring::stop_impulse() const { return impl_->state.stop_impulse; }
-double Spring::kinetic_energy() const { return impl_->parameters.mass / 2 * impl_->state.z * impl_->state.z; }
-double Spring::potential_energy() const { return impl_->motion.potential_energy(impl_->state.y); }
-double Spring::contact_energy() const {
-  return impl_->laws.compliance ? impl_->motion.compliance().energy(impl_->depth(impl_->state)) : 0.0;
+double Spring::reaction() const {
+  return laws_.compliance ? motion_.compliance().force(depth(), state_.z - state_.tip_rate) : 0.0;
 }
-double Spring::dissipated_energy() const { return impl_->state.dissipated; }
-double Spring::load_work() const { return impl_->state.load_work; }
-double Spring::impact_loss() const { return impl_->state.impact_loss; }
-bool Spring::seated() const { return impl_->state.seated != 0.0; }
-long Spring::ida_steps() const { return static_cast<long>(impl_->state.steps); }
+double Spring::kinetic_energy() const { return parameters_.mass / 2 * state_.z * state_.z; }
+double Spring::potential_energy() const { return motion_.potential_energy(state_.y); }
+double Spring::contact_energy() const { return motion_.compliance().energy(depth()); }
 
 void Spring::save(std::vector<double>& state) const {
-  const auto numbers = flat(impl_->state);
+  const auto numbers = flat(state_);
   state.assign(numbers.begin(), numbers.end());
 }
 
@@ -308,7 +244,7 @@ void Spring::restore(const std::vector<double>& state) {
   const auto restored = from_flat<State>(state.data());
   if (!(restored.steps >= 0.0 && restored.steps < 0x1p53))
     throw std::invalid_argument("spring: a saved state counts " + number(restored.steps) + " internal steps");
-  impl_->state = restored;
+  state_ = restored;
 }
 
 }  // namespace spring

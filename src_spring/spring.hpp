@@ -7,44 +7,17 @@
 //     0 ≤ N ⊥ y − φ ≥ 0,   z⁺ = −e z⁻ at an impact. Impacts that die out end seated, y = φ, until N would be < 0.
 #pragma once
 
-#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "polynomial.hpp"
+#include "flight.hpp"
+#include "motion.hpp"
+#include "parameters.hpp"
+#include "seated.hpp"
 
 namespace spring {
-
-enum class ContactLaw { external = 1, normal_compliance = 2 };
-
-/// SI units.
-struct Parameters {
-  double mass = 1.0;              ///< m [kg]
-  double damping = 0.0;           ///< α_s [N·s/m]
-  double linear_stiffness = 1.0;  ///< k1 [N/m]
-  double cubic_stiffness = 0.0;   ///< k2 [N/m³]
-  double displacement = 0.0;      ///< y at the start [m]
-  double velocity = 0.0;          ///< ẏ at the start [m/s]
-  ContactLaw contact_law = ContactLaw::external;
-  double compliance_stiffness = 1.0e4;  ///< λ_nc [N/m^p]
-  double compliance_exponent = 3.0;     ///< p [–] ≥ 1
-  double compliance_damping = 0.0;      ///< χ [s/m]
-  bool stop_enabled = false;
-  double stop_position = -1.0;  ///< φ [m]
-  double restitution = 1.0;     ///< e in [0, 1]
-  double relative_tolerance = 1e-12;
-  double absolute_tolerance = 1e-14;
-};
-
-/// Held or polynomial over one step; τ from its start.
-struct Inputs {
-  Quadratic contact_force{};      ///< C [N], positive presses the spring down
-  Quadratic foundation_force{};   ///< N ≥ 0 [N], upward; used when the stop inside is not enabled
-  Quadratic external_force{};     ///< f_s [N]
-  Quadratic base_acceleration{};  ///< a of the foundation [m/s²]: y is relative to it, so that it acts as −m a
-  Quadratic tip_displacement{};   ///< u_tip [m]; read by normal_compliance only
-};
 
 /// The step could not be completed: the state is as before the step, `reached` tells how far it came.
 class StepFailure : public std::runtime_error {
@@ -63,9 +36,8 @@ class Spring {
  public:
   /// @throws std::invalid_argument naming the parameter, its value and what is allowed
   explicit Spring(const Parameters& parameters);
-  ~Spring();
-  Spring(Spring&&) noexcept;
-  Spring& operator=(Spring&&) noexcept;
+  Spring(const Spring&) = delete;
+  Spring& operator=(const Spring&) = delete;
 
   /// Advance by `size` [s] > 0. The work is bounded: a step that spans too much of the motion is refused.
   /// @throws StepFailure, Escape (state unchanged)
@@ -78,23 +50,24 @@ class Spring {
   /// Instantaneous upward impulse J [N·s]: z += J/m.
   void apply_impulse(double impulse);
 
-  double displacement() const;             ///< y [m]
-  double velocity() const;                 ///< z [m/s]
-  double acceleration() const;             ///< ż [m/s²] under the inputs at the end of the last step
-  double displacement_integral() const;    ///< ∫ y dτ over the last step [m·s]
-  double displacement_integral_2() const;  ///< ∫∫ y dτ dτ over the last step [m·s²]
-  double reaction() const;                 ///< C of the law inside, at the end of the last step [N]; 0 for external
-  Quadratic tip() const;                   ///< u_tip [m] and its rate there, as observed or extrapolated; no curvature
-  double stop_force() const;               ///< mean of N over the last step, law inside [N]
-  double stop_impulse() const;             ///< sum of stop impulses over the last step [N·s]
-  double kinetic_energy() const;           ///< ½ m z² [J]
-  double potential_energy() const;         ///< ½ k1 y² + ¼ k2 y⁴ [J]
-  double contact_energy() const;           ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
-  double dissipated_energy() const;        ///< by α_s and χ since the start, an integrated unknown [J]
-  double load_work() const;                ///< of f_s and −m a since the start [J]
-  double impact_loss() const;              ///< energy lost in stop impacts since the start [J]
-  bool seated() const;                     ///< held on the foundation by the law inside
-  long ida_steps() const;                  ///< internal IDA steps since the start
+  double displacement() const { return state_.y; }                      ///< y [m]
+  double velocity() const { return state_.z; }                          ///< z [m/s]
+  double displacement_integral() const { return state_.integral; }      ///< ∫ y dτ over the last step [m·s]
+  double displacement_integral_2() const { return state_.integral_2; }  ///< ∫∫ y dτ dτ over the last step [m·s²]
+  double stop_force() const { return state_.stop_force; }         ///< mean of N over the last step, law inside [N]
+  double stop_impulse() const { return state_.stop_impulse; }     ///< sum of stop impulses over the last step [N·s]
+  double dissipated_energy() const { return state_.dissipated; }  ///< by α_s and χ since the start [J]
+  double load_work() const { return state_.load_work; }           ///< of f_s and −m a since the start [J]
+  double impact_loss() const { return state_.impact_loss; }       ///< in stop impacts since the start [J]
+  bool seated() const { return state_.seated != 0.0; }            ///< held on the foundation by the law inside
+  long ida_steps() const { return static_cast<long>(state_.steps); }  ///< internal IDA steps since the start
+  double kinetic_energy() const;                                      ///< ½ m z² [J]
+  double potential_energy() const;                                    ///< ½ k1 y² + ¼ k2 y⁴ [J]
+  // Under the inputs at the end of the last step, or as observed since:
+  double acceleration() const;    ///< ż [m/s²]
+  double reaction() const;        ///< C of the law inside [N]; 0 for external
+  double contact_energy() const;  ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
+  Quadratic tip() const { return {state_.tip, state_.tip_rate, 0.0}; }  ///< u_tip [m] and its rate; no curvature
 
   /// The whole dynamic state as a flat vector of fixed length.
   void save(std::vector<double>& state) const;
@@ -102,10 +75,27 @@ class Spring {
   void restore(const std::vector<double>& state);
 
  private:
+  /// Everything that a step changes; doubles only, see flat.hpp.
+  struct State {
+    double y, z;
+    double integral = 0.0, integral_2 = 0.0;
+    double dissipated = 0.0, impact_loss = 0.0, load_work = 0.0;
+    double stop_force = 0.0, stop_impulse = 0.0;
+    double seated = 0.0;                            ///< 1 on the foundation
+    double force = 0.0, tip = 0.0, tip_rate = 0.0;  ///< F, u_tip and its rate where the step ended
+    double steps = 0.0;                             ///< IDA's, since the start
+  };
+  class Step;
+  void see(const Loads& loads, double t);
+  double depth() const { return laws_.compliance ? state_.y - state_.tip : -1.0; }
   bool finite() const;
 
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  const Parameters parameters_;
+  const Motion motion_;
+  const Laws laws_;
+  Flight flight_;
+  std::optional<Seated> seat_;
+  State state_;
 };
 
 }  // namespace spring

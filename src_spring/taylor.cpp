@@ -2,28 +2,31 @@
 
 namespace spring {
 
-Taylor::Taylor(const std::array<double, max_order + 1>& derivatives, int order) : order_(order) {
-  for (int k = 0; k <= order; ++k) d_[static_cast<std::size_t>(k)] = derivatives[static_cast<std::size_t>(k)];
-}
-
-double Taylor::integral(double t) const {
-  return t * (d_[0] + t * (d_[1] / 2 + t * (d_[2] / 6 + t * (d_[3] / 24 + t * d_[4] / 120))));
-}
-
-double Taylor::integral_2(double t) const {
-  return t * t * (d_[0] / 2 + t * (d_[1] / 6 + t * (d_[2] / 24 + t * (d_[3] / 120 + t * d_[4] / 720))));
-}
-
-double Taylor::squared_rate_integral(double t) const {
-  // Four-point Gauss rule: exact for degree 7, Ṙ² has degree 6.
-  constexpr std::array<double, 2> node{0.339981043584856264802665759103, 0.861136311594052575223946488893};
-  constexpr std::array<double, 2> weight{0.652145154862546142626936050778, 0.347854845137453857373063949222};
-  double sum = 0.0;
-  for (std::size_t i = 0; i < 2; ++i) {
-    const double left = rate(t * (1.0 - node[i]) / 2), right = rate(t * (1.0 + node[i]) / 2);
-    sum += weight[i] * (left * left + right * right);
+Taylor::Taylor(const Series& coefficients, int order) : order_(order) {
+  for (std::size_t k = 0; k <= static_cast<std::size_t>(order); ++k) {
+    c_[k] = coefficients[k];
+    if (k > 0) rate_[k - 1] = static_cast<double>(k) * c_[k];
   }
-  return sum * t / 2;
+}
+
+double Taylor::integral(double s) const {
+  Series c = c_;
+  for (std::size_t k = 0; k < c.size(); ++k) c[k] /= static_cast<double>(k + 1);
+  return s * sum_of_powers(c, s, 0, order_);
+}
+
+double Taylor::integral_2(double s) const {
+  Series c = c_;
+  for (std::size_t k = 0; k < c.size(); ++k) c[k] /= static_cast<double>((k + 1) * (k + 2));
+  return s * s * sum_of_powers(c, s, 0, order_);
+}
+
+double Taylor::squared_rate_integral(double s) const {
+  std::array<double, std::size_t{2} * max_order> square{};
+  const std::size_t n = static_cast<std::size_t>(order_);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = 0; j < n; ++j) square[i + j + 1] += rate_[i] * rate_[j] / static_cast<double>(i + j + 1);
+  return sum_of_powers(square, s, 1, 2 * order_ - 1);
 }
 
 }  // namespace spring

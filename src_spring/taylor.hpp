@@ -1,37 +1,54 @@
-// Taylor polynomial of the displacement at a segment's start, R(τ) = Σ y⁽ᵏ⁾ τᵏ/k!, k ≤ 4, with its exact integrals.
+// Taylor polynomial of the displacement at a segment's start, in scaled time s = τ/H ∈ [0, 1], with its exact
+// integrals:
+//     R(s) = Σ c_k sᵏ, k ≤ order.
 //
 // IDA is given the deviation from R instead of y itself. The equation is the same, but the deviation starts with zero
 // value and zero rate, so the low orders with which a freshly started BDF begins meet a solution that has hardly
-// moved, the tolerances are relative to what changes, and y is interpolated accurately at events.
+// moved, the tolerances are relative to what changes, and y is interpolated accurately at events. Where R alone is
+// exact to the tolerance, one internal step of IDA confirms that.
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 namespace spring {
 
+/// Highest order of R.
+inline constexpr int max_order = 12;
+
+/// Coefficients of s⁰, s¹, …: as many as R has, and the first that it leaves out.
+using Series = std::array<double, max_order + 2>;
+
+/// Σ c_k sᵏ over first ≤ k ≤ last.
+template <std::size_t n>
+double sum_of_powers(const std::array<double, n>& c, double s, int first, int last) {
+  double sum = 0.0;
+  for (int k = last; k >= first; --k) sum = sum * s + c[static_cast<std::size_t>(k)];
+  for (int k = 0; k < first; ++k) sum *= s;
+  return sum;
+}
+
 class Taylor {
  public:
-  static constexpr int max_order = 4;
-
   Taylor() = default;
-  /// `derivatives` y, ẏ, ÿ, … ; those above `order` are dropped.
-  Taylor(const std::array<double, max_order + 1>& derivatives, int order);
+  /// Coefficients above `order` are dropped.
+  Taylor(const Series& coefficients, int order);
 
   int order() const { return order_; }
-  double operator()(double t) const { return start() + rise(t); }
-  double start() const { return d_[0]; }
-  /// R(τ) − R(0), not spoilt by R(0).
-  double rise(double t) const { return t * (d_[1] + t * (d_[2] / 2 + t * (d_[3] / 6 + t * d_[4] / 24))); }
-  double rate(double t) const { return d_[1] + t * (d_[2] + t * (d_[3] / 2 + t * d_[4] / 6)); }
-  /// y⁽ᵏ⁾/k!
-  std::array<double, max_order + 1> coefficients() const { return {d_[0], d_[1], d_[2] / 2, d_[3] / 6, d_[4] / 24}; }
+  const Series& coefficients() const { return c_; }
+  double operator()(double s) const { return start() + rise(s); }
+  double start() const { return c_[0]; }
+  /// R(s) − R(0), not spoilt by R(0).
+  double rise(double s) const { return sum_of_powers(c_, s, 1, order_); }
+  double rate(double s) const { return sum_of_powers(rate_, s, 0, order_ - 1); }       ///< dR/ds
+  double rate_rise(double s) const { return sum_of_powers(rate_, s, 1, order_ - 1); }  ///< dR/ds less its start
 
-  double integral(double t) const;               ///< ∫₀ᵗ R
-  double integral_2(double t) const;             ///< ∫₀ᵗ∫ R
-  double squared_rate_integral(double t) const;  ///< ∫₀ᵗ Ṙ²
+  double integral(double s) const;               ///< ∫₀ˢ R
+  double integral_2(double s) const;             ///< ∫₀ˢ∫ R
+  double squared_rate_integral(double s) const;  ///< ∫₀ˢ (dR/ds)²
 
  private:
-  std::array<double, max_order + 1> d_{};
+  Series c_{}, rate_{};
   int order_ = 0;
 };
 

@@ -2,9 +2,9 @@
 // machine would ask of a new glibc is defined here, hidden, with what every glibc since 2.14 has: each block names the
 // version that brought the symbol. Names that old programs use too keep their old version in a new glibc, so on a yet
 // newer one only new names can be missing here; then tests/contract/test_package.py, which states the version that is
-// left, fails with the name. Only for x86-64. (g++ cannot be told to link for an older glibc; a compiler that can would
-// have to come with the project.)
-// NOLINTBEGIN(bugprone-reserved-identifier,performance-no-int-to-ptr)
+// left, fails with the name. Only for x86-64. (g++ cannot be told to link for an older glibc, and without this file the
+// FMUs need 2.35, which RHEL 9 and Ubuntu 20.04 do not have; a compiler that can, zig, would have to come with the
+// build.) NOLINTBEGIN(bugprone-reserved-identifier,performance-no-int-to-ptr)
 #include <features.h>
 
 #if defined(__GLIBC__) && defined(__x86_64__)
@@ -13,7 +13,6 @@
 #include <link.h>
 
 #include <cerrno>
-#include <cstddef>
 
 // Hidden by -fvisibility and by the version script.
 #define HIDDEN extern "C"
@@ -58,37 +57,18 @@ HIDDEN int __pthread_key_create(unsigned*, void (*)(void*)) noexcept { return EN
 #endif
 
 #if __GLIBC_PREREQ(2, 35)
-// Where the unwinder finds the tables of a program address.
-namespace {
-struct Search {
-  unsigned long pc;
-  dl_find_object* found;
-};
-int visit(dl_phdr_info* object, std::size_t, void* data) {
-  auto& search = *static_cast<Search*>(data);
-  unsigned long begin = ~0UL, end = 0;
-  void* tables = nullptr;
-  bool inside = false;
-  for (int i = 0; i < object->dlpi_phnum; ++i) {
-    const auto& header = object->dlpi_phdr[i];
-    const unsigned long address = object->dlpi_addr + header.p_vaddr;
-    if (header.p_type == PT_GNU_EH_FRAME) tables = reinterpret_cast<void*>(address);
-    if (header.p_type != PT_LOAD) continue;
-    if (address < begin) begin = address;
-    if (address + header.p_memsz > end) end = address + header.p_memsz;
-    inside = inside || (search.pc >= address && search.pc < address + header.p_memsz);
+// Where the unwinder finds its tables: those of this library, which no exception leaves.
+extern "C" const ElfW(Ehdr) __ehdr_start;  // the linker's
+HIDDEN int _dl_find_object(void*, dl_find_object* found) noexcept {
+  const char* const base = reinterpret_cast<const char*>(&__ehdr_start);
+  const auto* headers = reinterpret_cast<const ElfW(Phdr)*>(base + __ehdr_start.e_phoff);
+  for (int i = 0; i < __ehdr_start.e_phnum; ++i) {
+    if (headers[i].p_type != PT_GNU_EH_FRAME) continue;
+    *found = {};
+    found->dlfo_eh_frame = const_cast<char*>(base + headers[i].p_vaddr);
+    return 0;
   }
-  if (!inside || !tables) return 0;
-  *search.found = dl_find_object{};
-  search.found->dlfo_map_start = reinterpret_cast<void*>(begin);
-  search.found->dlfo_map_end = reinterpret_cast<void*>(end);
-  search.found->dlfo_eh_frame = tables;
-  return 1;
-}
-}  // namespace
-HIDDEN int _dl_find_object(void* pc, dl_find_object* found) noexcept {
-  Search search{reinterpret_cast<unsigned long>(pc), found};
-  return dl_iterate_phdr(visit, &search) ? 0 : -1;
+  return -1;
 }
 #endif
 

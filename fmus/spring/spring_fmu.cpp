@@ -75,7 +75,10 @@ struct SpringModel final : fmi::Model {
       if (!before.empty()) restore(before);
       throw fmi::Discarded(why);
     };
-    if (held && !std::isfinite(held->force())) discard(no_force);
+    const auto has_force = [this] {
+      return !held || (std::isfinite(held->force()) && std::isfinite(contact_energy()));
+    };
+    if (!has_force()) discard(no_force);
     const spring::Inputs inputs = acting();
     try {
       if (impulse != 0.0) spring->apply_impulse(impulse);
@@ -86,10 +89,8 @@ struct SpringModel final : fmi::Model {
       discard(e.what());
     }
     keep_tip();
-    if (goes_on) {
-      held->advance(message(), spring->displacement(), trial());
-      if (!std::isfinite(held->force())) discard(no_force);
-    }
+    if (goes_on) held->advance(message(), spring->displacement(), trial());
+    if (!has_force()) discard(no_force);
     if (held) show_force();
     check_wiring();
   }

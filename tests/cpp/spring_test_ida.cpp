@@ -215,66 +215,74 @@ TEST(Seated, JacobianMatchesDifferences) {
   }
 }
 
+Series expanded(const Motion& motion, double y, double z, const Loads& loads, double H, bool touching, double depth) {
+  Expansion e(y, z, depth, loads, H);
+  while (e.highest <= max_order) motion.extend(e, touching, loads, H);
+  return e.y;
+}
+
 // ÿ − R̈ without cancellation is the same as the difference of both, to the rounding of that difference.
 TEST(Motion, ExcessAccelerationIsTheDifference) {
   const Parameters p = nonlinear();
   const Motion motion(p);
+  constexpr double H = 0.2;
   Loads loads;
-  loads.force = {1.0, -2.0, 3.0};
-  const double y = 0.15, z = 0.5;
-  const auto d = motion.derivatives(y, z, loads, false, 0.0);
-  for (const int order : {0, 2, 4}) {
-    const Taylor R({d[0], d[1], d[2], d[3], d[4]}, order);
-    const auto coefficients = motion.remainder(R, loads);
-    for (const double t : {0.0, 0.01, 0.2}) {
-      double remainder = 0.0;
-      for (std::size_t k = coefficients.size(); k-- > 0;) remainder = remainder * t + coefficients[k];
+  loads.force = scaled({1.0, -2.0, 3.0}, H);
+  const Series y = expanded(motion, 0.15, 0.5, loads, H, false, 0.0);
+  for (const int order : {0, 2, 4, max_order}) {
+    const Taylor R(y, order);
+    const auto remainder = motion.remainder(R, loads, H);
+    for (const double s : {0.0, 0.05, 1.0}) {
       const double q = 0.02, w = -0.3;
-      const double second = order == 0 ? 0.0 : d[2] + (order < 4 ? 0.0 : t * (d[3] + t * d[4] / 2));
-      const double difference =
-          motion.acceleration(R(t) + q, R.rate(t) + w, spring::value(loads.force, t), 0.0) - second;
-      EXPECT_NEAR(motion.excess_acceleration(R(t), q, w, remainder, 0.0), difference, 100 * epsilon)
-          << order << " " << t;
+      double second = 0.0;
+      for (int k = order; k >= 2; --k) second = second * s + k * (k - 1) * y[static_cast<std::size_t>(k)];
+      const double acceleration = motion.acceleration(R(s) + q, R.rate(s) / H + w, spring::value(loads.force, s), 0.0);
+      EXPECT_NEAR(motion.excess_acceleration(R(s), q, w, remainder(s), 0.0), acceleration - second / (H * H),
+                  1000 * epsilon)
+          << order << " " << s;
     }
   }
 }
 
-// The five derivatives that a start is expanded in: against differences of those one lower along the exact motion's
-// Taylor series (step 1e-3, central: error of order 1e-6).
-TEST(Motion, DerivativesAreThoseOfTheMotion) {
+// The coefficients that a start is expanded in, against differences of those one lower at later starts; for contact
+// forces that are a power of a depth > 0, and of one that begins at 0.
+TEST(Motion, ExpansionIsThatOfTheMotion) {
   Parameters p = nonlinear();
   Loads loads;
   loads.force = {1.0, -2.0, 3.0};
   loads.tip = {0.05, 0.4, -1.0};
-  const double y = 0.15, z = 0.5, h = 1e-3;
-  for (const auto& [touching, damping] :
-       std::array<std::pair<bool, double>, 3>{{{false, 0.0}, {true, 0.0}, {true, 0.8}}}) {
+  const double z = 0.5, h = 1e-3;
+  struct Kind {
+    bool touching;
+    double damping, exponent, depth;
+  };
+  for (const auto& [touching, damping, exponent, depth] :
+       {Kind{false, 0.0, 1.5, 0.1}, Kind{true, 0.0, 1.5, 0.1}, Kind{true, 0.8, 1.5, 0.1}, Kind{true, 0.8, 3.0, 0.1},
+        Kind{true, 0.0, 1.0, 0.0}, Kind{true, 0.8, 2.0, 0.0}}) {
     p.compliance_damping = damping;
+    p.compliance_exponent = exponent;
     const Motion motion(p);
-    const auto d = motion.derivatives(y, z, loads, touching, y - loads.tip[0]);
+    const double y = loads.tip[0] + depth;
+    const Series c = expanded(motion, y, z, loads, 1.0, touching, depth);
+    const Taylor R(c, max_order);
     const auto at = [&](double t) {
-      double position = 0.0, velocity = 0.0, factor = 1.0;
-      for (std::size_t k = 0; k < 6; ++k) {
-        position += d[k] * factor;
-        if (k > 0) velocity += d[k] * factor * static_cast<double>(k) / t;
-        factor *= t / static_cast<double>(k + 1);
-      }
-      return motion.derivatives(position, velocity, loads.from_time(t), touching,
-                                position - spring::value(loads.tip, t));
+      const double deep = depth + R.rise(t) - 0.4 * t + t * t / 2;
+      return expanded(motion, R(t), R.rate(t), loads.from_time(t), 1.0, touching, deep);
     };
-    const auto up = at(h), down = at(-h);
-    for (std::size_t k = 2; k < 5; ++k) {
-      const double difference = (up[k] - down[k]) / (2 * h);
-      EXPECT_NEAR(d[k + 1], difference, 1e-3 * std::abs(difference)) << "derivative " << k + 1;
+    const std::array<Series, 4> later{at(h), at(2 * h), at(3 * h), at(4 * h)};
+    for (std::size_t k = 2; k < max_order; ++k) {
+      const double rise = -25 * c[k] + 48 * later[0][k] - 36 * later[1][k] + 16 * later[2][k] - 3 * later[3][k];
+      const double difference = rise / (12 * h) / static_cast<double>(k + 1);
+      EXPECT_NEAR(c[k + 1], difference, 2e-3 * std::abs(difference) + 1e-9) << exponent << ", coefficient " << k + 1;
     }
   }
 }
 
 TEST(Taylor, IntegralsAreExact) {
-  const Taylor R({1.0, -2.0, 6.0, 12.0, -48.0}, 4);  // 1 − 2t + 3t² + 2t³ − 2t⁴
+  const Taylor R({1.0, -2.0, 3.0, 2.0, -2.0}, 4);
   EXPECT_DOUBLE_EQ(R(0.5), 1 - 1 + 0.75 + 0.25 - 0.125);
   EXPECT_DOUBLE_EQ(R.integral(1.0), 1 - 1 + 1 + 0.5 - 0.4);
   EXPECT_DOUBLE_EQ(R.integral_2(1.0), 0.5 - 1.0 / 3 + 0.25 + 0.1 - 1.0 / 15);
-  // ∫ (−2 + 6t + 6t² − 8t³)²
+  // ∫ (−2 + 6s + 6s² − 8s³)²
   EXPECT_DOUBLE_EQ(R.squared_rate_integral(1.0), 4.0 - 12 + 4 + 26 - 12 - 16 + 64.0 / 7);
 }

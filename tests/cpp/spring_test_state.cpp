@@ -168,17 +168,6 @@ TEST(SpringState, RepeatedStepsAreBitIdentical) {
   }
 }
 
-TEST(SpringState, MovedObjectsGoOn) {
-  Spring a(everything());
-  const auto start = saved(a);
-  a.step(0.02, Inputs{});
-  const auto once = saved(a);
-  a.restore(start);
-  Spring b(std::move(a));
-  b.step(0.02, Inputs{});
-  EXPECT_EQ(saved(b), once);
-}
-
 TEST(SpringState, AStateOfAnotherLengthIsRefused) {
   Spring s(softening());
   const auto before = saved(s);
