@@ -83,6 +83,8 @@ def test_a_run_leaves_results_and_pictures_and_says_where(here, unpainted):
     assert "31 macro steps" in result.stdout
     (event,) = [line for line in result.stdout.splitlines() if line.startswith("impact")]
     assert event.split() == ["impact", "0.10000000", "0.5", "-1", "0.25", "0.125"]
+    summary = json.loads((here / "results" / "soft" / "summary.json").read_text(encoding="utf-8"))
+    assert {key: summary[key] for key in SUMMARY} == SUMMARY
 
 
 def test_what_rounding_leaves_of_a_zero_is_shown_as_0(here, monkeypatch):
@@ -277,15 +279,6 @@ def test_progress_is_for_terminals(here, arguments, shown):
         assert (fragment in text) is (shown or fragment == "t = ")  # the last message names t, too
 
 
-def test_no_progress_in_a_file(here):
-    process = slow_command(here)
-    assert process.stdout.readline() == "going\n"
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
-    assert "steps/s" not in errors
-    assert "\x1b" not in errors
-
-
 # -- the other commands -------------------------------------------------------------------------------------------
 
 
@@ -306,12 +299,6 @@ def test_version_is_that_of_the_package(here, monkeypatch):
     monkeypatch.setattr(cli.metadata, "version", lambda name: {"springbeam": "1.2.3"}[name])
     result = command("--version")
     assert (result.exit_code, result.stdout) == (0, "springbeam 1.2.3\n")
-
-
-def test_summary_in_the_directory_is_the_runners(here):
-    command("run", "soft", "--no-plots")
-    summary = json.loads((here / "results" / "soft" / "summary.json").read_text(encoding="utf-8"))
-    assert {key: summary[key] for key in SUMMARY} == SUMMARY
 
 
 def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch):

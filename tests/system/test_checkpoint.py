@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from itertools import count
 from pathlib import Path
 from unittest.mock import patch
@@ -120,65 +123,54 @@ def test_what_would_not_come_back_is_refused(value):
 # -- refused --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("flip", [0, 10, 22, 40, 100, 3000, -1])
-def test_a_damaged_checkpoint_is_refused_and_nothing_is_touched(interrupted, flip):
+def flipped(at: int, file: bytes) -> bytes:
+    changed = bytearray(file)
+    changed[at] ^= 0x04
+    return bytes(changed)
+
+
+def cut(size: int, file: bytes) -> bytes:
+    return file[:size]
+
+
+def foreign(content: bytes, _: bytes) -> bytes:
+    return content
+
+
+def checksummed(old: bytes, new: bytes, file: bytes) -> bytes:
+    """A file with a good checksum of content that no run writes: no accident, but no traceback either."""
+    content = file.partition(b"\n")[2].replace(old, new, 1) if old else new
+    return b"springbeam checkpoint 1 sha256 %s\n%s" % (hashlib.sha256(content).hexdigest().encode(), content)
+
+
+#: What happens to the file, by what its refusal says.
+DAMAGE = {
+    "damaged|not a checkpoint of springbeam|of format": [
+        *(partial(flipped, at) for at in (0, 10, 22, 40, 100, 3000, -1)),
+        *(partial(cut, size) for size in (0, 1, 21, 60, 120, 2000, -1)),
+        *(partial(foreign, content) for content in (b"PK\x03\x04", b"{}", b"\xff" * 100)),
+        partial(foreign, b"springbeam checkpoint\n"),
+        partial(foreign, b"springbeam checkpoint 1 sha256\n"),
+    ],
+    "": [
+        *(partial(checksummed, b"", content) for content in (b"[]", b"[" * 100_000, b"nonsense")),
+        partial(checksummed, b'"version"', b'"vision"'),
+        partial(checksummed, b'"_macro_steps"', b'"_micro_steps"'),
+        partial(checksummed, b'"$Joint"', b'"$Phase"'),
+        partial(checksummed, b'"$bytes": "', b'"$bytes": "!'),
+        partial(checksummed, b'"$bytes": "c3By', b'"$bytes": "AAAA'),
+    ],
+}
+
+
+@pytest.mark.parametrize(("said", "damage"), [(said, damage) for said, some in DAMAGE.items() for damage in some])
+def test_a_damaged_checkpoint_is_refused_and_nothing_is_touched(interrupted, said, damage):
     path = interrupted / "run.checkpoint"
-    content = bytearray(path.read_bytes())
-    content[flip] ^= 0x04
-    path.write_bytes(content)
+    path.write_bytes(damage(path.read_bytes()))
     before = files(interrupted)
     result = command("resume", interrupted)
-    assert result.exit_code == 2
-    assert f"error: {path}: " in result.stderr
-    assert any(why in result.stderr for why in ("damaged", "not a checkpoint of springbeam", "of format"))
-    assert files(interrupted) == before
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        *(lambda content, size=size: content[:size] for size in (0, 1, 21, 60, 120, 2000, -1)),
-        *(lambda _, foreign=foreign: foreign for foreign in (b"PK\x03\x04", b"{}", b"\xff" * 100)),
-        lambda content: b"springbeam checkpoint\n",
-        lambda content: b"springbeam checkpoint 1 sha256\n",
-    ],
-)
-def test_a_truncated_or_foreign_file_is_refused(interrupted, change):
-    path = interrupted / "run.checkpoint"
-    path.write_bytes(change(path.read_bytes()))
-    with pytest.raises(CheckpointRefused, match=r"run\.checkpoint: (damaged|not a checkpoint of springbeam)"):
-        springbeam.resume(interrupted)
-
-
-def with_content(path: Path, change) -> None:
-    """A file with a good checksum of changed content: no accident, but no traceback either."""
-    import hashlib
-
-    _, _, content = path.read_bytes().partition(b"\n")
-    content = change(content)
-    path.write_bytes(b"springbeam checkpoint 1 sha256 %s\n%s" % (hashlib.sha256(content).hexdigest().encode(), content))
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda content: b"[]",
-        lambda content: b"[" * 100_000,
-        lambda content: b"nonsense",
-        lambda content: content.replace(b'"version"', b'"vision"', 1),
-        lambda content: content.replace(b'"_macro_steps"', b'"_micro_steps"', 1),
-        lambda content: content.replace(b'"$Joint"', b'"$Phase"', 1),
-        lambda content: content.replace(b'"$bytes": "', b'"$bytes": "!', 1),
-        lambda content: content.replace(b'"$bytes": "c3By', b'"$bytes": "AAAA', 1),
-    ],
-)
-def test_content_that_no_run_writes_is_refused(interrupted, change):
-    with_content(interrupted / "run.checkpoint", change)
-    before = files(interrupted)
-    result = command("resume", interrupted)
-    assert result.exit_code == 2
-    assert "Traceback" not in result.output
-    assert result.stderr.startswith("error: ")
+    assert result.exit_code == 2, result.output
+    assert re.match(rf"error: .*({said})", result.stderr)
     assert files(interrupted) == before
 
 
@@ -322,25 +314,20 @@ def test_a_run_that_stopped_stops_again_at_the_same_place(tmp_path):
 # -- the command, as a process --------------------------------------------------------------------------------------
 
 
-def process(*arguments: object, **options):
-    return subprocess.Popen(
-        [sys.executable, "-m", "springbeam", *map(str, arguments)], stderr=subprocess.PIPE, text=True, **options
-    )
-
-
 LONG = ["run", "soft", *CHANGES, "--set", "time.t_end=8", "--no-plots", "-q"]
 
 
 @pytest.fixture(scope="module")
 def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("long") / "run"
-    assert process(*LONG, "--out", directory).wait(120) == 0
+    assert command(*LONG, "--out", directory).exit_code == 0
     return directory
 
 
 def started(directory: Path) -> subprocess.Popen[str]:
     """The command, once it has taken a checkpoint."""
-    run = process(*LONG, "--out", directory, "--checkpoint", 0.05)
+    program = [sys.executable, "-m", "springbeam", *LONG, "--out", str(directory), "--checkpoint", "0.05"]
+    run = subprocess.Popen(program, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60.0
     while not (directory / "run.checkpoint").exists():
         assert time.monotonic() < deadline
@@ -358,7 +345,7 @@ def test_a_signal_ends_the_command_with_3_and_it_goes_on(tmp_path, long, number)
     assert "interrupted (reached t = " in errors
     assert "Traceback" not in errors
     assert load_trajectory(tmp_path / "run").summary["status"] == "interrupted"
-    assert process("resume", tmp_path / "run", "--no-plots", "-q").wait(120) == 0
+    assert command("resume", tmp_path / "run", "--no-plots", "-q").exit_code == 0
     assert results(tmp_path / "run") == results(long)
 
 
@@ -381,7 +368,7 @@ def test_a_run_without_room_ends_with_3_and_goes_on_where_there_is(tmp_path, lon
     cut = (tmp_path / "run" / "trajectory.csv").read_bytes()
     assert len(cut) == limit
     assert (long / "trajectory.csv").read_bytes().startswith(cut)
-    assert process("resume", tmp_path / "run", "--no-plots", "-q").wait(120) == 0
+    assert command("resume", tmp_path / "run", "--no-plots", "-q").exit_code == 0
     assert results(tmp_path / "run") == results(long)
 
 
