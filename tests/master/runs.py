@@ -5,10 +5,35 @@ from __future__ import annotations
 import numpy as np
 
 from springbeam.results.trajectory import EVENT_KINDS, Event, Trajectory, columns_of
-from springbeam.scene import load_scene
+from springbeam.scene import load_scene, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
 
 PAIR = load_scene("soft")
+#: Scenes that lack a body each, by what they have.
+SCENES = {
+    "all": PAIR,
+    "no stop": with_changes(PAIR, stop=None),
+    "no spring": with_changes(PAIR, spring=None),
+    "beam": with_changes(PAIR, spring=None, stop=None),
+    "no beam": with_changes(PAIR, beam=None),
+    "spring": with_changes(PAIR, beam=None, stop=None),
+}
+#: Columns that a picture must get along with.
+ODD_COLUMNS = {
+    "no motion": dict.fromkeys(("u_tip", "y", "v_tip", "z", "gap"), np.zeros(400)),
+    "no force nor residual": dict.fromkeys(
+        ("energy_residual", "contact_force", "contact_force_smoothed"), np.zeros(400)
+    ),
+    "no energy": dict.fromkeys(("e_beam", "e_spring", "e_total"), np.zeros(400)),
+    "nothing": {name: np.zeros(400) for name in columns_of(PAIR) if name not in ("time", "phase")},
+    "negative, unknown phase": {"e_spring": np.linspace(-1.0, 1.0, 400), "phase": np.full(400, "a phase to come")},
+    "stiff, extreme, alternating": {
+        "e_beam": np.full(400, 4.5e9),
+        "u_tip": np.full(400, 1e-300),
+        "y": np.full(400, -1e300),
+        "v_tip": np.where(np.arange(400) % 2, 1.0, -1.0),
+    },
+}
 
 
 def a_trajectory(scene=PAIR, n=400, events=(), **columns):

@@ -11,7 +11,7 @@ import pytest
 from commands import command
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
-from runs import PAIR, a_trajectory
+from runs import PAIR, SCENES, a_trajectory
 
 from springbeam.pictures import animation
 from springbeam.pictures.animation import AnimationError, animate
@@ -19,14 +19,6 @@ from springbeam.pictures.drawing import NOT_RESOLVED
 from springbeam.pictures.frames import frames_of
 from springbeam.results.directory import RunDirectory
 from springbeam.results.file_recorder import FileRecorder
-from springbeam.scene import with_changes
-
-SCENES = {
-    "pair": PAIR,
-    "no stop": with_changes(PAIR, stop=None),
-    "no spring": with_changes(PAIR, spring=None),
-    "spring": with_changes(PAIR, beam=None),
-}
 
 
 @pytest.fixture
@@ -142,22 +134,6 @@ def test_the_command_writes_a_gif_into_the_directory_and_says_where(directory):
     assert "already exists; --force replaces it" in again.stderr
     a_trajectory(n=30).save(directory, replace=True)
     assert not (directory / "animation.gif").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["run", "--out", "no/such/run.gif"], "No such file"),
-        (["run", "--fps", "0"], "--fps"),
-        (["run", "--seconds", "0"], "--seconds"),
-    ],
-)
-def test_bad_input_is_one_clear_error(directory, monkeypatch, arguments, message):
-    monkeypatch.chdir(directory.parent)
-    result = command("animate", *arguments)
-    assert result.exit_code == 2
-    assert message in result.stderr
-    assert not list(directory.parent.rglob("*.gif"))
 
 
 def test_a_run_of_one_row_has_nothing_to_animate(tmp_path):

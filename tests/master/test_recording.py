@@ -23,7 +23,7 @@ from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.reading import load_events, load_summary, load_trajectory
 from springbeam.results.recording import MemoryRecorder, NonFiniteValue
 from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, Event, columns_of
-from springbeam.scene import load_scene, with_changes
+from springbeam.scene import SceneError, load_scene, with_changes
 
 PAIR = load_scene("soft")
 BEAM_AND_STOP = with_changes(PAIR, spring=None)
@@ -236,7 +236,7 @@ def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
             "count": np.int64(3),
             "size": np.float64(0.5),
             "flag": np.bool_(True),
-            "list": np.arange(2),
+            "list": np.array([0.0, math.nan]),
             "path": tmp_path,
             "residual": math.nan,
             "nested": {"worst": -math.inf},
@@ -246,8 +246,8 @@ def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
     summary = load_summary(tmp_path)
     del summary["scene"]
     assert summary == {
-        "count": 3, "size": 0.5, "flag": True, "list": [0, 1], "path": str(tmp_path),
-        "residual": "nan", "nested": {"worst": "-inf"}, "nothing": None,
+        "count": 3, "size": 0.5, "flag": True, "list": [0.0, "NaN"], "path": str(tmp_path),
+        "residual": "NaN", "nested": {"worst": "-Infinity"}, "nothing": None,
     }  # fmt: skip
 
 
@@ -315,21 +315,18 @@ def test_a_run_killed_before_its_first_row_loads_empty(tmp_path):
         ("shapes.csv", lambda text: text.replace("u_0", "w_0"), r"shapes\.csv: line 1"),
         ("summary.json", lambda text: text[:-20], r"summary\.json: "),
         ("summary.json", lambda text: "[]", r"summary\.json: no scene"),
+        ("summary.json", lambda text: '{"scene": {}}', r"\[time\]: missing table"),
+        *((name, None, rf"{name}: ") for name in ("trajectory.csv", "events.csv", "summary.json")),
     ],
 )
 def test_damage_is_named_by_file(tmp_path, name, damage, message):
     run = filed(tmp_path / "run", event=Event(0.1, "impact", y=0.5))
     path = run.directory.path / name
-    path.write_text(damage(path.read_text(encoding="utf-8")), encoding="utf-8")
-    with pytest.raises(ResultsUnreadable, match=message):
-        load_trajectory(run.directory.path)
-
-
-@pytest.mark.parametrize("name", ["trajectory.csv", "events.csv", "summary.json"])
-def test_a_missing_file_is_named(tmp_path, name):
-    run = filed(tmp_path / "run")
-    (run.directory.path / name).unlink()
-    with pytest.raises(ResultsUnreadable, match=name):
+    if damage is None:
+        path.unlink()
+    else:
+        path.write_text(damage(path.read_text(encoding="utf-8")), encoding="utf-8")
+    with pytest.raises((ResultsUnreadable, SceneError), match=message):
         load_trajectory(run.directory.path)
 
 
@@ -401,6 +398,26 @@ def test_two_processes_do_not_write_into_one_directory(tmp_path):
     FileRecorder(PAIR, RunDirectory(tmp_path)).restore(saved)
 
 
+def test_a_directory_may_exist_with_other_files_and_is_made_with_its_parents(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    assert RunDirectory.create(tmp_path).path == tmp_path
+    assert RunDirectory.create(tmp_path / "a" / "b").path.is_dir()
+
+
+def test_numbered_directories_are_new_each_time_also_in_parallel(tmp_path):
+    with ThreadPoolExecutor(8) as pool:
+        made = list(pool.map(lambda _: RunDirectory.create_numbered(tmp_path / "results" / "soft").path, range(12)))
+    assert {path.name for path in made} == {"soft", *(f"soft-{i}" for i in range(2, 13))}
+
+
+def test_only_an_empty_directory_is_discarded(tmp_path):
+    RunDirectory.create(tmp_path / "empty").discard()
+    assert not (tmp_path / "empty").exists()
+    run = filed(tmp_path / "run")
+    run.directory.discard()
+    assert len(load_trajectory(tmp_path / "run")) == 3
+
+
 # -- going on -----------------------------------------------------------------------------------------------------
 
 
@@ -461,29 +478,6 @@ def test_results_that_have_changed_are_not_continued_nor_touched(tmp_path, name,
     ):
         refused.restore(saved)
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
-
-
-# -- directories --------------------------------------------------------------------------------------------------
-
-
-def test_a_directory_may_exist_with_other_files_and_is_made_with_its_parents(tmp_path):
-    (tmp_path / "notes.txt").write_text("mine")
-    assert RunDirectory.create(tmp_path).path == tmp_path
-    assert RunDirectory.create(tmp_path / "a" / "b").path.is_dir()
-
-
-def test_numbered_directories_are_new_each_time_also_in_parallel(tmp_path):
-    with ThreadPoolExecutor(8) as pool:
-        made = list(pool.map(lambda _: RunDirectory.create_numbered(tmp_path / "results" / "soft").path, range(12)))
-    assert {path.name for path in made} == {"soft", *(f"soft-{i}" for i in range(2, 13))}
-
-
-def test_only_an_empty_directory_is_discarded(tmp_path):
-    RunDirectory.create(tmp_path / "empty").discard()
-    assert not (tmp_path / "empty").exists()
-    run = filed(tmp_path / "run")
-    run.directory.discard()
-    assert len(load_trajectory(tmp_path / "run")) == 3
 
 
 # -- a full disk --------------------------------------------------------------------------------------------------

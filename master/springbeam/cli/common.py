@@ -7,7 +7,6 @@ Results go to stdout, progress and errors to stderr. ``--json`` puts one JSON do
 from __future__ import annotations
 
 import difflib
-import json
 import signal
 import threading
 from collections.abc import Iterator
@@ -22,7 +21,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from ..bodies.protocol import FmuError
 from ..results.directory import ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
-from ..results.file_recorder import json_ready
+from ..results.file_recorder import as_json
 from ..run.checkpoint import CheckpointRefused
 from ..scene import SceneError, scene_keys, shipped_scenes
 
@@ -126,7 +125,7 @@ def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
 
 def print_json(document: Any) -> None:
     """Print ``document`` as JSON; NaN and infinity, as in a run that stopped, become strings."""
-    typer.echo(json.dumps(json_ready(document), indent=2, allow_nan=False, ensure_ascii=False))
+    typer.echo(as_json(document).decode())
 
 
 def results_directory(path: Path) -> Path:

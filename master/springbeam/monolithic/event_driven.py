@@ -22,7 +22,7 @@ from .exponential import ExponentialPropagator, LinearForm
 from .hybrid_system import HybridSystem, ReferenceFailure
 from .laws import Phase
 from .location import EventLocator
-from .propagators import SCIPY_METHODS, Propagator, RungeKuttaPropagator, Segment
+from .propagators import SCIPY_METHODS, Method, Propagator, RungeKuttaPropagator, Segment
 from .quasi_static import QuasiStaticSystem
 from .rows import Rows
 from .semi_discrete import modal_beam
@@ -90,24 +90,13 @@ def simulate(
         method = "DOP853"
     if method not in ("exponential", *SCIPY_METHODS):
         raise ValueError(f"method = {method!r}: one of exponential, {', '.join(SCIPY_METHODS)}")
-    run = _Run(scene, method, rtol, atol, nodes, velocity_perturbation, t_end)
+    run = _Run(scene, Method(method, rtol, atol, nodes), velocity_perturbation, t_end)
     return run.execute(sample_times, time_limit)
 
 
 class _Run:
-    def __init__(
-        self,
-        scene: Scene,
-        method: str,
-        rtol: float,
-        atol: float,
-        nodes: int,
-        velocity_perturbation: float,
-        t_end: float | None,
-    ) -> None:
-        self.scene = scene
-        self.system = _system(scene)
-        self.method, self.rtol, self.atol, self._nodes = method, rtol, atol, nodes
+    def __init__(self, scene: Scene, method: Method, velocity_perturbation: float, t_end: float | None) -> None:
+        self.scene, self.method, self.system = scene, method, _system(scene)
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
         if self.system.two_ends and self.system.law.rigid and scene.contact.impact == "rest":
             raise ValueError(
@@ -199,24 +188,22 @@ class _Run:
     def _propagator(self) -> Propagator:
         self.counts["phases"] += 1
         state = self.state
-        if self.method == "exponential":
+        if self.method.name == "exponential":
             if state.phase not in self._forms:
                 self._forms[state.phase] = LinearForm(self.system, state.phase)
             return ExponentialPropagator(self._forms[state.phase], state.X)
         horizon = max(min(self.t_end, self.system.loads.next_kink(state.time)) - state.time, 1e-300)
-        return RungeKuttaPropagator(
-            self.system, state.phase, state.X, horizon, self.method, self.rtol, self.atol, self._nodes
-        )
+        return RungeKuttaPropagator(self.system, state.phase, state.X, horizon, self.method)
 
     def _summary(self, wall_time: float) -> dict[str, Any]:
         summary = {
             "reference": "event_driven",
-            "method": self.method,
+            "method": self.method.name,
             "wall_time": wall_time,
             "counts": {**self.counts, "events": len(self.state.events)},
         }
-        if self.method != "exponential":
-            summary["tolerances"] = {"rtol": self.rtol, "atol": self.atol}
+        if self.method.name != "exponential":
+            summary["tolerances"] = {"rtol": self.method.rtol, "atol": self.method.atol}
         return summary
 
 

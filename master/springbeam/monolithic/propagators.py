@@ -18,6 +18,16 @@ from .laws import Phase
 SCIPY_METHODS = {"DOP853": DOP853, "LSODA": LSODA, "Radau": Radau}
 
 
+@dataclass(frozen=True)
+class Method:
+    """How a phase is integrated, and how finely where that is scipy's; see `event_driven.simulate`."""
+
+    name: str
+    rtol: float
+    atol: float
+    nodes: int
+
+
 class Segment(ABC):
     """One accepted step of size ``size`` [s] with states at ``nodes``, 0 and ``size`` among them."""
 
@@ -54,49 +64,40 @@ class _RungeKuttaSegment(Segment):
         if tau <= 0.0:
             return np.array(self.start)
         owner = self.owner
-        if owner.method == "LSODA":
+        if owner.method.name == "LSODA":
             # Of the order of the step; and before scipy 1.17 no second LSODA may run while the first goes on.
             return owner.system.synchronise(owner.phase, self.dense(self.begin + tau))
         # Again from the start, because the dense output is a power of the step less accurate.
-        solution = solve_ivp(owner.rhs, (0.0, tau), self.start, method=owner.method, first_step=tau, **owner.options)
+        span, method = (0.0, tau), owner.method.name
+        solution = solve_ivp(owner.rhs, span, self.start, method=method, first_step=tau, **owner.options)
         return owner.system.synchronise(owner.phase, solution.y[:, -1].copy())
 
 
 class RungeKuttaPropagator(Propagator):
     """scipy's DOP853, LSODA or Radau on the modal form."""
 
-    def __init__(
-        self,
-        system: HybridSystem,
-        phase: Phase,
-        X: np.ndarray,
-        horizon: float,
-        method: str,
-        rtol: float,
-        atol: float,
-        nodes: int,
-    ) -> None:
-        self.system, self.phase, self.method, self._nodes = system, phase, method, nodes
-        self.options: dict[str, Any] = {"rtol": rtol, "atol": atol}
-        if method != "DOP853":
+    def __init__(self, system: HybridSystem, phase: Phase, X: np.ndarray, horizon: float, method: Method) -> None:
+        self.system, self.phase, self.method = system, phase, method
+        self.options: dict[str, Any] = {"rtol": method.rtol, "atol": method.atol}
+        if method.name != "DOP853":
             self.options["jac"] = lambda _time, X: system.jacobian(phase, X)
-        solver: Any = SCIPY_METHODS[method]
+        solver: Any = SCIPY_METHODS[method.name]
         self._solver = solver(self.rhs, 0.0, X.copy(), horizon, **self.options)
 
     def rhs(self, _time: float, X: np.ndarray) -> np.ndarray:
         return self.system.derivative(self.phase, X)
 
     def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
-        solver = self._solver
+        solver, count = self._solver, self.method.nodes
         start, begin = solver.y.copy(), solver.t
         message = solver.step()
         if solver.status == "failed":
-            raise ReferenceFailure(f"{self.method} failed in phase {self.phase.name}: {message}")
+            raise ReferenceFailure(f"{self.method.name} failed in phase {self.phase.name}: {message}")
         self.elapsed = solver.t
         size = solver.t - begin
-        nodes = np.linspace(0.0, size, self._nodes)
+        nodes = np.linspace(0.0, size, count)
         # DOP853's takes evaluations of its own.
-        dense: Any = solver.dense_output() if self._nodes != 2 or self.method == "LSODA" else None
-        states = np.array([start, solver.y]) if self._nodes == 2 else dense(begin + nodes).T
+        dense: Any = solver.dense_output() if count != 2 or self.method.name == "LSODA" else None
+        states = np.array([start, solver.y]) if count == 2 else dense(begin + nodes).T
         states[0], states[-1] = start, solver.y
         return _RungeKuttaSegment(self, start, begin, size, nodes, self.system.synchronise(self.phase, states), dense)

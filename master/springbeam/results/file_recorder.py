@@ -6,11 +6,9 @@ No file ever holds NaN or inf.
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from math import isfinite
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -32,13 +30,6 @@ _SUMMARY_ROOM = 16384
 _STEPS_TOGETHER = 8192
 #: Times closer than this share are one.
 _SAME = 1e-12
-_PLAIN: tuple[tuple[type, Callable[[Any], Any]], ...] = (
-    (np.bool_, bool),
-    (np.integer, int),
-    (np.floating, float),
-    (np.ndarray, np.ndarray.tolist),
-    (Path, str),
-)
 
 
 class FileRecorder(CheckedRecorder):
@@ -212,10 +203,10 @@ class FileRecorder(CheckedRecorder):
         self._summary_part.write_bytes(b" " * _SUMMARY_ROOM)
 
     def _write_summary(self, summary: Mapping[str, Any]) -> None:
-        text = json.dumps(json_ready(with_scene(summary, self.scene)), indent=2, allow_nan=False, ensure_ascii=False)
+        text = as_json(with_scene(summary, self.scene))
         # A reader, or a run killed at this moment, finds the old summary or the new one, never half of it.
         with self._summary_part.open("r+b" if self._summary_part.exists() else "wb") as file:
-            file.write(text.encode() + b"\n")
+            file.write(text + b"\n")
             file.truncate()
         os.replace(self._summary_part, self.directory.summary)
 
@@ -290,15 +281,6 @@ def _line(fields: Sequence[Any]) -> bytes:
     return to_json(fields)[1:-1].replace(b'"', b"") + b"\n"
 
 
-def json_ready(value: Any) -> Any:
-    """Return ``value`` in plain JSON types; NaN and infinity become strings, because JSON has no such numbers."""
-    for kind, plain in _PLAIN:
-        if isinstance(value, kind):
-            value = plain(value)
-    if isinstance(value, float) and not isfinite(value):
-        return repr(value)
-    if isinstance(value, Mapping):
-        return {str(key): json_ready(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [json_ready(item) for item in value]
-    return value
+def as_json(document: Any) -> bytes:
+    """Return ``document`` as JSON; NaN and infinity become strings, because JSON has no such numbers."""
+    return to_json(document, indent=2, inf_nan_mode="strings", fallback=lambda value: value.tolist())
