@@ -92,7 +92,7 @@ class Compliance:
         if p <= 0.0:
             return 0.0
         elastic: float = self.stiffness * p**self.exponent
-        return elastic * max(1.0 + self.damping * rate, 0.0) if self.damped else elastic
+        return elastic if rate == 0.0 else elastic * max(1.0 + self.damping * rate, 0.0)
 
     def potential(self, p: float) -> float:
         q = self.exponent + 1.0

@@ -32,8 +32,8 @@ _Rule = Sequence[tuple[float, float]]
 _EPS = 2.0**-52
 #: p̃ keeps its size, or keeps off zero, if the least of its Bézier points is above this share of the largest.
 _STEADY, _OFF_ZERO = 0.9, 0.3
-#: Relative change of p over a step up to which the quotient ΔΦ/Δp would lose digits.
-_SMALL_CHANGE = 0.1
+#: Relative change of p over a step up to which the quotient ΔΦ/Δp would lose more than two digits.
+_SMALL_CHANGE = 0.01
 #: How well zeros of p̃ are found, and steps to them at most.
 _ZERO, _MAX_STEPS_TO_ZERO = 1e-12, 40
 
@@ -43,8 +43,8 @@ def _gauss(points: int) -> list[tuple[float, float]]:
     return list(zip(nodes.tolist(), weights.tolist(), strict=True))
 
 
-#: Rules for a p̃ that keeps its size and for one that keeps off zero.
-_FEW, _MANY = _gauss(6), _gauss(8)
+#: Rules for a p̃ of degree 1, 2, 3 that keeps its size, and for one that keeps off zero.
+_FEW, _MANY = [_gauss(4), _gauss(5), _gauss(6)], _gauss(8)
 #: The rule for a piece between zeros, from 0 to 1. It is graded towards both ends, 3t² − 2t³ of the length: a power of
 #: p beside p = 0 becomes smooth.
 _GRADED = [
@@ -62,6 +62,8 @@ class Projection:
 
     def __init__(self, law: SoftLaw, degree: int) -> None:
         self.law, self.degree = law, degree
+        self._damped, self._few = law.damped, _FEW[degree]
+        self._is_quotient = degree == 0 and not law.damped
         units = np.eye(degree + 1).tolist()
         #: ∂p̃/∂x_j, and the Legendre coefficients of its projection, by rows.
         self._by_x = [_path(0.0, unit) for unit in units]
@@ -72,7 +74,7 @@ class Projection:
 
         Raises OverflowError where no double holds it.
         """
-        if self._tells_by_ends(start, x[0]):
+        if self._is_quotient and _changes(start, x[0]):
             return [(self.law.potential(x[0]) - self.law.potential(start)) / (x[0] - start)]
         path = b0, b1, b2, b3 = _path(start, x)
         rule = self._where_it_acts(path, start, x[0])
@@ -85,7 +87,7 @@ class Projection:
             m1 += m
             m2 += s * m
         share = self._missing(path, (m0, m1, m2), start, x[0]) if rule else 0.0
-        if self.law.damped:
+        if self._damped:
             for s, weight in rule:
                 m = weight * self.law.resistance(*_at(path, s, size))[0]
                 m0 += m
@@ -100,25 +102,25 @@ class Projection:
 
     def slope(self, start: float, size: float, x: Vector) -> Matrix:
         """Return ∂a/∂x [N/m] of `force`; where p keeps its size, with F′ as it is in the middle of the step."""
-        if self._tells_by_ends(start, x[0]):
+        if self._is_quotient and _changes(start, x[0]):
             return [[(self.law.force(x[0]) - self.force(start, size, x)[0]) / (x[0] - start)]]
         path = _path(start, x)
         rule = self._where_it_acts(path, start, x[0])
         law = self.law
-        if rule is _FEW and not law.damped:
+        if rule is self._few and not self._damped:
             in_middle = law.slope(path[0] + path[1] / 3.0 if self.degree == 0 else path[0])
             return [[in_middle * value for value in row] for row in self._by_x_projected]
         places = [_at(path, s, size) for s, _ in rule]
         slopes = [law.slope(p) for p, _ in places]
         rows = []
-        if law.damped:
+        if self._damped:
             resistances = [law.resistance(p, rate) for p, rate in places]
             slopes = [slope + by_p for slope, (_, by_p, _) in zip(slopes, resistances, strict=True)]
             by_rate = _moments(rule, [by_rate for _, _, by_rate in resistances])
         by_p = _moments(rule, slopes)
         for change in self._by_x:
             moments = [_product(change, by_p[k:]) for k in range(3)]
-            if law.damped:
+            if self._damped:
                 rate = [2.0 / size * i * b for i, b in enumerate(change)][1:]
                 moments = [m + _product(rate, by_rate[k:]) for k, m in enumerate(moments)]
             rows.append(_legendre(*moments)[: self.degree + 1])
@@ -144,10 +146,6 @@ class Projection:
             total += weight * value * self.law.force(_at(path, s)[0])
         return (k + 0.5) * total
 
-    def _tells_by_ends(self, start: float, end: float) -> bool:
-        """Whether C is ΔΦ/Δp, and that loses no digits to cancellation."""
-        return self.degree == 0 and not self.law.damped and abs(end - start) > _SMALL_CHANGE * max(abs(start), abs(end))
-
     def _missing(self, path: _Path, moments: tuple[float, float, float], start: float, end: float) -> float:
         """Return by how much of p̃′ C is to be corrected for ∫ C p̃′ = ΔΦ: quadrature of a power is not exact."""
         _, b1, b2, b3 = path
@@ -162,20 +160,25 @@ class Projection:
     def _where_it_acts(self, path: _Path, start: float, end: float) -> _Rule:
         """Return a rule for the pieces of the step where the law acts, without points if there are none."""
         if not self.law.one_sided:
-            return _FEW
+            return self._few
         _, b1, b2, b3 = path
         second, third = start + (b1 - 2.0 * b2 + 3.0 * b3) / 1.5, end - (b1 + 2.0 * b2 + 3.0 * b3) / 1.5
         low, high = min(start, second, third, end), max(start, second, third, end)  # of the Bézier points
         if high <= 0.0:
             return ()
         if low > _OFF_ZERO * high:
-            return _FEW if low > _STEADY * high else _MANY
+            return self._few if low > _STEADY * high else _MANY
         rule: list[tuple[float, float]] = []
         for left, right in pairwise([-1.0, *_zeros_inside(path), 1.0]):
             if _at(path, 0.5 * (left + right))[0] > 0.0:
                 length = right - left
                 rule += [(left + length * t, length * weight) for t, weight in _GRADED]
         return rule
+
+
+def _changes(start: float, end: float) -> bool:
+    """Whether p changes by so much that ΔΦ/Δp loses few digits to cancellation."""
+    return abs(end - start) > _SMALL_CHANGE * max(abs(start), abs(end))
 
 
 def penetration_series(start: float, x: Vector) -> Vector:

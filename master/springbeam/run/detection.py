@@ -120,6 +120,8 @@ class Detector:
         """The step, cut to the first event that positions tell of, and its kind; of size 0 if it is at the start."""
         found: str | None = None
         functions = self._functions.of(state.phase)
+        if not functions:
+            return step, None
         for _ in range(2 * len(functions) + 1):
             candidates, third = [], step.size / 3.0
             starts = self._functions.samples(state.phase, step.start)
@@ -216,8 +218,9 @@ class Detector:
 
         Nothing special happens there: the zero is that of the path of the gap.
         """
-        touched, touching = (tip.displacement < low.displacement for tip, low in (step.start, step.end))
-        if touched == touching:
+        (before_tip, before_low), (tip, low) = step.start, step.end
+        touching = tip.displacement < low.displacement
+        if touching == (before_tip.displacement < before_low.displacement):
             return None
         before, after = gap(step.start), gap(step.end)
         sign = 1.0 if touching else -1.0  # opening, the penetration falls through zero
@@ -225,8 +228,8 @@ class Detector:
             (sign * first, sign * second) for first, second in (before, after, gap.means(step.end, step.size))
         )
         at = Path.through(start, end, step.size, means).falls_through_zero()
-        tip, low = (_inside(step.start[i], step.end[i], step.size, at) for i in (0, 1))
-        return SoftChange("impact" if touching else "separation", step.time + at * step.size, tip, low)
+        places = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
+        return SoftChange("impact" if touching else "separation", step.time + at * step.size, *places)
 
 
 def _inside(start: Motion, end: Motion, size: float, s: float) -> Sample:

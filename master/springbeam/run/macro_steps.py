@@ -45,17 +45,14 @@ class MacroGrid(Checkpointed):
                 return (time + size, size) if kink >= time + size + _SHORT_REMAINDER * H else (kink, kink - time)
         target = self._start + (self._index + 1) * H
         size = target - time
-        on_grid = abs(size - H) <= _SAME * H
         if size < _SHORT_REMAINDER * H:
             self._index += 1
-            target, size, on_grid = target + H, size + H, False
+            target, size = target + H, size + H
         if target >= self._end - _SAME * H:
             target, size = self._end, self._end - time
-            on_grid = abs(size - H) <= _SAME * H
         if kink < target + _SHORT_REMAINDER * H:
             target, size = kink, kink - time
-            on_grid = abs(size - H) <= _SAME * H
-        return target, H if on_grid else size
+        return target, H if abs(size - H) <= _SAME * H else size
 
     def reached(self, time: float) -> None:
         """Grid points up to ``time`` are behind."""

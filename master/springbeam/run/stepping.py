@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ..bodies import force
@@ -64,6 +65,10 @@ class State(Checkpointed):
         if not phase.seated:
             self.foundation = NO_FORCE
 
+
+#: ``Window(*values)`` and ``Step(*values)`` in a third of the time.
+_window_of: Callable[[type[Window], tuple[float, float, Ends]], Window] = tuple.__new__
+_step_of: Callable[[type[Step], tuple[float, float, Force, Force, Ends, Ends]], Step] = tuple.__new__
 
 #: In place of a body that the scene does not have: at rest at 0.
 _ABSENT = RigidWall(0.0)
@@ -148,11 +153,12 @@ class Pair(Checkpointed):
         """
         phase = state.phase if phase is None else phase
         partner = self._held if phase.seated and self._held is not None else self.lower
-        window = Window(state.time, size, start)
-        self.loads.act(state.time, size)
+        time = state.time
+        self.loads.act(time, size)
+        window = _window_of(Window, (time, size, start))
         contact = self.coupling(phase).solve(self.upper, partner, window, state.guess(size))
-        foundation = self._held_down(state.time, size, contact) if phase.seated else NO_FORCE
-        self._last = step = Step(state.time, size, contact, foundation, start, (self._tip(), self._low()))
+        foundation = self._held_down(time, size, contact) if phase.seated else NO_FORCE
+        self._last = step = _step_of(Step, (time, size, contact, foundation, start, self.ends()))
         return step
 
     def _held_down(self, time: float, size: float, contact: Force) -> Force:
