@@ -1,21 +1,21 @@
 """Measure critical macro steps, and compare them with those that the spectral radius predicts.
 
 The FMUs are coupled by the solvers of a run, without events: the linear closed contact of
-`springbeam.studies.stability.linear` is stepped until its growth shows. `Preloaded` makes the one-sided law λ p₊ a
-two-sided one: the bodies are counted from where a preload holds them in equilibrium.
+`springbeam.studies.stability.linear` is stepped until its growth shows. A closed contact of law `compliance` with
+exponent 1 is a `link`, which also pulls: as that it is measured.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
 from ...bodies import force
 from ...bodies.factory import load_bodies
-from ...bodies.protocol import NO_FORCE, Body, Energies, Force, Motion
+from ...bodies.protocol import NO_FORCE
 from ...contact.laws import law_of
 from ...coupling import coupling_of
 from ...coupling.protocol import Window
@@ -26,43 +26,11 @@ from ..tables import table, write_csv
 from .linear import LinearPair, spectral_radius
 from .predict import RIGID, SOFT, THRESHOLD, critical_step, linear_pair
 
-#: Penetration in equilibrium [m], and first amplitude of the motion [m]: it may grow 1e6-fold before contact opens.
-_PRELOAD, _AMPLITUDE = 1e4, 1e-3
 #: Growth of the energy at which the rate is told, and how many macro steps it may take to get there.
 _GROWN, _MOST_STEPS = 1e10, 8000
 #: Distances from a predicted critical H, of itself, at which stability and instability are sought. The first ones are
 #: small: ``hermite`` is unstable in bands that can be 0.2 % wide.
 _SOUGHT = (0.001, 0.003, 0.01, 0.03, 0.1)
-
-
-class Preloaded(Body):
-    """A body counted from its equilibrium under a constant contact force, where its end is at ``offset`` [m]."""
-
-    def __init__(self, body: Body, offset: float, preload: float) -> None:
-        self._body, self._offset, self._preload = body, offset, preload
-        self._size = 0.0  #: of the last step [s]
-        self.mass = body.mass
-
-    def mark(self) -> None:
-        self._body.mark()
-
-    def rewind(self) -> None:
-        self._body.rewind()
-
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        self._size = size
-        self._body.advance(time, size, (contact[0] - self._preload, contact[1], contact[2]), foundation)
-        return self.motion()
-
-    def motion(self) -> Motion:
-        (w, v, once, twice), w0, h = self._body.motion(), self._offset, self._size
-        return Motion(w + w0, v, once + w0 * h, twice + 0.5 * w0 * h * h)
-
-    def energies(self) -> Energies:
-        return self._body.energies()
-
-    def apply_impulse(self, impulse: float) -> None:
-        self._body.apply_impulse(impulse)
 
 
 def growth(scene: Scene) -> float:
@@ -72,62 +40,38 @@ def growth(scene: Scene) -> float:
     without its cubic term and at its equilibrium, the tip on it. The rate is that of the second half of the steps up
     to `_GROWN`.
     """
-    coupling, contact = scene.coupling, scene.contact
-    H, soft = coupling.H, not contact.rigid
+    H, soft = scene.coupling.H, not scene.contact.rigid
     spring = {"cubic_stiffness": 0.0, "equilibrium": 0.0, "external_force": 0.0, "initial_velocity": 0.0}
     at_rest = {"distributed_load": 0.0, "initial_deflection_slope": 0.0, "initial_velocity_slope": 0.0}
-    linear = with_changes(scene, stop=None, spring=spring, beam={**at_rest, "approach": "elastic"})
+    law = {"law": "link", "damping": 0.0} if scene.contact.law == "compliance" else {}
+    linear = with_changes(scene, stop=None, spring=spring, beam={**at_rest, "approach": "elastic"}, contact=law)
+    coupling, guess = coupling_of(linear, law_of(linear.contact)), NO_FORCE
     beam, top = load_bodies(linear, 0.0)
     assert beam is not None
     assert top is not None
-    pair: tuple[Body, Body] = (beam, top)
-    frequency = 1.0 / H
-    if soft:
-        preload = contact.stiffness * _PRELOAD
-        pair = (Preloaded(beam, -0.5 * _PRELOAD, preload), Preloaded(top, 0.5 * _PRELOAD, preload))
-        frequency = math.sqrt(contact.stiffness * (1.0 / beam.mass + 1.0 / top.mass))
+
+    def energy() -> float:
+        stored = sum(body.energies().kinetic + body.energies().potential for body in (beam, top))
+        apart = top.motion().displacement - beam.motion().displacement
+        return stored + (0.5 * linear.contact.stiffness * apart**2 if soft else 0.0)
+
     try:
-        step = _stepper(linear, pair)
         # Tied ends start with one velocity; in contact it is their relative motion that grows.
-        speed = _AMPLITUDE * frequency
         reduced = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
-        impulses = (-reduced * speed, reduced * speed) if soft else (beam.mass * speed, top.mass * speed)
-        for body, impulse in zip(pair, impulses, strict=True):
-            body.apply_impulse(impulse)
-        energies = [_energy(linear, pair)]
+        beam.apply_impulse(-reduced if soft else beam.mass)
+        top.apply_impulse(reduced if soft else top.mass)
+        energies = [energy()]
         while len(energies) <= _MOST_STEPS and energies[-1] < _GROWN * energies[0]:
-            for body in pair:
-                body.mark()
-            step(H * (len(energies) - 1))
-            energies.append(_energy(linear, pair))
+            beam.mark()
+            top.mark()
+            window = Window(H * (len(energies) - 1), H, (beam.motion(), top.motion()))
+            guess = force.shifted(coupling.solve(beam, top, window, guess), H)
+            energies.append(energy())
     finally:
         beam.close()
         top.close()
     n = len(energies) - 1
     return float((energies[n] / energies[n // 2]) ** (0.5 / (n - n // 2)))
-
-
-def _energy(scene: Scene, pair: tuple[Body, Body]) -> float:
-    """Return the energy of the bodies, and of the contact law about its preload [J]."""
-    energy = sum(body.energies().kinetic + body.energies().potential for body in pair)
-    if not scene.contact.rigid:
-        beam, top = (body.motion().displacement for body in pair)
-        energy += 0.5 * scene.contact.stiffness * (top - beam - _PRELOAD) ** 2
-    return energy
-
-
-def _stepper(scene: Scene, pair: tuple[Body, Body]) -> Callable[[float], None]:
-    """Return ``step(time)``, which advances both bodies by the scene's coupling."""
-    H, (beam, top) = scene.coupling.H, pair
-    coupling = coupling_of(scene, law_of(scene.contact))
-    guess = NO_FORCE
-
-    def step(time: float) -> None:
-        nonlocal guess
-        window = Window(time, H, (beam.motion(), top.motion()))
-        guess = force.shifted(coupling.solve(beam, top, window, guess), H)
-
-    return step
 
 
 def measured_critical_step(scene: Scene, near: float, precision: float = 0.002) -> float | None:
