@@ -370,4 +370,4 @@ def test_a_sweep_without_its_packages_says_how_to_get_them(desk, monkeypatch):
     monkeypatch.setattr("springbeam.cli.sweep.find_spec", lambda name: None if name == "pyarrow" else find(name))
     result = command("sweep", "soft", "--vary", "spring.mass=1,2")
     assert result.exit_code == 2
-    assert result.stderr == "error: sweep needs the packages pyarrow: pip install pyarrow\n"
+    assert result.stderr == "error: sweep needs the package pyarrow: pip install pyarrow\n"

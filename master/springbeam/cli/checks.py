@@ -72,8 +72,7 @@ def crosscheck(
             what, how = made.scene, picked_in_words(made.summary["accuracy"])
             console.print(Text(f"accuracy {how}"))
         if with_orders:
-            study, default = Orders(scene=what, quick=quick), f"{Path(scene).stem}-orders"
-            carry_out(study, default, out=out, force=force, quiet=False, as_json=as_json)
+            carry_out(Orders(scene=what, quick=quick), scene, out=out, force=force, as_json=as_json)
             return
         if quick:
             start = what.contact_time or 0.0

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..scene import load_scene
-from .common import ForceOption, JsonOption, NoPlotsOption, QuietOption, SceneArgument, SettingsOption
-from .study import QuickOption, StudyOption, carry_out
+from .common import SceneArgument, SettingsOption
+from .study import QuickOption, study_command
+
+if TYPE_CHECKING:
+    from ..studies.study import Study
 
 
+@study_command()
 def converge(
     scene: SceneArgument,
     settings: SettingsOption = None,
@@ -22,26 +25,11 @@ def converge(
         list[str] | None, typer.Option("--metric", metavar="NAME", help="Quantity to compare; may be repeated.")
     ] = None,
     quick: QuickOption = False,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+) -> Study:
     """Show how the results settle with finer meshes and more modes: observed orders, extrapolated values, cost.
 
     Example: springbeam converge steel-bumper --metric contact_force_max
     """
     from ..studies.converge import Converge
 
-    carry_out(
-        lambda: Converge(
-            scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()), quick=quick
-        ),
-        f"{Path(scene).stem}-converge",
-        out=out,
-        force=force,
-        no_plots=no_plots,
-        quiet=quiet,
-        as_json=as_json,
-    )
+    return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()), quick=quick)

@@ -45,4 +45,4 @@ def resume(
             as_json=as_json,
         )
     elif study is not None:
-        carry_out_study(study, "", out=directory, no_plots=no_plots, quiet=quiet, as_json=as_json)
+        carry_out_study(study, None, out=directory, no_plots=no_plots, quiet=quiet, as_json=as_json)

@@ -12,20 +12,18 @@ from rich.text import Text
 
 from ..scene import load_scene
 from .common import (
-    ForceOption,
     JsonOption,
-    NoPlotsOption,
-    QuietOption,
     SceneArgument,
     SettingsOption,
     bad_input_reported,
     console_for,
     print_json,
 )
-from .study import QuickOption, StudyOption, WorkersOption, carry_out
+from .study import QuickOption, study_command
 
 if TYPE_CHECKING:
     from ..studies.stability.predict import Prediction, SchemePrediction
+    from ..studies.study import Study
 
 #: A mesh that is so much too stiff is said to lock.
 _LOCKS = 1.05
@@ -112,6 +110,7 @@ def _scheme(s: SchemePrediction, threshold: float) -> tuple[str, ...]:
     )
 
 
+@study_command("workers")
 def stability(
     critical: Annotated[
         bool,
@@ -125,13 +124,7 @@ def stability(
     ] = 6,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the hypercube.")] = 1,
     quick: QuickOption = False,
-    workers: WorkersOption = None,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+) -> Study:
     """Run extreme scenes and classify each result. Exit code 1 if a wrong result came without a warning.
 
     Example: springbeam stability --samples 100 --resolution 0
@@ -139,13 +132,4 @@ def stability(
     from ..studies.stability.critical import Critical
     from ..studies.stability.grid import Grid
 
-    carry_out(
-        Critical(quick=quick) if critical else Grid(samples=samples, resolution=resolution, seed=seed, quick=quick),
-        "critical" if critical else "stability",
-        out=out,
-        force=force,
-        workers=workers,
-        no_plots=no_plots,
-        quiet=quiet,
-        as_json=as_json,
-    )
+    return Critical(quick=quick) if critical else Grid(samples=samples, resolution=resolution, seed=seed, quick=quick)

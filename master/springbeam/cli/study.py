@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import nullcontext
+from inspect import signature
 from itertools import count
 from math import ceil
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
@@ -17,7 +18,20 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 from rich.text import Text
 
 from ..results.directory import ResultsExist
-from .common import BAD_INPUT, DISAGREES, STOPPED, bad_input_reported, console_for, fail, print_json, progress_bar
+from .common import (
+    BAD_INPUT,
+    DISAGREES,
+    STOPPED,
+    ForceOption,
+    JsonOption,
+    NoPlotsOption,
+    QuietOption,
+    bad_input_reported,
+    console_for,
+    fail,
+    print_json,
+    progress_bar,
+)
 from .watchdog import watched
 
 if TYPE_CHECKING:
@@ -30,31 +44,61 @@ StudyOption = Annotated[
 WorkersOption = Annotated[
     int | None, typer.Option("--workers", metavar="N", min=1, help="Local processes. Default: one per core.")
 ]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster instead of local processes."),
+]
 QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]
+#: Options of all studies.
+_SHARED = ("out", "force", "no_plots", "quiet", "as_json")
 #: A study that takes longer says how long the rest will take, where no bar does [s].
 _LONG = 10.0
 
 
+def study_command(*more: str) -> Callable[[Callable[..., Study]], Callable[..., None]]:
+    """Return what makes a command of a function that returns a study: it is carried out.
+
+    The command has the options of the function, those that all studies have, and of `carry_out` also ``more``.
+    """
+
+    def made(make: Callable[..., Study]) -> Callable[..., None]:
+        del make.__annotations__["return"]  # a type that only type checkers load
+        own, frame = signature(make, eval_str=True), signature(carry_out, eval_str=True)
+        shared = [frame.parameters[name] for name in (*more, *_SHARED)]
+
+        def command(**given: Any) -> None:
+            options = {parameter.name: given.pop(parameter.name) for parameter in shared}
+            carry_out(lambda: make(**given), given.get("scene"), **options)
+
+        command.__signature__ = own.replace(parameters=[*own.parameters.values(), *shared])  # type: ignore[attr-defined]
+        command.__name__, command.__doc__ = make.__name__, make.__doc__
+        return command
+
+    return made
+
+
 def carry_out(
-    study: Study | Callable[[], Study],
-    default: str,
+    what: Any,
+    scene: str | None,
     *,
-    out: Path | None = None,
-    force: bool = False,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    no_plots: bool = False,
-    quiet: bool,
-    as_json: bool,
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    out: StudyOption = None,
+    force: ForceOption = False,
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Compute what of a study is not yet in its directory, write its files, and show what was found.
 
-    The directory is ``out``, else ``results/default``, or with -2, -3, … behind it where another study is.
+    ``what`` is a `Study`, or a function that returns one and may raise what bad input raises. The directory is ``out``,
+    else ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
     """
     console = console_for(silent=quiet or as_json)
     with bad_input_reported():
-        study = study() if callable(study) else study
+        study: Study = what() if callable(what) else what
         study.cases()
+        default = study.kind if scene is None else f"{Path(scene).stem}-{study.kind}"
         records = _opened(study, default, out, force)
         directory = records.path.parent
         computed = _computed(study, records, console, workers, scheduler, quiet=quiet or as_json)

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,
-    ForceOption,
-    JsonOption,
-    NoPlotsOption,
-    QuietOption,
     SceneArgument,
     SettingsOption,
     complete_key,
     fail,
 )
-from .study import StudyOption, WorkersOption, carry_out
+from .study import study_command
+
+if TYPE_CHECKING:
+    from ..studies.study import Study
 
 
+@study_command("workers", "scheduler")
 def sweep(
     scene: SceneArgument,
     vary: Annotated[
@@ -57,42 +56,21 @@ def sweep(
             help="Keep the positions once a period of the harmonic load in the last third of each run, and draw them.",
         ),
     ] = False,
-    workers: WorkersOption = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster instead of local processes."),
-    ] = None,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+) -> Study:
     """Run a scene over many values of its keys, on all cores or a Dask cluster; one row per run.
 
     Example: springbeam sweep soft --vary spring.linear_stiffness=1:200:64:log
     """
-    needed = ("pyarrow", "distributed") if scheduler else ("pyarrow",)
-    if missing := [name for name in needed if find_spec(name) is None]:
-        fail(BAD_INPUT, f"sweep needs the packages {' and '.join(missing)}: pip install {' '.join(missing)}")
+    if find_spec("pyarrow") is None:
+        fail(BAD_INPUT, "sweep needs the package pyarrow: pip install pyarrow")
     from ..studies.sweep import Sweep
 
-    carry_out(
-        lambda: Sweep(
-            scene=load_scene(scene, settings or ()),
-            vary=tuple(vary or ()),
-            samples=samples,
-            sampling=sampling,
-            seed=seed,
-            metric=tuple(metric or ()),
-            stroboscopic=stroboscopic,
-        ),
-        f"{Path(scene).stem}-sweep",
-        out=out,
-        force=force,
-        workers=workers,
-        scheduler=scheduler,
-        no_plots=no_plots,
-        quiet=quiet,
-        as_json=as_json,
+    return Sweep(
+        scene=load_scene(scene, settings or ()),
+        vary=tuple(vary or ()),
+        samples=samples,
+        sampling=sampling,
+        seed=seed,
+        metric=tuple(metric or ()),
+        stroboscopic=stroboscopic,
     )

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..scene import load_scene
-from .common import ForceOption, JsonOption, NoPlotsOption, QuietOption, SceneArgument, SettingsOption
-from .study import StudyOption, carry_out
+from .common import SceneArgument, SettingsOption
+from .study import study_command
+
+if TYPE_CHECKING:
+    from ..studies.study import Study
 
 
+@study_command()
 def tradeoff(
     scene: SceneArgument,
     settings: SettingsOption = None,
@@ -29,24 +32,11 @@ def tradeoff(
             "--quick", help="Every third configuration of a kind, timed once; the slow ones are left out sooner."
         ),
     ] = False,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+) -> Study:
     """Measure error against cost over schemes, macro steps, modes, meshes and tolerances, beside scipy's solvers.
 
     Example: springbeam tradeoff soft --until 0.0712
     """
     from ..studies.tradeoff import Tradeoff
 
-    carry_out(
-        lambda: Tradeoff.of(load_scene(scene, settings or ()), until, repeats=repeats, quick=quick),
-        f"{Path(scene).stem}-tradeoff",
-        out=out,
-        force=force,
-        no_plots=no_plots,
-        quiet=quiet,
-        as_json=as_json,
-    )
+    return Tradeoff.of(load_scene(scene, settings or ()), until, repeats=repeats, quick=quick)

@@ -333,10 +333,12 @@ def _pool(workers: int) -> Iterator[Executor]:
 @contextmanager
 def dask_cluster(scheduler: str) -> Iterator[Executor]:
     """Open the Dask cluster at ``scheduler``. Raises ConnectionError if it cannot be reached or its workers differ."""
-    from distributed import Client
-
     try:
+        from distributed import Client
+
         client = Client(scheduler, timeout=10.0)
+    except ImportError as error:
+        raise ConnectionError(f"--scheduler: {error}; pip install distributed") from error
     except (OSError, ValueError) as error:
         raise ConnectionError(f"--scheduler {scheduler}: cannot be reached: {error}") from error
     with client:
@@ -344,14 +346,8 @@ def dask_cluster(scheduler: str) -> Iterator[Executor]:
         try:
             theirs = client.run(metadata.version, "springbeam")
         except Exception as error:  # whatever a worker without the package raises
-            raise ConnectionError(
-                f"the workers cannot load springbeam {own}: {error}; install it where they run"
-            ) from error
-        if not theirs:
-            raise ConnectionError("the scheduler has no workers; start some, or leave out --scheduler")
-        for address, version in theirs.items():
-            if version != own:
-                raise ConnectionError(
-                    f"the worker {address} has springbeam {version}, this is {own}; install the same version"
-                )
+            raise ConnectionError(f"the workers lack springbeam {own}: {error}; install it there") from error
+        if set(theirs.values()) != {own}:
+            others = ", ".join(f"{address} has {version}" for address, version in theirs.items()) or "there are none"
+            raise ConnectionError(f"the workers need springbeam {own}, as is here; {others}")
         yield client.get_executor(pure=False)
