@@ -1,7 +1,7 @@
 """Compare the FMUs with exact solutions: ``springbeam verify``.
 
 Every function of `SECTIONS` computes one exact solution from its formula, has ``beam.fmu`` and ``spring.fmu`` (alone,
-or in a scene) compute the same, and returns the comparison as a list of `Check`. A bound follows from what the method
+or in a scene) compute the same, and yields the comparison, a `Check` at a time. A bound follows from what the method
 leaves out, the discretisation's leading error, the solver's tolerance or rounding, and says which; none is fitted.
 A new exact solution is a function in one of the modules beside this one, and a line in `SECTIONS`; ``table`` prints
 them.
@@ -22,7 +22,7 @@ from .loads import moving_base, pulse, resonance, slow_ramp
 from .spring import duffing, escape
 
 #: Title and exact solution, in the order of the table.
-SECTIONS: tuple[tuple[str, Callable[[], list[Check]]], ...] = (
+SECTIONS: tuple[tuple[str, Callable[[], Iterator[Check]]], ...] = (
     ("Beam: static deflection of the tip, locking", static_deflection),
     ("Beam: clamped–free frequencies", frequencies),
     ("Beam: convergence of the mesh", mesh_convergence),
@@ -54,6 +54,6 @@ def verify() -> Iterator[tuple[str, list[Check]]]:
     """
     for title, section in SECTIONS:
         try:
-            yield title, section()
+            yield title, list(section())
         except (StepRefused, RunStopped) as error:
             yield title, [Check("not computed", None, None, 0.0, str(error))]

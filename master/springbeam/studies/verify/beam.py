@@ -5,6 +5,7 @@ The beam has ρA = ρI = L = 1, EI = KAG = κ, unless a function says otherwise;
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import closing
 from functools import lru_cache
 from itertools import pairwise
@@ -22,13 +23,13 @@ from ...scene.unit import unit_beam
 from .check import EPS, UNIT_FORCE, Check
 
 
-def static_deflection() -> list[Check]:
+def static_deflection() -> Iterator[Check]:
     """Tip deflection under a tip force of 1 N, of the mesh of n elements (h = L/n) and of the beam it stands for.
 
     Full integration: (1/3EI + 1/KAG)/(1 + KAG h²/12EI), which locks; reduced: (1 − h²/4)/3EI + 1/KAG; the beam:
     1/3EI + 1/KAG. Kelvin–Voigt damping brings the FMU to rest: its slowest rate is at least 1/2 s⁻¹ here.
     """
-    n, h, checks = 10, 0.1, []
+    n, h = 10, 0.1
     for ratio_name, kag in (("1", 1.0), ("1e6", 1e6)):
         true = 1.0 / 3.0 + 1.0 / kag
         full, reduced = true / (1.0 + kag * h * h / 12.0), (1.0 - h * h / 4.0) / 3.0 + 1.0 / kag
@@ -46,27 +47,24 @@ def static_deflection() -> list[Check]:
                 for step in range(200):
                     body.advance(float(step), 1.0, UNIT_FORCE)
                 ratio = body.motion().displacement / true
-            checks.append(
-                Check(
-                    f"KAG/EI {ratio_name}: {name}",
-                    exact / true,
-                    ratio,
-                    (2 * n) ** 2 * EPS * exact / true,
-                    "tip deflection over that of the beam, 1/3EI + 1/KAG (n = 10). Rounding: ε N² in an eigenproblem "
-                    "or factorisation of N = 2n unknowns",
-                )
+            yield Check(
+                f"KAG/EI {ratio_name}: {name}",
+                exact / true,
+                ratio,
+                (2 * n) ** 2 * EPS * exact / true,
+                "tip deflection over that of the beam, 1/3EI + 1/KAG (n = 10). Rounding: ε N² in an eigenproblem "
+                "or factorisation of N = 2n unknowns",
             )
-    return checks
 
 
-def frequencies() -> list[Check]:
+def frequencies() -> Iterator[Check]:
     """Clamped–free frequencies, κ = 1, from the motion of the tip; √κ times these for any κ."""
-    n, checks = 160, []
+    n = 160
     measured = _measured_frequencies(unit_beam(n_elements=n, n_modes=6), 0.1, 300)
     for i, w in enumerate(clamped_free_frequencies()[:6], 1):
         bound = _mesh_error(w) / n**2 * (1.0 + (_wave_number(w) / n) ** 2)
         reason = "P1, n = 160: leading error h²/24ω · ∫(EI θ''² + KAG u''²) of the mode, next order (kh)² of it"
-        checks.append(Check(f"ω{i} [rad/s]", w, _nearest(measured, w), bound, reason))
+        yield Check(f"ω{i} [rad/s]", w, _nearest(measured, w), bound, reason)
     kappa, n = 3.6e10, 40
     soft = _measured_frequencies(unit_beam(n_elements=n, n_modes=2), 0.1, 150)
     stiff = unit_beam(n_elements=n, n_modes=2, young_modulus=kappa, shear_modulus=kappa)
@@ -74,11 +72,10 @@ def frequencies() -> list[Check]:
     first = _nearest(soft, clamped_free_frequencies()[0])
     reason = "against κ = 1 on the same mesh, n = 40. Rounding: ε N², N = 2n unknowns"
     bound = (2 * n) ** 2 * EPS * first
-    checks.append(Check("ω1/√κ at κ = 3.6e10 [rad/s]", first, _nearest(scaled, first), bound, reason))
-    return checks
+    yield Check("ω1/√κ at κ = 3.6e10 [rad/s]", first, _nearest(scaled, first), bound, reason)
 
 
-def mesh_convergence() -> list[Check]:
+def mesh_convergence() -> Iterator[Check]:
     """The first frequency's error is second order in h, with the coefficient of `_mesh_error`."""
     w = clamped_free_frequencies()[0]
     errors = {}
@@ -88,21 +85,18 @@ def mesh_convergence() -> list[Check]:
     next_order = (_wave_number(w) / 80) ** 2
     leading = _mesh_error(w) / 80**2 / w
     reason = "next order of the P1 dispersion, (kh)² of the leading error"
-    return [
-        Check("relative error of ω1, n = 80", leading, errors[80], leading * next_order, reason),
-        # log2 of (1 + 4d)/(1 + d), |d| ≤ (kh)²
-        Check(
-            "order from n = 40 to 80", 2.0, float(np.log2(errors[40] / errors[80])), 3.0 * next_order / log(2), reason
-        ),
-    ]
+    yield Check("relative error of ω1, n = 80", leading, errors[80], leading * next_order, reason)
+    # log2 of (1 + 4d)/(1 + d), |d| ≤ (kh)²
+    order = float(np.log2(errors[40] / errors[80]))
+    yield Check("order from n = 40 to 80", 2.0, order, 3.0 * next_order / log(2), reason)
 
 
-def beam_energy() -> list[Check]:
+def beam_energy() -> Iterator[Check]:
     """E(t+H) − E(t) = C·(u_tip(t+H) − u_tip(t)) − dissipation for every step under a constant force.
 
     At rest again, all that was there and half the work of C are dissipated: 1/6 + C²·(tip compliance)/2 for u_t⁰ = x.
     """
-    n, kappa, size, checks = 50, 1e4, 0.02, []
+    n, kappa, size = 50, 1e4, 0.02
     reason = "largest in 200 steps over the largest energy, κ = 1e4, H = 0.02 s. Rounding: sums of 2n terms, 2nε"
     for integrator in ("modal", "generalized_alpha"):
         for alpha in (0.0, 1e-4):
@@ -118,15 +112,14 @@ def beam_energy() -> list[Check]:
                     change = after.kinetic + after.potential - e.kinetic - e.potential
                     violation = max(violation, abs(change + after.dissipated - e.dissipated - du))
             name = "midpoint" if integrator == "generalized_alpha" else "modal"
-            checks.append(Check(f"{name}, α_b = {alpha:g} s", 0.0, violation / scale, 2 * n * EPS, reason))
+            yield Check(f"{name}, α_b = {alpha:g} s", 0.0, violation / scale, 2 * n * EPS, reason)
     with closing(FmuBeam(unit_beam(n_elements=n, alpha_b=1.0, initial_velocity_slope=1.0), 0.0, 0.0)) as body:
         for step in range(200):
             body.advance(float(step), 1.0, UNIT_FORCE)
         lost = body.energies().dissipated
     compliance = (4.0 / 3.0) / (1.0 + 1.0 / (12.0 * n * n))
     reason = "rounding: 2nε a step, 200 steps (κ = 1, α_b = 1 s, H = 1 s)"
-    checks.append(Check("modal: all lost at rest [J]", 1.0 / 6.0 + compliance / 2.0, lost, 200 * 2 * n * EPS, reason))
-    return checks
+    yield Check("modal: all lost at rest [J]", 1.0 / 6.0 + compliance / 2.0, lost, 200 * 2 * n * EPS, reason)
 
 
 @lru_cache(maxsize=1)

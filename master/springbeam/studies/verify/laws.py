@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from math import nan, pi, sin, sqrt
 
@@ -48,14 +48,12 @@ def _halving(
     scene: Callable[[float], Scene],
     size: float,
     solver: float,
-) -> list[Check]:
-    """Return checks of what a run at H = ``size``/2 gives, bounded by its change from H = ``size``."""
+) -> Iterator[Check]:
+    """Yield checks of what a run at H = ``size``/2 gives, bounded by its change from H = ``size``."""
     coarse, fine = simulate(scene(size)), simulate(scene(0.5 * size))
-    checks = []
     for name, value, of in quantities:
         bound = abs(of(fine) - of(coarse)) + solver * abs(value)
-        checks.append(Check(name, value, of(fine), bound, f"{_HALVED}; and {IDA}"))
-    return checks
+        yield Check(name, value, of(fine), bound, f"{_HALVED}; and {IDA}")
 
 
 def _parting(run: Trajectory) -> float:
@@ -69,12 +67,11 @@ def _duration(run: Trajectory) -> float:
     return float(ends[0]) if ends else nan
 
 
-def compliant_impact() -> list[Check]:
+def compliant_impact() -> Iterator[Check]:
     """Free masses, 0.5 and 2 kg at 1 m/s, on λ_nc p₊^q: how long, and how fast they part; λ_nc = 1e4 N/m^q.
 
     q = 1 is half a period of √(λ_nc/μ); other q by the beta function. No energy is lost.
     """
-    checks = []
     for q in (1.0, 1.5, 3.0):
         hit = exact.impact(_REDUCED, 1.0, _STIFFNESS, q)
         assert hit.duration is not None
@@ -89,22 +86,18 @@ def compliant_impact() -> list[Check]:
             for degree in (0, 1, 2):
                 bound = whole * (_phase(degree, pi / steps) + solver)
                 lasts = _duration(simulate(scene(whole / steps, degree)))
-                checks.append(
-                    Check(f"q = 1, degree {degree}: lasts [s]", whole, lasts, bound, f"{_PROJECTED}; and {IDA}")
-                )
+                yield Check(f"q = 1, degree {degree}: lasts [s]", whole, lasts, bound, f"{_PROJECTED}; and {IDA}")
         else:
             quantity = (f"q = {q:g}, degree 2: lasts [s]", whole, _duration)
-            checks += _halving((quantity,), scene, 2.0 * whole / steps, solver)
+            yield from _halving((quantity,), scene, 2.0 * whole / steps, solver)
         run = simulate(scene(whole / 10.0))
         tolerance = 15.0 * run.scene.coupling.tolerance
         reason = f"H a tenth of the contact: no energy lost but coupling.tolerance of each of 15 steps; and {IDA}"
-        checks.append(Check(f"q = {q:g}: part at [m/s]", 1.0, _parting(run), tolerance + solver, reason))
-    return checks
+        yield Check(f"q = {q:g}: part at [m/s]", 1.0, _parting(run), tolerance + solver, reason)
 
 
-def hunt_crossley() -> list[Check]:
+def hunt_crossley() -> Iterator[Check]:
     """C = λ_nc p₊^q (1 + χ ṗ), χ = 0.5 s/m: the masses part at w with χ w − ln(1 + χ w) as before, and w < 0."""
-    checks = []
     for q in (1.0, 1.5, 3.0):
         hit = exact.impact(_REDUCED, 1.0, _STIFFNESS, q, 0.5)
         undamped = exact.impact(_REDUCED, 1.0, _STIFFNESS, q).duration
@@ -119,16 +112,15 @@ def hunt_crossley() -> list[Check]:
             (f"q = {q:g}: part at [m/s]", hit.rebound, _parting),
             (f"q = {q:g}: dissipated [J]", hit.dissipated, lambda run: float(run["e_dissipated"][-1])),
         )
-        checks += _halving(quantities, scene, whole / 20.0, _solver(scene(whole / 20.0), pi))
-    return checks
+        yield from _halving(quantities, scene, whole / 20.0, _solver(scene(whole / 20.0), pi))
 
 
-def linked_masses() -> list[Check]:
+def linked_masses() -> Iterator[Check]:
     """Unit masses held by 4π² each, on a link of 16π² N/m: u, y = (cos 2πt ± cos 6πt)/2; or c = 3 N·s/m as well.
 
     The link has 8/9 of the stiffness of the fast mode and none of the slow one's.
     """
-    checks, link, T = [], 16.0 * pi**2, 1.0
+    link, T = 16.0 * pi**2, 1.0
     M, K = np.eye(1), np.full((1, 1), 4.0 * pi**2)
 
     def error(run: Trajectory) -> float:
@@ -141,7 +133,7 @@ def linked_masses() -> list[Check]:
             run = simulate(exact.linked_masses(link, 0.0, T, macro_step=size, degree=degree))
             bound = 0.5 * 6.0 * pi * T * 8.0 / 9.0 * _phase(degree, 6.0 * pi * size) + solver
             name = f"degree {degree}, H = {size:g}: error [m]"
-            checks.append(Check(name, 0.0, error(run), bound, f"largest error over 1 s. {_PROJECTED}; and {IDA}"))
+            yield Check(name, 0.0, error(run), bound, f"largest error over 1 s. {_PROJECTED}; and {IDA}")
 
     def damped(size: float) -> Scene:
         return exact.linked_masses(link, 3.0, T, macro_step=size, degree=2)
@@ -151,10 +143,10 @@ def linked_masses() -> list[Check]:
         ("c = 3 N·s/m: u_tip(1) [m]", float(u), lambda run: float(run["u_tip"][-1])),
         ("c = 3 N·s/m: y(1) [m]", float(y), lambda run: float(run["y"][-1])),
     )
-    return checks + _halving(ends, damped, 0.025, solver)
+    yield from _halving(ends, damped, 0.025, solver)
 
 
-def tied_masses() -> list[Check]:
+def tied_masses() -> Iterator[Check]:
     """Unit masses held by 4π² and 12π² N/m, tied for good: one oscillator of ω² = 8π² from ẏ = −½ m/s, ¼ J lost.
 
     The tie pulls as much as it presses: C = (k₁ − k₂) y/2.
@@ -169,4 +161,4 @@ def tied_masses() -> list[Check]:
         ("lost in the impact [J]", 0.25, lambda run: float(run["e_impact_loss"][-1])),
         ("C(1) [N]", 2.0 * pi**2 / omega * sin(omega * T), lambda run: float(run["contact_force"][-1])),
     )
-    return _halving(quantities, scene, 0.01, _solver(scene(0.01), omega * T))
+    yield from _halving(quantities, scene, 0.01, _solver(scene(0.01), omega * T))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from math import nan, pi, sqrt
 
@@ -18,13 +18,12 @@ from .check import Check
 IDA = "IDA: BDF of order ≤ 5 takes some ε^(−1/6) internal steps a radian, each of error ε: ωT·ε^(5/6)"
 
 
-def duffing() -> list[Check]:
+def duffing() -> Iterator[Check]:
     """Undamped Duffing spring, m = 1, from rest at A.
 
     Hardening: y = A cn(ωt|μ), ω² = k1 + k2A², μ = k2A²/2ω². Softening: y = A sn(ωt + K|μ), ω² = k1 + k2A²/2,
     μ = −k2A²/2ω². Period 4K(μ)/ω.
     """
-    checks = []
     for k1, k2, amplitude in ((3.0, -0.2, 0.5), (3.0, -0.2, 1.0), (150.0, 67.0, 0.5), (150.0, 67.0, 1.0)):
         w2 = k1 + k2 * amplitude**2 * (1.0 if k2 > 0.0 else 0.5)
         period = 4.0 * float(ellipk(abs(k2) * amplitude**2 / (2.0 * w2))) / sqrt(w2)
@@ -37,15 +36,12 @@ def duffing() -> list[Check]:
             for step in range(20):
                 body.advance(step * period / 20.0, period / 20.0, NO_FORCE)
             back = body.motion()
-        checks += [
-            Check(f"{name}: period [s]", period, second - first, relative * period, IDA),
-            Check(f"{name}: y(T) [m]", amplitude, back.displacement, relative * amplitude, IDA),
-            Check(f"{name}: ẏ(T) [m/s]", 0.0, back.velocity, relative * amplitude * 2.0 * pi / period, IDA),
-        ]
-    return checks
+        yield Check(f"{name}: period [s]", period, second - first, relative * period, IDA)
+        yield Check(f"{name}: y(T) [m]", amplitude, back.displacement, relative * amplitude, IDA)
+        yield Check(f"{name}: ẏ(T) [m/s]", 0.0, back.velocity, relative * amplitude * 2.0 * pi / period, IDA)
 
 
-def escape() -> list[Check]:
+def escape() -> Iterator[Check]:
     """A softening spring escapes past the hilltop √(k1/|k2|) of its potential; from y = 0 with z > k1/√(2 m |k2|).
 
     Inside the FMU must run, outside it must refuse. Bisection finds where one turns into the other.
@@ -69,22 +65,11 @@ def escape() -> list[Check]:
             return False
         return True
 
-    return [
-        Check(
-            "start at rest, largest |y| [m]",
-            hilltop,
-            _threshold(lambda y: runs(y, 0.0), 0.9 * hilltop, 1.1 * hilltop, width),
-            width * hilltop,
-            "width of the bisection; the start is compared with the formula",
-        ),
-        Check(
-            "escape from y = 0, ẏ [m/s]",
-            speed,
-            _threshold(lambda z: runs(0.0, z), 0.9 * speed, 1.1 * speed, width),
-            relative * speed,
-            IDA + ", T = 20 s",
-        ),
-    ]
+    reason = "width of the bisection; the start is compared with the formula"
+    furthest = _threshold(lambda y: runs(y, 0.0), 0.9 * hilltop, 1.1 * hilltop, width)
+    yield Check("start at rest, largest |y| [m]", hilltop, furthest, width * hilltop, reason)
+    fastest = _threshold(lambda z: runs(0.0, z), 0.9 * speed, 1.1 * speed, width)
+    yield Check("escape from y = 0, ẏ [m/s]", speed, fastest, relative * speed, f"{IDA}, T = 20 s")
 
 
 def ida_error(body: FmuSpring, radians: float) -> float:
