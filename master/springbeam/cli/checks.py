@@ -25,8 +25,9 @@ from .common import (
     fail,
     print_json,
 )
-from .run import picked, picked_in_words
+from .run import picked
 from .study import carry_out
+from .summary import picked_in_words
 
 if TYPE_CHECKING:
     from ..studies.crosscheck import Report
