@@ -166,7 +166,7 @@ def locate(evaluate: Callable[[float], Sample], guess: float, size: float, toler
     is only the first guess of df/dh: where both ends differ in velocity, the force of a step, and with it the motion,
     changes with h.
     """
-    low, high, h = 0.0, size, guess
+    low, high, h = 0.0, size, max(guess, _EPS * size)
     last: tuple[float, float] | None = None
     for _ in range(_MAX_EVALUATIONS):
         value, rate = evaluate(h)

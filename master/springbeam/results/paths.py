@@ -66,7 +66,7 @@ class Path(NamedTuple):
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.at(middle) >= 0.0 else (low, middle)
-        return high
+        return high if low > 0.0 else 0.0
 
     def lowest_inside(self) -> float | None:
         """Return s in (0, 1) of the lowest minimum, ``None`` if there is none inside."""
