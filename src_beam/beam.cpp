@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <sstream>
 #include <stdexcept>
+#include <string>
 
 #include "generalized_alpha.hpp"
 #include "modal_beam.hpp"
@@ -16,15 +16,13 @@ namespace beam {
 namespace {
 
 [[noreturn]] void throw_not_finite(double size, const Polynomial& c, const Loads& loads) {
-  std::ostringstream message;
-  message.precision(17);
-  message << "beam: the result is not finite after a step of " << size << " s under the tip force " << c[0] << " N, "
-          << c[1] << " N/s, " << c[2] << " N/s2";
+  std::string message = "beam: the result is not finite after a step of " + number(size) + " s under the tip force " +
+                        number(c[0]) + " N, " + number(c[1]) + " N/s, " + number(c[2]) + " N/s2";
   loads.for_each([&message](std::size_t i, const Polynomial& f) {
-    message << ", " << Loads::names[i] << " = " << f[0] << " and its derivatives " << f[1] << ", " << f[2];
+    message += std::string(", ") + Loads::names[i] + " = " + number(f[0]) + " and its derivatives " + number(f[1]) +
+               ", " + number(f[2]);
   });
-  message << "; the state is unchanged, use a smaller step or smaller inputs";
-  throw std::domain_error(message.str());
+  throw std::domain_error(message + "; the state is unchanged, use a smaller step or smaller inputs");
 }
 
 }  // namespace

@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
+#include <string>
 #include <vector>
+
+#include "validate.hpp"
 
 namespace beam {
 namespace {
@@ -358,10 +360,9 @@ Modes exact_modes(const Parameters& p) {
   const double error = 3.0 * modes.linear_shape.squaredNorm() / (beam.mass * L * L * L) - 1.0;
   if (std::abs(error) > start_energy_tolerance &&
       (p.initial_deflection_slope != 0.0 || p.initial_velocity_slope != 0.0)) {
-    std::ostringstream message;
-    message << "beam: n_modes = " << n << " is not allowed; the kinetic energy of a start u = s x would be "
-            << 1.0 + error << " times the true one; keep more modes, or use a mesh";
-    throw std::invalid_argument(message.str());
+    throw std::invalid_argument("beam: n_modes = " + std::to_string(n) +
+                                " is not allowed; the kinetic energy of a start u = s x would be " +
+                                number(1.0 + error) + " times the true one; keep more modes, or use a mesh");
   }
   return modes;
 }

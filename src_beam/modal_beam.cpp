@@ -20,11 +20,13 @@ using Eigen::Index;
 /// Structure of arrays over the modes, G_k as in modal_oscillator.hpp; φ stands for φ(L).
 struct Coefficients {
   ArrayXd sign, kick, drift, reflection;  // undamped; reflection = (1 − sign)/ω²
-  ArrayXd one_minus_decay, G0;            // damped; 1 − ġ = ω²G₁ + cG₀
-  ArrayXd G1, G2, G3, G4, G5;
-  // ∫u and ∫∫u: from η₀ and v₀ per mode; from the tip force in sum.
-  ArrayXd integral_eta, integral_v, integral2_eta, integral2_v;
-  Polynomial integral_force{}, integral2_force{};
+  ArrayXd one_minus_decay;                // damped; 1 − ġ = ω²G₁ + cG₀
+  std::array<ArrayXd, 6> G;
+  struct Integral {  // from η₀ and v₀ per mode; from the tip force in sum
+    ArrayXd eta, v;
+    Polynomial force;
+  };
+  std::array<Integral, 2> integral;  // ∫u, ∫∫u
 };
 
 /// The quadratic form of oscillator_dissipation(), a row per entry.
@@ -102,8 +104,8 @@ class ModalBeam final : public Beam {
     }
     r_ = force_[0] - omega2_ * eta_;
     if (damped_) {
-      eta_next_ = eta_ + (k.G0 * v_ + k.G1 * r_);
-      v_next_ = v_ + (k.G0 * r_ - k.one_minus_decay * v_);
+      eta_next_ = eta_ + (k.G[0] * v_ + k.G[1] * r_);
+      v_next_ = v_ + (k.G[0] * r_ - k.one_minus_decay * v_);
     } else {
       v_next_ = v_ + k.kick * r_;
       eta_next_ = eta_ + k.drift * v_next_;
@@ -116,15 +118,17 @@ class ModalBeam final : public Beam {
         force_[j] = c[j] * tip_;
         if (load_varies) force_[j] += load_[j];
       }
-      eta_next_ += k.G2 * force_[1] + k.G3 * force_[2];
-      v_next_ += k.G1 * force_[1] + k.G2 * force_[2];
+      eta_next_ += k.G[2] * force_[1] + k.G[3] * force_[2];
+      v_next_ += k.G[1] * force_[1] + k.G[2] * force_[2];
     }
-    now_.integral = (k.integral_eta * eta_ + k.integral_v * v_).sum() + dot(k.integral_force, c);
-    now_.integral_2 = (k.integral2_eta * eta_ + k.integral2_v * v_).sum() + dot(k.integral2_force, c);
-    if (loaded) {
-      now_.integral += (tip_ * (k.G2 * load_[0] + k.G3 * load_[1] + k.G4 * load_[2])).sum();
-      now_.integral_2 += (tip_ * (k.G3 * load_[0] + k.G4 * load_[1] + k.G5 * load_[2])).sum();
-    }
+    const auto integral = [&](std::size_t j) {
+      const Coefficients::Integral& of = k.integral[j];
+      double sum = (of.eta * eta_ + of.v * v_).sum() + dot(of.force, c);
+      if (loaded) sum += (tip_ * (k.G[j + 2] * load_[0] + k.G[j + 3] * load_[1] + k.G[j + 4] * load_[2])).sum();
+      return sum;
+    };
+    now_.integral = integral(0);
+    now_.integral_2 = integral(1);
     eta_.swap(eta_next_);
     v_.swap(v_next_);
     update_tip();
@@ -158,35 +162,21 @@ class ModalBeam final : public Beam {
 
   void make_coefficients(double h, Coefficients& k) const {
     const Index m = eta_.size();
-    for (ArrayXd* array :
-         {&k.G1, &k.G2, &k.G3, &k.G4, &k.G5, &k.integral_eta, &k.integral_v, &k.integral2_eta, &k.integral2_v}) {
-      array->resize(m);
-    }
-    if (damped_) {
-      for (ArrayXd* array : {&k.one_minus_decay, &k.G0}) array->resize(m);
-    } else {
-      for (ArrayXd* array : {&k.sign, &k.kick, &k.drift, &k.reflection}) array->resize(m);
-    }
-    k.integral_force = k.integral2_force = {};
+    for (ArrayXd& G : k.G) G.resize(m);
+    for (ArrayXd* array : {&k.one_minus_decay, &k.sign, &k.kick, &k.drift, &k.reflection}) array->resize(m);
+    for (Coefficients::Integral& of : k.integral) of = {ArrayXd(m), ArrayXd(m), {}};
     for (Index i = 0; i < m; ++i) {
       const double phi = tip_[i], c = damping_[i];
       const std::array<double, 6> G = oscillator_response(modes_.omega[i], c, h).G;
-      k.G1[i] = G[1];
-      k.G2[i] = G[2];
-      k.G3[i] = G[3];
-      k.G4[i] = G[4];
-      k.G5[i] = G[5];
-      k.integral_eta[i] = phi * (G[0] + c * G[1]);
-      k.integral_v[i] = phi * G[1];
-      k.integral2_eta[i] = phi * (G[1] + c * G[2]);
-      k.integral2_v[i] = phi * G[2];
-      for (std::size_t j = 0; j < 3; ++j) {
-        k.integral_force[j] += phi * phi * G[j + 2];
-        k.integral2_force[j] += phi * phi * G[j + 3];
+      for (std::size_t j = 0; j < G.size(); ++j) k.G[j][i] = G[j];
+      for (std::size_t j = 0; j < 2; ++j) {
+        Coefficients::Integral& of = k.integral[j];
+        of.eta[i] = phi * (G[j] + c * G[j + 1]);
+        of.v[i] = phi * G[j + 1];
+        for (std::size_t l = 0; l < 3; ++l) of.force[l] += phi * phi * G[j + l + 2];
       }
       if (damped_) {
         k.one_minus_decay[i] = omega2_[i] * G[1] + c * G[0];
-        k.G0[i] = G[0];
       } else {
         const UndampedStep undamped = undamped_step(modes_.omega[i], h);
         k.sign[i] = undamped.sign;
@@ -234,8 +224,9 @@ class ModalBeam final : public Beam {
     if (unbooked_.load_varies) {
       const Coefficients& k = coefficients(h);
       const ArrayXd& v = v_next_;
-      const ArrayXd Z1 = k.G1 * v + k.G2 * r_ + k.G3 * force_[1] + k.G4 * force_[2];
-      const auto Z2 = k.G2 * v + k.G3 * r_ + k.G4 * force_[1] + k.G5 * force_[2];
+      const auto& G = k.G;
+      const ArrayXd Z1 = G[1] * v + G[2] * r_ + G[3] * force_[1] + G[4] * force_[2];
+      const auto Z2 = G[2] * v + G[3] * r_ + G[4] * force_[1] + G[5] * force_[2];
       sum += (load_[1] * (h * rise - Z1) + load_[2] * (0.5 * h * h * rise - h * Z1 + Z2)).sum();
     }
     return sum;

@@ -1,10 +1,15 @@
 #include "modal_oscillator.hpp"
 
+#include <Eigen/Core>
+
 #include <algorithm>
 #include <cmath>
 
 namespace beam {
 namespace {
+
+using Eigen::Matrix4d;
+using Eigen::Vector4d;
 
 constexpr int max_order = 5;
 constexpr int n_terms = 24;
@@ -216,67 +221,39 @@ UndampedStep undamped_step(double omega, double t) {
 }
 
 std::array<double, 10> oscillator_dissipation(double omega, double c, double t) {
-  constexpr std::size_t n = 4;
   // In units of the current length t_j the state is z = (v, r t_j, f₁ t_j², f₂ t_j³), and v(σ t_j) = basis · z.
-  const Roots whole = roots(omega, c, t);
   int doublings = 0;
-  std::frexp(whole.fast, &doublings);  // |μ₋| < 2^doublings
+  std::frexp(roots(omega, c, t).fast, &doublings);  // |μ₋| < 2^doublings
   doublings = std::max(doublings, 0);
   double length = std::ldexp(t, -doublings);
 
-  double Q[n][n] = {};
+  Matrix4d Q = Matrix4d::Zero();
   for (std::size_t q = 0; q < 2 * gauss_node.size(); ++q) {
     const std::size_t half = q / 2;
     const double sigma = q % 2 == 0 ? gauss_node[half] : 1.0 - gauss_node[half];
     const Gamma gamma = by_series(sigma * omega * length, sigma * c * length);
-    double basis[n], power = 1.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      basis[i] = power * gamma[i];
-      power *= sigma;
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i; j < n; ++j) Q[i][j] += gauss_weight[half] * basis[i] * basis[j];
-    }
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < i; ++j) Q[i][j] = Q[j][i];
+    const Vector4d basis(gamma[0], sigma * gamma[1], sigma * sigma * gamma[2], sigma * sigma * sigma * gamma[3]);
+    Q += gauss_weight[half] * basis * basis.transpose();
   }
 
+  const Vector4d unit(0.5, 0.25, 0.125, 0.0625);  // of z, from t_j to 2 t_j; Q has one more ½, its own
   for (int step = 0; step < doublings; ++step) {
     const Roots z = roots(omega, c, length);
     const Gamma g = gamma_functions(z);
-    const double P[n][n] = {{g[0], g[1], g[2], g[3]},
-                            {-z.x * z.x * g[1], g[0] + z.d * g[1], g[1] + z.d * g[2], g[2] + z.d * g[3]},
-                            {0.0, 0.0, 1.0, 1.0},
-                            {0.0, 0.0, 0.0, 1.0}};
-    double QP[n][n] = {};
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t k = 0; k < n; ++k) {
-        for (std::size_t j = 0; j < n; ++j) QP[i][j] += Q[i][k] * P[k][j];
-      }
-    }
-    double R[n][n];
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = i; j < n; ++j) {
-        double sum = Q[i][j];
-        for (std::size_t k = 0; k < n; ++k) sum += P[k][i] * QP[k][j];
-        R[i][j] = R[j][i] = std::ldexp(sum, -1 - static_cast<int>(i + j));  // from units of t_j to 2 t_j
-      }
-    }
-    std::copy(&R[0][0], &R[0][0] + n * n, &Q[0][0]);
+    Matrix4d P;
+    P << g[0], g[1], g[2], g[3],                                                     //
+        -z.x * z.x * g[1], g[0] + z.d * g[1], g[1] + z.d * g[2], g[2] + z.d * g[3],  //
+        0.0, 0.0, 1.0, 1.0,                                                          //
+        0.0, 0.0, 0.0, 1.0;
+    const Matrix4d R = Q + P.transpose() * Q * P;
+    Q = 2.0 * unit.asDiagonal() * R * unit.asDiagonal();
     length *= 2.0;
   }
 
   std::array<double, 10> form{};
   std::size_t entry = 0;
-  double row = c * t;
-  for (std::size_t i = 0; i < n; ++i) {
-    double power = row;
-    for (std::size_t j = i; j < n; ++j) {
-      form[entry++] = power * Q[i][j];
-      power *= t;
-    }
-    row *= t * t;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = i; j < 4; ++j) form[entry++] = c * std::pow(t, 1 + i + j) * Q(i, j);
   }
   return form;
 }

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "validate.hpp"
@@ -110,6 +110,8 @@ class ArnoldiOp<double, SymGEigsShiftInvertOp<beam::Flexibility, beam::Mass>, be
 namespace beam {
 namespace {
 
+constexpr const char* remedy = "; keep fewer n_modes, or use the integrator generalized_alpha";
+
 /// Lowest modes by implicitly restarted Lanczos on K⁻¹M, M-orthonormal columns.
 MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
   // Rayleigh quotient of the static tip shape: a little above the lowest ω².
@@ -124,10 +126,8 @@ MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
   solver.init();  // a fixed pseudo-random start
   const Index converged = solver.compute(Spectra::SortRule::LargestMagn, 300, 1e-12, Spectra::SortRule::SmallestAlge);
   if (converged < count) {
-    std::ostringstream message;
-    message << "beam: only " << converged << " of " << count << " modes of " << mesh.elements()
-            << " elements converged; keep fewer n_modes, or use the integrator generalized_alpha";
-    throw std::runtime_error(message.str());
+    throw std::runtime_error("beam: only " + std::to_string(converged) + " of " + std::to_string(count) + " modes of " +
+                             std::to_string(mesh.elements()) + " elements converged" + remedy);
   }
   return solver.eigenvectors();
 }
@@ -217,11 +217,9 @@ Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
     y = mesh.flexibility_times(mesh.mass_times(VectorXd(basis.col(k))));
     const double residual = std::sqrt(mesh.stiffness_norm2(basis.col(k) - omega2 * y) / omega2);
     if (!(residual <= residual_tolerance)) {
-      std::ostringstream message;
-      message << "beam: mode " << k + 1 << " of " << count << " (" << std::sqrt(omega2)
-              << " rad/s) did not converge: its residual is " << residual << ", allowed is " << residual_tolerance
-              << "; keep fewer n_modes, or use the integrator generalized_alpha";
-      throw std::runtime_error(message.str());
+      throw std::runtime_error("beam: mode " + std::to_string(k + 1) + " of " + std::to_string(count) + " (" +
+                               number(std::sqrt(omega2)) + " rad/s) did not converge: its residual is " +
+                               number(residual) + ", allowed is " + number(residual_tolerance) + remedy);
     }
     modes.residual = std::max(modes.residual, residual);
   }

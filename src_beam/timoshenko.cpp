@@ -254,24 +254,6 @@ void Timoshenko::weighted_strains(const double* x, double* out) const {
   }
 }
 
-Eigen::VectorXd Timoshenko::mass_times(const Eigen::VectorXd& x) const {
-  Eigen::VectorXd y(size());
-  mass_times(x.data(), y.data());
-  return y;
-}
-
-Eigen::VectorXd Timoshenko::stiffness_times(const Eigen::VectorXd& x) const {
-  Eigen::VectorXd y(size());
-  stiffness_times(x.data(), y.data());
-  return y;
-}
-
-Eigen::VectorXd Timoshenko::flexibility_times(const Eigen::VectorXd& x) const {
-  Eigen::VectorXd y(size());
-  flexibility_times(x.data(), y.data());
-  return y;
-}
-
 Eigen::VectorXd Timoshenko::mass_solve(const Eigen::VectorXd& x) const {
   const MassFactor factor(mass());
   require_factor(factor);

@@ -72,9 +72,11 @@ class Timoshenko {
   /// √(h/(2j+1)) (√b_j κ_j, √s γ_j) of all elements, interleaved: its squared norm is xᵀKx.
   void weighted_strains(const double* x, double* strains) const;
 
-  Eigen::VectorXd mass_times(const Eigen::VectorXd& x) const;
-  Eigen::VectorXd stiffness_times(const Eigen::VectorXd& x) const;
-  Eigen::VectorXd flexibility_times(const Eigen::VectorXd& x) const;
+  Eigen::VectorXd mass_times(const Eigen::VectorXd& x) const { return product(&Timoshenko::mass_times, x); }
+  Eigen::VectorXd stiffness_times(const Eigen::VectorXd& x) const { return product(&Timoshenko::stiffness_times, x); }
+  Eigen::VectorXd flexibility_times(const Eigen::VectorXd& x) const {
+    return product(&Timoshenko::flexibility_times, x);
+  }
   Eigen::VectorXd mass_solve(const Eigen::VectorXd& x) const;  ///< M⁻¹ x
 
   double mass_norm2(const Eigen::VectorXd& x) const;       ///< xᵀMx, as a sum of squares
@@ -93,6 +95,12 @@ class Timoshenko {
   void sample_scaled_rotation(const double* q, double* values) const { sample(q, 0, values); }
 
  private:
+  using Times = void (Timoshenko::*)(const double* x, double* y) const;
+  Eigen::VectorXd product(Times times, const Eigen::VectorXd& x) const {
+    Eigen::VectorXd y(size());
+    (this->*times)(x.data(), y.data());
+    return y;
+  }
   struct Strains;
   struct Field;
   /// Known to the compiler, the degree of linear elements makes products three times as fast.

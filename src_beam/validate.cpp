@@ -1,20 +1,18 @@
 #include "validate.hpp"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 
 namespace beam {
 namespace {
 
-template <typename Value>
-[[noreturn]] void reject(const char* name, Value value, const std::string& allowed) {
-  std::ostringstream message;
-  message.precision(17);
-  message << "beam: " << name << " = " << value << " is not allowed; it must be " << allowed;
-  throw std::invalid_argument(message.str());
+[[noreturn]] void reject(const char* name, double value, const std::string& allowed) {
+  throw std::invalid_argument(std::string("beam: ") + name + " = " + number(value) + " is not allowed; it must be " +
+                              allowed);
 }
 
 void require_positive(const char* name, double value) {
@@ -22,6 +20,11 @@ void require_positive(const char* name, double value) {
 }
 
 }  // namespace
+
+std::string number(double value) {
+  std::array<char, 32> text;
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
+}
 
 void reject_not_finite(const char* name, double value) { reject(name, value, "finite"); }
 

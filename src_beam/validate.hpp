@@ -2,10 +2,14 @@
 #pragma once
 
 #include <cmath>
+#include <string>
 
 #include "beam.hpp"
 
 namespace beam {
+
+/// The shortest decimal that reads back as the same double, for messages.
+std::string number(double value);
 
 /// @throws std::invalid_argument for the first parameter that is not allowed
 void validate(const Parameters& parameters);
