@@ -5,14 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from springbeam import scene
-from springbeam.scene.unit import UNIT_BEAM, UNIT_SPRING
 
 CONTACT = {"stiffness": 1.0e4, "exponent": 3.0}
 
 
 def completed(tables: dict[str, Any]) -> dict[str, Any]:
     """Return the tables of a scene with what they leave out."""
-    below = {"beam": UNIT_BEAM, "spring": UNIT_SPRING, "contact": CONTACT}
+    below = {"beam": scene.Beam.ones(), "spring": scene.Spring.ones(), "contact": CONTACT}
     return {
         name: {**below[name], **content} if name in below and isinstance(content, dict) else content
         for name, content in tables.items()

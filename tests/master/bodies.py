@@ -24,7 +24,6 @@ from springbeam.run.outcome import RunStopped
 from springbeam.run.simulation import Simulation
 from springbeam.scene import Beam, Scene
 from springbeam.scene.statics import SHAPE_POINTS
-from springbeam.scene.unit import unit_beam
 
 _EPS = float(np.finfo(float).eps)
 
@@ -235,7 +234,7 @@ def beam_body(beam: Beam, slope: float | None = None) -> ModalBody:
 def modal_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> ModalBody:
     """An undamped unit beam of ``n`` elements, EI = KAG = ``stiffness``, moving as u̇ = slope·x."""
     return beam_body(
-        unit_beam(n_elements=n, young_modulus=stiffness, shear_modulus=stiffness, initial_velocity_slope=slope)
+        Beam.with_ones(n_elements=n, young_modulus=stiffness, shear_modulus=stiffness, initial_velocity_slope=slope)
     )
 
 

@@ -12,11 +12,10 @@ from commands import command
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene import suspicions
+from springbeam.scene import Beam, suspicions
 from springbeam.scene.automatic import choice, decided
 from springbeam.scene.linearised import spring_frequency
 from springbeam.scene.resolution import STABLE, mesh_frequency, slowest_frequency
-from springbeam.scene.unit import unit_beam
 from springbeam.studies.stability.linear import LinearBody, LinearPair, spectral_radius
 
 PAIR = load_scene("soft")
@@ -62,7 +61,7 @@ def test_below_the_bound_no_pair_amplifies():
     for _ in range(60):
         n, degree = int(rng.integers(1, 9)), int(rng.choice([1, 2, 4]))
         inertia = 10 ** rng.uniform(-4, 0)
-        beam = unit_beam(
+        beam = Beam.with_ones(
             young_modulus=10 ** rng.uniform(-2, 2) / inertia, second_moment_of_area=inertia,
             shear_modulus=10 ** rng.uniform(-2, 3), n_elements=n, element_degree=degree,
             n_modes=int(rng.choice([0, rng.integers(1, 2 * n * degree + 1)])),

@@ -18,8 +18,7 @@ from springbeam.contact.phases import (
     rebound,
     spring_force,
 )
-from springbeam.scene import load_scene
-from springbeam.scene.unit import unit_spring
+from springbeam.scene import Spring, load_scene
 
 MASSES = [(0.25, 1.0), (1.0, 0.01), (3.0, 100.0)]
 VELOCITIES = [(-1.0, 0.0), (-0.2, 0.7), (0.1, 0.3)]
@@ -95,7 +94,7 @@ def test_an_end_that_takes_no_part_gets_no_impulse(part, absent):
 
 @pytest.mark.parametrize(("y", "load"), list(product([-0.5, 0.0, 0.2], [0.0, 1.5])))
 def test_spring_force_is_that_of_the_duffing_law(y, load):
-    spring = unit_spring(linear_stiffness=3.0, cubic_stiffness=-0.2, external_force=load)
+    spring = Spring.with_ones(linear_stiffness=3.0, cubic_stiffness=-0.2, external_force=load)
     # The derivative of k1 y²/2 + k2 y⁴/4 − f_s y by a central difference: error k2 y δ² and rounding 1e-16/δ.
     potential = lambda x: 1.5 * x * x - 0.05 * x**4 - load * x  # noqa: E731
     assert spring_force(spring, y) == pytest.approx((potential(y + 1e-5) - potential(y - 1e-5)) / 2e-5, abs=1e-10)

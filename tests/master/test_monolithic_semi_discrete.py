@@ -9,12 +9,11 @@ from scipy.sparse.linalg import spsolve
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam
 from springbeam.scene.statics import SHAPE_POINTS
-from springbeam.scene.unit import unit_beam
 from springbeam.studies.verify.beam import clamped_free_frequencies
 
 
 def beam(bending: float = 1.0, shear: float = 1.0, **changes: object) -> Beam:
-    return unit_beam(young_modulus=bending, shear_modulus=shear, **changes)  # type: ignore[arg-type]
+    return Beam.with_ones(young_modulus=bending, shear_modulus=shear, **changes)  # type: ignore[arg-type]
 
 
 def static_compliance(bending: float, shear: float, n: int, reduced: bool) -> float:

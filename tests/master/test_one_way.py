@@ -15,8 +15,7 @@ from springbeam.coupling.one_way import OneWay
 from springbeam.coupling.projection import Projection
 from springbeam.coupling.protocol import Step, Window
 from springbeam.run.outcome import RunStopped
-from springbeam.scene import Scene, SceneError, load_scene, statics, with_changes
-from springbeam.scene.unit import unit_beam
+from springbeam.scene import Beam, Scene, SceneError, load_scene, statics, with_changes
 
 LAW = (100.0, 1.0)
 
@@ -82,7 +81,7 @@ def test_the_driving_body_moves_as_if_alone() -> None:
 
 def test_a_resonant_force_keeps_to_the_bound() -> None:
     """The worst case: a force that reverses in step with the first mode adds 2 φ²C/ω² each half period."""
-    beam = unit_beam(n_elements=5, young_modulus=100.0, shear_modulus=100.0)
+    beam = Beam.with_ones(n_elements=5, young_modulus=100.0, shear_modulus=100.0)
     stiffness = 1.0 / statics.tip_compliance(beam)
     body = modal_beam(5, slope=0.0)
     half = np.pi / body.omega[0]

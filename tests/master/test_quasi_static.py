@@ -19,11 +19,10 @@ from springbeam.results.recording import MemoryRecorder
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.simulation import Simulation
 from springbeam.run.stepping import Pair
-from springbeam.scene import Scene, SceneError, statics, suspicions
+from springbeam.scene import Beam, Scene, SceneError, statics, suspicions
 from springbeam.scene.statics import SHAPE_POINTS
-from springbeam.scene.unit import unit_beam
 
-BEAM = unit_beam(
+BEAM = Beam.with_ones(
     density=2.0, area=0.5, second_moment_of_area=0.3, young_modulus=30.0, shear_modulus=50.0, shear_coefficient=0.8,
     length=1.3, n_elements=4, distributed_load=-1.5, tip_load_coefficient=4.0,
 )  # fmt: skip
@@ -53,7 +52,7 @@ def test_statics_are_those_of_a_mesh_that_holds_them() -> None:
 
 
 def test_a_slender_beam_moves_33_of_140_of_its_mass() -> None:
-    slender = unit_beam(second_moment_of_area=1e-8, young_modulus=1e8, shear_modulus=1e8)
+    slender = Beam.with_ones(second_moment_of_area=1e-8, young_modulus=1e8, shear_modulus=1e8)
     assert statics.tip_inertia(slender) == pytest.approx(33.0 / 140.0, rel=1e-6)
 
 

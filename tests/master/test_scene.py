@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from scenes import scene_from_dict
 
 import springbeam
-from springbeam.scene import Scene, SceneError, load_scene, reference, shipped_scenes, suspicions, with_changes
+from springbeam.scene import Beam, Scene, SceneError, load_scene, reference, shipped_scenes, suspicions, with_changes
 from springbeam.scene.partners import PARTNERS
-from springbeam.scene.unit import UNIT_BEAM
 
 
 def changed(**tables):
@@ -311,7 +310,9 @@ def test_the_beams_energy_counts_for_the_well():
 def test_other_ways_to_give_a_beam_mean_the_same(given, follows):
     """A beam given another way is the beam of ρ, A, I, …; it is kept, and changed, as it was given."""
     without = dict.fromkeys((*follows, *(("shear_coefficient",) if "area" in follows else ())))
-    beam = {k: v for k, v in {**UNIT_BEAM, "length": 2.0, "young_modulus": 100.0, **given}.items() if k not in without}
+    beam = {
+        k: v for k, v in {**Beam.ones(), "length": 2.0, "young_modulus": 100.0, **given}.items() if k not in without
+    }
     scene = springbeam.scene.scene_from_dict({**load_pair(), "spring": None, "stop": None, "beam": beam})
     assert {key: getattr(scene.beam, key) for key in follows} == pytest.approx(follows, rel=1e-15)
     assert scene.beam.shear_coefficient == (5 / 6 if "width" in given else 0.9 if "diameter" in given else 1.0)

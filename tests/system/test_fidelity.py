@@ -12,8 +12,7 @@ from springbeam import simulate, with_changes
 from springbeam.bodies.fmu_bodies import FmuBeam
 from springbeam.bodies.protocol import NO_FORCE
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene import Scene
-from springbeam.scene.unit import unit_beam
+from springbeam.scene import Beam, Scene
 from springbeam.studies.crosscheck import crosscheck
 
 
@@ -21,7 +20,7 @@ from springbeam.studies.crosscheck import crosscheck
 @pytest.mark.parametrize(("degree", "n"), [(1, 12), (2, 6), (3, 4), (5, 2), (12, 1)])
 def test_the_fmu_vibrates_with_the_frequencies_of_the_reference(degree, n, reduced):
     """After a unit tip impulse v_tip(t) = Σ φ_k(L)² cos ω_k t: every frequency and every tip value takes part."""
-    beam = unit_beam(
+    beam = Beam.with_ones(
         young_modulus=3.0, shear_modulus=7.0, n_elements=n, element_degree=degree, reduced_integration=reduced
     )
     modes, size = modal_beam(beam), 0.05

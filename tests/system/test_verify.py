@@ -18,7 +18,7 @@ from springbeam.bodies.protocol import StepRefused
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.tie import SCHEMES
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene.unit import unit_beam
+from springbeam.scene import Beam
 from springbeam.studies import verify
 from springbeam.studies.verify.beam import _mesh_error, clamped_free_frequencies
 from springbeam.studies.verify.check import Check
@@ -188,7 +188,7 @@ def test_a_check_passes_within_its_bound_only(check: Check, passed: bool | None)
 def test_frequencies_of_the_transfer_matrix_are_the_limit_of_the_mesh():
     """And its leading error is the predicted one: extrapolation leaves O((kh)⁴), 0.05⁴ relative at n = 160."""
     w = np.array(clamped_free_frequencies()[:6])
-    coarse, fine = (modal_beam(unit_beam(n_elements=n)).omega[:6] for n in (80, 160))
+    coarse, fine = (modal_beam(Beam.with_ones(n_elements=n)).omega[:6] for n in (80, 160))
     assert (4.0 * fine - coarse) / 3.0 == pytest.approx(w, rel=(8.4 / 80.0) ** 4)
     predicted = np.array([_mesh_error(x) for x in w]) / 160**2
     assert fine - w == pytest.approx(predicted, rel=(8.4 / 160.0) ** 2)

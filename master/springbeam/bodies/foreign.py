@@ -73,7 +73,6 @@ class ForeignBody(FmuBody, EndLoaded):
     def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings, by_substeps: bool) -> None:
         self._spec, self._found, self._by_substeps = spec, found, by_substeps
         self.abilities = found.abilities
-        self.repeatable, self.any_size = found.abilities.state, found.abilities.any_size
         names = (spec.displacement, spec.velocity, spec.integral, spec.integral_2)
         self._MOTION = tuple(name for name in names if name is not None)
         self._at = [None if name is None else self._MOTION.index(name) for name in names]
@@ -87,7 +86,10 @@ class ForeignBody(FmuBody, EndLoaded):
         self._size = 0.0  #: of the last step [s]
         self._time = start_time  #: of the present state [s]
         self._held: dict[float, float] = {}  #: holding forces [N] by displacement [m]
-        check_names(fmu := Fmu(None, Path(spec.fmu), spec.parameters, start_time), spec)
+        fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
+        self.repeatable = found.abilities.state and bool(fmu.says.canGetAndSetFMUstate)
+        self.any_size = found.abilities.any_size
+        _check_names(fmu, spec)
         super().__init__(fmu)
 
     def told(self) -> tuple[Motion, float, int, int]:
@@ -171,8 +173,7 @@ class ForeignBody(FmuBody, EndLoaded):
             w0, v0 = self._current[:2]
             if v is None:
                 v0 = v = (w - w0) / size
-            first = size * 0.5 * (w0 + w) + size**2 * (v0 - v) / 12.0
-            second = size**2 * (7.0 * w0 + 3.0 * w) / 20.0 + size**3 * (v0 / 20.0 - v / 30.0)
+            first, second = moments(w0, v0, w, v, size)
             motion = Motion(w, v, first if once is None else once, second if twice is None else twice)
         return motion if isfinite(sum(motion)) else self._refused(motion)
 
@@ -220,7 +221,13 @@ class ForeignBody(FmuBody, EndLoaded):
         return found
 
 
-def check_names(fmu: Fmu, spec: ForeignFmu) -> None:
+def moments(w0: float, v0: float, w: float, v: float, size: float) -> tuple[float, float]:
+    """Return ∫ x dτ and ∫∫ x dτ dτ over a step from (w0, v0) to (w, v), of the cubic through its ends."""
+    first = size * 0.5 * (w0 + w) + size**2 * (v0 - v) / 12.0
+    return first, size**2 * (7.0 * w0 + 3.0 * w) / 20.0 + size**3 * (v0 / 20.0 - v / 30.0)
+
+
+def _check_names(fmu: Fmu, spec: ForeignFmu) -> None:
     """Raise FmuError, after closing it, if the FMU has not the variables that the scene names, or not as such."""
     inputs = {"force": spec.force, "impulse": spec.impulse}
     keys = ("displacement", "velocity", "integral", "integral_2")

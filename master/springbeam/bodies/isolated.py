@@ -71,6 +71,7 @@ class FmuProcess:
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._errors)
         self._doing, self._until, self._late = "", inf, False
         threading.Thread(target=self._look_after, daemon=True).start()
+        self.ask([], "its start", inf)  # which is not the FMU's time
 
     @classmethod
     def of(cls, file: tuple[str, int, int]) -> FmuProcess:

@@ -51,7 +51,7 @@ def main() -> None:
         except tuple(FAILURES.values()) as failure:
             answer(next(name for name, kind in FAILURES.items() if isinstance(failure, kind)), str(failure), None)
         else:
-            answer("done", values[-1], None if body is None else body.told())
+            answer("done", values[-1] if values else None, None if body is None else body.told())
 
 
 def _end_with(parent: int) -> None:

@@ -18,9 +18,8 @@ from rich.text import Text
 
 from ..bodies.archive import fmu_directory
 from ..bodies.protocol import FmuError
-from ..scene import Scene, load_scene
+from ..scene import Beam, Scene, Spring, load_scene
 from ..scene.partners import kind_of
-from ..scene.unit import unit_beam, unit_spring
 from .common import (
     BAD_INPUT,
     DISAGREES,
@@ -129,7 +128,7 @@ def _found() -> dict[str, Any]:
         platforms: list[str] = []
         error = None
         try:
-            (FmuBeam(unit_beam(), 0.0, 0.0) if name == "beam" else FmuSpring(unit_spring(), 0.0)).close()
+            (FmuBeam(Beam.with_ones(), 0.0, 0.0) if name == "beam" else FmuSpring(Spring.with_ones(), 0.0)).close()
             platforms = _platforms(path)
         except FmuError as failure:
             error = str(failure)

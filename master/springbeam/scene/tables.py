@@ -79,6 +79,16 @@ class Table(BaseModel):
     _followed: frozenset[str] = PrivateAttr(frozenset())
 
     @classmethod
+    def ones(cls) -> dict[str, float]:
+        """Return 1 for all keys that are needed: the table in units of its own, what exact solutions are stated for."""
+        return {name: 1.0 for name, field in cls.model_fields.items() if field.is_required()}
+
+    @classmethod
+    def with_ones(cls, **keys: Any) -> Self:
+        """Return the table of `ones` with some keys changed."""
+        return cls(**{**cls.ones(), **keys})
+
+    @classmethod
     def _follows(cls, data: dict[str, Any]) -> dict[str, Any]:
         """Return the values of keys that follow from those given."""
         return {}
@@ -95,7 +105,7 @@ class Table(BaseModel):
                 raise ValueError(f"{', '.join(both)}: give the {ways.thing} one way: {ways}")
         follows = {name: value for name, value in cls._follows(data).items() if name not in given}
         if not any(name in given for name in cls.SCALES):
-            follows |= {name: 1.0 for name in cls.SCALES if cls.model_fields[name].is_required()}
+            follows |= {name: one for name, one in cls.ones().items() if name in cls.SCALES}
         table = handler({**data, **follows})
         table._followed = frozenset(follows)
         return table

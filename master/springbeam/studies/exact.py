@@ -16,8 +16,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.special import beta, lambertw
 
-from ..scene import Scene, scene_from_dict
-from ..scene.unit import UNIT_BEAM
+from ..scene import Beam, Scene, scene_from_dict
 
 #: Stiffness [N, N·m²] that leaves the tip of a beam a free mass for a second, and rotary inertia that keeps θ at rest.
 _LIMP, _RIGID = 1e-13, 1e14
@@ -55,7 +54,7 @@ def free_masses(
 
     The beam is one linear element, whose tip has ρAL/3, too limp to hold it.
     """
-    beam = {**UNIT_BEAM, "density": 3.0 * tip_mass, "young_modulus": _LIMP, "shear_modulus": _LIMP, "n_elements": 1}
+    beam = {**Beam.ones(), "density": 3.0 * tip_mass, "young_modulus": _LIMP, "shear_modulus": _LIMP, "n_elements": 1}
     return scene_from_dict(
         {
             "time": {"t_end": t_end},
@@ -87,7 +86,7 @@ def _held_masses(
 
     The beam is one linear element that can shear only: a huge rotary inertia keeps θ = 0.
     """
-    beam = {**UNIT_BEAM, "density": 3.0, "second_moment_of_area": _RIGID, "shear_modulus": tip, "n_elements": 1}
+    beam = {**Beam.ones(), "density": 3.0, "second_moment_of_area": _RIGID, "shear_modulus": tip, "n_elements": 1}
     return scene_from_dict(
         {
             "time": {"t_end": t_end},

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from ...scene.unit import UNIT_BEAM
+from ...scene import Beam
 
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
 _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
@@ -207,7 +207,7 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
         degree_of_elements = cell["element_degree"]
         n = max(1, cell["n_elements"] // degree_of_elements)
         scene["beam"] = {
-            **UNIT_BEAM,
+            **Beam.ones(),
             "young_modulus": cell["stiffness"] / root,
             "shear_modulus": cell["stiffness"] * root,
             "alpha_b": cell["alpha_b"],

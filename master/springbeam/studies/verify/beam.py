@@ -19,7 +19,6 @@ from scipy.optimize import brentq
 from ...bodies.fmu_bodies import FmuBeam
 from ...bodies.protocol import NO_FORCE
 from ...scene import Beam
-from ...scene.unit import unit_beam
 from .check import EPS, UNIT_FORCE, Check
 
 
@@ -41,7 +40,7 @@ def static_deflection() -> Iterator[Check]:
             ("reduced, 1 mode", reduced, {"reduced_integration": True, "n_modes": 1}),
         )
         for name, exact, options in variants:
-            beam = unit_beam(shear_modulus=kag, n_elements=n, alpha_b=1.0, **options)
+            beam = Beam.with_ones(shear_modulus=kag, n_elements=n, alpha_b=1.0, **options)
             with closing(FmuBeam(beam, 0.0, 0.0)) as body:
                 # 200 s: what is left has decayed below e⁻¹⁰⁰, and generalized-α damps every step.
                 for step in range(200):
@@ -60,14 +59,14 @@ def static_deflection() -> Iterator[Check]:
 def frequencies() -> Iterator[Check]:
     """Clamped–free frequencies, κ = 1, from the motion of the tip; √κ times these for any κ."""
     n = 160
-    measured = _measured_frequencies(unit_beam(n_elements=n, n_modes=6), 0.1, 300)
+    measured = _measured_frequencies(Beam.with_ones(n_elements=n, n_modes=6), 0.1, 300)
     for i, w in enumerate(clamped_free_frequencies()[:6], 1):
         bound = _mesh_error(w) / n**2 * (1.0 + (_wave_number(w) / n) ** 2)
         reason = "P1, n = 160: leading error h²/24ω · ∫(EI θ''² + KAG u''²) of the mode, next order (kh)² of it"
         yield Check(f"ω{i} [rad/s]", w, _nearest(measured, w), bound, reason)
     kappa, n = 3.6e10, 40
-    soft = _measured_frequencies(unit_beam(n_elements=n, n_modes=2), 0.1, 150)
-    stiff = unit_beam(n_elements=n, n_modes=2, young_modulus=kappa, shear_modulus=kappa)
+    soft = _measured_frequencies(Beam.with_ones(n_elements=n, n_modes=2), 0.1, 150)
+    stiff = Beam.with_ones(n_elements=n, n_modes=2, young_modulus=kappa, shear_modulus=kappa)
     scaled = _measured_frequencies(stiff, 0.1 / sqrt(kappa), 150) / sqrt(kappa)
     first = _nearest(soft, clamped_free_frequencies()[0])
     reason = "against κ = 1 on the same mesh, n = 40. Rounding: ε N², N = 2n unknowns"
@@ -80,7 +79,7 @@ def mesh_convergence() -> Iterator[Check]:
     w = clamped_free_frequencies()[0]
     errors = {}
     for n in (40, 80):
-        measured = _measured_frequencies(unit_beam(n_elements=n, n_modes=2), 0.1, 150)
+        measured = _measured_frequencies(Beam.with_ones(n_elements=n, n_modes=2), 0.1, 150)
         errors[n] = _nearest(measured, w) / w - 1.0
     next_order = (_wave_number(w) / 80) ** 2
     leading = _mesh_error(w) / 80**2 / w
@@ -100,7 +99,7 @@ def beam_energy() -> Iterator[Check]:
     reason = "largest in 200 steps over the largest energy, κ = 1e4, H = 0.02 s. Rounding: sums of 2n terms, 2nε"
     for integrator in ("modal", "generalized_alpha"):
         for alpha in (0.0, 1e-4):
-            stiff = unit_beam(young_modulus=kappa, shear_modulus=kappa, n_elements=n, initial_velocity_slope=1.0)
+            stiff = Beam.with_ones(young_modulus=kappa, shear_modulus=kappa, n_elements=n, initial_velocity_slope=1.0)
             beam = stiff.model_copy(update={"integrator": integrator, "alpha_b": alpha})
             violation = scale = 0.0
             with closing(FmuBeam(beam, 0.0, 0.0)) as body:
@@ -113,7 +112,7 @@ def beam_energy() -> Iterator[Check]:
                     violation = max(violation, abs(change + after.dissipated - e.dissipated - du))
             name = "midpoint" if integrator == "generalized_alpha" else "modal"
             yield Check(f"{name}, α_b = {alpha:g} s", 0.0, violation / scale, 2 * n * EPS, reason)
-    with closing(FmuBeam(unit_beam(n_elements=n, alpha_b=1.0, initial_velocity_slope=1.0), 0.0, 0.0)) as body:
+    with closing(FmuBeam(Beam.with_ones(n_elements=n, alpha_b=1.0, initial_velocity_slope=1.0), 0.0, 0.0)) as body:
         for step in range(200):
             body.advance(float(step), 1.0, UNIT_FORCE)
         lost = body.energies().dissipated

@@ -15,8 +15,7 @@ from ...bodies.fmu_bodies import FmuBeam, FmuSpring
 from ...bodies.protocol import NO_FORCE
 from ...run.outcome import RunStopped
 from ...run.runner import simulate
-from ...scene import Coupling, Scene, Time
-from ...scene.unit import unit_beam, unit_spring
+from ...scene import Beam, Coupling, Scene, Spring, Time
 from .check import EPS, UNIT_FORCE, Check
 from .spring import IDA, ida_error
 
@@ -29,8 +28,8 @@ def two_masses() -> Iterator[Check]:
     """
     k_own, k_between = 4.0 * pi**2, 16.0 * pi**2
     sizes = (1e-3, 5e-4)
-    by_force = unit_spring(linear_stiffness=k_own)
-    by_displacement = unit_spring(linear_stiffness=k_own + k_between)
+    by_force = Spring.with_ones(linear_stiffness=k_own)
+    by_displacement = Spring.with_ones(linear_stiffness=k_own + k_between)
     with closing(FmuSpring(by_force, 0.0)) as f, closing(FmuSpring(by_displacement, 0.0)) as d:
         load = Reals(d.fmu, "external_force")
 
@@ -103,7 +102,10 @@ def added_mass() -> Iterator[Check]:
     """
     n, m, inertia = 100, 1.0, 1e8
     cutoff = sqrt(12.0) * n
-    beam, spring = unit_beam(n_elements=n, second_moment_of_area=inertia), unit_spring(mass=m, linear_stiffness=0.0)
+    beam, spring = (
+        Beam.with_ones(n_elements=n, second_moment_of_area=inertia),
+        Spring.with_ones(mass=m, linear_stiffness=0.0),
+    )
 
     def gain(size: float) -> float:
         with closing(FmuBeam(beam, 0.0, 0.0)) as upper, closing(FmuSpring(spring, 0.0)) as lower:
@@ -140,11 +142,11 @@ def energy_scheme() -> Iterator[Check]:
     steps, n = 100, 50
     reason = "relative drift in 100 steps: coupling.tolerance of each step's work, at most twice the energy; and " + IDA
     for kappa, size in ((1.0, 0.01), (1e4, 1e-3), (1e4, 0.1)):
-        spring = unit_spring(linear_stiffness=3.0, cubic_stiffness=100.0, external_force=-0.1 * kappa)
+        spring = Spring.with_ones(linear_stiffness=3.0, cubic_stiffness=100.0, external_force=-0.1 * kappa)
         for degree in (0, 1, 2):
             scene = Scene(
                 time=Time(t_end=steps * size),
-                beam=unit_beam(young_modulus=kappa, shear_modulus=kappa, n_elements=n),
+                beam=Beam.with_ones(young_modulus=kappa, shear_modulus=kappa, n_elements=n),
                 spring=spring,
                 coupling=Coupling(scheme="energy", degree=degree, macro_step=size),
             )

@@ -14,8 +14,7 @@ from scipy.linalg import expm
 from scipy.special import spherical_jn
 
 from ...run.runner import simulate
-from ...scene import Scene, scene_from_dict
-from ...scene.unit import unit_beam, unit_spring
+from ...scene import Beam, Scene, Spring, scene_from_dict
 from .beam import clamped_free_frequencies
 from .check import EPS, Check
 
@@ -30,7 +29,7 @@ def _scene(t_end: float, macro_step: float, loads: list[dict[str, Any]], **bodie
 
 
 def _beam(**changes: Any) -> Any:
-    return unit_beam(n_elements=2, element_degree=8, approach="elastic", **changes)
+    return Beam.with_ones(n_elements=2, element_degree=8, approach="elastic", **changes)
 
 
 def resonance() -> Iterator[Check]:
@@ -78,7 +77,7 @@ def pulse() -> Iterator[Check]:
     y = -scale * r * sin(w * duration) / (1.0 - r * r)
     z = scale * rate * (-1.0 - cos(w * duration)) / (1.0 - r * r)
     shock = {"on": "spring", "signal": "half_sine", "amplitude": force, "start": start, "duration": duration}
-    run = simulate(_scene(start + duration + 1.25, 0.01, [shock], spring=unit_spring(linear_stiffness=stiffness)))
+    run = simulate(_scene(start + duration + 1.25, 0.01, [shock], spring=Spring.with_ones(linear_stiffness=stiffness)))
     at = int(np.argmin(np.abs(run.time - start - duration)))
     bound = 1e-9 * scale
     reason = "IDA's tolerance, 1e-12 a step; the pulse loses 7 j₃(ΩH/2)² < 1e-9 of itself"
@@ -113,9 +112,9 @@ def slow_ramp() -> Iterator[Check]:
 
 def moving_base() -> Iterator[Check]:
     """A base that accelerates by a(t) is the load −ρA a(t) on the beam and −m a(t) on the spring, through an impact."""
-    beam = unit_beam(density=2.0, area=1.5, n_elements=6, young_modulus=100.0, initial_velocity_slope=-1.0)
+    beam = Beam.with_ones(density=2.0, area=1.5, n_elements=6, young_modulus=100.0, initial_velocity_slope=-1.0)
     signal = {"signal": "harmonic", "frequency": 12.0, "amplitude": 5.0}
-    spring = unit_spring(mass=0.7, linear_stiffness=3.0)
+    spring = Spring.with_ones(mass=0.7, linear_stiffness=3.0)
     equivalent = [
         {**signal, "on": "beam", "amplitude": -5.0 * 2.0 * 1.5},
         {**signal, "on": "spring", "amplitude": -5.0 * 0.7},

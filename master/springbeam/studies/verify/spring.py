@@ -12,7 +12,7 @@ from scipy.special import ellipk
 from ...bodies.fmu import Reals
 from ...bodies.fmu_bodies import FmuSpring
 from ...bodies.protocol import NO_FORCE, FmuError, StepRefused
-from ...scene.unit import unit_spring
+from ...scene import Spring
 from .check import Check
 
 IDA = "IDA: BDF of order ≤ 5 takes some ε^(−1/6) internal steps a radian, each of error ε: ωT·ε^(5/6)"
@@ -27,7 +27,7 @@ def duffing() -> Iterator[Check]:
     for k1, k2, amplitude in ((3.0, -0.2, 0.5), (3.0, -0.2, 1.0), (150.0, 67.0, 0.5), (150.0, 67.0, 1.0)):
         w2 = k1 + k2 * amplitude**2 * (1.0 if k2 > 0.0 else 0.5)
         period = 4.0 * float(ellipk(abs(k2) * amplitude**2 / (2.0 * w2))) / sqrt(w2)
-        spring = unit_spring(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=amplitude)
+        spring = Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=amplitude)
         name = f"({k1:g}, {k2:g}, {amplitude:g})"
         with closing(FmuSpring(spring, 0.0)) as body:
             relative = ida_error(body, 2.0 * pi)
@@ -49,12 +49,12 @@ def escape() -> Iterator[Check]:
     k1, k2 = 3.0, -0.2
     hilltop, speed = sqrt(k1 / -k2), k1 / sqrt(-2.0 * k2)
     seconds, width = 20, 1e-11
-    with closing(FmuSpring(unit_spring(linear_stiffness=k1, cubic_stiffness=k2), 0.0)) as body:
+    with closing(FmuSpring(Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2), 0.0)) as body:
         relative = ida_error(body, sqrt(k1) * seconds)
 
     def runs(position: float, velocity: float) -> bool:
         start = {"equilibrium": position, "initial_velocity": velocity}
-        spring = unit_spring(linear_stiffness=k1, cubic_stiffness=k2, **start)
+        spring = Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, **start)
         try:
             with closing(FmuSpring(spring, 0.0)) as body:
                 for second in range(seconds):
