@@ -38,22 +38,18 @@ __all__ = [
 ]
 
 _HOME = {
-    "Body": "bodies.protocol",
-    "Energies": "bodies.protocol",
-    "Motion": "bodies.protocol",
-    "PointMass": "bodies.elements",
-    "RigidWall": "bodies.rigid_wall",
-    "SpringDamper": "bodies.elements",
-    "load": "api",
-    "Event": "results.trajectory",
-    "RunStopped": "run.outcome",
-    "Scene": "scene",
-    "SceneError": "scene",
-    "Trajectory": "results.trajectory",
-    "load_scene": "scene",
-    "resume": "run.runner",
-    "simulate": "api",
-    "with_changes": "scene",
+    name: home
+    for home, names in {
+        "api": ("load", "simulate"),
+        "bodies.elements": ("PointMass", "SpringDamper"),
+        "bodies.protocol": ("Body", "Energies", "Motion"),
+        "bodies.rigid_wall": ("RigidWall",),
+        "results.trajectory": ("Event", "Trajectory"),
+        "run.outcome": ("RunStopped",),
+        "run.runner": ("resume",),
+        "scene": ("Scene", "SceneError", "load_scene", "with_changes"),
+    }.items()
+    for name in names
 }
 
 

@@ -228,8 +228,8 @@ def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     if s.has_spring:
         X[s.Y] = s.spring.equilibrium
         X[s.Z] = s.spring.initial_velocity + (0.0 if inertia else perturbation)
-    if scene.elastic_stop and scene.stop is not None:
-        X[s.Y] = scene.stop.position
+    if scene.elastic_stop:
+        X[s.Y] = s.stop.position
     if scene.beam is not None and s.beam is not None:
         slope, rate = scene.beam.initial_deflection_slope, scene.beam.initial_velocity_slope
         if scene.tip_target is not None:

@@ -91,11 +91,11 @@ class LinearForm:
             tip, top = np.append(tip, 0.0), np.append(top, 1.0 / self.root_mass)
         self.offset, self.pressing = np.zeros(len(omega2)), np.zeros(len(omega2))
         if held:
-            self.offset = tip * (self._stop() / s.inverse_tip_mass)
+            self.offset = tip * (s.stop.position / s.inverse_tip_mass)
             constant = constant - omega2 * self.offset
             self.pressing = omega2 * tip
         elif self.linked > 0.0 and not self.spring_moves:
-            constant = constant + tip * (self.linked * self._stop())
+            constant = constant + tip * (self.linked * s.stop.position)
         elif joined and phase.contact == "touch":
             self.pressing = tip
         #: `offset` + this @ ξ = x; ``None`` where x are the modes.
@@ -119,12 +119,6 @@ class LinearForm:
         self.oscillators = Oscillators(self.omega2, s.alpha_b)
         self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
         self._cache: dict[str, _Weights] = {}
-
-    def _stop(self) -> float:
-        stop = self.system.scene.stop
-        if stop is None:
-            raise ReferenceFailure("seated without a stop")
-        return stop.position
 
     def _split(self) -> tuple[float, tuple[float, float] | None]:
         """`linked`, and the (k, c) that it leaves of a linear law; ``None`` where the law is not linear."""

@@ -19,7 +19,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..scene import Scene, Spring
+from ..scene import Scene, Spring, Stop
 from .laws import Motion, Phase, law_of
 from .loads import Loads
 from .semi_discrete import ModalBeam
@@ -41,6 +41,8 @@ class HybridSystem:
         #: Without a spring its terms vanish: no stiffness, and 1/m = 0.
         self.spring = scene.spring or Spring(mass=1.0, linear_stiffness=0.0)
         self.inverse_mass = 1.0 / self.spring.mass if self.has_spring else 0.0
+        #: Without a stop nothing is ever seated on this one.
+        self.stop = scene.stop or Stop(position=0.0)
         empty = np.zeros(0)
         self.omega = empty if self.beam is None else self.beam.omega
         self.b = empty if self.beam is None else self.beam.tip
@@ -165,9 +167,9 @@ class HybridSystem:
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """X, in place, with what rounding leaves of the phase's constraint removed: y = u, or u = φ when seated."""
         joined = self.joined(phase)
-        if phase.seated and (joined or not self.has_spring) and self.scene.stop is not None:
+        if phase.seated and (joined or not self.has_spring):
             towards = self.b / self.inverse_tip_mass
-            X[..., self.A] += (self.scene.stop.position - X[..., self.A] @ self.b)[..., None] * towards
+            X[..., self.A] += (self.stop.position - X[..., self.A] @ self.b)[..., None] * towards
             X[..., self.V] -= (X[..., self.V] @ self.b)[..., None] * towards
         elif joined:
             X[..., self.Y] = X[..., self.A] @ self.b
@@ -202,8 +204,7 @@ class HybridSystem:
         """What rounding leaves of a displacement, velocity or contact force that is exactly zero."""
         a, v, b = np.abs(X[self.A]), np.abs(X[self.V]), np.abs(self.b)
         if unit == "m":
-            stop = 0.0 if self.scene.stop is None else abs(self.scene.stop.position)
-            return _NOISE * (float(a @ b) + abs(float(X[self.Y])) + stop)
+            return _NOISE * (float(a @ b) + abs(float(X[self.Y])) + abs(self.stop.position))
         if unit == "m/s":
             return _NOISE * (float(v @ b) + abs(float(X[self.Z])))
         beam = float(b @ (self.stiffness * (a + self.alpha_b * v) + np.abs(self.load)))

@@ -76,7 +76,7 @@ class Rows:
 
     def _derive(self, columns: dict[str, np.ndarray]) -> None:
         """Add what follows from other columns."""
-        s, stop = self._system, self._system.scene.stop
+        s = self._system
         if s.two_ends:
             columns["gap"] = columns["u_tip"] - columns["y"]
             together = columns["phase"] != "free"
@@ -84,8 +84,8 @@ class Rows:
             C = columns["contact_force"]
             inside = s.law.inside(C, columns["u_tip"])
             columns["compliance_force"], columns["tie_reaction"] = inside, C - inside
-        elif stop is not None and s.beam is not None:
-            columns["gap"] = columns["u_tip"] - stop.position
+        elif s.scene.stop is not None and s.beam is not None:
+            columns["gap"] = columns["u_tip"] - s.stop.position
             columns["foundation_force"] = columns["contact_force"]
         columns["e_total"] = np.sum([columns[name] for name in _ENERGIES], axis=0)
         columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]

@@ -19,7 +19,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..results.trajectory import Event
-from ..scene import Stop
 from .hybrid_system import HybridSystem
 from .laws import Phase, Watch
 
@@ -41,12 +40,11 @@ class HybridState:
 
     def watched(self) -> list[Watch]:
         """Return the functions that are ≥ 0 as long as the phase lasts."""
-        s, stop = self.system, self.system.scene.stop
+        s, phi = self.system, self.system.stop.position
         watched = s.law.watched(self.phase) if s.two_ends else []
         if self.phase.seated:
             return [*watched, Watch("unseat", lambda m: m.N, "N")]
-        if stop is not None and not s.scene.elastic_stop:
-            phi = stop.position
+        if s.scene.stop is not None and not s.scene.elastic_stop:
             return [*watched, Watch("stop", (lambda m: m.y - phi) if s.has_spring else (lambda m: m.u - phi), "m")]
         return watched
 
@@ -66,7 +64,7 @@ class HybridState:
 
     def start(self) -> None:
         """First contact, and its impact, where tip and obstacle touch at the start, or are joined from there on."""
-        s, X, stop = self.system, self.X, self._stop
+        s, X = self.system, self.X
         if s.law.start != "free":
             if self.phase.contact == "free":
                 self._meet()
@@ -76,7 +74,7 @@ class HybridState:
         if s.two_ends and float(m.u - m.y) <= noise:
             if m.v <= m.z:
                 self._meet()
-        elif not s.has_spring and stop is not None and m.u - stop.position <= noise:
+        elif not s.has_spring and s.scene.stop is not None and m.u - s.stop.position <= noise:
             if m.v < 0.0:
                 self._hit_stop()
             elif m.v == 0.0 and m.a @ s.b < 0.0:
@@ -136,16 +134,10 @@ class HybridState:
 
     # Foundation -----------------------------------------------------------------------------------------------------
 
-    @property
-    def _stop(self) -> Stop | None:
-        return self.system.scene.stop
-
     def _hit_stop(self) -> None:
         """Newton's impact law on the foundation, and whether it was the last bounce."""
-        s, stop = self.system, self._stop
-        assert stop is not None
-        e = stop.restitution
-        self._place(stop.position)
+        s, e = self.system, self.system.stop.restitution
+        self._place(s.stop.position)
         arriving = self.X.copy()
         before = self._mechanical_energy()
         contact_impulse, foundation_impulse, speed = self._bounce(e)
@@ -185,11 +177,10 @@ class HybridState:
         return on_tip, of_foundation, speed
 
     def _seat(self) -> None:
-        s, stop = self.system, self._stop
-        assert stop is not None
+        s = self.system
         self.phase = Phase(self.phase.contact, seated=True)
         if s.has_spring:
-            self.X[s.Y], self.X[s.Z] = stop.position, 0.0
+            self.X[s.Y], self.X[s.Z] = s.stop.position, 0.0
         s.synchronise(self.phase, self.X)
 
     def _unseat(self) -> None:
@@ -202,11 +193,10 @@ class HybridState:
         It is 1e-12 of the distance |Ψ − φ|, or of the tip's deflection if larger. What is cut off changes no impulse,
         and the displacement by less than (velocity × remaining time) of the bounces left out.
         """
-        s, stop = self.system, self._stop
-        assert stop is not None
-        reach = abs(s.spring.equilibrium - stop.position) if s.has_spring else 0.0
+        s, phi = self.system, self.system.stop.position
+        reach = abs(s.spring.equilibrium - phi) if s.has_spring else 0.0
         deflection = float(np.abs(self.X[s.A]) @ np.abs(s.b))
-        return 1e-12 * max(reach, deflection, abs(stop.position), 1e-9)
+        return 1e-12 * max(reach, deflection, abs(phi), 1e-9)
 
     # All events -----------------------------------------------------------------------------------------------------
 
