@@ -20,7 +20,7 @@ from pydantic_core import to_json
 from ..scene import Scene
 from .directory import EVENTS, SHAPES, STEPS, TRAJECTORY, ResultsUnreadable, RunDirectory, lock
 from .reading import load_events, load_trajectory
-from .recording import CheckedRecorder, replay, with_scene
+from .recording import Recorder, replay, with_scene
 from .steps import STEP, steps_of
 from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
 
@@ -32,7 +32,7 @@ _STEPS_TOGETHER = 8192
 _SAME = 1e-12
 
 
-class FileRecorder(CheckedRecorder):
+class FileRecorder(Recorder):
     """Streams into a `RunDirectory` and keeps nothing, so that memory does not grow with the run.
 
     A row is in its file when `row` returns (what `springbeam.results.steps` keeps of its step, some rows later), and
@@ -42,12 +42,8 @@ class FileRecorder(CheckedRecorder):
 
     Parameters
     ----------
-    scene
-        The scene as run.
     directory
-        Where the results go (`RunDirectory.create`).
-    columns
-        Names in row order, starting with ``time``; default `columns_of(scene)`.
+        Where the results go (`RunDirectory.create`); the others are those of `Recorder`.
     """
 
     def __init__(self, scene: Scene, directory: RunDirectory, columns: Sequence[str] | None = None) -> None:

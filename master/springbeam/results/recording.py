@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
 from struct import Struct
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -36,11 +37,35 @@ class NonFiniteValue(ValueError):
         self.value = value
 
 
-class Recorder(Protocol):
-    """What a run reports to, in this order: any number of rows, events and shapes, then ``finish``."""
+def _refuse_non_finite(names: Sequence[str], row: list[float]) -> None:
+    """Raise NonFiniteValue for the first number of ``row`` that is not finite; the row begins with its time [s]."""
+    if not isfinite(sum(row)):  # or the sum alone overflows
+        for name, value in zip(names, row, strict=True):
+            if not isfinite(value):
+                raise NonFiniteValue(name, row[0], value)
 
-    columns: tuple[str, ...]
 
+class Recorder(ABC):
+    """What a run reports to, in this order: any number of rows, events and shapes, then ``finish``.
+
+    It refuses rows, events and shapes that no file could hold.
+
+    Parameters
+    ----------
+    scene
+        The scene as run.
+    columns
+        Names in row order, starting with ``time``; default `columns_of(scene)`.
+    """
+
+    def __init__(self, scene: Scene, columns: Sequence[str] | None) -> None:
+        self.scene = scene
+        self.columns = columns_of(scene) if columns is None else tuple(columns)
+        self._phase_at = self.columns.index("phase") if "phase" in self.columns else -1
+        self._numbers = [name for name in self.columns if name != "phase"]
+        self._phases: set[str] = set()
+
+    @abstractmethod
     def row(self, values: Sequence[Any], step: bytes | None = None) -> None:
         """Record an accepted step: a value per column, in their order.
 
@@ -53,43 +78,29 @@ class Recorder(Protocol):
             If a number is NaN or infinite; nothing of the row is recorded then.
         """
 
+    @abstractmethod
     def event(self, event: Event) -> None:
         """Record an event."""
 
+    @abstractmethod
     def shape(self, time: float, deflection: np.ndarray) -> None:
         """Record the beam's deflection [m] at `SHAPE_POINTS`, shape (21,), at ``time`` [s]."""
 
+    @abstractmethod
     def steps(self) -> np.ndarray | None:
         """Return the steps recorded so far, of dtype `springbeam.results.steps.STEP`; ``None`` if there are none."""
 
+    @abstractmethod
     def events(self) -> Iterable[Event]:
         """Return the events recorded so far."""
 
+    @abstractmethod
     def finish(self, summary: Mapping[str, Any]) -> None:
         """End the record with ``summary``, which is JSON-like; the scene as run is added.
 
         The command line reports ``status`` (``done``, ``stopped``, ``interrupted``), ``macro_steps``, ``wall_time``
         [s], ``max_energy_residual`` (relative) and ``warnings`` (list of str), those that are there.
         """
-
-
-def _refuse_non_finite(names: Sequence[str], row: list[float]) -> None:
-    """Raise NonFiniteValue for the first number of ``row`` that is not finite; the row begins with its time [s]."""
-    if not isfinite(sum(row)):  # or the sum alone overflows
-        for name, value in zip(names, row, strict=True):
-            if not isfinite(value):
-                raise NonFiniteValue(name, row[0], value)
-
-
-class CheckedRecorder:
-    """Refuses rows, events and shapes that no file could hold; the base of both recorders."""
-
-    def __init__(self, scene: Scene, columns: Sequence[str] | None) -> None:
-        self.scene = scene
-        self.columns = columns_of(scene) if columns is None else tuple(columns)
-        self._phase_at = self.columns.index("phase") if "phase" in self.columns else -1
-        self._numbers = [name for name in self.columns if name != "phase"]
-        self._phases: set[str] = set()
 
     def _checked_row(self, values: Sequence[Any]) -> tuple[list[float], str]:
         """Return the numbers of the row, and its phase."""
@@ -129,16 +140,8 @@ class CheckedRecorder:
         return shape
 
 
-class MemoryRecorder(CheckedRecorder):
-    """Keeps everything; `trajectory` is the result.
-
-    Parameters
-    ----------
-    scene
-        The scene as run.
-    columns
-        Names in row order, starting with ``time``; default `columns_of(scene)`.
-    """
+class MemoryRecorder(Recorder):
+    """Keeps everything; `trajectory` is the result."""
 
     def __init__(self, scene: Scene, columns: Sequence[str] | None = None) -> None:
         super().__init__(scene, columns)
