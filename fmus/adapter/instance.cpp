@@ -204,6 +204,9 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
   const Variable& of = variable(unknown, Type::real, "differentiate");
   const Variable& by = variable(known, Type::real, "differentiate by");
   if (of.causality != Causality::output) throw std::invalid_argument("'" + of.name + "' is not an output");
+  if (is_setting(by) && phase == initialization) {
+    throw Discarded("derivatives by parameters and start values, such as '" + by.name + "', are not available");
+  }
   if (!by.continuous_input()) throw std::invalid_argument("'" + by.name + "' is not a continuous input");
   ensure_built();
   for (const Dependency& d : of.dependencies) {

@@ -178,3 +178,17 @@ def test_a_directional_derivative_that_is_not_known_is_discarded(spring: Any) ->
     assert k.call("fmi2GetDirectionalDerivative", *one, (ct.c_double * 1)(1.0), value) == 2
     assert "reaction" in k.message
     k.step(0.0, 1e-3)
+
+
+def test_a_directional_derivative_by_a_parameter_is_discarded_in_initialization_mode(case: Any) -> None:
+    """There parameters are knowns, so asking is right; later it is an error."""
+    k = case.fmu.instance()
+    k.setup()
+    k.call("fmi2EnterInitializationMode")
+    name = next(iter(case.parameters))
+    one = (references(case.fmu, [case.velocity]), ct.c_size_t(1), references(case.fmu, [name]), ct.c_size_t(1))
+    ask = (*one, (ct.c_double * 1)(1.0), (ct.c_double * 1)())
+    assert k.call("fmi2GetDirectionalDerivative", *ask) == 2
+    assert name in k.message
+    assert k.call("fmi2ExitInitializationMode") == 0
+    assert k.call("fmi2GetDirectionalDerivative", *ask) == 3

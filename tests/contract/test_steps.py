@@ -119,6 +119,13 @@ def test_after_any_refusal_a_master_goes_on(
         slave.free()
 
 
+def test_a_held_contact_of_finite_force_but_infinite_energy_is_discarded(spring: Any) -> None:
+    k = spring.running(**{**AHEAD, "communication_step": 1e3})
+    k.set("tip_displacement", -1e100)  # λ δ³ = 1e304 N, λ δ⁴/4 overflows
+    assert k.try_step(0.0, 1e-6) == DISCARD
+    assert "range of floating-point numbers" in k.message
+
+
 @pytest.mark.parametrize("tolerance", [0.1, 1e-4, 0.0, -1.0, math.nan, 1e-3])
 def test_a_loose_tolerance_of_the_importer_changes_nothing(case: Any, tolerance: float) -> None:
     plain, loose = case.fmu.instance(), case.fmu.instance()

@@ -1018,6 +1018,7 @@ class Episode {
     const bool right = of < variables().size() && by < variables().size() && variables()[by].continuous_input() &&
                        variables()[of].type == fmi::Type::real && variables()[of].causality == fmi::Causality::output;
     unsigned expected = right ? ok | discard : error_status;
+    if (!right && k.phase == initialization) expected |= discard;  // by a parameter
     if (right && (k.phase & (initialization | error | terminated)) != 0) expected |= error_status;
     const fmi2Status status =
         k.call("fmi2GetDirectionalDerivative", any_phase & ~instantiated, expected, format("%u, %u", of, by),
