@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite, sqrt
@@ -73,10 +72,10 @@ class ForeignBody(FmuBody, EndLoaded):
     def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings, by_substeps: bool) -> None:
         self._spec, self._found, self._by_substeps = spec, found, by_substeps
         self.abilities = found.abilities
-        names = (spec.displacement, spec.velocity, spec.integral, spec.integral_2)
+        names, energies = spec.named(spec.MOTION), spec.named(spec.ENERGIES)
         self._MOTION = tuple(name for name in names if name is not None)
         self._at = [None if name is None else self._MOTION.index(name) for name in names]
-        self._ENERGIES = tuple(name for name in spec.energies if name is not None) if found.abilities.energies else ()
+        self._ENERGIES = tuple(name for name in energies if name is not None) if found.abilities.energies else ()
         self._IMPULSE = () if spec.impulse is None else (spec.impulse,)
         self._FORCES, self._SLOPES = (spec.force,), found.abilities.slopes
         self._KEEPS_SLOPES = self._SLOPES > 0
@@ -89,8 +88,22 @@ class ForeignBody(FmuBody, EndLoaded):
         fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
         self.repeatable = found.abilities.state and bool(fmu.says.canGetAndSetFMUstate)
         self.any_size = found.abilities.any_size
-        _check_names(fmu, spec)
         super().__init__(fmu)
+
+    def _prepare(self, fmu: Fmu) -> None:
+        spec = self._spec
+        for wanted, keys in (("input", spec.INPUTS), ("output", (*spec.MOTION, *spec.ENERGIES))):
+            for key, name in zip(keys, spec.named(keys), strict=True):
+                if name is None:
+                    continue
+                try:
+                    fmu.references([name], fmu.real)
+                except FmuError as error:
+                    raise FmuError(f"{error}; it is the scene's {key}") from None
+                causality = fmu.variable(name).causality
+                if causality != wanted and (causality, wanted) != ("local", "output"):
+                    raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
+        super()._prepare(fmu)
 
     def told(self) -> tuple[Motion, float, int, int]:
         """Return motion, `received`, doStep calls, and how often the state was set back."""
@@ -181,7 +194,7 @@ class ForeignBody(FmuBody, EndLoaded):
         if not self.abilities.energies:
             return self.exchanged()
         told = iter(self._stored())
-        energies = Energies(*(0.0 if name is None else next(told) for name in self._spec.energies))
+        energies = Energies(*(0.0 if name is None else next(told) for name in self._spec.named(self._spec.ENERGIES)))
         return energies._replace(load_potential=energies.load_potential - self._load_work)
 
     def exchanged(self) -> Energies:
@@ -225,34 +238,3 @@ def moments(w0: float, v0: float, w: float, v: float, size: float) -> tuple[floa
     """Return ∫ x dτ and ∫∫ x dτ dτ over a step from (w0, v0) to (w, v), of the cubic through its ends."""
     first = size * 0.5 * (w0 + w) + size**2 * (v0 - v) / 12.0
     return first, size**2 * (7.0 * w0 + 3.0 * w) / 20.0 + size**3 * (v0 / 20.0 - v / 30.0)
-
-
-def _check_names(fmu: Fmu, spec: ForeignFmu) -> None:
-    """Raise FmuError, after closing it, if the FMU has not the variables that the scene names, or not as such."""
-    inputs = {"force": spec.force, "impulse": spec.impulse}
-    keys = ("displacement", "velocity", "integral", "integral_2")
-    outputs: Mapping[str, str | None] = {
-        **{key: getattr(spec, key) for key in keys},
-        **dict(
-            zip(
-                ("kinetic_energy", "potential_energy", "dissipated_energy", "load_potential"),
-                spec.energies,
-                strict=True,
-            )
-        ),
-    }
-    try:
-        for wanted, names in (("input", inputs), ("output", outputs)):
-            for key, name in names.items():
-                if name is None:
-                    continue
-                try:
-                    fmu.references([name], fmu.real)
-                    causality = fmu.variable(name).causality
-                except FmuError as error:
-                    raise FmuError(f"{error}; it is the scene's {key}") from None
-                if causality != wanted and (causality, wanted) != ("local", "output"):
-                    raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
-    except BaseException:
-        fmu.close()
-        raise

@@ -7,28 +7,10 @@ looked for at once, the others when they are called.
 
 from __future__ import annotations
 
+import ctypes
 import os
 from collections.abc import Callable
-from ctypes import (
-    Array,
-    byref,
-    c_bool,
-    c_char_p,
-    c_double,
-    c_float,
-    c_int,
-    c_int8,
-    c_int16,
-    c_int32,
-    c_int64,
-    c_size_t,
-    c_uint8,
-    c_uint16,
-    c_uint32,
-    c_uint64,
-    c_void_p,
-    cdll,
-)
+from ctypes import Array, byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_void_p, cdll
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
@@ -217,15 +199,12 @@ class Fmi3(Functions):
     VERSION, PREFIX, FOLDER, REAL = "3.0", "fmi3", platform_tuple, "Float64"
     KINDS: ClassVar = {
         "Float64": Kind("Float64", c_double, _NUMBER),
-        "Float32": Kind("Float32", c_float, _NUMBER),
+        "Float32": Kind("Float32", ctypes.c_float, _NUMBER),
         **{
-            name: Kind(name, ctype, _WHOLE)
-            for name, ctype in (
-                *(("Int8", c_int8), ("Int16", c_int16), ("Int32", c_int32), ("Int64", c_int64)),
-                *(("UInt8", c_uint8), ("UInt16", c_uint16), ("UInt32", c_uint32), ("UInt64", c_uint64)),
-            )
+            name: Kind(name, getattr(ctypes, f"c_{name.lower()}"), _WHOLE)
+            for name in ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
         },
-        "Enumeration": Kind("Int64", c_int64, _WHOLE),
+        "Enumeration": Kind("Int64", ctypes.c_int64, _WHOLE),
         "Boolean": Kind("Boolean", c_bool, _YES_OR_NO),
         "String": Kind("String", c_char_p, _TEXT),
     }

@@ -53,22 +53,26 @@ def explain(error: Any) -> list[str]:
         if kind == "union_tag_invalid":
             elements = " or ".join(_toml(name) for name in PARTNERS if name != "fmu")
             return [f"[{loc[0]}] element = {_toml(value['element'])}: must be {elements}"]
-        loc, partner = [loc[0], *loc[2:]], loc[1]
-        if partner != OWN and len(loc) > 1:
-            return [_explain_partner(kind, value, loc[0], partner, ".".join(map(_bare, loc[1:])))]
+        loc, body = [loc[0], *loc[2:]], loc[1]
+    else:
+        body = OWN
     if kind == "value_error":
         prefix = f"[{loc[0]}] " if loc else ""
         return [prefix + line for line in error["msg"].removeprefix("Value error, ").splitlines()]
     if len(loc) == 1:
         return [_explain_top(kind, value, loc[0])]
-    table, key = loc[0], ".".join(map(_bare, loc[1:]))
-    if kind == "extra_forbidden":
-        return [f"[{table}] {key}: unknown key; {_nearest_key(table, key)}"]
-    model = table_of(table)
+    table, name, key = loc[0], loc[1], ".".join(map(_bare, loc[1:]))
+    model = PARTNERS.get(body) or table_of(table)
     assert model is not None
+    if kind == "extra_forbidden":
+        beside = {OWN: "", "fmu": " beside fmu"}.get(body, f' of element = "{body}"')
+        return [f"[{table}] {key}: unknown key{beside}; {_nearest_key(table, key, body)}"]
     if kind == "missing":
         return [f"[{table}] {_missing(model, key, value)}"]
-    return [f"[{table}] {key} = {_toml(value)}: must be {allowed(model.model_fields[loc[1]])}"]
+    may_be = allowed(model.model_fields[name])
+    if name == "parameters" and len(loc) > 2:  # the last word is one of the types that the value is not
+        key, may_be = key.rpartition(".")[0], "a number, true or false, or a text in quotes"
+    return [f"[{table}] {key} = {_toml(value)}: must be {may_be}"]
 
 
 def _missing(model: type[Table], key: str, given: Any) -> str:
@@ -86,22 +90,6 @@ def _missing(model: type[Table], key: str, given: Any) -> str:
 def extra(field: FieldInfo, name: str) -> str:
     """Return what `springbeam.scene.tables.key` noted of a key: its "unit", or what holds "otherwise"."""
     return str(field.json_schema_extra[name]) if isinstance(field.json_schema_extra, dict) else ""
-
-
-def _explain_partner(kind: str, value: Any, table: str, partner: str, key: str) -> str:
-    """Explain a key of a body that is not our own; ``partner`` is its name in `PARTNERS`."""
-    fields = PARTNERS[partner].model_fields
-    if kind == "extra_forbidden":
-        beside = "beside fmu" if partner == "fmu" else f'of element = "{partner}"'
-        ours = f"it belongs to our own {table}; " if key in TABLES[table].model_fields else nearest(key, fields)
-        return f"[{table}] {key}: unknown key {beside}; {ours}allowed: {', '.join(fields)}"
-    if kind == "missing":
-        return f"[{table}] {_missing(PARTNERS[partner], key, value)}"
-    name, _, of_parameter = key.partition(".")
-    if of_parameter:  # its last word is one of the types that the value is not
-        may_be = "a number, true or false, or a text in quotes"
-        return f"[{table}] {key.rpartition('.')[0]} = {_toml(value)}: must be {may_be}"
-    return f"[{table}] {name} = {_toml(value)}: must be {allowed(fields[name])}"
 
 
 def _explain_top(kind: str, value: Any, name: str) -> str:
@@ -123,15 +111,17 @@ def nearest(name: str, candidates: Iterable[str]) -> str:
     return f"did you mean {close[0]}? " if close else ""
 
 
-def _nearest_key(table: str, key: str) -> str:
-    model = table_of(table)
+def _nearest_key(table: str, key: str, body: str = OWN) -> str:
+    model = PARTNERS.get(body) or table_of(table)
     here = list(model.model_fields) if model else ["title", *(f"[{name}]" for name in TABLES)]
-    elsewhere = [name for name, other in TABLES.items() if key in other.model_fields]
+    elsewhere = [f"[{name}]" for name, other in TABLES.items() if key in other.model_fields]
+    if body != OWN and key in TABLES[table].model_fields:
+        elsewhere = [f"our own {table}"]
     longer = [name for name in here if name.endswith(f"_{key}")]
     if longer:
         hint = f"did you mean {longer[0]}? "
     else:
-        hint = f"it belongs to [{elsewhere[0]}]; " if elsewhere else nearest(key, here)
+        hint = f"it belongs to {elsewhere[0]}; " if elsewhere else nearest(key, here)
     return f"{hint}allowed: {', '.join(here)}"
 
 

@@ -6,7 +6,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Sequence
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Discriminator, Tag
 
@@ -18,6 +19,11 @@ class ForeignFmu(Table):
 
     What has no name decides what can be offered: `springbeam.bodies.abilities`.
     """
+
+    INPUTS: ClassVar = ("force", "impulse")
+    #: In the order of `springbeam.bodies.protocol.Motion` and `springbeam.bodies.protocol.Energies`.
+    MOTION: ClassVar = ("displacement", "velocity", "integral", "integral_2")
+    ENERGIES: ClassVar = ("kinetic_energy", "potential_energy", "dissipated_energy", "load_potential")
 
     fmu: str = key("–", "the file; relative to the scene's")
     force: str = key("N", "input: the contact force, which presses the lower body down and lifts the upper one")
@@ -41,10 +47,9 @@ class ForeignFmu(Table):
         """Where the end is at the start: only the FMU knows."""
         return
 
-    @property
-    def energies(self) -> tuple[str | None, ...]:
-        """Names of the energies, in the order of `springbeam.bodies.protocol.Energies`."""
-        return (self.kinetic_energy, self.potential_energy, self.dissipated_energy, self.load_potential)
+    def named(self, keys: Sequence[str]) -> tuple[str | None, ...]:
+        """Return the names of variables by their keys, as `INPUTS`, `MOTION` and `ENERGIES`."""
+        return tuple(getattr(self, key) for key in keys)
 
 
 class PointMass(Table):

@@ -23,20 +23,10 @@ from typing_extensions import Self
 
 #: Up to this many unknowns all modes may be kept; the full eigenproblem grows with the cube.
 ALL_MODES_UP_TO = 1000
-
-
-#: Most modes of a mesh with more.
-MOST_MODES = 1000
-
-
-#: Most modes of the continuous beam.
-MOST_EXACT_MODES = 10_000
-
-
+#: Most modes of a mesh with more, and of the continuous beam.
+MOST_MODES, MOST_EXACT_MODES = 1000, 10_000
 #: Most modes times unknowns: 40 bytes each while the modes are found, so 1 GB.
 MOST_MODE_VALUES = 25_000_000
-
-
 #: Most elements times their degree.
 MOST_ELEMENTS = 1_000_000
 
@@ -335,19 +325,13 @@ class Contact(Table):
 
 #: Keys that set the length of macro steps: the one, or the others.
 STEP_KEY, TOLERANCE_KEYS = "macro_step", ("relative_tolerance", "absolute_tolerance")
-
-
 #: H [s] of a scene that gives neither: that of Ahn & Tate's section 6.
 DEFAULT_STEP = 0.004
-
-
 #: What ``accuracy`` picks, by table: it takes the place of these keys.
 PICKED_BY_ACCURACY = {
     "coupling": ("scheme", "degree", STEP_KEY, *TOLERANCE_KEYS, "tolerance"),
     "spring": TOLERANCE_KEYS,
 }
-
-
 #: Schemes that exchange once per macro step, as ordinary masters do.
 ORDINARY_SCHEMES = ("gauss_seidel", "jacobi")
 
