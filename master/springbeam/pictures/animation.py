@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from ..results.trajectory import Trajectory
-from .drawing import BLACK, GREY, LEVEL_LINES, STONE, VERMILLION, level_side, mark, time_unit
+from .drawing import BLACK, GREY, LEVELS, STONE, VERMILLION, level_side, mark, time_unit
 from .frames import Frames, Part, Sketch, frames_of, sketches
 from .panels import positions
 from .timeline import STYLE, line_style, paint, shade
@@ -144,11 +144,11 @@ class _Picture:
         else:
             ax.plot(sketch.rest, [0.0, 0.0], color=GREY, lw=0.6, ls=":")
         for symbol, level in sketch.levels.items():
-            ax.plot(sketch.level_ends, [level, level], color=BLACK, **line_style(LEVEL_LINES[symbol]))
+            ax.plot(sketch.level_ends, [level, level], **line_style(LEVELS[symbol]))
             ax.annotate(symbol, (sketch.level_ends[1], level), xytext=(3.0, 0.0), textcoords="offset points",
                         va=level_side(symbol, sketch.levels))  # fmt: skip
-        for part, x, look, width in sketch.moving:
-            (line,) = ax.plot(x, np.zeros(len(x)), color=look.colour, lw=width, solid_capstyle="butt")
+        for part, x, look in sketch.moving:
+            (line,) = ax.plot(x, np.zeros(len(x)), solid_capstyle="butt", **line_style(look))
             self._moving.append((line, part, sketch.unit.factor))
         ax.set_xlim(sketch.x)
         ax.set_ylim(sketch.y)

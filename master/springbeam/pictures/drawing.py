@@ -33,23 +33,12 @@ _PHASE_WORDS_OF_LAWS = {
 }
 
 
-class Look(NamedTuple):
-    """Colour and words of a quantity or a kind of event."""
+class Line(NamedTuple):
+    """Width and dashes, which distinguish lines besides their colour."""
 
-    colour: str
-    words: str
-
-
-EVENT_LOOKS = {
-    "impact": Look(VERMILLION, "impact tip–spring"),
-    "stop_impact": Look(BLACK, "impact on foundation"),
-    "release": Look(BLUE, "release"),
-    "retie": Look(PURPLE, "retie"),
-    "separation": Look(GREEN, "separation"),
-    "seated": Look(GREY, "seated"),
-    "unseated": Look(GREY, "unseated"),
-}
-assert tuple(EVENT_LOOKS) == EVENT_KINDS
+    width: float = 1.1  #: [pt]
+    dashed: bool = False
+    opacity: float = 1.0
 
 
 class Marker(NamedTuple):
@@ -61,26 +50,39 @@ class Marker(NamedTuple):
     size: float = 4.0
 
 
-EVENT_MARKERS = {
-    "impact": Marker("▼", "v", "triangle-down"),
-    "stop_impact": Marker("▲", "^", "triangle-up"),
-    "release": Marker("●", "o", "circle"),
-    "retie": Marker("■", "s", "square"),
-    "separation": Marker("◆", "D", "diamond"),
-    "seated": Marker("◀", "<", "triangle-left"),
-    "unseated": Marker("▶", ">", "triangle-right"),
+class Look(NamedTuple):
+    """Colour, words and line of a quantity, or marker of a kind of event."""
+
+    colour: str
+    words: str
+    line: Line = Line()
+    marker: Marker | None = None
+
+
+EVENT_LOOKS = {
+    "impact": Look(VERMILLION, "impact tip–spring", marker=Marker("▼", "v", "triangle-down")),
+    "stop_impact": Look(BLACK, "impact on foundation", marker=Marker("▲", "^", "triangle-up")),
+    "release": Look(BLUE, "release", marker=Marker("●", "o", "circle")),
+    "retie": Look(PURPLE, "retie", marker=Marker("■", "s", "square")),
+    "separation": Look(GREEN, "separation", marker=Marker("◆", "D", "diamond")),
+    "seated": Look(GREY, "seated", marker=Marker("◀", "<", "triangle-left")),
+    "unseated": Look(GREY, "unseated", marker=Marker("▶", ">", "triangle-right")),
 }
+assert tuple(EVENT_LOOKS) == EVENT_KINDS
 #: More events than this are not drawn through all panels.
 MANY_EVENTS = 60
 
 #: Columns of `Trajectory`, in the order in which they are drawn.
-POSITIONS = {"u_tip": Look(BLUE, "tip u(t, L)"), "y": Look(VERMILLION, "spring top y")}
-VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)"), "z": Look(VERMILLION, "spring top z")}
+POSITIONS = {
+    "u_tip": Look(BLUE, "tip u(t, L)", Line(2.2, opacity=0.75)),
+    "y": Look(VERMILLION, "spring top y", Line(0.9)),
+}
+VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)", Line(1.5)), "z": Look(VERMILLION, "spring top z", Line(0.8))}
 FORCES = {
-    "contact_force": Look(SKY, "contact C, as applied"),
-    "contact_force_smoothed": Look(BLUE, "contact C, smoothed"),
-    "compliance_force": Look(GREEN, "part λ(Ψ − u)₊ᵖ"),  # `panels.forces` has those of other laws
-    "foundation_force": Look(BLACK, "foundation N"),
+    "contact_force": Look(SKY, "contact C, as applied", Line(0.7)),
+    "contact_force_smoothed": Look(BLUE, "contact C, smoothed", Line(1.2)),
+    "compliance_force": Look(GREEN, "part λ(Ψ − u)₊ᵖ", Line(1.0, dashed=True)),  # of other laws: `panels.forces`
+    "foundation_force": Look(BLACK, "foundation N", Line(0.9)),
 }
 ENERGIES = {
     "e_beam": Look(SKY, "beam"),
@@ -90,40 +92,15 @@ ENERGIES = {
     "e_impact_loss": Look(GREY, "impact losses"),
     "e_load": Look(GREEN, "loads (potential)"),
 }
-#: Fields of `Event`.
+#: Fields of `Event`. A beam on a stop has both, equal: one is drawn within the other.
 IMPULSES = {
-    "impulse_contact": Look(BLUE, "on the tip"),
-    "impulse_foundation": Look(BLACK, "of the foundation"),
+    "impulse_contact": Look(BLUE, "on the tip", marker=Marker("○", "o", "circle-open", 5.5)),
+    "impulse_foundation": Look(BLACK, "of the foundation", marker=Marker("▲", "^", "triangle-up", 3.0)),
 }
-#: A beam on a stop has both, equal: one is drawn within the other.
-IMPULSE_MARKERS = {
-    "impulse_contact": Marker("○", "o", "circle-open", 5.5),
-    "impulse_foundation": Marker("▲", "^", "triangle-up", 3.0),
+LEVELS = {
+    "Ψ": Look(BLACK, "rest of the spring Ψ", Line(0.8, dashed=True)),
+    "φ": Look(BLACK, "foundation φ", Line(1.3)),
 }
-
-
-class Line(NamedTuple):
-    """Width and dashes, which distinguish lines besides their colour."""
-
-    width: float = 1.1  #: [pt]
-    dashed: bool = False
-    opacity: float = 1.0
-
-
-#: By column; all others are as `Line()`.
-LINES = {
-    "u_tip": Line(2.2, opacity=0.75),
-    "y": Line(0.9),
-    "v_tip": Line(1.5),
-    "z": Line(0.8),
-    "contact_force": Line(0.7),
-    "contact_force_smoothed": Line(1.2),
-    "compliance_force": Line(1.0, dashed=True),
-    "foundation_force": Line(0.9),
-    "e_total": Line(1.4, dashed=True),
-}
-LEVEL_LINES = {"Ψ": Line(0.8, dashed=True), "φ": Line(1.3)}
-LEVEL_WORDS = {"Ψ": "rest of the spring Ψ", "φ": "foundation φ"}
 ALTERNATES = "alternates from step to step"
 #: Columns of pixels of a time axis, roughly; more points than a few per column cannot be seen.
 PIXEL_COLUMNS = 1000
@@ -162,7 +139,7 @@ def decimated(time: np.ndarray, values: np.ndarray, columns: int = PIXEL_COLUMNS
 
 
 class EventMark(NamedTuple):
-    """The events of one kind: look with how many they are, shape, times [s] and what each lost [J]."""
+    """The events of one kind: look and marker with how many they are, times [s] and what each lost [J]."""
 
     kind: str
     look: Look
@@ -181,7 +158,8 @@ def event_marks(trajectory: Trajectory) -> list[EventMark]:
             rows = decimated(times, times)
             losses = np.array([event.energy_loss for event in events])[rows]
             counted = look._replace(words=f"{look.words} ({len(events)})")
-            found.append(EventMark(kind, counted, EVENT_MARKERS[kind], times[rows], losses))
+            assert look.marker is not None
+            found.append(EventMark(kind, counted, look.marker, times[rows], losses))
     return found
 
 

@@ -13,6 +13,7 @@ from .drawing import (
     BLUE,
     POSITIONS,
     VERMILLION,
+    Line,
     Look,
     Unit,
     length_along,
@@ -73,12 +74,11 @@ class Frames:
 
 
 class Moving(NamedTuple):
-    """A line that moves up and down: where its corners are along the beam, in the sketch's unit, and its width [pt]."""
+    """A line that moves up and down: where its corners are along the beam, in the sketch's unit."""
 
     part: Part
     x: np.ndarray
     look: Look
-    width: float
 
 
 class Block(NamedTuple):
@@ -165,15 +165,15 @@ def _bodies(
     if frames.y is not None:
         half = _COIL_WIDTH * length
         ends = np.array([length - 1.6 * half, length + 1.6 * half])
-        sketch.moving.append(Moving("coil", length + half * _COIL_ACROSS, Look(VERMILLION, "spring"), 1.2))
-        sketch.moving.append(Moving("top", ends, Look(VERMILLION, "its top y"), 3.5))
+        sketch.moving.append(Moving("coil", length + half * _COIL_ACROSS, Look(VERMILLION, "spring", Line(1.2))))
+        sketch.moving.append(Moving("top", ends, Look(VERMILLION, "its top y", Line(3.5))))
     if frames.deflection is not None:
         sketch.moving.append(_beam(trajectory))
     return sketch
 
 
 def _beam(trajectory: Trajectory) -> Moving:
-    return Moving("beam", length_along(trajectory.scene)[1] * SHAPE_POINTS, Look(BLUE, "beam u"), 3.0)
+    return Moving("beam", length_along(trajectory.scene)[1] * SHAPE_POINTS, Look(BLUE, "beam u", Line(3.0)))
 
 
 def frames_of(trajectory: Trajectory) -> Frames | None:

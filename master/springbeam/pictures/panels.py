@@ -17,16 +17,12 @@ from .drawing import (
     BLUE,
     ENERGIES,
     FORCES,
-    GREEN,
-    IMPULSE_MARKERS,
     IMPULSES,
-    LINES,
     POSITIONS,
     VELOCITIES,
     VERMILLION,
     Line,
     Look,
-    Marker,
     Unit,
     alternates,
     decimated,
@@ -38,21 +34,18 @@ from .drawing import (
 
 #: Forces and energies below this part of the largest one are not seen beside it.
 _INVISIBLE = 5e-3
-_PLAIN = Line()
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve over time, thinned; with a ``marker``, points on stems."""
+    """A curve over time, thinned; where its look has a marker, points on stems."""
 
     name: str  #: column of the run, or field of its events
     look: Look
     time: np.ndarray  #: [s]
     values: np.ndarray  #: in SI units
-    line: Line = _PLAIN
     alternates: bool = False  #: drawn as dots on a faint line
     stacked: bool = False  #: drawn as an area on top of those before it
-    marker: Marker | None = None
 
 
 @dataclass
@@ -101,9 +94,8 @@ def enlarged(trajectory: Trajectory) -> list[Panel]:
     """Return a panel of its own for the one of two positions whose motion is lost beside the other's."""
     found = []
     for name in much_smaller(trajectory, present(trajectory, POSITIONS)):
-        look = POSITIONS[name]._replace(words=f"{POSITIONS[name].words}, enlarged")
+        look = Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged")
         panel = _lines(trajectory, f"position-{name}", "The smaller one, enlarged", {name: look}, "position", "m")
-        panel.curves = [_curve(trajectory, name, look, _PLAIN)]
         panel.height = 1.2
         found.append(panel)
     return found
@@ -123,7 +115,7 @@ def forces(trajectory: Trajectory) -> list[Panel]:
     }
     looks = dict(FORCES)
     if contact.law in words:
-        looks["compliance_force"] = Look(GREEN, words[contact.law])
+        looks["compliance_force"] = FORCES["compliance_force"]._replace(words=words[contact.law])
     looks = _not_zero(trajectory, looks)
     if not looks:
         return []
@@ -147,7 +139,7 @@ def impulses(trajectory: Trajectory) -> list[Panel]:
     curves = []
     for name, every in found.items():
         time, values = every[decimated(every[:, 0], every[:, 1])].T
-        curves.append(Curve(name, IMPULSES[name], time, values, marker=IMPULSE_MARKERS[name]))
+        curves.append(Curve(name, IMPULSES[name], time, values))
     limits = None if foot is None else (foot, 3.0 * float(np.max(sizes)))
     return [Panel("impulses", "Impulses", "impulse", unit, curves, 1.2, logarithmic=limits)]
 
@@ -173,7 +165,8 @@ def gap(trajectory: Trajectory) -> list[Panel]:
 def energies(trajectory: Trajectory) -> Panel:
     """Return the energies, stacked where no part is negative but by rounding."""
     parts, remarks = _seen(trajectory, _not_zero(trajectory, ENERGIES), "J")
-    panel = _lines(trajectory, "energies", "Energy ledger", parts | {"e_total": Look(BLACK, "total")}, "energy", "J")
+    looks = parts | {"e_total": Look(BLACK, "total", Line(1.4, dashed=True))}
+    panel = _lines(trajectory, "energies", "Energy ledger", looks, "energy", "J")
     panel.height = 2.2
     panel.remarks += remarks
     least = min((float(np.min(trajectory[name])) for name in parts), default=-1.0)
@@ -192,8 +185,8 @@ def residual(trajectory: Trajectory) -> Panel:
     relative = np.abs(trajectory["energy_residual"]) / _energy_scale(trajectory)
     rows = decimated(trajectory["time"], relative)
     rows = rows[relative[rows] > 0.0]
-    look = Look(VERMILLION, "over the largest energy")
-    curve = Curve("energy_residual", look, trajectory["time"][rows], relative[rows], Line(0.8))
+    look = Look(VERMILLION, "over the largest energy", Line(0.8))
+    curve = Curve("energy_residual", look, trajectory["time"][rows], relative[rows])
     heading = "Energy residual: what the sum of all energies has changed by since the start"
     panel = Panel("residual", heading, "energy residual", Unit(1.0, "–"), [curve], 1.4)
     if len(rows):
@@ -215,16 +208,16 @@ def _lines(
 ) -> Panel:
     """Return a panel of those columns of ``looks`` that the run has."""
     there = present(trajectory, looks)
-    curves = [_curve(trajectory, column, looks[column], LINES.get(column, _PLAIN)) for column in there]
+    curves = [_curve(trajectory, column, looks[column]) for column in there]
     readable = readable_unit([trajectory[column] for column in there], unit)
     remarks = [f"{curve.look.words} {ALTERNATES}" for curve in curves if curve.alternates]
     return Panel(name, heading, quantity, readable, curves, remarks=remarks)
 
 
-def _curve(trajectory: Trajectory, name: str, look: Look, line: Line) -> Curve:
+def _curve(trajectory: Trajectory, name: str, look: Look) -> Curve:
     values = trajectory[name]
     rows = decimated(trajectory["time"], values)
-    return Curve(name, look, trajectory["time"][rows], values[rows], line, alternates(values))
+    return Curve(name, look, trajectory["time"][rows], values[rows], alternates(values))
 
 
 def _not_zero(trajectory: Trajectory, looks: Mapping[str, Look]) -> dict[str, Look]:

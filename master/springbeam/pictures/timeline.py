@@ -17,12 +17,11 @@ from matplotlib.ticker import LogLocator
 
 from ..results.trajectory import Trajectory
 from .drawing import (
-    BLACK,
     GREY,
-    LEVEL_LINES,
+    LEVELS,
     MANY_EVENTS,
     VERMILLION,
-    Line,
+    Look,
     Unit,
     event_marks,
     level_side,
@@ -152,24 +151,24 @@ def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
 
 
 def _paint_curve(ax: Axes, curve: Curve, time: np.ndarray, values: np.ndarray, panel: Panel) -> None:
-    colour, words = curve.look
-    if curve.marker is not None:
+    colour, words, _, marker = curve.look
+    if marker is not None:
         foot = 0.0 if panel.logarithmic is None else panel.logarithmic[0]
         ax.vlines(time, foot, values, color=colour, lw=1.0)
-        face = "none" if curve.marker.sign == "○" else colour
-        ax.plot(time, values, color=colour, linestyle="none", label=words, marker=curve.marker.matplotlib,
-                markersize=curve.marker.size, markerfacecolor=face)  # fmt: skip
+        face = "none" if marker.sign == "○" else colour
+        ax.plot(time, values, color=colour, linestyle="none", label=words, marker=marker.matplotlib,
+                markersize=marker.size, markerfacecolor=face)  # fmt: skip
         return
-    style = line_style(curve.line)
+    style = line_style(curve.look)
     if curve.alternates:
         style |= {"linewidth": 0.25, "marker": ".", "markersize": 1.6, "markeredgewidth": 0.0}
-    ax.plot(time, values, color=colour, label=words, **style)
+    ax.plot(time, values, label=words, **style)
 
 
 def paint_levels(ax: Axes, heights: Mapping[str, float], *, whole_width: bool = False) -> None:
     """Draw Ψ and φ, at ``heights`` in the unit of the axis, across the panel or as ticks at its right edge."""
     for symbol, height in heights.items():
-        ax.axhline(height, xmin=0.0 if whole_width else 0.93, color=BLACK, zorder=1, **line_style(LEVEL_LINES[symbol]))
+        ax.axhline(height, xmin=0.0 if whole_width else 0.93, zorder=1, **line_style(LEVELS[symbol]))
         # One above and one below: however near the two levels are, their names are apart.
         side: str = level_side(symbol, heights)
         place: dict[str, Any] = {"xytext": (3.0, 0.0), "va": side}
@@ -183,9 +182,15 @@ def paint_levels(ax: Axes, heights: Mapping[str, float], *, whole_width: bool = 
                     **place)  # fmt: skip
 
 
-def line_style(line: Line) -> dict[str, Any]:
+def line_style(look: Look) -> dict[str, Any]:
     """Return matplotlib's arguments for a line."""
-    return {"linewidth": line.width, "linestyle": _DASHES if line.dashed else "-", "alpha": line.opacity}
+    line = look.line
+    return {
+        "color": look.colour,
+        "linewidth": line.width,
+        "linestyle": _DASHES if line.dashed else "-",
+        "alpha": line.opacity,
+    }
 
 
 def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:

@@ -7,7 +7,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from ..drawing import BLACK, GREY, Line, Marker
+from ..drawing import BLACK, GREY, Look, Marker
 
 _GRID = "#E3E3E3"
 #: Pixels of the page for a point of the pictures.
@@ -16,9 +16,10 @@ _PIXELS = 1.8
 _PIXELS_PER_INCH, _PIXELS_BESIDE = 82, 110
 
 
-def line_style(line: Line) -> dict[str, Any]:
-    """Return plotly's ``line`` but for its colour."""
-    return {"width": round(_PIXELS * line.width, 1), "dash": "dash" if line.dashed else "solid"}
+def line_style(look: Look) -> dict[str, Any]:
+    """Return plotly's ``line``."""
+    width = round(_PIXELS * look.line.width, 1)
+    return {"color": look.colour, "width": width, "dash": "dash" if look.line.dashed else "solid"}
 
 
 def marker_style(marker: Marker) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from ..drawing import BLACK, GREY, LEVEL_LINES, STONE, Line
+from ..drawing import GREY, LEVELS, STONE
 from ..frames import COIL_HEIGHTS, Frames, Sketch
 from .chart import Chart, height_of, layout, line_style
 
@@ -28,13 +28,12 @@ def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
         figure.add_shape(type="line", x0=sketch.rest[0], x1=sketch.rest[1], y0=0.0, y1=0.0, line=dotted)
     begin, end = sketch.level_ends
     for symbol, level in sketch.levels.items():
-        line = {"color": BLACK, **line_style(LEVEL_LINES[symbol])}
-        figure.add_shape(type="line", x0=begin, x1=end, y0=level, y1=level, line=line)
+        figure.add_shape(type="line", x0=begin, x1=end, y0=level, y1=level, line=line_style(LEVELS[symbol]))
         figure.add_annotation(x=end, y=level, text=symbol, showarrow=False, xanchor="left", xshift=3)
-    for part, x, look, width in sketch.moving:
+    for part, x, look in sketch.moving:
         figure.add_scatter(
             x=x, y=sketch.unit.factor * frames.heights(part, 0), mode="lines", meta=part, name=look.words,
-            line={"color": look.colour, **line_style(Line(width))}, hoverinfo="skip" if part == "coil" else None,
+            line=line_style(look), hoverinfo="skip" if part == "coil" else None,
             hovertemplate=None if part == "coil" else f"%{{y:.6g}} {sketch.unit.name}",
         )  # fmt: skip
     return Chart(sketch.name, sketch.heading, figure)

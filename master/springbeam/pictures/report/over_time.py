@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from ...results.trajectory import Trajectory
-from ..drawing import BLACK, EVENT_LOOKS, LEVEL_LINES, LEVEL_WORDS, MANY_EVENTS, event_marks, shaded_phases, time_unit
+from ..drawing import EVENT_LOOKS, LEVELS, MANY_EVENTS, event_marks, shaded_phases, time_unit
 from ..panels import Curve, Panel, panels
 from .chart import Chart, height_of, layout, line_style, marker_style
 
@@ -72,8 +72,8 @@ def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
     ends = clock * trajectory["time"][[0, -1]]
     for symbol, height in panel.levels.items():
         chart.figure.add_scatter(
-            x=ends, y=factor * np.array([height, height]), mode="lines", name=LEVEL_WORDS[symbol],
-            line={"color": BLACK, **line_style(LEVEL_LINES[symbol])}, hoverinfo="skip",
+            x=ends, y=factor * np.array([height, height]), mode="lines", name=LEVELS[symbol].words,
+            line=line_style(LEVELS[symbol]), hoverinfo="skip",
         )  # fmt: skip
     chart.figure.update_yaxes(title_text=panel.axis)
     if panel.logarithmic is not None:
@@ -86,16 +86,16 @@ def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
 
 
 def _style(curve: Curve, panel: Panel) -> dict[str, Any]:
-    colour = curve.look.colour
+    colour, _, line, marker = curve.look
     if curve.stacked:
         return {"mode": "lines", "line": {"width": 0.0}, "stackgroup": "stack", "fillcolor": colour}
-    if curve.marker is not None:
+    if marker is not None:
         values = panel.unit.factor * curve.values
         foot = 0.0 if panel.logarithmic is None else panel.logarithmic[0]
         stems = {"type": "data", "symmetric": False, "array": np.zeros(len(values)), "arrayminus": values - foot}
         return {
             "mode": "markers",
-            "marker": {**marker_style(curve.marker), "color": colour},
+            "marker": {**marker_style(marker), "color": colour},
             "error_y": {**stems, "width": 0, "thickness": 1.5},
             "cliponaxis": False,
         }
@@ -105,7 +105,7 @@ def _style(curve: Curve, panel: Panel) -> dict[str, Any]:
             "line": {"color": colour, "width": 0.4},
             "marker": {"size": 2.5, "color": colour},
         }
-    return {"mode": "lines", "line": {"color": colour, **line_style(curve.line)}, "opacity": curve.line.opacity}
+    return {"mode": "lines", "line": line_style(curve.look), "opacity": line.opacity}
 
 
 def _timeline(trajectory: Trajectory) -> Chart:
