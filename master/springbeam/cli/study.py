@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from inspect import signature
 from itertools import count
-from math import ceil
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
@@ -51,7 +50,7 @@ SchedulerOption = Annotated[
 QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]
 #: Options of all studies.
 _SHARED = ("out", "force", "no_plots", "quiet", "as_json")
-#: A study that takes longer says how long the rest will take, where no bar does [s].
+#: Where no bar is shown, a study that takes longer, and so much more, says once how long the rest takes [s].
 _LONG = 10.0
 
 
@@ -101,8 +100,10 @@ def carry_out(
         default = study.kind if scene is None else f"{Path(scene).stem}-{study.kind}"
         records = _opened(study, default, out, force)
         directory = records.path.parent
-        computed = _computed(study, records, console, workers, scheduler, quiet=quiet or as_json)
-        files = study.write(computed, directory, pictures=not no_plots)
+        with _going_on(records, len(study.cases())) as cut_short:
+            with watched(cut_short):
+                computed = _computed(study, records, console, workers, scheduler, quiet=quiet or as_json)
+            files = study.write(computed, directory, pictures=not no_plots)
         found = study.found(computed)
     if as_json:
         print_json({"directory": directory, "files": files, **found.document})
@@ -129,44 +130,22 @@ def _opened(study: Study, default: str, out: Path | None, force: bool) -> Record
     raise AssertionError("unreachable")
 
 
-def _computed(
-    study: Study, records: Records, console: Console, workers: int | None, scheduler: str | None, *, quiet: bool
-) -> dict[str, Record]:
-    """Return all records; where the study stops, end the command with the cause and how it goes on."""
+@contextmanager
+def _going_on(records: Records, total: int) -> Iterator[Callable[[str], str]]:
+    """Where the study stops, end the command with the cause and how it goes on; yield what says that of a cause."""
     from ..monolithic.hybrid_system import ReferenceFailure
     from ..run.outcome import RunStopped
-    from ..studies.study import dask_cluster, record_all
 
-    directory, total = records.path.parent, len(study.cases())
-    there = len(records.found)
-    if there == total:
-        return record_all(study, records)
-    console.print(Text(f"{study.cost()}{f', {there} of them are there' if there else ''}"))
+    directory = records.path.parent
 
     def cut_short(cause: str) -> str:
         if not records.found:
             return cause
-        done = f"{len(records.found)} of {total} records are in {directory}"
-        return f"{cause}; {done}; springbeam resume {directory} goes on"
-
-    state, left = TextColumn("{task.fields[failed]} failed"), TimeRemainingColumn()
-    bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), state, left, quiet=quiet)
-    began, failed, said = monotonic(), 0, False
-
-    def report(record: Record) -> None:
-        nonlocal failed, said
-        failed += study.failed(record)
-        bar.update(task, advance=1, failed=failed)
-        spent, done = monotonic() - began, len(records.found) - there
-        if bar.disable and not said and spent > _LONG and done:
-            said = True
-            console.print(f"some {ceil(spent / done * (total - there - done))} s more")
+        there = f"{len(records.found)} of {total} records are in {directory}"
+        return f"{cause}; {there}; springbeam resume {directory} goes on"
 
     try:
-        with records, dask_cluster(scheduler) if scheduler else nullcontext() as cluster, bar, watched(cut_short):
-            task = bar.add_task("", total=total, completed=there, failed=0)
-            processes = (workers or os.cpu_count() or 1) if study.parallel else 0
-            return record_all(study, records, processes, cluster, report)
+        yield cut_short
     except ConnectionError as error:
         fail(BAD_INPUT, str(error))
     except KeyboardInterrupt:
@@ -176,4 +155,36 @@ def _computed(
     except OSError as error:
         if not records.found:
             raise
-        fail(STOPPED, cut_short(f"{error.filename or records.path}: {error.strerror or error}"))
+        fail(STOPPED, cut_short(f"{error.filename or directory}: {error.strerror or error}"))
+
+
+def _computed(
+    study: Study, records: Records, console: Console, workers: int | None, scheduler: str | None, *, quiet: bool
+) -> dict[str, Record]:
+    """Return all records, and show meanwhile how far it is."""
+    from ..studies.study import dask_cluster, record_all
+
+    total, there = len(study.cases()), len(records.found)
+    if there == total:
+        return record_all(study, records)
+    console.print(Text(study.cost()))
+    if there:
+        console.print(f"{there} of {total} records are there")
+    state, left = TextColumn("{task.fields[failed]} failed"), TimeRemainingColumn()
+    bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), state, left, quiet=quiet)
+    task = bar.add_task("", total=total, completed=there, failed=0)
+    began, failed, said = monotonic(), 0, False
+
+    def report(record: Record) -> None:
+        nonlocal failed, said
+        failed += study.failed(record)
+        bar.update(task, advance=1, failed=failed)
+        spent, done = monotonic() - began, len(records.found) - there
+        rest = spent / max(done, 1) * (total - there - done)
+        if bar.disable and not said and min(spent, rest) > _LONG:
+            said = True
+            console.print(f"some {rest:.0f} s more")
+
+    processes = (workers or os.cpu_count() or 1) if study.parallel else 0
+    with records, dask_cluster(scheduler) if scheduler else nullcontext() as cluster, bar:
+        return record_all(study, records, processes, cluster, report)
