@@ -367,7 +367,7 @@ def test_without_fmus_the_error_says_what_builds_them(desk, arguments, monkeypat
 
 def test_a_sweep_without_its_packages_says_how_to_get_them(desk, monkeypatch):
     find = util.find_spec
-    monkeypatch.setattr("springbeam.cli.sweep.find_spec", lambda name: None if name == "pyarrow" else find(name))
+    monkeypatch.setattr("springbeam.cli.studies.find_spec", lambda name: None if name == "pyarrow" else find(name))
     result = command("sweep", "soft", "--vary", "spring.mass=1,2")
     assert result.exit_code == 2
     assert result.stderr == "error: sweep needs the package pyarrow: pip install pyarrow\n"

@@ -129,7 +129,7 @@ def test_results_of_another_springbeam_are_not_gone_on_with(tmp_path):
     with Records(plan(), tmp_path) as records:
         record_all(plan(), records)
     text = (tmp_path / FILE).read_text()
-    (tmp_path / FILE).write_text(text.replace('"springbeam": "', '"springbeam": "9.', 1))
+    (tmp_path / FILE).write_text(text.replace('"springbeam":"', '"springbeam":"9.', 1))
     result = command("resume", tmp_path)
     assert result.exit_code == 2
     assert "another springbeam or other FMUs" in result.stderr

@@ -19,15 +19,13 @@ import typer
 from . import (
     checks,
     compare,
-    converge,
     doctor,
+    predict,
     report,
     resume,
     run,
     scenes,
-    stability,
-    sweep,
-    tradeoff,
+    studies,
 )
 from .common import STOPPED, Command, Group
 
@@ -93,10 +91,10 @@ def _common(
 
 _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Scenes": (scenes.scenes, scenes.keys, scenes.new),
-    "Run": (run.run, resume.resume, sweep.sweep),
+    "Run": (run.run, resume.resume, studies.sweep),
     "Look": (report.report, report.animate, compare.compare),
-    "Choose scheme and accuracy": (stability.predict, tradeoff.tradeoff, converge.converge),
-    "Check": (checks.crosscheck, checks.verify, stability.stability, doctor.doctor),
+    "Choose scheme and accuracy": (predict.predict, studies.tradeoff, studies.converge),
+    "Check": (checks.crosscheck, checks.verify, studies.stability, doctor.doctor),
 }
 for title, commands in _COMMANDS.items():
     for command in commands:

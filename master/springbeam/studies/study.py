@@ -15,7 +15,6 @@
 from __future__ import annotations
 
 import errno
-import json
 import multiprocessing
 import os
 import signal
@@ -27,11 +26,11 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from importlib import import_module, metadata
 from itertools import islice
-from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import from_json, to_json
 
 from ..bodies.factory import fingerprints
 from ..results.directory import ResultsExist, ResultsUnreadable, RunDirectory, lock
@@ -163,7 +162,7 @@ class Records:
         self.found[name] = record
 
     def _write(self, line: dict[str, Any]) -> None:
-        left = json.dumps(line, allow_nan=False, ensure_ascii=False).encode() + b"\n"
+        left = to_json(line) + b"\n"
         while left:
             left = left[self._file.write(left) :]
 
@@ -174,7 +173,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Record], int]:
     if lines and not lines[-1].endswith(b"\n"):
         lines.pop()
     try:
-        settings, *entries = map(json.loads, lines or [b"{}"])
+        settings, *entries = map(from_json, lines or [b"{}"])
         return settings, {entry["case"]: entry["record"] for entry in entries}, sum(map(len, lines))
     except (ValueError, KeyError, TypeError) as error:
         raise ResultsUnreadable(f"{path}: not a file of records: {error}") from error
@@ -201,17 +200,6 @@ def study_in(directory: Path) -> Study | None:
             f"{directory}: was begun with another springbeam or other FMUs; the first command with --force begins anew"
         )
     return study
-
-
-def _plain(value: Any) -> Any:
-    """Return ``value`` as JSON has it: ``None`` in place of numbers that are not finite."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return float(value) if isfinite(value) else None
-    return value
 
 
 # -- computing ------------------------------------------------------------------------------------------------------
@@ -249,7 +237,7 @@ def record_all(
             if made is None:  # not kept: the next time it is tried again
                 lost[name] = record = study.lost("its worker process died: an FMU has crashed, or memory ran out")
             else:
-                record = _plain(made)
+                record = from_json(to_json(made, inf_nan_mode="null"))  # as it is read again
                 (known.__setitem__ if records is None else records.add)(name, record)
             report(record)
     return {name: known[name] if name in known else lost[name] for name in cases}

@@ -23,9 +23,9 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = ""
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
-    """Write rows with the keys of the first as header, ``None`` left empty; return the path."""
+    """Write rows with the keys of the first as header, ``None`` and NaN left empty; return the path."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(rows[0]) if rows else [])
         writer.writeheader()
-        writer.writerows(rows)
+        writer.writerows({name: None if value != value else value for name, value in row.items()} for row in rows)
     return path

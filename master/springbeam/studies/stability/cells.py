@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ...scene import Beam
+from ..schemes import RIGID, SOFT
 
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
 _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
@@ -45,15 +46,13 @@ class Parameter:
         return float(self.low * (self.high / self.low) ** x)
 
 
-_ENERGY = (("energy", 0), ("energy", 1), ("energy", 2))
-_RIGID = (*_ENERGY, ("hermite", 1), ("hermite", 2), ("auto", 0))
-_SOFT = (*_ENERGY, ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1), ("auto", 0))
+_AUTO = ("auto", 0)
 #: law, scheme, degree: all that a scene may ask for; Algorithm 1 has no scheme.
 COUPLINGS = (
-    *(("transmission", *scheme) for scheme in _RIGID),
-    *(("compliance", *scheme) for scheme in _SOFT),
-    *(("tie", *scheme) for scheme in _RIGID),
-    *(("link", *scheme) for scheme in _SOFT),
+    *(("transmission", *scheme) for scheme in (*RIGID, _AUTO)),
+    *(("compliance", *scheme) for scheme in (*SOFT, _AUTO)),
+    *(("tie", *scheme) for scheme in (*RIGID, _AUTO)),
+    *(("link", *scheme) for scheme in (*SOFT, _AUTO)),
     ("paper", "energy", 0),
 )
 

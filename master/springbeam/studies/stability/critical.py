@@ -21,10 +21,11 @@ from ...coupling import coupling_of
 from ...coupling.protocol import Window
 from ...monolithic.semi_discrete import modal_beam
 from ...scene import Scene, load_scene, with_changes
+from ..schemes import RIGID, SOFT
 from ..study import Found, Record, Study
 from ..tables import table, write_csv
 from .linear import LinearPair, spectral_radius
-from .predict import RIGID, SOFT, THRESHOLD, critical_step, linear_pair
+from .predict import THRESHOLD, critical_step, linear_pair
 
 #: Growth of the energy at which the rate is told, and how many macro steps it may take to get there.
 _GROWN, _MOST_STEPS = 1e10, 8000

@@ -19,6 +19,7 @@ from ...scene.estimates import Estimates, estimates
 from ...scene.linearised import contact_depth, spring_frequency, spring_stiffness
 from ...scene.resolution import STABLE
 from ...scene.statics import shear_stiffness
+from ..schemes import RIGID, SOFT
 from .linear import LinearBody, LinearPair, spectral_radius
 
 #: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.
@@ -31,11 +32,6 @@ _UNMOVED = 1e-12
 RESOLVED = 1.0
 #: The search for a critical macro step begins here, in units of 1/(highest frequency), and goes up by these factors.
 _SEARCH = {"hermite": (STABLE / 1.2, 1.03), "jacobi": (1e-3, 2.0), "gauss_seidel": (1e-3, 2.0)}
-
-_ENERGY = (("energy", 0), ("energy", 1), ("energy", 2))
-#: (scheme, degree) that ends can be coupled by, rigidly and softly.
-RIGID = (*_ENERGY, ("hermite", 1), ("hermite", 2))
-SOFT = (*_ENERGY, ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1))
 
 
 @dataclass(frozen=True)

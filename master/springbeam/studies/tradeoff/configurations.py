@@ -9,6 +9,7 @@ from typing import Any
 from ...scene import Scene, SceneError, with_changes
 from ...scene.resolution import slowest_frequency
 from ...scene.tables import ALL_MODES_UP_TO
+from ..schemes import RIGID, SOFT
 
 #: Macro steps are the scene's times powers of 2 between these, where a run has this many of them.
 _COARSEST, _FINEST = 6, -2
@@ -49,7 +50,7 @@ class Configuration:
 
 def configurations(scene: Scene) -> list[Configuration]:
     """Return the configurations for a scene, without those that the scene cannot have."""
-    return [*_macro_steps(scene), *_ida(scene), *_automatic(scene), *_adaptive(scene), *_models(scene), *_rivals(scene)]
+    return [*_macro_steps(scene), *_adaptive(scene), *_models(scene), *_rivals(scene)]
 
 
 def _changed(scene: Scene, **tables: Any) -> Iterator[Scene]:
@@ -59,13 +60,6 @@ def _changed(scene: Scene, **tables: Any) -> Iterator[Scene]:
         return
 
 
-def _schemes(scene: Scene) -> list[tuple[str, int]]:
-    energy = [("energy", 0), ("energy", 1), ("energy", 2)]
-    if scene.contact.rigid:
-        return [*energy, ("hermite", 1), ("hermite", 2)]
-    return [*energy, ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
-
-
 def _sizes(scene: Scene) -> list[float]:
     span = scene.time.t_end - (scene.contact_time or 0.0)
     sizes = [scene.coupling.H * 2.0**k for k in range(_COARSEST, _FINEST - 1, -1)]
@@ -73,32 +67,27 @@ def _sizes(scene: Scene) -> list[float]:
 
 
 def _macro_steps(scene: Scene) -> Iterator[Configuration]:
-    for scheme, degree in _schemes(scene):
+    """Yield all schemes, the best ones with a looser tolerance of IDA, and `auto`."""
+    families: list[tuple[str, str, int, dict[str, Any]]] = [
+        (f"{scheme} {degree}", scheme, degree, {}) for scheme, degree in (RIGID if scene.contact.rigid else SOFT)
+    ]
+    if scene.spring is not None:
+        looser = {"relative_tolerance": _IDA_TOLERANCE, "absolute_tolerance": 1e-2 * _IDA_TOLERANCE}
+        families += [
+            (f"{scheme} {degree}, IDA {_IDA_TOLERANCE:.0e}", scheme, degree, {"spring": looser})
+            for scheme, degree in _best_schemes(scene)
+        ]
+    for family, scheme, degree, more in [*families, ("auto", "auto", 0, {})]:
         for H in _sizes(scene):
             coupling = {"scheme": scheme, "degree": degree, "macro_step": H}
-            for changed in _changed(scene, coupling=coupling):
-                yield Configuration(f"{scheme} {degree}", f"H = {H:.3g}", changed)
+            if more:
+                coupling["tolerance"] = 1e-2 * _IDA_TOLERANCE
+            for changed in _changed(scene, coupling=coupling, **more):
+                yield Configuration(family, f"H = {H:.3g}", changed)
 
 
 def _best_schemes(scene: Scene) -> list[tuple[str, int]]:
     return [("energy", 2), ("hermite", 2)] if scene.contact.rigid else [("energy", 2)]
-
-
-def _ida(scene: Scene) -> Iterator[Configuration]:
-    if scene.spring is None:
-        return
-    for scheme, degree in _best_schemes(scene):
-        for H in _sizes(scene):
-            coupling = {"scheme": scheme, "degree": degree, "macro_step": H, "tolerance": 1e-2 * _IDA_TOLERANCE}
-            spring = {"relative_tolerance": _IDA_TOLERANCE, "absolute_tolerance": 1e-2 * _IDA_TOLERANCE}
-            for changed in _changed(scene, coupling=coupling, spring=spring):
-                yield Configuration(f"{scheme} {degree}, IDA {_IDA_TOLERANCE:.0e}", f"H = {H:.3g}", changed)
-
-
-def _automatic(scene: Scene) -> Iterator[Configuration]:
-    for H in _sizes(scene):
-        for changed in _changed(scene, coupling={"scheme": "auto", "degree": 0, "macro_step": H}):
-            yield Configuration("auto", f"H = {H:.3g}", changed)
 
 
 def _adaptive(scene: Scene) -> Iterator[Configuration]:

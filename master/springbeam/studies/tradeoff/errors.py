@@ -39,12 +39,8 @@ class Errors:
 
     @classmethod
     def of(cls, known: Mapping[str, float | None]) -> Errors:
-        """Return the errors whose `known` values are these."""
+        """Return the errors of a record, which has ``None`` in place of NaN."""
         return cls(**{name: math.nan if value is None else value for name, value in known.items()})
-
-    def known(self) -> dict[str, float | None]:
-        """Return the errors, ``None`` in place of NaN."""
-        return {name: value if math.isfinite(value) else None for name, value in vars(self).items()}
 
 
 def errors(run: Trajectory, reference: Trajectory, macro_step: float) -> Errors:

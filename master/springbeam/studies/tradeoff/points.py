@@ -65,7 +65,7 @@ class Point:
     def row(self) -> dict[str, Any]:
         """Return the row of the CSV file."""
         against = "finer mesh" if self.refined else "same model"
-        errors = dict.fromkeys(Errors.__dataclass_fields__) if self.errors is None else self.errors.known()
+        errors = dict.fromkeys(Errors.__dataclass_fields__) if self.errors is None else vars(self.errors)
         costs = {name: getattr(self, name) for name in _COSTS}
         return {"family": self.family, "setting": self.setting, "against": against, **errors, **costs}
 

@@ -1,13 +1,12 @@
-"""``springbeam predict`` and ``springbeam stability``."""
+"""``springbeam predict``."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict
 from math import inf
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
 from rich.text import Text
 
 from ..scene import load_scene
@@ -19,11 +18,9 @@ from .common import (
     console_for,
     print_json,
 )
-from .study import QuickOption, study_command
 
 if TYPE_CHECKING:
     from ..studies.stability.predict import Prediction, SchemePrediction
-    from ..studies.study import Study
 
 #: A mesh that is so much too stiff is said to lock.
 _LOCKS = 1.05
@@ -108,28 +105,3 @@ def _scheme(s: SchemePrediction, threshold: float) -> tuple[str, ...]:
         "none" if s.critical_step is None else f"{s.critical_step:.3g}",
         "unstable" if excess > threshold else "",
     )
-
-
-@study_command("workers")
-def stability(
-    critical: Annotated[
-        bool,
-        typer.Option("--critical", help="Compare predicted and measured critical macro steps of all schemes instead."),
-    ] = False,
-    samples: Annotated[
-        int, typer.Option("--samples", metavar="N", min=0, help="Cells of the hypercube over all parameters.")
-    ] = 300,
-    resolution: Annotated[
-        int, typer.Option("--resolution", metavar="N", min=0, help="Values of each parameter of a slice; 0: no slices.")
-    ] = 6,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the hypercube.")] = 1,
-    quick: QuickOption = False,
-) -> Study:
-    """Run extreme scenes and classify each result. Exit code 1 if a wrong result came without a warning.
-
-    Example: springbeam stability --samples 100 --resolution 0
-    """
-    from ..studies.stability.critical import Critical
-    from ..studies.stability.grid import Grid
-
-    return Critical(quick=quick) if critical else Grid(samples=samples, resolution=resolution, seed=seed, quick=quick)

@@ -1,0 +1,147 @@
+"""The commands that carry out a study: ``springbeam sweep``, ``tradeoff``, ``converge``, ``stability``.
+
+Each returns its study; `study_command` gives it the options that all have and carries it out.
+"""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from ..scene import load_scene
+from .common import BAD_INPUT, SceneArgument, SettingsOption, complete_key, fail
+from .study import QuickOption, study_command
+
+if TYPE_CHECKING:
+    from ..studies.study import Study
+
+
+@study_command("workers", "scheduler")
+def sweep(
+    scene: SceneArgument,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="TABLE.KEY=VALUES",
+            help="A list 1,2,5, a grid LOW:HIGH:COUNT, or LOW:HIGH for --samples; with :log even in the logarithm.",
+            autocompletion=complete_key,
+        ),
+    ] = None,
+    settings: SettingsOption = None,
+    samples: Annotated[
+        int, typer.Option("--samples", metavar="N", min=0, help="Number of samples of the ranges, instead of a grid.")
+    ] = 0,
+    sampling: Annotated[
+        Literal["latin_hypercube", "random"], typer.Option("--sampling", help="How --samples are placed.")
+    ] = "latin_hypercube",
+    seed: Annotated[
+        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the samples; one seed gives the same runs again.")
+    ] = 0,
+    metric: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--metric", metavar="NAME", help="Keep only this number of each run; may be repeated. Default: all."
+        ),
+    ] = None,
+    stroboscopic: Annotated[
+        bool,
+        typer.Option(
+            "--stroboscopic",
+            help="Keep the positions once a period of the harmonic load in the last third of each run, and draw them.",
+        ),
+    ] = False,
+) -> Study:
+    """Run a scene over many values of its keys, on all cores or a Dask cluster; one row per run.
+
+    Example: springbeam sweep soft --vary spring.linear_stiffness=1:200:64:log
+    """
+    if find_spec("pyarrow") is None:
+        fail(BAD_INPUT, "sweep needs the package pyarrow: pip install pyarrow")
+    from ..studies.sweep import Sweep
+
+    return Sweep(
+        scene=load_scene(scene, settings or ()),
+        vary=tuple(vary or ()),
+        samples=samples,
+        sampling=sampling,
+        seed=seed,
+        metric=tuple(metric or ()),
+        stroboscopic=stroboscopic,
+    )
+
+
+@study_command()
+def tradeoff(
+    scene: SceneArgument,
+    settings: SettingsOption = None,
+    until: Annotated[
+        float | None,
+        typer.Option("--until", metavar="SECONDS", help="End of the comparison. Default: while comparable."),
+    ] = None,
+    repeats: Annotated[
+        int,
+        typer.Option("--repeats", metavar="N", min=1, help="Timings per configuration; the median is used."),
+    ] = 3,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick", help="Every third configuration of a kind, timed once; the slow ones are left out sooner."
+        ),
+    ] = False,
+) -> Study:
+    """Measure error against cost over schemes, macro steps, modes, meshes and tolerances, beside scipy's solvers.
+
+    Example: springbeam tradeoff soft --until 0.0712
+    """
+    from ..studies.tradeoff import Tradeoff
+
+    return Tradeoff.of(load_scene(scene, settings or ()), until, repeats=repeats, quick=quick)
+
+
+@study_command()
+def converge(
+    scene: SceneArgument,
+    settings: SettingsOption = None,
+    levels: Annotated[
+        int, typer.Option("--levels", metavar="N", min=3, max=8, help="Meshes, each with twice the elements.")
+    ] = 4,
+    metric: Annotated[
+        list[str] | None, typer.Option("--metric", metavar="NAME", help="Quantity to compare; may be repeated.")
+    ] = None,
+    quick: QuickOption = False,
+) -> Study:
+    """Show how the results settle with finer meshes and more modes: observed orders, extrapolated values, cost.
+
+    Example: springbeam converge steel-bumper --metric contact_force_max
+    """
+    from ..studies.converge import Converge
+
+    return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()), quick=quick)
+
+
+@study_command("workers")
+def stability(
+    critical: Annotated[
+        bool,
+        typer.Option("--critical", help="Compare predicted and measured critical macro steps of all schemes instead."),
+    ] = False,
+    samples: Annotated[
+        int, typer.Option("--samples", metavar="N", min=0, help="Cells of the hypercube over all parameters.")
+    ] = 300,
+    resolution: Annotated[
+        int, typer.Option("--resolution", metavar="N", min=0, help="Values of each parameter of a slice; 0: no slices.")
+    ] = 6,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the hypercube.")] = 1,
+    quick: QuickOption = False,
+) -> Study:
+    """Run extreme scenes and classify each result. Exit code 1 if a wrong result came without a warning.
+
+    Example: springbeam stability --samples 100 --resolution 0
+    """
+    from ..studies.stability.critical import Critical
+    from ..studies.stability.grid import Grid
+
+    return Critical(quick=quick) if critical else Grid(samples=samples, resolution=resolution, seed=seed, quick=quick)
