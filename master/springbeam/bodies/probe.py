@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from ..scene.partners import ForeignFmu
 from .abilities import Abilities
 from .foreign import Findings, ForeignBody, moments
-from .protocol import NO_FORCE, FmuError, Force
+from .protocol import NO_FORCE, FmuError, Force, StepRefused
 
 #: Sizes tried, over H; steps of a record.
 _SIZES, _RECORD = (1.0, 0.1, 1e-2, 1e-3, 1e-4), 64
@@ -103,7 +103,10 @@ class Bench:
             body.apply_impulse(impulse)
         self.stage("a step")
         for i, given in enumerate(forces):
-            body.advance(self._start + i * size, size, given)
+            try:
+                body.advance(self._start + i * size, size, given)
+            except StepRefused as refused:
+                raise FmuError(f"{self.spec.fmu}: {refused}") from None
             samples.append(self._sample(body))
         return samples
 
@@ -124,7 +127,7 @@ class Bench:
 
 
 def examine(bench: Bench) -> Findings:
-    """Examine an FMU here and now. Raises FmuError, or StepRefused where a step fails."""
+    """Examine an FMU here and now. Raises FmuError."""
     spec, H = bench.spec, bench.sizes[0]
     _check_state(bench)
     mass = _mass(bench)
