@@ -32,21 +32,24 @@ enum Unknown { q, p, A, B, e, unknowns };
 // spring pushes as hard as 1e12 linear springs would pull.
 constexpr double runaway = 1e6;
 
+std::vector<Crossing> crossings(const Laws& laws) {
+  std::vector<Crossing> all;
+  if (std::isfinite(laws.hilltop)) all = {Crossing::falling};
+  if (laws.stop) all.insert(all.end(), {Crossing::falling, Crossing::rising});
+  return all;
+}
+
 }  // namespace
 
 Flight::Flight(const Motion& motion, const Laws& laws)
-    : motion_(motion),
-      laws_(laws),
-      hilltop_(add_events(crossings_, std::isfinite(laws.hilltop), {Crossing::falling})),
-      stop_(add_events(crossings_, laws.stop, {Crossing::falling, Crossing::rising})),
-      contact_(add_events(crossings_, laws.compliance, {Crossing::falling, Crossing::rising})),
-      solver_(unknowns, crossings_) {}
+    : Segment(motion, laws, unknowns, crossings(laws)),
+      hilltop_(std::isfinite(laws.hilltop) ? own_ : -1),
+      stop_(laws.stop ? std::max(hilltop_ + 1, own_) : -1) {}
 
-void Flight::prepare(const FlightStart& start) {
-  start_ = start;
+void Flight::prepare() {
+  const Start& start = start_;
   const double H = start.size, z = start.z;
   const Compliance& contact = motion_.compliance();
-  loads_ = start.loads.scaled(H);
 
   Expansion motion(start.y, z, start.depth, loads_, H);
   const auto extend_to = [&](std::size_t highest) {
@@ -61,12 +64,7 @@ void Flight::prepare(const FlightStart& start) {
   }
   if (start.released) motion.y[2] = 0.0;
   const Series &y = motion.y, &depth = motion.depth;
-  if (laws_.compliance) {
-    contact_sign_ = touching_ ? 1.0 : -1.0;
-    Series distance = depth;
-    for (double& coefficient : distance) coefficient *= contact_sign_;
-    contact_watch_ = Watch(distance);
-  }
+  meet(touching_, depth);
   if (laws_.stop) {
     Series gap = y;
     gap[0] = start.gap;
@@ -96,7 +94,6 @@ void Flight::prepare(const FlightStart& start) {
   };
   const double tolerance_z = tolerance_of(velocity, std::max(noise, smallest));
   const double tolerance_y = tolerance_of(displacement, std::max(noise * span, smallest));
-  relative_ = std::max(share * laws_.relative_tolerance, 50.0 * epsilon);
   double* tolerance = solver_.absolute_tolerance();
   tolerance[q] = tolerance[A] = tolerance[B] = tolerance_y;
   tolerance[p] = H * tolerance_z;
@@ -137,7 +134,6 @@ void Flight::prepare(const FlightStart& start) {
     };
     while (halvings < most_halvings && growth(std::ldexp(1.0, -halvings)) > tolerance_z) ++halvings;
   }
-  h0_ = std::ldexp(1.0, -halvings);
 
   R_ = Taylor(y, order);
   remainder_ = motion_.remainder(R_, loads_, H);
@@ -154,11 +150,13 @@ void Flight::prepare(const FlightStart& start) {
   Y[p] = Yp[q] = y[1] - R_.rate(0.0);
   Yp[p] = order == 0 ? 2.0 * y[2] : 0.0;
   if (order == 0) Yp[e] = H * (motion_.damping() * z * z + lost);
+  const double relative = std::max(share * laws_.relative_tolerance, 50.0 * epsilon);
+  solver_.start(*this, relative, std::ldexp(1.0, -halvings), start.most_steps);
 }
 
-Flight::Event Flight::run(const FlightStart& start) {
-  prepare(start);
-  solver_.start(*this, relative_, h0_, start.most_steps);
+Flight::Event Flight::run(const Start& start) {
+  begin(start);
+  prepare();
   Event event = Event::none;
   while (event == Event::none && solver_.advance() == IdaSolver::Outcome::event) {
     if (hilltop_ >= 0 && solver_.occurred(hilltop_)) {
@@ -171,37 +169,32 @@ Flight::Event Flight::run(const FlightStart& start) {
       event = Event::contact;
   }
   finish();
-  if (event == Event::none && laws_.to(height_, y_) < 0.0 && escapes()) event = Event::hilltop;
-  if (event == Event::none && laws_.stop && start.gap + (y_ - start.y) < -solver_.absolute_tolerance()[q])
+  if (event == Event::none && laws_.to(height_, reached_.y) < 0.0 && escapes()) event = Event::hilltop;
+  if (event == Event::none && laws_.stop && start.gap + (reached_.y - start.y) < -solver_.absolute_tolerance()[q])
     throw IdaError("the top passed the stop unnoticed");
   return event;
 }
 
 /// Past the hilltop the spring pushes outwards: a top that moves outwards comes back only if something else pulls.
 bool Flight::escapes() const {
-  const double outwards = y_ < 0.0 ? -1.0 : 1.0;
+  const auto& [y, z, integral, integral_2, dissipated, impulse] = reached_;
+  const double outwards = y < 0.0 ? -1.0 : 1.0;
   const double force = value(loads_.force, solver_.s());
-  return held_ || (outwards * z_ > 0.0 && motion_.push_outwards(y_, outwards, force) >= 0.0);
+  return held_ || (outwards * z > 0.0 && motion_.push_outwards(y, outwards, force) >= 0.0);
 }
-
-double Flight::elapsed() const { return solver_.s() * start_.size; }
 
 void Flight::finish() {
   const double H = start_.size, s = solver_.s();
   const double* Y = solver_.value();
-  y_ = start_.y + (R_.rise(s) + Y[q]);
-  z_ = (R_.order() > 0 ? start_.z : 0.0) + (R_.rate_rise(s) + Y[p]) / H;
-  integral_ = H * (R_.integral(s) + Y[A]);
-  integral_2_ = H * H * (R_.integral_2(s) + Y[B]);
-  dissipated_ = Y[e];
-  if (motion_.damping() > 0.0) dissipated_ += motion_.damping() / H * R_.squared_rate_integral(s);
+  auto& [y, z, integral, integral_2, dissipated, impulse] = reached_;
+  y = start_.y + (R_.rise(s) + Y[q]);
+  z = (R_.order() > 0 ? start_.z : 0.0) + (R_.rate_rise(s) + Y[p]) / H;
+  integral = H * (R_.integral(s) + Y[A]);
+  integral_2 = H * H * (R_.integral_2(s) + Y[B]);
+  dissipated = Y[e];
+  if (motion_.damping() > 0.0) dissipated += motion_.damping() / H * R_.squared_rate_integral(s);
   for (int k = 0; k <= contact_order_; ++k)
-    dissipated_ += H * dissipation_taylor_[static_cast<std::size_t>(k)] * std::pow(s, k + 1) / (k + 1);
-}
-
-double Flight::contact_depth(double rise, double s) const {
-  const auto& u = loads_.tip;
-  return start_.depth + rise - s * (u[1] + s * u[2] / 2);
+    dissipated += H * dissipation_taylor_[static_cast<std::size_t>(k)] * std::pow(s, k + 1) / (k + 1);
 }
 
 bool Flight::residual(double s, const double* Y, const double* Yp, double* F) const noexcept {
@@ -243,10 +236,7 @@ void Flight::events(double s, const double* Y, double* g) const noexcept {
     g[stop_] = stop_watch_.distance(start_.gap + rise, s);
     g[stop_ + 1] = stop_watch_.rate(slope, s);
   }
-  if (contact_ >= 0) {
-    g[contact_] = contact_watch_.distance(contact_sign_ * contact_depth(rise, s), s);
-    g[contact_ + 1] = contact_watch_.rate(contact_sign_ * contact_rate(slope, s), s);
-  }
+  contact_events(rise, slope, s, g);
 }
 
 }  // namespace spring

@@ -82,12 +82,6 @@ int events(sunrealtype s, N_Vector Y, N_Vector, sunrealtype* g, void* user_data)
 
 }  // namespace
 
-int add_events(std::vector<Crossing>& list, bool wanted, std::initializer_list<Crossing> added) {
-  if (!wanted) return -1;
-  list.insert(list.end(), added);
-  return static_cast<int>(list.size() - added.size());
-}
-
 struct IdaSolver::Impl {
   // Order matters: the context outlives everything made in it.
   Owned<SUNContext, ContextDeleter> context;

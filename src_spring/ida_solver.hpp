@@ -2,7 +2,6 @@
 // Memory is allocated once; every start() re-initialises IDA completely, so the result depends on the arguments alone.
 #pragma once
 
-#include <initializer_list>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -35,9 +34,6 @@ class TooMuchWork : public IdaError {
 
 /// Which sign changes of an event function count.
 enum class Crossing { falling = -1, rising = 1 };
-
-/// Append `added` to the list of event functions if they are `wanted`. @return the number of the first, −1 if not
-int add_events(std::vector<Crossing>& list, bool wanted, std::initializer_list<Crossing> added);
 
 class IdaSolver {
  public:

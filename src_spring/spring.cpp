@@ -32,7 +32,6 @@ class Spring::Step {
 
   State run() {
     state_.integral = state_.integral_2 = state_.stop_force = state_.stop_impulse = 0.0;
-    double held = 0.0;   // ∫N while seated
     double last = -1.0;  // event's time
     for (long stalled = 0; remaining() > 0.0; ++segments_) {
       stalled = t_ > last ? 0 : stalled + 1;
@@ -45,11 +44,11 @@ class Spring::Step {
       depth_ = !laws_.compliance ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
       if (laws_.stop) land();
       if (seat_ && state_.seated != 0.0)
-        held += sit(*seat_);
+        advance(*seat_);
       else
-        fly();
+        advance(flight_);
     }
-    state_.stop_force = held / size_;
+    state_.stop_force = held_ / size_;
     return state_;
   }
 
@@ -89,61 +88,49 @@ class Spring::Step {
     state_.seated = state_.z == 0.0 && pressed && !released_ ? 1.0 : 0.0;
   }
 
-  void fly() {
+  /// One segment, and what it did.
+  void advance(Segment& segment) {
     const double gap = laws_.stop ? state_.y - laws_.stop_position : 1.0;
-    const FlightStart start{state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_};
-    const auto event = attempt(flight_, start);
-    released_ = false;
-    state_.integral_2 += state_.integral * flight_.elapsed() + flight_.integral_2();
-    state_.integral += flight_.integral();
-    state_.dissipated += flight_.dissipated();
-    state_.y = flight_.displacement();
-    state_.z = flight_.velocity();
-    t_ += flight_.elapsed();
-    if (event == Flight::Event::hilltop)
+    const Start start{state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_};
+    const auto event = attempt(segment, start);
+    const auto& [y, z, integral, integral_2, dissipated, impulse] = segment.reached();
+    state_.integral_2 += state_.integral * segment.elapsed() + integral_2;
+    state_.integral += integral;
+    state_.dissipated += dissipated;
+    state_.y = y;
+    state_.z = z;
+    held_ += impulse;
+    t_ += segment.elapsed();
+    if (event == Segment::Event::hilltop)
       throw Escape("spring: y = " + number(state_.y) +
                        " m has run away, past the hilltop |y| = " + number(laws_.hilltop) +
                        " m of the softening spring, reached " + number(t_) + " s after the step's start",
                    t_);
     // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
     if (laws_.stop)
-      state_.y = event == Flight::Event::stop ? laws_.stop_position : std::max(state_.y, laws_.stop_position);
-    meeting_ = event == Flight::Event::contact;
-    if (event == Flight::Event::none) t_ = size_;
-  }
-
-  /// @return ∫N
-  double sit(Seated& seat) {
-    const auto event = attempt(seat, SeatedStart{now_, remaining(), depth_, most_work - work_});
-    const double t = seat.elapsed();
-    state_.integral_2 += state_.integral * t + state_.y * t * t / 2;
-    state_.integral += state_.y * t;
-    state_.dissipated += seat.dissipated();
-    t_ += t;
-    released_ = event == Seated::Event::release;
+      state_.y = event == Segment::Event::stop ? laws_.stop_position : std::max(state_.y, laws_.stop_position);
+    released_ = event == Segment::Event::release;
     if (released_) state_.seated = 0.0;
-    meeting_ = event == Seated::Event::contact;
-    if (event == Seated::Event::none) t_ = size_;
-    return seat.impulse();
+    meeting_ = event == Segment::Event::contact;
+    if (event == Segment::Event::none) t_ = size_;
   }
 
-  template <class Phase, class Start>
-  typename Phase::Event attempt(Phase& phase, const Start& start) {
+  Segment::Event attempt(Segment& segment, const Start& start) {
     try {
-      const auto event = phase.run(start);
-      const long steps = phase.solver().steps();
+      const auto event = segment.run(start);
+      const long steps = segment.solver().steps();
       state_.steps += static_cast<double>(steps);
       work_ += steps + work_of_start;
       return event;
     } catch (const TooMuchWork&) {
-      const double reached = t_ + phase.solver().s() * start.size;
+      const double reached = t_ + segment.solver().s() * start.size;
       throw StepFailure("spring: a step of " + number(size_) + " s spans too much of the motion: " +
                             std::to_string(most_work - work_of_start * segments_) + " internal steps with " +
                             std::to_string(segments_) + " contact events reach " + number(reached) +
                             " s after its start; use a smaller step size",
                         reached);
     } catch (const IdaError& error) {
-      const double reached = t_ + phase.solver().s() * start.size;
+      const double reached = t_ + segment.solver().s() * start.size;
       throw StepFailure(std::string("spring: ") + error.what() + ", " + number(reached) + " s after the step's start",
                         reached);
     }
@@ -162,6 +149,7 @@ class Spring::Step {
   Loads now_;                     ///< loads_ from t_ on
   double depth_ = -1.0;           ///< y − u_tip at t_
   bool meeting_ = false;          ///< tip and top are at a contact event: y = u_tip
+  double held_ = 0.0;             ///< ∫N while seated
   bool released_ = false;         ///< has just left the foundation, N = 0
 };
 

@@ -192,7 +192,7 @@ TEST(Flight, JacobianMatchesDifferences) {
     loads.tip = {0.05, speed, -1.0};
     // Touching, δ = 0.1; unresolved steps have another reference polynomial.
     for (const double size : {H, 40 * H}) {
-      const FlightStart start{y, z, loads, size, y + 0.2, y - 0.05, false, 100000};
+      const Start start{y, z, loads, size, y + 0.2, y - 0.05, false, 100000};
       flight.run(start);
       const double d = 1e-5;
       expect_jacobian<5>(flight, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2, 0.3}, {d, d * size, d, d, d}, 1e-7);
@@ -209,7 +209,7 @@ TEST(Seated, JacobianMatchesDifferences) {
     const Motion motion(p);
     Seated seated(motion, laws_of(p));
     loads.tip = {-0.3, speed, -1.0};
-    EXPECT_EQ(seated.run({loads, 0.02, 0.1, 100000}), Seated::Event::none);
+    EXPECT_EQ(seated.run({-0.2, 0.0, loads, 0.02, 0.0, 0.1, false, 100000}), Seated::Event::none);
     const double d = 1e-5;
     expect_jacobian<5>(seated, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2, 0.3}, {d, d, d, d, d}, 1e-7);
   }
