@@ -17,10 +17,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from math import isfinite
-from operator import mul
 
 import numpy as np
 
+from ..bodies.force import sign_changes
 from ..contact.laws import SoftLaw
 from .small import Matrix, Vector, transposed
 
@@ -93,7 +93,7 @@ class Projection:
                 m0 += m
                 m1 += s * m
                 m2 += s * s * m
-        a = _legendre(m0, m1, m2)
+        a = [0.5 * m0, 1.5 * m1, 3.75 * m2 - 1.25 * m0]
         if share != 0.0:
             a = [a[0] + share * (b1 + b3), a[1] + share * 2.0 * b2, a[2] + share * 2.0 * b3]
         if not isfinite(sum(a)):
@@ -110,21 +110,20 @@ class Projection:
         if rule is self._few and not self._damped:
             in_middle = law.slope(path[0] + path[1] / 3.0 if self.degree == 0 else path[0])
             return [[in_middle * value for value in row] for row in self._by_x_projected]
-        places = [_at(path, s, size) for s, _ in rule]
-        slopes = [law.slope(p) for p, _ in places]
-        rows = []
-        if self._damped:
-            resistances = [law.resistance(p, rate) for p, rate in places]
-            slopes = [slope + by_p for slope, (_, by_p, _) in zip(slopes, resistances, strict=True)]
-            by_rate = _moments(rule, [by_rate for _, _, by_rate in resistances])
-        by_p = _moments(rule, slopes)
-        for change in self._by_x:
-            moments = [_product(change, by_p[k:]) for k in range(3)]
+        rows = [[0.0] * len(x) for _ in x]
+        for s, weight in rule:
+            p, rate = _at(path, s, size)
+            by_p, by_rate = law.slope(p), 0.0
             if self._damped:
-                rate = [2.0 / size * i * b for i, b in enumerate(change)][1:]
-                moments = [m + _product(rate, by_rate[k:]) for k, m in enumerate(moments)]
-            rows.append(_legendre(*moments)[: self.degree + 1])
-        return transposed(rows)
+                _, of_resistance, by_rate = law.resistance(p, rate)
+                by_p += of_resistance
+            legendre = (0.5, 1.5 * s, 3.75 * s * s - 1.25)  # (2k + 1)/2 P_k(s)
+            for j, change in enumerate(self._by_x):
+                of_p, of_rate = _at(change, s, size)
+                moved = weight * (by_p * of_p + by_rate * of_rate)
+                for row, factor in zip(rows, legendre, strict=False):
+                    row[j] += factor * moved
+        return rows
 
     def dissipated(self, start: float, size: float, x: Vector) -> float:
         """Return ∫ D ṗ dτ ≥ 0 [J] over a step of ``size`` [s]."""
@@ -191,35 +190,6 @@ def penetration_series(start: float, x: Vector) -> Vector:
     return [x[1], 3.0 * x[2], mean - x[1], half_change - 3.0 * x[2]]
 
 
-def _legendre(m0: float, m1: float, m2: float) -> Vector:
-    """Return the first three Legendre coefficients of what has the moments ∫ sᵏ … ds."""
-    return [0.5 * m0, 1.5 * m1, 3.75 * m2 - 1.25 * m0]
-
-
-def _moments(rule: _Rule, values: Vector) -> Vector:
-    """Return the moments ∫ sᵏ … ds, k = 0 … 5, of what has ``values`` at the points of ``rule``."""
-    m0 = m1 = m2 = m3 = m4 = m5 = 0.0
-    for (s, weight), value in zip(rule, values, strict=True):
-        m = weight * value
-        m0 += m
-        m *= s
-        m1 += m
-        m *= s
-        m2 += m
-        m *= s
-        m3 += m
-        m *= s
-        m4 += m
-        m5 += s * m
-    return [m0, m1, m2, m3, m4, m5]
-
-
-def _product(path: Sequence[float], moments: Vector) -> float:
-    """Return ∫ of ``path`` times what has the ``moments``."""
-    total: float = sum(map(mul, path, moments))
-    return total
-
-
 def _path(start: float, x: Vector) -> _Path:
     c = penetration_series(start, x)
     if len(c) == 2:
@@ -238,7 +208,10 @@ def _at(path: _Path, s: float, size: float = 2.0) -> tuple[float, float]:
 def _zeros_inside(path: _Path) -> list[float]:
     """Return the zeros in (−1, 1) of ``path`` where its sign changes, ascending."""
     found = []
-    for low, high in pairwise([-1.0, *_turns_inside(path), 1.0]):
+    _, b1, b2, b3 = path
+    rate = (b1 - 2.0 * b2 + 3.0 * b3, 2.0 * b2 - 6.0 * b3, 6.0 * b3)  # dp̃/ds and its derivatives at s = −1
+    turns = [tau - 1.0 for tau in sign_changes(rate, 2.0)]
+    for low, high in pairwise([-1.0, *turns, 1.0]):
         at_low = _at(path, low)[0]
         if at_low * _at(path, high)[0] >= 0.0:
             continue
@@ -253,17 +226,3 @@ def _zeros_inside(path: _Path) -> list[float]:
             change -= s
         found.append(s)
     return found
-
-
-def _turns_inside(path: _Path) -> list[float]:
-    """Return where in (−1, 1) ``path`` turns: zeros of b₁ + 2 b₂ s + 3 b₃ s²."""
-    _, constant, b2, b3 = path
-    quadratic, linear = 3.0 * b3, 2.0 * b2
-    discriminant = linear * linear - 4.0 * quadratic * constant
-    if discriminant < 0.0:
-        return []
-    q = -0.5 * (linear + (discriminant**0.5 if linear >= 0.0 else -(discriminant**0.5)))
-    zeros = [
-        numerator / denominator for numerator, denominator in ((q, quadratic), (constant, q)) if denominator != 0.0
-    ]
-    return sorted(s for s in zeros if -1.0 < s < 1.0)
