@@ -155,7 +155,7 @@ SET_ANEW = {
     *(f"{body}.{name}" for body in ("FmuBeam", "FmuSpring") for name in ("_marked_pending", "_marked_motion")),
     *(f"Fmu.{name}" for name in ("moved", "_time", "_size", "_start_time", "_messages")),
     *(f"EventFunctions.{name}" for name in ("_phase", "_functions", "_ends", "_samples")),
-    "Pair._last",
+    *("Detector._tolerance", "Detector._tolerance_of", "Pair._last"),
     "Loads._last",
     "FmuBeam._loads",
     *(f"FmuSpring.{name}" for name in ("_loads", "_on_end")),

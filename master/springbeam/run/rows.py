@@ -17,7 +17,7 @@ from ..results.steps import packed
 from ..results.trajectory import COLUMNS, load_units
 from ..scene import Scene
 from ..scene.resolution import VIBRATION
-from .ledger import Ledger
+from .balance import Balance
 from .stepping import Pair, State
 
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
@@ -39,8 +39,8 @@ class Rows(Checkpointed):
         *("contact_steps", "not_shown", "mismatch_at_stop", "_last_strike"),
     )
 
-    def __init__(self, scene: Scene, pair: Pair, ledger: Ledger, recorder: Recorder, start_time: float) -> None:
-        self._pair, self._ledger, self._recorder = pair, ledger, recorder
+    def __init__(self, scene: Scene, pair: Pair, balance: Balance, recorder: Recorder, start_time: float) -> None:
+        self._pair, self._balance, self._recorder = pair, balance, recorder
         self._shapes_left = _SHAPES_AFTER_CONTACT
         self._next_shape = start_time
         #: The normal-compliance part of a rigid contact's force, as the paper has it.
@@ -83,7 +83,7 @@ class Rows(Checkpointed):
         if speed > self.largest_speed:
             self.largest_speed = speed
         forces = (contact, smoothed, inside, reaction, state.foundation[0])
-        booked, loads = self._ledger.book(*pair.energies(ends)), pair.loads.values(time)
+        booked, loads = self._balance.book(ends), pair.loads.values(time)
         row = (time, u, v, y, z, *forces, u - y, mismatch, phase.name, *booked, *loads)
         if step is None or step.size == 0.0:
             kept = packed(time, 0.0, *ends[0], *ends[1], *NO_FORCE, 0.0)

@@ -8,7 +8,6 @@ the run goes on from there. Every row closes the ledger (`springbeam.run.rows`, 
 
 from __future__ import annotations
 
-from math import inf
 from typing import Any
 
 from ..bodies.checkpointed import Checkpointed
@@ -20,8 +19,9 @@ from ..results.trajectory import Event
 from ..scene import Scene
 from ..scene.automatic import decided
 from ..scene.resolution import not_resolved, peak_force_doubt
+from .balance import Balance
+from .crowd import AT_ONCE, Crowd
 from .detection import Detector
-from .ledger import Ledger, bounds
 from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .outcome import OVERFLOW, Progress, RunStopped
@@ -32,12 +32,6 @@ from .stepping import Pair
 _SAME_TIME = 1e-9
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
-#: Events closer than this fraction of H are at once; so many of them and the contact is said to chatter. Impacts that
-#: die out are up to 370 (e = 0.997) between this and `_NO_TIME` of `springbeam.run.detection`, where they are seated.
-_AT_ONCE, _MAX_EVENTS_AT_ONCE = 1e-6, 500
-#: Events within H. Impacts that die out are up to 18,000 (e = 0.999); those of a lossy body on a lossless stop are
-#: without end.
-_MAX_EVENTS_IN_STEP = 20_000
 
 
 class Simulation(Checkpointed):
@@ -63,13 +57,11 @@ class Simulation(Checkpointed):
         "_steps",
         "_error",
         "_transitions",
-        "_ledger",
-        "_interface",
+        "_balance",
         "_rows",
         "_begun",
         "_last_opening",
-        "_at_once",
-        "_in_step",
+        "_crowd",
         "_macro_steps",
         "_events",
         "_halvings",
@@ -103,23 +95,11 @@ class Simulation(Checkpointed):
             self._fastest,
             self._pair.equilibrium,
         )
-        self._ledger = Ledger()
-        #: What judges the coupling: the ledger, or with foreign bodies, whose own accounts may be off, that of the work
-        #: that they have received.
-        self._interface = Ledger() if scene.foreign else self._ledger
-        self._energy_warns, self._energy_stops = bounds(scene)
-        #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
-        self._untold = any(
-            body is not None and type(body).energies is Body.energies and body.mass < inf for body in (beam, spring)
-        )
-        if self._untold:
-            self._energy_warns = self._energy_stops = inf
-        self._numerically_damped = scene.beam is not None and scene.beam.damped_numerically
-        self._rows = Rows(scene, self._pair, self._ledger, recorder, start_time)
+        self._balance = Balance(scene, self._pair)
+        self._rows = Rows(scene, self._pair, self._balance, recorder, start_time)
         self._begun = False
         self._last_opening = -float("inf")
-        self._at_once = (0, start_time)  #: events at once, and since when [s]
-        self._in_step = (0, start_time)  #: the same within one macro step
+        self._crowd = Crowd(start_time)
         self._macro_steps = self._events = self._halvings = 0
 
     def run(self) -> None:
@@ -154,7 +134,7 @@ class Simulation(Checkpointed):
             step, event = self._advance(size)
             whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
             end = target if whole else state.time + step.size
-            self._count_events(end, step.size)
+            self._crowd.count(end, step.size, steps.size)
             if step.size > 0.0:
                 if self._error is not None:
                     self._error.accept(step)
@@ -202,32 +182,13 @@ class Simulation(Checkpointed):
     def _holds(self, step: Step, local_error: LocalError) -> bool:
         """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set."""
         assert isinstance(self._steps, AdaptiveSteps)
-        error, order = local_error.of(self._state, step, self._ledger.scale)
+        error, order = local_error.of(self._state, step, self._balance.ledger.scale)
         try:
             return self._steps.judge(step.size, error, order)
         except StepTooShort as too_short:
             raise RunStopped(f"{too_short}, where it is {error:.3g} of it", step.time) from too_short
 
     # -- events -----------------------------------------------------------------------------------------------------
-
-    def _count_events(self, end: float, size: float) -> None:
-        """Count a step that ends at ``end`` [s] after ``size`` [s]. Raises RunStopped if events crowd."""
-        H = self._steps.size
-        if size >= H:
-            self._at_once = self._in_step = (1, end)
-            return
-        at_once, since = self._at_once
-        self._at_once = (at_once + 1, since) if end - since <= _AT_ONCE * H else (1, end)
-        if at_once >= _MAX_EVENTS_AT_ONCE:
-            raise RunStopped(f"the contact chatters: {at_once} events at once", self._state.time)
-        in_step, since = self._in_step
-        self._in_step = (in_step + 1, since) if end - since <= H else (1, end)
-        if in_step >= _MAX_EVENTS_IN_STEP:
-            raise RunStopped(
-                f"the contact chatters: {in_step} events within a macro step of {H:g} s; a restitution below 1 "
-                "lets impacts die out",
-                self._state.time,
-            )
 
     def _settle_start(self) -> None:
         """First contact at the start: the tip on the spring top (or the stop), moving down or at rest."""
@@ -241,9 +202,7 @@ class Simulation(Checkpointed):
             return
         pair.mark()
         # The bodies are recorded as they arrive: the ledger starts before the impact.
-        self._ledger.book(*pair.energies(start))
-        if self._interface is not self._ledger:
-            self._interface.book(*pair.exchanged(start))
+        self._balance.book(start)
         at_start = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
         self._act("impact" if pair.joinable else "stop_impact", at_start)
 
@@ -253,7 +212,7 @@ class Simulation(Checkpointed):
         if kind in ("separation", "release"):
             self._last_opening = state.time
         if kind == "impact":
-            state.reclosed = state.time - self._last_opening <= _AT_ONCE * self._steps.size
+            state.reclosed = state.time - self._last_opening <= AT_ONCE * self._steps.size
         if kind == "stop_impact":
             self._rows.struck(state, self._steps.size)
         ends = pair.ends()
@@ -265,9 +224,7 @@ class Simulation(Checkpointed):
             self._steps.shorten_after_impact()
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.follow_phase(phase)
-        self._ledger.impact_loss += lost
-        if self._interface is not self._ledger:
-            self._interface.impact_loss += lost
+        self._balance.lose(lost)
         state.enter(phase)
         tip, low = pair.ends()
         beam, spring = pair.beam is not None, pair.spring is not None
@@ -300,12 +257,7 @@ class Simulation(Checkpointed):
 
     def _record(self, step: Step | None) -> None:
         self._rows.write(self._state, step)
-        if self._interface is not self._ledger:
-            self._interface.book(*self._pair.exchanged(self._pair.ends()))
-        # What numerical damping takes is not an error; what it brings is.
-        judged = self._interface
-        if (judged.gain if self._numerically_damped else judged.relative) > self._energy_stops:
-            raise RunStopped(self._energy_cause(), self._state.time)
+        self._balance.refuse_change(self._state.time, self._steps.size)
         if self._scene.coupling.feedback != "two_way":
             self._refuse_neglect()
 
@@ -320,33 +272,9 @@ class Simulation(Checkpointed):
                 self._state.time,
             )
 
-    def _energy_cause(self) -> str:
-        coupling, beam = self._scene.coupling, self._scene.beam
-        causes, remedies = [], []
-        if not self._pair.joined.energy_exact:
-            causes.append(f"{coupling.scheme} of degree {coupling.degree}")
-            or_else = ", or coupling.scheme = 'energy'" if self._pair.repeatable else ""
-            remedies.append(f"the macro step {self._steps.size:g} s is too large for it; take a smaller one{or_else}")
-        if self._numerically_damped:
-            assert beam is not None
-            causes.append(f"beam.rho_inf = {beam.rho_inf:g}")
-            remedies.append("no column books what numerical damping takes; beam.rho_inf = 1 takes nothing")
-        if not causes:
-            causes.append("rounding, or a solver's tolerance,")
-            remedies.append("the results are not to be trusted; try another coupling.macro_step")
-        percent = 100.0 * self._interface.relative
-        return f"{' with '.join(causes)} has changed the energy by {percent:.2g} %: {'; '.join(remedies)}"
-
     def summary(self) -> dict[str, Any]:
         """Counts, residuals and warnings, as they go into ``summary.json``."""
-        warnings, rows = [], self._rows
-        if self._interface.relative > self._energy_warns:
-            warnings.append(self._energy_cause())
-        elif self._ledger.relative > self._energy_warns:
-            warnings.append(
-                f"the energies that the FMUs tell are off by {100.0 * self._ledger.relative:.2g} %, by their own "
-                f"solvers: the coupling has kept those of the interface to {self._interface.relative:.1e}"
-            )
+        rows, warnings = self._rows, self._balance.warnings(self._steps.size)
         if reduced := self._pair.joined.reduced:
             warnings.append(
                 f"the contact force of {reduced} of {self._macro_steps} macro steps was not found at coupling.degree = "
@@ -364,8 +292,6 @@ class Simulation(Checkpointed):
         doubt = unresolved or peak_force_doubt(self._scene)
         if doubt is not None:
             warnings.append(doubt)
-        if self._untold:
-            warnings.append("a body reports no energies, so the energy balance is not checked")
         if rows.not_shown:
             warnings.append(NOT_SHOWN)
         left_out = self._pair.joined.neglected()
@@ -381,24 +307,11 @@ class Simulation(Checkpointed):
             **({"rejected_steps": self._steps.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
             "iterations": self._pair.iterations,
             **({"reduced_steps": reduced} if reduced else {}),
-            "max_energy_residual": self._ledger.relative,
-            "max_energy_residual_joule": self._ledger.largest_residual,
-            **({"max_interface_residual": self._interface.relative} if self._scene.foreign else {}),
+            **self._balance.summary(),
             "max_velocity_mismatch": rows.largest_mismatch,
             "resolved": unresolved is None,
-            **self._losses(),
             "warnings": warnings,
         }
-
-    def _losses(self) -> dict[str, float]:
-        """Return what the bodies and the contact law have dissipated [J]."""
-        beam, spring, contact = self._ledger.dissipated
-        here = {
-            "loss_beam": (beam, self._pair.beam is not None),
-            "loss_spring": (spring, self._pair.spring is not None),
-            "loss_contact": (contact, self._pair.law.soft),
-        }
-        return {name: lost for name, (lost, present) in here.items() if present}
 
     @property
     def apart(self) -> bool:

@@ -94,12 +94,12 @@ class Pair(Checkpointed):
         self.upper: Body = beam or _ABSENT
         self.lower: Body = spring or self._held or _ABSENT
         self.loads = Loads(scene, beam, spring)
-        self._bodies: list[Body] = [body for body in (beam, spring) if body is not None]
-        for body in self._bodies:
+        self.bodies: list[Body] = [body for body in (beam, spring) if body is not None]
+        for body in self.bodies:
             body.take_place(upper=body is beam)
-        self.repeatable = all(body.repeatable for body in self._bodies)
+        self.repeatable = all(body.repeatable for body in self.bodies)
         #: Whether a step can be repeated with another size.
-        self.divides = self.repeatable and all(body.any_size for body in self._bodies)
+        self.divides = self.repeatable and all(body.any_size for body in self.bodies)
         #: Ψ: where the ends of a rigid law are tied below [m].
         self.equilibrium = scene.spring.equilibrium if scene.spring is not None else self.lower.motion().displacement
         #: Where the ends are; looked up once, since every step asks a few times.
@@ -138,12 +138,12 @@ class Pair(Checkpointed):
 
     def mark(self) -> None:
         """Remember the bodies' states as those that steps start from."""
-        for body in self._bodies:
+        for body in self.bodies:
             body.mark()
 
     def rewind(self) -> None:
         self._last = None
-        for body in self._bodies:
+        for body in self.bodies:
             body.rewind()
 
     def attempt(self, state: State, size: float, start: Ends, phase: Phase | None = None) -> Step:
