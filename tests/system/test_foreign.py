@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import functools
+import os
+import signal
+import threading
 
 import numpy as np
 import oscillator
@@ -19,6 +22,7 @@ from springbeam.results.directory import RunDirectory
 from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.reading import load_summary
 from springbeam.run import runner
+from springbeam.run.outcome import RunStopped
 from springbeam.scene import scene_from_dict
 
 M1, M2, K, C, V = 2.0, 3.0, 40.0, 0.2, -0.3
@@ -356,6 +360,20 @@ def test_an_fmu_that_hangs_is_given_up(fmu, monkeypatch):
     monkeypatch.setattr(isolated, "CHECK_PATIENCE", 4.0)
     with pytest.raises(FmuError, match="has not returned within 4 s from a step of the check before the run"):
         simulate(pair(fmu(), spring={"parameters": {"lie": oscillator.LIES["hang"]}}))
+
+
+def test_ctrl_c_names_an_fmu_that_does_not_return(fmu, monkeypatch):
+    monkeypatch.setattr(isolated, "LONG", 0.5)
+    sent: list[threading.Timer] = []
+
+    def interrupt_later(time: float, phase: str, steps: int) -> None:
+        if time > 1.49 and not sent:
+            sent.append(threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)))
+            sent[0].start()
+
+    parameters = {"m": M2, "k": K, "lie": oscillator.LIES["late hang"]}
+    with pytest.raises(RunStopped, match=r"interrupted, for it .* from its step at t = 1\.5 s"):
+        simulate(pair(fmu(), spring={"parameters": parameters}, time={"t_end": 2.0}), interrupt_later)
 
 
 @pytest.mark.parametrize("lie", LATE)

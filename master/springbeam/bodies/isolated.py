@@ -31,6 +31,8 @@ from .protocol import NO_FORCE, BodyFailed, Energies, FmuError, Force, Motion, S
 
 #: Longest time that the check before the run may take, any call of the run, and the last one [s].
 CHECK_PATIENCE, CALL_PATIENCE, _FAREWELL = 20.0, 60.0, 2.0
+#: From when on Ctrl-C means the FMU, not the run [s].
+LONG = 5.0
 #: How often a process is looked after [s].
 _LOOK = 0.2
 #: Most processes that wait for another body of their FMU.
@@ -103,7 +105,8 @@ class FmuProcess:
         send, receive = self._process.stdin, self._process.stdout
         assert send is not None
         assert receive is not None
-        self._doing, self._until = doing, monotonic() + patience
+        began = monotonic()
+        self._doing, self._until = doing, began + patience
         try:
             send.write(pickle.dumps(calls))
             send.flush()
@@ -114,6 +117,12 @@ class FmuProcess:
                 self._doing = f"{value} of {doing}"
         except (EOFError, OSError, pickle.UnpicklingError):
             raise FmuError(f"{self._file[0]}: {self._why_it_ended(patience)}") from None
+        except KeyboardInterrupt:
+            waited = monotonic() - began
+            if waited < LONG:
+                raise
+            said = f"interrupted, for it has not returned within {waited:.3g} s from {self._doing}"
+            raise FmuError(f"{self._file[0]}: {said}") from None
         self._until = inf
         if kind in FAILURES:
             raise FAILURES[kind](value)

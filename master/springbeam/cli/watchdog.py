@@ -1,8 +1,8 @@
-"""End the command on Ctrl-C while an FMU does not return.
+"""End the command on Ctrl-C while an FMU of ours does not return.
 
 Python acts on a signal between two instructions of the main thread, which a call into a library that never returns
 keeps from ever coming. Its C handler, however, writes the signal to the wakeup descriptor at once, and ctypes lets
-other threads run during a call.
+other threads run during a call. FMUs of others are in processes of their own (`springbeam.bodies.isolated`).
 """
 
 from __future__ import annotations
