@@ -14,7 +14,7 @@ from commands import Interrupt, command
 from springbeam.results.directory import ResultsExist, ResultsInUse
 from springbeam.scene import load_scene
 from springbeam.studies import sweep
-from springbeam.studies.study import FILE, Records, record_all
+from springbeam.studies.study import FILE, Records, record_all, study_in
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
@@ -57,8 +57,14 @@ def test_another_study_is_not_mixed_in(tmp_path):
         record_all(plan(), records)
         with pytest.raises(ResultsInUse), Records(plan(), tmp_path / "s"):
             pass
+    other = plan(masses="1,3")
     with pytest.raises(ResultsExist, match="another study"):
-        Records(plan(masses="1,3"), tmp_path / "s")
+        Records(other, tmp_path / "s")
+    with Records(other, tmp_path / "s", replace=True):  # results stay until there are new ones
+        assert study_in(tmp_path / "s") == plan()
+    with Records(other, tmp_path / "s", replace=True) as records:
+        record_all(other, records)
+    assert study_in(tmp_path / "s") == other
     (tmp_path / "t").mkdir()
     (tmp_path / "t" / "thesis.txt").write_text("mine")
     with pytest.raises(ResultsExist, match="not empty"):

@@ -117,7 +117,7 @@ class Study(BaseModel, ABC):
 class Records:
     """``study.jsonl`` of a directory: the study in the first line, then a record a line, as they come.
 
-    Within the context the file is open for new records; without any record it does not stay.
+    Within the context the file is open for new records. Results that are replaced stay until there is one.
 
     Raises
     ------
@@ -145,19 +145,22 @@ class Records:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._file = self.path.open("ab", buffering=0)
         lock(self._file)
-        self._file.truncate(self._whole)  # without a line that was cut short
-        if not self._whole:
-            self._write(self._settings)
+        self._begun = False
         return self
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
-        if not self.found:
+        if self.path.stat().st_size == 0:
             self.path.unlink()
             RunDirectory(self.path.parent).discard()
 
     def add(self, name: str, record: Record) -> None:
-        """Append a record. Raises OSError if the disk is full."""
+        """Append a record; the first one removes what it replaces. Raises OSError if the disk is full."""
+        if not self._begun:
+            self._begun = True
+            self._file.truncate(self._whole)  # without a line that was cut short
+            if not self._whole:
+                self._write(self._settings)
         self._write({"case": name, "record": record})
         self.found[name] = record
 

@@ -24,7 +24,7 @@ from .cells import COUPLINGS, sampled_cells, scene_dict, slice_cells
 from .outcome import CLASSES, Outcome, run_cell
 
 #: How many reasons the summary lists, and how many characters of each.
-_REASONS, _REASON_WIDTH = 12, 66
+_REASONS, _REASON_WIDTH = 12, 62
 #: Quick: the hypercube has so many times fewer cells, each axis of a slice half as many.
 _QUICK = 5
 
