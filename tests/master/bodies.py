@@ -385,7 +385,7 @@ def simulate(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> Trajecto
     trajectory = recorder.trajectory()
     trajectory.summary["stopped"] = stopped
     trajectory.summary["work"] = {
-        name: body.steps for name, body in (("beam", beam), ("spring", spring)) if body is not None
+        name: body.steps for name, body in (("beam", beam), ("spring", spring)) if hasattr(body, "steps")
     }
     return trajectory
 
