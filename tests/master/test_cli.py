@@ -144,6 +144,12 @@ def test_warnings_are_shown_as_they_are(here, monkeypatch):
     assert "warning   [beam] is [bold]coarse[/bold]" in command("run", "soft", "--no-plots").stdout
 
 
+def test_what_can_hardly_be_meant_is_told_before_the_run(here):
+    arguments = ["run", "steel-bumper", "--set", "beam.density=7.85", "--no-plots"]
+    assert command(*arguments).stderr.startswith("warning: [beam] density = 7.85: in kg/m³, no solid has it")
+    assert command(*arguments, "--quiet").stderr == ""
+
+
 @pytest.mark.parametrize("name", ["duffing", "beam-on-stop"])
 def test_scenes_without_a_body(here, name, unpainted):
     result = command("run", name)

@@ -239,10 +239,11 @@ def test_loads_are_changed_by_their_number_and_tables_lie_beside_the_scene(tmp_p
         ("0,1\n1,2,3\n", "line 2: 3 columns; a table has two, time and value"),
         ("0,1\n2,2\n1,3\n", "line 3, column 1: 1.0 s comes after 2.0 s; times must increase"),
         ("time,value\n0,1\n", "1 lines with numbers; a table needs two at least"),
+        ("0,1\n1,\udcff\n", "not a text in UTF-8: invalid start byte at byte 6"),
     ],
 )
 def test_a_bad_table_is_named_with_line_and_column(text, error):
-    Path("record.csv").write_text(text)
+    Path("record.csv").write_bytes(text.encode(errors="surrogateescape"))
     with pytest.raises(SceneError) as refused:
         soft("linear")
     assert str(refused.value) == f'scene: [loads.0] file = "record.csv": {error}'

@@ -324,6 +324,32 @@ def test_other_ways_to_give_a_beam_mean_the_same(given, follows):
     assert back.beam.model_dump(exclude_none=True).keys().isdisjoint(given)
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, []),
+        (
+            {"young_modulus": 210.0},
+            [
+                "in GPa it would be 2.1e+11 Pa",
+                "shear_modulus = 8.1e+10: young_modulus is 2.59e-09 times as large",
+                "lowest frequency is 0.00054 Hz",
+                "12 times the speed of sound in the beam (0.164 m/s)",
+            ],
+        ),
+        ({"density": 7.85}, ["in g/cm³ it would be 7.85e+03 kg/m³"]),
+        ({"length": 500.0}, ["a thread (length over radius of gyration 3.5e+05)", "lowest frequency is 1.7e-05 Hz"]),
+        ({"length": 5e-4}, ["thicker than long (length over radius of gyration 0.35)"]),
+        ({"approach_speed": 5e4}, ["5e+04 m/s, 9.7 times the speed of sound in the beam (5.17e+03 m/s)"]),
+    ],
+)
+def test_what_can_hardly_be_meant_is_told(changes, said):
+    """Steel: c = √(E/ρ) = 5172 m/s; 500 mm over 5 mm/√12 is 346; f₁ = 17.1 Hz goes with √E and 1/L²."""
+    lines = suspicions(with_changes(load_scene("steel-bumper"), beam=changes))
+    assert len(lines) == len(said)
+    assert all(fragment in line for fragment, line in zip(said, lines, strict=True))
+
+
 def test_every_key_is_explained():
     for key in reference.listed():
         assert key.meaning, key

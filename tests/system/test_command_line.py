@@ -19,7 +19,8 @@ from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
 from springbeam.cli.run import _ProgressBar
 from springbeam.results.reading import load_summary
-from springbeam.scene import load_scene, scene_keys, shipped_scenes
+from springbeam.scene import load_scene, reference, scene_keys, shipped_scenes
+from springbeam.studies.sweep.metrics import METRICS
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -169,6 +170,14 @@ def test_json_of_a_run_that_stops_early_is_its_summary_and_the_error_is_on_stder
     assert result.stderr.startswith("error: the run stopped early: ")
 
 
+def test_keys_has_the_schema_and_the_metrics_too():
+    assert json.loads(command("keys", "--schema").stdout) == reference.schema()
+    listed = json.loads(command("keys", "--metrics", "--json").stdout)
+    assert [(m["name"], m["unit"]) for m in listed] == [(name, m.unit) for name, m in METRICS.items()]
+    lines = command("keys", "--metrics").stdout.splitlines()
+    assert [re.match(r"(\w+)(?: \[(.*)\])?: ", line)[1] for line in lines] == list(METRICS)
+
+
 def test_json_of_bad_input_is_nothing():
     result = command("run", "sotf", "--json")
     assert (result.exit_code, result.stdout) == (2, "")
@@ -253,6 +262,7 @@ def test_there_is_a_completion_script_for(shell):
         ("springbeam run so", ["soft"]),
         ("springbeam run soft --set coupling.sch", ["coupling.scheme="]),
         ("springbeam sweep soft --vary stop.", ["stop.position=", "stop.restitution="]),
+        ("springbeam keys sto", ["stop"]),
         ("springbeam run my_scene", []),  # the shell goes on with files
     ],
 )
@@ -300,6 +310,14 @@ MISTAKES = {
     ),
     "not TOML": ("run comma.toml", ["comma.toml: not TOML", "at line 5, column 9", "mass = 1,0"]),
     "accuracy in per cent": ("run soft --accuracy 5", ["--accuracy 5: must be between 0 and 1, as in"]),
+    "mesh without accuracy": ("run soft --mesh", ["--mesh: picks a mesh that keeps an accuracy", "--accuracy 1e-3"]),
+    "rows too close": ("run soft --output-interval 1e-9", ["--output-interval 1e-09: more than", "take a longer one"]),
+    "rows with checkpoints": (
+        "run soft --output-interval 1e-2 --checkpoint 1",
+        ["--output-interval 0.01: --checkpoint"],
+    ),
+    "table of keys misspelt": ("keys beem", ["beem: unknown table; allowed: time, beam, spring"]),
+    "new scene that is there": ("new comma", ["comma.toml: already there; give another NAME"]),
     "results are there": ("run soft --out done", ["done already holds results", "--force replaces", "--out DIR"]),
     "a file for a directory": ("run soft --out comma.toml", ["comma.toml: is a file; --out DIR names a directory"]),
     "report of a scene": ("report soft", ["soft: no such directory; did you mean results/soft?"]),
