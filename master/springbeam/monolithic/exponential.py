@@ -77,8 +77,7 @@ class LinearForm:
     def __init__(self, system: HybridSystem, phase: Phase) -> None:
         self.system, self.phase = system, phase
         s, p = system, system.spring
-        joined = s.joined(phase)
-        held = phase.seated and (joined or not s.has_spring)
+        joined, held = s.joined(phase), s.held(phase)
         self.spring_moves = s.has_spring and not phase.seated
         self.linked, self.rest = self._split()
         self.pressed = s.law.acts(phase.contact) and self.rest != (0.0, 0.0)

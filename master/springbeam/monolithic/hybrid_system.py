@@ -71,6 +71,10 @@ class HybridSystem:
         """Whether u = y holds as a constraint."""
         return self.law.holds(phase.contact)
 
+    def held(self, phase: Phase) -> bool:
+        """Whether the tip stands on the foundation, u = φ."""
+        return phase.seated and (self.joined(phase) or not self.has_spring)
+
     def spring_force(self, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """s = f_s − α_s z − k1 y − k2 y³ [N]."""
         p = self.spring
@@ -105,7 +109,7 @@ class HybridSystem:
         self, phase: Phase, p: np.ndarray, penetration: np.ndarray, rate: np.ndarray, s: np.ndarray
     ) -> np.ndarray:
         """C [N] of beam forces p (..., r), penetration y − u, its rate, and spring force s (...)."""
-        if phase.seated and (self.joined(phase) or not self.has_spring):
+        if self.held(phase):
             return np.asarray(-(p @ self.b) / self.inverse_tip_mass)
         if self.joined(phase):
             return np.asarray((s * self.inverse_mass - p @ self.b) / (self.inverse_tip_mass + self.inverse_mass))
@@ -142,7 +146,7 @@ class HybridSystem:
             s[Y] = -p.linear_stiffness - 3.0 * p.cubic_stiffness * X[Y] ** 2
             s[Z] = -p.damping
         C = np.zeros(self.size)
-        if phase.seated and (self.joined(phase) or not self.has_spring):
+        if self.held(phase):
             C = -(b @ J[V]) / self.inverse_tip_mass
         elif self.joined(phase):
             C = (s * self.inverse_mass - b @ J[V]) / (self.inverse_tip_mass + self.inverse_mass)
@@ -166,12 +170,11 @@ class HybridSystem:
 
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """X, in place, with what rounding leaves of the phase's constraint removed: y = u, or u = φ when seated."""
-        joined = self.joined(phase)
-        if phase.seated and (joined or not self.has_spring):
+        if self.held(phase):
             towards = self.b / self.inverse_tip_mass
             X[..., self.A] += (self.stop.position - X[..., self.A] @ self.b)[..., None] * towards
             X[..., self.V] -= (X[..., self.V] @ self.b)[..., None] * towards
-        elif joined:
+        elif self.joined(phase):
             X[..., self.Y] = X[..., self.A] @ self.b
             X[..., self.Z] = X[..., self.V] @ self.b
         return X
