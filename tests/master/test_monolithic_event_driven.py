@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from references import kinds, linear, matrices, soft, tip_mass
 from scenes import scene_from_dict
 from scipy.special import ellipj, ellipk
 
@@ -18,20 +19,9 @@ from springbeam.scene import Scene, load_scene, with_changes
 from springbeam.studies import exact
 
 
-def soft(n_elements: int = 6, **tables: dict[str, Any]) -> Scene:
-    """The scene `soft` on a coarser beam, with changes."""
-    tables["beam"] = {"n_elements": n_elements, **tables.get("beam", {})}
-    tables.setdefault("coupling", {"macro_step": 1e-3})
-    return with_changes(load_scene("soft"), **tables)
-
-
 def spring_only(t_end: float, stop: dict[str, float] | None = None, **spring: float) -> Scene:
     tables: dict[str, Any] = {"time": {"t_end": t_end}, "spring": spring, "coupling": {"macro_step": 0.01}}
     return scene_from_dict(tables if stop is None else {**tables, "stop": stop})
-
-
-def kinds(trajectory: Trajectory) -> list[str]:
-    return [event.kind for event in trajectory.events]
 
 
 # The scene `soft` -------------------------------------------------------------------------------------------------
@@ -75,11 +65,6 @@ def test_soft_conserves_energy_and_visits_the_phases() -> None:
     times, shapes = result.shapes
     np.testing.assert_array_equal(times, result.time)
     np.testing.assert_allclose(shapes[:, -1], result.u_tip, atol=1e-15)
-
-
-def linear(**tables: dict[str, Any]) -> Scene:
-    """The scene `soft` on a coarser beam and a linear spring, with changes."""
-    return soft(**{**tables, "spring": {"cubic_stiffness": 0.0, **tables.get("spring", {})}})
 
 
 CASES = {
@@ -169,8 +154,8 @@ def test_stiff_damped_beam_agrees_with_radau() -> None:
 def test_tied_phase_is_the_matrix_exponential() -> None:
     """With k2 = 0 the tied phase is linear: exp of the full first-order system in nodal unknowns."""
     scene = soft(6, beam={"alpha_b": 1e-3}, spring={"cubic_stiffness": 0.0, "damping": 0.4, "external_force": -0.5})
-    d, times = assemble(scene.beam), np.array([0.01, 0.02, 0.04])  # type: ignore[arg-type]
-    y, z = exact.tied(scene, d.M.toarray(), d.K.toarray(), -d.slope_shape, times)
+    (M, K, x), times = matrices(scene), np.array([0.01, 0.02, 0.04])
+    y, z = exact.tied(scene, M, K, -x, times)
     result = simulate(scene, sample_times=times, t_end=0.04)
     np.testing.assert_allclose(result.y, y, atol=1e-13)
     np.testing.assert_allclose(result.z, z, atol=1e-12)
@@ -182,14 +167,14 @@ def test_tied_phase_is_the_matrix_exponential() -> None:
 def test_meeting_conserves_momentum_and_books_the_loss() -> None:
     scene = soft(spring={"mass": 0.3, "initial_velocity": 0.2})
     first = simulate(scene, t_end=1e-3).events[0]
-    tip_mass = 1.0 / np.linalg.inv(assemble(scene.beam).M.toarray())[-1, -1]  # type: ignore[arg-type]
-    common = (tip_mass * -1.0 + 0.3 * 0.2) / (tip_mass + 0.3)
+    tip = tip_mass(scene)
+    common = (tip * -1.0 + 0.3 * 0.2) / (tip + 0.3)
     assert first.kind == "impact"
     assert first.z == pytest.approx(common, rel=1e-12)
     assert first.v_tip == pytest.approx(common, rel=1e-12)
-    assert first.impulse_contact == pytest.approx(tip_mass * (common + 1.0), rel=1e-12)
+    assert first.impulse_contact == pytest.approx(tip * (common + 1.0), rel=1e-12)
     assert first.impulse_contact == pytest.approx(-0.3 * (common - 0.2), rel=1e-12)
-    reduced = tip_mass * 0.3 / (tip_mass + 0.3)
+    reduced = tip * 0.3 / (tip + 0.3)
     assert first.energy_loss == pytest.approx(0.5 * reduced * 1.2**2, rel=1e-12)
 
 
@@ -197,12 +182,12 @@ def test_foundation_reverses_both_and_takes_its_share() -> None:
     e = 0.4
     scene = soft(stop={"restitution": e})
     impact = next(event for event in simulate(scene, t_end=0.08).events if event.kind == "stop_impact")
-    tip_mass = 1.0 / np.linalg.inv(assemble(scene.beam).M.toarray())[-1, -1]  # type: ignore[arg-type]
+    tip = tip_mass(scene)
     arriving = -impact.z / e
     assert impact.v_tip == pytest.approx(impact.z, abs=1e-13)
-    assert impact.impulse_contact == pytest.approx(-(1.0 + e) * tip_mass * arriving, rel=1e-12)
-    assert impact.impulse_foundation == pytest.approx(-(1.0 + e) * (tip_mass + 1.0) * arriving, rel=1e-12)
-    assert impact.energy_loss == pytest.approx(0.5 * (1.0 - e**2) * (tip_mass + 1.0) * arriving**2, rel=1e-10)
+    assert impact.impulse_contact == pytest.approx(-(1.0 + e) * tip * arriving, rel=1e-12)
+    assert impact.impulse_foundation == pytest.approx(-(1.0 + e) * (tip + 1.0) * arriving, rel=1e-12)
+    assert impact.energy_loss == pytest.approx(0.5 * (1.0 - e**2) * (tip + 1.0) * arriving**2, rel=1e-10)
 
 
 def test_line_5_gives_the_spring_the_tips_velocity() -> None:

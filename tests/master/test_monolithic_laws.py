@@ -6,29 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from references import kinds, linear, matrices, tip_mass
 from scipy.integrate import quad, solve_ivp
 
 from springbeam.monolithic.event_driven import simulate
 from springbeam.monolithic.laws import law_of
-from springbeam.monolithic.semi_discrete import assemble
-from springbeam.results.trajectory import Trajectory
-from springbeam.scene import Scene, load_scene, with_changes
+from springbeam.scene import with_changes
 from springbeam.studies import exact
 
 METHODS = ("exponential", "DOP853")
 TIP, TOP, STIFFNESS = 0.5, 2.0, 1e4  #: kg, kg, N/m^q
 REDUCED = TIP * TOP / (TIP + TOP)
-
-
-def soft(n_elements: int = 6, **tables: dict[str, Any] | None) -> Scene:
-    """The scene `soft` on a coarse beam and a linear spring, with changes."""
-    tables["beam"] = {"n_elements": n_elements, **(tables.get("beam") or {})}
-    tables["spring"] = {"cubic_stiffness": 0.0, **(tables.get("spring") or {})}
-    return with_changes(load_scene("soft"), **tables)
-
-
-def kinds(trajectory: Trajectory) -> list[str]:
-    return [event.kind for event in trajectory.events]
 
 
 # Normal compliance ------------------------------------------------------------------------------------------------
@@ -162,11 +150,11 @@ def test_a_beam_on_a_link_is_the_matrix_exponential(
 ) -> None:
     contact = {"law": "link", "stiffness": stiffness, "damping": damping}
     spring = {"damping": 0.4, "external_force": -0.5}
-    scene = soft(beam={"alpha_b": alpha, "initial_deflection_slope": 0.02}, spring=spring, contact=contact, stop=None)
+    scene = linear(beam={"alpha_b": alpha, "initial_deflection_slope": 0.02}, spring=spring, contact=contact, stop=None)
     times = np.array([0.01, 0.05, 0.1, 0.2])
     result = simulate(scene, method=method, sample_times=times, t_end=0.2)
-    d = assemble(scene.beam)  # type: ignore[arg-type]
-    expected = exact.linked(scene, d.M.toarray(), d.K.toarray(), 0.02 * d.slope_shape, -d.slope_shape, times)
+    M, K, x = matrices(scene)
+    expected = exact.linked(scene, M, K, 0.02 * x, -x, times)
     np.testing.assert_allclose(np.column_stack([result.u_tip, result.y]), expected, atol=2e-13)
     assert result.summary["largest_relative_energy_residual"] < 2e-12
 
@@ -174,16 +162,16 @@ def test_a_beam_on_a_link_is_the_matrix_exponential(
 def test_a_stiff_link_needs_no_more_steps_than_its_motion() -> None:
     """λ = 1e8: the link is part of the modes, the error that of their rounding, ε ω_max/ω_min."""
     contact = {"law": "link", "stiffness": 1e8}
-    scene = soft(contact=contact, stop=None)
+    scene = linear(contact=contact, stop=None)
     result = simulate(scene, sample_times=[0.02], t_end=0.02)
-    d = assemble(scene.beam)  # type: ignore[arg-type]
-    expected = exact.linked(scene, d.M.toarray(), d.K.toarray(), 0.0 * d.slope_shape, -d.slope_shape, np.array([0.02]))
+    M, K, x = matrices(scene)
+    expected = exact.linked(scene, M, K, 0.0 * x, -x, np.array([0.02]))
     np.testing.assert_allclose([[result.u_tip[0], result.y[0]]], expected, atol=1e-11)
     assert result.summary["counts"]["steps"] < 1000
 
 
 def test_only_the_spring_strikes_the_foundation_through_a_link() -> None:
-    scene = soft(contact={"law": "link", "stiffness": 1e3}, stop={"restitution": 0.5})
+    scene = linear(contact={"law": "link", "stiffness": 1e3}, stop={"restitution": 0.5})
     strike = next(event for event in simulate(scene, t_end=0.1).events if event.kind == "stop_impact")
     assert strike.impulse_contact == 0.0
     assert strike.y == -0.015
@@ -198,11 +186,11 @@ def test_only_the_spring_strikes_the_foundation_through_a_link() -> None:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_tie_swings_in_the_modes_of_the_joined_system(method: str) -> None:
     """Above Ψ and below it, pressed and pulled."""
-    scene = soft(contact={"law": "tie"}, stop=None, spring={"initial_velocity": 0.2}, time={"t_end": 2.0})
+    scene = linear(contact={"law": "tie"}, stop=None, spring={"initial_velocity": 0.2}, time={"t_end": 2.0})
     times = np.linspace(0.05, 2.0, 40)
     result = simulate(scene, method=method, sample_times=times)
-    d = assemble(scene.beam)  # type: ignore[arg-type]
-    y, z = exact.tied(scene, d.M.toarray(), d.K.toarray(), -d.slope_shape, times)
+    M, K, x = matrices(scene)
+    y, z = exact.tied(scene, M, K, -x, times)
     np.testing.assert_allclose(result.y, y, atol=3e-12)
     np.testing.assert_allclose(result.z, z, atol=3e-11)
     assert np.max(result.y) > 0.01
@@ -211,7 +199,7 @@ def test_a_tie_swings_in_the_modes_of_the_joined_system(method: str) -> None:
     assert np.max(result.contact_force) > 0.1
     assert set(result.phase) == {"tied"}
     assert kinds(result) == ["impact"]
-    tip = 1.0 / np.linalg.inv(d.M.toarray())[-1, -1]
+    tip = tip_mass(scene)
     assert result.events[0].energy_loss == pytest.approx(0.5 * tip / (1.0 + tip) * 1.2**2, rel=1e-12)
     np.testing.assert_array_equal(result.tie_reaction, result.contact_force)
 
@@ -219,7 +207,7 @@ def test_a_tie_swings_in_the_modes_of_the_joined_system(method: str) -> None:
 @pytest.mark.parametrize("fidelity", ["dynamic", "quasi_static"])
 def test_ends_that_move_alike_are_tied_without_an_impact(fidelity: str) -> None:
     changes = {"fidelity": fidelity, "initial_velocity_slope": 0.5}
-    result = simulate(soft(contact={"law": "tie"}, beam=changes, spring={"initial_velocity": 0.5}, stop=None))
+    result = simulate(linear(contact={"law": "tie"}, beam=changes, spring={"initial_velocity": 0.5}, stop=None))
     assert result.events == []
     assert set(result.phase) == {"tied"}
     assert np.max(np.abs(result.gap)) < 1e-15
@@ -228,7 +216,9 @@ def test_ends_that_move_alike_are_tied_without_an_impact(fidelity: str) -> None:
 
 def test_a_tie_without_inertia_adds_the_beams_stiffness() -> None:
     """y = z₀/ω sin ωt, ω² = k1 + k, 1/k = L³/3EI + L/KAG = 4/300: the tip bears either sign of C."""
-    scene = soft(contact={"law": "tie"}, beam={"fidelity": "quasi_static"}, spring={"initial_velocity": 0.3}, stop=None)
+    scene = linear(
+        contact={"law": "tie"}, beam={"fidelity": "quasi_static"}, spring={"initial_velocity": 0.3}, stop=None
+    )
     result = simulate(scene)
     omega = np.sqrt(3.0 + 75.0)
     np.testing.assert_allclose(result.y, 0.3 / omega * np.sin(omega * result.time), atol=1e-12)
@@ -237,11 +227,10 @@ def test_a_tie_without_inertia_adds_the_beams_stiffness() -> None:
 
 
 def test_both_ends_of_a_tie_strike_the_foundation() -> None:
-    scene = soft(contact={"law": "tie"}, stop={"restitution": 0.4})
+    scene = linear(contact={"law": "tie"}, stop={"restitution": 0.4})
     strike = next(event for event in simulate(scene, t_end=0.1).events if event.kind == "stop_impact")
     assert strike.v_tip == pytest.approx(strike.z, abs=1e-13)
-    d = assemble(scene.beam)  # type: ignore[arg-type]
-    tip = 1.0 / np.linalg.inv(d.M.toarray())[-1, -1]
+    tip = tip_mass(scene)
     arriving = -strike.z / 0.4
     assert strike.impulse_foundation == pytest.approx(-1.4 * (1.0 + tip) * arriving, rel=1e-12)
     assert strike.energy_loss == pytest.approx(0.5 * (1.0 - 0.16) * (1.0 + tip) * arriving**2, rel=1e-10)
@@ -249,7 +238,7 @@ def test_both_ends_of_a_tie_strike_the_foundation() -> None:
 
 def test_a_pair_at_rest_without_inertia_stays_at_rest() -> None:
     """Every function that is watched is zero, and stays so: none of them is an event."""
-    result = simulate(soft(beam={"fidelity": "quasi_static"}, stop=None))
+    result = simulate(linear(beam={"fidelity": "quasi_static"}, stop=None))
     assert np.all(result.y == 0.0)
     assert kinds(result) == ["impact"]
 
@@ -260,7 +249,7 @@ def test_a_pair_at_rest_without_inertia_stays_at_rest() -> None:
 @pytest.mark.parametrize(("name", "contact"), [("compliance", "touch"), ("compliance", "slack"), ("link", "tied")])
 def test_what_a_law_stores_and_takes_is_the_power_of_its_force(name: str, contact: Any) -> None:
     """C ṗ = dΦ/dt + dissipation, with dΦ/dt from Φ itself."""
-    law = law_of(soft(contact={"law": name, "stiffness": 30.0, "exponent": 2.5, "damping": 0.7}))
+    law = law_of(linear(contact={"law": name, "stiffness": 30.0, "exponent": 2.5, "damping": 0.7}))
     p, rate, h = np.array([0.1, 0.3]), np.array([-2.0, 0.5]), 1e-6
     force = law.force(p, rate) if law.acts(contact) else np.zeros_like(p)
     stored = (law.potential(p + h * rate) - law.potential(p - h * rate)) / (2.0 * h)
