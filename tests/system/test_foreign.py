@@ -299,6 +299,12 @@ def test_steps_of_one_size_stay_of_one_size(fmu):
     assert run.summary["max_interface_residual"] < 1e-12
     with pytest.raises(SceneError, match=r"t_end = 0\.99: .*use a multiple of 0\.02"):
         simulate(pair(fmu("fixed", variable=False), time={"t_end": 0.99}, coupling={"degree": 0}))
+    pulse = {"on": "tip", "signal": "half_sine", "start": 0.1, "duration": 0.3}
+    steps = np.diff(simulate(pair(fmu("fixed", variable=False), loads=[pulse], coupling={"degree": 0})).time)
+    assert steps == pytest.approx(0.02, rel=1e-9)
+    pulse["duration"] = 0.25
+    with pytest.raises(SceneError, match=r"loads\.0\]: a step ends where it jumps or bends: .*use a multiple of 0\.02"):
+        simulate(pair(fmu("fixed", variable=False), loads=[pulse], coupling={"degree": 0}))
 
 
 REFUSED = {

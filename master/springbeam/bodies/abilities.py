@@ -44,6 +44,10 @@ _SLOPES = "its input takes no derivatives (canInterpolateInputs = false; FMI 3.0
 _VELOCITY, _IMPULSE, _INTEGRALS = "it has no velocity", "it has no impulse", "it has not integral and integral_2"
 
 
+#: A share of a step that is rounding.
+_SAME = 1e-9
+
+
 def needs(scene: Scene, body: Abilities) -> Iterator[Need]:
     """Yield all that ``scene`` needs of a body."""
     coupling, contact = scene.coupling, scene.contact
@@ -81,8 +85,12 @@ def needs(scene: Scene, body: Abilities) -> Iterator[Need]:
         yield Need(asked, body.velocity, _VELOCITY, "use macro_step")
         yield Need(asked, body.integrals == 2, _INTEGRALS, "use macro_step")
     elif not body.any_size:
-        whole = scene.equal_steps[1] == 0.0
-        yield Need(f"[time] t_end = {scene.time.t_end}", whole, _SIZES, f"use a multiple of {scene.coupling.H:g}")
+        H, multiple = scene.coupling.H, f"use a multiple of {scene.coupling.H:g}"
+        yield Need(f"[time] t_end = {scene.time.t_end}", scene.equal_steps[1] == 0.0, _SIZES, multiple)
+        for number, load in enumerate(scene.loads):
+            steps = [(kink - (scene.contact_time or 0.0)) / H for kink in load.kinks(H) if kink < scene.time.t_end]
+            whole = all(step < 0.0 or abs(step - round(step)) <= _SAME for step in steps)
+            yield Need(f"[loads.{number}]: a step ends where it jumps or bends", whole, _SIZES, multiple)
 
 
 def refusals(scene: Scene, abilities: Mapping[str, Abilities]) -> list[str]:

@@ -29,25 +29,13 @@ _VALUES = np.polynomial.legendre.legvander(_NODES, 2)
 _NORMS = np.array([0.5, 1.5, 2.5])
 
 
-def kinks(load: Load, macro_step: float | None) -> list[float]:
-    """Return when a signal jumps or bends [s]; points of a table that is finer than the macro step are left out."""
-    if load.signal == "constant":
-        return []
-    if load.signal == "table":
-        times = load.start + load.record.x
-        if load.interpolation == "cubic" or load.is_finer_than(macro_step):
-            times = times[[0, -1]]
-        return [float(time) for time in times]
-    return [load.start] if load.duration is None else [load.start, load.start + load.duration]
-
-
 class Signal:
     """One load over the steps of a run."""
 
     def __init__(self, load: Load, macro_step: float | None) -> None:
         self._load = load
         self._end = inf if load.end is None else load.end
-        self.kinks = kinks(load, macro_step)
+        self.kinks = load.kinks(macro_step)
 
     def over(self, time: float, size: float) -> Force:
         """Return the projection onto a step of ``size`` [s] from ``time`` [s] on."""

@@ -124,6 +124,16 @@ class Load(Table):
         times = self.record.x
         return bool(times[-1] - times[0] < _CLOSE * macro_step * (len(times) - 1))
 
+    def kinks(self, macro_step: float | None) -> list[float]:
+        """Return when it jumps or bends [s]; points of a table that is finer than the macro step are left out."""
+        if self.signal == "constant":
+            return []
+        if self.signal == "table":
+            times = self.start + self.record.x
+            only_ends = self.interpolation == "cubic" or self.is_finer_than(macro_step)
+            return [float(time) for time in (times[[0, -1]] if only_ends else times)]
+        return [self.start] if self.duration is None else [self.start, self.start + self.duration]
+
     @property
     def record(self) -> PPoly:
         """The table, as the polynomials between its lines. Raises TableFault, or OSError."""

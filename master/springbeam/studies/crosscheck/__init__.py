@@ -25,7 +25,6 @@ import numpy as np
 
 from ...results.contact_times import ContactChange, contact_changes
 from ...results.trajectory import Trajectory
-from ...run.loads import kinks
 from ...run.outcome import RunStopped
 from ...run.runner import simulate
 from ...scene import Scene, SceneError, with_changes
@@ -130,7 +129,7 @@ def _compare_quantity(report: Report, name: str, sample: Sample, runs: tuple[Tra
     if name not in DISPLACEMENTS:
         # A jump at slightly different times is an event error, judged there.
         jumps = [event.time for run in (coarse, reference) for event in run.events]
-        jumps += [kink for load in report.scene.loads for kink in kinks(load, size)]
+        jumps += [kink for load in report.scene.loads for kink in load.kinks(size)]
         times = times[away_from(times, jumps, size)]
     if len(times) < 2:
         return
