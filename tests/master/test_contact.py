@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from math import inf
 
 import pytest
 
@@ -13,6 +14,7 @@ from springbeam.contact.phases import (
     Joint,
     Phase,
     Transitions,
+    common_velocity,
     foundation_impact,
     meeting,
     rebound,
@@ -42,6 +44,11 @@ def test_inelastic_meeting_leaves_one_velocity(v, z, tip_mass, mass):
     common = (tip_mass * v + mass * z) / (tip_mass + mass)
     scale = abs(v) + abs(z)
     assert after(impact, v, z, tip_mass, mass) == pytest.approx((common, common), abs=1e-14 * scale)
+
+
+def test_an_end_joined_to_a_wall_goes_on_with_the_walls_velocity():
+    assert common_velocity(-0.4, 0.1, 0.25, inf) == 0.1
+    assert common_velocity(0.3, -0.1, inf, 2.0) == 0.3
 
 
 @pytest.mark.parametrize("kind", ["inelastic", "tip", "rest"])

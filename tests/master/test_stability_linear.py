@@ -211,6 +211,9 @@ def test_compliance_is_predicted_where_it_is_stiffest():
     cubic = predict(with_changes(soft, contact={"exponent": 3.0}))
     depth2 = (4.0 / 6.0 / 1e4) ** 0.5
     assert cubic.contact_frequency == pytest.approx((3e4 * depth2 * inverse) ** 0.5)
+    # A load of 0.5 N that begins all at once does 2 F²/k1 = 1/6 J on the spring.
+    pressed = predict(with_changes(soft, contact={"exponent": 3.0}, loads=[{"on": "spring", "amplitude": -0.5}]))
+    assert pressed.contact_frequency == pytest.approx(2.0**0.25 * cubic.contact_frequency)
     assert [(s.scheme, s.degree) for s in cubic.schemes] == [*ENERGY, *EXCHANGES]
     assert cubic.auto[:2] == ("energy", 2)
 
@@ -255,3 +258,17 @@ def test_what_a_scene_lacks_is_left_out(name, changes):
     # The beam on its stop has one note: hermite's bands may be narrow.
     assert [note.split()[0] for note in p.notes if note.startswith("hermite")] == ["hermite"] * (name == "beam-on-stop")
     assert len(p.notes) >= 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "note"),
+    [
+        ({"contact": {"law": "paper"}}, "Algorithm 1 (law = 'paper') overwrites the tip's position"),
+        ({"beam": {"fidelity": "quasi_static"}}, "a quasi-static beam has no inertia"),
+        ({"beam": {"n_elements": 65}, "spring": None, "stop": None}, "predicted with the lowest 128 modes of the beam"),
+    ],
+)
+def test_what_cannot_be_predicted_or_only_in_part_is_said(changes, note):
+    p = predict(with_changes(load_scene("soft"), **changes))
+    assert p.schemes == ()
+    assert any(note in text for text in p.notes)

@@ -85,9 +85,10 @@ def predict(scene: Scene) -> Prediction:
             notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
         if beam.integrator == "generalized_alpha":
             notes.append("predicted for exact modes; generalized_alpha with rho_inf = 1 adds no energy of its own")
-    pair = None if modal is None else linear_pair(scene, modal)
+    of_the_paper = scene.contact.law == "paper"
+    pair = None if modal is None or of_the_paper else linear_pair(scene, modal)
     schemes: tuple[SchemePrediction, ...] = ()
-    if scene.contact.law == "paper":
+    if of_the_paper:
         notes.append("Algorithm 1 (law = 'paper') overwrites the tip's position: no matrix of this kind")
     elif pair is None and not notes:
         notes.append("nothing to couple: a scene with one body and no stop under its tip")
