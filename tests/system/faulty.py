@@ -138,7 +138,7 @@ class Function:
             result = NAMES[fault.kind]
         else:
             result = self._function(*arguments)
-            values = arguments[3]
+            values = getattr(arguments[3], "_obj", arguments[3])  # an array, or `byref` of one
             values[0 if fault.skip % 2 else len(values) - 1] = float(fault.kind)
         script.calls.append((self._fmu, self._name, result if isinstance(result, int) else OK))
         return result
