@@ -101,15 +101,16 @@ class Projection:
         return a[: self.degree + 1]
 
     def slope(self, start: float, size: float, x: Vector) -> Matrix:
-        """Return ∂a/∂x [N/m] of `force`; where p keeps its size, with F′ as it is in the middle of the step."""
+        """Return ∂a/∂x [N/m] of `force`; where p keeps its size, with F′ of its mean."""
+        law = self.law
         if self._is_quotient and _changes(start, x[0]):
-            return [[(self.law.force(x[0]) - self.force(start, size, x)[0]) / (x[0] - start)]]
+            return [[(law.force(x[0]) - self.force(start, size, x)[0]) / (x[0] - start)]]
+        mean = x[1] if self.degree else (start + 2.0 * x[0]) / 3.0  # at degree 0, weighted by ∂p̃/∂x
+        if not self._damped and min(start, x[0], mean) > _STEADY * max(start, x[0], mean):
+            of_mean = law.slope(mean)
+            return [[of_mean * value for value in row] for row in self._by_x_projected]
         path = _path(start, x)
         rule = self._where_it_acts(path, start, x[0])
-        law = self.law
-        if rule is self._few and not self._damped:
-            in_middle = law.slope(path[0] + path[1] / 3.0 if self.degree == 0 else path[0])
-            return [[in_middle * value for value in row] for row in self._by_x_projected]
         rows = [[0.0] * len(x) for _ in x]
         for s, weight in rule:
             p, rate = _at(path, s, size)
@@ -182,21 +183,20 @@ def _changes(start: float, end: float) -> bool:
 
 def penetration_series(start: float, x: Vector) -> Vector:
     """Return the Legendre coefficients of p̃ [m], d + 2 of them."""
-    mean, half_change = 0.5 * (start + x[0]), 0.5 * (x[0] - start)
-    if len(x) == 1:
-        return [mean, half_change]
-    if len(x) == 2:
-        return [x[1], half_change, mean - x[1]]
-    return [x[1], 3.0 * x[2], mean - x[1], half_change - 3.0 * x[2]]
+    b0, b1, b2, b3 = _path(start, x)
+    return [b0 + b2 / 3.0, b1 + 0.6 * b3, b2 / 1.5, 0.4 * b3][: len(x) + 1]
 
 
 def _path(start: float, x: Vector) -> _Path:
-    c = penetration_series(start, x)
-    if len(c) == 2:
-        return (c[0], c[1], 0.0, 0.0)
-    if len(c) == 3:
-        return (c[0] - 0.5 * c[2], c[1], 1.5 * c[2], 0.0)
-    return (c[0] - 0.5 * c[2], c[1] - 1.5 * c[3], 1.5 * c[2], 2.5 * c[3])
+    middle, half_change = 0.5 * (start + x[0]), 0.5 * (x[0] - start)
+    if len(x) == 1:
+        return (middle, half_change, 0.0, 0.0)
+    bend = middle - x[1]
+    if len(x) == 2:
+        return (x[1] - 0.5 * bend, half_change, 1.5 * bend, 0.0)
+    slant = 3.0 * x[2]
+    twist = half_change - slant
+    return (x[1] - 0.5 * bend, slant - 1.5 * twist, 1.5 * bend, 2.5 * twist)
 
 
 def _at(path: _Path, s: float, size: float = 2.0) -> tuple[float, float]:
