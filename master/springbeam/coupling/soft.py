@@ -22,7 +22,7 @@ from ..contact.laws import SoftLaw
 from . import energy
 from .projection import Projection
 from .protocol import Booking, Coupling, Ends, ErrorEstimate, NotConverged, Scales, Step, Window
-from .small import Matrix, Vector, inverse_by_minors, times
+from .small import Matrix, Vector, inverse, times
 from .solver import StepSolver
 
 _MAX_NEWTON, _MAX_DAMPING = 60, 8
@@ -153,7 +153,7 @@ class _Line:
 
     def _flexibility(self, x: Vector, softness: float) -> Matrix:
         """Return (E + A′)⁻¹ [m/N], of the law times ``softness``."""
-        return inverse_by_minors(
+        return inverse(
             [
                 [softness * s - d for s, d in zip(row, line, strict=True)]
                 for row, line in zip(self._slope(x), self._descent, strict=True)
@@ -199,9 +199,7 @@ class _Line:
 
     def _stiffened(self) -> tuple[Vector, Vector] | None:
         """Start from the law so soft that the bodies hardly feel it, and stiffen it from crossing to crossing."""
-        alone = [
-            value - step for value, step in zip(self._x, times(inverse_by_minors(self._descent), self._a), strict=True)
-        ]
+        alone = [value - step for value, step in zip(self._x, times(inverse(self._descent), self._a), strict=True)]
         slope = self._slope(alone)
         gain = max(abs(value) for row in slope for value in row) / max(abs(e) for row in self._descent for e in row)
         softness = min(1.0, 1.0 / gain) if gain > 0.0 else 1.0

@@ -10,17 +10,15 @@ so a step usually costs two beam steps and two spring steps.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from math import inf
 from operator import add, sub
-from typing import Any
 
 import numpy as np
 
 from ..bodies import force
 from ..bodies.protocol import Body, Force, Motion
 from .protocol import Conditions, Coupling, NotConverged, Window
-from .small import Matrix, Vector, broyden, inverse, times, transposed
+from .small import Matrix, Vector, broyden, times, transposed
 
 _MAX_ITERATIONS = 20
 #: Rounding of a sum of modes, relative to the largest it has been.
@@ -37,14 +35,9 @@ SIZES_REMEMBERED = 64
 #: How corrections follow from residuals against one kind of lower body: D = −(B − S)⁻¹ [N/m], and whether S was
 #: measured; if not, it is that of a free mass, followed by Broyden's updates.
 Descent = tuple[Matrix, bool]
-
-
-@dataclass
-class _Response:
-    """What is remembered of a size of step."""
-
-    B: Matrix  #: of the upper body's conditions to a [m/N]
-    descents: dict[str, Descent] = field(default_factory=dict)  #: by the kind of the lower body
+#: What is remembered of a size of step: B of the upper body's conditions to a [m/N], and descents by the kind of the
+#: lower body.
+Response = tuple[Matrix, dict[str, Descent]]
 
 
 class StepSolver(Coupling):
@@ -68,7 +61,7 @@ class StepSolver(Coupling):
         self._conditions = conditions
         self.degree = degree
         self._tolerance = tolerance
-        self._sizes: dict[float, _Response] = {}
+        self._sizes: dict[float, Response] = {}
         self._last_size = 0.0
         self._reach = 0.0  #: largest displacement of an end under a force found [m]
         self._expected = expected
@@ -77,13 +70,6 @@ class StepSolver(Coupling):
     @property
     def iterations(self) -> int:
         return self._corrections
-
-    def save(self) -> dict[str, Any]:
-        return {**super().save(), "_sizes": {size: (known.B, known.descents) for size, known in self._sizes.items()}}
-
-    def restore(self, saved: dict[str, Any]) -> None:
-        super().restore(saved)
-        self._sizes = {size: _Response(*known) for size, known in saved["_sizes"].items()}
 
     def apart(self, gap: Vector, a: Vector, window: Window) -> bool:
         """Return whether nothing acts between the bodies under ``a``, nor should; parameters as of `aim`."""
@@ -126,10 +112,10 @@ class StepSolver(Coupling):
         if known is None:
             tried = None
             length = max(self._expected, abs(upper_end.displacement), size * abs(upper_end.velocity))
-            known = _Response(self._measure(upper, time, size, a, r_upper, length))
+            known = (self._measure(upper, time, size, a, r_upper, length), {})
         self._remember(size, known)
-        B, kind = known.B, type(lower).__name__
-        remembered = known.descents.get(kind)
+        (B, descents), kind = known, type(lower).__name__
+        remembered = descents.get(kind)
         descent, measured = remembered or (_descent(B, self._free_response(lower, size)), False)
         aim = self.aim(gap, a, descent, window)
         residual = gap if aim is None else list(map(sub, gap, aim[0]))
@@ -189,14 +175,14 @@ class StepSolver(Coupling):
         self._last_size = size
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
         self._reach = max(self._reach, abs(upper_end.displacement), abs(lower_end.displacement))
-        known.descents[kind] = (descent, measured)
+        descents[kind] = (descent, measured)
         return acting
 
     def _noise(self, tolerance: float) -> float:
         """Return up to which residual [m] an iteration that stagnates may have met the bodies' own rounding."""
         return max(_NOISE * tolerance, _ROUNDING * self._expected)
 
-    def _remember(self, size: float, known: _Response) -> None:
+    def _remember(self, size: float, known: Response) -> None:
         """Keep ``known`` as what was used last, and forget the size that was used least recently."""
         if size != self._last_size:
             self._sizes.pop(size, None)
@@ -240,6 +226,7 @@ class StepSolver(Coupling):
 def _descent(B: Matrix, S: Matrix) -> Matrix:
     """Return −(B − S)⁻¹, from residuals to Newton's steps. Raises NotConverged if there is none."""
     try:
-        return inverse(np.subtract(S, B).tolist())
+        descent: Matrix = np.linalg.inv(np.subtract(S, B)).tolist()
     except np.linalg.LinAlgError:
         raise NotConverged(float("nan"), 0) from None
+    return descent

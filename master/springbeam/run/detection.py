@@ -6,7 +6,6 @@ Positions tell of meeting, release and the foundation (`springbeam.contact.event
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 from ..bodies.protocol import Motion, StepRefused
 from ..contact.events import (
@@ -20,6 +19,7 @@ from ..contact.events import (
 from ..contact.phases import common_velocity
 from ..coupling.protocol import Ends, Step
 from ..results.paths import Path, Sample
+from ..results.trajectory import Event
 from ..scene import Scene
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .separation import Separation
@@ -33,15 +33,6 @@ _JUMP = 1e5
 _NO_TIME = 1e-9
 #: Rounding of a velocity, relative to the largest so far.
 _VELOCITY_ROUNDING = 16.0 * 2.0**-52
-
-
-class SoftChange(NamedTuple):
-    """Contact by a soft law begins or ends."""
-
-    kind: str
-    time: float  #: [s]
-    tip: Sample  #: displacement [m] and velocity [m/s]
-    low: Sample
 
 
 class Detector:
@@ -215,7 +206,7 @@ class Detector:
 
     # -- soft contact ------------------------------------------------------------------------------------------------
 
-    def soft_change(self, step: Step) -> SoftChange | None:
+    def soft_change(self, step: Step) -> Event | None:
         """Return where contact by a soft law has opened or closed in ``step``, ``None`` if it has not.
 
         Nothing special happens there: the zero is that of the path of the gap.
@@ -231,7 +222,8 @@ class Detector:
         )
         at = Path.through(start, end, step.size, means).falls_through_zero()
         places = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
-        return SoftChange("impact" if touching else "separation", step.time + at * step.size, *places)
+        (u, v), (y, z) = places
+        return Event(step.time + at * step.size, "impact" if touching else "separation", y, z, u, v)
 
 
 def _inside(start: Motion, end: Motion, size: float, s: float) -> Sample:

@@ -103,7 +103,7 @@ class Separation:
             return None
         points = [(t, n if push.event == "unseated" else f) for t, f, n in state.middles]
         zero = _zero_of_means([*points, (state.time + 0.5 * step.size, c)], state.time)
-        if zero is None or (zero >= step.size and _mean(points[-1][1], c) > 0.0):
+        if zero is None or (zero >= step.size and points[-1][1] + c > 0.0):
             return None
         if zero <= self._no_time * macro_step:
             return self.no_step(step), push.event
@@ -127,17 +127,13 @@ class Separation:
         return False
 
 
-def _mean(first: float, second: float) -> float:
-    return 0.5 * (first + second)
-
-
 def _zero_of_means(points: list[tuple[float, float]], start: float) -> float | None:
     """Return when the force vanishes, after ``start`` [s], by the line through its last two means; ``None`` if not.
 
     ``points`` are (middle [s], force [N]) of two or three steps, the last one that which begins at ``start``. The line
     also tells of zeros past the last mean.
     """
-    means = [(_mean(t0, t1), _mean(f0, f1)) for (t0, f0), (t1, f1) in itertools.pairwise(points)]
+    means = [(0.5 * (t0 + t1), 0.5 * (f0 + f1)) for (t0, f0), (t1, f1) in itertools.pairwise(points)]
     time, mean = means[-1]
     if len(means) == 2:
         before, higher = means[0]

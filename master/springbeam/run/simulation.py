@@ -251,7 +251,7 @@ class Simulation(Checkpointed):
         change = self._detector.soft_change(step)
         if change is not None:
             self._events += 1
-            self._recorder.event(Event(change.time, change.kind, *change.low, *change.tip))
+            self._recorder.event(change)
 
     # -- what is reported -------------------------------------------------------------------------------------------
 
@@ -305,7 +305,7 @@ class Simulation(Checkpointed):
             "events": self._events,
             "halved_steps": self._halvings,
             **({"rejected_steps": self._steps.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
-            "iterations": self._pair.iterations,
+            "iterations": self._pair.joined.iterations,
             **({"reduced_steps": reduced} if reduced else {}),
             **self._balance.summary(),
             "max_velocity_mismatch": rows.largest_mismatch,

@@ -85,7 +85,7 @@ class Pair(Checkpointed):
         The bodies; ``None`` where the scene has none.
     """
 
-    CHECKPOINTED = ("beam", "spring", "_held", "_joined")
+    CHECKPOINTED = ("beam", "spring", "_held", "joined")
 
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self.beam, self.spring = beam, spring
@@ -111,8 +111,9 @@ class Pair(Checkpointed):
         self.law = law_of(scene.contact) if self.joinable else Transmission()
         #: Whether contact opens and closes inside steps, without an event that ends them.
         self.opens_softly = self.law.soft and not self.law.lasting
-        self._joined = coupling_of(scene, self.law)
-        self._apart = self._joined if self.law.soft else Uncoupled()
+        #: What couples the bodies where the law acts, and where the ends are apart.
+        self.joined = coupling_of(scene, self.law)
+        self._apart = self.joined if self.law.soft else Uncoupled()
 
     def initial_state(self, time: float) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start."""
@@ -125,16 +126,7 @@ class Pair(Checkpointed):
 
     def coupling(self, phase: Phase) -> Coupling:
         """What couples the bodies in ``phase``: a soft law acts wherever the ends are."""
-        return self._apart if phase.joint is Joint.FREE else self._joined
-
-    @property
-    def joined(self) -> Coupling:
-        """What couples the bodies where the law acts."""
-        return self._joined
-
-    @property
-    def iterations(self) -> int:
-        return self._joined.iterations
+        return self._apart if phase.joint is Joint.FREE else self.joined
 
     def mark(self) -> None:
         """Remember the bodies' states as those that steps start from."""
@@ -197,11 +189,11 @@ class Pair(Checkpointed):
 
     def energies(self, ends: Ends) -> tuple[Energies, Energies, Booking]:
         """Energies of the beam, of the spring and of what couples them [J], where the ends are."""
-        return self.upper.energies(), self.lower.energies(), self._joined.booking(ends)
+        return self.upper.energies(), self.lower.energies(), self.joined.booking(ends)
 
     def exchanged(self, ends: Ends) -> tuple[Energies, Energies, Booking]:
         """Return the energies by which the coupling is judged [J], where the ends are."""
-        return self.upper.exchanged(), self.lower.exchanged(), self._joined.booking(ends)
+        return self.upper.exchanged(), self.lower.exchanged(), self.joined.booking(ends)
 
     def end_force(self, state: State, step: Step) -> float:
         """C at the end of the step as well as the degree tells; exactly, where the tip has no mass [N]."""
@@ -209,9 +201,7 @@ class Pair(Checkpointed):
             low = self.lower.motion()
             return self.upper.holding_force(low.displacement, low.velocity)
         return (
-            force.end_value(self.told_force(state.phase, step), step.size)
-            if self._joined.degree > 0
-            else state.smoothed
+            force.end_value(self.told_force(state.phase, step), step.size) if self.joined.degree > 0 else state.smoothed
         )
 
     def told_force(self, phase: Phase, step: Step) -> Force:
