@@ -139,10 +139,8 @@ class Beam {
   double load_potential() const;  ///< −qᵀF [J] of the uniform and the hat load, as if they were constant
   virtual double load_work_per_unit(std::size_t shape) const = 0;  ///< qᵀF of a unit of a load, as ∫ u dx [m²]
   virtual double tip_mass() const = 0;                             ///< 1/(eᵀ M⁻¹ e) [kg]
-  virtual double static_tip_compliance() const = 0;                ///< u(L) per unit static tip force [m/N]
   virtual void deflection(Shape& u) const = 0;                     ///< [m]
   virtual void rotation(Shape& theta) const = 0;                   ///< [rad]
-  virtual std::vector<double> frequencies() const { return {}; }   ///< of the modes, ascending [rad/s]
 
   /// How the tip goes on over two steps of `size` [s] without a tip force.
   struct Forecast {

@@ -178,9 +178,6 @@ class GeneralizedAlphaBeam final : public Beam {
   double strain_energy() const override { return 0.5 * mu_ * mesh_.stiffness_norm2(q_); }
   double load_work_per_unit(std::size_t i) const override { return shape(i).dot(q_); }
   double tip_mass() const override { return 1.0 / tip_response_[mesh_.tip_index()]; }
-  double static_tip_compliance() const override {
-    return mesh_.flexibility_times(mesh_.unit_tip_force())[mesh_.tip_index()] / mu_;
-  }
   void deflection(Shape& u) const override { mesh_.sample_deflection(q_.data(), u.data()); }
   void rotation(Shape& theta) const override {
     mesh_.sample_scaled_rotation(q_.data(), theta.data());

@@ -73,17 +73,11 @@ class ModalBeam final : public Beam {
   double strain_energy() const override { return 0.5 * (modes_.omega.array() * eta_).square().sum(); }
   double load_work_per_unit(std::size_t i) const override { return modes_.loads[i].dot(eta_.matrix()); }
   double tip_mass() const override { return 1.0 / tip_.square().sum(); }
-  double static_tip_compliance() const override { return (tip_ / modes_.omega.array()).square().sum(); }
   void deflection(Shape& u) const override {
     Eigen::Map<Eigen::VectorXd>(u.data(), shape_points).noalias() = modes_.deflection * eta_.matrix();
   }
   void rotation(Shape& theta) const override {
     Eigen::Map<Eigen::VectorXd>(theta.data(), shape_points).noalias() = modes_.rotation * eta_.matrix();
-  }
-  std::vector<double> frequencies() const override {
-    std::vector<double> omega(modes_.omega.data(), modes_.omega.data() + modes_.omega.size());
-    std::sort(omega.begin(), omega.end());
-    return omega;
   }
 
  private:

@@ -1,11 +1,14 @@
 // What the beam's tests share.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "beam.hpp"
+#include "exact_modes.hpp"
+#include "modes.hpp"
 
 namespace beam::testing {
 
@@ -33,6 +36,28 @@ inline Parameters general_beam(int n_elements, int element_degree = 1) {
   p.n_elements = n_elements;
   p.element_degree = element_degree;
   return p;
+}
+
+inline Modes modes_of(const Parameters& p) {
+  return p.n_elements == 0 ? exact_modes(p) : compute_modes(Timoshenko(p), p);
+}
+
+/// Of the modal beam, ascending [rad/s].
+inline std::vector<double> frequencies(const Parameters& p) {
+  const Eigen::VectorXd omega = modes_of(p).omega;
+  std::vector<double> ascending(omega.data(), omega.data() + omega.size());
+  std::sort(ascending.begin(), ascending.end());
+  return ascending;
+}
+
+/// u(L) per unit static tip force [m/N], of the modes and of the mesh.
+inline double static_tip_compliance(const Parameters& p) {
+  const Modes modes = modes_of(p);
+  return modes.tip.cwiseQuotient(modes.omega).squaredNorm();
+}
+inline double mesh_tip_compliance(const Parameters& p) {
+  const Timoshenko mesh(p);
+  return mesh.flexibility_times(mesh.unit_tip_force())[mesh.tip_index()] / mesh.mass_per_length();
 }
 
 inline Parameters with_integrator(Parameters p, Integrator integrator, double rho_inf = 1.0) {
