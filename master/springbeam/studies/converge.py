@@ -51,27 +51,15 @@ class Mesh:
 
 
 @dataclass(frozen=True)
-class Level:
-    """A run of one mesh."""
-
-    n_elements: int
-    n_modes: int  #: kept; 0: all
-    unknowns: int  #: modes that take part
-    values: dict[str, float | None]  #: by quantity; ``None`` where it did not happen
-    seconds: float  #: wall time
-    cause: str = ""  #: why it stopped early
-
-
-@dataclass(frozen=True)
 class Refinement:
     """Runs whose mesh is finer by `RATIO` from one to the next."""
 
     refined: str  #: ``elements`` or ``modes``
-    levels: list[Level]
+    levels: list[Record]
 
     def settled(self, quantity: str) -> Settled:
         """Judge ``quantity`` by its last three values."""
-        values = [level.values.get(quantity) for level in self.levels]
+        values = [level["values"].get(quantity) for level in self.levels]
         return settled([value for value in values if value is not None]) if None not in values[-3:] else Settled()
 
 
@@ -146,7 +134,7 @@ class Converge(Study):
         return {mesh.name: mesh for mesh in [*meshes, replace(finest, halved=True)]}
 
     def record(self, case: Mesh) -> Record:
-        """Run one mesh."""
+        """Run one mesh. ``unknowns`` are the modes that take part; a value is ``None`` where it did not happen."""
         mesh = {"n_elements": case.n_elements} if case.n_elements else {}
         scene = with_changes(self.scene, beam={**mesh, "n_modes": case.n_modes})
         if case.halved and scene.accuracy is None:
@@ -158,14 +146,13 @@ class Converge(Study):
             values = {name: METRICS[name](made) for name in quantities}
         except RunStopped as stopped:
             values, cause = dict.fromkeys(quantities), stopped.cause
-        seconds = perf_counter() - began
-        return asdict(Level(case.n_elements, case.n_modes, scene.beam.modes_kept, values, seconds, cause))
+        mesh |= {"n_elements": case.n_elements, "n_modes": case.n_modes, "unknowns": scene.beam.modes_kept}
+        return {**mesh, "values": values, "seconds": perf_counter() - began, "cause": cause}
 
     def refinements(self, records: Mapping[str, Record]) -> list[Refinement]:
         """Return the sequences as they were run."""
         return [
-            Refinement(refined, [Level(**records[mesh.name]) for mesh in meshes])
-            for refined, meshes in self.sequences().items()
+            Refinement(refined, [records[mesh.name] for mesh in meshes]) for refined, meshes in self.sequences().items()
         ]
 
     def quantities(self, records: Mapping[str, Record]) -> list[str]:
@@ -175,18 +162,17 @@ class Converge(Study):
 
     def found(self, records: Mapping[str, Record]) -> Found:
         """Judge how the quantities settle."""
-        quantities, halved = self.quantities(records), Level(**list(records.values())[-1])
-        document: dict[str, Any] = {"halved_macro_step": asdict(halved)}
+        quantities, halved = self.quantities(records), list(records.values())[-1]
+        document: dict[str, Any] = {"halved_macro_step": halved}
         shown: list[Any] = [Text(self.scene.title or "(untitled scene)", style="bold")]
         refinements = self.refinements(records)
         for refinement in refinements:
             settled = {name: asdict(refinement.settled(name)) for name in quantities}
-            levels = [asdict(level) for level in refinement.levels]
-            document[refinement.refined] = {"levels": levels, "settled": settled}
+            document[refinement.refined] = {"levels": refinement.levels, "settled": settled}
             rows = [_row(name, refinement, refinements[0].levels, halved) for name in quantities]
             names = ("", "as given", "extrapolated", "error", "order", "by H/2")
             shown.append(table(names, rows, f"more {refinement.refined}"))
-            meshes = (f"{x.n_elements} el. {x.unknowns} modes {x.seconds:.2g} s" for x in refinement.levels)
+            meshes = ("{n_elements} el. {unknowns} modes {seconds:.2g} s".format(**x) for x in refinement.levels)
             shown.append(Text(f"runs      {', '.join(meshes)}"))
         shown += [Text(f"stopped   {name}: {r['cause']}") for name, r in records.items() if r["cause"]]
         shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
@@ -197,10 +183,11 @@ class Converge(Study):
         """Write a row per run, and draw how far each quantity is from its limit."""
         quantities, refinements = self.quantities(records), self.refinements(records)
         levels = [(sequence.refined, level) for sequence in refinements for level in sequence.levels]
-        levels.append(("macro step halved", Level(**list(records.values())[-1])))
+        levels.append(("macro step halved", list(records.values())[-1]))
         rows = [
-            {"refined": refined, "n_elements": level.n_elements, "n_modes": level.n_modes, "unknowns": level.unknowns}
-            | {"wall_time": level.seconds, **{name: level.values[name] for name in quantities}, "stopped": level.cause}
+            {"refined": refined, **{name: level[name] for name in ("n_elements", "n_modes", "unknowns")}}
+            | {"wall_time": level["seconds"], **{name: level["values"][name] for name in quantities}}
+            | {"stopped": level["cause"]}
             for refined, level in levels
         ]
         files = [write_csv(directory / "converge.csv", rows)]
@@ -209,9 +196,9 @@ class Converge(Study):
         return files
 
 
-def _row(name: str, refinement: Refinement, elements: Sequence[Level], halved: Level) -> tuple[str, ...]:
+def _row(name: str, refinement: Refinement, elements: Sequence[Record], halved: Record) -> tuple[str, ...]:
     """Return a quantity for a terminal: of the mesh as given, and where finer ones or more modes lead."""
-    given, last, by_time = elements[0].values[name], elements[-1].values[name], halved.values[name]
+    given, last, by_time = (level["values"][name] for level in (elements[0], elements[-1], halved))
     settled = refinement.settled(name)
     error = "" if settled.change is None else f"({settled.change:.1e})"
     if given is not None and settled.limit is not None:
@@ -262,12 +249,12 @@ def _errors(sequence: Refinement, quantities: Sequence[str]) -> Iterator[tuple[s
         points = [
             (_size(sequence, level), abs(value / limit - 1.0))
             for level in sequence.levels
-            if (value := level.values[name]) is not None and abs(value / limit - 1.0) > _ROUNDING
+            if (value := level["values"][name]) is not None and abs(value / limit - 1.0) > _ROUNDING
         ]
         if points:
             sizes, errors = zip(*points, strict=True)
             yield heading(name), list(sizes), list(errors)
 
 
-def _size(sequence: Refinement, level: Level) -> int:
-    return level.n_elements if sequence.refined == "elements" else level.unknowns
+def _size(sequence: Refinement, level: Record) -> int:
+    return int(level["n_elements" if sequence.refined == "elements" else "unknowns"])
