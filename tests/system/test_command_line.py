@@ -61,7 +61,7 @@ def arguments():
     """The words of a line; sweeps run on a cluster in this process."""
     from distributed import LocalCluster
 
-    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as local:
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0") as local:
         yield lambda line: line.format(scheduler=local.scheduler_address).split()
 
 

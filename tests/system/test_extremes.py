@@ -182,7 +182,7 @@ def test_rebounds_that_cannot_be_seen_end_seated():
 
 def test_bouncing_without_end_stops_by_name(monkeypatch):
     """A damped beam on a lossless stop: its rebounds shrink, but never by enough to be the last."""
-    monkeypatch.setattr("springbeam.run.simulation._MAX_EVENTS_IN_STEP", 300)
+    monkeypatch.setattr("springbeam.run.crowd._MAX_IN_STEP", 300)
     beam = {"density": 672.6, "area": 0.07, "shear_modulus": 53.6, "alpha_b": 1.0, "n_elements": 6}
     tables = {
         "time": {"t_end": 1.5},
