@@ -106,7 +106,8 @@ class Projection:
         if self._is_quotient and _changes(start, x[0]):
             return [[(law.force(x[0]) - self.force(start, size, x)[0]) / (x[0] - start)]]
         mean = x[1] if self.degree else (start + 2.0 * x[0]) / 3.0  # at degree 0, weighted by ∂p̃/∂x
-        if not self._damped and min(start, x[0], mean) > _STEADY * max(start, x[0], mean):
+        steady = not law.one_sided or min(start, x[0], mean) > _STEADY * max(start, x[0], mean)
+        if steady and not self._damped:
             of_mean = law.slope(mean)
             return [[of_mean * value for value in row] for row in self._by_x_projected]
         path = _path(start, x)
