@@ -1,8 +1,10 @@
-"""Imports run downwards only, the references share nothing with what they check, one module knows FMPy."""
+"""Imports run downwards only, references share nothing with what they check, and what is slow is loaded late."""
 
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -14,3 +16,17 @@ ROOT = Path(__file__).parents[2]
 def test_the_contracts_of_pyproject_are_kept(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
     monkeypatch.chdir(ROOT)
     assert lint_imports(no_cache=True) == os.EX_OK, capsys.readouterr().out
+
+
+def test_a_command_loads_what_is_slow_only_where_it_is_needed() -> None:
+    """`springbeam scenes` loads every scene, and none of what takes longer to load than all else of the command."""
+    script = """
+import sys
+from springbeam.cli import app
+try:
+    app(["scenes"])
+except SystemExit:
+    print("SLOW", *sorted({"scipy", "fmpy", "matplotlib", "plotly", "distributed", "pandas"} & set(sys.modules)))
+"""
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
+    assert ran.stdout.splitlines()[-1].split() == ["SLOW"]

@@ -31,7 +31,6 @@ from .common import (
     print_json,
     progress_bar,
 )
-from .watchdog import watched
 
 if TYPE_CHECKING:
     from ..studies.study import Record, Records, Study
@@ -93,6 +92,8 @@ def carry_out(
     ``what`` is a `Study`, or a function that returns one and may raise what bad input raises. The directory is ``out``,
     else ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
     """
+    from .watchdog import watched
+
     console = console_for(silent=quiet or as_json)
     with bad_input_reported():
         study: Study = what() if callable(what) else what
