@@ -357,7 +357,7 @@ def profile(effort: Effort) -> Iterator[Row]:
         lambda: detector.first(state, step),
         lambda: simulation._rows.write(state, step),
         lambda: pair.energies(end),
-        lambda: simulation._ledger.book(*energies),
+        lambda: simulation._balance.ledger.book(*energies),
         lambda: recorder.shape(1.0, beam.shape()),
     ]
     calls = 10 if effort.quick else 2000

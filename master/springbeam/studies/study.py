@@ -274,11 +274,12 @@ def _by_processes(study: Study, todo: dict[str, Any], workers: int) -> Iterator[
                 else:
                     del batch[name]
                     yield name, future.result()
-        if len(died) == 1:
-            del batch[died[0]]
-            yield died[0], None
+        if suspects:  # which died alone
+            for name in died:
+                del suspects[name]
+                yield name, None
         else:
-            suspects = {name: batch.pop(name) for name in died}
+            suspects = {name: todo.pop(name) for name in died}
 
 
 def _as_done(
