@@ -19,7 +19,7 @@ def soft(n_elements: int = 6, **tables: Any) -> Scene:
 
 
 def linear(**tables: Any) -> Scene:
-    """The same with a linear spring."""
+    """Return the scene of `soft` with a linear spring."""
     return soft(**{**tables, "spring": {"cubic_stiffness": 0.0, **tables.get("spring", {})}})
 
 

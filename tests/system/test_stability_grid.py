@@ -184,7 +184,7 @@ class Part(Grid):
 
 
 def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else(tmp_path):
-    """The same records from this process and from two."""
+    """One process and two compute the same records."""
     records = record_all(Part())
     assert record_all(Part(), workers=2) == records
     assert [(r["kind"], r["reason"]) for r in records.values() if r["kind"] == "garbage"] == []
