@@ -82,13 +82,8 @@ def reason_not_to_run(line: str) -> str | None:
     return next((reason for start, reason in NOT_RUN.items() if line.startswith(start)), None)
 
 
-def shell_blocks() -> list[tuple[Path, int]]:
-    return [
-        (page, number)
-        for page in PAGES
-        for number, block in enumerate(blocks(page, "sh"))
-        if not all(reason_not_to_run(line) for line in block.splitlines())
-    ]
+def shell_pages() -> list[Path]:
+    return [page for page in PAGES if not all(map(reason_not_to_run, "\n".join(blocks(page, "sh")).splitlines()))]
 
 
 @pytest.mark.parametrize(("page", "number"), PROGRAMS)
@@ -117,29 +112,30 @@ def test_all_programs_are_run():
 
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory):
-    """A folder that looks like a checkout to commands; pages are followed in turn, results stay."""
+    """A folder that looks like a checkout to commands; a page is followed from its first to its last."""
     folder = tmp_path_factory.mktemp("desk")
     shutil.copytree(ROOT / "master/springbeam/scene/shipped", folder / "master/springbeam/scene/shipped")
     return folder
 
 
-@pytest.mark.parametrize(("page", "number"), shell_blocks(), ids=lambda value: getattr(value, "name", value))
-def test_commands_of_the_documentation_run(desk, page, number, unpainted, monkeypatch):
+@pytest.mark.parametrize("page", shell_pages(), ids=lambda page: page.name)
+def test_commands_of_the_documentation_run(desk, page, unpainted, monkeypatch):
     monkeypatch.chdir(desk)
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
-    shutil.rmtree("results", ignore_errors=True)
-    for line in blocks(page, "sh")[number].splitlines():
-        if reason_not_to_run(line):
-            continue
-        if ">" in line:  # what a shell does; all others are run in this process, which has imported everything
-            ran = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=100)
-            code, said = ran.returncode, ran.stderr
-        else:
-            program, *arguments = shlex.split(line, comments=True)
-            assert program == "springbeam"
-            result = command(*arguments)
-            code, said = result.exit_code, result.stderr
-        assert (code, said) == (0, ""), f"{page.name}: {line}"
+    for block in blocks(page, "sh"):
+        shutil.rmtree("results", ignore_errors=True)
+        for line in filter(str.strip, block.splitlines()):
+            if reason_not_to_run(line):
+                continue
+            if ">" in line:  # what a shell does; all others are run in this process, which has imported everything
+                ran = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=100)
+                code, said = ran.returncode, ran.stderr
+            else:
+                program, *arguments = shlex.split(line, comments=True)
+                assert program == "springbeam"
+                result = command(*arguments)
+                code, said = result.exit_code, result.stderr
+            assert (code, said) == (0, ""), f"{page.name}: {line}"
 
 
 def test_what_is_not_run_is_still_there_and_understood():
