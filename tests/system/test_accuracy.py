@@ -19,7 +19,8 @@ from springbeam.results.recording import MemoryRecorder
 from springbeam.run.runner import run
 from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.studies.accuracy import simulate
-from springbeam.studies.crosscheck import crosscheck, orders
+from springbeam.studies.crosscheck import crosscheck
+from springbeam.studies.crosscheck.orders import orders
 from springbeam.studies.stability.predict import predict
 from springbeam.studies.sweep import row
 from springbeam.studies.tradeoff import Tradeoff
@@ -267,14 +268,15 @@ def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked(study_of, asking):
         study_of(load_scene(asking))
 
 
-def test_crosscheck_compares_the_scene_that_was_picked(asking):
+def test_crosscheck_compares_the_scene_that_was_picked(asking, tmp_path):
     picked = simulate(load_scene(asking)).scene
-    result = command("crosscheck", asking, "--json")
+    arguments = ("crosscheck", asking, "--out", tmp_path / "out")
+    result = command(*arguments, "--json")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     assert found["scene"] == json.loads(json.dumps(picked.model_dump(exclude_none=True)))
     assert found["horizon"] == 0.05
-    assert "accuracy 0.0001 asked: hermite 2, H = " in command("crosscheck", asking).stdout
+    assert "accuracy 0.0001 asked: hermite 2, H = " in command(*arguments).stdout
 
 
 def test_orders_are_those_of_the_scheme_that_was_picked(asking, tmp_path):
@@ -284,9 +286,9 @@ def test_orders_are_those_of_the_scheme_that_was_picked(asking, tmp_path):
     assert 4.5 <= tip["orders"][0] <= 7.0
 
 
-def test_crosscheck_compares_soft_laws_that_were_picked(asking):
+def test_crosscheck_compares_soft_laws_that_were_picked(asking, tmp_path):
     asking.write_text(tomli_w.dumps(completed({**ASKING, "contact": {"law": "compliance"}})))
-    result = command("crosscheck", asking)
+    result = command("crosscheck", asking, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert "accuracy 0.0001 asked: energy 2, H = " in result.stdout
 

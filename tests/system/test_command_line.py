@@ -178,6 +178,12 @@ def test_keys_has_the_schema_and_the_metrics_too():
     assert [re.match(r"(\w+)(?: \[(.*)\])?: ", line)[1] for line in lines] == list(METRICS)
 
 
+@pytest.mark.parametrize("asked", ["spring.mass", "loads.0.frequency", "accuracy"])
+def test_keys_shows_one_key_alone(asked):
+    (key,) = json.loads(command("keys", asked, "--json").stdout)
+    assert key["name"] == asked.rpartition(".")[2]
+
+
 def test_json_of_bad_input_is_nothing():
     result = command("run", "sotf", "--json")
     assert (result.exit_code, result.stdout) == (2, "")
@@ -317,6 +323,7 @@ MISTAKES = {
         ["--output-interval 0.01: --checkpoint"],
     ),
     "table of keys misspelt": ("keys beem", ["beem: unknown table; allowed: time, beam, spring"]),
+    "key to list misspelt": ("keys beam.densty", ["beam.densty: unknown key; allowed: density, length"]),
     "new scene that is there": ("new comma", ["comma.toml: already there; give another NAME"]),
     "results are there": ("run soft --out done", ["done already holds results", "--force replaces", "--out DIR"]),
     "a file for a directory": ("run soft --out comma.toml", ["comma.toml: is a file; --out DIR names a directory"]),

@@ -7,10 +7,13 @@ import json
 
 import pytest
 from commands import command
+from rich.console import Console
 
 from springbeam import load_scene, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.studies.crosscheck import crosscheck, orders
+from springbeam.studies.crosscheck import crosscheck
+from springbeam.studies.crosscheck.comparison import Crosscheck
+from springbeam.studies.crosscheck.orders import orders
 
 SHORT = {"time": {"t_end": 0.2}, "coupling": {"macro_step": 5e-4}}
 
@@ -132,6 +135,8 @@ def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(tmp_pa
     settings = ["--set", "time.t_end=0.2", "--set", "coupling.macro_step=1e-3", "--quick", "--json"]
     found = json.loads(command("crosscheck", "soft", *settings).stdout)
     assert (found["passed"], found["scene"]["time"]["t_end"]) == (True, 0.05)
+    rows = list(csv.DictReader((tmp_path / found["files"][0]).open()))
+    assert [float(row["error"]) for row in rows] == [row["error"] for row in found["quantities"]]
     found = json.loads(command("crosscheck", "soft", *settings, "--orders").stdout)
     assert {len(row["errors"]) for row in found["orders"]} == {3}
     rows = list(csv.DictReader((tmp_path / found["files"][0]).open()))
@@ -139,14 +144,24 @@ def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(tmp_pa
 
 
 def test_the_command_tells_by_its_exit_code(monkeypatch, tmp_path):
-    picture = tmp_path / "both.png"
-    arguments = ["crosscheck", "duffing", "--set", "time.t_end=1", "--out", str(picture)]
-    assert command(*arguments).exit_code == 0
-    assert picture.stat().st_size > 10_000
+    """And shows again what it has found, until it is to begin anew."""
+    out = tmp_path / "both"
+    arguments = ["crosscheck", "duffing", "--set", "time.t_end=1", "--out", out]
     right = event_driven.simulate
-    monkeypatch.setattr(
-        event_driven,
-        "simulate",
-        lambda scene, **options: right(with_changes(scene, spring={"mass": 1.01}), **options),
-    )
-    assert command(*arguments).exit_code == 1
+    for options, mass, code in (([], 1.0, 0), ([], 1.01, 0), (["--force"], 1.01, 1)):
+        wrong = {"spring": {"mass": mass}}
+        monkeypatch.setattr(event_driven, "simulate", lambda scene, **more: right(with_changes(scene, **wrong), **more))  # noqa: B023
+        assert command(*arguments, *options).exit_code == code
+    assert (out / "crosscheck.png").stat().st_size > 10_000
+
+
+def test_a_change_of_contact_that_the_run_lacks_is_shown_as_none():
+    quantity = dict.fromkeys(("error", "at", "l2", "bound"), 0.0) | {"quantity": "y", "passed": True}
+    missing = {"kind": "opens", "time": None, "reference": 0.5, "bound": 0.0, "passed": False}
+    record = {"quantities": [quantity], "events": [missing], "notes": [], "scene": {}, "motion": {"time": [0.0, 1.0]}}
+    study = Crosscheck(scene=load_scene("soft"))
+    found = study.found({"comparison": {**record, "passed": False, "horizon": 1.0, "growth": 1.0}})
+    console = Console(record=True, width=80)
+    console.print(*found.shown)
+    assert not found.passed
+    assert ["opens", "none", "0.5000000000", "0.0e+00", "FAILED"] in map(str.split, console.export_text().splitlines())

@@ -17,7 +17,6 @@ from typing import Annotated
 import typer
 
 from . import (
-    checks,
     compare,
     doctor,
     predict,
@@ -26,6 +25,7 @@ from . import (
     run,
     scenes,
     studies,
+    verify,
 )
 from .common import STOPPED, Command, Group
 
@@ -94,7 +94,7 @@ _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Run": (run.run, resume.resume, studies.sweep),
     "Look": (report.report, report.animate, compare.compare),
     "Choose scheme and accuracy": (predict.predict, studies.tradeoff, studies.converge),
-    "Check": (checks.crosscheck, checks.verify, studies.stability, doctor.doctor),
+    "Check": (studies.crosscheck, verify.verify, studies.stability, doctor.doctor),
 }
 for title, commands in _COMMANDS.items():
     for command in commands:

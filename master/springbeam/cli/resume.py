@@ -24,7 +24,7 @@ def resume(
     """Go on with a run or a study that was killed or stopped.
 
     A run needs --checkpoint; its results are those of a run that was never stopped, to the last bit. A study (sweep,
-    tradeoff, converge, stability, crosscheck --orders) goes on with the cases that have no record yet.
+    tradeoff, converge, stability, crosscheck) goes on with the cases that have no record yet.
 
     Example: springbeam resume results/soft
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated
@@ -47,8 +48,11 @@ def scenes(as_json: JsonOption = False) -> None:
 
 
 def keys(
-    table: Annotated[
-        str | None, typer.Argument(metavar="TABLE", help="Only the keys of this table.", autocompletion=_complete_table)
+    what: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="TABLE[.KEY]", help="Only the keys of this table, or this key.", autocompletion=_complete_table
+        ),
     ] = None,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON Schema of scene files, for editors.")
@@ -75,9 +79,16 @@ def keys(
         for name, m in () if as_json else METRICS.items():
             typer.echo(f"{name}{f' [{m.unit}]' if m.unit else ''}: {m.words}")
         return
-    if table is not None and table not in MODELS:
-        fail(BAD_INPUT, f"{table}: unknown table; allowed: {', '.join(filter(None, MODELS))}")
-    found = reference.listed(table)
+    found = reference.listed()
+    if what is not None:
+        wanted = re.sub(r"\.\d+", "", what)  # loads.0.frequency is a key of loads
+        found = [key for key in found if wanted in (key.table, f"{key.table}.{key.name}".lstrip("."))]
+        if not found:
+            table = wanted.partition(".")[0]
+            kind, there = (
+                ("key", [key.name for key in reference.listed(table)]) if table in MODELS else ("table", MODELS)
+            )
+            fail(BAD_INPUT, f"{what}: unknown {kind}; allowed: {', '.join(filter(None, there))}")
     if as_json:
         print_json([key._asdict() for key in found])
     console = console_for(silent=as_json)

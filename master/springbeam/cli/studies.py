@@ -1,4 +1,4 @@
-"""The commands that carry out a study: ``springbeam sweep``, ``tradeoff``, ``converge``, ``stability``.
+"""The commands that carry out a study: ``springbeam sweep``, ``tradeoff``, ``converge``, ``crosscheck``, ``stability``.
 
 Each returns its study; `study_command` gives it the options that all have and carries it out.
 """
@@ -12,7 +12,9 @@ import typer
 
 from ..scene import load_scene
 from .common import BAD_INPUT, SceneArgument, SettingsOption, complete_key, fail
+from .run import picked
 from .study import QuickOption, study_command
+from .summary import picked_in_words
 
 if TYPE_CHECKING:
     from ..studies.study import Study
@@ -120,6 +122,31 @@ def converge(
     from ..studies.converge import Converge
 
     return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()), quick=quick)
+
+
+@study_command()
+def crosscheck(
+    scene: SceneArgument,
+    settings: SettingsOption = None,
+    with_orders: Annotated[
+        bool, typer.Option("--orders", help="Repeat the run at H/2, H/4, H/8; print observed orders instead.")
+    ] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Compare only the first quarter of the time; with --orders, not H/8.")
+    ] = False,
+) -> Study:
+    """Compare the co-simulation with the monolithic reference of its law. Exit code 1 if they disagree.
+
+    Example: springbeam crosscheck soft --set coupling.scheme=hermite --set coupling.degree=2 --orders
+    """
+    from ..studies.crosscheck.comparison import Crosscheck
+    from ..studies.crosscheck.orders import Orders
+
+    what = load_scene(scene, settings or ())
+    made = picked(what)
+    remarks = () if made is None else (f"accuracy {picked_in_words(made.summary['accuracy'])}",)
+    kind = Orders if with_orders else Crosscheck
+    return kind(scene=what if made is None else made.scene, quick=quick, remarks=remarks)
 
 
 @study_command("workers")

@@ -110,7 +110,7 @@ def carry_out(
         print_json({"directory": directory, "files": files, **found.document})
     elif quiet:
         typer.echo(directory)
-    for part in found.shown:
+    for part in (*map(Text, study.remarks), *found.shown):
         console.print(part)
     for file in files:
         console.print(Text(f"results   {file}"), soft_wrap=True)

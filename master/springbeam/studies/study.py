@@ -25,7 +25,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from importlib import import_module, metadata
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -43,9 +43,16 @@ _STUDIES = {
     "tradeoff": ".tradeoff:Tradeoff",
     "converge": ".converge:Converge",
     "stability": ".stability.grid:Grid",
+    "crosscheck": ".crosscheck.comparison:Crosscheck",
     "orders": ".crosscheck.orders:Orders",
     "critical": ".stability.critical:Critical",
 }
+#: Files that studies write (`Study.write`).
+_WRITTEN = (
+    *("sweep.parquet", "sweep.png", "bifurcation.png", "tradeoff.csv", "tradeoff.png", "converge.csv", "converge.png"),
+    *("stability.csv", "classes.png", "residuals.png", "garbage-*.toml", "critical.csv"),
+    *("crosscheck.csv", "crosscheck.png", "orders.csv"),
+)
 Record = dict[str, Any]
 #: ``report(record)``, called for each record that is new.
 Report = Callable[[Record], None]
@@ -75,6 +82,7 @@ class Study(BaseModel, ABC):
 
     scene: Scene | None = None
     quick: bool = False  #: a smaller table of cases
+    remarks: tuple[str, ...] = ()  #: said before what is found
 
     @abstractmethod
     def cases(self) -> Mapping[str, Any]:
@@ -82,7 +90,10 @@ class Study(BaseModel, ABC):
 
     @abstractmethod
     def record(self, case: Any) -> Record:
-        """Compute one case. Raises FmuError if an FMU cannot be loaded."""
+        """Compute one case; dataclasses and arrays in a record become JSON data, too.
+
+        Raises FmuError if an FMU cannot be loaded.
+        """
 
     @abstractmethod
     def found(self, records: Mapping[str, Record]) -> Found:
@@ -160,6 +171,8 @@ class Records:
             self._begun = True
             self._file.truncate(self._whole)  # without a line that was cut short
             if not self._whole:
+                for stale in chain.from_iterable(map(self.path.parent.glob, _WRITTEN)):
+                    stale.unlink()
                 self._write(self._settings)
         self._write({"case": name, "record": record})
         self.found[name] = record
@@ -240,7 +253,7 @@ def record_all(
             if made is None:  # not kept: the next time it is tried again
                 lost[name] = record = study.lost("its worker process died: an FMU has crashed, or memory ran out")
             else:
-                record = from_json(to_json(made, inf_nan_mode="null"))  # as it is read again
+                record = from_json(to_json(made, inf_nan_mode="null", fallback=lambda value: value.tolist()))
                 (known.__setitem__ if records is None else records.add)(name, record)
             report(record)
     return {name: known[name] if name in known else lost[name] for name in cases}

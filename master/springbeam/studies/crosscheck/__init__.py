@@ -13,8 +13,8 @@ Nothing in it knows the reference, so a wrong sign, mass or law, which converges
 Nonsmooth trajectories separate: comparable is what comes before the first change of contact that the macro step, or a
 tiny perturbation of the reference, moves to another place in the order of events.
 
-``report`` holds what is found, ``sampling`` the values compared; ``paper_law`` compares Algorithm 1, ``orders``
-observes orders.
+``comparison`` is the study, ``report`` holds what is found, ``sampling`` the values compared; ``paper_law`` compares
+Algorithm 1, ``orders`` observes orders.
 """
 
 from __future__ import annotations
@@ -32,12 +32,9 @@ from ...scene.automatic import decided
 from ...scene.resolution import mesh_frequency
 from ...scene.statics import tip_compliance
 from ..reference import PERTURBATION, reference_and_perturbed, refuse_without_reference
-from .orders import OrderRow, Orders, orders
 from .paper_law import crosscheck_paper
 from .report import IDA_TOLERANCE, SAFETY, EventRow, QuantityRow, Report
-from .sampling import DISPLACEMENTS, SHORT, VELOCITIES, Sample, at, away_from, macro_points, quantities
-
-__all__ = ["EventRow", "OrderRow", "Orders", "QuantityRow", "Report", "crosscheck", "orders"]
+from .sampling import DISPLACEMENTS, SHORT, VELOCITIES, at, away_from, macro_points, quantities, sample
 
 #: A scene whose comparable window is shorter than this many macro steps is resolved further, 4 times at a go.
 _ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 16
@@ -115,13 +112,13 @@ def _compare(scene: Scene, coarse: Trajectory, fine: Trajectory, own_horizon: fl
     changes = [contact_changes(run, SHORT * scene.coupling.H) for run in runs]
     stable = _agree_until(changes[2], changes[3], float(coarse.time[0]), float(coarse.time[-1]))
     report = Report(scene, reference, coarse, min(own_horizon, stable), 1.0)
-    for name, sample in quantities(scene):
-        _compare_quantity(report, name, sample, runs)
+    for name in quantities(scene):
+        _compare_quantity(report, name, runs)
     _compare_events(report, changes[0], changes[1], changes[2])
     return report
 
 
-def _compare_quantity(report: Report, name: str, sample: Sample, runs: tuple[Trajectory, ...]) -> None:
+def _compare_quantity(report: Report, name: str, runs: tuple[Trajectory, ...]) -> None:
     coarse, _, reference, _ = runs
     size = report.scene.coupling.H
     times = macro_points(coarse, report.scene)
@@ -133,7 +130,7 @@ def _compare_quantity(report: Report, name: str, sample: Sample, runs: tuple[Tra
         times = times[away_from(times, jumps, size)]
     if len(times) < 2:
         return
-    values = [sample(run, times) for run in runs]
+    values = [sample(run, times, name) for run in runs]
     good = np.all(np.isfinite(values), axis=0)
     if good.sum() < 2:
         return
@@ -177,7 +174,7 @@ def _compare_events(
     expected = [change for change in reference if change.time <= report.horizon]
     for i, (kind, time) in enumerate(expected):
         if i >= len(coarse) or coarse[i].kind != kind:
-            report.events.append(EventRow(kind, float("nan"), time, 0.0, False))
+            report.events.append(EventRow(kind, None, time, 0.0, False))
             return
         ours = coarse[i].time
         if i < len(fine):

@@ -16,7 +16,7 @@ from ...run.runner import simulate
 from ...scene import Scene, SceneError, with_changes
 from ..study import Found, Record, Study, record_all
 from ..tables import table, write_csv
-from .sampling import SHORT, away_from, quantities
+from .sampling import SHORT, away_from, quantities, sample
 
 
 @dataclass(frozen=True)
@@ -63,9 +63,9 @@ class Orders(Study):
             run = event_driven.simulate(self.scene, sample_times=times)
         else:
             run = simulate(with_changes(self.scene, coupling={"macro_step": size / 2**case}))
-        found: Record = {"values": {name: sample(run, times).tolist() for name, sample in quantities(self.scene)}}
+        found: Record = {"values": {name: sample(run, times, name) for name in quantities(self.scene)}}
         if case is None:
-            found["phases"] = run.phase[np.searchsorted(run.time, times)].tolist()
+            found["phases"] = run.phase[np.searchsorted(run.time, times)]
             found["changes"] = [change.time for change in contact_changes(run, SHORT * size)]
         return found
 

@@ -45,7 +45,7 @@ class EventRow:
     """One change of contact."""
 
     kind: str
-    time: float  #: NaN if the co-simulation lacks it
+    time: float | None  #: ``None`` if the co-simulation lacks it
     reference: float
     bound: float
     passed: bool

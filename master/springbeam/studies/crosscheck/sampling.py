@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from ...scene import Scene
 #: Intervals of contact shorter than this many macro steps are no evidence either way.
 SHORT = 2.0
 DISPLACEMENTS, VELOCITIES = ("u_tip", "y"), ("v_tip", "z")
-
-#: Values of a quantity at times [s]; NaN where there is none.
-Sample = Callable[[Trajectory, np.ndarray], np.ndarray]
 
 
 def macro_points(trajectory: Trajectory, scene: Scene) -> np.ndarray:
@@ -31,21 +28,18 @@ def away_from(times: np.ndarray, events: Iterable[float], size: float) -> np.nda
     return away
 
 
-def quantities(scene: Scene) -> Iterable[tuple[str, Sample]]:
-    """Yield names and samples of what is compared."""
+def quantities(scene: Scene) -> list[str]:
+    """Return the columns that are compared."""
+    beam = ("u_tip", "v_tip", "e_beam") if scene.beam is not None else ()
+    spring = ("y", "z", "e_spring") if scene.spring is not None else ()
+    return [*beam, *spring, *(("contact_force",) if scene.coupled else ())]
 
-    def column(name: str) -> Sample:
-        return lambda run, times: at(run, times, name)
 
-    names: list[str] = []
-    if scene.beam is not None:
-        names += ["u_tip", "v_tip", "e_beam"]
-    if scene.spring is not None:
-        names += ["y", "z", "e_spring"]
-    for name in names:
-        yield name, column(name)
-    if scene.coupled:
-        yield "contact_force", _contact_force
+def sample(trajectory: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
+    """Return a quantity at macro points [s]; NaN where there is none. `at`, but for the contact force of a run."""
+    if name == "contact_force" and "reference" not in trajectory.summary:
+        return _contact_force(trajectory, times)
+    return at(trajectory, times, name)
 
 
 def at(trajectory: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
@@ -60,10 +54,8 @@ def at(trajectory: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
 
 
 def _contact_force(trajectory: Trajectory, times: np.ndarray) -> np.ndarray:
-    """Return the contact force at macro points: of a run the mean of its two limits there, from the row after."""
+    """Return the mean of the contact force's two limits at macro points of a run, from the row after."""
     size = trajectory.scene.coupling.H
-    if "reference" in trajectory.summary:
-        return at(trajectory, times, "contact_force")
     steps = np.diff(trajectory.time, prepend=np.nan)
     regular = (np.abs(steps - size) < 1e-6 * size) & (np.abs(np.roll(steps, 1) - size) < 1e-6 * size)
     if regular.sum() < 2:

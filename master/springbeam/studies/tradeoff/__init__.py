@@ -54,7 +54,6 @@ class Tradeoff(Study):
     scene: Scene  #: ends with the compared window
     repeats: int = 3  #: timings of each configuration, taken in turn; their median counts. 1 if quick
     reach: float = 1.0  #: largest displacement [m]; scipy's absolute tolerances are relative to it
-    remarks: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, scene: Scene, until: float | None = None, **settings: Any) -> Tradeoff:
@@ -158,7 +157,7 @@ class Tradeoff(Study):
 
     def notes(self, records: Mapping[str, Record]) -> list[str]:
         """Return what was left out, and why."""
-        notes = [*self.remarks, *(note for record in records.values() for note in record["notes"])]
+        notes = [note for record in records.values() for note in record["notes"]]
         if hopeless := dict.fromkeys(c.method for c in configurations(self.scene) if _hopeless(c)):
             turns = f"explicit steps would follow the mesh's fastest mode over {_MOST_TURNS:g} rad"
             notes.append(f"not run, {turns}: {', '.join(hopeless)}")
@@ -169,7 +168,7 @@ class Tradeoff(Study):
         found, notes, until = self.judged(records), self.notes(records), self.scene.time.t_end
         title = f"{self.scene.title}: up to t = {until:.6g} s, {len(found.points)} configurations"
         shown = [Text(title), *found.tables(), *(Text(f"note      {note}") for note in notes)]
-        return Found({"until": until, **found.document(), "notes": notes}, shown)
+        return Found({"until": until, **found.document(), "notes": [*self.remarks, *notes]}, shown)
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
         """Write a row per point, and draw the work–precision diagrams."""
@@ -180,7 +179,8 @@ class Tradeoff(Study):
         rows = [{**point.row(), "on_front": point in front, "cause": point.cause} for point in found.points]
         files = [write_csv(directory / "tradeoff.csv", rows)]
         if pictures:
-            files.append(draw(self.scene, found, self.notes(records), directory / "tradeoff.png"))
+            notes = [*self.remarks, *self.notes(records)]
+            files.append(draw(self.scene, found, notes, directory / "tradeoff.png"))
         return files
 
 
