@@ -60,11 +60,14 @@ def test_another_study_is_not_mixed_in(tmp_path):
     other = plan(masses="1,3")
     with pytest.raises(ResultsExist, match="another study"):
         Records(other, tmp_path / "s")
+    (tmp_path / "s" / "sweep.png").touch()
     with Records(other, tmp_path / "s", replace=True):  # results stay until there are new ones
         assert study_in(tmp_path / "s") == plan()
+    assert (tmp_path / "s" / "sweep.png").exists()
     with Records(other, tmp_path / "s", replace=True) as records:
         record_all(other, records)
     assert study_in(tmp_path / "s") == other
+    assert not (tmp_path / "s" / "sweep.png").exists()  # which the one before had drawn
     (tmp_path / "t").mkdir()
     (tmp_path / "t" / "thesis.txt").write_text("mine")
     with pytest.raises(ResultsExist, match="not empty"):

@@ -80,8 +80,6 @@ class Grid(Study):
         cells = self.cases()
         rows = [_row(name, cells[name], record) for name, record in records.items()]
         files = [write_csv(directory / "stability.csv", rows)]
-        for stale in directory.glob("garbage-*.toml"):
-            stale.unlink()
         for name, record in records.items():
             if self.failed(record):
                 text = tomli_w.dumps(scene_dict(cells[name]))
