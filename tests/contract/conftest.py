@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes as ct
 import math
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,38 +29,57 @@ class Callbacks(ct.Structure):
     ]
 
 
+#: The inputs of force and impulse, the motion of the end.
+ENDS = {
+    "beam": ("tip_force", "tip_impulse", "tip_displacement", "tip_velocity"),
+    "spring": ("contact_force", "impulse", "displacement", "velocity"),
+}
+#: Parameters that make something happen.
+HILL = {"linear_stiffness": 3.0, "cubic_stiffness": -0.2}
+SOFT = {"young_modulus": 100.0, "shear_modulus": 100.0}
+MOVING: dict[str, dict[str, float]] = {
+    "beam": {**SOFT, "n_elements": 12, "alpha_b": 1e-3, "initial_velocity_slope": -1.0},
+    "spring": {**HILL, "damping": 0.1, "displacement": 0.5, "velocity": -1.0},
+}
+
+
 class Fmu:
-    """A loaded FMU: description and library."""
+    """A loaded FMU: description, library, and what the tests need to know of it."""
 
     def __init__(self, path: Path, folder: Path) -> None:
-        self.path, self.folder = path, folder
+        self.path, self.folder, self.name = path, folder, path.stem
         fmpy.extract(str(path), unzipdir=str(folder))
         self.description: ModelDescription = fmpy.read_model_description(str(path))
-        self.identifier = self.description.coSimulation.modelIdentifier
-        self.binary = folder / "binaries" / "linux64" / f"{self.identifier}.so"
+        identifier = self.description.coSimulation.modelIdentifier
+        self.binary = folder / "binaries" / "linux64" / f"{identifier}.so"
         self.library = ct.CDLL(str(self.binary))
         self.library.fmi2Instantiate.restype = ct.c_void_p
         self.variables = {v.name: v for v in self.description.modelVariables}
+        self.outputs = self.named("output")
         self.instances: list[Instance] = []
+        self.parameters = MOVING[self.name]
+        self.force, self.impulse, self.displacement, self.velocity = ENDS[self.name]
+
+    def named(self, causality: str) -> list[str]:
+        """The variables of a causality."""
+        return [name for name, v in self.variables.items() if v.causality == causality]
+
+    def references(self, *names: str) -> Any:
+        """The value references, as C takes them."""
+        return (ct.c_uint * len(names))(*[self.variables[name].valueReference for name in names])
 
     def instance(self, **options: Any) -> Instance:
         made = Instance(self, **options)
         self.instances.append(made)
         return made
 
-    def running(self, start_time: float = 0.0, **values: float) -> Instance:
-        """An instance that has left initialization mode, with the given parameters and inputs."""
-        made = self.instance()
-        assert made.setup(start=start_time) == OK
-        for name, value in values.items():
-            made.set(name, value)
-        assert made.call("fmi2EnterInitializationMode") == OK
-        assert made.call("fmi2ExitInitializationMode") == OK
-        return made
+    def running(self, **values: Any) -> Instance:
+        """An instance that was started, see `Instance.enter`."""
+        return self.instance().start(**values)
 
-    @property
-    def outputs(self) -> list[str]:
-        return [v.name for v in self.description.modelVariables if v.causality == "output"]
+    def moving(self, **values: Any) -> Instance:
+        """One in which something happens."""
+        return self.running(**{**self.parameters, **values})
 
 
 class Instance:
@@ -82,9 +101,8 @@ class Instance:
         struct = Callbacks(self._logger, None, None, None, None)
         pointer = ct.byref(struct) if callbacks else None
         identity = fmu.description.guid.encode() if guid is None else guid
-        self.component = ct.c_void_p(
-            fmu.library.fmi2Instantiate(name, kind, identity, resources, pointer, 0, int(logging))
-        )
+        made = fmu.library.fmi2Instantiate(name, kind, identity, resources, pointer, 0, int(logging))
+        self.component = ct.c_void_p(made)
         # The FMU must have copied the struct.
         ct.memset(ct.byref(struct), 0xFF, ct.sizeof(struct))
 
@@ -105,22 +123,29 @@ class Instance:
             self.component = ct.c_void_p()
 
     def setup(self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None) -> int:
-        return self.call(
-            "fmi2SetupExperiment",
-            int(tolerance is not None),
-            ct.c_double(tolerance or 0.0),
-            ct.c_double(start),
-            int(stop is not None),
-            ct.c_double(stop or 0.0),
-        )
+        known = int(tolerance is not None), ct.c_double(tolerance or 0.0)
+        end = int(stop is not None), ct.c_double(stop or 0.0)
+        return self.call("fmi2SetupExperiment", *known, ct.c_double(start), *end)
 
-    def initialize(self) -> None:
+    def enter(
+        self, start_time: float = 0.0, stop_time: float | None = None, tolerance: float | None = None, **values: float
+    ) -> Instance:
+        """Enter initialization mode, with values of parameters and inputs."""
+        assert self.setup(start_time, stop_time, tolerance) == OK, self.message
+        for name, value in values.items():
+            self.set(name, value)
         assert self.call("fmi2EnterInitializationMode") == OK, self.message
+        return self
+
+    def start(self, **values: Any) -> Instance:
+        """Enter initialization mode and leave it."""
+        self.enter(**values)
         assert self.call("fmi2ExitInitializationMode") == OK, self.message
+        return self
 
     def try_set(self, name: str, value: float) -> int:
         variable = self.fmu.variables[name]
-        reference = (ct.c_uint * 1)(variable.valueReference)
+        reference = self.fmu.references(name)
         if variable.type == "Real":
             return self.call("fmi2SetReal", reference, 1, (ct.c_double * 1)(value))
         function = "fmi2SetBoolean" if variable.type == "Boolean" else "fmi2SetInteger"
@@ -131,9 +156,8 @@ class Instance:
 
     def get(self, *names: str) -> Any:
         """Real values: one, or a list."""
-        references = (ct.c_uint * len(names))(*[self.fmu.variables[n].valueReference for n in names])
         values = (ct.c_double * len(names))(*[math.nan] * len(names))
-        assert self.call("fmi2GetReal", references, len(names), values) == OK, self.message
+        assert self.call("fmi2GetReal", self.fmu.references(*names), len(names), values) == OK, self.message
         return values[0] if len(names) == 1 else list(values)
 
     def outputs(self) -> list[float]:
@@ -141,11 +165,11 @@ class Instance:
 
     def derive(self, name: str, order: int, value: float) -> int:
         """Set an input's derivative."""
-        reference = (ct.c_uint * 1)(self.fmu.variables[name].valueReference)
+        reference = self.fmu.references(name)
         return self.call("fmi2SetRealInputDerivatives", reference, 1, (ct.c_int * 1)(order), (ct.c_double * 1)(value))
 
     def derivative(self, name: str, order: int = 1) -> tuple[int, float]:
-        reference = (ct.c_uint * 1)(self.fmu.variables[name].valueReference)
+        reference = self.fmu.references(name)
         value = (ct.c_double * 1)(math.nan)
         return self.call("fmi2GetRealOutputDerivatives", reference, 1, (ct.c_int * 1)(order), value), value[0]
 
@@ -176,6 +200,11 @@ class Instance:
         status = self.call("fmi2DeSerializeFMUstate", blob, ct.c_size_t(len(blob)), ct.byref(token))
         return status, token
 
+    def deserialized(self, blob: bytes) -> ct.c_void_p:
+        status, token = self.try_deserialize(blob)
+        assert status == OK, self.message
+        return token
+
 
 @pytest.fixture
 def folder(fmu_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -187,82 +216,31 @@ def folder(fmu_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.fixture(scope="session")
-def loaded(fmu_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Fmu]:
-    cache: dict[str, Fmu] = {}
-
-    def load(name: str) -> Fmu:
-        if name not in cache:
-            cache[name] = Fmu(fmu_folder / f"{name}.fmu", tmp_path_factory.mktemp(name))
-        return cache[name]
-
-    return load
-
-
-def _lend(fmu: Fmu) -> Iterator[Fmu]:
-    yield fmu
-    for instance in fmu.instances:
-        instance.free()
-    fmu.instances.clear()
+def fmus(fmu_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Fmu]:
+    return {name: Fmu(fmu_folder / f"{name}.fmu", tmp_path_factory.mktemp(name)) for name in ENDS}
 
 
 @pytest.fixture
-def beam(loaded: Callable[[str], Fmu]) -> Iterator[Fmu]:
-    yield from _lend(loaded("beam"))
+def loaded(fmus: dict[str, Fmu]) -> Iterator[dict[str, Fmu]]:
+    """Both FMUs; the instances that the test makes are freed after it."""
+    yield fmus
+    for fmu in fmus.values():
+        for instance in fmu.instances:
+            instance.free()
+        fmu.instances.clear()
 
 
 @pytest.fixture
-def spring(loaded: Callable[[str], Fmu]) -> Iterator[Fmu]:
-    yield from _lend(loaded("spring"))
+def beam(loaded: dict[str, Fmu]) -> Fmu:
+    return loaded["beam"]
 
 
-#: Per FMU: parameters that make something happen, the force and the impulse input, the motion of the end.
-CASES: dict[str, dict[str, Any]] = {
-    "beam": {
-        "parameters": {
-            "young_modulus": 100.0,
-            "shear_modulus": 100.0,
-            "n_elements": 12,
-            "alpha_b": 1e-3,
-            "initial_velocity_slope": -1.0,
-        },
-        "force": "tip_force",
-        "impulse": "tip_impulse",
-        "displacement": "tip_displacement",
-        "velocity": "tip_velocity",
-    },
-    "spring": {
-        "parameters": {
-            "linear_stiffness": 3.0,
-            "cubic_stiffness": -0.2,
-            "damping": 0.1,
-            "displacement": 0.5,
-            "velocity": -1.0,
-        },
-        "force": "contact_force",
-        "impulse": "impulse",
-        "displacement": "displacement",
-        "velocity": "velocity",
-    },
-}
+@pytest.fixture
+def spring(loaded: dict[str, Fmu]) -> Fmu:
+    return loaded["spring"]
 
 
-class Case:
-    """An FMU with what the tests need to know of it."""
-
-    def __init__(self, name: str, fmu: Fmu) -> None:
-        self.name, self.fmu = name, fmu
-        self.parameters: dict[str, float] = CASES[name]["parameters"]
-        self.force: str = CASES[name]["force"]
-        self.impulse: str = CASES[name]["impulse"]
-        self.displacement: str = CASES[name]["displacement"]
-        self.velocity: str = CASES[name]["velocity"]
-
-    def running(self, start_time: float = 0.0, **values: float) -> Instance:
-        return self.fmu.running(start_time, **{**self.parameters, **values})
-
-
-@pytest.fixture(params=["beam", "spring"])
-def case(request: pytest.FixtureRequest, loaded: Callable[[str], Fmu]) -> Iterator[Case]:
-    name: str = request.param
-    for fmu in _lend(loaded(name)):
-        yield Case(name, fmu)
+@pytest.fixture(params=ENDS)
+def case(request: pytest.FixtureRequest, loaded: dict[str, Fmu]) -> Fmu:
+    """Each of them in turn."""
+    return loaded[request.param]

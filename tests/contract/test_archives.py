@@ -121,26 +121,12 @@ def test_our_own_are_unpacked_to_the_last_byte(fmu_folder: Path, tmp_path: Path,
     assert {str(p.relative_to(tmp_path)): p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == files
 
 
-def refusal(folder: Path) -> str:
-    result = command("run", "soft", "--out", folder / "out")
-    assert result.exit_code == 2
-    assert "Traceback" not in result.output
-    assert not (folder / "out").exists()
-    return result.stderr
-
-
 def test_the_command_names_file_and_member(folder: Path) -> None:
     with ZipFile(folder / "spring.fmu", "a") as file:
         file.writestr(named("../../evil"), b"evil")
-    assert refusal(folder).startswith(f"error: {folder / 'spring.fmu'}: not a usable FMU: member '../../evil' leads")
-
-
-def test_entities_of_a_description_are_not_followed(folder: Path) -> None:
-    with ZipFile(folder / "beam.fmu") as file:
-        files = {name: file.read(name) for name in file.namelist()}
-    entity = b'<!DOCTYPE x [<!ENTITY secret SYSTEM "file:///etc/passwd">]>\n<fmiModelDescription'
-    files["modelDescription.xml"] = files["modelDescription.xml"].replace(b"<fmiModelDescription", entity, 1)
-    with ZipFile(folder / "beam.fmu", "w") as file:
-        for name, content in files.items():
-            file.writestr(name, content)
-    assert "document type declaration" in refusal(folder)
+    result = command("run", "soft", "--out", folder / "out")
+    assert result.exit_code == 2
+    said = f"error: {folder / 'spring.fmu'}: not a usable FMU: member '../../evil' leads"
+    assert result.output.startswith(said)
+    assert "Traceback" not in result.output
+    assert not (folder / "out").exists()

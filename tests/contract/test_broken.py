@@ -44,6 +44,10 @@ TIP_FORCE = r'(name="tip_force" valueReference=")\d+'
 BROKEN: dict[str, tuple[Callable[[Files], None], str]] = {
     "no description": (without(XML), "modelDescription.xml"),
     "description is not XML": (replaced(XML, b"<fmiModelDescription"), "XML|markup|parse|syntax|find end"),
+    "an entity from outside": (
+        edited("<fmi", '<!DOCTYPE x [<!ENTITY secret SYSTEM "file:///etc/passwd">]>\n<fmi'),
+        "document type declaration",
+    ),
     "description breaks the schema": (edited(r"<CoSimulation", '<CoSimulation colour="red"'), "colour"),
     "another FMI version": (edited(r'fmiVersion="2.0"', 'fmiVersion="9.9"'), r"9\.9|version"),
     "no co-simulation": (

@@ -79,23 +79,15 @@ CHANGES: dict[str, list[float]] = {
 
 def started(case: Any, values: dict[str, float]) -> dict[str, float]:
     """Return the outputs at the start; none where these values are refused together."""
-    k = case.fmu.instance()
-    k.setup()
-    for name, value in values.items():
-        k.set(name, value)
-    assert k.call("fmi2EnterInitializationMode") == 0
-    refused = k.call("fmi2GetReal", references(case.fmu, case.fmu.outputs[:1]), 1, (ct.c_double * 1)()) != 0
-    outputs = {} if refused else dict(zip(case.fmu.outputs, k.outputs(), strict=True))
+    k = case.instance().enter(**values)
+    refused = k.call("fmi2GetReal", case.references(case.outputs[0]), 1, (ct.c_double * 1)()) != 0
+    outputs = {} if refused else dict(zip(case.outputs, k.outputs(), strict=True))
     k.free()
     return outputs
 
 
-def references(fmu: Any, names: list[str]) -> Any:
-    return (ct.c_uint * len(names))(*[fmu.variables[name].valueReference for name in names])
-
-
 def declared(case: Any, section: str) -> dict[str, set[str]]:
-    root = ET.parse(case.fmu.folder / "modelDescription.xml").getroot()
+    root = ET.parse(case.folder / "modelDescription.xml").getroot()
     names = [v.get("name", "") for v in root.iter("ScalarVariable")]
     return {
         names[int(u.get("index", "")) - 1]: {names[int(i) - 1] for i in u.get("dependencies", "").split()}
@@ -108,31 +100,31 @@ def differ(a: float, b: float) -> bool:
 
 
 def test_initial_unknowns(case: Any) -> None:
-    found: dict[str, set[str]] = {name: set() for name in case.fmu.outputs}
-    knobs = [v.name for v in case.fmu.description.modelVariables if v.initial != "calculated"]
+    found: dict[str, set[str]] = {name: set() for name in case.outputs}
+    knobs = [v.name for v in case.description.modelVariables if v.initial != "calculated"]
     for base in BASES[case.name]:
         values = {**COMMON[case.name], **base}
         before = started(case, values)
         for name in knobs:
-            start = values.get(name, float(case.fmu.variables[name].start or 0.0) if name not in CHANGES else 0.0)
+            start = values.get(name, float(case.variables[name].start or 0.0) if name not in CHANGES else 0.0)
             for value in CHANGES.get(name, [1.25 * start + 0.01]):
                 after = started(case, {**values, name: value})
                 for output, reached in after.items():
                     if differ(before[output], reached):
                         found[output].add(name)
-    exact = {v.name for v in case.fmu.description.modelVariables if v.causality == "output" and v.initial == "exact"}
+    exact = {v.name for v in case.description.modelVariables if v.causality == "output" and v.initial == "exact"}
     assert {name: found[name] for name in found if name not in exact} == declared(case, "InitialUnknowns")
 
 
 def test_outputs_follow_between_steps_what_is_declared(case: Any) -> None:
-    found: dict[str, set[str]] = {name: set() for name in case.fmu.outputs}
+    found: dict[str, set[str]] = {name: set() for name in case.outputs}
     for base in BASES[case.name]:
-        for name in [v.name for v in case.fmu.description.modelVariables if v.causality == "input"]:
-            k = case.fmu.running(**{**COMMON[case.name], **base})
+        for name in case.named("input"):
+            k = case.running(**{**COMMON[case.name], **base})
             k.step(0.0, 1e-3)
             before = k.outputs()
             k.set(name, k.get(name) - 0.05)
-            for output, a, b in zip(case.fmu.outputs, before, k.outputs(), strict=True):
+            for output, a, b in zip(case.outputs, before, k.outputs(), strict=True):
                 if differ(a, b):
                     found[output].add(name)
             k.free()
@@ -141,13 +133,12 @@ def test_outputs_follow_between_steps_what_is_declared(case: Any) -> None:
 
 def test_directional_derivatives_are_those_of_the_outputs(case: Any) -> None:
     """Derivatives of every output by every continuous input, against the difference over a small change of it."""
-    inputs = [v.name for v in case.fmu.description.modelVariables if v.causality == "input"]
-    inputs = [name for name in inputs if case.fmu.variables[name].variability == "continuous"]
-    outputs = case.fmu.outputs
-    known, unknown = references(case.fmu, inputs), references(case.fmu, outputs)
+    inputs = [name for name in case.named("input") if case.variables[name].variability == "continuous"]
+    outputs = case.outputs
+    known, unknown = case.references(*inputs), case.references(*outputs)
     found = 0
     for base in BASES[case.name]:
-        k = case.fmu.running(**{**COMMON[case.name], **base})
+        k = case.running(**{**COMMON[case.name], **base})
         k.step(0.0, 1e-3)
         for i, name in enumerate(inputs):
             value, change = k.get(name), 1e-6
@@ -170,24 +161,25 @@ def test_directional_derivatives_are_those_of_the_outputs(case: Any) -> None:
     assert found >= {"beam": 8, "spring": 2}[case.name]
 
 
+def by_one(fmu: Any, output: str, name: str) -> tuple[Any, ...]:
+    """Return the arguments that ask for the derivative of an output by one variable."""
+    one = ct.c_size_t(1)
+    return fmu.references(output), one, fmu.references(name), one, (ct.c_double * 1)(1.0), (ct.c_double * 1)()
+
+
 def test_a_directional_derivative_that_is_not_known_is_discarded(spring: Any) -> None:
     """The held force before its first step follows the tip by a search with trial steps."""
     k = spring.running(**{**COMMON["spring"], **AHEAD})
-    value = (ct.c_double * 1)()
-    one = (references(spring, ["reaction"]), ct.c_size_t(1), references(spring, ["tip_displacement"]), ct.c_size_t(1))
-    assert k.call("fmi2GetDirectionalDerivative", *one, (ct.c_double * 1)(1.0), value) == 2
+    assert k.call("fmi2GetDirectionalDerivative", *by_one(spring, "reaction", "tip_displacement")) == 2
     assert "reaction" in k.message
     k.step(0.0, 1e-3)
 
 
 def test_a_directional_derivative_by_a_parameter_is_discarded_in_initialization_mode(case: Any) -> None:
     """There parameters are knowns, so asking is right; later it is an error."""
-    k = case.fmu.instance()
-    k.setup()
-    k.call("fmi2EnterInitializationMode")
+    k = case.instance().enter()
     name = next(iter(case.parameters))
-    one = (references(case.fmu, [case.velocity]), ct.c_size_t(1), references(case.fmu, [name]), ct.c_size_t(1))
-    ask = (*one, (ct.c_double * 1)(1.0), (ct.c_double * 1)())
+    ask = by_one(case, case.velocity, name)
     assert k.call("fmi2GetDirectionalDerivative", *ask) == 2
     assert name in k.message
     assert k.call("fmi2ExitInitializationMode") == 0

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
+from scipy.integrate import solve_ivp
 
 import springbeam
 
@@ -41,21 +42,15 @@ class Pair:
         """Parameters of the beam are in `BEAM` or unknown to the spring."""
         of_beam = {n: v for n, v in parameters.items() if n not in self.spring.fmu.variables}
         of_spring = {n: v for n, v in parameters.items() if n not in of_beam}
-        self.set_up(self.beam, {**BEAM, **self.ahead, **of_beam})
+        self.beam.enter(**{**BEAM, **self.ahead, **of_beam})
         if self.ahead:
             names = ["tip_response", "tip_response_2", "tip_velocity_forecast"]
             of_spring = {**self.ahead, **dict(zip(names, self.beam.get(*names), strict=True)), **of_spring}
-        self.set_up(self.spring, {**SPRING, **of_spring})
+        self.spring.enter(**{**SPRING, **of_spring})
         self.exchange()
         for k in (self.beam, self.spring):
             assert k.call("fmi2ExitInitializationMode") == 0
         return self
-
-    def set_up(self, k: Any, values: dict[str, float]) -> None:
-        k.setup()
-        for name, value in values.items():
-            k.set(name, value)
-        assert k.call("fmi2EnterInitializationMode") == 0, k.message
 
     def exchange(self) -> None:
         force = self.spring.get("reaction")
@@ -166,15 +161,6 @@ def test_beam_that_looks_ahead_says_where_its_free_tip_goes(beam: Any) -> None:
     assert plain.get("tip_velocity") == pytest.approx(v + 2 * size * rate, abs=1e-13)
 
 
-def test_spring_that_looks_ahead_refuses_steps_of_another_size(spring: Any) -> None:
-    k = spring.running(contact_law=2, communication_step=1e-3, tip_response=1e-4, **LAW)
-    k.step(0.0, 1e-3 * (1 + 1e-9))  # rounding of a tool's times
-    before = k.outputs()
-    assert k.try_step(1e-3 * (1 + 1e-9), 5e-4) == 2
-    assert "a step of 0.0005 s, but communication_step = 0.001 s" in k.message
-    assert k.outputs() == before
-
-
 def test_a_last_step_of_rounding_is_made_under_the_held_force(beam: Any, spring: Any) -> None:
     size = 1e-3
     pair, twin = Pair(beam, spring, size).start(), Pair(beam, spring, size).start()
@@ -189,6 +175,7 @@ def test_a_last_step_of_rounding_is_made_under_the_held_force(beam: Any, spring:
     pair.time += 3e-14
     assert pair.run(0.1)[1] == pytest.approx(twin.run(0.1)[1], abs=1e-10)  # 1 m/s times the rounding, and its effect
     assert pair.spring.try_step(pair.time, 2e-9) == 2  # no rounding any more: 2e-6 of the step
+    pair.spring.step(pair.time, size * (1 + 1e-9))  # as a tool's times may have it
 
 
 def gauss_seidel(pair: Pair, first: str) -> None:
@@ -262,17 +249,6 @@ def test_a_right_pair_is_not_warned_of_its_loads(beam: Any, spring: Any, load: A
         assert warnings(pair) == []
 
 
-def test_spring_that_looks_ahead_needs_the_response_of_the_tip(spring: Any) -> None:
-    k = spring.instance()
-    k.setup()
-    for name, value in {"contact_law": 2, "communication_step": 1e-3}.items():
-        k.set(name, value)
-    k.call("fmi2EnterInitializationMode")
-    assert k.call("fmi2ExitInitializationMode") == 3
-    assert "tip_response = 0" in k.message
-    assert "output of the beam" in k.message
-
-
 def test_reaction_follows_the_tip_without_a_step(spring: Any) -> None:
     k = spring.running(contact_law=2, **LAW)
     assert k.get("reaction") == 0.0
@@ -283,24 +259,16 @@ def test_reaction_follows_the_tip_without_a_step(spring: Any) -> None:
     assert k.get("reaction") == 0.0
 
 
-def hunt_crossley(chi: float, tip: float, speed: float, end: float, steps: int) -> tuple[float, float, float]:
-    """y, velocity and what was dissipated of a mass of 1 kg at 0 under a tip at ``tip + speed t``, by Runge-Kutta."""
-    stiffness, exponent = LAW["compliance_stiffness"], LAW["compliance_exponent"]
+def hunt_crossley(chi: float, speed: float, end: float) -> np.ndarray:
+    """y, velocity and what was dissipated of a mass of 1 kg at 0 under a tip at ``speed t``, by scipy."""
 
-    def slope(t: float, state: np.ndarray) -> np.ndarray:
-        depth, rate = state[0] - tip - speed * t, state[1] - speed
-        elastic = stiffness * max(depth, 0.0) ** exponent
+    def slope(t: float, state: np.ndarray) -> list[float]:
+        depth, rate = state[0] - speed * t, state[1] - speed
+        elastic = LAW["compliance_stiffness"] * max(depth, 0.0) ** LAW["compliance_exponent"]
         force = elastic * max(0.0, 1.0 + chi * rate)
-        return np.array([state[1], -3.0 * state[0] - force, (force - elastic) * rate])
+        return [state[1], -3.0 * state[0] - force, (force - elastic) * rate]
 
-    state, h = np.zeros(3), end / steps
-    for i in range(steps):
-        t = i * h
-        a = slope(t, state)
-        b = slope(t + h / 2, state + h / 2 * a)
-        c = slope(t + h / 2, state + h / 2 * b)
-        state = state + h / 6 * (a + 2 * b + 2 * c + slope(t + h, state + h * c))
-    return float(state[0]), float(state[1]), float(state[2])
+    return solve_ivp(slope, (0.0, end), np.zeros(3), "DOP853", rtol=1e-13, atol=1e-18).y[:, -1]
 
 
 @pytest.mark.parametrize("chi", [0.0, 0.3, 4.0])
@@ -311,7 +279,7 @@ def test_damped_law_inside_follows_an_independent_integration(spring: Any, chi: 
         k.set("tip_displacement", i * size * speed)
         k.set("tip_velocity", speed)
         k.step(i * size, size)
-    y, velocity, dissipated = hunt_crossley(chi, 0.0, speed, 20 * size, 20_000)
+    y, velocity, dissipated = hunt_crossley(chi, speed, 20 * size)
     assert k.get("displacement") == pytest.approx(y, rel=1e-9)
     assert k.get("velocity") == pytest.approx(velocity, rel=1e-8)
     assert k.get("dissipated_energy") == pytest.approx(dissipated, rel=1e-7, abs=1e-18)
@@ -341,15 +309,9 @@ def test_looking_ahead_belongs_to_the_state(beam: Any, spring: Any) -> None:
     first = pair.run(0.1)
     outputs = [k.outputs() for k in (pair.beam, pair.spring)]
     fresh = Pair(beam, spring, 1e-3)
-    for k, blob in zip((fresh.beam, fresh.spring), blobs, strict=True):
-        status, token = k.try_deserialize(blob)
-        assert status == 0, k.message
-        k.restore(token)
     for again in (fresh, pair):  # in new instances, and back in the old
         for k, blob in zip((again.beam, again.spring), blobs, strict=True):
-            status, token = k.try_deserialize(blob)
-            assert status == 0, k.message
-            k.restore(token)
+            k.restore(k.deserialized(blob))
         again.time = 5e-3
         assert np.array_equal(again.run(0.1)[1:], first[1:])
         assert [k.outputs() for k in (again.beam, again.spring)] == outputs

@@ -25,7 +25,7 @@ def run(*command: str | Path, **options: Any) -> str:
 
 def arguments(case: Any) -> list[str]:
     names = [case.force, case.impulse, case.displacement, case.velocity, "kinetic_energy", "dissipated_energy"]
-    return [case.fmu.description.guid, *(str(case.fmu.variables[n].valueReference) for n in names)]
+    return [case.description.guid, *(str(case.variables[n].valueReference) for n in names)]
 
 
 def rows(output: str) -> list[list[str]]:
@@ -49,17 +49,17 @@ def wine_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_c_host(case: Any, linux_host: Path) -> None:
-    result = rows(run(linux_host, case.fmu.binary, *arguments(case)))
+    result = rows(run(linux_host, case.binary, *arguments(case)))
     repeated = [row for row in result if row[0] == "100"]
     assert len(repeated) == 8  # step 100 was made twice, from the same state
     assert repeated[:4] == repeated[4:]
 
 
 def test_windows_binary_under_wine(case: Any, linux_host: Path, wine_prefix: Path, tmp_path: Path) -> None:
-    with zipfile.ZipFile(case.fmu.path) as archive:
+    with zipfile.ZipFile(case.path) as archive:
         name = f"binaries/win64/{case.name}.dll"
         if name not in archive.namelist():
-            pytest.skip(f"{case.fmu.path.name} has no Windows binary: ./build.sh win64 makes one")
+            pytest.skip(f"{case.path.name} has no Windows binary: ./build.sh win64 makes one")
         archive.extract(name, tmp_path)
     wine = shutil.which("wine64") or shutil.which("wine") or shutil.which("wine64", path="/usr/lib/wine")
     if wine is None or not ZIG.is_file():
@@ -68,7 +68,7 @@ def test_windows_binary_under_wine(case: Any, linux_host: Path, wine_prefix: Pat
     run(ZIG, "-O1", "-isystem", HEADERS, HERE / "host.c", "-o", host)
     environment = {**os.environ, "WINEPREFIX": str(wine_prefix), "WINEDEBUG": "-all"}
     theirs = rows(run(wine, host, f"binaries\\win64\\{case.name}.dll", *arguments(case), cwd=tmp_path, env=environment))
-    ours = rows(run(linux_host, case.fmu.binary, *arguments(case)))
+    ours = rows(run(linux_host, case.binary, *arguments(case)))
     assert [row[:2] for row in theirs] == [row[:2] for row in ours]
     repeated = [row for row in theirs if row[0] == "100"]
     assert repeated[:4] == repeated[4:]
