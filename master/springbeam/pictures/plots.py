@@ -33,7 +33,7 @@ from .drawing import (
     present,
     readable_unit,
 )
-from .timeline import DPI, REMARK, STYLE, Timeline, figure_for, paint_levels
+from .timeline import DPI, REMARK, STYLE, figure_for, paint_levels, timeline
 
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
 #: Early to late, dark to light, but not so light that a line is lost on paper.
@@ -209,7 +209,7 @@ def _positions(trajectory: Trajectory) -> Figure | None:
     whose = "beam's tip" if "v_tip" in speeds else "spring's top"
     title = "(C) Positions, and velocity" if len(positions) > 1 else "(C) Position and velocity"
     shown = [panels.positions(trajectory), *panels.enlarged(trajectory), panels.velocities(trajectory, speeds)]
-    return Timeline.drawn(trajectory, f"{title} of the {whose}", shown)
+    return timeline(trajectory, f"{title} of the {whose}", shown)
 
 
 def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
@@ -217,12 +217,12 @@ def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
     if not acting:
         return None
     if "z" not in trajectory.columns:
-        return Timeline.drawn(trajectory, "(D) Forces", acting)
+        return timeline(trajectory, "(D) Forces", acting)
     title = "(D) Velocity of the spring's top, and forces"
-    return Timeline.drawn(trajectory, title, [panels.velocities(trajectory, ["z"]), *acting])
+    return timeline(trajectory, title, [panels.velocities(trajectory, ["z"]), *acting])
 
 
 def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
     gap = panels.gap(trajectory)
     title = "(E) Gap and energy" if gap else "(E) Energy"
-    return Timeline.drawn(trajectory, title, [*gap, panels.energies(trajectory), panels.residual(trajectory)])
+    return timeline(trajectory, title, [*gap, panels.energies(trajectory), panels.residual(trajectory)])

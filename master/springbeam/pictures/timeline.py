@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,6 @@ from .drawing import (
     MANY_EVENTS,
     VERMILLION,
     Look,
-    Unit,
     event_marks,
     level_side,
     mark,
@@ -55,73 +53,53 @@ _KEY_COLUMNS = 4
 _NOTE_WIDTH = 24
 
 
-@dataclass
-class Timeline:
-    """A figure of panels over a common time axis, phases shaded and events marked."""
-
-    trajectory: Trajectory
-    figure: Figure
-    axes: list[Axes]
-    unit: Unit
-
-    @classmethod
-    def drawn(cls, trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Figure:
-        """Return the figure of ``panels``, one below the other."""
-        timeline = cls.of(trajectory, title, [panel.height for panel in panels])
-        for ax, panel in zip(timeline.axes, panels, strict=True):
-            paint(ax, panel, timeline.unit)
-        return timeline.figure
-
-    @classmethod
-    def of(cls, trajectory: Trajectory, title: str, heights: Sequence[float]) -> Timeline:
-        """Make the figure with a panel of each of ``heights`` [inch], empty but for phases and events."""
-        figure = figure_for(trajectory, title, 1.0 + sum(heights))
-        axes = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
-        unit = time_unit(trajectory)
-        timeline = cls(trajectory, figure, axes, unit)
-        axes[-1].set_xlabel(f"time t [{unit.name}]")
-        axes[0].set_xlim(unit.factor * trajectory["time"][0], unit.factor * trajectory["time"][-1])
-        keys: list[Patch | Line2D] = [*timeline._shade(), *timeline._mark_events()]
-        # Legends fill column by column; these read row by row.
-        keys = [key for column in range(_KEY_COLUMNS) for key in keys[column::_KEY_COLUMNS]]
-        if keys:
-            figure.legend(handles=keys, loc="outside lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
-        return timeline
-
-    def _shade(self) -> list[Patch]:
-        for ax in self.axes:
-            shade(ax, self.trajectory, self.unit)
-        looks = [look for look, _ in shaded_phases(self.trajectory)]
-        return [Patch(facecolor=look.colour, edgecolor=GREY, linewidth=0.5, label=look.words) for look in looks]
-
-    def _mark_events(self) -> list[Line2D]:
-        """Mark events above the first panel and by lines through all; many only by ticks, a row for each kind."""
-        many = len(self.trajectory.events) > MANY_EVENTS
-        handles: list[Line2D] = []
-        for event in event_marks(self.trajectory):
-            height = _MARK_HEIGHT + (_MARK_ROW * len(handles) if many else 0.0)
-            shape, size = ("|", 4.0) if many else (event.marker.matplotlib, event.marker.size)
-            look: dict[str, Any] = {"color": event.look.colour, "marker": shape, "markersize": size, "ls": "none"}
-            times, first = self.unit.factor * event.times, self.axes[0]
-            first.plot(times, np.full(len(times), height), transform=first.get_xaxis_transform(), clip_on=False, **look)
-            for ax in [] if many else self.axes:
-                across = ax.get_xaxis_transform()
-                ax.vlines(times, 0.0, 1.0, transform=across, color=event.look.colour, lw=0.4, alpha=0.6, zorder=1)
-            key = {"markersize": 8.0, "markeredgewidth": 1.5} if many else {}
-            handles.append(Line2D([], [], label=event.look.words, **(look | key)))
-        return handles
+def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Figure:
+    """Return the figure of ``panels``, one below the other over a common time axis, phases shaded and events marked."""
+    heights = [panel.height for panel in panels]
+    figure = figure_for(trajectory, title, 1.0 + sum(heights))
+    axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
+    for ax, panel in zip(axes, panels, strict=True):
+        paint(ax, trajectory, panel)
+        ax.label_outer()
+    phases = [look for look, _ in shaded_phases(trajectory)]
+    shades = [Patch(facecolor=look.colour, edgecolor=GREY, linewidth=0.5, label=look.words) for look in phases]
+    keys = [*shades, *_mark_events(axes, trajectory)]
+    # Legends fill column by column; these read row by row.
+    keys = [key for column in range(_KEY_COLUMNS) for key in keys[column::_KEY_COLUMNS]]
+    if keys:
+        figure.legend(handles=keys, loc="outside lower left", ncols=_KEY_COLUMNS, frameon=False, columnspacing=1.4)
+    return figure
 
 
-def shade(ax: Axes, trajectory: Trajectory, clock: Unit) -> None:
-    """Shade the phases of the run behind an axis over time."""
+def _mark_events(axes: list[Axes], trajectory: Trajectory) -> list[Line2D]:
+    """Mark events above the first panel and by lines through all; many only by ticks, a row for each kind.
+
+    Returns what the key shows.
+    """
+    many, factor = len(trajectory.events) > MANY_EVENTS, time_unit(trajectory).factor
+    handles: list[Line2D] = []
+    for event in event_marks(trajectory):
+        height = _MARK_HEIGHT + (_MARK_ROW * len(handles) if many else 0.0)
+        shape, size = ("|", 4.0) if many else (event.marker.matplotlib, event.marker.size)
+        look: dict[str, Any] = {"color": event.look.colour, "marker": shape, "markersize": size, "ls": "none"}
+        times, first = factor * event.times, axes[0]
+        first.plot(times, np.full(len(times), height), transform=first.get_xaxis_transform(), clip_on=False, **look)
+        for ax in [] if many else axes:
+            across = ax.get_xaxis_transform()
+            ax.vlines(times, 0.0, 1.0, transform=across, color=event.look.colour, lw=0.4, alpha=0.6, zorder=1)
+        key = {"markersize": 8.0, "markeredgewidth": 1.5} if many else {}
+        handles.append(Line2D([], [], label=event.look.words, **(look | key)))
+    return handles
+
+
+def paint(ax: Axes, trajectory: Trajectory, panel: Panel) -> None:
+    """Draw ``panel`` over the time of the run, whose phases are shaded."""
+    clock, factor = time_unit(trajectory), panel.unit.factor
     for look, spans in shaded_phases(trajectory):
         intervals = [(clock.factor * start, clock.factor * (end - start)) for start, end in spans]
         ax.broken_barh(intervals, (0.0, 1.0), transform=ax.get_xaxis_transform(), color=look.colour, lw=0.0, zorder=0)
-
-
-def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
-    """Draw ``panel`` over time in the unit ``clock``."""
-    factor = panel.unit.factor
+    ax.set_xlim(*(clock.factor * trajectory["time"][[0, -1]]))
+    ax.set_xlabel(f"time t [{clock.name}]")
     stack = [curve for curve in panel.curves if curve.stacked]
     if stack:
         ax.stackplot(
@@ -144,7 +122,8 @@ def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
     elif ax.get_ylim()[0] < 0.0 < ax.get_ylim()[1]:
         ax.axhline(0.0, color=GREY, lw=0.5, zorder=1)
     ax.set_ylabel(panel.axis)
-    put_key(ax)
+    # The key stands beside the panel.
+    ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), frameon=False, borderaxespad=0.0, handlelength=1.6)
     if panel.remarks:
         note = "\n".join(textwrap.fill(remark, _NOTE_WIDTH) for remark in panel.remarks)
         ax.text(1.012, 0.0, note, transform=ax.transAxes, va="bottom", **REMARK)
@@ -201,8 +180,3 @@ def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
     figure.suptitle(f"{title}\n{scene}" if scene else title, fontsize=10.0, x=0.01, ha="left")
     figure.text(0.99, 0.985, mark(trajectory), fontsize=8.0, weight="bold", color=VERMILLION, ha="right", va="top")
     return figure
-
-
-def put_key(ax: Axes) -> None:
-    """Put the key beside the panel."""
-    ax.legend(loc="upper left", bbox_to_anchor=(1.005, 1.0), frameon=False, borderaxespad=0.0, handlelength=1.6)
