@@ -206,6 +206,8 @@ def phase_intervals(
 
 def shaded_phases(trajectory: Trajectory) -> list[tuple[Look, list[tuple[float, float]]]]:
     """Return shade, words and intervals [s] of each phase; none if the run is free throughout."""
+    if not drawable(trajectory):
+        return []
     spans: dict[str, list[tuple[float, float]]] = {}
     for phase, start, end in phase_intervals(trajectory["time"], trajectory["phase"]):
         spans.setdefault(phase, []).append((start, end))
@@ -220,6 +222,11 @@ def shaded_phases(trajectory: Trajectory) -> list[tuple[Look, list[tuple[float, 
         (Look(PHASE_SHADES.get(phase) or next(others), words.get(phase, phase)), found)
         for phase, found in spans.items()
     ]
+
+
+def drawable(trajectory: Trajectory) -> bool:
+    """Tell whether there is anything to draw over time: two rows at different times."""
+    return len(trajectory) > 1 and bool(trajectory.time[-1] > trajectory.time[0])
 
 
 def present(trajectory: Trajectory, names: Iterable[str]) -> list[str]:
@@ -256,12 +263,6 @@ def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
     low, high = min(float(np.min(part)) for part in moving), max(float(np.max(part)) for part in moving)
     reach = 1.5 * (high - low)
     return {symbol: height for symbol, height in heights.items() if low - reach <= height <= high + reach}
-
-
-def first_contact_time(trajectory: Trajectory) -> float:
-    """Return when the tip first meets something [s]; without such an event, the start."""
-    times = (event.time for event in trajectory.events if event.kind in ("impact", "stop_impact"))
-    return next(times, float(trajectory["time"][0]))
 
 
 def much_smaller(trajectory: Trajectory, names: list[str]) -> list[str]:

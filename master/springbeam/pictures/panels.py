@@ -1,6 +1,6 @@
 """What is drawn of a run over time: panels of curves, with units, limits and remarks.
 
-``timeline`` paints them with matplotlib, ``report.over_time`` makes plotly's charts of them.
+``timeline`` paints them with matplotlib, ``report.charts`` makes plotly's charts of them.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from .drawing import (
     Unit,
     alternates,
     decimated,
+    drawable,
     much_smaller,
     near_levels,
     present,
@@ -69,7 +70,9 @@ class Panel:
 
 
 def panels(trajectory: Trajectory) -> list[Panel]:
-    """Return all panels that the run has something to show for; it has at least two rows at different times."""
+    """Return all panels that the run has something to show for."""
+    if not drawable(trajectory):
+        return []
     return [
         positions(trajectory),
         *enlarged(trajectory),

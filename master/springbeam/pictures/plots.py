@@ -27,7 +27,7 @@ from .drawing import (
     VELOCITIES,
     Unit,
     alternates,
-    first_contact_time,
+    drawable,
     length_along,
     near_levels,
     present,
@@ -57,9 +57,8 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
     """
     written = []
     with matplotlib.rc_context(STYLE):
-        for name, file in zip(_drawings(), PICTURES, strict=True):
-            figure = _drawn(trajectory, name)
-            if figure is not None:
+        for name, file in zip(_DRAWINGS, PICTURES, strict=True):
+            if (figure := _drawn(trajectory, name)) is not None:
                 path = Path(directory) / file
                 figure.savefig(path, dpi=DPI)
                 written.append(path)
@@ -68,8 +67,8 @@ def plot_run(trajectory: Trajectory, directory: str | Path) -> list[Path]:
 
 def figure_of(trajectory: Trajectory, picture: str) -> Figure:
     """Return the picture of that name; see `springbeam.Trajectory.plot`."""
-    if picture not in _drawings():
-        raise ValueError(f"no picture {picture!r}; there are {', '.join(_drawings())}")
+    if picture not in _DRAWINGS:
+        raise ValueError(f"no picture {picture!r}; there are {', '.join(_DRAWINGS)}")
     with matplotlib.rc_context(STYLE):
         figure = _drawn(trajectory, picture)
     if figure is None:
@@ -77,32 +76,25 @@ def figure_of(trajectory: Trajectory, picture: str) -> Figure:
     return figure
 
 
-def _drawings() -> dict[str, Callable[[Trajectory], Figure | None]]:
-    """Return what draws each picture, in the order of `PICTURES`."""
-    return {
-        "shapes_after_contact": _shapes_after_contact,
-        "shapes_later": _shapes_later,
-        "positions": _positions,
-        "velocities_and_forces": _velocities_and_forces,
-        "gap_and_energy": _gap_and_energy,
-    }
-
-
 def _drawn(trajectory: Trajectory, picture: str) -> Figure | None:
-    if len(trajectory) < 2 or trajectory["time"][-1] <= trajectory["time"][0]:
-        return None
-    return _drawings()[picture](trajectory)
+    return _DRAWINGS[picture](trajectory) if drawable(trajectory) else None
 
 
 # -- (A), (B): the beam's shape -----------------------------------------------------------------------------------
 
 
-def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
+def _since_contact(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Return the times [s] and shapes [m] since the tip first met something, or all; none without a beam."""
     if trajectory.shapes is None:
-        return None
+        return np.empty(0), np.empty((0, len(SHAPE_POINTS)))
     times, shapes = trajectory.shapes
-    first = int(np.searchsorted(times, first_contact_time(trajectory)))
-    times, shapes = times[first : first + _SHAPES_EARLY], shapes[first : first + _SHAPES_EARLY]
+    meetings = (event.time for event in trajectory.events if event.kind in ("impact", "stop_impact"))
+    first = int(np.searchsorted(times, next(meetings, trajectory.time[0])))
+    return times[first:], shapes[first:]
+
+
+def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
+    times, shapes = (values[:_SHAPES_EARLY] for values in _since_contact(trajectory))
     if len(times) < 2:
         return None
     figure = figure_for(trajectory, "(A) The beam right after first contact", 3.6)
@@ -127,11 +119,7 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
 
 
 def _shapes_later(trajectory: Trajectory) -> Figure | None:
-    if trajectory.shapes is None:
-        return None
-    times, shapes = trajectory.shapes
-    first = int(np.searchsorted(times, first_contact_time(trajectory)))
-    times, shapes = times[first:], shapes[first:]
+    times, shapes = _since_contact(trajectory)
     if len(times) < _SHAPES_EARLY:
         return None
     figure = figure_for(trajectory, "(B) Subsequent motion of the beam", 3.6)
@@ -226,3 +214,13 @@ def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
     gap = panels.gap(trajectory)
     title = "(E) Gap and energy" if gap else "(E) Energy"
     return timeline(trajectory, title, [*gap, panels.energies(trajectory), panels.residual(trajectory)])
+
+
+#: What draws each picture, in the order of `PICTURES`.
+_DRAWINGS: dict[str, Callable[[Trajectory], Figure | None]] = {
+    "shapes_after_contact": _shapes_after_contact,
+    "shapes_later": _shapes_later,
+    "positions": _positions,
+    "velocities_and_forces": _velocities_and_forces,
+    "gap_and_energy": _gap_and_energy,
+}

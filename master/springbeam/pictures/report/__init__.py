@@ -1,6 +1,6 @@
 """A run as one HTML page that needs nothing else: no network, no server, no other file.
 
-``over_time`` and ``moving`` make the charts, ``page.html``, ``page.js`` and ``page.css`` the page around them.
+``charts`` makes the charts, ``page.html``, ``page.js`` and ``page.css`` the page around them.
 """
 
 from __future__ import annotations
@@ -34,10 +34,8 @@ from ..drawing import (
     time_unit,
 )
 from ..frames import Frames, Sketch, frames_of, sketches
-from .chart import Chart
+from .charts import Chart, backdrop, charts, moving_chart, moving_parts
 from .described import described
-from .moving import moving_chart, moving_parts
-from .over_time import backdrop, charts
 
 _HERE = Path(__file__).parent
 #: Rows of the table of events.
@@ -57,9 +55,7 @@ def page(trajectory: Trajectory) -> str:
         Any run, also one that stopped early or has no rows: then only what is there is shown.
     """
     time = trajectory.columns["time"]
-    drawable = len(time) > 1 and time[-1] > time[0]
-    over_time = charts(trajectory) if drawable else []
-    frames = frames_of(trajectory) if drawable else None
+    over_time, frames = charts(trajectory), frames_of(trajectory)
     shown = [] if frames is None else sketches(trajectory, frames)
     moving = [] if frames is None else [moving_chart(sketch, frames) for sketch in shown]
     environment = jinja2.Environment(
@@ -77,7 +73,7 @@ def page(trajectory: Trajectory) -> str:
         moving=moving,
         frames=0 if frames is None else len(frames.time),
         charts=over_time,
-        phases=[look for look, _ in shaded_phases(trajectory)] if drawable else [],
+        phases=[look for look, _ in shaded_phases(trajectory)],
         event_key=event_marks(trajectory),
         numbers=list(_numbers(trajectory)),
         described=list(described(scene)),
@@ -92,7 +88,7 @@ def page(trajectory: Trajectory) -> str:
         points=max((chart.points for chart in over_time), default=0),
         toml=tomli_w.dumps(scene.model_dump(exclude_none=True)),
         command=shipped_command(scene),
-        data=_as_script(_data(trajectory, [*moving, *over_time], shown, frames) if drawable else None),
+        data=_as_script(_data(trajectory, [*moving, *over_time], shown, frames) if over_time else None),
         plotly=get_plotlyjs(),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
         style=(_HERE / "page.css").read_text(encoding="utf-8"),

@@ -1,0 +1,233 @@
+"""The charts of the report, figures of plotly: panels over a common time axis, and sketches that the script moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from ...results.trajectory import Trajectory
+from ..drawing import (
+    BLACK,
+    EVENT_LOOKS,
+    GREY,
+    LEVELS,
+    MANY_EVENTS,
+    STONE,
+    Look,
+    Marker,
+    event_marks,
+    shaded_phases,
+    time_unit,
+)
+from ..frames import COIL_HEIGHTS, Frames, Sketch
+from ..panels import Curve, Panel, panels
+
+_GRID = "#E3E3E3"
+#: Pixels of the page for a point of the pictures.
+_PIXELS = 1.8
+#: Pixels of a chart's height: for each inch of its picture, and for what stands around it.
+_PIXELS_PER_INCH, _PIXELS_BESIDE = 82, 110
+
+
+@dataclass
+class Chart:
+    """A figure with its heading, and remarks to print beside it."""
+
+    name: str
+    heading: str
+    figure: go.Figure
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def points(self) -> int:
+        """The most rows that any curve shows."""
+        return max((len(curve.x) for curve in self.figure.data), default=0)
+
+
+def charts(trajectory: Trajectory) -> list[Chart]:
+    """Return the charts over time that the run has something to show for, in the order of the page."""
+    shown = [_of_panel(trajectory, panel) for panel in panels(trajectory)]
+    eventful = trajectory.events or set(trajectory["phase"]) != {"free"}
+    return [_timeline(trajectory), *shown] if shown and eventful else shown
+
+
+def backdrop(trajectory: Trajectory) -> list[dict[str, Any]]:
+    """Return the layout shapes behind every chart over time: phases shaded, events as lines unless there are many."""
+    factor = time_unit(trajectory).factor
+    shared: dict[str, Any] = {"type": "path", "xref": "x", "yref": "paper", "layer": "below"}
+    shapes = [
+        {
+            **shared,
+            "path": "".join(f"M{factor * start!r},0V1H{factor * end!r}V0Z" for start, end in spans),
+            "fillcolor": look.colour,
+            "line": {"width": 0.0},
+        }
+        for look, spans in shaded_phases(trajectory)
+    ]
+    for mark in event_marks(trajectory) if len(trajectory.events) <= MANY_EVENTS else ():
+        path = "".join(f"M{time!r},0V1" for time in (factor * mark.times).tolist())
+        shapes.append({**shared, "path": path, "line": {"width": 1.0, "color": mark.look.colour}, "opacity": 0.45})
+    return shapes
+
+
+def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
+    """Draw a panel."""
+    figure = _over_time(trajectory, _height_of(panel.height))
+    clock, factor = time_unit(trajectory).factor, panel.unit.factor
+    for curve in panel.curves:
+        figure.add_scatter(
+            x=clock * curve.time,
+            y=factor * curve.values,
+            name=curve.look.words,
+            meta=curve.name,
+            hovertemplate=f"%{{y:.6g}} {panel.unit.name}",
+            **_style(curve, panel),
+        )
+    ends = clock * trajectory["time"][[0, -1]]
+    for symbol, height in panel.levels.items():
+        figure.add_scatter(
+            x=ends, y=factor * np.array([height, height]), mode="lines", name=LEVELS[symbol].words,
+            line=_line_style(LEVELS[symbol]), hoverinfo="skip",
+        )  # fmt: skip
+    figure.update_yaxes(title_text=panel.axis)
+    if panel.logarithmic is not None:
+        begin, end = (float(np.log10(limit)) for limit in panel.logarithmic)
+        figure.update_yaxes(
+            type="log", range=[begin, end], tick0=0.0, dtick=max(1, round((end - begin) / 4.0)), exponentformat="e",
+            zeroline=False,
+        )  # fmt: skip
+    return Chart(panel.name, panel.heading, figure, panel.remarks)
+
+
+def _timeline(trajectory: Trajectory) -> Chart:
+    """Draw each kind of event in a row of its own; the phases are in the backdrop."""
+    kinds = event_marks(trajectory)
+    figure = _over_time(trajectory, height=76 + 18 * len(kinds))
+    for i, mark in enumerate(kinds):
+        figure.add_scatter(
+            x=time_unit(trajectory).factor * mark.times,
+            y=np.full(len(mark.times), -i),
+            customdata=np.column_stack([mark.times, mark.losses]),
+            mode="markers",
+            marker={**_marker_style(mark.marker), "color": mark.look.colour},
+            name=EVENT_LOOKS[mark.kind].words,
+            meta=mark.kind,
+            cliponaxis=False,
+            hovertemplate="t = %{customdata[0]:.9g} s, energy lost %{customdata[1]:.3g} J",
+        )
+    if not kinds:
+        figure.add_scatter(x=[], y=[])  # plotly draws no axes without a curve
+    figure.update_layout(hovermode="closest", showlegend=False)
+    figure.update_yaxes(
+        range=[-len(kinds), 1.0], showgrid=False, zeroline=False, showticklabels=False, ticks="", fixedrange=True
+    )
+    return Chart("timeline", "Phases and events", figure)
+
+
+def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
+    """Draw a sketch at the first frame; `moving_parts` tells how the page's script moves it."""
+    figure = go.Figure(layout=_layout(_height_of(sketch.height)))
+    figure.update_layout(hovermode="closest", margin_r=30, showlegend=len(sketch.moving) > 1)
+    figure.update_xaxes(
+        range=list(sketch.x), title_text=f"position along the beam x [{sketch.along.name}]",
+        visible=sketch.rest is not None,
+    )  # fmt: skip
+    figure.update_yaxes(range=list(sketch.y), title_text=f"{sketch.quantity} [{sketch.unit.name}]", zeroline=False)
+    for block in sketch.blocks:
+        corners = {"x0": block.left, "x1": block.right, "y0": block.bottom, "y1": block.top}
+        figure.add_shape(type="rect", **corners, line={"width": 0.0}, fillcolor=STONE, layer="below")
+    if sketch.rest is not None:
+        dotted = {"color": GREY, "width": 1.0, "dash": "dot"}
+        figure.add_shape(type="line", x0=sketch.rest[0], x1=sketch.rest[1], y0=0.0, y1=0.0, line=dotted)
+    begin, end = sketch.level_ends
+    for symbol, level in sketch.levels.items():
+        figure.add_shape(type="line", x0=begin, x1=end, y0=level, y1=level, line=_line_style(LEVELS[symbol]))
+        figure.add_annotation(x=end, y=level, text=symbol, showarrow=False, xanchor="left", xshift=3)
+    for part, x, look in sketch.moving:
+        figure.add_scatter(
+            x=x, y=sketch.unit.factor * frames.heights(part, 0), mode="lines", meta=part, name=look.words,
+            line=_line_style(look), hoverinfo="skip" if part == "coil" else None,
+            hovertemplate=None if part == "coil" else f"%{{y:.6g}} {sketch.unit.name}",
+        )  # fmt: skip
+    return Chart(sketch.name, sketch.heading, figure)
+
+
+def moving_parts(frames: Frames, sketch: Sketch) -> dict[str, Any]:
+    """Return what the page's script needs to move the chart of ``sketch``: its traces by part, factor of heights."""
+    return {
+        "factor": sketch.unit.factor,
+        "traces": [moving.part for moving in sketch.moving],
+        "foot": frames.foot,
+        "heights": COIL_HEIGHTS.tolist(),
+    }
+
+
+def _height_of(inches: float) -> int:
+    """Return the height of a chart [px] whose picture has ``inches``."""
+    return round(_PIXELS_BESIDE + _PIXELS_PER_INCH * inches)
+
+
+def _over_time(trajectory: Trajectory, height: int) -> go.Figure:
+    """Return a figure of ``height`` [px] without curves over the run's time."""
+    unit, time = time_unit(trajectory), trajectory["time"]
+    figure = go.Figure(layout=_layout(height))
+    ends = [unit.factor * float(time[0]), unit.factor * float(time[-1])]
+    return figure.update_xaxes(range=ends, title_text=f"time t [{unit.name}]")
+
+
+def _layout(height: int) -> dict[str, Any]:
+    """Return the layout that all charts share; ``height`` in pixels."""
+    axis = {
+        "gridcolor": _GRID, "zeroline": False, "showline": True, "linecolor": BLACK, "ticks": "outside", "ticklen": 4,
+        "title": {"standoff": 6}, "exponentformat": "power",
+    }  # fmt: skip
+    return {
+        "template": "none",
+        "height": height,
+        "margin": {"l": 66, "r": 14, "t": 10, "b": 42},
+        "font": {"family": "system-ui, sans-serif", "size": 12, "color": "#222222"},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "hovermode": "x",
+        "showlegend": True,
+        "legend": {"orientation": "h", "x": 0.0, "xanchor": "left", "y": 1.0, "yanchor": "bottom"},
+        "xaxis": axis,
+        "yaxis": {**axis, "zeroline": True, "zerolinecolor": GREY, "zerolinewidth": 1.0},
+    }
+
+
+def _style(curve: Curve, panel: Panel) -> dict[str, Any]:
+    colour, _, line, marker = curve.look
+    if curve.stacked:
+        return {"mode": "lines", "line": {"width": 0.0}, "stackgroup": "stack", "fillcolor": colour}
+    if marker is not None:
+        values = panel.unit.factor * curve.values
+        foot = 0.0 if panel.logarithmic is None else panel.logarithmic[0]
+        stems = {"type": "data", "symmetric": False, "array": np.zeros(len(values)), "arrayminus": values - foot}
+        return {
+            "mode": "markers",
+            "marker": {**_marker_style(marker), "color": colour},
+            "error_y": {**stems, "width": 0, "thickness": 1.5},
+            "cliponaxis": False,
+        }
+    if curve.alternates:
+        return {
+            "mode": "lines+markers",
+            "line": {"color": colour, "width": 0.4},
+            "marker": {"size": 2.5, "color": colour},
+        }
+    return {"mode": "lines", "line": _line_style(curve.look), "opacity": line.opacity}
+
+
+def _line_style(look: Look) -> dict[str, Any]:
+    """Return plotly's ``line``."""
+    width = round(_PIXELS * look.line.width, 1)
+    return {"color": look.colour, "width": width, "dash": "dash" if look.line.dashed else "solid"}
+
+
+def _marker_style(marker: Marker) -> dict[str, Any]:
+    """Return plotly's ``marker`` but for its colour."""
+    return {"symbol": marker.plotly, "size": round(_PIXELS * marker.size)}
