@@ -35,7 +35,7 @@ def contact_changes(run: Trajectory, window: float) -> list[ContactChange]:
     changes = []
     for intervals, least, begin, end in (
         (_contacts(run, inf), window, "closes", "opens"),
-        (_foundation_contacts(run, inf), 0.0, "strikes", "leaves"),
+        (foundation_contacts(run.events, inf), 0.0, "strikes", "leaves"),
     ):
         for since, until in _lasting(intervals, window, least):
             changes.append(ContactChange(begin, float(since)))
@@ -53,11 +53,12 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
     """
     end = float(second.time[-1])
     worst, number = 0.0, 0
-    for intervals, least in ((_contacts, window), (_foundation_contacts, 0.0)):
-        ours, theirs = intervals(first, end), intervals(second, end)
-        worst = max(worst, _furthest(_lasting(ours, window, least), theirs, end))
+    for ours, theirs, least in (
+        (_contacts(first, end), _contacts(second, end), window),
+        (foundation_contacts(first.events, end), foundation_contacts(second.events, end), 0.0),
+    ):
         lasting = _lasting(theirs, window, least)
-        worst = max(worst, _furthest(lasting, ours, end))
+        worst = max(worst, _furthest(_lasting(ours, window, least), theirs, end), _furthest(lasting, ours, end))
         number += sum(t < end for interval in lasting for t in set(interval))
     return worst, number
 
@@ -95,10 +96,6 @@ def tip_contacts(events: Iterable[Event], end: float, *, free_at_end: bool) -> l
     if len(edges) % 2:
         edges.append(end)
     return list(zip(edges[::2], edges[1::2], strict=True))
-
-
-def _foundation_contacts(run: Trajectory, end: float) -> list[Interval]:
-    return foundation_contacts(run.events, end)
 
 
 def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:

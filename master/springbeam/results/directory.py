@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import tempfile
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import BinaryIO
@@ -45,37 +44,18 @@ class ResultsUnreadable(ValueError):
     """A run directory cannot be read; the message names the file and, where known, the line."""
 
 
-@dataclass(frozen=True)
 class RunDirectory:
-    """The files of one run."""
+    """The files of one run in the directory ``path``, whether they exist or not."""
 
-    path: Path
-
-    @property
-    def trajectory(self) -> Path:
-        return self.path / TRAJECTORY
-
-    @property
-    def events(self) -> Path:
-        return self.path / EVENTS
-
-    @property
-    def shapes(self) -> Path:
-        return self.path / SHAPES
-
-    @property
-    def steps(self) -> Path:
-        """What `springbeam.results.steps` says of each step, as doubles."""
-        return self.path / STEPS
-
-    @property
-    def summary(self) -> Path:
-        return self.path / "summary.json"
-
-    @property
-    def checkpoint(self) -> Path:
-        """The checkpoint file; it exists until the run is done (`springbeam.run.checkpoint`)."""
-        return self.path / "run.checkpoint"
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        self.trajectory = self.path / TRAJECTORY
+        self.events = self.path / EVENTS
+        self.shapes = self.path / SHAPES
+        self.steps = self.path / STEPS  #: what `springbeam.results.steps` says of each step, as doubles
+        self.summary = self.path / "summary.json"
+        #: It exists until the run is done (`springbeam.run.checkpoint`).
+        self.checkpoint = self.path / "run.checkpoint"
 
     @property
     def pictures(self) -> list[Path]:
@@ -113,7 +93,7 @@ class RunDirectory:
         OSError
             If the directory cannot be made or written to.
         """
-        directory = cls(Path(path))
+        directory = cls(path)
         directory.path.mkdir(parents=True, exist_ok=True)
         results = directory.results()
         if results and not replace:

@@ -53,7 +53,6 @@ class FileRecorder(Recorder):
         #: Time of the last row [s]; ``None`` before the first.
         self.time: float | None = None
         self._headers: dict[str, Sequence[str]] = {TRAJECTORY: self.columns, EVENTS: EVENT_COLUMNS, STEPS: ()}
-        self._waiting = bytearray()  #: steps that are not in their file yet
         if scene.beam is not None:
             self._headers[SHAPES] = SHAPE_COLUMNS
         self._files: dict[str, _Lines] = {}
@@ -73,20 +72,17 @@ class FileRecorder(Recorder):
         """Whether the directory holds results of this run."""
         return bool(self._files)
 
-    def row(self, values: Sequence[Any], step: bytes | None = None) -> None:
-        row, phase = self._checked_row(values)
-        if step is not None:
-            self._waiting += step
-        fields: list[float | str] = [*row]
+    def _keep_row(self, numbers: list[float], phase: str) -> None:
+        fields: list[float | str] = [*numbers]
         if self._phase_at >= 0:
             fields.insert(self._phase_at, phase)
         self._file(TRAJECTORY).write(_line(fields))
-        self.time = row[0]
-        if len(self._waiting) >= _STEPS_TOGETHER:
+        self.time = numbers[0]
+        if len(self._steps) >= _STEPS_TOGETHER:
             self._write_steps()
 
     def _write_steps(self) -> None:
-        waiting, self._waiting = self._waiting, bytearray()
+        waiting, self._steps = self._steps, bytearray()
         if waiting:
             steps_of(waiting)
             self._file(STEPS).write(waiting)
@@ -100,16 +96,13 @@ class FileRecorder(Recorder):
     def events(self) -> Iterable[Event]:
         return load_events(self.directory.path) if self.begun else iter(())
 
-    def event(self, event: Event) -> None:
-        values = [getattr(self._checked_event(event), name) for name in EVENT_COLUMNS]
+    def _keep_event(self, event: Event) -> None:
+        values = [getattr(event, name) for name in EVENT_COLUMNS]
         fields = ["" if v is None else v if isinstance(v, str) else repr(float(v)) for v in values]
         self._file(EVENTS).write((",".join(fields) + "\n").encode())
 
-    def shape(self, time: float, deflection: np.ndarray) -> None:
-        shape = self._checked_shape(time, deflection)
-        if self.scene.beam is None:
-            raise ValueError("a beam's shape in a scene without a beam")
-        self._file(SHAPES).write(_line([float(time), *shape.tolist()]))
+    def _keep_shape(self, numbers: list[float]) -> None:
+        self._file(SHAPES).write(_line(numbers))
 
     def finish(self, summary: Mapping[str, Any]) -> None:
         self._begin()

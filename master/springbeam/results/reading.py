@@ -24,7 +24,7 @@ def load_trajectory(directory: str | Path) -> Trajectory:
     ResultsUnreadable
         If a file is missing or is not what a run writes.
     """
-    run = RunDirectory(Path(directory))
+    run = RunDirectory(directory)
     summary = load_summary(run.path)
     header, lines = _complete_lines(run.trajectory)
     columns = _read_table(run.trajectory, header, lines)
@@ -55,7 +55,7 @@ def _read_steps(run: RunDirectory, times: np.ndarray) -> np.ndarray | None:
 
 def load_summary(directory: str | Path) -> dict[str, Any]:
     """Read ``summary.json`` of a run directory."""
-    path = RunDirectory(Path(directory)).summary
+    path = RunDirectory(directory).summary
     try:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -69,7 +69,7 @@ def load_summary(directory: str | Path) -> dict[str, Any]:
 
 def load_events(directory: str | Path) -> Iterator[Event]:
     """Read the events of a run directory, one at a time."""
-    path = RunDirectory(Path(directory)).events
+    path = RunDirectory(directory).events
     header, lines = _complete_lines(path)
     if header != EVENT_COLUMNS:
         raise ResultsUnreadable(f"{path}: line 1: not the columns of events.csv")

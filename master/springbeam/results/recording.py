@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
-from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -58,14 +58,14 @@ class Recorder(ABC):
         Names in row order, starting with ``time``; default `columns_of(scene)`.
     """
 
-    def __init__(self, scene: Scene, columns: Sequence[str] | None) -> None:
+    def __init__(self, scene: Scene, columns: Sequence[str] | None = None) -> None:
         self.scene = scene
         self.columns = columns_of(scene) if columns is None else tuple(columns)
         self._phase_at = self.columns.index("phase") if "phase" in self.columns else -1
         self._numbers = [name for name in self.columns if name != "phase"]
         self._phases: set[str] = set()
+        self._steps = bytearray()  #: those that are nowhere else
 
-    @abstractmethod
     def row(self, values: Sequence[Any], step: bytes | None = None) -> None:
         """Record an accepted step: a value per column, in their order.
 
@@ -77,14 +77,39 @@ class Recorder(ABC):
         NonFiniteValue
             If a number is NaN or infinite; nothing of the row is recorded then.
         """
+        if len(values) != len(self.columns):
+            raise ValueError(f"row of {len(values)} values for {len(self.columns)} columns")
+        values = list(values)
+        phase = ""
+        if self._phase_at >= 0:
+            phase = values.pop(self._phase_at)
+            if phase not in self._phases:
+                self._check_phase(phase)
+        numbers = list(map(float, values))
+        _refuse_non_finite(self._numbers, numbers)
+        if step is not None:
+            self._steps += step
+        self._keep_row(numbers, phase)
 
-    @abstractmethod
     def event(self, event: Event) -> None:
         """Record an event."""
+        if event.kind not in EVENT_KINDS:
+            raise ValueError(f"event kind {event.kind!r}; allowed: {', '.join(EVENT_KINDS)}")
+        for name in EVENT_COLUMNS:
+            value = getattr(event, name)
+            if name != "kind" and value is not None and not isfinite(value):
+                raise NonFiniteValue(f"{name} of event {event.kind!r}", event.time, value)
+        self._keep_event(event)
 
-    @abstractmethod
     def shape(self, time: float, deflection: np.ndarray) -> None:
         """Record the beam's deflection [m] at `SHAPE_POINTS`, shape (21,), at ``time`` [s]."""
+        if self.scene.beam is None:
+            raise ValueError("a beam's shape in a scene without a beam")
+        if np.shape(deflection) != SHAPE_POINTS.shape:
+            raise ValueError(f"shape of {np.shape(deflection)} values for {SHAPE_POINTS.shape} points")
+        numbers = [float(time), *np.asarray(deflection, dtype=float).tolist()]
+        _refuse_non_finite(SHAPE_COLUMNS, numbers)
+        self._keep_shape(numbers)
 
     @abstractmethod
     def steps(self) -> np.ndarray | None:
@@ -102,42 +127,22 @@ class Recorder(ABC):
         [s], ``max_energy_residual`` (relative) and ``warnings`` (list of str), those that are there.
         """
 
-    def _checked_row(self, values: Sequence[Any]) -> tuple[list[float], str]:
-        """Return the numbers of the row, and its phase."""
-        if len(values) != len(self.columns):
-            raise ValueError(f"row of {len(values)} values for {len(self.columns)} columns")
-        values = list(values)
-        phase = ""
-        if self._phase_at >= 0:
-            phase = values.pop(self._phase_at)
-            if phase not in self._phases:
-                self._check_phase(phase)
-        row = list(map(float, values))
-        _refuse_non_finite(self._numbers, row)
-        return row, phase
+    @abstractmethod
+    def _keep_row(self, numbers: list[float], phase: str) -> None:
+        """Keep a row that has been checked: its numbers without the phase, which is "" in a row without one."""
+
+    @abstractmethod
+    def _keep_event(self, event: Event) -> None:
+        """Keep an event that has been checked."""
+
+    @abstractmethod
+    def _keep_shape(self, numbers: list[float]) -> None:
+        """Keep the numbers of `SHAPE_COLUMNS`, which have been checked."""
 
     def _check_phase(self, phase: str) -> None:
         if not phase.isprintable() or not 0 < len(phase) <= PHASE_WIDTH or set(phase) & set(',"\\'):
             raise ValueError(f"phase {phase!r} cannot be written to a file")
         self._phases.add(phase)
-
-    @staticmethod
-    def _checked_event(event: Event) -> Event:
-        if event.kind not in EVENT_KINDS:
-            raise ValueError(f"event kind {event.kind!r}; allowed: {', '.join(EVENT_KINDS)}")
-        for name in EVENT_COLUMNS:
-            value = getattr(event, name)
-            if name != "kind" and value is not None and not isfinite(value):
-                raise NonFiniteValue(f"{name} of event {event.kind!r}", event.time, value)
-        return event
-
-    @staticmethod
-    def _checked_shape(time: float, deflection: np.ndarray) -> np.ndarray:
-        shape = np.asarray(deflection, dtype=float)
-        if shape.shape != SHAPE_POINTS.shape:
-            raise ValueError(f"shape of {shape.shape} values for {SHAPE_POINTS.shape} points")
-        _refuse_non_finite(SHAPE_COLUMNS, [time, *shape.tolist()])
-        return shape
 
 
 class MemoryRecorder(Recorder):
@@ -145,26 +150,20 @@ class MemoryRecorder(Recorder):
 
     def __init__(self, scene: Scene, columns: Sequence[str] | None = None) -> None:
         super().__init__(scene, columns)
-        self._rows = bytearray()
-        self._packed = Struct(f"{len(self._numbers)}d").pack
+        self._rows, self._shapes = array("d"), array("d")
         self._phase_of_row: list[str] = []
         self._events: list[Event] = []
-        self._shapes, self._steps = bytearray(), bytearray()
         self._summary: dict[str, Any] = {}
 
-    def row(self, values: Sequence[Any], step: bytes | None = None) -> None:
-        row, phase = self._checked_row(values)
-        if step is not None:
-            self._steps += step
-        self._rows += self._packed(*row)
+    def _keep_row(self, numbers: list[float], phase: str) -> None:
+        self._rows.extend(numbers)
         self._phase_of_row.append(phase)
 
-    def event(self, event: Event) -> None:
-        self._events.append(self._checked_event(event))
+    def _keep_event(self, event: Event) -> None:
+        self._events.append(event)
 
-    def shape(self, time: float, deflection: np.ndarray) -> None:
-        shape = self._checked_shape(time, deflection)
-        self._shapes += np.float64(time).tobytes() + shape.tobytes()
+    def _keep_shape(self, numbers: list[float]) -> None:
+        self._shapes.extend(numbers)
 
     def steps(self) -> np.ndarray | None:
         return steps_of(self._steps)
@@ -177,13 +176,13 @@ class MemoryRecorder(Recorder):
 
     def trajectory(self) -> Trajectory:
         """Return everything recorded so far."""
-        numbers = iter(_columns(self._rows, len(self._numbers)))
+        numbers = iter(np.reshape(self._rows, (-1, len(self._numbers))).T.copy())
         phases = np.array(self._phase_of_row, dtype=str)
         columns = {name: phases if name == "phase" else next(numbers) for name in self.columns}
         shapes = None
         if self.scene.beam is not None:
-            time, *deflection = _columns(self._shapes, len(SHAPE_COLUMNS))
-            shapes = (time, np.column_stack(deflection))
+            table = np.reshape(self._shapes, (-1, len(SHAPE_COLUMNS)))
+            shapes = (table[:, 0].copy(), table[:, 1:].copy())
         return Trajectory(self.scene, columns, list(self._events), shapes, dict(self._summary), self.steps())
 
 
@@ -202,8 +201,3 @@ def replay(trajectory: Trajectory, recorder: Recorder) -> None:
 def with_scene(summary: Mapping[str, Any], scene: Scene) -> dict[str, Any]:
     """Return ``summary`` with the scene as run, as it goes into ``summary.json``."""
     return {**summary, "scene": scene.model_dump(exclude_none=True)}
-
-
-def _columns(rows: bytearray, width: int) -> list[np.ndarray]:
-    """Return the columns of rows of ``width`` doubles."""
-    return [column.copy() for column in np.frombuffer(rows).reshape(-1, width).T]

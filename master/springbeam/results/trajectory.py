@@ -44,17 +44,6 @@ _COLUMNS = {
 }
 COLUMNS = tuple(_COLUMNS)
 COLUMN_UNITS = {name: unit for name, (unit, _) in _COLUMNS.items() if unit}
-EVENT_COLUMNS = (
-    "time",
-    "kind",
-    "y",
-    "z",
-    "u_tip",
-    "v_tip",
-    "impulse_contact",
-    "impulse_foundation",
-    "energy_loss",
-)
 EVENT_KINDS = ("impact", "stop_impact", "release", "retie", "separation", "seated", "unseated")
 #: Columns of the table of shapes: time [s] and deflections [m] at `SHAPE_POINTS`.
 SHAPE_COLUMNS = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
@@ -66,7 +55,8 @@ _NOISE = 1e-13
 
 @dataclass(frozen=True)
 class Event:
-    """One event; ``y, z, u_tip, v_tip`` are the values after it, ``None`` for an absent body."""
+    """One event, with its columns in file order; ``y, z, u_tip, v_tip`` are the values after it, ``None`` for an absent
+    body."""
 
     time: float
     kind: str
@@ -77,6 +67,9 @@ class Event:
     impulse_contact: float = 0.0  #: on the beam's tip, upward [N·s]
     impulse_foundation: float = 0.0  #: of the foundation, upward [N·s]
     energy_loss: float = 0.0  #: [J]
+
+
+EVENT_COLUMNS = tuple(Event.__dataclass_fields__)
 
 
 def columns_of(scene: Scene) -> tuple[str, ...]:

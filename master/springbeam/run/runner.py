@@ -169,7 +169,7 @@ def last_checkpoint(directory: str | Path) -> Checkpoint:
     FmuError
         If an FMU is missing.
     """
-    results = RunDirectory(Path(directory))
+    results = RunDirectory(directory)
     summary = load_summary(results.path)
     if summary.get("status") == "done":
         raise CheckpointRefused(f"{results.path}: the run is done, nothing to resume")
@@ -196,7 +196,7 @@ def resume(directory: str | Path, progress: Progress | None = None) -> Trajector
     `last_checkpoint` and `run` do.
     """
     start = last_checkpoint(directory)
-    with FileRecorder(start.scene, RunDirectory(Path(directory))) as recorder:
+    with FileRecorder(start.scene, RunDirectory(directory)) as recorder:
         run(start.scene, recorder, progress, seconds=start.seconds, start=start)
     return load_trajectory(directory)
 
