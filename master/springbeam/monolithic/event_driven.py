@@ -84,7 +84,7 @@ def simulate(
     ValueError
         If the scene is outside what this reference defines.
     """
-    if scene.beam is not None and scene.beam.fidelity == "quasi_static":
+    if scene.massless:
         if method not in ("exponential", "DOP853"):
             raise ValueError(f"method = {method!r}: a scene with a quasi-static beam is integrated by DOP853")
         method = "DOP853"

@@ -234,7 +234,7 @@ def _without_own(scene: Scene, **own: Body | None) -> Scene:
     asked = {
         'contact.law = "paper"': scene.contact.law == "paper",
         'coupling.scheme = "auto"': scene.coupling.scheme == "auto",
-        'beam.fidelity = "quasi_static"': scene.beam is not None and scene.beam.fidelity == "quasi_static",
+        'beam.fidelity = "quasi_static"': scene.massless,
     }
     for what in (what for what, is_so in asked.items() if is_so):
         raise SceneError(f"{what}: takes the bodies from the scene, and cannot be used with a body of your own")

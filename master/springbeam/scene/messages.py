@@ -51,8 +51,8 @@ def explain(error: Any) -> list[str]:
         loc = [f"loads.{loc[1]}", *loc[2:]]
     if loc[0] in ("beam", "spring"):
         if kind == "union_tag_invalid":
-            elements = " or ".join(_toml(name) for name in PARTNERS if name != "fmu")
-            return [f"[{loc[0]}] element = {_toml(value['element'])}: must be {elements}"]
+            elements = " or ".join(toml_of(name) for name in PARTNERS if name != "fmu")
+            return [f"[{loc[0]}] element = {toml_of(value['element'])}: must be {elements}"]
         loc, body = [loc[0], *loc[2:]], loc[1]
     else:
         body = OWN
@@ -72,7 +72,7 @@ def explain(error: Any) -> list[str]:
     may_be = allowed(model.model_fields[name])
     if name == "parameters" and len(loc) > 2:  # the last word is one of the types that the value is not
         key, may_be = key.rpartition(".")[0], "a number, true or false, or a text in quotes"
-    return [f"[{table}] {key} = {_toml(value)}: must be {may_be}"]
+    return [f"[{table}] {key} = {toml_of(value)}: must be {may_be}"]
 
 
 def _missing(model: type[Table], key: str, given: Any) -> str:
@@ -98,12 +98,12 @@ def _explain_top(kind: str, value: Any, name: str) -> str:
     if kind == "extra_forbidden" and isinstance(value, dict):
         return f"[{_bare(name)}]: unknown table; {nearest(name, TABLES)}allowed: {', '.join(TABLES)}"
     if kind == "extra_forbidden":
-        return f"{_bare(name)} = {_toml(value)}: unknown key outside a table; {_nearest_key('', name)}"
+        return f"{_bare(name)} = {toml_of(value)}: unknown key outside a table; {_nearest_key('', name)}"
     if table_of(name):
         may_be = f"a table, written as [{'[loads]' if name not in TABLES else name}]"
     else:
         may_be = allowed(Scene.model_fields[name])
-    return f"{name} = {_toml(value)}: must be {may_be}"
+    return f"{name} = {toml_of(value)}: must be {may_be}"
 
 
 def nearest(name: str, candidates: Iterable[str]) -> str:
@@ -135,7 +135,7 @@ def allowed(field: FieldInfo) -> str:
         return "a table, as { k = 3.0e4 }"
     for part in _alternatives(field.annotation):
         if get_origin(part) is Literal:
-            return " or ".join(_toml(choice) for choice in get_args(part))
+            return " or ".join(toml_of(choice) for choice in get_args(part))
     nouns: dict[Any, str] = {bool: "true or false", str: "a text in quotes", int: "a whole number"}
     noun = next((nouns[part] for part in _alternatives(field.annotation) if part in nouns), "a finite number")
     bounds = {
@@ -148,7 +148,7 @@ def allowed(field: FieldInfo) -> str:
     return " ".join([noun, " and ".join(f"{words[name]} {value:.15g}" for name, value in bounds.items())]).strip()
 
 
-def _toml(value: Any) -> str:
+def toml_of(value: Any) -> str:
     """Return a value as it may stand in a file, in one line of at most 60 characters."""
     if isinstance(value, dict):
         return "{…}"
@@ -157,7 +157,7 @@ def _toml(value: Any) -> str:
     if isinstance(value, (datetime.date, datetime.time)):
         return value.isoformat()
     if isinstance(value, list):
-        shown = [_toml(item) if not isinstance(item, list) else "[…]" for item in value[:8]]
+        shown = [toml_of(item) if not isinstance(item, list) else "[…]" for item in value[:8]]
         return one_line(f"[{', '.join(shown)}{', …' if len(value) > 8 else ''}]")
     if isinstance(value, int) and value.bit_length() > 1000:  # more digits than Python may convert
         return one_line(hex(value)[:50] + "…")

@@ -42,11 +42,6 @@ class ForeignFmu(Table):
     load_potential: str | None = key("J", "output: −(work of loads inside)", None)
     parameters: dict[str, float | int | bool | str] = key("–", "values of the FMU's parameters, by name", {})
 
-    @property
-    def start(self) -> None:
-        """Where the end is at the start: only the FMU knows."""
-        return
-
     def named(self, keys: Sequence[str]) -> tuple[str | None, ...]:
         """Return the names of variables by their keys, as `INPUTS`, `MOTION` and `ENERGIES`."""
         return tuple(getattr(self, key) for key in keys)
@@ -55,16 +50,13 @@ class ForeignFmu(Table):
 class PointMass(Table):
     """A free mass, m ẍ = ± C + N + f."""
 
+    START = "displacement"
+
     element: Literal["point_mass"] = key("–", "a free mass")
     mass: float = key("kg", "mass m", gt=0.0)
     displacement: float = key("m", "where it is at the start", 0.0)
     velocity: float = key("m/s", "velocity at the start, upward", 0.0)
     external_force: float = key("N", "constant force f, upward", 0.0)
-
-    @property
-    def start(self) -> float:
-        """Where the end is at the start [m]."""
-        return self.displacement
 
 
 class SpringDamper(PointMass):
@@ -79,13 +71,10 @@ class SpringDamper(PointMass):
 class RigidWall(Table):
     """An end that is held at rest, whatever acts on it."""
 
+    START = "position"
+
     element: Literal["rigid_wall"] = key("–", "an end that nothing moves")
     position: float = key("m", "where it is", 0.0)
-
-    @property
-    def start(self) -> float:
-        """Where the end is [m]."""
-        return self.position
 
 
 Element = PointMass | SpringDamper | RigidWall

@@ -80,8 +80,13 @@ class Scene(Table):
     @property
     def fmus(self) -> tuple[str, ...]:
         """Names of our FMUs that the scene needs; a beam without inertia needs none."""
-        beam = self.beam is not None and self.beam.fidelity == "dynamic"
+        beam = self.beam is not None and not self.massless
         return ("beam",) * beam + ("spring",) * (self.spring is not None)
+
+    @property
+    def massless(self) -> bool:
+        """Whether the upper body is our beam without inertia."""
+        return self.beam is not None and self.beam.fidelity == "quasi_static"
 
     @property
     def elastic_stop(self) -> bool:
@@ -105,7 +110,7 @@ class Scene(Table):
 
     @property
     def tip_target(self) -> tuple[str, float] | None:
-        """What the upper end meets first, as ``("[table] key", height [m])``: the lower body, else the stop.
+        """What the upper end meets first, as ``("table.key", height [m])``: the lower body, else the stop.
 
         ``None`` where there is nothing to meet, where only an FMU knows, or where the law joins the ends at once.
         """
@@ -113,24 +118,36 @@ class Scene(Table):
             return None
         if self.lower is not None:
             top = self.initial_top
-            return None if top is None else (f"[spring] {'equilibrium' if self.spring else 'displacement'}", top)
-        return None if self.stop is None else ("[stop] position", self.stop.position)
+            return None if top is None else (self.top_key, top)
+        return None if self.stop is None else ("stop.position", self.stop.position)
+
+    @property
+    def tip_key(self) -> str:
+        """The key that says where the upper end is at the start."""
+        return f"beam.{self.upper.START if self.upper else None}"
+
+    @property
+    def top_key(self) -> str:
+        """The key that says where the lower end is at the start."""
+        return f"spring.{self.lower.START if self.lower else None}"
 
     @property
     def initial_top(self) -> float | None:
         """Where the lower end is at the start [m]; of our spring Ψ."""
-        if self.lower is None:
-            return None
-        return self.lower.equilibrium if isinstance(self.lower, Spring) else self.lower.start
+        return getattr(self.lower, self.lower.START) if self.lower and self.lower.START else None
 
     @property
     def initial_tip(self) -> float | None:
         """u_tip at the start [m]: s₀ L, or the static deflection of a beam let go without inertia and damping."""
-        if (beam := self.upper) is None or not isinstance(beam, Beam):
-            return None if beam is None else beam.start
-        if beam.fidelity == "quasi_static" and beam.approach == "elastic" and beam.alpha_b == 0.0:
+        beam = self.upper
+        if beam is None or beam.START is None:
+            return None
+        start: float = getattr(beam, beam.START)
+        if not isinstance(beam, Beam):
+            return start
+        if self.massless and beam.approach == "elastic" and beam.alpha_b == 0.0:
             return tip_load_deflection(beam)
-        return beam.initial_deflection_slope * beam.length
+        return start * beam.length
 
     @property
     def initial_clearance(self) -> float | None:

@@ -64,6 +64,8 @@ class Table(BaseModel):
     WAYS: ClassVar[tuple[Ways, ...]] = ()
     #: Keys that give the table its scales: of a table with none of them, those that are needed are 1 (dimensionless).
     SCALES: ClassVar[tuple[str, ...]] = ()
+    #: Of a body: the key that says where its end is at the start; ``None`` where only an FMU knows.
+    START: ClassVar[str | None] = None
 
     #: Keys that follow from others that were given; files do not have them.
     _followed: frozenset[str] = PrivateAttr(frozenset())
@@ -166,6 +168,7 @@ class Beam(Table):
         Ways("mesh", (("n_elements", "element_degree", "reduced_integration", "mass_matrix"), ("mesh",))),
         Ways("velocity at the start", (("initial_velocity_slope",), ("approach_speed",))),
     )
+    START = "initial_deflection_slope"
     SCALES = (
         *("density", "length", "area", "second_moment_of_area", "width", "height", "diameter"),
         *("poisson_ratio", "shear_coefficient"),
@@ -260,6 +263,7 @@ class Spring(Table):
     Mass and linear stiffness have no defaults. Only if neither is given, the spring is dimensionless: both are 1.
     """
 
+    START = "equilibrium"
     SCALES = ("mass", "linear_stiffness")
 
     mass: float = key("kg", "mass m", gt=0.0)

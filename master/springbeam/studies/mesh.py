@@ -38,7 +38,7 @@ def pick_mesh(scene: Scene) -> Trajectory:
     """
     if scene.accuracy is None:
         raise SceneError("accuracy: missing; the mesh is chosen to reach it")
-    if scene.beam is None or scene.beam.fidelity == "quasi_static":
+    if scene.beam is None or scene.massless:
         raise SceneError("[beam]: the scene has no mesh to choose")
     beam, asked = scene.beam, scene.accuracy
     coarse: Trajectory | None = None

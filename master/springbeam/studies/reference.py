@@ -22,7 +22,7 @@ def refuse_without_reference(scene: Scene) -> None:
         )
     if scene.contact.law == "transmission" and scene.contact.impact == "rest" and scene.beam and scene.spring:
         raise SceneError("contact.impact = 'rest': no reference has it; use 'inelastic' or 'tip'")
-    if scene.contact.law == "compliance" and scene.beam and scene.beam.fidelity == "quasi_static":
+    if scene.contact.law == "compliance" and scene.massless:
         raise SceneError("beam.fidelity = 'quasi_static': no reference has it with law 'compliance'; use 'dynamic'")
 
 

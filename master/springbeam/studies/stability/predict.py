@@ -76,7 +76,7 @@ def predict(scene: Scene) -> Prediction:
     if scene.accuracy is not None:
         notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")
     modal = None
-    if scene.beam is not None and scene.beam.fidelity == "quasi_static":
+    if scene.massless:
         notes.append("a quasi-static beam has no inertia and no step of its own: nothing to predict")
     elif scene.beam is not None:
         beam, truncated = _reduced(scene.beam)
