@@ -305,7 +305,7 @@ def test_tradeoff_leaves_the_accuracy_out_and_says_so(asking):
     """Each configuration once had the name of one and the settings that were picked."""
     study = Tradeoff.of(load_scene(asking), repeats=1)
     assert study.remarks == ("accuracy = 0.0001 is left out: each configuration has its own scheme and steps",)
-    calls = [point["macro_steps"] for point in study.record(study.cases()["energy 0"])["points"]]
+    calls = [point.macro_steps for point in study.record(study.cases()["energy 0"])["points"]]
     assert len(set(calls)) == len(calls) == 4
 
 

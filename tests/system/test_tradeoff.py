@@ -157,12 +157,12 @@ def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
     cases = late.cases()
     records = {name: late.record(cases[name]) for name in cases if name != "Algorithm 1"}
     models = records.pop("modes and elements")
-    assert models["points"] == [] or all(point["cause"] for point in models["points"])
+    assert models["points"] == [] or all(point.cause for point in models["points"])
     for name, record in records.items():
         (point,) = record["points"]
-        assert (point["family"], point["errors"]) == (name, None)
-        assert "takes more than 0 s" in point["cause"] or "diverges" in point["cause"]
-        assert record["notes"] == [f"given up after 0 s, finer ones of their kind not run: {name}, {point['setting']}"]
+        assert (point.family, point.errors) == (name, None)
+        assert "takes more than 0 s" in point.cause or "diverges" in point.cause
+        assert record["notes"] == [f"given up after 0 s, finer ones of their kind not run: {name}, {point.setting}"]
 
 
 def test_models_are_left_out_if_their_reference_takes_too_long(monkeypatch):

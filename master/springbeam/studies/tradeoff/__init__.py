@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Any, ClassVar
@@ -44,6 +44,15 @@ _EXPLICIT, _MOST_TURNS = ("DOP853", "LSODA"), 1e5
 _ADAPTIVE_ROWS = 60
 #: The case that holds all configurations whose model varies: they share one costly reference.
 _MODELS = "modes and elements"
+
+
+@dataclass
+class _Timed:
+    """A configuration that has been run."""
+
+    configuration: Configuration
+    run: Trajectory | str  #: the result, or why it stopped
+    times: list[list[float]]  #: solve and setup [s] of each repetition
 
 
 class Tradeoff(Study):
@@ -97,51 +106,42 @@ class Tradeoff(Study):
 
     def record(self, case: Sequence[Configuration]) -> Record:
         """Run, time and judge the configurations of a case."""
-        runs: dict[Configuration, Trajectory | str] = {}
-        timings: dict[Configuration, list[tuple[float, float]]] = {}
+        limit, repeats = (0.1 * _LIMIT, 1) if self.quick else (_LIMIT, self.repeats)
+        timed: list[_Timed] = []
         given_up: dict[str, Configuration] = {}
-        limit = 0.1 * _LIMIT if self.quick else _LIMIT
-        for repeat in range(1 if self.quick else self.repeats):
-            for configuration in case:
-                if repeat == 0 and configuration.family in given_up:
-                    continue
-                if repeat > 0 and (
-                    not isinstance(runs.get(configuration), Trajectory) or timings[configuration][0][0] > _TIMED_ONCE
-                ):
-                    continue
-                run, solve, setup = _run(configuration, self.reach)
-                runs.setdefault(configuration, run)
-                timings.setdefault(configuration, []).append((solve, setup))
-                if repeat == 0 and solve > limit:
+        for configuration in case:
+            if configuration.family not in given_up:
+                run, *times = _run(configuration, self.reach)
+                timed.append(_Timed(configuration, run, [times]))
+                if times[0] > limit:
                     given_up[configuration.family] = configuration
+        for _ in range(1, repeats):
+            for one in timed:
+                if isinstance(one.run, Trajectory) and one.times[0][0] <= _TIMED_ONCE:
+                    _, *times = _run(one.configuration, self.reach)
+                    one.times.append(times)
         notes = []
         if given_up:
             names = "; ".join(c.name for c in given_up.values())
             notes.append(f"given up after {limit:g} s, finer ones of their kind not run: {names}")
         points: list[Point] = []
         try:
-            points = self._judged(runs, timings)
+            points = self._judged(timed)
         except event_driven.ReferenceFailure as failed:
             if not case[0].refined:
                 raise
             notes.append(f"modes and elements not judged: on a finer mesh the reference {failed}")
-        return {"points": [asdict(point) for point in points], "notes": notes}
+        return {"points": points, "notes": notes}
 
-    def _judged(
-        self,
-        runs: dict[Configuration, Trajectory | str],
-        timings: dict[Configuration, list[tuple[float, float]]],
-    ) -> list[Point]:
-        # scipy is timed without rows; its errors are those of the same steps, sampled.
+    def _judged(self, timed: Sequence[_Timed]) -> list[Point]:
         grid = np.linspace(self.scene.contact_time or 0.0, self.scene.time.t_end, 401)
-        found = {
-            c: _scipy(c, self.reach, grid) if isinstance(run, Trajectory) and c.method in SCIPY_TOLERANCES else run
-            for c, run in runs.items()
-        }
-        times = [_judged_times(c, run) for c, run in found.items() if isinstance(run, Trajectory)]
+        for one in timed:  # scipy is timed without rows; its errors are those of the same steps, sampled
+            if isinstance(one.run, Trajectory) and one.configuration.method in SCIPY_TOLERANCES:
+                one.run = _scipy(one.configuration, self.reach, grid)
+        times = [_judged_times(one.configuration, one.run) for one in timed if isinstance(one.run, Trajectory)]
         reference: Trajectory | None = None
         if times:
-            refined = next(iter(runs)).refined
+            refined = timed[0].configuration.refined
             model = finer(self.scene) if refined else self.scene
             assert model is not None
             reference = event_driven.simulate(
@@ -149,11 +149,11 @@ class Tradeoff(Study):
                 sample_times=np.unique(np.concatenate([grid, *times])),
                 time_limit=_LIMIT_FINER if refined else None,
             )
-        return [_point(c, run, reference, timings[c]) for c, run in found.items()]
+        return [_point(one, reference) for one in timed]
 
     def judged(self, records: Mapping[str, Record]) -> Points:
         """Return all points."""
-        return Points([Point.of(point) for record in records.values() for point in record["points"]])
+        return Points.of(records.values())
 
     def notes(self, records: Mapping[str, Record]) -> list[str]:
         """Return what was left out, and why."""
@@ -237,13 +237,9 @@ def _judged_times(configuration: Configuration, run: Trajectory) -> np.ndarray:
     return np.asarray(run.time[::every])
 
 
-def _point(
-    configuration: Configuration,
-    run: Trajectory | str,
-    reference: Trajectory | None,
-    timing: list[tuple[float, float]],
-) -> Point:
-    solves = [solve for solve, _ in timing]
+def _point(timed: _Timed, reference: Trajectory | None) -> Point:
+    configuration, run = timed.configuration, timed.run
+    solves, setups = zip(*timed.times, strict=True)
     beam, size = configuration.scene.beam, configuration.scene.coupling.macro_step
     counts, cause = {}, ""
     found: Errors | None = None
@@ -271,6 +267,6 @@ def _point(
         cause=cause,
         solve=statistics.median(solves),
         solve_spread=max(solves) - min(solves),
-        setup=statistics.median(setup for _, setup in timing),
+        setup=statistics.median(setups),
         **counts,
     )

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import TypeAdapter
 from rich.table import Table
 
 from ..tables import table
@@ -56,12 +57,6 @@ class Point:
     def displacement(self) -> float:
         return float("inf") if self.errors is None else self.errors.displacement
 
-    @classmethod
-    def of(cls, record: Mapping[str, Any]) -> Point:
-        """Return the point of a record."""
-        errors = record["errors"]
-        return cls(**{**record, "errors": None if errors is None else Errors.of(errors)})
-
     def row(self) -> dict[str, Any]:
         """Return the row of the CSV file."""
         against = "finer mesh" if self.refined else "same model"
@@ -72,6 +67,9 @@ class Point:
     def summary(self) -> dict[str, Any]:
         """Return what is said of it to programs."""
         return {"name": self.name, "error": self.displacement, "solve": self.solve, "setup": self.setup}
+
+
+_POINTS = TypeAdapter(list[Point])
 
 
 @dataclass(frozen=True)
@@ -94,6 +92,11 @@ class Points:
     """The points of a tradeoff, judged together."""
 
     points: list[Point]
+
+    @classmethod
+    def of(cls, records: Iterable[Mapping[str, Any]]) -> Points:
+        """Return the points of the records."""
+        return cls(_POINTS.validate_python([point for record in records for point in record["points"]]))
 
     def front(self) -> list[Point]:
         """Return the Pareto front, the cheapest first: no other point is both quicker and more accurate.
