@@ -6,7 +6,6 @@ import multiprocessing
 import os
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -31,8 +30,7 @@ def recorded(todo: sweep.Sweep, pool: ProcessPoolExecutor) -> float:
 
 
 def in_a_pool(todo: sweep.Sweep, pool: ProcessPoolExecutor) -> float:
-    run = partial(sweep.row, todo.scene, todo.axes, metrics=todo.metrics)
-    return timed(lambda: list(pool.map(run, todo.cases().values())), perf_counter)
+    return timed(lambda: list(pool.map(todo.record, todo.cases().values())), perf_counter)
 
 
 def warm(workers: int) -> ProcessPoolExecutor:

@@ -22,7 +22,7 @@ from springbeam.studies.accuracy import simulate
 from springbeam.studies.crosscheck import crosscheck
 from springbeam.studies.crosscheck.orders import orders
 from springbeam.studies.stability.predict import predict
-from springbeam.studies.sweep import row
+from springbeam.studies.sweep import Sweep
 from springbeam.studies.tradeoff import Tradeoff
 
 sys.path.append(str(Path(__file__).parents[1] / "campaign"))
@@ -295,7 +295,7 @@ def test_crosscheck_compares_soft_laws_that_were_picked(asking, tmp_path):
 
 def test_each_run_of_a_sweep_picks_its_own():
     scene = scene_from_dict({**STIFF_ON_SOFT, "accuracy": 1e-3})
-    found = row(scene, (), (), ("y_min", "macro_steps"))
+    found = Sweep(scene=scene, vary=(), metric=("y_min", "macro_steps")).record(())
     expected = simulate(scene)
     assert found["status"] == "done"
     assert (found["y_min"], found["macro_steps"]) == (expected.y.min(), expected.summary["macro_steps"])

@@ -8,23 +8,15 @@ from itertools import islice
 import pytest
 from commands import command
 
-from springbeam import load_scene, with_changes
+from springbeam import with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.studies.stability import critical
-from springbeam.studies.stability.critical import LARGE_STEP, Comparison, Critical, comparison, growth
+from springbeam.studies.stability.critical import Comparison, Critical, comparison, growth, linear_scene
+from springbeam.studies.stability.linear import spectral_radius
 from springbeam.studies.stability.predict import THRESHOLD, linear_pair
 
 
 def compared(law: str, stiffness: float, scheme: str, degree: int, n: int = 4) -> Comparison:
-    soft = with_changes(
-        load_scene("soft"),
-        stop=None,
-        beam={"n_elements": n},
-        spring={"cubic_stiffness": 0.0},
-        contact={"law": law, "stiffness": stiffness, "exponent": 1.0},
-        coupling={"scheme": scheme, "degree": degree, "macro_step": LARGE_STEP},
-    )
-    return comparison(soft, linear_pair(soft, modal_beam(soft.beam)))
+    return comparison(linear_scene(law, stiffness, scheme, degree, n))
 
 
 @pytest.mark.parametrize(
@@ -63,14 +55,10 @@ def test_energy_is_stable_where_ordinary_exchanges_are_not(law, stiffness, degre
 def test_growth_is_the_spectral_radius():
     """Above the threshold, where a power of ten is reached in some 400 steps."""
     c = compared("compliance", 1e4, "jacobi", 0)
-    soft = with_changes(
-        load_scene("soft"),
-        beam={"n_elements": 4},
-        contact={"law": "compliance", "stiffness": 1e4, "exponent": 1.0},
-        coupling={"scheme": "jacobi", "macro_step": 3.0 * c.predicted},
-    )
-    pair = linear_pair(with_changes(soft, spring={"cubic_stiffness": 0.0}), modal_beam(soft.beam))
-    radius = critical.spectral_radius(pair, "jacobi", 0, soft.coupling.H)
+    soft = linear_scene("compliance", 1e4, "jacobi", 0, 4)
+    soft = with_changes(soft, coupling={"macro_step": 3.0 * c.predicted})
+    pair = linear_pair(soft, modal_beam(soft.beam))
+    radius = spectral_radius(pair, "jacobi", 0, soft.coupling.H)
     assert radius > 1.005
     assert growth(soft) - 1.0 == pytest.approx(radius - 1.0, rel=0.02)
 

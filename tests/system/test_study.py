@@ -88,8 +88,8 @@ def test_an_interrupted_study_says_how_it_goes_on_and_does(tmp_path, monkeypatch
     whole = command(*SWEEP, "--workers", "2", "--out", "whole")
     assert whole.exit_code == 0, whole.output
     monkeypatch.setattr(sweep.Sweep, "parallel", False)
-    interrupt, row = Interrupt(3), sweep.row
-    monkeypatch.setattr(sweep, "row", lambda *arguments: interrupt() or row(*arguments))
+    interrupt, record = Interrupt(3), sweep.Sweep.record
+    monkeypatch.setattr(sweep.Sweep, "record", lambda *arguments: interrupt() or record(*arguments))
     cut = command(*SWEEP)
     assert cut.exit_code == 3
     there = "2 of 5 records are in results/duffing-sweep"

@@ -157,7 +157,7 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
     scene = scene_from_dict(
         {"time": {"t_end": 30.0}, "spring": spring, "coupling": {"macro_step": 0.02}, "loads": [drive]}
     )
-    found = sweep.row(scene, (), (), (), once_a_period=True)
+    found = sweep.Sweep(scene=scene, vary=(), metric=("y_max",), stroboscopic=True).record(())
     w = 4.0 * np.pi
     exact = 3.0 / (40.0 - w * w + 4.0j * w)
     assert len(found["stroboscopic"]) == 20

@@ -13,13 +13,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 from rich.text import Text
 
 from ..bodies.archive import fmu_directory
 from ..bodies.protocol import FmuError
 from ..scene import Beam, Scene, Spring, load_scene
 from ..scene.partners import kind_of
+from ..studies.tables import table
 from .common import (
     BAD_INPUT,
     DISAGREES,
@@ -102,13 +102,12 @@ def _examine(scene: Scene, as_json: bool) -> None:
         console.print(Text(f"[{name}] {path}", style="bold"), soft_wrap=True)
         given = f"{finding.mass:.9g} kg" + (" (measured)" if mass is None else f" measured, {mass:.9g} kg given")
         console.print(Text(f"mass that a force or an impulse meets: {given}"))
-        table = Table(box=None, pad_edge=False, header_style="bold")
-        for header in ("", "capability", "shown by", "what is offered"):
-            table.add_column(header)
-        for key, shown_by, having, lacking in OFFERED:
-            there = told[key] > 0
-            table.add_row("yes" if there else "no", key, shown_by, Text(having if there else lacking))
-        console.print(table)
+        names = ("", "capability", "shown by", "what is offered")
+        rows = [
+            ("yes", key, shown_by, having) if told[key] > 0 else ("no", key, shown_by, lacking)
+            for key, shown_by, having, lacking in OFFERED
+        ]
+        console.print(table(names, rows, words=names))
     faults = [fault for finding in found.values() for fault in finding.faults]
     refused = refusals(scene, {table: finding.abilities for table, finding in found.items()})
     if as_json:

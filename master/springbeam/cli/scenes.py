@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 from rich.text import Text
 
 from ..scene import load_scene, shipped_scenes
 from ..scene.reference import MODELS
+from ..studies.tables import table
 from .common import BAD_INPUT, JsonOption, bad_input_reported, console_for, fail, print_json
 
 
@@ -25,25 +25,20 @@ def scenes(as_json: JsonOption = False) -> None:
 
     Example: springbeam scenes
     """
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("scene", no_wrap=True)
-    table.add_column("contains", no_wrap=True)
-    table.add_column(Text("t_end [s]"), justify="right", no_wrap=True)
-    table.add_column("title")
-    listed = []
+    listed: list[dict[str, Any]] = []
     with bad_input_reported():
         for name, path in shipped_scenes().items():
             scene = load_scene(path)
             parts = {"beam": scene.upper, "spring": scene.lower, "stop": scene.stop}
             contents = [part for part, there in parts.items() if there is not None]
-            table.add_row(name, ", ".join(contents), f"{scene.time.t_end:g}", Text(scene.title))
             listed.append({
                 "name": name, "contains": contents, "t_end": scene.time.t_end, "title": scene.title, "file": path
             })  # fmt: skip
     if as_json:
         print_json(listed)
     console = console_for(silent=as_json)
-    console.print(table)
+    rows = [(row["name"], ", ".join(row["contains"]), f"{row['t_end']:g}", row["title"]) for row in listed]
+    console.print(table(("scene", "contains", "t_end [s]", "title"), rows, words=("contains", "title")))
     console.print(Text(f"\nfiles: {path.parent}"), soft_wrap=True)
 
 

@@ -12,11 +12,11 @@ from rich.text import Text
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", words: Collection[str] = ()) -> Table:
-    """Return a table: the first column and those named in ``words`` hold words, the others numbers, on the right."""
+    """Return a table: the first column and those named in ``words`` hold words, which may wrap, the others numbers."""
     made = Table(box=None, pad_edge=False, header_style="bold", title=title or None, title_justify="left")
     for k, name in enumerate(columns):
         left = k == 0 or name in words
-        made.add_column(Text(name), justify="left" if left else "right", no_wrap=k > 0, overflow="fold")
+        made.add_column(Text(name), justify="left" if left else "right", no_wrap=not left, overflow="fold")
     for row in rows:
         made.add_row(*map(Text, row))
     return made

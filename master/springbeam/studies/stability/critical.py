@@ -24,7 +24,7 @@ from ...scene import Scene, load_scene, with_changes
 from ..schemes import RIGID, SOFT
 from ..study import Found, Record, Study
 from ..tables import table, write_csv
-from .linear import LinearPair, spectral_radius
+from .linear import spectral_radius
 from .predict import THRESHOLD, critical_step, linear_pair
 
 #: Growth of the energy at which the rate is told, and how many macro steps it may take to get there.
@@ -172,18 +172,8 @@ class Critical(Study):
     def record(self, case: Sequence[Any]) -> Record:
         """Compare one coupling."""
         law, stiffness, scheme, degree = case
-        scene = with_changes(
-            load_scene("soft"),
-            stop=None,
-            beam={"n_elements": 4 if self.quick else self.n_elements},
-            spring={"cubic_stiffness": 0.0},
-            contact={"law": law, "stiffness": stiffness or 1.0, "exponent": 1.0},
-            coupling={"scheme": scheme, "degree": degree, "macro_step": LARGE_STEP},
-        )
-        assert scene.beam is not None
-        pair = linear_pair(scene, modal_beam(scene.beam))
-        assert pair is not None
-        return asdict(comparison(scene, pair))
+        n_elements = 4 if self.quick else self.n_elements
+        return asdict(comparison(linear_scene(law, stiffness, scheme, degree, n_elements)))
 
     def found(self, records: Mapping[str, Record]) -> Found:
         """Judge whether predicted and measured agree."""
@@ -199,8 +189,23 @@ class Critical(Study):
         return [write_csv(directory / "critical.csv", list(records.values()))]
 
 
-def comparison(scene: Scene, pair: LinearPair) -> Comparison:
-    """Compare ``scene`` with its linearised ``pair``."""
+def linear_scene(law: str, stiffness: float, scheme: str, degree: int, n_elements: int) -> Scene:
+    """Return `soft` without a stop, with linear spring and contact, λ in N/m, at `LARGE_STEP`."""
+    return with_changes(
+        load_scene("soft"),
+        stop=None,
+        beam={"n_elements": n_elements},
+        spring={"cubic_stiffness": 0.0},
+        contact={"law": law, "stiffness": stiffness or 1.0, "exponent": 1.0},
+        coupling={"scheme": scheme, "degree": degree, "macro_step": LARGE_STEP},
+    )
+
+
+def comparison(scene: Scene) -> Comparison:
+    """Compare ``scene`` with its linearised pair."""
+    assert scene.beam is not None
+    pair = linear_pair(scene, modal_beam(scene.beam))
+    assert pair is not None
     coupling, law = scene.coupling, scene.contact.law
     scheme, degree = coupling.scheme, coupling.degree
     predicted = critical_step(pair, scheme, degree, factor=_FINE if scheme == "hermite" else None)

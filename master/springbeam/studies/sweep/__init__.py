@@ -20,7 +20,7 @@ from . import stroboscopic
 from .design import Axis, Sampling, compatible, design, parse_axis, varied
 from .metrics import METRICS, PRINCIPAL
 
-__all__ = ["METRICS", "PRINCIPAL", "TABLE", "Sweep", "row", "rows"]
+__all__ = ["METRICS", "PRINCIPAL", "TABLE", "Sweep", "rows"]
 
 TABLE, PICTURE = "sweep.parquet", "sweep.png"
 STATUSES = ("done", "stopped", "refused", "lost")
@@ -62,8 +62,21 @@ class Sweep(Study):
         return {str(index): several for index, several in enumerate(values)}
 
     def record(self, case: Sequence[Any]) -> Record:
-        """Run once."""
-        return row(self.scene, self.axes, case, self.metrics, self.stroboscopic)
+        """Run once. ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` says why."""
+        status, error, warnings = "done", "", ""
+        found: dict[str, Any] = dict.fromkeys(self.metrics)
+        try:
+            run = simulate(varied(self.scene, self.axes, case))
+        except SceneError as refused:
+            status, error = "refused", str(refused)
+        except RunStopped as stopped:
+            status, error = "stopped", str(stopped)
+        else:
+            warnings = "\n".join(run.summary["warnings"])
+            found = {name: METRICS[name](run) for name in self.metrics}
+            if self.stroboscopic:
+                found |= stroboscopic.observed(run)
+        return {"status": status, "error": error, "warnings": warnings, **found}
 
     def lost(self, cause: str) -> Record:
         """Return a row that says why there is no run."""
@@ -115,26 +128,6 @@ class Sweep(Study):
             for index, record in records.items()
         ]
         return pa.Table.from_pylist(entries, schema=pa.schema(fields))
-
-
-def row(
-    scene: Scene, axes: Sequence[Axis], values: Sequence[Any], metrics: Sequence[str], once_a_period: bool = False
-) -> Record:
-    """Run once. ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` says why.
-
-    ``once_a_period`` adds what `stroboscopic` observes.
-    """
-    blank: dict[str, Any] = dict.fromkeys(metrics)
-    try:
-        run = simulate(varied(scene, axes, values))
-    except SceneError as error:
-        return {"status": "refused", "error": str(error), "warnings": "", **blank}
-    except RunStopped as error:
-        return {"status": "stopped", "error": str(error), "warnings": "", **blank}
-    found: dict[str, Any] = {name: METRICS[name](run) for name in metrics}
-    if once_a_period:
-        found |= stroboscopic.observed(run)
-    return {"status": "done", "error": "", "warnings": "\n".join(run.summary["warnings"]), **found}
 
 
 def rows(directory: str | Path) -> dict[str, list[Any]]:

@@ -15,7 +15,7 @@ from scipy.special import spherical_jn
 
 from ...run.runner import simulate
 from ...scene import Beam, Scene, Spring, scene_from_dict
-from .beam import clamped_free_frequencies
+from .beam import clamped_free_frequencies, free_end, transfer_rate
 from .check import EPS, Check
 
 _N = 2 * 2 * 8  #: unknowns of the beam
@@ -58,11 +58,9 @@ def resonance() -> Iterator[Check]:
 
 
 def _tip_receptance(w: float, alpha: float) -> complex:
-    """Return u(L)/C [m/N] at ``w`` [rad/s]: (θ, M, u, Q)' = A (θ, M, u, Q) with M = 0 and Q = C at the tip."""
-    soft = 1.0 / (1.0 + 1j * w * alpha)
-    A = np.array([[0, soft, 0, 0], [-w * w, 0, 0, -1], [1, 0, 0, soft], [0, 0, -w * w, 0]])
-    across = expm(A)
-    start = np.linalg.solve(across[np.ix_([1, 3], [1, 3])], [0.0, 1.0])
+    """Return u(L)/C [m/N] at ``w`` [rad/s]: M = 0 and Q = C at the tip."""
+    across = expm(transfer_rate(w, 1.0 / (1.0 + 1j * w * alpha)))
+    start = np.linalg.solve(free_end(across), [0.0, 1.0])
     return complex(across[2, [1, 3]] @ start)
 
 
