@@ -12,7 +12,6 @@ find the root. `StepSolver` then tries the crossing on the bodies.
 
 from __future__ import annotations
 
-from functools import partial
 from operator import add, neg, sub
 
 import numpy as np
@@ -118,9 +117,11 @@ class _Crossing(StepSolver):
 
     def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> tuple[Vector, Vector]:
         tip, low = window.ends
-        x = list(map(neg, gap))
+        start, x = low.displacement - tip.displacement, list(map(neg, gap))
         try:
-            found = _Line(self.projection, low.displacement - tip.displacement, window.size, x, a, descent).crossing()
+            found = self._newton(start, window.size, x, a, descent)
+            if found is None:
+                found = self._stiffened(start, window.size, x, a, descent)
         except np.linalg.LinAlgError:
             found = None
         if found is None:
@@ -128,55 +129,27 @@ class _Crossing(StepSolver):
         x, a = found
         return list(map(neg, x)), a
 
+    def _newton(
+        self, start: float, size: float, x: Vector, a: Vector, descent: Matrix
+    ) -> tuple[Vector, Vector] | None:
+        """Return the x and A(x) that law and bodies have in common, ``None`` if they are not found.
 
-class _Line:
-    """The crossing of one step's law and responses; ``descent`` is −E."""
-
-    __slots__ = ("_a", "_descent", "_force", "_slope", "_start", "_x")
-
-    def __init__(
-        self, projection: Projection, start: float, size: float, x: Vector, a: Vector, descent: Matrix
-    ) -> None:
-        self._force, self._slope = partial(projection.force, start, size), partial(projection.slope, start, size)
-        self._start, self._x, self._a, self._descent = start, x, a, descent
-
-    def crossing(self) -> tuple[Vector, Vector] | None:
-        """Return x and A(x), ``None`` if they are not found. Raises numpy.linalg.LinAlgError."""
-        return self._newton(self._x, 1.0) or self._stiffened()
-
-    def _missing(self, x: Vector, a: Vector, softness: float) -> Vector:
-        """Return −f of the law times ``softness``, whose force is ``a``."""
-        if x is self._x and softness == 1.0:
-            return list(map(sub, self._a, a))
-        moved = times(self._descent, list(map(sub, x, self._x)))
-        return [m - softness * new + old for m, new, old in zip(moved, a, self._a, strict=True)]
-
-    def _flexibility(self, x: Vector, softness: float) -> Matrix:
-        """Return (E + A′)⁻¹ [m/N], of the law times ``softness``."""
-        return inverse(
-            [
-                [softness * s - d for s, d in zip(row, line, strict=True)]
-                for row, line in zip(self._slope(x), self._descent, strict=True)
-            ]
-        )
-
-    def _newton(self, x: Vector, softness: float) -> tuple[Vector, Vector] | None:
-        """Return the crossing with the law times ``softness``, ``None`` if it is not found.
-
-        Damped Newton iteration from ``x``, a correction being accepted where the next one would be shorter; the slope
-        of the law is kept where that is much shorter (Deuflhard 2004, section 2.1).
+        Damped Newton iteration from ``x``, where the bodies are under ``a``, a correction being accepted where the next
+        one would be shorter; the slope of the law is kept where that is much shorter (Deuflhard 2004, section 2.1).
+        ``descent`` is −E. Raises numpy.linalg.LinAlgError.
         """
-        force, start = self._force, self._start
-        missing = self._missing(x, force(x), softness)
-        flexibility = self._flexibility(x, softness)
+        force, under_a = self.projection.force, x
+        missing = list(map(sub, a, force(start, size, x)))  # −f
+        flexibility = self._flexibility(start, size, x, descent)
         change = times(flexibility, missing)
         length = max(map(abs, change))
         for _ in range(_MAX_NEWTON):
             share = 1.0
             for _ in range(_MAX_DAMPING):
                 tried = list(map(add, x, change if share == 1.0 else [share * step for step in change]))
-                a = force(tried)
-                missing = self._missing(tried, a, softness)
+                of_law = force(start, size, tried)
+                moved = times(descent, list(map(sub, tried, under_a)))
+                missing = [m - new + old for m, new, old in zip(moved, of_law, a, strict=True)]
                 following = times(flexibility, missing)
                 left = max(map(abs, following))
                 scale = max(abs(start), *map(abs, tried))
@@ -188,24 +161,36 @@ class _Line:
             x = tried
             if left * left <= _SETTLED * scale * length or length <= _ROUNDING * scale:
                 # The correction after the next would be left²/length. For the next one the law's slope tells the force.
-                felt = times(self._descent, following)
-                return list(map(add, x, following)), [c + m + d for c, m, d in zip(a, missing, felt, strict=True)]
+                felt = times(descent, following)
+                return list(map(add, x, following)), [c + m + d for c, m, d in zip(of_law, missing, felt, strict=True)]
             if left > _SLOW * length:
-                flexibility = self._flexibility(x, softness)
+                flexibility = self._flexibility(start, size, x, descent)
                 following = times(flexibility, missing)
                 left = max(map(abs, following))
             change, length = following, left
         return None
 
-    def _stiffened(self) -> tuple[Vector, Vector] | None:
-        """Start from the law so soft that the bodies hardly feel it, and stiffen it from crossing to crossing."""
-        alone = [value - step for value, step in zip(self._x, times(inverse(self._descent), self._a), strict=True)]
-        slope = self._slope(alone)
-        gain = max(abs(value) for row in slope for value in row) / max(abs(e) for row in self._descent for e in row)
+    def _flexibility(self, start: float, size: float, x: Vector, descent: Matrix) -> Matrix:
+        """Return (E + A′)⁻¹ [m/N]."""
+        slope = self.projection.slope(start, size, x)
+        return inverse([list(map(sub, row, line)) for row, line in zip(slope, descent, strict=True)])
+
+    def _stiffened(
+        self, start: float, size: float, x: Vector, a: Vector, descent: Matrix
+    ) -> tuple[Vector, Vector] | None:
+        """Start from the law so soft that the bodies hardly feel it, and stiffen it from crossing to crossing.
+
+        To soften the law is to have bodies that are harder to move by as much, under forces as much larger.
+        """
+        x = list(map(sub, x, times(inverse(descent), a)))
+        a = [0.0] * len(a)
+        slope = self.projection.slope(start, size, x)
+        gain = max(abs(value) for row in slope for value in row) / max(abs(e) for row in descent for e in row)
         softness = min(1.0, 1.0 / gain) if gain > 0.0 else 1.0
-        x = alone
         while True:
-            found = self._newton(x, softness)
+            harder = [[e / softness for e in row] for row in descent]
+            found = self._newton(start, size, x, [c / softness for c in a], harder)
             if found is None or softness == 1.0:
                 return found
-            x, softness = found[0], min(1.0, _STIFFER * softness)
+            x, a = found[0], [softness * c for c in found[1]]
+            softness = min(1.0, _STIFFER * softness)
