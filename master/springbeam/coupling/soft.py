@@ -129,9 +129,7 @@ class _Crossing(StepSolver):
         x, a = found
         return list(map(neg, x)), a
 
-    def _newton(
-        self, start: float, size: float, x: Vector, a: Vector, descent: Matrix
-    ) -> tuple[Vector, Vector] | None:
+    def _newton(self, start: float, size: float, x: Vector, a: Vector, descent: Matrix) -> tuple[Vector, Vector] | None:
         """Return the x and A(x) that law and bodies have in common, ``None`` if they are not found.
 
         Damped Newton iteration from ``x``, where the bodies are under ``a``, a correction being accepted where the next

@@ -16,7 +16,7 @@ from ..contact.events import (
     locate,
     position_tolerance,
 )
-from ..contact.phases import common_velocity
+from ..contact.phases import Joint, common_velocity
 from ..coupling.protocol import Ends, Step
 from ..results.paths import Path, Sample
 from ..results.trajectory import Event
@@ -204,26 +204,18 @@ class Detector:
         cut = self._pair.attempt(state, inside * step.size, step.start)
         return cut if any(cut.contact) else step
 
-    # -- soft contact ------------------------------------------------------------------------------------------------
 
-    def soft_change(self, step: Step) -> Event | None:
-        """Return where contact by a soft law has opened or closed in ``step``, ``None`` if it has not.
+def soft_change(step: Step, joint: Joint) -> Event:
+    """Return where contact by a soft law has opened or closed in ``step``, which has led to ``joint``.
 
-        Nothing special happens there: the zero is that of the path of the gap.
-        """
-        (before_tip, before_low), (tip, low) = step.start, step.end
-        touching = tip.displacement < low.displacement
-        if touching == (before_tip.displacement < before_low.displacement):
-            return None
-        before, after = gap(step.start), gap(step.end)
-        sign = 1.0 if touching else -1.0  # opening, the penetration falls through zero
-        start, end, means = (
-            (sign * first, sign * second) for first, second in (before, after, gap.means(step.end, step.size))
-        )
-        at = Path.through(start, end, step.size, means).falls_through_zero()
-        places = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
-        (u, v), (y, z) = places
-        return Event(step.time + at * step.size, "impact" if touching else "separation", y, z, u, v)
+    Nothing special happens there: the zero is that of the path of the gap.
+    """
+    sign = 1.0 if joint is Joint.TOUCH else -1.0  # opening, the penetration falls through zero
+    told = (gap(step.start), gap(step.end), gap.means(step.end, step.size))
+    start, end, means = ((sign * first, sign * second) for first, second in told)
+    at = Path.through(start, end, step.size, means).falls_through_zero()
+    (u, v), (y, z) = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
+    return Event(step.time + at * step.size, "impact" if joint is Joint.TOUCH else "separation", y, z, u, v)
 
 
 def _inside(start: Motion, end: Motion, size: float, s: float) -> Sample:

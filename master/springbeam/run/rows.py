@@ -112,13 +112,16 @@ class Rows(Checkpointed):
             self.mismatch_at_stop = max(self.mismatch_at_stop, abs(v - z) / speed)
 
     def reached(self, step: Step) -> None:
-        """Note how deep the ends of a soft law have sunk into each other on ``step``, also inside it."""
+        """Note how deep the ends of a soft law have sunk into each other on ``step``, also inside it.
+
+        A law that never opens is linear: how deep does not matter.
+        """
         if not any(step.contact):
             return
         self.contact_steps += 1
         tip, low = step.end
         depth = low.displacement - tip.displacement
-        if depth <= 0.0:
+        if depth <= 0.0 and self._pair.opens_softly:
             path = Path.through(gap(step.start), gap(step.end), step.size, gap.means(step.end, step.size))
             inside = path.lowest_inside()
             depth = 0.0 if inside is None else -path.at(inside)

@@ -21,7 +21,7 @@ from ..scene.automatic import decided
 from ..scene.resolution import not_resolved, peak_force_doubt
 from .balance import Balance
 from .crowd import AT_ONCE, Crowd
-from .detection import Detector
+from .detection import Detector, soft_change
 from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .outcome import OVERFLOW, Progress, RunStopped
@@ -248,10 +248,8 @@ class Simulation(Checkpointed):
         joint = Joint.TOUCH if tip.displacement < low.displacement else Joint.FREE
         if joint is not state.phase.joint:
             state.phase = Phase(joint, state.phase.seated)
-        change = self._detector.soft_change(step)
-        if change is not None:
             self._events += 1
-            self._recorder.event(change)
+            self._recorder.event(soft_change(step, joint))
 
     # -- what is reported -------------------------------------------------------------------------------------------
 
