@@ -16,7 +16,7 @@ HERE = Path(__file__).parent
 PAGE = HERE.parents[1] / "docs" / "performance.md"
 
 
-@pytest.mark.parametrize("group", ["beam", "spring", "master", "profile", "paper", "long", "accuracy", "sweep"])
+@pytest.mark.parametrize("group", ["beam", "spring", "master", "profile", "paper", "accuracy", "sweep"])
 def test_every_group_runs(
     group: str, fmu_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -78,6 +78,18 @@ def test_flight_before_contact_costs_one_step_of_each_body(counted, coupling):
         assert calls[body, "fmi2SetFMUstate"] == 0
 
 
+@pytest.mark.parametrize(
+    ("H", "scheme", "degree"), [(2.5e-4, "energy", 0), (1e-3, "energy", 0), (1e-3, "energy", 2), (1e-3, "hermite", 2)]
+)
+def test_a_tied_step_costs_two_steps_of_each_body(H, scheme, degree):
+    """One to see what is left of the gap, one to close it; what a unit of each coefficient does is measured once for
+    each size of step: H/8 after the impact, what is left of H, and H."""
+    coupling = {"macro_step": H, "scheme": scheme, "degree": degree}
+    summary = simulate(with_changes(load_scene("soft"), coupling=coupling, time={"t_end": 0.071})).summary
+    for body in ("beam", "spring"):
+        assert summary[f"{body}_steps"] <= 2 * summary["macro_steps"] + 3 * (degree + 1)
+
+
 def test_a_load_sets_slopes_while_it_varies_and_makes_no_other_call(counted):
     """Without loads these are 50 steps, 51 fmi2SetReal and no slopes (above); the pulse lasts for 10 steps."""
     approach = {"approach": "elastic", "initial_deflection_slope": 0.5, "n_elements": 10}

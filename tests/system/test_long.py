@@ -33,7 +33,7 @@ SCENES = {
 }  # fmt: skip
 
 #: Prints, for every tenth of the steps, memory in use [bytes] and the mean time of a tied step [s]; then the summary.
-RUN = Path(__file__).parents[1] / "bench" / "long_run.py"
+RUN = Path(__file__).with_name("long_run.py")
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory in use is read from /proc")

@@ -1,0 +1,113 @@
+"""The FMUs and their numerics, beside the least work that a step needs."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+from collections.abc import Iterator
+from math import log10
+from pathlib import Path
+from typing import Any
+
+import scipy.sparse.linalg as spla
+from measure import Times, compare, timed
+from rows import Effort, Row, below, ratio_row, shown
+
+from springbeam import load_scene
+from springbeam.bodies.fmu_bodies import FmuBeam
+from springbeam.monolithic.semi_discrete import assemble
+
+PROGRAMS = Path(__file__).parents[2] / "build" / "tests" / "bench"
+
+
+def program(name: str, effort: Effort) -> dict[str, Any]:
+    """What ``build/tests/bench/NAME`` prints, by the names of its lines."""
+    arguments = ["--quick"] if effort.quick else []
+    output = subprocess.run([str(PROGRAMS / name), *arguments], stdout=subprocess.PIPE, text=True, check=True).stdout
+    lines = [json.loads(line) for line in output.splitlines()]
+    return {line["name"] + (f" {line['modes']}" if "modes" in line else ""): line for line in lines}
+
+
+def _of(line: dict[str, Any]) -> Times:
+    return Times(line["ours"], line["rival"])
+
+
+def beam(effort: Effort) -> Iterator[Row]:
+    found = program("beam_bench", effort)
+    bare = "one solve with the factors, one product, by Eigen (SimplicialLDLT, natural order)"
+    yield ratio_row("beam step, generalized-α, 1000 elements", _of(found["generalized_alpha"]), 1.5, bare)
+    yield ratio_row(
+        "the same from the same state under another force", _of(found["generalized_alpha repeated"]), 1.5, bare
+    )
+    for key, what, goal in (("", "", 1.0), (" repeated", " and the state set back before", 0.35)):
+        modal = _of(found["modal fmu" + key])
+        rival = f"64 products of 2 × 2 matrices: {shown(statistics.median(modal.rival))}"
+        name = f"beam step of the FMU, 64 modes{what}, called from C"
+        yield below(name, [1e6 * s for s in modal.ours], goal, "µs", rival)
+    yield from _initialisation(effort)
+    for modes, name in ((0, "generalized-α"), (64, "64 modes")):
+        line = found[f"scaling {modes}"]
+        for key, what, first, unit in (
+            ("step", "time of a step", 0, shown),
+            ("memory", "memory at its most", 1, _size),
+        ):
+            # A hundred elements are less than the system gives out at once.
+            n, values = line["elements"][first:], line[key][first:]
+            exponents = _exponents(n, values)
+            yield Row(
+                f"{what}, {name}, {n[0]:.0e} to {n[-1]:.0e} elements",
+                "exponent ≤ 1.1",
+                ", ".join(f"{e:.2f}" for e in exponents) + " a decade",
+                max(exponents, default=0.0) <= 1.1,
+                "; ".join(unit(value) for value in values),
+            )
+
+
+def _exponents(n: list[float], values: list[float]) -> list[float]:
+    return [log10(b / a) / log10(m / k) for a, b, k, m in zip(values, values[1:], n, n[1:], strict=False)]
+
+
+def _size(size: float) -> str:
+    return f"{size / 1e6:.2g} MB"
+
+
+def _initialisation(effort: Effort) -> Iterator[Row]:
+    """Beside ARPACK's shift-invert Lanczos of scipy for as many modes of the same matrices."""
+    paper = load_scene("paper-fig2").beam
+    assert paper is not None
+    for n, goal, unit, rounds in ((1000, 100.0, "ms", min(effort.rounds, 5)), (100_000, 10.0, "s", 1)):
+        if effort.quick and n > 1000:
+            continue
+        one = paper.model_copy(update={"n_elements": n, "n_modes": 64})
+
+        def ours(one: Any = one) -> float:
+            made: list[FmuBeam] = []
+            seconds = timed(lambda: made.append(FmuBeam(one, 0.0, 0.0)))
+            made[0].close()
+            return seconds
+
+        def arpack(one: Any = one) -> float:
+            d = assemble(one)
+            return timed(lambda: spla.eigsh(d.K.tocsc(), 64, d.M.tocsc(), sigma=0.0))
+
+        times = compare(ours, arpack, rounds) if n == 1000 else Times([ours()], [arpack()])
+        scaled = [seconds * {"ms": 1e3, "s": 1.0}[unit] for seconds in times.ours]
+        rival = f"scipy's eigsh (ARPACK) for the same modes: {shown(statistics.median(times.rival))}"
+        yield below(f"initialisation of beam.fmu, {n} elements, 64 modes", scaled, goal, unit, rival)
+
+
+def spring(effort: Effort) -> Iterator[Row]:
+    found = program("spring_bench", effort)
+    bare = "IDA restarted on (y, z, ∫y, ∫∫y), same tolerances"
+    for name, what in (
+        ("soft 1e-12", "`soft`, H = 4e-3, tolerance 1e-12"),
+        ("soft 1e-10", "`soft`, H = 4e-3, tolerance 1e-10"),
+        ("soft 1e-12 H=2.5e-4", "`soft`, H = 2.5e-4, tolerance 1e-12"),
+        ("fig4 1e-12", "`paper-fig4`, H = 4e-3, tolerance 1e-12"),
+    ):
+        counts, errors = found[f"{name} counts"], found[f"{name} errors"]
+        against = f"{bare}: {counts['rival'][0]} internal steps, ours {counts['ours'][0]}; error "
+        against += f"{errors['rival'][0]:.0e} m, ours {errors['ours'][0]:.0e} m"
+        yield ratio_row(f"spring step, {what}", _of(found[name]), 1.2, against)
+    yield ratio_row("the same of the FMU, state restored before", _of(found["fmu"]), 1.2, bare)

@@ -1,0 +1,211 @@
+"""The master: what a macro step costs outside the FMUs, where that goes, and the paper's scene."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from ctypes import c_size_t
+from time import thread_time
+from typing import Any
+
+import printed
+from against_scipy import UNTIL
+from fmus import program
+from measure import Times, compare, median_and_spread, timed
+from rows import Effort, Row, below, ratio_row, shown
+
+from springbeam import load_scene, simulate, with_changes
+from springbeam.bodies.factory import load_bodies
+from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
+from springbeam.bodies.functions import Functions
+from springbeam.monolithic import algorithm1
+from springbeam.results.recording import MemoryRecorder
+from springbeam.results.trajectory import Trajectory
+from springbeam.run.simulation import Simulation
+from springbeam.scene import Scene
+
+#: The calls of a macro step; those before the first one are set-up.
+STEPPING = ("DoStep", "GetReal", "SetReal", "SetRealInputDerivatives", "GetFMUState", "SetFMUState")
+
+
+class Inside:
+    """Time spent in `STEPPING` calls while it is in force; what ctypes needs for a call is not part of it."""
+
+    def __init__(self) -> None:
+        self.seconds, self.calls = 0.0, 0
+        self._prepared = Functions.prepared
+
+    def __enter__(self) -> Inside:
+        inside, prepared = self, self._prepared
+
+        def timed_call(self: Functions, name: str, *arguments: Any) -> Callable[[], int]:
+            function = prepared(self, name, *arguments)
+            if name not in STEPPING:
+                return function
+
+            def call() -> int:
+                began = thread_time()
+                status = function()
+                inside.seconds += thread_time() - began
+                inside.calls += 1
+                return status
+
+            return call
+
+        Functions.prepared = timed_call  # type: ignore[method-assign]
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        Functions.prepared = self._prepared  # type: ignore[method-assign]
+
+
+def nothing(times: int = 20_000) -> float:
+    """Seconds that `Inside` sees of a call that does nothing."""
+    with Inside() as inside:
+        body = FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
+        call = body.fmu.prepared("GetReal", None, c_size_t(0), None)
+        inside.seconds, inside.calls = 0.0, 0
+        for _ in range(times):
+            call()
+        body.close()
+    return inside.seconds / times
+
+
+def tied_phase(scene: Scene) -> tuple[float, int]:
+    """Seconds and macro steps of the first tied phase of `soft`, up to the foundation, in a run of the whole scene."""
+    clock: list[float] = []
+
+    def progress(time: float, phase: str, macro_steps: int) -> None:
+        if time < UNTIL:
+            clock.append(thread_time())
+
+    simulate(scene, progress)
+    return clock[-1] - clock[0], len(clock) - 1
+
+
+def master(effort: Effort) -> Iterator[Row]:
+    empty = nothing()
+    for H, scheme, degree in ((2.5e-4, "energy", 0), (1e-3, "energy", 0), (1e-3, "energy", 2), (1e-3, "hermite", 2)):
+        coupling = {"macro_step": H, "scheme": scheme, "degree": degree}
+        scene = with_changes(load_scene("soft"), coupling=coupling)
+        only_tied = with_changes(scene, time={"t_end": 0.071})
+        outside, within = [], []
+        for _ in range(effort.rounds):
+            seconds, steps = tied_phase(scene)
+            with Inside() as inside:
+                summary = simulate(only_tied).summary
+            of_fmus = (inside.seconds - inside.calls * empty) / summary["macro_steps"]
+            within.append(1e6 * of_fmus)
+            outside.append(1e6 * (seconds / steps - of_fmus))
+        name = f"`soft` tied, {scheme} {degree}, H = {H:g}"
+        inner = f"inside {median_and_spread(within)} µs"
+        yield below(f"{name}: time outside the FMUs per macro step", outside, 40.0, "µs", inner)
+        if effort.quick:
+            return
+
+
+class _Enough(Exception):
+    pass
+
+
+def profile(effort: Effort) -> Iterator[Row]:
+    """Parts of a macro step, each repeated by itself in the middle of the first tied phase of `soft`."""
+    scene = load_scene("soft")
+    beam, spring = load_bodies(scene, 0.0)
+    assert isinstance(beam, FmuBeam)
+    assert spring is not None
+
+    def progress(time: float, phase: str, macro_steps: int) -> None:
+        if macro_steps == 20:
+            raise _Enough
+
+    recorder = MemoryRecorder(scene)
+    simulation = Simulation(scene, 0.0, beam, spring, recorder, progress)
+    with suppress(_Enough):
+        simulation._run()
+    state, pair, detector = simulation._state, simulation._pair, simulation._detector
+    start, H = pair.ends(), scene.coupling.H
+    pair.mark()
+    step = pair.attempt(state, H, start)
+    end = pair.ends()
+    energies = pair.energies(end)
+    simulation._rows._next_shape, simulation._rows._shapes_left = float("inf"), 0
+
+    def stepped(body: FmuBeam | FmuSpring) -> None:
+        body.rewind()
+        body.advance(state.time, H, step.contact)
+
+    parts: dict[str, Callable[[], object]] = {
+        "both bodies marked": pair.mark,
+        "a step attempted: 2 doSteps of each body, and the contact force": lambda: pair.attempt(state, H, start),
+        "of it, the beam set back and stepped": lambda: stepped(beam),
+        "of it, the spring set back and stepped": lambda: stepped(spring),
+        "is an event due at the start": lambda: detector.at_start(state, start),
+        "does one come inside": lambda: detector.first(state, step),
+        "a row: energies, ledger, recorder": lambda: simulation._rows.write(state, step),
+        "of it, energies of both bodies": lambda: pair.energies(end),
+        "of it, the ledger": lambda: simulation._balance.ledger.book(*energies),
+        "a shape (400 a run)": lambda: recorder.shape(1.0, beam.shape()),
+    }
+    calls = 10 if effort.quick else 2000
+    pair.rewind()  # which is where bodies are marked
+    for what, part in parts.items():
+        seconds = [timed(lambda part=part: [part() for _ in range(calls)]) / calls for _ in range(effort.rounds)]  # type: ignore[misc]
+        step = pair.attempt(state, H, start)  # with the bodies at the end of the step that is looked at
+        yield Row(what, "", f"{median_and_spread([1e6 * s for s in seconds])} µs")
+    for body in (beam, spring):
+        body.close()
+
+
+def paper(effort: Effort) -> Iterator[Row]:
+    scene = with_changes(load_scene("paper-fig2"), contact={"law": "paper", "impact": "rest"})
+    if effort.quick:
+        scene = with_changes(scene, time={"t_end": 0.54})
+    steps = 0
+
+    def ours() -> float:
+        nonlocal steps
+        summary = simulate(scene).summary
+        steps = int(summary["macro_steps"])
+        return float(summary["wall_time"])
+
+    def theirs(run: Trajectory) -> float:
+        return float(run.summary["newton"]["time_per_step"]) * (len(run) - 1)
+
+    as_printed = compare(ours, lambda: theirs(printed.simulate(scene)), min(effort.rounds, 3))
+    yield ratio_row(
+        f"`paper-fig2`, law `paper`, {steps} steps, 1000 elements",
+        as_printed,
+        10.0,
+        "Algorithm 1 as printed in scipy.sparse, `spsolve` for each of its linear systems, three a step",
+        faster=True,
+    )
+    times = compare(ours, lambda: theirs(algorithm1.simulate(scene)), min(effort.rounds, 5))
+    ratios = median_and_spread([1.0 / ratio for ratio in times.ratios])
+    seconds = f"{shown(statistics.median(times.ours))} against {shown(statistics.median(times.rival))}"
+    condensed = "the same numbers from one solution a step, factorised once before the clock runs (SuperLU)"
+    yield Row("the same", "", f"{ratios} × faster; {seconds}", None, condensed)
+    bare = statistics.median(program("beam_bench", effort)["generalized_alpha"]["rival"])
+    of_solves = Times(times.ours, [bare * steps] * len(times.ours))
+    yield ratio_row("the same", of_solves, 5.0, f"{steps} bare solves and products, one a step, by Eigen")
+    resolved = with_changes(
+        load_scene("paper-fig2"),
+        beam={"n_modes": 64},
+        coupling={"macro_step": 4e-6},
+        time={"t_end": 0.5 + 4e-6 * (100 if effort.quick else 5000)},
+    )
+    per_step = []
+    for _ in range(min(effort.rounds, 5)):
+        summary = simulate(resolved).summary
+        per_step.append(float(summary["wall_time"]) / summary["macro_steps"])
+    median, needed = statistics.median(per_step), 3.5 / 4e-6
+    per_step_of_scipy = statistics.median(times.rival) / steps
+    yield Row(
+        "`paper-fig2` resolved: H = 4e-6 ≤ 1/ω₁, 64 modes",
+        "",
+        f"{median_and_spread([1.0 / s for s in per_step])} macro steps a second; up to T = 4: {needed:.3g} steps, "
+        f"{shown(median * needed)}",
+        None,
+        f"Algorithm 1 in scipy.sparse, {shown(per_step_of_scipy)} a step: {shown(per_step_of_scipy * needed)}",
+    )
