@@ -58,6 +58,16 @@ def test_critical_damping() -> None:
         np.testing.assert_allclose(S_dot[:, 0], (1.0 - omega * tau) * np.exp(-omega * tau), rtol=1e-7)
 
 
+@pytest.mark.parametrize("theta", [1e8, 1e10])
+def test_a_mode_that_is_fast_beyond_all_digits_follows_its_force(theta: float) -> None:
+    """ξ = f/ω² but for its delay, 2σ/ω² of a time."""
+    omega = theta / SIZE
+    w = Oscillators(np.array([omega**2]), 1.0 / omega).weights(SIZE)
+    f = np.array([1.0, -2.0, 0.7])
+    response = w.force[..., 0] @ np.polynomial.polynomial.polyval(GAUSS.nodes, f)
+    np.testing.assert_allclose(response * omega**2, np.polynomial.polynomial.polyval(TARGETS, f), atol=1e-7)
+
+
 def test_components_tell_a_decayed_fast_root_from_a_slow_one() -> None:
     """Overdamped, moving with its slow root alone: the fast root's share is nothing."""
     o = Oscillators(np.array([100.0]), 1.0)

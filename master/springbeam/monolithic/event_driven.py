@@ -11,6 +11,7 @@ law `transmission` then has no solution with bounded force, and the scene is ref
 from __future__ import annotations
 
 import time as clock
+from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,7 +23,7 @@ from .exponential import ExponentialPropagator, LinearForm
 from .hybrid_system import HybridSystem, ReferenceFailure
 from .laws import Phase
 from .location import EventLocator
-from .propagators import SCIPY_METHODS, Method, Propagator, RungeKuttaPropagator, Segment
+from .propagators import SCIPY_METHODS, Method, Propagator, RungeKuttaPropagator
 from .quasi_static import QuasiStaticSystem
 from .rows import Rows
 from .semi_discrete import modal_beam
@@ -113,57 +114,49 @@ class _Run:
     def execute(self, sample_times: Sequence[float] | np.ndarray | None, time_limit: float | None) -> Trajectory:
         began = clock.perf_counter()
         every_event, state = sample_times is None, self.state
-        samples = self._samples(sample_times)
+        self._due = self._samples(sample_times)
         if every_event:
             self._record()
         state.start()
-        upcoming = 0
-        while upcoming < len(samples) and samples[upcoming] <= state.time:
-            self._record()
-            upcoming += 1
-        propagator, locator, phase_start = self._propagator(), self._locator(), state.time
+        self._record_due()
+        self._begin_phase()
         while self.t_end - state.time > 1e-14 * self.t_end:
             if time_limit is not None and clock.perf_counter() - began > time_limit:
                 raise ReferenceFailure(f"takes more than {time_limit:g} s; it is at t = {state.time:.6g} s")
-            target = samples[upcoming] if upcoming < len(samples) else self.t_end
             kink = self.system.loads.next_kink(state.time)
-            target = min(target, kink)
-            segment = propagator.advance(max(target - state.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
+            target = min(self._due[0] if self._due else self.t_end, kink)
+            segment = self._propagator.advance(max(target - state.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
             self.counts["steps"] += 1
-            found = locator.first(segment)
-            begin = state.time
+            found = self._locator.first(segment)
             if found is None:
-                reach, end = segment.size, phase_start + propagator.elapsed
+                reach, end = segment.size, self._phase_start + self._propagator.elapsed
                 for exact in (kink, target):
                     if abs(end - exact) <= 1e-14 * self.t_end:
                         end = exact  # the sum is off by rounding
             else:
-                reach, end = found[1], begin + found[1]
-            while upcoming < len(samples) and samples[upcoming] <= end:
-                at = samples[upcoming]
-                inside = at < end
-                self.rows.record(at, segment.state(at - begin) if inside else _at(segment, reach), state)
-                upcoming += 1
-            state.time = end
-            state.X = _at(segment, reach)
+                reach, end = found[1], state.time + found[1]
+            while self._due and self._due[0] < end:
+                at = self._due.popleft()
+                self.rows.record(at, segment.state(at - state.time), state)
+            state.time, state.X = end, segment.state(reach)
             state.X[self.system.T] = end
-            if found is None:
-                if end == kink:
-                    propagator, phase_start = self._propagator(), end
-                continue
-            if every_event:
-                self._record()
-            state.happen(found[0])
-            self._happened.append(state.time)
-            if every_event:
-                self._record()
-            if len(state.events) > _MOST_EVENTS or self._chatters():
-                raise ReferenceFailure(f"{len(state.events)} events by t = {state.time!r} s: they do not end")
-            propagator, locator, phase_start = self._propagator(), self._locator(), state.time
+            self._record_due()
+            if found is not None:
+                if every_event:
+                    self._record()
+                state.happen(found[0])
+                self._happened.append(end)
+                if every_event:
+                    self._record()
+                if len(state.events) > _MOST_EVENTS or self._chatters():
+                    raise ReferenceFailure(f"{len(state.events)} events by t = {end!r} s: they do not end")
+                self._begin_phase()
+            elif end == kink:
+                self._begin_piece()
         self.system.loads.whole()
         return self.rows.trajectory(state, self._summary(clock.perf_counter() - began))
 
-    def _samples(self, sample_times: Sequence[float] | np.ndarray | None) -> np.ndarray:
+    def _samples(self, sample_times: Sequence[float] | np.ndarray | None) -> deque[float]:
         """Times of the rows [s], those of events apart."""
         start = self.state.time
         if sample_times is None:
@@ -173,27 +166,36 @@ class _Run:
             samples = np.append(grid, self.t_end) if self.t_end - grid[-1] > 1e-9 * H else grid
         else:
             samples = np.asarray(sample_times, dtype=float)
-        return samples[(samples >= start) & (samples <= self.t_end * (1.0 + 1e-15))]
+        return deque(samples[(samples >= start) & (samples <= self.t_end * (1.0 + 1e-15))].tolist())
 
     def _record(self) -> None:
         self.rows.record(self.state.time, self.state.X, self.state)
+
+    def _record_due(self) -> None:
+        while self._due and self._due[0] <= self.state.time:
+            self._due.popleft()
+            self._record()
 
     def _chatters(self) -> bool:
         at_once = _AT_ONCE + 1
         return len(self._happened) >= at_once and self._happened[-at_once] == self.state.time
 
-    def _locator(self) -> EventLocator:
-        return EventLocator(self.system, self.state.phase, self.state.watched())
+    def _begin_phase(self) -> None:
+        self._locator = EventLocator(self.system, self.state.phase, self.state.watched())
+        self._begin_piece()
 
-    def _propagator(self) -> Propagator:
+    def _begin_piece(self) -> None:
+        """Integrate from here on anew: in another phase, or after a kink of a load."""
         self.counts["phases"] += 1
-        state = self.state
+        state, self._phase_start = self.state, self.state.time
+        self._propagator: Propagator
         if self.method.name == "exponential":
             if state.phase not in self._forms:
                 self._forms[state.phase] = LinearForm(self.system, state.phase)
-            return ExponentialPropagator(self._forms[state.phase], state.X)
+            self._propagator = ExponentialPropagator(self._forms[state.phase], state.X)
+            return
         horizon = max(min(self.t_end, self.system.loads.next_kink(state.time)) - state.time, 1e-300)
-        return RungeKuttaPropagator(self.system, state.phase, state.X, horizon, self.method)
+        self._propagator = RungeKuttaPropagator(self.system, state.phase, state.X, horizon, self.method)
 
     def _summary(self, wall_time: float) -> dict[str, Any]:
         summary = {
@@ -207,18 +209,10 @@ class _Run:
         return summary
 
 
-def _at(segment: Segment, tau: float) -> np.ndarray:
-    return segment.states[-1].copy() if tau == segment.size else segment.state(tau)
-
-
 def _system(scene: Scene) -> HybridSystem:
-    if scene.beam is None:
-        return HybridSystem(scene, None)
-    return (
-        QuasiStaticSystem(scene)
-        if scene.beam.fidelity == "quasi_static"
-        else HybridSystem(scene, modal_beam(scene.beam))
-    )
+    if scene.beam is not None and scene.beam.fidelity == "quasi_static":
+        return QuasiStaticSystem(scene)
+    return HybridSystem(scene, None if scene.beam is None else modal_beam(scene.beam))
 
 
 def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:

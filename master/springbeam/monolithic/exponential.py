@@ -20,7 +20,8 @@ import scipy.linalg
 from .hybrid_system import HybridSystem, ReferenceFailure
 from .laws import Phase
 from .oscillators import GAUSS, STAGES, Oscillators, StepWeights
-from .propagators import Propagator, Segment
+from .propagators import Segment
+from .semi_discrete import singular_modes
 
 _MAX_ITERATIONS = 60
 #: Step size × rate of the fastest motion that matters: 12 Gauss points interpolate e^{iθ}, θ ≤ 2, to 1e-12.
@@ -227,30 +228,13 @@ def _modes(omega2: np.ndarray, space: np.ndarray, k: float, row: np.ndarray) -> 
     """
     if np.all(omega2 >= 0.0):
         factor = np.vstack([np.sqrt(omega2)[:, None] * space, np.sqrt(k) * row @ space])
-        _, sigma, vt = scipy.linalg.svd(factor, full_matrices=False)
-        return sigma[::-1] ** 2, vt[::-1].T
+        omega, modes = singular_modes(factor)
+        return omega**2, modes
     omega2, modes = np.linalg.eigh(space.T @ (np.diag(omega2) + k * np.outer(row, row)) @ space)
     return omega2, modes
 
 
-@dataclass
-class _ExponentialSegment(Segment):
-    form: LinearForm
-    size: float
-    nodes: np.ndarray
-    states: np.ndarray
-    speed: float
-
-    def state(self, tau: float) -> np.ndarray:
-        # Stepped anew, because the forces of the whole segment may hold a kink that lies after τ.
-        inner = ExponentialPropagator(self.form, self.states[0], self.speed)
-        elapsed = 0.0
-        while tau - elapsed > 1e-15 * tau:
-            elapsed += inner.advance(tau - elapsed).size
-        return np.array(inner.X)
-
-
-class ExponentialPropagator(Propagator):
+class ExponentialPropagator:
     """Exact in the phase's linear part, Gauss collocation in the rest."""
 
     def __init__(self, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
@@ -287,7 +271,7 @@ class ExponentialPropagator(Propagator):
             self._size, self._steps = 2.0 * self._size, self._steps // 2
         return self._size
 
-    def _step(self, size: float, xi: np.ndarray, xi_dot: np.ndarray, start: np.ndarray) -> _ExponentialSegment | None:
+    def _step(self, size: float, xi: np.ndarray, xi_dot: np.ndarray, start: np.ndarray) -> Segment | None:
         """One step, or None where it is too long for the forces r, whose values at its start are given."""
         form, X = self.form, self.X
         weights = form.weights(size)
@@ -320,7 +304,16 @@ class ExponentialPropagator(Propagator):
         if len(form.loads):
             states[-1, s.W] = X[s.W] + size * float(GAUSS.weights @ s.load_power(states[:-1]))
         nodes = np.concatenate([[0.0], GAUSS.nodes * size, [size]])
-        return _ExponentialSegment(form, size, nodes, np.vstack([X, states]), self._speed)
+        states, speed = np.vstack([X, states]), self._speed
+
+        def inside(tau: float) -> np.ndarray:
+            # Stepped anew, because the forces of the whole segment may hold a kink that lies after τ.
+            inner = ExponentialPropagator(form, states[0], speed)
+            while tau - inner.elapsed > 1e-15 * tau:
+                inner.advance(tau - inner.elapsed)
+            return inner.X
+
+        return Segment(nodes, states, inside)
 
     def _forces(self, w: _Weights, free: np.ndarray, free_dot: np.ndarray, start: np.ndarray) -> np.ndarray | None:
         """r = R(w, ẇ) at the Gauss points by fixed-point iteration; ``free`` (stages, o) is w without r."""

@@ -10,23 +10,24 @@ fast the oscillator. With the roots s₁,₂ = −σ ± √(σ² − ω²), σ =
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
+from scipy.interpolate import BarycentricInterpolator
+from scipy.special import ive
 
 #: Gauss points of a step, at which forces are given.
 STAGES = 12
-#: Points per panel: they integrate e^{iθ} × a polynomial of degree 11 for θ ≤ `_PANEL` to 1e-16.
+#: Points of a quadrature that integrates e^{iθ} × a polynomial of degree 11 for θ ≤ `_SLOW` to 1e-16.
 _QUADRATURE = 24
-_PANEL = 20.0
-#: Above this |s| h the response to a polynomial is found as a polynomial, whose terms then fall like (288/|s|h)ᵐ.
-_FAST = 2000.0
+_SLOW = 20.0
+#: Above this |s| h/2, which `ive` refuses, only the limit of fast roots is left.
+_LIMIT = 1e9
 #: Roots nearer than this share of σ are moved apart by it: S changes by its square.
 _CRITICAL = 1e-6
 
 
 class GaussRule:
-    """Gauss–Legendre collocation on [0, 1]: nodes, weights, Lagrange basis ℓ_k, Legendre transform."""
+    """Gauss–Legendre collocation on [0, 1]: nodes, weights, Legendre transform."""
 
     def __init__(self, stages: int) -> None:
         x, w = np.polynomial.legendre.leggauss(stages)
@@ -34,23 +35,19 @@ class GaussRule:
         self.weights = 0.5 * w
         #: (stages, stages): values at the nodes → Legendre coefficients.
         self.transform = np.polynomial.legendre.legvander(x, stages - 1).T * w * (np.arange(stages)[:, None] + 0.5)
-        self.stages = stages
-
-    def lagrange(self, c: np.ndarray) -> np.ndarray:
-        """ℓ_k(c), shape c.shape + (stages,)."""
-        return np.asarray(np.polynomial.legendre.legvander(2.0 * c - 1.0, self.stages - 1) @ self.transform)
 
 
 GAUSS = GaussRule(STAGES)
 _INNER = GaussRule(_QUADRATURE)
 #: Where a step is evaluated: the Gauss points and the end, as fractions of it.
 TARGETS = np.append(GAUSS.nodes, 1.0)
-_AT_TARGETS = np.polynomial.legendre.legvander(2.0 * TARGETS - 1.0, STAGES - 1)
-_AT_START = np.polynomial.legendre.legvander(np.array([-1.0]), STAGES - 1)[0]
-#: d/dx on [0, 1] in Legendre coefficients.
-_DERIVATIVE = np.zeros((STAGES, STAGES))
-for _k in range(1, STAGES):
-    _DERIVATIVE[:_k, _k] = 2.0 * np.polynomial.legendre.legder(np.eye(STAGES)[_k])[:_k]
+#: ℓ_k at points of the step, shape (..., stages): the Lagrange basis on its Gauss points.
+_LAGRANGE = BarycentricInterpolator(GAUSS.nodes, np.eye(STAGES))
+#: Quadrature points on [0, c] for each target c, (targets, Q), and weight × ℓ_k there, (targets, stages, Q).
+_ELAPSED = TARGETS[:, None] * _INNER.nodes
+_WEIGHTED = np.swapaxes(_LAGRANGE(_ELAPSED) * (TARGETS[:, None] * _INNER.weights)[..., None], 1, 2).copy()
+#: c × the Legendre coefficients on [0, c] of ℓ_k for each target c, (targets, legendre, stages).
+_ON_PARTS = TARGETS[:, None, None] * (GAUSS.transform @ _LAGRANGE(TARGETS[:, None] * GAUSS.nodes))
 
 
 @dataclass(frozen=True)
@@ -117,12 +114,11 @@ class Oscillators:
         S, S_dot = self.kernels(TARGETS * size)
         shape = (len(TARGETS), STAGES, len(self.omega2))
         force, force_dot = np.empty(shape), np.empty(shape)
-        near = np.abs(self.fast) * size <= _PANEL
+        near = np.abs(self.fast) * size <= _SLOW
         if np.any(near):
-            elapsed, basis = _panels(1)
-            kernel, kernel_dot = self._pick(near).kernels((TARGETS[:, None] - elapsed) * size)
-            force[..., near] = np.matmul(basis * size, kernel)
-            force_dot[..., near] = np.matmul(basis * size, kernel_dot)
+            kernel, kernel_dot = self._pick(near).kernels((TARGETS[:, None] - _ELAPSED) * size)
+            force[..., near] = np.matmul(_WEIGHTED * size, kernel)
+            force_dot[..., near] = np.matmul(_WEIGHTED * size, kernel_dot)
         if not np.all(near):
             far = ~near
             slow, fast = self.slow[far], self.fast[far]
@@ -149,36 +145,16 @@ class Oscillators:
         return rates, np.where(rates > 0.0, np.nan_to_num(amplitudes), 0.0)
 
 
-@lru_cache(maxsize=16)
-def _panels(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Quadrature points on [0, c] for each target c, (targets, Q), and weight × ℓ_k there, (targets, stages, Q)."""
-    nodes = ((np.arange(count)[:, None] + _INNER.nodes) / count).ravel()
-    weights = np.tile(_INNER.weights / count, count)
-    elapsed = TARGETS[:, None] * nodes
-    basis = GAUSS.lagrange(elapsed) * (TARGETS[:, None] * weights)[..., None]
-    return elapsed, np.ascontiguousarray(np.swapaxes(basis, 1, 2))
-
-
 def _convolve(s: np.ndarray, size: float) -> np.ndarray:
-    """∫₀^τ e^{s(τ − ν)} ℓ_k(ν) dν at the targets, for roots s with Re s ≤ 0 or small: (targets, stages, len(s))."""
-    result = np.empty((len(TARGETS), STAGES, len(s)), dtype=complex)
-    phase = np.abs(s) * size
-    level = np.where(phase > _FAST, -1, np.ceil(np.log2(np.maximum(phase / _PANEL, 1.0))).astype(int))
-    for value in np.unique(level):
-        which = level == value
-        if value < 0:
-            result[..., which] = _polynomial_response(s[which], size)
-            continue
-        elapsed, basis = _panels(int(2**value))
-        kernel = np.exp(((TARGETS[:, None] - elapsed) * size)[..., None] * s[which])
-        result[..., which] = np.matmul(basis * size, kernel)
-    return result
+    """∫₀^τ e^{s(τ − ν)} ℓ_k(ν) dν at the targets, for roots s: (targets, stages, len(s)).
 
-
-def _polynomial_response(s: np.ndarray, size: float) -> np.ndarray:
-    """Return the weights of fast roots: with the polynomial p of p'/h − s p = ℓ_k it is p(τ) − e^{sτ} p(0)."""
-    operators = _DERIVATIVE / size - s[:, None, None] * np.eye(STAGES)
-    p = np.linalg.solve(operators, np.broadcast_to(GAUSS.transform, operators.shape))  # (len(s), legendre, k)
-    decay = np.exp(s[:, None] * TARGETS * size)
-    response = _AT_TARGETS @ p - decay[..., None] * (_AT_START @ p)[:, None, :]
-    return np.asarray(np.moveaxis(response, 0, -1))
+    On [0, 1], ∫ e^{z(1 − x)} P_m(2x − 1) dx = e^{−w} i_m(w) with w = −z/2 and i_m the modified spherical Bessel
+    functions (Abramowitz & Stegun, 10.1.14 and 10.2.2).
+    """
+    w = -0.5 * size * TARGETS[:, None] * s
+    m = np.arange(STAGES)[:, None, None]
+    with np.errstate(over="ignore", invalid="ignore"):
+        bessel = np.sqrt(0.5 * np.pi / w) * ive(m + 0.5, w) * np.exp(np.abs(w.real) - w)
+    limit = 0.5 * (1.0 - (-1.0) ** m * np.exp(-2.0 * w)) / w
+    responses = np.where(np.abs(w) > _LIMIT, limit, bessel)
+    return np.asarray(size * np.einsum("tmk,mtp->tkp", _ON_PARTS, responses))

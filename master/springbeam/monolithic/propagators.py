@@ -5,9 +5,9 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.integrate import DOP853, LSODA, Radau, solve_ivp
@@ -28,52 +28,36 @@ class Method:
     nodes: int
 
 
-class Segment(ABC):
-    """One accepted step of size ``size`` [s] with states at ``nodes``, 0 and ``size`` among them."""
+@dataclass(frozen=True)
+class Segment:
+    """One accepted step: its states at ``nodes`` [s], from 0 to its size, and what finds those between them."""
 
-    size: float
     nodes: np.ndarray  #: (k,)
     states: np.ndarray  #: (k, 2r + 5); good enough to find events, exact at both ends
+    inside: Callable[[float], np.ndarray]  #: τ [s] → X at the accuracy of the method
 
-    @abstractmethod
+    @property
+    def size(self) -> float:
+        """How long it lasts [s]."""
+        return float(self.nodes[-1])
+
     def state(self, tau: float) -> np.ndarray:
-        """X at ``tau`` after the start, at the accuracy of the method."""
+        """Return X at ``tau`` after the start [s]."""
+        if tau <= 0.0 or tau == self.size:
+            return np.array(self.states[0 if tau <= 0.0 else -1])
+        return self.inside(tau)
 
 
-class Propagator(ABC):
+class Propagator(Protocol):
     """Advances a state within one phase."""
 
     elapsed: float  #: since the start of the phase [s]
 
-    @abstractmethod
     def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
         """One step towards ``remaining`` [s] from here, which is known to ``resolution`` [s]; it may end beyond."""
 
 
-@dataclass
-class _RungeKuttaSegment(Segment):
-    owner: RungeKuttaPropagator
-    start: np.ndarray
-    begin: float  #: as `RungeKuttaPropagator.elapsed` [s]
-    size: float
-    nodes: np.ndarray
-    states: np.ndarray
-    dense: Any
-
-    def state(self, tau: float) -> np.ndarray:
-        if tau <= 0.0:
-            return np.array(self.start)
-        owner = self.owner
-        if owner.method.name == "LSODA":
-            # Of the order of the step; and before scipy 1.17 no second LSODA may run while the first goes on.
-            return owner.system.synchronise(owner.phase, self.dense(self.begin + tau))
-        # Again from the start, because the dense output is a power of the step less accurate.
-        span, method = (0.0, tau), owner.method.name
-        solution = solve_ivp(owner.rhs, span, self.start, method=method, first_step=tau, **owner.options)
-        return owner.system.synchronise(owner.phase, solution.y[:, -1].copy())
-
-
-class RungeKuttaPropagator(Propagator):
+class RungeKuttaPropagator:
     """scipy's DOP853, LSODA or Radau on the modal form."""
 
     def __init__(self, system: HybridSystem, phase: Phase, X: np.ndarray, horizon: float, method: Method) -> None:
@@ -100,4 +84,15 @@ class RungeKuttaPropagator(Propagator):
         dense: Any = solver.dense_output() if count != 2 or self.method.name == "LSODA" else None
         states = np.array([start, solver.y]) if count == 2 else dense(begin + nodes).T
         states[0], states[-1] = start, solver.y
-        return _RungeKuttaSegment(self, start, begin, size, nodes, self.system.synchronise(self.phase, states), dense)
+
+        def inside(tau: float) -> np.ndarray:
+            if self.method.name == "LSODA":
+                # Of the order of the step; and before scipy 1.17 no second LSODA may run while the first goes on.
+                X = dense(begin + tau)
+            else:
+                # Again from the start, because the dense output is a power of the step less accurate.
+                options = {"method": self.method.name, "first_step": tau, **self.options}
+                X = solve_ivp(self.rhs, (0.0, tau), start, **options).y[:, -1].copy()
+            return self.system.synchronise(self.phase, X)
+
+        return Segment(nodes, self.system.synchronise(self.phase, states), inside)

@@ -228,11 +228,8 @@ def modal_beam(beam: Beam) -> ModalBeam:
     discrete = assemble(beam)
     if beam.mesh == "none":
         return _without_mesh(discrete, beam)
-    if 0 < beam.n_modes < discrete.size:
-        space = _augmented_space(discrete, beam)
-        omega, basis = _rayleigh_ritz(discrete, space)
-    else:
-        omega, basis = _all_modes(discrete)
+    space = _augmented_space(discrete, beam) if 0 < beam.n_modes < discrete.size else np.eye(discrete.size)
+    omega, basis = _rayleigh_ritz(discrete, space)
     load = beam.distributed_load * discrete.uniform_load + beam.tip_load_coefficient * discrete.hat_load
     return ModalBeam(
         omega=omega,
@@ -264,26 +261,15 @@ def _without_mesh(discrete: SemiDiscreteBeam, beam: Beam) -> ModalBeam:
     return replace(found, load=load, slope_shape=start / omega**2)
 
 
-def _all_modes(discrete: SemiDiscreteBeam) -> tuple[np.ndarray, np.ndarray]:
-    """With M = LLᵀ, the modes are L⁻ᵀ × right singular vectors of B L⁻ᵀ."""
-    L = np.linalg.cholesky(discrete.M.toarray())
-    factor = scipy.linalg.solve_triangular(L, discrete.B.toarray().T, lower=True).T
-    omega, vectors = _singular_modes(factor)
-    return omega, scipy.linalg.solve_triangular(L.T, vectors, lower=False)
-
-
-def _singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (ascending) and orthonormal modes of factorᵀfactor."""
-    _, sigma, vt = scipy.linalg.svd(factor, full_matrices=factor.shape[0] < factor.shape[1])
-    padded = np.zeros(factor.shape[1])
-    padded[: len(sigma)] = sigma
-    order = np.argsort(padded, kind="stable")
-    return padded[order], vt[order].T
+def singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (ascending) and orthonormal modes of factorᵀfactor, which has as many rows as columns or more."""
+    _, sigma, vt = scipy.linalg.svd(factor, full_matrices=False)
+    return sigma[::-1], vt[::-1].T
 
 
 def _lowest_modes(discrete: SemiDiscreteBeam, count: int) -> np.ndarray:
     if discrete.size <= _DENSE_SIZE or 2 * count > discrete.size:
-        return _all_modes(discrete)[1][:, :count]
+        return _rayleigh_ritz(discrete, np.eye(discrete.size))[1][:, :count]
     return np.asarray(spla.eigsh(discrete.K, k=count, M=discrete.M, sigma=0.0, v0=np.ones(discrete.size))[1])
 
 
@@ -306,8 +292,8 @@ def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
 
 
 def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    gram = space.T @ (discrete.M @ space)
-    L = np.linalg.cholesky(gram)
+    """Frequencies and modes in a space, given by its columns."""
+    L = np.linalg.cholesky(space.T @ (discrete.M @ space))
     orthonormal = scipy.linalg.solve_triangular(L, space.T, lower=True).T
-    omega, vectors = _singular_modes(discrete.B @ orthonormal)
+    omega, vectors = singular_modes(discrete.B @ orthonormal)
     return omega, orthonormal @ vectors
