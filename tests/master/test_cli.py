@@ -21,6 +21,7 @@ import springbeam.run.runner
 from springbeam import cli
 from springbeam.results.directory import PICTURES
 from springbeam.results.reading import load_trajectory
+from springbeam.results.recording import NonFiniteValue
 from springbeam.results.trajectory import Event
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import shipped_scenes
@@ -46,8 +47,6 @@ def fake_run(scene, recorder, progress=None, **checkpoints):
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(springbeam.run.runner, "run", fake_run)
-    for name in ("COLUMNS", "TERMINAL_WIDTH", "FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS"):
-        monkeypatch.delenv(name, raising=False)
     return tmp_path
 
 
@@ -87,29 +86,13 @@ def test_a_run_leaves_results_and_pictures_and_says_where(here, unpainted):
     assert {key: summary[key] for key in SUMMARY} == SUMMARY
 
 
-def test_what_rounding_leaves_of_a_zero_is_shown_as_0(here, monkeypatch):
-    def released(scene, recorder, progress=None, **checkpoints):
-        recorder.event(Event(0.2, "release", -1.355e-20, 0.25, 0.0, 0.25))
-        fake_run(scene, recorder)
-
-    monkeypatch.setattr(springbeam.run.runner, "run", released)
-    (event,) = [line for line in command("run", "soft", "--no-plots").stdout.splitlines() if line.startswith("release")]
-    assert event.split() == ["release", "0.20000000", "0", "0.25"]
-
-
-def test_a_second_run_does_not_touch_the_first(here):
-    command("run", "soft", "--no-plots")
-    first = (here / "results" / "soft" / "summary.json").stat().st_mtime_ns
-    result = command("run", "soft", "--no-plots")
-    assert result.exit_code == 0
-    assert "results   results/soft-2\n" in result.stdout
-    assert (here / "results" / "soft" / "summary.json").stat().st_mtime_ns == first
-
-
-def test_results_are_named_after_the_file(here):
+def test_results_are_named_after_the_file_and_a_second_run_does_not_touch_the_first(here):
     (here / "mine.toml").write_text(shipped_scenes()["soft"].read_text(encoding="utf-8"), encoding="utf-8")
-    assert command("run", "mine.toml", "--no-plots").exit_code == 0
-    assert (here / "results" / "mine" / "trajectory.csv").exists()
+    assert "results   results/mine\n" in command("run", "mine.toml", "--no-plots").stdout
+    summary = here / "results" / "mine" / "summary.json"
+    first = summary.stat().st_mtime_ns
+    assert "results   results/mine-2\n" in command("run", "mine.toml", "--no-plots").stdout
+    assert summary.stat().st_mtime_ns == first
 
 
 def test_force_replaces(here, unpainted):
@@ -119,29 +102,25 @@ def test_force_replaces(here, unpainted):
     assert not list((here / "here").glob("*.png"))  # pictures of the earlier run would lie
 
 
-def test_report_fits_80_columns_and_says_how_many_events_are_not_shown(here, monkeypatch):
+def test_report_fits_80_columns_with_whole_numbers_and_warnings_as_they_are(here, monkeypatch):
+    """It says how many events are not shown; what rounding leaves of a zero is 0."""
+
     def many(scene, recorder, progress=None, **checkpoints):
+        recorder.event(Event(0.2, "release", -1.355e-20, 0.25, 0.0, 0.25))
         for i in range(40):
             recorder.event(Event(123.456789 + i, "stop_impact", -1.2345e-5, -1.234e-5, 0.1, 0.1, -1.234e-7, 1e-9, 1e-9))
         fake_run(scene, recorder)
+        recorder.finish({**SUMMARY, "warnings": ["[beam] is [bold]coarse[/bold]"]})
 
     monkeypatch.setattr(springbeam.run.runner, "run", many)
     result = command("run", "soft", "--no-plots")
     lines = result.stdout.splitlines()
     assert max(map(len, lines)) <= 80
-    # Whole numbers, none cut short.
-    assert " ".join(lines[3].split()) == "stop_impact 123.45678900 -1.234e-05 -1.234e-05 -1.23e-07 1e-09 1e-09"
-    assert "⋮ 28 more" in " ".join(result.stdout.split())
-    assert "events    40 stop_impact, 1 impact" in result.stdout
-
-
-def test_warnings_are_shown_as_they_are(here, monkeypatch):
-    def warned(scene, recorder, progress=None, **checkpoints):
-        fake_run(scene, recorder)
-        recorder.finish({**SUMMARY, "warnings": ["[beam] is [bold]coarse[/bold]"]})
-
-    monkeypatch.setattr(springbeam.run.runner, "run", warned)
-    assert "warning   [beam] is [bold]coarse[/bold]" in command("run", "soft", "--no-plots").stdout
+    assert lines[3].split() == ["release", "0.20000000", "0", "0.25"]
+    assert " ".join(lines[4].split()) == "stop_impact 123.45678900 -1.234e-05 -1.234e-05 -1.23e-07 1e-09 1e-09"
+    assert "⋮ 29 more" in " ".join(result.stdout.split())
+    assert "events    40 stop_impact, 1 release, 1 impact" in result.stdout
+    assert "warning   [beam] is [bold]coarse[/bold]" in result.stdout
 
 
 def test_what_can_hardly_be_meant_is_told_before_the_run(here):
@@ -177,8 +156,9 @@ def test_a_place_that_cannot_be_written_is_bad_input(here):
         (RunStopped("not converged", 0.6, 1e-3), "stopped", ["stopped", "not converged", "0.6"]),
         (KeyboardInterrupt(), "interrupted", ["interrupted (reached t = 0.6 s of 0.6 s)"]),
         (OSError(errno.ENOSPC, "No space left on device"), "stopped", ["No space left on device"]),
+        (NonFiniteValue("u_tip", 0.7, float("nan")), "stopped", ["u_tip = nan at t = 0.7 s"]),
     ],
-    ids=["stopped", "interrupted", "disk full"],
+    ids=["stopped", "interrupted", "disk full", "not finite"],
 )
 def test_a_run_that_stops_early(here, unpainted, monkeypatch, error, status, fragments):
     replace_run(monkeypatch, error)
@@ -191,17 +171,6 @@ def test_a_run_that_stops_early(here, unpainted, monkeypatch, error, status, fra
     assert len(trajectory) == 31
     assert (trajectory.summary["status"], trajectory.summary["time"]) == (status, trajectory.time[-1])
     assert (here / "results" / "soft" / PICTURES[2]).exists()
-
-
-def test_a_value_that_is_not_finite_stops_the_run(here, monkeypatch):
-    def run(scene, recorder, progress=None, **checkpoints):
-        fake_run(scene, recorder)
-        recorder.row([{"time": 0.7, "phase": "free"}.get(name, float("nan")) for name in recorder.columns])
-
-    monkeypatch.setattr(springbeam.run.runner, "run", run)
-    result = command("run", "soft", "--no-plots")
-    assert result.exit_code == 3
-    assert "u_tip = nan at t = 0.7 s" in result.stderr
 
 
 def test_an_unforeseen_error_is_not_hidden(here, monkeypatch):
@@ -286,19 +255,6 @@ def test_progress_is_for_terminals(here, arguments, shown):
 
 
 # -- the other commands -------------------------------------------------------------------------------------------
-
-
-def test_scenes_lists_what_is_shipped_within_80_columns(here):
-    result = command("scenes")
-    assert result.exit_code == 0
-    *lines, where = result.stdout.splitlines()
-    assert where == f"files: {shipped_scenes()['soft'].parent}"
-    assert max(map(len, lines)) <= 80
-    assert lines[0].split() == ["scene", "contains", "t_end", "[s]", "title"]
-    first_words = [line.split()[0] for line in lines if line and not line.startswith(" ")]
-    assert first_words[1:] == list(shipped_scenes())
-    (soft,) = [line for line in lines if line.startswith("soft ")]
-    assert "beam, spring, stop" in soft
 
 
 def test_version_is_that_of_the_package(here, monkeypatch):

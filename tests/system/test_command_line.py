@@ -19,7 +19,8 @@ from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
 from springbeam.cli.run import _ProgressBar
 from springbeam.results.reading import load_summary
-from springbeam.scene import load_scene, reference, scene_keys, shipped_scenes
+from springbeam.scene import load_scene, reference, scene_keys, shipped_scenes, with_changes
+from springbeam.studies.stability.predict import predict
 from springbeam.studies.sweep.metrics import METRICS
 
 pytestmark = pytest.mark.usefixtures("unpainted")
@@ -86,11 +87,15 @@ def test_what_a_command_prints_fits_80_columns(place, arguments, name):
     assert "…" not in result.stdout or name == "stability"  # nothing cut off but reasons, which are in its table
 
 
-def test_observed_orders_fit_80_columns(place):
-    result = command("crosscheck", "soft", "--orders", "--set", "time.t_end=0.05")
+@pytest.mark.parametrize(
+    "line", ["crosscheck soft --orders --set time.t_end=0.05", "predict steel-bumper", "predict duffing"]
+)
+def test_what_it_prints_of_other_scenes_and_options_fits_80_columns(place, line):
+    result = command(*line.split())
     assert result.exit_code == 0
     assert max(map(len, result.stdout.splitlines())) <= 80
-    assert "…" not in result.stdout.split("\n", 1)[1]
+    assert "…" not in result.stdout
+    assert ("critical H" in result.stdout) == ("steel" in line)
 
 
 @pytest.mark.parametrize("name", [None, *COMMAND.commands])
@@ -148,13 +153,18 @@ def test_json_is_one_document_and_all_of_stdout(arguments, tmp_path, monkeypatch
         assert [event["kind"] for event in document["events"]] == ["closes", "strikes"]
     elif name == "scenes":
         assert [scene["name"] for scene in document] == list(shipped_scenes())
+        (soft,) = [scene for scene in document if scene["name"] == "soft"]
+        assert (soft["contains"], Path(soft["file"])) == (["beam", "spring", "stop"], shipped_scenes()["soft"])
     elif name == "keys":
         found = {f"{key['table']}.{key['name']}" for key in document}
         assert {name.replace(".0.", ".") for name in scene_keys()} <= found
     elif name == "doctor":
         assert [fmu["error"] for fmu in document["fmus"].values()] == [None, None]
     elif name == "predict":
-        assert document["macro_step"] == load_scene("soft").coupling.macro_step
+        expected = predict(with_changes(load_scene("soft"), beam={"n_elements": 10}))
+        assert document["omega_max"] == expected.omega_max
+        assert document["schemes"][3]["critical_step"] == expected.schemes[3].critical_step
+        assert document["auto"][:2] == ["hermite", 2]
     elif name == "stability":
         assert sum(document["classes"].values()) == document["cells"] == 4
     else:
