@@ -6,13 +6,13 @@ impulse and S_j its j-fold integral (S₋₁ = Ṡ), a step of size h under F(τ
     ξ(h) = (Ṡ + cS) ξ₀ + S ξ̇₀ + b Σ F_j S_{j+1}      ∫ξ, ∫∫ξ: each index one, two higher
     ξ̇(h) = −ω²S ξ₀ + Ṡ ξ̇₀ + b Σ F_j S_j
 
-A step of a scheme is written as what it does to a state; applied to the columns of the identity it gives its matrix.
+A step of a scheme is written as what it does to states; those of the identity give its matrix.
 Nothing here uses the bodies or the solvers of a run, except the conditions that define a scheme.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import factorial, inf, sqrt
 
@@ -186,81 +186,53 @@ class LinearPair:
         )
 
 
-#: ``step(x)``: what one macro step makes of the states in the columns of x.
-CoupledStep = Callable[[np.ndarray], np.ndarray]
-
-
-def tied_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledStep:
-    """Return the step of the tie by ``energy`` or ``hermite``, in closed form what `coupling.tie.Tie` solves."""
-    condition = SCHEMES[scheme][degree]
-    T = np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
-    beam, spring = Step(pair.beam, h), Step(pair.spring, h)
-    (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(degree), spring.response(degree)
-    inverse = np.linalg.inv(T @ (beam_motions + spring_motions))
-
-    def step(x: np.ndarray) -> np.ndarray:
-        a, s = pair.split(x)
-        (a, u), (s, y) = beam(a), spring(s)
-        coefficients = -inverse @ (T @ (u - y))
-        return np.vstack([a + beam_states @ coefficients, s - spring_states @ coefficients])
-
-    return step
-
-
-def projected_step(pair: LinearPair, degree: int, h: float) -> CoupledStep:
-    """Return the step of a soft law by ``energy``: C has the first Legendre coefficients of k p̃ + c p̃′."""
-    n = degree + 1
-    law = pair.stiffness * np.eye(n, n + 1) + pair.damping * 2.0 / h * legendre.legder(np.eye(n + 1))
-    from_numbers = law @ np.transpose([penetration_series(0.0, unit) for unit in np.eye(n).tolist()])
-    from_start = law @ penetration_series(1.0, [0.0] * n)
-    condition = SCHEMES["energy"][degree]
-    T = np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
-    beam, spring = Step(pair.beam, h), Step(pair.spring, h)
-    (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(degree), spring.response(degree)
-    inverse = np.linalg.inv(np.eye(n) + from_numbers @ T @ (beam_motions + spring_motions))
-
-    def step(x: np.ndarray) -> np.ndarray:
-        p, _ = pair.penetration(x)
-        a, s = pair.split(x)
-        (a, u), (s, y) = beam(a), spring(s)
-        coefficients = inverse @ (from_numbers @ T @ (y - u) + np.outer(from_start, p))
-        return np.vstack([a + beam_states @ coefficients, s - spring_states @ coefficients])
-
-    return step
-
-
-def exchange_step(pair: LinearPair, sequential: bool, degree: int, h: float) -> CoupledStep:
-    """Return the step of a soft law by ``jacobi`` or ``gauss_seidel``, what `coupling.exchange.Exchange` does."""
-    beam, spring, k, c = Step(pair.beam, h), Step(pair.spring, h), pair.stiffness, pair.damping
-
-    def step(x: np.ndarray) -> np.ndarray:
-        p, rate = pair.penetration(x)
-        a, s = pair.split(x)
-        at_start = k * p + c * rate
-        forces = [at_start, k * rate][: degree + 1]
-        end, u = beam(a, forces)
-        if sequential:
-            moved = pair.spring.displacement(s) + degree * h * pair.spring.velocity(s)
-            at_end = k * (moved - u[0]) + c * (pair.spring.velocity(s) - u[1])
-            forces = [at_start, (at_end - at_start) / h] if degree else [at_end]
-        return np.vstack([end, spring(s, [-f for f in forces])[0]])
-
-    return step
-
-
-def coupled_step(pair: LinearPair, scheme: str, degree: int, h: float) -> CoupledStep:
-    """Return the step of a scheme."""
-    if not pair.soft:
-        return tied_step(pair, scheme, degree, h)
-    if scheme == "energy":
-        return projected_step(pair, degree, h)
-    return exchange_step(pair, scheme == "gauss_seidel", degree, h)
-
-
 def amplification(pair: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
     """Return the matrix of one macro step of size ``h`` [s], for states (ξ, ξ̇) of the beam, then of the spring."""
-    n = pair.beam.size + pair.spring.size
-    return coupled_step(pair, scheme, degree, h)(np.eye(n))
+    states = np.eye(pair.beam.size + pair.spring.size)
+    if scheme in ("jacobi", "gauss_seidel"):
+        return _exchanged(pair, scheme == "gauss_seidel", degree, h, states)
+    return _solved(pair, scheme, degree, h, states)
+
+
+def _solved(pair: LinearPair, scheme: str, degree: int, h: float, x: np.ndarray) -> np.ndarray:
+    """Return states after a step by ``energy`` or ``hermite``, in closed form what the solvers of `coupling` find.
+
+    Of a soft law C has the first Legendre coefficients of k p̃ + c p̃′. Of a tie, its limit for k → ∞, the numbers that
+    p̃ is made of are zero.
+    """
+    n = degree + 1
+    own, from_numbers, from_start = np.zeros((n, n)), np.eye(n), np.zeros(n)
+    if pair.soft:
+        law = pair.stiffness * np.eye(n, n + 1) + pair.damping * 2.0 / h * legendre.legder(np.eye(n + 1))
+        own = np.eye(n)
+        from_numbers = law @ np.transpose([penetration_series(0.0, unit) for unit in own.tolist()])
+        from_start = law @ penetration_series(1.0, [0.0] * n)
+    condition = SCHEMES[scheme][degree]
+    numbers = from_numbers @ np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
+    beam, spring = Step(pair.beam, h), Step(pair.spring, h)
+    (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(degree), spring.response(degree)
+    p, _ = pair.penetration(x)
+    a, s = pair.split(x)
+    (a, u), (s, y) = beam(a), spring(s)
+    coefficients = np.linalg.solve(
+        own + numbers @ (beam_motions + spring_motions), numbers @ (y - u) + np.outer(from_start, p)
+    )
+    return np.vstack([a + beam_states @ coefficients, s - spring_states @ coefficients])
+
+
+def _exchanged(pair: LinearPair, sequential: bool, degree: int, h: float, x: np.ndarray) -> np.ndarray:
+    """Return states after a step of a soft law by ``jacobi`` or ``gauss_seidel``, as `coupling.exchange.Exchange`."""
+    beam, spring, k, c = Step(pair.beam, h), Step(pair.spring, h), pair.stiffness, pair.damping
+    p, rate = pair.penetration(x)
+    a, s = pair.split(x)
+    at_start = k * p + c * rate
+    forces = [at_start, k * rate][: degree + 1]
+    end, u = beam(a, forces)
+    if sequential:
+        moved = pair.spring.displacement(s) + degree * h * pair.spring.velocity(s)
+        at_end = k * (moved - u[0]) + c * (pair.spring.velocity(s) - u[1])
+        forces = [at_start, (at_end - at_start) / h] if degree else [at_end]
+    return np.vstack([end, spring(s, [-f for f in forces])[0]])
 
 
 def spectral_radius(pair: LinearPair, scheme: str, degree: int, h: float) -> float:
