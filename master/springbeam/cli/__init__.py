@@ -11,7 +11,6 @@ import os
 import sys
 import textwrap
 from collections.abc import Callable
-from importlib import metadata
 from typing import Annotated
 
 import typer
@@ -65,16 +64,10 @@ def main() -> None:
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"springbeam {version()}")
+        from .. import __version__
+
+        typer.echo(f"springbeam {__version__}")
         raise typer.Exit
-
-
-def version() -> str:
-    """Return the version of the installed package."""
-    try:
-        return metadata.version("springbeam")
-    except metadata.PackageNotFoundError:
-        return "(not installed)"
 
 
 @app.callback()

@@ -58,9 +58,8 @@ class Prediction:
     contact_frequency: float | None  #: of tip and spring top on the linearised contact law [rad/s]
     tip_mass: float | None  #: [kg]
     impedance: float | None  #: Z = √(KAG ρA) [N·s/m]
-    displacement_gain: (
-        float | None
-    )  #: 2m/(ZH) of rigid laws: the fixed-point gain of an exchange of displacement against force
+    #: 2m/(ZH) of rigid laws: the fixed-point gain of an exchange of displacement against force
+    displacement_gain: float | None
     resolved_modes: int | None  #: of the beam's, with ωH ≤ `RESOLVED`
     modes: int | None
     schemes: tuple[SchemePrediction, ...]
@@ -150,7 +149,7 @@ def _reduced(beam: Beam) -> tuple[Beam, bool]:
 
 
 def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
-    """Return the beam's modes and the linearised spring; without a spring, the tip against the foundation.
+    """Return the beam's modes and the spring with k1 + 3 k2 y² at its stiffest; without one, tip and foundation.
 
     ``None`` where the scene joins no two bodies.
     """
@@ -159,8 +158,12 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
     moved = modal.tip**2 > _UNMOVED * modal.inverse_tip_mass
     omega2 = modal.omega[moved] ** 2
     beam = LinearBody(omega2, modal.alpha * omega2, modal.tip[moved])
-    wall = LinearBody(np.zeros(0), np.zeros(0), np.zeros(0))
-    low = wall if scene.spring is None else spring_body(scene)
+    low = LinearBody(np.zeros(0), np.zeros(0), np.zeros(0))
+    if scene.spring is not None:
+        m = scene.spring.mass
+        low = LinearBody(
+            np.array([spring_stiffness(scene) / m]), np.array([scene.spring.damping / m]), np.array([m**-0.5])
+        )
     law = law_of(scene.contact) if scene.coupled else Transmission()
     if not law.soft:
         return LinearPair(beam, low)
@@ -174,14 +177,6 @@ def contact_frequency(scene: Scene) -> float:
     pair = linear_pair(scene, modal_beam(_reduced(scene.beam)[0]))
     assert pair is not None
     return pair.contact_frequency
-
-
-def spring_body(scene: Scene) -> LinearBody:
-    """Return the spring with k1 + 3 k2 y² at its stiffest."""
-    spring = scene.spring
-    assert spring is not None
-    m = spring.mass
-    return LinearBody(np.array([spring_stiffness(scene) / m]), np.array([spring.damping / m]), np.array([m**-0.5]))
 
 
 # -- critical steps -------------------------------------------------------------------------------------------------
