@@ -35,7 +35,7 @@ SCENES = {
     "quasi-static": with_changes(
         SOFT, beam={"fidelity": "quasi_static", "alpha_b": 0.1, "distributed_load": -20.0}, coupling={"degree": 1}
     ),
-    "compliance": with_changes(SOFT, contact=COMPLIANCE),
+    "compliance": with_changes(SOFT, contact={**COMPLIANCE, "exponent": 1.5}, coupling={"degree": 2}),
     "one-way": with_changes(
         SOFT,
         beam={"young_modulus": 1e6, "shear_modulus": 1e6},

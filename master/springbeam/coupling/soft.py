@@ -105,9 +105,13 @@ def penetration(step: Step, degree: int) -> tuple[float, Vector]:
 class _Crossing(StepSolver):
     """Aims at the crossing of the law with the bodies' responses."""
 
+    CHECKPOINTED = (*StepSolver.CHECKPOINTED, "_last_crossing")
+
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
         super().__init__(energy.CONDITIONS[degree], degree, tolerance)
         self.projection = Projection(law, degree)
+        #: Size of the last step [s], and (E + A′)⁻¹ [m/N] where its crossing was found.
+        self._last_crossing: tuple[float, Matrix] = (0.0, [])
 
     def apart(self, gap: Vector, a: Vector, window: Window) -> bool:
         if any(a):
@@ -117,28 +121,36 @@ class _Crossing(StepSolver):
 
     def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> tuple[Vector, Vector]:
         tip, low = window.ends
-        start, x = low.displacement - tip.displacement, list(map(neg, gap))
+        size, x = window.size, list(map(neg, gap))
+        step = (low.displacement - tip.displacement, size, x, a, descent)
+        last_size, flexibility = self._last_crossing
+        found = None
         try:
-            found = self._newton(start, window.size, x, a, descent)
-            if found is None:
-                found = self._stiffened(start, window.size, x, a, descent)
+            if self.degree > 0 and size == last_size:  # at degree 0 the law's slope costs no more than a third force
+                found = self._newton(*step, flexibility)
+            found = found or self._newton(*step) or self._stiffened(*step)
         except np.linalg.LinAlgError:
-            found = None
+            pass
         if found is None:
             raise NotConverged(max(map(abs, x)), _MAX_NEWTON)
         x, a = found
         return list(map(neg, x)), a
 
-    def _newton(self, start: float, size: float, x: Vector, a: Vector, descent: Matrix) -> tuple[Vector, Vector] | None:
+    def _newton(
+        self, start: float, size: float, x: Vector, a: Vector, descent: Matrix, flexibility: Matrix | None = None
+    ) -> tuple[Vector, Vector] | None:
         """Return the x and A(x) that law and bodies have in common, ``None`` if they are not found.
 
         Damped Newton iteration from ``x``, where the bodies are under ``a``, a correction being accepted where the next
         one would be shorter; the slope of the law is kept where that is much shorter (Deuflhard 2004, section 2.1).
-        ``descent`` is −E. Raises numpy.linalg.LinAlgError.
+        ``descent`` is −E, ``flexibility`` a guess of (E + A′)⁻¹, good if it makes corrections shrink as much. Raises
+        numpy.linalg.LinAlgError.
         """
         force, under_a = self.projection.force, x
         missing = list(map(sub, a, force(start, size, x)))  # −f
-        flexibility = self._flexibility(start, size, x, descent)
+        guessed = flexibility is not None
+        if flexibility is None:
+            flexibility = self._flexibility(start, size, x, descent)
         change = times(flexibility, missing)
         length = max(map(abs, change))
         for _ in range(_MAX_NEWTON):
@@ -156,13 +168,15 @@ class _Crossing(StepSolver):
                 share *= 0.5
             else:
                 return None
-            x = tried
-            if left * left <= _SETTLED * scale * length or length <= _ROUNDING * scale:
+            x, slow = tried, left > _SLOW * length
+            settled = left * left <= _SETTLED * scale * length or length <= _ROUNDING * scale
+            if settled and not (guessed and slow):
+                self._last_crossing = (size, flexibility)
                 # The correction after the next would be left²/length. For the next one the law's slope tells the force.
                 felt = times(descent, following)
                 return list(map(add, x, following)), [c + m + d for c, m, d in zip(of_law, missing, felt, strict=True)]
-            if left > _SLOW * length:
-                flexibility = self._flexibility(start, size, x, descent)
+            if slow:
+                flexibility, guessed = self._flexibility(start, size, x, descent), False
                 following = times(flexibility, missing)
                 left = max(map(abs, following))
             change, length = following, left

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 from operator import add, sub
+from typing import ClassVar
 
 import numpy as np
 
@@ -55,7 +56,7 @@ class StepSolver(Coupling):
         A displacement that is to be expected [m]: modes whose sum, the tip, is held at 0 are as large.
     """
 
-    CHECKPOINTED = ("_sizes", "_last_size", "_reach", "_corrections")
+    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("_sizes", "_last_size", "_reach", "_corrections")
 
     def __init__(self, conditions: Conditions, degree: int, tolerance: float, expected: float = 0.0) -> None:
         self._conditions = conditions
