@@ -11,9 +11,9 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import shipped_scenes
 from springbeam.scene.resolution import (
     CONTACT_LAG,
+    CONTACT_STEPS,
     CONTACT_TURN,
     MISMATCH,
-    VIBRATION,
     fastest_frequency,
     modes_below,
     not_resolved,
@@ -61,10 +61,12 @@ def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
 
 
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
-def test_the_limit_of_the_mismatch_is_that_of_the_degree(share, resolved):
+def test_the_limits_of_the_mismatch_and_of_the_shortest_contact(share, resolved):
     limit = share * MISMATCH[PAIR.coupling.degree]
     assert (not_resolved(PAIR, 3.0 * limit, 3.0) is None) is resolved
     assert (not_resolved(PAIR, 0.0, 3.0, mismatch_at_stop=limit) is None) is resolved
+    lasted = CONTACT_STEPS * PAIR.coupling.H / share
+    assert (not_resolved(PAIR, 0.0, 3.0, shortest_contact=lasted) is None) is resolved
 
 
 def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
@@ -122,12 +124,13 @@ STIFF = with_changes(
 )
 
 
-@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
 def test_the_limit_of_a_contact_depends_on_the_degree(degree, share, resolved):
     scene = with_changes(STIFF, coupling={"degree": degree})
     turn = share * CONTACT_TURN[degree]
-    assert (not_resolved(scene, 0.0, 1.0, contact_frequency=turn / 1e-3) is None) is resolved
+    lost = not_resolved(scene, 0.0, 1.0, contact_frequency=turn / 1e-3, contact_steps=1)
+    assert (lost is None) is resolved
 
 
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
@@ -150,21 +153,21 @@ def test_a_contact_that_is_not_resolved_is_said(size, degree):
     named = float(warning.split("macro_step <= ")[1].split()[0])
     omega = np.sqrt(1e8 * (modal_beam(STIFF.beam).inverse_tip_mass + 1.0))
     if degree == 0:
-        assert named < 0.5 * CONTACT_TURN[0] / omega  # by the lag of all steps
+        assert named < 0.25 / omega  # by the lag of all steps
     else:
         assert named == pytest.approx(CONTACT_TURN[degree] / omega, rel=0.15)
 
 
 def test_the_step_that_is_named_resolves_the_contact():
-    """λ = 1e6: velocities are then a fifth of the fastest off at most, from one that takes a quarter of the step."""
+    """λ = 1e6: velocities are then a tenth of the fastest off at most, from one that takes a quarter of the step."""
     scene = with_changes(STIFF, time={"t_end": 0.02}, contact={"stiffness": 1e6})
     (warning,) = simulate(scene).summary["warnings"]
     named = float(warning.split("macro_step <= ")[1].split()[0])
-    runs = [simulate(with_changes(scene, coupling={"macro_step": 0.02 / n})) for n in (4 * 64, 16 * 64)]
-    assert 0.02 / 512 <= named <= 0.02 / 128
+    runs = [simulate(with_changes(scene, coupling={"macro_step": 0.02 / n})) for n in (1024, 4096)]
+    assert 0.02 / 1024 <= named <= 0.02 / 512
     assert all(run.summary["resolved"] and run.summary["warnings"] == [] for run in runs)
-    ends = [run.v_tip[np.isin(np.round(run.time / 0.02 * 256, 6), np.arange(257))] for run in runs]
-    assert np.abs(ends[0] - ends[1]).max() <= VIBRATION * np.abs(ends[1]).max()
+    ends = [run.v_tip[np.isin(np.round(run.time / 0.02 * 1024, 6), np.arange(1025))] for run in runs]
+    assert np.abs(ends[0] - ends[1]).max() <= 0.1 * np.abs(ends[1]).max()
 
 
 def test_a_stiff_link_that_does_not_swing_has_nothing_to_resolve():

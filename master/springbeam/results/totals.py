@@ -7,6 +7,7 @@ polynomial that was applied, so its integral, and its mean over any window, are 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,6 +51,8 @@ LOSS_NAMES = {
 _BESIDE = ("contact_force_window", "deepest_tip_time")
 #: Gauss–Legendre nodes and weights on [0, 1].
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(3)[0] + 1) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
+#: Share of the impulse of a run below which a contact is none to speak of.
+_SLIGHT = 2e-3
 #: Windows that are looked at together.
 _CHUNK = 65536
 
@@ -99,6 +102,22 @@ def totals(
     if beam and spring:
         found["loss_impact"] = sum(e.energy_loss for e in events if e.kind not in ("stop_impact", "seated"))
     return {name: value if name == "stop_strokes" else float(value) for name, value in found.items()}
+
+
+def shortest_contact(steps: np.ndarray | None, events: Iterable[Event], below: float, *, free_at_end: bool) -> float:
+    """Return how long the shortest contact or rest on the foundation that has ended lasts [s]; ∞ if not ``below`` [s].
+
+    Those that pass on hardly any impulse are left out. Other parameters as of `totals`.
+    """
+    events = list(events)
+    intervals = [*tip_contacts(events, inf, free_at_end=free_at_end), *foundation_contacts(events, inf)]
+    short = [(since, until) for since, until in intervals if 0.0 < until - since < below]
+    if not short or steps is None:
+        return inf
+    before, after = _cumulative(steps, events)
+    first, last = (np.searchsorted(steps["time"], times) for times in np.transpose(short))
+    passed = np.abs(before[last] - after[first])
+    return min((u - s for (s, u), j in zip(short, passed, strict=True) if j > _SLIGHT * abs(after[-1])), default=inf)
 
 
 def _contact(

@@ -43,10 +43,19 @@ class Balance(Checkpointed):
         if self._judged is not self.ledger:
             self._judged.impact_loss += energy
 
+    @property
+    def _error(self) -> float:
+        """Return the share of the energy that has changed; what numerical damping takes is not an error."""
+        return self._judged.gain if self._numerically_damped else self._judged.relative
+
+    @property
+    def changed(self) -> bool:
+        """Whether so much of the energy has changed that the motion is in doubt."""
+        return self._error > self._warns
+
     def refuse_change(self, time: float, macro_step: float) -> None:
         """Raise RunStopped if more of the energy has changed by ``time`` [s] than can be right."""
-        # What numerical damping takes is not an error; what it brings is.
-        if (self._judged.gain if self._numerically_damped else self._judged.relative) > self._stops:
+        if self._error > self._stops:
             raise RunStopped(self._cause(macro_step), time)
 
     def warnings(self, macro_step: float) -> list[str]:

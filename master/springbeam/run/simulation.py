@@ -15,10 +15,11 @@ from ..bodies.protocol import NO_FORCE, Body, BodyFailed, StepRefused
 from ..contact.phases import Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
 from ..results.recording import NonFiniteValue, Recorder
+from ..results.totals import shortest_contact
 from ..results.trajectory import Event
 from ..scene import Scene
 from ..scene.automatic import decided
-from ..scene.resolution import not_resolved, peak_force_doubt
+from ..scene.resolution import CONTACT_STEPS, not_resolved, peak_force_doubt
 from .balance import Balance
 from .crowd import AT_ONCE, Crowd
 from .detection import Detector, soft_change
@@ -211,10 +212,10 @@ class Simulation(Checkpointed):
         state, pair = self._state, self._pair
         if kind in ("separation", "release"):
             self._last_opening = state.time
-        if kind == "impact":
-            state.reclosed = state.time - self._last_opening <= AT_ONCE * self._steps.size
         if kind == "stop_impact":
             self._rows.struck(state, self._steps.size)
+        if kind == "impact":
+            state.reclosed = state.time - self._last_opening <= AT_ONCE * self._steps.size
         ends = pair.ends()
         tolerance = self._detector.simultaneity_tolerance(ends) if kind == "impact" else self._detector.tolerance(ends)
         kind, phase, impact = self._transitions.after(
@@ -283,9 +284,15 @@ class Simulation(Checkpointed):
             self._scene,
             rows.largest_mismatch,
             rows.largest_speed,
-            rows.mismatch_at_stop,
-            rows.contact_frequency,
-            rows.contact_steps,
+            mismatch_at_stop=rows.mismatch_at_stop,
+            shortest_contact=shortest_contact(
+                self._recorder.steps(),
+                self._recorder.events(),
+                CONTACT_STEPS * self._steps.size,
+                free_at_end=self.apart,
+            ),
+            contact_frequency=rows.contact_frequency,
+            contact_steps=rows.contact_steps,
         )
         doubt = unresolved or peak_force_doubt(self._scene)
         if doubt is not None:
@@ -307,7 +314,7 @@ class Simulation(Checkpointed):
             **({"reduced_steps": reduced} if reduced else {}),
             **self._balance.summary(),
             "max_velocity_mismatch": rows.largest_mismatch,
-            "resolved": unresolved is None,
+            "resolved": unresolved is None and not self._balance.changed,
             "warnings": warnings,
         }
 

@@ -4,9 +4,11 @@ A run is called *not resolved* if (``docs/coupling.md``, "Is the motion resolved
 
 * the slowest oscillation of a body, or a load, turns more than `TURN` in a macro step: its rows are aliased;
 * tip and lower end turn more than `CONTACT_TURN` against each other on a soft contact law, or with degree 0 in all
-  steps together more than `CONTACT_LAG` too little; or
+  steps together more than `CONTACT_LAG` too little;
+* `hermite` is used where the fastest mode kept turns more than `STABLE` in a macro step;
 * the velocities of the joined ends differ by more than `MISMATCH` of their largest speed, or of that with which they
-  strike the foundation.
+  strike the foundation; or
+* a contact or a rest on the foundation lasts less than `CONTACT_STEPS` macro steps: one polynomial tells when it ends.
 
 Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
 `springbeam.studies.stability.predict` has the mesh's.
@@ -14,7 +16,7 @@ Frequencies are those of the beam, not of its mesh, so that asking costs next to
 
 from __future__ import annotations
 
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 from .linearised import contact_stiffness, spring_frequency, spring_stiffness
 from .scene import Scene
@@ -23,18 +25,20 @@ from .tables import Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
 TURN = 1.0
-#: Largest angle [rad] that a soft contact may turn in a macro step, where its force is of degree 0, 1, 2 in time: there
-#: velocities are up to a fifth off (docs/coupling.md has them).
-CONTACT_TURN = (0.5, 2.0, 4.0)
+#: Largest angle [rad] that a soft contact may turn in a macro step, where its force is of degree 1, 2 in time: there
+#: displacements are up to 1 % off (docs/coupling.md has more).
+CONTACT_TURN = {1: 1.0, 2: 3.0}
 #: What all steps of degree 0 together may turn it too little [rad], one that turns it by x by x³/12 as the midpoint
-#: rule does; at higher degrees the limit of one step is reached first.
-CONTACT_LAG = 0.5
+#: rule does.
+CONTACT_LAG = 0.1
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
 #: Velocity mismatch of tip and spring top, relative to their speed, above which the motion is called unresolved, where
 #: the force is of degree 0, 1, 2: what is below is wrong by more than 1 % in few scenes (docs/accuracy.md).
 MISMATCH = (0.15, 0.1, 0.1)
+#: Macro steps that a contact must last, or a rest on the foundation: one polynomial of the force ends a shorter one.
+CONTACT_STEPS = 1.5
 #: Velocity mismatch above which it is a vibration and no error.
 VIBRATION = 0.2
 #: Periods of the fastest wave of the mesh that a window must hold for the mean of a rigid force to be settled to 5 %.
@@ -47,7 +51,9 @@ def not_resolved(
     scene: Scene,
     mismatch: float,
     speed: float,
+    *,
     mismatch_at_stop: float = 0.0,
+    shortest_contact: float = inf,
     contact_frequency: float = 0.0,
     contact_steps: int = 0,
 ) -> str | None:
@@ -61,6 +67,8 @@ def not_resolved(
         The largest difference of the joined ends' velocities, and the largest speed of an end [m/s].
     mismatch_at_stop
         The largest difference of these velocities as the ends strike the foundation, over the speed of the stroke.
+    shortest_contact
+        How long the shortest contact by a rigid law, or rest on the foundation, has lasted [s].
     contact_frequency
         Of tip and lower end on a soft contact law at the deepest penetration reached [rad/s], 0 without one.
     contact_steps
@@ -75,13 +83,19 @@ def not_resolved(
                     f"Velocities, forces and times of events are samples of a faster motion; coupling.macro_step <= "
                     f"{_rounded_down(TURN / omega)} resolves it{else_}"
                 )
-        if contact_frequency > 0.0 and (lost := _contact_lost(scene, contact_frequency, H, contact_steps)):
+        if lost := _contact_lost(scene, contact_frequency, H, contact_steps) or _unstable(scene, H):
             return lost
     allowed = MISMATCH[scene.coupling.degree]
     if mismatch > allowed * speed:
         differ = f"up to {mismatch:.3g} m/s of {speed:.3g} m/s"
     elif mismatch_at_stop > allowed:
         differ = f"{mismatch_at_stop:.2g} of the speed with which they strike the foundation"
+    elif H is not None and scene.contact.rigid and shortest_contact < CONTACT_STEPS * H:
+        return (
+            f"not resolved: a contact lasts {shortest_contact / H:.2g} macro steps only, so that one polynomial of the "
+            f"force decides when it ends, and with it what follows; coupling.macro_step <= "
+            f"{_rounded_down(shortest_contact / CONTACT_STEPS)} resolves it"
+        )
     else:
         return None
     return (
@@ -94,16 +108,30 @@ def _contact_lost(scene: Scene, omega: float, H: float, steps: int) -> str | Non
     """Return in words why ``steps`` of H [s] do not follow a soft contact of ``omega`` [rad/s]; ``None`` if they do."""
     projected = scene.coupling.scheme == "energy"
     degree = scene.coupling.degree if projected else 0
-    turn = CONTACT_TURN[degree]
-    if degree == 0 and steps > 0:
-        turn = min(turn, sqrt(12.0 * CONTACT_LAG / (steps * omega * H)))
-    if omega * H <= turn:
+    lag = steps * (omega * H) ** 3 / 12.0  # of all steps of degree 0: it falls with the square of their size
+    excess = sqrt(lag / CONTACT_LAG) if degree == 0 else omega * H / CONTACT_TURN[degree]
+    if steps == 0 or excess <= 1.0:
         return None
-    higher = ", a higher coupling.degree allows longer ones" if projected and degree < len(CONTACT_TURN) - 1 else ""
+    higher = ", a higher coupling.degree allows longer ones" if projected and degree < max(CONTACT_TURN) else ""
     return (
         f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step, {steps * omega * H:.2g} rad in all,"
         f" on the contact law at its deepest penetration. Velocities, forces and times of contact are samples of a "
-        f"faster motion; coupling.macro_step <= {_rounded_down(turn / omega)} resolves it{higher}"
+        f"faster motion; coupling.macro_step <= {_rounded_down(H / excess)} resolves it{higher}"
+    )
+
+
+def _unstable(scene: Scene, H: float) -> str | None:
+    """Return in words why steps of H [s] are too long for `hermite`, as far as is known; ``None`` if they are not."""
+    beam, meets = scene.beam, scene.spring is not None or scene.stop is not None
+    if scene.coupling.scheme != "hermite" or beam is None or beam.fidelity == "quasi_static" or not meets:
+        return None
+    fastest = fastest_frequency(beam)
+    if fastest * H <= STABLE:
+        return None
+    return (
+        f'not resolved: with [coupling] scheme = "hermite" the fastest mode of the beam turns {fastest * H:.3g} rad in '
+        f"a macro step. Above {STABLE:g} rad the scheme may be unstable and miss short contacts; take a macro_step of "
+        f'{STABLE / fastest:.2g} s, or scheme = "energy"'
     )
 
 

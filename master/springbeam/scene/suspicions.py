@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from .estimates import implausible
-from .resolution import STABLE, fastest_frequency
 from .scene import Scene
 from .statics import locking, shear_stiffness, tip_inertia
 from .well import spring_energy, well_depth
@@ -33,14 +32,6 @@ def suspicions(scene: Scene) -> list[str]:
     ]
     found += implausible(scene)
     beam, spring = scene.beam, scene.spring
-    if scene.coupling.scheme == "hermite" and H is not None and beam is not None and beam.fidelity == "dynamic":
-        turn = fastest_frequency(beam) * H
-        if turn > STABLE and (spring is not None or scene.stop is not None):
-            found.append(
-                f'[coupling] scheme = "hermite": the fastest mode of the beam turns {turn:.3g} rad in a macro step. '
-                f"Above {STABLE:g} rad the scheme may be unstable and miss short contacts; take a macro_step of "
-                f'{STABLE / fastest_frequency(beam):.2g} s, or scheme = "energy"'
-            )
     if spring is not None and spring.cubic_stiffness < 0.0:
         energy, depth = spring_energy(spring) + _beam_energy(scene), well_depth(scene)
         if energy > depth:

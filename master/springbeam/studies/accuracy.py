@@ -91,8 +91,7 @@ class Picked:
         """Return the run, with what was picked and found in its summary."""
         found = self.run.summary
         # What a run says of its steps is a guess; two runs that agree know better.
-        answered = ("not resolved", "[coupling] scheme")  # by the comparison of two runs
-        warnings = [warning for warning in found["warnings"] if not warning.startswith(answered)]
+        warnings = [warning for warning in found["warnings"] if not warning.startswith("not resolved")]
         return replace(self.run, summary={**found, "resolved": True, "warnings": warnings, "accuracy": self.summary()})
 
     def summary(self) -> dict[str, Any]:
