@@ -125,11 +125,11 @@ def _verdict(seed: int, number: int, way: str, run: Trajectory, reference: Traje
     span = float(run.time[-1] - run.time[0])
     picked = run.summary.get("accuracy")
     found = errors(run, reference, span / run.summary["macro_steps"])
-    wrong = (found.u_tip_max, found.y_max, found.event_time / span, found.impulse)
+    wrong = (found.u_tip_max, found.y_max, (found.event_time or 0.0) / span, found.impulse)
     said = set(run.summary["warnings"]) - {*suspicions(run.scene), peak_force_doubt(run.scene)}
     return Verdict(
         seed, number, way, "done", condition, bool(said) or not run.summary["resolved"],
-        *(float(np.nan_to_num(value)) for value in wrong),
+        *(float(value or 0.0) for value in wrong),
         calls=run.do_steps + (picked["pilot_steps"] if picked else 0), why="; ".join(said),
     )  # fmt: skip
 
