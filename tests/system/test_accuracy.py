@@ -20,7 +20,7 @@ from springbeam.run.runner import run
 from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.studies.accuracy import simulate
 from springbeam.studies.crosscheck import crosscheck
-from springbeam.studies.crosscheck.orders import orders
+from springbeam.studies.crosscheck.orders import Orders
 from springbeam.studies.stability.predict import predict
 from springbeam.studies.sweep import Sweep
 from springbeam.studies.tradeoff import Tradeoff
@@ -262,7 +262,10 @@ def asking(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("study_of", [crosscheck, orders, lambda scene: run(scene, MemoryRecorder(scene))])
+@pytest.mark.parametrize(
+    "study_of",
+    [crosscheck, lambda scene: Orders(scene=scene).record(0), lambda scene: run(scene, MemoryRecorder(scene))],
+)
 def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked(study_of, asking):
     with pytest.raises(SceneError, match=r"accuracy = 0\.0001"):
         study_of(load_scene(asking))

@@ -13,7 +13,8 @@ from springbeam import load_scene, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.studies.crosscheck import crosscheck
 from springbeam.studies.crosscheck.comparison import Crosscheck
-from springbeam.studies.crosscheck.orders import orders
+from springbeam.studies.crosscheck.orders import Orders
+from springbeam.studies.study import record_all
 
 SOFT = load_scene("soft")
 
@@ -89,7 +90,8 @@ def test_a_wrong_reference_fails(monkeypatch, what):
 def test_orders_are_those_of_the_scheme():
     """hermite of degree 2: displacement 6, velocity 6, force 4."""
     coupling = {"macro_step": 2e-3, "scheme": "hermite", "degree": 2}
-    rows = orders(with_changes(SOFT, time={"t_end": 0.07}, coupling=coupling))
+    study = Orders(scene=with_changes(SOFT, time={"t_end": 0.07}, coupling=coupling))
+    rows = study.rows(record_all(study))
     last = {row.quantity: row.orders[1] for row in rows}
     assert last["y"] == pytest.approx(6.0, abs=0.5)
     assert last["z"] == pytest.approx(6.0, abs=0.4)

@@ -227,11 +227,6 @@ def test_a_quick_grid_is_a_smaller_one():
     assert len(Grid(quick=True).cases()) == 60 + 9 * len(SLICES)
 
 
-def test_command_without_cells_is_refused():
-    result = command("stability", "--samples", "0", "--resolution", "0")
-    assert result.exit_code == 2
-
-
 def test_a_scene_of_a_cell_is_that_cell():
     cell = slice_cells(2)[0]
     scene = scene_dict(cell)

@@ -141,13 +141,6 @@ def results_directory(path: Path) -> Path:
     return path
 
 
-def new_directory(default: Path, out: Path | None, force: bool) -> RunDirectory:
-    """Return the directory ``out`` for results; without one ``default``, or ``default``-2, … if that has some."""
-    if out is None and not force:
-        return RunDirectory.create_numbered(default)
-    return RunDirectory.create(out or default, replace=force)
-
-
 @contextmanager
 def bad_input_reported() -> Iterator[None]:
     """End the command with exit code 2 and one error if the input or a file is at fault."""

@@ -34,7 +34,6 @@ from .common import (
     bad_input_reported,
     console_for,
     fail,
-    new_directory,
     print_json,
     progress_bar,
 )
@@ -110,7 +109,11 @@ def run(
             typer.echo(f"warning: {line}", err=True)
         made = picked(what, mesh)
         what = what if made is None else made.scene
-        directory = new_directory(Path("results") / Path(scene).stem, out, force)
+        default = Path("results") / Path(scene).stem
+        numbered = out is None and not force
+        directory = (
+            RunDirectory.create_numbered(default) if numbered else RunDirectory.create(out or default, replace=force)
+        )
     carry_out(
         what,
         directory,

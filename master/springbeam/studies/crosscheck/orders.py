@@ -14,7 +14,7 @@ from ...monolithic import event_driven
 from ...results.contact_times import contact_changes
 from ...run.runner import simulate
 from ...scene import Scene, SceneError, with_changes
-from ..study import Found, Record, Study, record_all
+from ..study import Found, Record, Study
 from ..tables import table, write_csv
 from .sampling import SHORT, away_from, quantities, sample
 
@@ -118,9 +118,3 @@ class Orders(Study):
             for row in self.rows(records)
         ]
         return [write_csv(directory / "orders.csv", rows)]
-
-
-def orders(scene: Scene) -> list[OrderRow]:
-    """Return the observed orders in H of displacement, velocity and contact force."""
-    study = Orders(scene=scene)
-    return study.rows(record_all(study))

@@ -75,8 +75,8 @@ def growth(scene: Scene) -> float:
     return float((energies[n] / energies[n // 2]) ** (0.5 / (n - n // 2)))
 
 
-def measured_critical_step(scene: Scene, near: float, precision: float = 0.002) -> float | None:
-    """Return the H [s] near ``near`` at which `growth` passes 1 + `THRESHOLD`, to ``precision`` of itself.
+def measured_critical_step(scene: Scene, near: float) -> float | None:
+    """Return the H [s] near ``near`` at which `growth` passes 1 + `THRESHOLD`, to 0.2 % of itself.
 
     ``None`` if it does not within 10 % of ``near``.
     """
@@ -88,7 +88,7 @@ def measured_critical_step(scene: Scene, near: float, precision: float = 0.002) 
     high = next((H for x in _SOUGHT if unstable(H := near * (1.0 + x))), None)
     if low is None or high is None:
         return None
-    while high > (1.0 + precision) * low:
+    while high > 1.002 * low:
         middle = math.sqrt(low * high)
         if unstable(middle):
             high = middle

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 
@@ -23,12 +24,8 @@ class Metric:
         return self.of(run)
 
 
-def _extreme(column: str, pick: Callable[[np.ndarray], float]) -> Callable[[Trajectory], float | None]:
+def _of(column: str, pick: Callable[[np.ndarray], float]) -> Callable[[Trajectory], float | None]:
     return lambda run: float(pick(run[column])) if column in run.columns else None
-
-
-def _last(column: str) -> Callable[[Trajectory], float | None]:
-    return lambda run: float(run[column][-1]) if column in run.columns else None
 
 
 def _first(kind: str) -> Callable[[Trajectory], float | None]:
@@ -43,23 +40,23 @@ def _total(name: str) -> Callable[[Trajectory], float | None]:
     return lambda run: float(run.summary[name]) if name in run.summary else None
 
 
+_last: Callable[[np.ndarray], float] = itemgetter(-1)
+
 METRICS: dict[str, Metric] = {
-    "u_tip_min": Metric("m", "lowest row of the tip", _extreme("u_tip", np.min)),
-    "u_tip_max": Metric("m", "highest row of the tip", _extreme("u_tip", np.max)),
-    "u_tip_end": Metric("m", "the tip at the end", _last("u_tip")),
-    "y_min": Metric("m", "lowest row of the spring's top", _extreme("y", np.min)),
-    "y_max": Metric("m", "highest row of the spring's top", _extreme("y", np.max)),
-    "y_end": Metric("m", "the spring's top at the end", _last("y")),
-    "z_max": Metric("m/s", "largest speed of the spring's top", _extreme("z", lambda z: np.max(np.abs(z)))),
-    "gap_max": Metric("m", "largest gap", _extreme("gap", np.max)),
+    "u_tip_min": Metric("m", "lowest row of the tip", _of("u_tip", np.min)),
+    "u_tip_max": Metric("m", "highest row of the tip", _of("u_tip", np.max)),
+    "u_tip_end": Metric("m", "the tip at the end", _of("u_tip", _last)),
+    "y_min": Metric("m", "lowest row of the spring's top", _of("y", np.min)),
+    "y_max": Metric("m", "highest row of the spring's top", _of("y", np.max)),
+    "y_end": Metric("m", "the spring's top at the end", _of("y", _last)),
+    "z_max": Metric("m/s", "largest speed of the spring's top", _of("z", lambda z: np.max(np.abs(z)))),
+    "gap_max": Metric("m", "largest gap", _of("gap", np.max)),
     **{name: Metric(unit, words, _total(name)) for name, (words, unit) in TOTALS.items()},
     **{name: Metric("J", f"energy lost by {words}", _total(name)) for name, words in LOSS_NAMES.items()},
-    "dissipated": Metric("J", "energy lost to damping", _last("e_dissipated")),
-    "impact_loss": Metric("J", "energy lost in impacts", _last("e_impact_loss")),
-    "energy_residual": Metric(
-        "", "largest change of the sum of all energies, relative", lambda run: float(run.summary["max_energy_residual"])
-    ),
-    "macro_steps": Metric("", "macro steps", lambda run: float(run.summary["macro_steps"])),
+    "dissipated": Metric("J", "energy lost to damping", _of("e_dissipated", _last)),
+    "impact_loss": Metric("J", "energy lost in impacts", _of("e_impact_loss", _last)),
+    "energy_residual": Metric("", "largest change of the sum of all energies, relative", _total("max_energy_residual")),
+    "macro_steps": Metric("", "macro steps", _total("macro_steps")),
     **{f"first_{kind}": Metric("s", f"first event {kind}", _first(kind)) for kind in EVENT_KINDS},
     **{f"number_of_{kind}": Metric("", f"events {kind}", _number(kind)) for kind in EVENT_KINDS},
 }

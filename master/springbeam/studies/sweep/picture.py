@@ -78,11 +78,11 @@ def _map(figure: Figure, ax: Axes, columns: dict[str, list[Any]], values: np.nda
     grid = len(values) == len(levels[0]) * len(levels[1]) and all(axis.values for axis in axes)
     words = [any(isinstance(v, str) for v in level) for level in levels]
     if grid:
-        x = np.arange(len(levels[0])) if words[0] else np.array(levels[0], dtype=float)
-        y = np.arange(len(levels[1])) if words[1] else np.array(levels[1], dtype=float)
-        picture: ScalarMappable = ax.pcolormesh(
-            x, y, values.reshape(len(x), len(y)).T, shading="nearest", cmap="cividis"
-        )
+        x, y = (np.arange(len(level)) if word else np.array(level, dtype=float)
+                for level, word in zip(levels, words, strict=True))  # fmt: skip
+        ascending = np.ix_(np.argsort(x), np.argsort(y))
+        found = values.reshape(len(x), len(y))[ascending].T
+        picture: ScalarMappable = ax.pcolormesh(np.sort(x), np.sort(y), found, shading="nearest", cmap="cividis")
     else:
         x, y = (np.array([level.index(v) for v in columns[a.name]] if word else columns[a.name], dtype=float)
                 for a, level, word in zip(axes, levels, words, strict=True))  # fmt: skip
