@@ -19,20 +19,14 @@ from .tables import Table, key
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-#: Which keys each signal takes, and which of them it needs.
-_TAKES: dict[str, tuple[str, ...]] = {
-    "constant": (),
-    "harmonic": ("frequency", "phase", "start", "duration"),
-    "half_sine": ("start", "duration"),
-    "step": ("start", "duration"),
-    "ramp": ("start", "duration"),
-    "table": ("file", "interpolation", "start"),
-}
-_NEEDS: dict[str, tuple[str, ...]] = {
-    "harmonic": ("frequency",),
-    "half_sine": ("duration",),
-    "ramp": ("duration",),
-    "table": ("file",),
+#: Which keys each signal takes: those that it needs, and others.
+_TAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "constant": ((), ()),
+    "harmonic": (("frequency",), ("phase", "start", "duration")),
+    "half_sine": (("duration",), ("start",)),
+    "step": ((), ("start", "duration")),
+    "ramp": (("duration",), ("start",)),
+    "table": (("file",), ("interpolation", "start")),
 }
 _OF_SIGNALS = ("frequency", "phase", "start", "duration", "file", "interpolation")
 #: A straight table ends steps at its lines unless they are closer than this share of the macro step on average.
@@ -76,14 +70,14 @@ class Load(Table):
     @model_validator(mode="after")
     def _keys_of_signal(self) -> Load:
         given = [name for name in _OF_SIGNALS if getattr(self, name) != type(self).model_fields[name].default]
-        takes = _TAKES[self.signal]
+        needs, may_have = _TAKES[self.signal]
         for name in given:
-            if name not in takes:
-                allowed = f"it takes {', '.join(takes)}" if takes else "it takes none of these keys"
+            if name not in needs + may_have:
+                allowed = ", ".join(needs + may_have) or "none of these keys"
                 raise ValueError(
-                    f'{name} = {getattr(self, name)!r}: plays no part in signal = "{self.signal}"; {allowed}'
+                    f'{name} = {getattr(self, name)!r}: plays no part in signal = "{self.signal}"; it takes {allowed}'
                 )
-        for name in _NEEDS.get(self.signal, ()):
+        for name in needs:
             if getattr(self, name) is None:
                 raise ValueError(f'{name}: missing; signal = "{self.signal}" needs it')
         for name in ("shape", "at"):

@@ -238,21 +238,13 @@ class Beam(Table):
             )
         if self.n_modes > unknowns:
             raise ValueError(f"n_modes = {self.n_modes}: {mesh} has only {unknowns} modes; use 0 for all of them")
-        if self.integrator == "modal" and self.n_modes == 0 and unknowns > ALL_MODES_UP_TO:
-            raise ValueError(
-                f"n_modes = 0: {mesh} has {unknowns} modes, too many to keep them all (allowed up to "
-                f'{ALL_MODES_UP_TO}); use n_modes = 64, or integrator = "generalized_alpha"'
-            )
         if self.integrator == "modal" and unknowns > ALL_MODES_UP_TO:
-            most = min(MOST_MODES, unknowns // 2)
-            if self.n_modes > most:
+            most = min(MOST_MODES, unknowns // 2, MOST_MODE_VALUES // unknowns)
+            if not 1 <= self.n_modes <= most:
                 raise ValueError(
-                    f"n_modes = {self.n_modes}: at most {most} of the {unknowns} modes of {mesh} are found"
-                )
-            if self.n_modes * unknowns > MOST_MODE_VALUES:
-                raise ValueError(
-                    f"n_modes = {self.n_modes}: with {mesh} they take {40 * self.n_modes * unknowns / 1e9:.3g} GB; "
-                    f"use n_modes = {MOST_MODE_VALUES // unknowns} or less, or fewer n_elements"
+                    f"n_modes = {self.n_modes}: of the {unknowns} modes of {mesh} at most {most} are found, all only "
+                    f"up to {ALL_MODES_UP_TO}; use n_modes = {min(64, most)}, fewer elements, or "
+                    'integrator = "generalized_alpha"'
                 )
         return self
 

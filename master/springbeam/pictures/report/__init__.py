@@ -10,7 +10,7 @@ import shlex
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import jinja2
 import numpy as np
@@ -139,24 +139,11 @@ def _warnings(trajectory: Trajectory) -> list[str]:
     return found
 
 
-class _Folded(NamedTuple):
-    """Events that the table shows as one line, which opens."""
-
-    kind: str
-    events: list[Event]
-    impulse_contact: float
-    impulse_foundation: float
-    energy_loss: float
-
-
-def _folded(events: list[Event]) -> Iterator[_Folded]:
-    """Return the events, cascades of a kind together and all others alone."""
-    for kind, some in groupby(events, key=lambda event: event.kind):
+def _folded(events: list[Event]) -> Iterator[list[Event]]:
+    """Return the events as the lines of the table: cascades of a kind together and all others alone."""
+    for _, some in groupby(events, key=lambda event: event.kind):
         same = list(some)
-        parts = [same] if len(same) >= _CASCADE else [[event] for event in same]
-        for part in parts:
-            sums = (sum(getattr(e, name) for e in part) for name in _Folded._fields[2:])
-            yield _Folded(kind, part, *sums)
+        yield from [same] if len(same) >= _CASCADE else ([event] for event in same)
 
 
 def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
