@@ -98,8 +98,7 @@ class FileRecorder(Recorder):
 
     def _keep_event(self, event: Event) -> None:
         values = [getattr(event, name) for name in EVENT_COLUMNS]
-        fields = ["" if v is None else v if isinstance(v, str) else repr(float(v)) for v in values]
-        self._file(EVENTS).write((",".join(fields) + "\n").encode())
+        self._file(EVENTS).write(_line(["" if v is None else v if isinstance(v, str) else float(v) for v in values]))
 
     def _keep_shape(self, numbers: list[float]) -> None:
         self._file(SHAPES).write(_line(numbers))

@@ -53,8 +53,6 @@ _BESIDE = ("contact_force_window", "deepest_tip_time")
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(3)[0] + 1) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
 #: Share of the impulse of a run below which a contact is none to speak of.
 _SLIGHT = 2e-3
-#: Windows that are looked at together.
-_CHUNK = 65536
 
 
 def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -167,14 +165,9 @@ def _largest_mean(steps: np.ndarray, before: np.ndarray, after: np.ndarray, wind
     An impulse at the edge of a window belongs to it if that makes the mean larger.
     """
     time = steps["time"]
-    highest, lowest = np.maximum(before, after), np.minimum(before, after)
-    largest = 0.0
-    for first in range(0, len(steps), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        ending = highest[part] - _impulse_until(steps, time, after, time[part] - window)
-        beginning = _impulse_until(steps, time, after, time[part] + window) - lowest[part]
-        largest = max(largest, float(ending.max()), float(beginning.max()))
-    return largest / window
+    ending = np.maximum(before, after) - _impulse_until(steps, time, after, time - window)
+    beginning = _impulse_until(steps, time, after, time + window) - np.minimum(before, after)
+    return max(0.0, float(ending.max()), float(beginning.max())) / window
 
 
 def _impulse_until(steps: np.ndarray, time: np.ndarray, after: np.ndarray, times: np.ndarray) -> np.ndarray:
