@@ -11,26 +11,22 @@ import pytest
 from commands import command
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
-from runs import PAIR, SCENES, a_trajectory
+from runs import SCENES, a_trajectory
 
 from springbeam.pictures import animation
 from springbeam.pictures.animation import AnimationError, animate
 from springbeam.pictures.drawing import NOT_RESOLVED
 from springbeam.pictures.frames import frames_of
-from springbeam.results.directory import RunDirectory
-from springbeam.results.file_recorder import FileRecorder
 
 
-@pytest.fixture
-def picture():
-    run = a_trajectory()
+def picture_of(run):
     with matplotlib.rc_context(animation.STYLE):
-        return animation._Picture(run, frames_of(run)), run
+        return animation._Picture(run, frames_of(run))
 
 
-def test_each_frame_is_a_recorded_one(picture):
-    shown, run = picture
-    motion = frames_of(run)
+def test_each_frame_is_a_recorded_one():
+    run = a_trajectory()
+    shown, motion = picture_of(run), frames_of(run)
     for frame in (0, 123, 399):
         shown.show(frame)
         for line, part, factor in shown._moving:
@@ -40,25 +36,22 @@ def test_each_frame_is_a_recorded_one(picture):
         assert shown._words.get_text().split() == ["t", "=", f"{run.time[frame]:.4f}", "s", str(run.phase[frame])]
 
 
-def test_what_stands_still_is_drawn_as_it_was_laid_out(picture):
+def test_what_stands_still_is_drawn_as_it_was_laid_out(monkeypatch):
     """The frozen background with the moving parts upon it is the picture drawn in full, but for lines that cross."""
-    shown, run = picture
-    shown.show(77)
-    frozen = pixels(shown.figure)
-    with matplotlib.rc_context(animation.STYLE), pytest.MonkeyPatch.context() as patch:
-        patch.setattr(animation._Picture, "_freeze", lambda self: None)
-        whole = animation._Picture(run, frames_of(run))
-    whole.show(77)
-    full = pixels(whole.figure)
+
+    def pixels():
+        shown = picture_of(a_trajectory())
+        shown.show(77)
+        canvas = animation.FigureCanvasAgg(shown.figure)
+        canvas.draw()
+        return np.asarray(canvas.buffer_rgba())[..., :3].astype(float)
+
+    frozen = pixels()
+    monkeypatch.setattr(animation._Picture, "_freeze", lambda self: None)
+    full = pixels()
     assert frozen.shape == full.shape == (500, 800, 3)
     assert np.mean(np.any(np.abs(frozen - full) > 40.0, axis=2)) < 0.005
     assert full.std() > 20.0
-
-
-def pixels(figure):
-    canvas = animation.FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3].astype(float)
 
 
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
@@ -78,15 +71,12 @@ def test_a_gif_plays_as_long_as_asked(tmp_path, recwarn, scene):
     assert [str(warning.message) for warning in recwarn] == []
 
 
-def test_a_motion_that_is_not_resolved_is_said_to_be(tmp_path):
-    def titles(run):
-        with matplotlib.rc_context(animation.STYLE):
-            return [ax.get_title("right") for ax in animation._Picture(run, frames_of(run)).figure.axes]
-
-    assert not any(titles(a_trajectory()))
-    marked = a_trajectory()
-    marked.summary["resolved"] = False
-    assert titles(marked)[0] == NOT_RESOLVED
+@pytest.mark.parametrize("resolved", [True, False])
+def test_a_motion_that_is_not_resolved_is_said_to_be(resolved):
+    run = a_trajectory()
+    run.summary["resolved"] = resolved
+    titles = [ax.get_title("right") for ax in picture_of(run).figure.axes]
+    assert titles == ["" if resolved else NOT_RESOLVED, *[""] * (len(titles) - 1)]
 
 
 def test_mp4_holds_every_frame(tmp_path):
@@ -102,16 +92,16 @@ def test_mp4_holds_every_frame(tmp_path):
     assert len({line.split(",")[-1] for line in frames}) == 10
 
 
-def test_without_ffmpeg_an_mp4_is_refused_with_the_remedy(tmp_path, monkeypatch):
-    monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", "/no/such/ffmpeg")
-    with pytest.raises(AnimationError, match=r"needs ffmpeg.*apt-get install ffmpeg.*or write a .gif"):
-        animate(a_trajectory(), tmp_path / "run.mp4")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_an_ffmpeg_that_fails_leaves_nothing(tmp_path, monkeypatch):
-    monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", "false")
-    with pytest.raises(AnimationError, match="ffmpeg could not write it"):
+@pytest.mark.parametrize(
+    ("ffmpeg", "message"),
+    [
+        ("/no/such/ffmpeg", r"needs ffmpeg.*apt-get install ffmpeg.*or write a .gif"),
+        ("false", "ffmpeg could not write it"),
+    ],
+)
+def test_a_missing_or_failing_ffmpeg_is_told_and_leaves_nothing(tmp_path, monkeypatch, ffmpeg, message):
+    monkeypatch.setitem(matplotlib.rcParams, "animation.ffmpeg_path", ffmpeg)
+    with pytest.raises(AnimationError, match=message):
         animate(a_trajectory(), tmp_path / "run.mp4", seconds=0.2)
     assert list(tmp_path.iterdir()) == []
 
@@ -119,12 +109,8 @@ def test_an_ffmpeg_that_fails_leaves_nothing(tmp_path, monkeypatch):
 # -- the command --------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def directory(tmp_path):
-    return a_trajectory(n=30).save(tmp_path / "run")
-
-
-def test_the_command_writes_a_gif_into_the_directory_and_says_where(directory):
+def test_the_command_writes_a_gif_into_the_directory_and_says_where(tmp_path):
+    directory = a_trajectory(n=30).save(tmp_path / "run")
     result = command("animate", directory, "--seconds", 0.2, "--fps", 10)
     assert (result.exit_code, result.stdout) == (0, f"{directory / 'animation.gif'}\n")
     with Image.open(directory / "animation.gif") as gif:
@@ -132,13 +118,10 @@ def test_the_command_writes_a_gif_into_the_directory_and_says_where(directory):
     again = command("animate", directory, "--seconds", 0.2)
     assert again.exit_code == 2
     assert "already exists; --force replaces it" in again.stderr
-    a_trajectory(n=30).save(directory, replace=True)
-    assert not (directory / "animation.gif").exists()
 
 
 def test_a_run_of_one_row_has_nothing_to_animate(tmp_path):
-    with FileRecorder(PAIR, RunDirectory.create(tmp_path / "run")) as recorder:
-        recorder.finish({"status": "stopped"})
+    a_trajectory(n=1).save(tmp_path / "run")
     result = command("animate", tmp_path / "run")
     assert result.exit_code == 2
     assert "nothing to animate" in result.stderr

@@ -17,7 +17,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from springbeam.results.directory import PICTURES, ResultsExist, ResultsInUse, ResultsUnreadable, RunDirectory
+from springbeam.results.directory import (
+    ANIMATIONS,
+    PICTURES,
+    REPORT,
+    ResultsExist,
+    ResultsInUse,
+    ResultsUnreadable,
+    RunDirectory,
+)
 from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.reading import load_events, load_summary, load_trajectory
 from springbeam.results.recording import MemoryRecorder, NonFiniteValue
@@ -315,7 +323,7 @@ def test_events_are_read_one_at_a_time(tmp_path):
 
 
 WRITTEN = ["events.csv", "shapes.csv", "steps.bin", "summary.json", "trajectory.csv"]
-RESULT_FILES = [*WRITTEN, "run.checkpoint", PICTURES[2]]
+RESULT_FILES = [*WRITTEN, "run.checkpoint", PICTURES[2], REPORT, ANIMATIONS[0]]
 
 
 @pytest.mark.parametrize("name", RESULT_FILES)
