@@ -5,9 +5,9 @@ Times are the smallest of several repetitions, in one process, as ratios to the 
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from contextlib import closing
+from itertools import count
+from timeit import repeat
 from typing import Any
 
 import numpy as np
@@ -42,29 +42,13 @@ def spring_top(beam: dict[str, Any]) -> np.ndarray:
     return np.asarray(run.y[np.searchsorted(run.time, TIMES - 1e-9)])
 
 
-def shortest(action: Callable[[], object], repetitions: int) -> float:
-    best = float("inf")
-    for _ in range(repetitions):
-        start = time.perf_counter()
-        action()
-        best = min(best, time.perf_counter() - start)
-    return best
-
-
 def times(beam: Beam) -> tuple[float, float]:
     """Return the times of initialisation and of one step of the FMU [s]."""
-    initialisation = shortest(lambda: FmuBeam(beam, 0.0, 0.0).close(), 5)
+    initialisation = min(repeat(lambda: FmuBeam(beam, 0.0, 0.0).close(), repeat=5, number=1))
     with closing(FmuBeam(beam, 0.0, 0.0)) as body:
-        clock = 0.0
-
-        def hundred_steps() -> None:
-            nonlocal clock
-            for _ in range(100):
-                body.advance(clock, MACRO_STEP, (1.0, 0.0, 0.0))
-                clock += MACRO_STEP
-
-        hundred_steps()
-        return initialisation, shortest(hundred_steps, 10) / 100.0
+        starts = count(0.0, MACRO_STEP)
+        steps = repeat(lambda: body.advance(next(starts), MACRO_STEP, (1.0, 0.0, 0.0)), repeat=11, number=100)
+        return initialisation, min(steps) / 100.0
 
 
 def main() -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from fmpy import read_model_description
+from pages import DOCS, table  # beside this script
 
-ROOT = Path(__file__).parents[1]
-TARGET = ROOT / "docs" / "fmu_variables.md"
+TARGET = DOCS / "fmu_variables.md"
 HEAD = """# Variables of the FMUs
 
 Made from the FMUs by `python docs/fmu_variables.py`. Everything is SI, up is positive; what the symbols mean is in
@@ -16,9 +16,9 @@ What is local can be read like an output; tools that record or plot every output
 """
 
 
-def table(name: str) -> str:
-    description = read_model_description(str(ROOT / "fmus" / f"{name}.fmu"))
-    lines = [f"\n## {name}\n", "| variable | kind | unit | start | |", "|---|---|---|---|---|"]
+def section(name: str) -> str:
+    description = read_model_description(str(DOCS.parent / "fmus" / f"{name}.fmu"))
+    rows = []
     shown: set[str] = set()
     for variable in description.modelVariables:
         stem = variable.name.split("[")[0]
@@ -31,12 +31,12 @@ def table(name: str) -> str:
         start = "" if variable.start is None else str(variable.start)
         unit = variable.unit or ("–" if variable.type == "Real" else variable.type)
         text = (variable.description or "").replace("|", "\\|")
-        lines.append(f"| `{label}` | {variable.causality} | {unit} | {start} | {text} |")
-    return "\n".join(lines) + "\n"
+        rows.append((f"`{label}`", variable.causality, unit, start, text))
+    return "\n".join([f"\n## {name}\n", *table(("variable", "kind", "unit", "start", ""), rows), ""])
 
 
 def files() -> dict[Path, str]:
-    return {TARGET: HEAD + table("beam") + table("spring")}
+    return {TARGET: HEAD + section("beam") + section("spring")}
 
 
 if __name__ == "__main__":

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from pages import DOCS, table  # beside this script
+
 from springbeam.scene import reference
 
-DOCS = Path(__file__).parent
 HEAD = """# Scene files
 
 Made by `python docs/scene.py` from the declarations that `springbeam keys` lists.
@@ -26,17 +27,17 @@ NAME` writes a commented scene to start from. The symbols are those of [model.md
 def page() -> str:
     """Return the text of scene.md."""
     lines = [HEAD]
-    for table, model in reference.MODELS.items():
-        heading = reference.heading(table)
-        lines += [f"## {heading}\n\n{reference.about(table)}\n" if table else f"## {heading.capitalize()}\n"]
+    for name, model in reference.MODELS.items():
+        heading = reference.heading(name)
+        lines += [f"## {heading}\n\n{reference.about(name)}\n" if name else f"## {heading.capitalize()}\n"]
         for ways in model.WAYS:
-            marked = ", or ".join(" and ".join(f"`{name}`" for name in group) for group in ways.groups)
+            marked = ", or ".join(" and ".join(f"`{key}`" for key in group) for group in ways.groups)
             lines.append(f"Give the {ways.thing} one way: {marked}.\n")
-        lines += ["| key | unit | value | default | meaning |", "|---|---|---|---|---|"]
-        for key in reference.listed(table):
-            cells = (f"`{key.name}`", key.unit, key.allowed, key.default, key.meaning.replace("|", "\\|"))
-            lines.append(f"| {' | '.join(cells)} |")
-        lines.append("")
+        rows = [
+            (f"`{key.name}`", key.unit, key.allowed, key.default, key.meaning.replace("|", "\\|"))
+            for key in reference.listed(name)
+        ]
+        lines += [*table(("key", "unit", "value", "default", "meaning"), rows), ""]
     return "\n".join(lines)
 
 

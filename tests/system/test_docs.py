@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from commands import COMMAND, command
@@ -58,12 +59,21 @@ NOT_RUN = {
 }
 
 
-def test_every_page_has_its_place_on_the_site():
-    spec = importlib.util.spec_from_file_location("conf", DOCS / "conf.py")
-    conf = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(conf)
+def module(name: str) -> ModuleType:
+    """A script of the folder of the pages."""
+    specification = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    loaded = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(loaded)
+    return loaded
+
+
+def test_every_page_has_its_place_on_the_site_and_in_the_index():
+    conf = module("conf")
     named = [name for pages in conf.PAGES.values() for name in pages.split()]
     assert sorted([*named, conf.root_doc]) == sorted(page.stem for page in DOCS.glob("*.md"))
+    index = (DOCS / "README.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^\| \[[\w./]+\]\(([\w./]+)\) \| \S", index, re.M)
+    assert sorted(listed) == sorted(["../README.md", *(p.name for p in DOCS.glob("*.md") if p.name != "README.md")])
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -149,18 +159,10 @@ def test_what_is_not_run_is_still_there_and_understood():
                 COMMAND.commands[words[0]].make_context(words[0], words[1:])  # raises if an option or a value is wrong
 
 
-def test_every_page_is_in_the_index():
-    index = (DOCS / "README.md").read_text(encoding="utf-8")
-    listed = re.findall(r"^\| \[[\w./]+\]\(([\w./]+)\) \| \S", index, re.M)
-    assert sorted(listed) == sorted(["../README.md", *(p.name for p in DOCS.glob("*.md") if p.name != "README.md")])
-
-
 @pytest.mark.parametrize("name", ["fmu_variables", "scene"])
-def test_generated_pages_are_current(name):
-    specification = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    for path, text in module.files().items():
+def test_generated_pages_are_current(name, monkeypatch):
+    monkeypatch.syspath_prepend(DOCS)
+    for path, text in module(name).files().items():
         assert path.read_text(encoding="utf-8") == text, f"run python docs/{name}.py"
 
 
