@@ -6,9 +6,11 @@ The script is below the master, in place of the functions of the shared library,
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -113,37 +115,6 @@ def hang() -> None:
     raise AssertionError("returned")
 
 
-class Function:
-    """A function of the library."""
-
-    def __init__(self, script: Script, fmu: str, name: str, function: Any) -> None:
-        self.__dict__.update(_script=script, _fmu=fmu, _name=name, _function=function)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._function, name)
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        setattr(self._function, name, value)
-
-    def __call__(self, *arguments: Any) -> Any:
-        script = self._script
-        fault = next((f for f in script.faults if f.after(self._fmu, self._name, script.where)), None)
-        if fault is None:
-            result = self._function(*arguments)
-        elif fault.kind == "raise":
-            raise ZeroDivisionError("nobody expected this")
-        elif fault.kind == "hang":
-            hang()
-        elif fault.kind in NAMES:
-            result = NAMES[fault.kind]
-        else:
-            result = self._function(*arguments)
-            values = getattr(arguments[3], "_obj", arguments[3])  # an array, or `byref` of one
-            values[0 if fault.skip % 2 else len(values) - 1] = float(fault.kind)
-        script.calls.append((self._fmu, self._name, result if isinstance(result, int) else OK))
-        return result
-
-
 class Library:
     """A shared library with the script between it and its callers."""
 
@@ -152,22 +123,34 @@ class Library:
         self._fmu = "beam" if "beam" in path.rsplit("/", 1)[-1] else "spring"
         self._handle = self._library._handle
 
-    def __getitem__(self, name: str) -> Function:
-        return Function(self._script, self._fmu, name, self._library[name])
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._library, name)
 
-    def __getattr__(self, name: str) -> Function:
-        return self[name]
+    def __getitem__(self, name: str) -> Callable[..., Any]:
+        script, fmu, function = self._script, self._fmu, self._library[name]
+
+        def call(*arguments: Any) -> Any:
+            function.restype = call.restype  # type: ignore[attr-defined]
+            fault = next((f for f in script.faults if f.after(fmu, name, script.where)), None)
+            if fault is None:
+                result = function(*arguments)
+            elif fault.kind == "raise":
+                raise ZeroDivisionError("nobody expected this")
+            elif fault.kind == "hang":
+                hang()
+            elif fault.kind in NAMES:
+                result = NAMES[fault.kind]
+            else:
+                result = function(*arguments)
+                values = getattr(arguments[3], "_obj", arguments[3])  # an array, or `byref` of one
+                values[0 if fault.skip % 2 else len(values) - 1] = float(fault.kind)
+            script.calls.append((fmu, name, result if isinstance(result, int) else OK))
+            return result
+
+        return call
 
 
 real_cdll = functions.cdll
-
-
-class Loader:
-    def __init__(self, script: Script) -> None:
-        self._script = script
-
-    def LoadLibrary(self, path: str) -> Library:
-        return Library(self._script, path)
 
 
 def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
@@ -177,38 +160,27 @@ def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
     the bodies go back to the mark, "row" while a row is written, "event" while one acts; in Algorithm 1 "paper".
     """
     script = Script(faults)
-    monkeypatch.setattr(functions, "cdll", Loader(script))
-    attempt, rewind, write, locate = Pair.attempt, Pair.rewind, Rows.write, detection.locate
-    act, algorithm = simulation.Simulation._act, PaperLaw._step
+    monkeypatch.setattr(functions, "cdll", SimpleNamespace(LoadLibrary=partial(Library, script)))
 
-    def attempted(self: Pair, state: Any, *arguments: Any) -> Any:
-        with script.at(script.where if script.where == "location" else str(state.phase)):
-            return attempt(self, state, *arguments)
+    def watch(owner: Any, name: str, where: Callable[..., str]) -> None:
+        function = getattr(owner, name)
 
-    def rewound(self: Pair) -> None:
-        with script.at("rollback"):
-            rewind(self)
+        def watched(*arguments: Any) -> Any:
+            with script.at(where(*arguments)):
+                return function(*arguments)
 
-    def written(self: Rows, *arguments: Any) -> None:
-        with script.at("row"):
-            write(self, *arguments)
+        monkeypatch.setattr(owner, name, watched)
 
-    def located(*arguments: Any) -> float:
-        with script.at("location"):
-            return locate(*arguments)
+    def phase(_: Pair, state: Any, *_arguments: Any) -> str:
+        return script.where if script.where == "location" else str(state.phase)
 
-    def acted(self: Any, *arguments: Any) -> None:
-        with script.at("event"):
-            act(self, *arguments)
-
-    def stepped(self: PaperLaw) -> Any:
-        with script.at("paper"):
-            return algorithm(self)
-
-    monkeypatch.setattr(PaperLaw, "_step", stepped)
-    monkeypatch.setattr(Pair, "attempt", attempted)
-    monkeypatch.setattr(Pair, "rewind", rewound)
-    monkeypatch.setattr(Rows, "write", written)
-    monkeypatch.setattr(detection, "locate", located)
-    monkeypatch.setattr(simulation.Simulation, "_act", acted)
+    watch(Pair, "attempt", phase)
+    for owner, name, where in (
+        (Pair, "rewind", "rollback"),
+        (Rows, "write", "row"),
+        (detection, "locate", "location"),
+        (simulation.Simulation, "_act", "event"),
+        (PaperLaw, "_step", "paper"),
+    ):
+        watch(owner, name, lambda *_, where=where: where)
     return script

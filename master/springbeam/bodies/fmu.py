@@ -89,8 +89,8 @@ class Fmu(Checkpointed):
         self.path, self._own = path, name is not None
         self._name = path.stem if name is None else name
         self._messages: list[str] = []
-        self._functions: Functions | None = None
         self._functions = functions = self._load()
+        self._closed = False
         self.prepared, self.real = functions.prepared, functions.REAL
         self._state = c_void_p()
         self._worst = 0  #: status of the calls that have failed for good
@@ -137,7 +137,6 @@ class Fmu(Checkpointed):
 
     def _prepare_parameters(self, parameters: Mapping[str, Value]) -> None:
         """Calls that set the parameters."""
-        assert self._functions is not None
         kinds = self._functions.KINDS
         #: Where the value of a parameter is.
         self._parameters: dict[str, tuple[Any, int]] = {}
@@ -178,19 +177,17 @@ class Fmu(Checkpointed):
         for name, value in changed.items():
             values, i = self._parameters[name]
             values[i] = value
-        if (status := self.prepared("Reset")()) > WARNING:
-            raise self.failed(status, "cannot be reset")
+        self._must("cannot be reset", "Reset")
         self.initialise(time)
         self.moved = True
 
     @property
     def usable(self) -> bool:
         """Whether no call has failed for good."""
-        return self._functions is not None and self._worst <= WARNING
+        return not self._closed and self._worst <= WARNING
 
     def accessor(self, verb: str, names: Sequence[str], values: Any) -> Call:
         """Return what gets or sets (``verb``) variables that are real numbers by ``values``, an array of C."""
-        assert self._functions is not None
         return self._functions.accessor(verb, self.real, self.references(names, self.real), values)
 
     def variable(self, name: str) -> Any:
@@ -239,7 +236,6 @@ class Fmu(Checkpointed):
             return
         if status not in (DISCARD, ERROR):
             raise self.failed(status, f"cannot step at t = {time:.9g} s")
-        assert self._functions is not None
         cause = self._cause(f"{self._functions.spelt('DoStep')} returned {_STATUS[status]}")
         reached = ""
         if status == DISCARD:
@@ -280,15 +276,15 @@ class Fmu(Checkpointed):
 
     def close(self) -> None:
         """Free the instance, unless it has returned fmi2Fatal: then none of its library may be called again."""
-        functions, self._functions = self._functions, None
-        if functions is None:
+        if self._closed:
             return
+        self._closed = True
         if self._state and self._worst < FATAL:
             self._worst = self.prepared("FreeFMUState", byref(self._state))()
         if self._worst == FATAL:
             _unpacked.cache_clear()  # the next instance takes a copy of the library of its own
         else:
-            functions.free()
+            self._functions.free()
 
     def _log(self, status: int, text: str) -> None:
         if status > 0:

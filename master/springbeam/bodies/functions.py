@@ -60,9 +60,7 @@ class Functions:
     FOLDER: ClassVar[str]  #: of the libraries of this platform
     REAL: ClassVar[str]  #: the kind of the variables of a motion
     KINDS: ClassVar[dict[str, Kind]]
-    NEEDED: ClassVar[tuple[str, ...]] = (
-        *("FreeInstance", "EnterInitializationMode", "ExitInitializationMode", "DoStep"),
-    )
+    NEEDED: ClassVar[tuple[str, ...]] = ("FreeInstance", "EnterInitializationMode", "ExitInitializationMode", "DoStep")
 
     def __init__(self, description: ModelDescription, folder: Path, name: str, log: Callable[[int, str], None]) -> None:
         says = description.coSimulation

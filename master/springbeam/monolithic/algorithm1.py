@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -43,19 +42,6 @@ class AlgorithmFailure(RuntimeError):
     """Newton's method did not converge, or the solution overflows; ``trajectory`` holds what came before."""
 
     trajectory: Trajectory | None = None
-
-
-@dataclass(frozen=True)
-class NewtonStatistics:
-    """Newton iterations per solve (Table 2): steps Δ taken up to and including the first with |Δ| ≤ tolerance."""
-
-    tolerance: float
-    beam: float  #: line 9, (62) at the tip
-    spring_predicted: float  #: line 10, (53) from yˡ
-    spring_joined: float  #: line 17, (53) from y_temp
-    spring: float  #: lines 10 and 17 together
-    solves: int  #: of (53)
-    time_per_step: float  #: [s]
 
 
 def simulate(
@@ -85,7 +71,9 @@ def simulate(
         ``tie_reaction`` are means over the step that ends in the row. ``e_total`` is (63) + ``e_dissipated``, and
         ``energy_residual`` what the algorithm has injected. Extra columns: ``e_injected_beam``,
         ``e_injected_spring`` [J], and ``case`` (11, 14, or 0 where neither line holds).
-        ``summary["newton"]`` holds a `NewtonStatistics`.
+        ``summary["newton"]`` holds Newton iterations per solve (Table 2), counted up to and including the first step
+        |Δ| ≤ ``tolerance``: ``beam`` of line 9, (62) at the tip; ``spring`` of lines 10 and 17, (53), and each by
+        itself, ``spring_predicted`` and ``spring_joined``. ``solves`` of (53) were made; ``time_per_step`` is in s.
 
     Raises
     ------
@@ -303,19 +291,19 @@ class _Algorithm:
             counts = [k for solve in solves for k in self.iterations[solve]]
             return float(np.mean(counts)) if counts else 0.0
 
-        statistics = NewtonStatistics(
-            tolerance=self.tolerance,
-            beam=mean("beam"),
-            spring_predicted=mean("predicted"),
-            spring_joined=mean("joined"),
-            spring=mean("predicted", "joined"),
-            solves=len(self.iterations["predicted"]) + len(self.iterations["joined"]),
-            time_per_step=time_per_step,
-        )
+        newton = {
+            "tolerance": self.tolerance,
+            "beam": mean("beam"),
+            "spring_predicted": mean("predicted"),
+            "spring_joined": mean("joined"),
+            "spring": mean("predicted", "joined"),
+            "solves": len(self.iterations["predicted"]) + len(self.iterations["joined"]),
+            "time_per_step": time_per_step,
+        }
         summary = {
             "reference": "algorithm1",
             "start_velocity": self.start_velocity,
             "y_temp": self.y_temp,
-            "newton": asdict(statistics),
+            "newton": newton,
         }
         return self.ledger.trajectory(self._events, summary)
