@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import factorial
-
 import numpy as np
 import pytest
 from numpy.polynomial import Legendre, Polynomial
@@ -85,9 +83,3 @@ def test_free_mass_response_is_the_repeated_integral(size):
         scales = [size**n / mass for n in (2, 1, 3, 4)]
         for got, want, scale in zip(motion, exact, scales, strict=True):
             assert got == pytest.approx(want, abs=4 * EPS * scale)
-
-
-def test_free_mass_response_to_a_constant_force():
-    """−1 N on 1 kg: −Hⁿ/n!."""
-    (motion,) = force.free_mass_response(0, 2.0, 1.0)
-    assert motion == pytest.approx([-(2.0**n) / factorial(n) for n in (2, 1, 3, 4)], rel=1e-15)
