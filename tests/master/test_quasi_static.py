@@ -18,7 +18,7 @@ from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.contact_times import contact_changes
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.stepping import Pair
-from springbeam.scene import Beam, Scene, SceneError, statics, suspicions
+from springbeam.scene import Beam, Scene, statics, suspicions
 from springbeam.scene.statics import SHAPE_POINTS
 
 BEAM = Beam.with_ones(
@@ -246,27 +246,7 @@ def test_a_snap_back_is_booked() -> None:
     assert run.e_impact_loss[-1] == pytest.approx(release.energy_loss, rel=1e-9)
 
 
-# -- what is refused, and what is said -------------------------------------------------------------------------------
-
-REFUSED: dict[str, tuple[dict[str, Any], list[str]]] = {
-    "deflection": (
-        {"beam": {"approach": "elastic", "initial_velocity_slope": 0.0, "initial_deflection_slope": 0.3}},
-        ["initial_deflection_slope = 0.3", "static deflection", "alpha_b > 0"],
-    ),
-    "below the spring": (
-        {"beam": {"approach": "elastic", "initial_velocity_slope": 0.0}},
-        ["m below [spring] equilibrium"],
-    ),
-}
-
-
-@pytest.mark.parametrize("what", REFUSED)
-def test_scenes_that_need_inertia_are_refused(what: str) -> None:
-    changes, words = REFUSED[what]
-    with pytest.raises(SceneError) as refused:
-        scene(**changes)
-    for word in words:
-        assert word in str(refused.value)
+# -- what is said ----------------------------------------------------------------------------------------------------
 
 
 def test_what_is_left_out_is_said_with_its_size() -> None:

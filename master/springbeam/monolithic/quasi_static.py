@@ -16,6 +16,7 @@ import itertools
 from collections.abc import Callable
 
 import numpy as np
+from scipy.integrate import fixed_quad
 
 from ..scene import Beam, Scene
 from .hybrid_system import HybridSystem
@@ -89,12 +90,10 @@ def _statics(beam: Beam) -> tuple[float, float, float]:
     L, h = beam.length, beam.length / beam.n_elements
     EI = beam.young_modulus * beam.second_moment_of_area
     KAG = beam.shear_coefficient * beam.area * beam.shear_modulus
-    nodes, weights = np.polynomial.legendre.leggauss(5)
 
     def integral(f: Callable[[np.ndarray], np.ndarray], *breaks: float) -> float:
-        edges = np.unique([0.0, L, *breaks])
-        parts = itertools.pairwise(edges)
-        return float(sum(0.5 * (b - a) * weights @ f(0.5 * (a + b) + 0.5 * (b - a) * nodes) for a, b in parts))
+        parts = itertools.pairwise(np.unique([0.0, L, *breaks]))
+        return float(sum(fixed_quad(f, a, b, n=5)[0] for a, b in parts))
 
     def influence(x: float, at: np.ndarray) -> np.ndarray:
         low, high = np.minimum(x, at), np.maximum(x, at)

@@ -86,6 +86,5 @@ class Rows:
             columns["compliance_force"], columns["tie_reaction"] = inside, C - inside
         elif s.scene.stop is not None and s.beam is not None:
             columns["gap"] = columns["u_tip"] - s.stop.position
-            columns["foundation_force"] = columns["contact_force"]
         columns["e_total"] = np.sum([columns[name] for name in _ENERGIES], axis=0)
         columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
