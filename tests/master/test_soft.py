@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Body, Motion
 from springbeam.contact.laws import Compliance, Link
-from springbeam.coupling.protocol import Step, Window
+from springbeam.coupling.protocol import NotConverged, Step, Window
 from springbeam.coupling.soft import SoftSolver
 
 DEGREES = [0, 1, 2]
@@ -138,3 +138,20 @@ def test_forces_are_found_however_far_they_move_the_ends(depth, response):
     window = Window(0.0, 1e-3, (at_rest, at_rest))
     c = law.solve(Affine(-depth, response, 1e-3), Affine(0.0, -response, 1e-3), window, NO_FORCE)[0]
     assert c == pytest.approx(1e12 * depth / (2.0 + 2e12 * response), rel=1e-11)
+
+
+@pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), Link(1e4, 3.0)], ids=repr)
+def test_a_step_made_at_degree_0_books_what_damping_takes_at_degree_0(law, monkeypatch):
+    """As if no force of degree 2 were found: energy to rounding, though the force belongs to another polynomial."""
+    aim = SoftSolver.aim
+
+    def fails_above_0(self, gap, a, descent, window):
+        if self.degree > 0:
+            raise NotConverged(1.0, 1)
+        return aim(self, gap, a, descent, window)
+
+    monkeypatch.setattr(SoftSolver, "aim", fails_above_0)
+    _, energies, coupling = couple(law, 2, 2e-2, 100, modal_beam(4), DuffingBody(k1=3.0, k2=-0.2))
+    assert coupling.reduced >= 12
+    assert coupling.dissipated > 1e-4
+    assert np.abs(energies - energies[0]).max() < 1e-12 * energies[0]

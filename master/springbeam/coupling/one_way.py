@@ -19,12 +19,11 @@ from math import inf
 from ..bodies import force
 from ..bodies.protocol import Body, Force, Prescribed
 from ..contact.laws import SoftLaw
-from .projection import Projection
-from .protocol import Booking, Coupling, Ends, ErrorEstimate, Neglected, Scales, Step, Window
+from .protocol import Booking, Ends, Neglected, Step, Window
 from .soft import SoftSolver, penetration
 
 
-class OneWay(Coupling):
+class OneWay(SoftSolver):
     """Coupling that one end does not feel, and what has been neglected.
 
     Parameters
@@ -37,24 +36,15 @@ class OneWay(Coupling):
         k: static force per displacement of the driving end [N/m].
     """
 
-    CHECKPOINTED = ("_solver", "_variation", "_force", "_deepest", "_work")
+    CHECKPOINTED = (*SoftSolver.CHECKPOINTED, "_variation", "_force", "_deepest", "_work")
 
     def __init__(
         self, law: SoftLaw, degree: int, tolerance: float, *, upper_drives: bool, driver_stiffness: float
     ) -> None:
-        self._solver, self.law, self.degree = SoftSolver(law, degree, tolerance), law, degree
-        self._projection = Projection(law, degree)
+        super().__init__(law, degree, tolerance)
         self._upper_drives, self._stiffness = upper_drives, driver_stiffness
         self._variation = self._force = self._deepest = 0.0
         self._work = 0.0  #: of the contact force on the driving end, which does not feel it [J]
-
-    @property
-    def iterations(self) -> int:
-        return self._solver.iterations
-
-    @property
-    def reduced(self) -> int:
-        return self._solver.reduced
 
     def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
         driver, driven = (upper, lower) if self._upper_drives else (lower, upper)
@@ -66,10 +56,10 @@ class OneWay(Coupling):
             start, x = penetration(Step(window.time, window.size, guess, guess, window.ends, ends), self.degree)
             return force.derivatives(self._projection.force(start, window.size, x), window.size)
         upper, lower = (end, driven) if self._upper_drives else (driven, end)
-        return self._solver.solve(upper, lower, window, guess)
+        return super().solve(upper, lower, window, guess)
 
     def accept(self, step: Step) -> None:
-        self._solver.accept(step)
+        super().accept(step)
         contact, size = step.contact, step.size
         self._variation += abs(contact[0] - self._force) + force.variation(contact, size)
         self._force = force.end_value(contact, size)
@@ -80,10 +70,7 @@ class OneWay(Coupling):
         self._work += work if self._upper_drives else -work
 
     def booking(self, ends: Ends) -> Booking:
-        return self._solver.booking(ends)._replace(unfelt=self._work)
-
-    def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
-        return self._solver.local_errors(step, scales)
+        return super().booking(ends)._replace(unfelt=self._work)
 
     def neglected(self) -> Neglected:
         motion = 2.0 * self._variation / self._stiffness

@@ -71,16 +71,10 @@ class Coupling(Checkpointed):
     sharpest: float = 1.0
     #: Whether the force does no net work but what is booked, at any step.
     energy_exact: bool = True
-
-    @property
-    def iterations(self) -> int:
-        """Corrections of the force since the start."""
-        return 0
-
-    @property
-    def reduced(self) -> int:
-        """Steps since the start whose force was not found at `degree`, but at degree 0."""
-        return 0
+    #: Corrections of the force since the start.
+    iterations: int = 0
+    #: Steps since the start whose force was not found at `degree`, but at degree 0.
+    reduced: int = 0
 
     def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
         """Advance both bodies from their marks over ``window`` and return the contact force.

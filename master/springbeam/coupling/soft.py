@@ -20,7 +20,7 @@ from ..bodies.protocol import Body, Force
 from ..contact.laws import SoftLaw
 from . import energy
 from .projection import Projection
-from .protocol import Booking, Coupling, Ends, ErrorEstimate, NotConverged, Scales, Step, Window
+from .protocol import Booking, Ends, ErrorEstimate, NotConverged, Scales, Step, Window
 from .small import Matrix, Vector, inverse, times
 from .solver import StepSolver
 
@@ -35,7 +35,7 @@ _ROUNDING = 1e-12
 _STIFFER = 16.0
 
 
-class SoftSolver(Coupling):
+class SoftSolver(StepSolver):
     """Coupling by a soft law; a step that does not converge at its degree is made at degree 0, which conserves as well.
 
     Parameters
@@ -48,38 +48,36 @@ class SoftSolver(Coupling):
         Tolerance as of `StepSolver`.
     """
 
-    CHECKPOINTED = ("_solver", "_simpler", "_simplified", "_reduced", "dissipated")
+    CHECKPOINTED = (*StepSolver.CHECKPOINTED, "_last_crossing", "_simpler", "_simplified", "reduced", "dissipated")
 
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
-        self.law, self.degree = law, degree
-        self._solver = _Crossing(law, degree, tolerance)
-        self._simpler = _Crossing(law, 0, tolerance) if degree > 0 else None
-        self._simplified, self._reduced = False, 0  #: the last step tried, and the steps made
+        super().__init__(energy.CONDITIONS[degree], degree, tolerance)
+        self.law, self._projection = law, Projection(law, degree)
+        #: Size of the last step [s], and (E + A′)⁻¹ [m/N] where its crossing was found.
+        self._last_crossing: tuple[float, Matrix] = (0.0, [])
+        self._simpler = SoftSolver(law, 0, tolerance) if degree > 0 else None
+        self._simplified, self.reduced = False, 0  #: the last step tried, and the steps made
         self.dissipated = 0.0  #: by the law since the start [J]
-
-    @property
-    def iterations(self) -> int:
-        return self._solver.iterations + (0 if self._simpler is None else self._simpler.iterations)
-
-    @property
-    def reduced(self) -> int:
-        return self._reduced
 
     def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
         self._simplified = False
         try:
-            return self._solver.solve(upper, lower, window, guess)
+            return super().solve(upper, lower, window, guess)
         except NotConverged:
             if self._simpler is None:
                 raise
         self._simplified = True
-        return self._simpler.solve(upper, lower, window, (guess[0], 0.0, 0.0))
+        before = self._simpler.iterations
+        found = self._simpler.solve(upper, lower, window, (guess[0], 0.0, 0.0))
+        self.iterations += self._simpler.iterations - before
+        return found
 
     def accept(self, step: Step) -> None:
-        self._reduced += self._simplified
+        self.reduced += self._simplified
         if self.law.damped:
-            start, x = penetration(step, self.degree)
-            self.dissipated += self._solver.projection.dissipated(start, step.size, x)
+            made = self._simpler if self._simplified and self._simpler is not None else self
+            start, x = penetration(step, made.degree)
+            self.dissipated += made._projection.dissipated(start, step.size, x)
 
     def booking(self, ends: Ends) -> Booking:
         tip, low = ends
@@ -88,36 +86,16 @@ class SoftSolver(Coupling):
     def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
         """Estimate from the part of the law's force that the polynomial leaves out: it changes velocities."""
         start, x = penetration(step, self.degree)
-        left_out = abs(self._solver.projection.left_out(start, x))
+        left_out = abs(self._projection.left_out(start, x))
         if left_out == 0.0 or scales.reduced_mass == 0.0:
             return []
         return [(step.size * left_out / (6.0 * scales.reduced_mass * scales.speed), self.degree + 2)]
-
-
-def penetration(step: Step, degree: int) -> tuple[float, Vector]:
-    """Return the penetration at the start of ``step`` [m], and its numbers over the step as `Projection` takes them."""
-    tip, low = step.start
-    conditions = energy.CONDITIONS[degree]
-    x = list(map(sub, conditions(step.end[1], step.size), conditions(step.end[0], step.size)))
-    return low.displacement - tip.displacement, x
-
-
-class _Crossing(StepSolver):
-    """Aims at the crossing of the law with the bodies' responses."""
-
-    CHECKPOINTED = (*StepSolver.CHECKPOINTED, "_last_crossing")
-
-    def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
-        super().__init__(energy.CONDITIONS[degree], degree, tolerance)
-        self.projection = Projection(law, degree)
-        #: Size of the last step [s], and (E + A′)⁻¹ [m/N] where its crossing was found.
-        self._last_crossing: tuple[float, Matrix] = (0.0, [])
 
     def apart(self, gap: Vector, a: Vector, window: Window) -> bool:
         if any(a):
             return False
         tip, low = window.ends
-        return not any(self.projection.force(low.displacement - tip.displacement, window.size, list(map(neg, gap))))
+        return not any(self._projection.force(low.displacement - tip.displacement, window.size, list(map(neg, gap))))
 
     def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> tuple[Vector, Vector]:
         tip, low = window.ends
@@ -146,7 +124,7 @@ class _Crossing(StepSolver):
         ``descent`` is −E, ``flexibility`` a guess of (E + A′)⁻¹, good if it makes corrections shrink as much. Raises
         numpy.linalg.LinAlgError.
         """
-        force, under_a = self.projection.force, x
+        force, under_a = self._projection.force, x
         missing = list(map(sub, a, force(start, size, x)))  # −f
         guessed = flexibility is not None
         if flexibility is None:
@@ -184,7 +162,7 @@ class _Crossing(StepSolver):
 
     def _flexibility(self, start: float, size: float, x: Vector, descent: Matrix) -> Matrix:
         """Return (E + A′)⁻¹ [m/N]."""
-        slope = self.projection.slope(start, size, x)
+        slope = self._projection.slope(start, size, x)
         return inverse([list(map(sub, row, line)) for row, line in zip(slope, descent, strict=True)])
 
     def _stiffened(
@@ -196,7 +174,7 @@ class _Crossing(StepSolver):
         """
         x = list(map(sub, x, times(inverse(descent), a)))
         a = [0.0] * len(a)
-        slope = self.projection.slope(start, size, x)
+        slope = self._projection.slope(start, size, x)
         gain = max(abs(value) for row in slope for value in row) / max(abs(e) for row in descent for e in row)
         softness = min(1.0, 1.0 / gain) if gain > 0.0 else 1.0
         while True:
@@ -206,3 +184,11 @@ class _Crossing(StepSolver):
                 return found
             x, a = found[0], [softness * c for c in found[1]]
             softness = min(1.0, _STIFFER * softness)
+
+
+def penetration(step: Step, degree: int) -> tuple[float, Vector]:
+    """Return the penetration at the start of ``step`` [m], and its numbers over the step as `Projection` takes them."""
+    tip, low = step.start
+    conditions = energy.CONDITIONS[degree]
+    x = list(map(sub, conditions(step.end[1], step.size), conditions(step.end[0], step.size)))
+    return low.displacement - tip.displacement, x

@@ -56,7 +56,7 @@ class StepSolver(Coupling):
         A displacement that is to be expected [m]: modes whose sum, the tip, is held at 0 are as large.
     """
 
-    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("_sizes", "_last_size", "_reach", "_corrections")
+    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("_sizes", "_last_size", "_reach", "iterations")
 
     def __init__(self, conditions: Conditions, degree: int, tolerance: float, expected: float = 0.0) -> None:
         self._conditions = conditions
@@ -66,11 +66,7 @@ class StepSolver(Coupling):
         self._last_size = 0.0
         self._reach = 0.0  #: largest displacement of an end under a force found [m]
         self._expected = expected
-        self._corrections = 0
-
-    @property
-    def iterations(self) -> int:
-        return self._corrections
+        self.iterations = 0
 
     def apart(self, gap: Vector, a: Vector, window: Window) -> bool:
         """Return whether nothing acts between the bodies under ``a``, nor should; parameters as of `aim`."""
@@ -136,7 +132,7 @@ class StepSolver(Coupling):
                 upper_end, tried = upper.advance(time, size, acting), a
                 r_upper = conditions(upper_end, size)  # in place of the affine prediction
             else:
-                self._corrections += 1
+                self.iterations += 1
                 if aim is None:
                     step = times(descent, residual)
                     a = list(map(add, a, step))
