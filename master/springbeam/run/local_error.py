@@ -31,7 +31,9 @@ class LocalError(Checkpointed):
         self._relative = scene.coupling.relative_tolerance or 0.0
         self._absolute = scene.coupling.absolute_tolerance or 0.0
         ends = pair.ends()
-        self._lowest = self._highest = (ends[0].displacement, ends[1].displacement)  #: positions of the ends so far [m]
+        #: Positions of the ends so far [m].
+        self._lowest: list[float] = [end.displacement for end in ends]
+        self._highest = self._lowest
         self._fastest = 0.0  #: [m/s]
 
     def of(self, state: State, step: Step, energy_scale: float) -> tuple[float, int]:
@@ -40,14 +42,15 @@ class LocalError(Checkpointed):
         ``energy_scale`` is the largest energy so far [J].
         """
         pair, size = self._pair, step.size
-        ranges = self._ranges(step)
+        lowest, highest, speed = self._extremes(step)
+        ranges = [high - low for low, high in zip(lowest, highest, strict=True)]
         cubic = [_beside_cubic(a, b, size) for a, b in zip(step.start, step.end, strict=True)]
         span = min((r for r in ranges if r > 0.0), default=0.0)
         if span == 0.0:
             return 0.0, _CUBIC
         tolerance = self._relative + self._absolute / span
         coupling = pair.coupling(state.phase)
-        scales = Scales(span, self._speed(step), energy_scale, pair.reduced_mass(Phase()))
+        scales = Scales(span, speed, energy_scale, pair.reduced_mass(Phase()))
         tied = not pair.law.soft and state.phase.joint is not Joint.FREE
         curve = self._curve(cubic, ranges, max(self._relative, _SEEN) if tied else self._relative)
         told = coupling.local_errors(step, scales)
@@ -55,21 +58,14 @@ class LocalError(Checkpointed):
 
     def accept(self, step: Step) -> None:
         """The motion has come so far."""
-        self._fastest = self._speed(step)
-        for end in (step.start, step.end):
-            self._lowest = (min(self._lowest[0], end[0].displacement), min(self._lowest[1], end[1].displacement))
-            self._highest = (max(self._highest[0], end[0].displacement), max(self._highest[1], end[1].displacement))
+        self._lowest, self._highest, self._fastest = self._extremes(step)
 
-    def _ranges(self, step: Step) -> list[float]:
-        """Lengths over which the ends have moved, with this step [m]."""
-        ranges = []
-        for i, (low, high) in enumerate(zip(self._lowest, self._highest, strict=True)):
-            a, b = step.start[i].displacement, step.end[i].displacement
-            ranges.append(max(high, a, b) - min(low, a, b))
-        return ranges
-
-    def _speed(self, step: Step) -> float:
-        return max(self._fastest, *(abs(end.velocity) for ends in (step.start, step.end) for end in ends))
+    def _extremes(self, step: Step) -> tuple[list[float], list[float], float]:
+        """Return the lowest and the highest positions of the ends [m] and their largest speed [m/s], with ``step``."""
+        passed = [[a.displacement, b.displacement] for a, b in zip(step.start, step.end, strict=True)]
+        lowest = [min(low, *places) for low, places in zip(self._lowest, passed, strict=True)]
+        highest = [max(high, *places) for high, places in zip(self._highest, passed, strict=True)]
+        return lowest, highest, max(self._fastest, *(abs(end.velocity) for end in (*step.start, *step.end)))
 
     def _curve(self, errors: list[float], ranges: list[float], relative: float) -> tuple[float, int]:
         allowed = (self._absolute + relative * r for r in ranges)

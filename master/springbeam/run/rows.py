@@ -17,7 +17,7 @@ from ..results.steps import packed
 from ..results.trajectory import COLUMNS, load_units
 from ..scene import Scene
 from ..scene.resolution import VIBRATION
-from .balance import Balance
+from .ledger import Balance
 from .stepping import Pair, State
 
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.

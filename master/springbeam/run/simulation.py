@@ -20,9 +20,9 @@ from ..results.trajectory import Event
 from ..scene import Scene
 from ..scene.automatic import decided
 from ..scene.resolution import CONTACT_STEPS, not_resolved, peak_force_doubt
-from .balance import Balance
 from .crowd import AT_ONCE, Crowd
 from .detection import Detector, soft_change
+from .ledger import Balance
 from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .outcome import OVERFLOW, Progress, RunStopped
