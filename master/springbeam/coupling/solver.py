@@ -19,7 +19,7 @@ import numpy as np
 from ..bodies import force
 from ..bodies.protocol import Body, Force, Motion
 from .protocol import Conditions, Coupling, NotConverged, Window
-from .small import Matrix, Vector, broyden, times, transposed
+from .small import Matrix, Vector, broyden, inverse, times, transposed
 
 _MAX_ITERATIONS = 20
 #: Rounding of a sum of modes, relative to the largest it has been.
@@ -223,7 +223,6 @@ class StepSolver(Coupling):
 def _descent(B: Matrix, S: Matrix) -> Matrix:
     """Return −(B − S)⁻¹, from residuals to Newton's steps. Raises NotConverged if there is none."""
     try:
-        descent: Matrix = np.linalg.inv(np.subtract(S, B)).tolist()
+        return inverse([list(map(sub, *rows)) for rows in zip(S, B, strict=True)])
     except np.linalg.LinAlgError:
         raise NotConverged(float("nan"), 0) from None
-    return descent
