@@ -29,7 +29,7 @@ from springbeam.scene import shipped_scenes
 SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
 
 
-def fake_run(scene, recorder, progress=None, **checkpoints):
+def fake_steps(scene, recorder, progress=None, **checkpoints):
     """Steps, as the real runner reports them."""
     for i in range(31):
         t = i / 30 * scene.time.t_end
@@ -39,6 +39,10 @@ def fake_run(scene, recorder, progress=None, **checkpoints):
         if progress is not None:
             progress(t, "free", i)
     recorder.event(Event(0.1, "impact", 0.5, -1.0, 0.5, -1.0, 0.25, 0.0, 0.125))
+
+
+def fake_run(scene, recorder, progress=None, **checkpoints):
+    fake_steps(scene, recorder, progress)
     recorder.finish(SUMMARY)
     return SUMMARY
 
@@ -50,17 +54,9 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def replace_run(monkeypatch, error, after=fake_run):
-    def run(scene, recorder, progress=None, **checkpoints):
-        class Stop:
-            columns = recorder.columns
-            row, event, shape = recorder.row, recorder.event, recorder.shape
-
-            def finish(self, summary):
-                pass
-
-        if after is not None:
-            after(scene, Stop(), progress)
+def replace_run(monkeypatch, error):
+    def run(*arguments, **checkpoints):
+        fake_steps(*arguments)
         raise error
 
     monkeypatch.setattr(springbeam.run.runner, "run", run)
@@ -240,7 +236,7 @@ def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch
 
 def test_a_run_that_stopped_names_what_goes_on_with_it(here, monkeypatch):
     def stopping(scene, recorder, *args, **kwargs):
-        fake_run(scene, recorder)
+        fake_steps(scene, recorder)
         recorder.directory.checkpoint.write_bytes(b"")
         raise KeyboardInterrupt
 
