@@ -14,19 +14,17 @@ def verify(as_json: JsonOption = False) -> None:
 
     Example: springbeam verify
     """
-    from ..studies import verify as checks
+    from ..studies.verify import verify
     from ..studies.verify.table import report
 
     with bad_input_reported():
-        if as_json:
-            sections = list(checks.verify())
-            passed = all(check.passed is not False for _, section in sections for check in section)
-            described = [
-                {"title": title, "checks": [{**asdict(c), "error": c.error, "passed": c.passed} for c in section]}
-                for title, section in sections
-            ]
-            print_json({"passed": passed, "sections": described})
-        else:
-            passed = report(console_for(silent=False))
+        sections = report(verify(), console_for(silent=as_json))
+    passed = all(check.passed is not False for _, section in sections for check in section)
+    if as_json:
+        described = [
+            {"title": title, "checks": [{**asdict(c), "error": c.error, "passed": c.passed} for c in section]}
+            for title, section in sections
+        ]
+        print_json({"passed": passed, "sections": described})
     if not passed:
         raise typer.Exit(DISAGREES)

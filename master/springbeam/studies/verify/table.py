@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import isnan
 from time import perf_counter
 
@@ -9,24 +10,25 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from . import verify
 from .check import Check
 
+#: A title and its checks.
+Section = tuple[str, list[Check]]
 
-def report(console: Console) -> bool:
-    """Print every section's table and a last line that counts; return whether all judged checks passed."""
-    began = perf_counter()
-    verdicts: list[bool | None] = []
-    for title, section in verify():
+
+def report(sections: Iterable[Section], console: Console) -> list[Section]:
+    """Print each section's table as it comes and a last line that counts; return the sections."""
+    began, printed = perf_counter(), []
+    for title, checks in sections:
         console.print(Text(title, style="bold"))
-        console.print(_table(section))
-        console.print(_footnotes(section))
+        console.print(_table(checks))
+        console.print(_footnotes(checks))
         console.print()
-        verdicts += [check.passed for check in section]
-    failed = verdicts.count(False)
-    counts = f"{verdicts.count(True)} passed, {failed} failed, {verdicts.count(None)} reported without judgement"
-    console.print(f"{counts}; {perf_counter() - began:.0f} s")
-    return failed == 0
+        printed.append((title, checks))
+    verdicts = [check.passed for _, checks in printed for check in checks]
+    counts = f"{verdicts.count(True)} passed, {verdicts.count(False)} failed, {verdicts.count(None)} reported without"
+    console.print(f"{counts} judgement; {perf_counter() - began:.0f} s")
+    return printed
 
 
 def _table(section: list[Check]) -> Table:
