@@ -210,15 +210,17 @@ def test_impacts_that_die_out_under_a_tie_of_degree_2_end_seated(size):
     assert 10 < bounces <= np.log2(1e8) + 1
 
 
-@pytest.mark.parametrize(("degree", "size"), [(1, 1e-3), (2, 1e-3), (2, 4e-3)])
-def test_a_tip_that_is_let_go_does_not_strike_at_once(degree, size):
+def test_a_tip_that_is_let_go_does_not_strike_at_once():
     """Under `hermite` it leaves the stop with velocity 0, but for 1e-17 m/s that may point down; the reference has two
     contacts, each of which ends once."""
-    coupling = {"scheme": "hermite", "degree": degree, "macro_step": size}
-    scene = with_changes(load_scene("beam-on-stop"), time={"t_end": 0.5}, coupling=coupling)
-    kinds = [event.kind for event in simulate(scene).events if event.kind != "stop_impact"]
-    assert kinds == [event.kind for event in event_driven.simulate(scene).events if event.kind != "stop_impact"]
-    assert kinds == ["seated", "separation"] * 2
+    scene = with_changes(load_scene("beam-on-stop"), time={"t_end": 0.5})
+    runs = [event_driven.simulate(scene)]
+    for degree, size in ((1, 1e-3), (2, 1e-3), (2, 4e-3)):
+        coupling = {"scheme": "hermite", "degree": degree, "macro_step": size}
+        runs.append(simulate(with_changes(scene, coupling=coupling)))
+    for run in runs:
+        kinds = [event.kind for event in run.events if event.kind != "stop_impact"]
+        assert kinds == ["seated", "separation"] * 2, run.scene.coupling
 
 
 @pytest.mark.parametrize(
