@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -73,35 +74,31 @@ def panels(trajectory: Trajectory) -> list[Panel]:
     """Return all panels that the run has something to show for."""
     if not drawable(trajectory):
         return []
-    return [
+    found = [
         positions(trajectory),
-        *enlarged(trajectory),
+        enlarged(trajectory),
         velocities(trajectory, VELOCITIES),
-        *forces(trajectory),
-        *impulses(trajectory),
-        *gap(trajectory),
+        forces(trajectory),
+        impulses(trajectory),
+        gap(trajectory),
         energies(trajectory),
         residual(trajectory),
     ]
+    return [panel for panel in found if panel.curves]
 
 
 def positions(trajectory: Trajectory) -> Panel:
     """Return tip and spring top, with the levels that are near what moves."""
-    panel = _lines(trajectory, "positions", "Positions", POSITIONS, "position", "m")
-    panel.height = 2.4
-    panel.levels = near_levels(trajectory.scene, [trajectory[name] for name in present(trajectory, POSITIONS)])
-    return panel
+    levels = near_levels(trajectory.scene, [trajectory[name] for name in present(trajectory, POSITIONS)])
+    return _lines(trajectory, "positions", "Positions", POSITIONS, "position", "m", height=2.4, levels=levels)
 
 
-def enlarged(trajectory: Trajectory) -> list[Panel]:
+def enlarged(trajectory: Trajectory) -> Panel:
     """Return a panel of its own for the one of two positions whose motion is lost beside the other's."""
-    found = []
-    for name in much_smaller(trajectory, present(trajectory, POSITIONS)):
-        look = Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged")
-        panel = _lines(trajectory, f"position-{name}", "The smaller one, enlarged", {name: look}, "position", "m")
-        panel.height = 1.2
-        found.append(panel)
-    return found
+    small = much_smaller(trajectory, present(trajectory, POSITIONS))
+    looks = {name: Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged") for name in small}
+    name = "-".join(["position", *small])
+    return _lines(trajectory, name, "The smaller one, enlarged", looks, "position", "m", height=1.2)
 
 
 def velocities(trajectory: Trajectory, names: Iterable[str]) -> Panel:
@@ -109,8 +106,8 @@ def velocities(trajectory: Trajectory, names: Iterable[str]) -> Panel:
     return _lines(trajectory, "velocities", "Velocities", {name: VELOCITIES[name] for name in names}, "velocity", "m/s")
 
 
-def forces(trajectory: Trajectory) -> list[Panel]:
-    """Return the forces that are not zero throughout, in the words of the run's law; none if there are none."""
+def forces(trajectory: Trajectory) -> Panel:
+    """Return the forces that are not zero throughout, in the words of the run's law."""
     contact = trajectory.scene.contact
     words = {
         "compliance": "of the law λ(y − u)₊ᵖ" + " (1 + χ ṗ)" * (contact.damping > 0.0),
@@ -119,59 +116,40 @@ def forces(trajectory: Trajectory) -> list[Panel]:
     looks = dict(FORCES)
     if contact.law in words:
         looks["compliance_force"] = FORCES["compliance_force"]._replace(words=words[contact.law])
-    looks = _not_zero(trajectory, looks)
-    if not looks:
-        return []
     seen, remarks = _seen(trajectory, looks, "N")
-    panel = _lines(trajectory, "forces", "Forces", seen, "force", "N")
-    panel.height = 2.0
-    panel.remarks += remarks
-    return [panel]
+    return _lines(trajectory, "forces", "Forces", seen, "force", "N", remarks, height=2.0)
 
 
-def impulses(trajectory: Trajectory) -> list[Panel]:
+def impulses(trajectory: Trajectory) -> Panel:
     """Return the impulses of the events, on a logarithmic axis where a linear one would not show them all."""
-    points = {name: [(e.time, getattr(e, name)) for e in trajectory.events if getattr(e, name)] for name in IMPULSES}
-    found = {name: np.array(some) for name, some in points.items() if some}
-    if not found:
-        return []
-    sizes = np.concatenate([some[:, 1] for some in found.values()])
-    foot = _stem_foot(sizes)
-    # A logarithmic axis needs no prefix.
-    unit = readable_unit([sizes], "N·s") if foot is None else Unit(1.0, "N·s")
-    curves = []
-    for name, every in found.items():
-        time, values = every[decimated(every[:, 0], every[:, 1])].T
-        curves.append(Curve(name, IMPULSES[name], time, values))
-    limits = None if foot is None else (foot, 3.0 * float(np.max(sizes)))
-    return [Panel("impulses", "Impulses", "impulse", unit, curves, 1.2, logarithmic=limits)]
+    panel = Panel("impulses", "Impulses", "impulse", Unit(1.0, "N·s"), [], 1.2)
+    for name, look in IMPULSES.items():
+        points = [(e.time, getattr(e, name)) for e in trajectory.events if getattr(e, name)]
+        time, values = np.reshape(points, (-1, 2)).T
+        rows = decimated(time, values)
+        if points:
+            panel.curves.append(Curve(name, look, time[rows], values[rows]))
+    sizes = [curve.values for curve in panel.curves]
+    least, most = min(map(np.min, sizes), default=0.0), max(map(np.max, sizes), default=0.0)
+    if 0.0 < 30.0 * least < most:
+        # Impulses of rounding size would stretch the axis over the ones that matter.
+        panel.logarithmic = 0.3 * max(least, 1e-8 * most), 3.0 * most
+    else:
+        panel.unit = readable_unit(sizes, "N·s")
+    return panel
 
 
-def _stem_foot(sizes: np.ndarray) -> float | None:
-    """Return where stems of ``sizes`` begin on a logarithmic axis; ``None`` where a linear one shows them all.
-
-    Impulses of rounding size would stretch the axis over the ones that matter.
-    """
-    if np.any(sizes <= 0.0) or np.max(sizes) <= 30.0 * np.min(sizes):
-        return None
-    return 0.3 * max(float(np.min(sizes)), 1e-8 * float(np.max(sizes)))
-
-
-def gap(trajectory: Trajectory) -> list[Panel]:
-    """Return the gap above the spring, or above the foundation; nothing of a scene without one."""
-    if "gap" not in trajectory.columns:
-        return []
+def gap(trajectory: Trajectory) -> Panel:
+    """Return the gap above the spring, or above the foundation."""
     look = Look(BLUE, "u(t, L) − y" if "y" in trajectory.columns else "u(t, L) − φ")
-    return [_lines(trajectory, "gap", "Gap", {"gap": look}, "gap", "m")]
+    return _lines(trajectory, "gap", "Gap", {"gap": look}, "gap", "m")
 
 
 def energies(trajectory: Trajectory) -> Panel:
     """Return the energies, stacked where no part is negative but by rounding."""
-    parts, remarks = _seen(trajectory, _not_zero(trajectory, ENERGIES), "J")
+    parts, remarks = _seen(trajectory, ENERGIES, "J")
     looks = parts | {"e_total": Look(BLACK, "total", Line(1.4, dashed=True))}
-    panel = _lines(trajectory, "energies", "Energy ledger", looks, "energy", "J")
-    panel.height = 2.2
-    panel.remarks += remarks
+    panel = _lines(trajectory, "energies", "Energy ledger", looks, "energy", "J", remarks, height=2.2)
     least = min((float(np.min(trajectory[name])) for name in parts), default=-1.0)
     if least < -1e-9 * float(np.max(trajectory["e_total"])):
         panel.heading += " (lines: a part is negative)"
@@ -207,29 +185,30 @@ def _energy_scale(trajectory: Trajectory) -> float:
 
 
 def _lines(
-    trajectory: Trajectory, name: str, heading: str, looks: Mapping[str, Look], quantity: str, unit: str
+    trajectory: Trajectory,
+    name: str,
+    heading: str,
+    looks: Mapping[str, Look],
+    quantity: str,
+    unit: str,
+    remarks: Iterable[str] = (),
+    **more: Any,
 ) -> Panel:
-    """Return a panel of those columns of ``looks`` that the run has."""
-    there = present(trajectory, looks)
-    curves = [_curve(trajectory, column, looks[column]) for column in there]
-    readable = readable_unit([trajectory[column] for column in there], unit)
-    remarks = [f"{curve.look.words} {ALTERNATES}" for curve in curves if curve.alternates]
-    return Panel(name, heading, quantity, readable, curves, remarks=remarks)
-
-
-def _curve(trajectory: Trajectory, name: str, look: Look) -> Curve:
-    values = trajectory[name]
-    rows = decimated(trajectory["time"], values)
-    return Curve(name, look, trajectory["time"][rows], values[rows], alternates(values))
-
-
-def _not_zero(trajectory: Trajectory, looks: Mapping[str, Look]) -> dict[str, Look]:
-    return {name: looks[name] for name in present(trajectory, looks) if np.any(trajectory[name] != 0.0)}
+    """Return a panel of those columns of ``looks`` that the run has; ``more`` are fields of the panel."""
+    time, curves = trajectory["time"], []
+    for column in present(trajectory, looks):
+        values = trajectory[column]
+        rows = decimated(time, values)
+        curves.append(Curve(column, looks[column], time[rows], values[rows], alternates(values)))
+    readable = readable_unit([trajectory[curve.name] for curve in curves], unit)
+    said = [f"{curve.look.words} {ALTERNATES}" for curve in curves if curve.alternates]
+    return Panel(name, heading, quantity, readable, curves, remarks=[*said, *remarks], **more)
 
 
 def _seen(trajectory: Trajectory, looks: Mapping[str, Look], unit: str) -> tuple[dict[str, Look], list[str]]:
-    """Return the columns that can be seen beside the largest of them, and words for those that cannot."""
-    sizes = {name: float(np.max(np.abs(trajectory[name]))) for name in looks}
+    """Return the columns that can be seen beside the largest of them, and words for those that cannot but are not 0."""
+    sizes = {name: float(np.max(np.abs(trajectory[name]))) for name in present(trajectory, looks)}
+    sizes = {name: size for name, size in sizes.items() if size > 0.0}
     seen = {name: looks[name] for name, size in sizes.items() if size >= _INVISIBLE * max(sizes.values())}
     unseen = [f"{looks[name].words} ≤ {size:.2g}\u00a0{unit}" for name, size in sizes.items() if name not in seen]
     return seen, [f"too small to draw: {', '.join(unseen)}"] if unseen else []

@@ -196,24 +196,21 @@ def _positions(trajectory: Trajectory) -> Figure | None:
     positions, speeds = present(trajectory, POSITIONS), present(trajectory, VELOCITIES)[:1]
     whose = "beam's tip" if "v_tip" in speeds else "spring's top"
     title = "(C) Positions, and velocity" if len(positions) > 1 else "(C) Position and velocity"
-    shown = [panels.positions(trajectory), *panels.enlarged(trajectory), panels.velocities(trajectory, speeds)]
+    shown = [panels.positions(trajectory), panels.enlarged(trajectory), panels.velocities(trajectory, speeds)]
     return timeline(trajectory, f"{title} of the {whose}", shown)
 
 
 def _velocities_and_forces(trajectory: Trajectory) -> Figure | None:
-    acting = [*panels.forces(trajectory), *panels.impulses(trajectory)]
-    if not acting:
-        return None
-    if "z" not in trajectory.columns:
-        return timeline(trajectory, "(D) Forces", acting)
-    title = "(D) Velocity of the spring's top, and forces"
-    return timeline(trajectory, title, [panels.velocities(trajectory, ["z"]), *acting])
+    speed = panels.velocities(trajectory, ["z"])
+    acting = [panel for panel in (panels.forces(trajectory), panels.impulses(trajectory)) if panel.curves]
+    title = "(D) Velocity of the spring's top, and forces" if speed.curves else "(D) Forces"
+    return timeline(trajectory, title, [speed, *acting]) if acting else None
 
 
 def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
     gap = panels.gap(trajectory)
-    title = "(E) Gap and energy" if gap else "(E) Energy"
-    return timeline(trajectory, title, [*gap, panels.energies(trajectory), panels.residual(trajectory)])
+    title = "(E) Gap and energy" if gap.curves else "(E) Energy"
+    return timeline(trajectory, title, [gap, panels.energies(trajectory), panels.residual(trajectory)])
 
 
 #: What draws each picture, in the order of `PICTURES`.

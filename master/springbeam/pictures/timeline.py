@@ -54,7 +54,11 @@ _NOTE_WIDTH = 24
 
 
 def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Figure:
-    """Return the figure of ``panels``, one below the other over a common time axis, phases shaded and events marked."""
+    """Return the figure of ``panels``, those that have a curve, one below the other over a common time axis.
+
+    Phases are shaded and events marked.
+    """
+    panels = [panel for panel in panels if panel.curves]
     heights = [panel.height for panel in panels]
     figure = figure_for(trajectory, title, 1.0 + sum(heights))
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
