@@ -18,6 +18,7 @@ from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS
 from springbeam.pictures.frames import COIL_HEIGHTS, MOST_FRAMES, frames_of
 from springbeam.pictures.panels import panels
 from springbeam.pictures.report import page, shipped_command
+from springbeam.pictures.report.described import described
 from springbeam.results.directory import REPORT
 from springbeam.results.trajectory import Event
 from springbeam.scene import load_scene, scene_from_dict, shipped_scenes, with_changes
@@ -207,6 +208,15 @@ def test_the_page_opens_with_the_scene_the_motion_and_the_results():
     assert found.headings[1:3] == ["Motion", "Results"]
     assert "peak contact force, mean over 0.001 s" in found.texts["results"]
     assert "83.2 N" in found.texts["results"]
+    assert "energy of degree 0, macro step 0.00025 s, to 0.6 s" in found.texts["described"]
+
+
+def test_a_scene_without_a_macro_step_or_with_other_bodies_is_described():
+    given = {"time": {"t_end": 1.0}, "coupling": {"relative_tolerance": 1e-4}, "contact": {"law": "tie"}}
+    scene = scene_from_dict({**given, "beam": {"element": "point_mass", "mass": 1.0}, "spring": {}})
+    said = dict(described(scene))
+    assert said["beam"] == "another body in its place: point mass"
+    assert said["steps"] == "energy of degree 0, macro steps that follow from tolerances, to 1 s"
 
 
 def test_phases_are_shaded_where_they_hold():

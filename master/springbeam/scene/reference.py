@@ -31,8 +31,12 @@ class Key(NamedTuple):
 
 def listed(table: str | None = None) -> list[Key]:
     """Return the keys of one table, or all."""
-    wanted = MODELS if table is None else [table]
-    return [Key(name, *described) for name in wanted for described in _described(MODELS[name])]
+    return [
+        Key(name, key, extra(field, "unit"), allowed(field), _default(model, key, field), field.description or "")
+        for name, model in MODELS.items()
+        for key, field in model.model_fields.items()
+        if table in (None, name) and (field.alias or key) not in MODELS
+    ]
 
 
 def heading(table: str) -> str:
@@ -50,12 +54,6 @@ def unit_of(table: str, key: str) -> str:
 def about(table: str) -> str:
     """Return what a table describes."""
     return " ".join((MODELS[table].__doc__ or "").split()).replace("``", "`")
-
-
-def _described(model: type[Table]) -> Iterator[tuple[str, str, str, str, str]]:
-    for name, field in model.model_fields.items():
-        if (field.alias or name) not in MODELS:
-            yield name, extra(field, "unit"), allowed(field), _default(model, name, field), field.description or ""
 
 
 def _default(model: type[Table], name: str, field: FieldInfo) -> str:

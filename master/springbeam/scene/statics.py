@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -19,9 +20,6 @@ from .tables import Beam
 
 #: Places at which the beam's shape is sampled, as fractions of its length.
 SHAPE_POINTS = np.linspace(0.0, 1.0, 21)
-
-#: A virtual moment or shear force over t.
-Virtual = Callable[[np.ndarray], np.ndarray]
 
 #: Gauss–Legendre on [0, 1], exact to degree 7: M² has degree 6.
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomial.legendre.leggauss(4)[1] / 2
@@ -83,12 +81,8 @@ def lowest_frequency(beam: Beam) -> float:
 
 def load_shape(beam: Beam, fractions: np.ndarray) -> np.ndarray:
     """Return the deflection [m] at x = ``fractions``·L under the loads."""
-    ends = beam.length * (1.0 - fractions)
-
-    def beyond(end: float) -> Virtual:
-        return lambda t: t - end
-
-    return np.array([_work(beam, float(end), beyond(end), np.ones_like) for end in ends])
+    ends = (beam.length * (1.0 - fractions)).tolist()
+    return np.array([_work(beam, end, partial(_unit_force, end)) for end in ends])
 
 
 def tip_load_deflection(beam: Beam) -> float:
@@ -98,7 +92,7 @@ def tip_load_deflection(beam: Beam) -> float:
 
 def load_energy(beam: Beam) -> float:
     """Return the work of the loads on their own deflection, ∫ M²/EI + Q²/KAG [J], twice the energy they store."""
-    return _work(beam, 0.0, lambda t: _loads(beam, t)[1], lambda t: _loads(beam, t)[0])
+    return _work(beam, 0.0, partial(_loads, beam))
 
 
 def _loads(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -109,13 +103,18 @@ def _loads(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return f * t + force, f * t**2 / 2.0 + c * (s**2 / 2.0 - s**3 / (6.0 * h)) + c * h / 2.0 * (t - s)
 
 
-def _work(beam: Beam, start: float, moment: Virtual, shear: Virtual) -> float:
-    """Return ∫ M m/EI + Q q/KAG dt from ``start`` to the clamp, for virtual m(t) and q(t)."""
+def _unit_force(end: float, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (q, m) of 1 N at the distance ``end`` from the tip, at distances ``t`` beyond it."""
+    return np.ones_like(t), t - end
+
+
+def _work(beam: Beam, start: float, virtual: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> float:
+    """Return ∫ M m/EI + Q q/KAG dt from ``start`` to the clamp; ``virtual`` gives q and m at the distances t."""
     h, total = beam.length / beam.n_elements, 0.0
     for a, b in ((start, max(start, h)), (max(start, h), beam.length)):
         t = a + (b - a) * _NODES
-        Q, M = _loads(beam, t)
-        density = M * moment(t) / bending_stiffness(beam) + Q * shear(t) / shear_stiffness(beam)
+        (Q, M), (q, m) = _loads(beam, t), virtual(t)
+        density = M * m / bending_stiffness(beam) + Q * q / shear_stiffness(beam)
         total += (b - a) * float(_WEIGHTS @ density)
     return total
 

@@ -98,17 +98,16 @@ def page(trajectory: Trajectory) -> str:
 def shipped_command(scene: Scene) -> str | None:
     """Return the command that runs ``scene`` from the shipped scene of its title; ``None`` if none is."""
     wanted = _tables(scene)
-    for name in shipped_scenes():
-        shipped = _tables(load_scene(name))
-        if shipped.keys() != wanted.keys() or load_scene(name).title != scene.title:
-            continue
-        settings = [
-            f"--set {shlex.quote(f'{table}.{key}={_setting(value)}')}"
-            for table, content in wanted.items()
-            for key, value in content.items()
-            if shipped[table].get(key) != value
-        ]
-        return " ".join(["springbeam", "run", name, *settings])
+    for name, shipped in ((name, load_scene(name)) for name in shipped_scenes()):
+        given = _tables(shipped)
+        if given.keys() == wanted.keys() and shipped.title == scene.title:
+            settings = [
+                f"--set {shlex.quote(f'{table}.{key}={value if isinstance(value, str) else json.dumps(value)}')}"
+                for table, content in wanted.items()
+                for key, value in content.items()
+                if given[table].get(key) != value
+            ]
+            return " ".join(["springbeam", "run", name, *settings])
     return None
 
 
@@ -117,10 +116,6 @@ def _tables(scene: Scene) -> dict[str, dict[str, Any]]:
     data = scene.model_dump(exclude_none=True)
     tables = {name: content for name, content in data.items() if isinstance(content, dict)}
     return tables | {f"loads.{i}": load for i, load in enumerate(data.get("loads", ()))}
-
-
-def _setting(value: Any) -> str:
-    return value if isinstance(value, str) else json.dumps(value)
 
 
 def _warnings(trajectory: Trajectory) -> list[str]:

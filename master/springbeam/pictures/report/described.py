@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...scene import Scene
+from ...scene.partners import kind_of
 from ...scene.statics import bending_stiffness, shear_stiffness
 
 _LAWS = {
@@ -27,13 +28,10 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
         yield "beam", f"length {beam.length:.4g} m, mass {mass:.4g} kg, stiffness {stiffness}; {mesh}"
     if spring is not None:
         cubic = f", cubic stiffness {spring.cubic_stiffness:.4g} N/m³" if spring.cubic_stiffness else ""
-        yield (
-            "spring",
-            (
-                f"mass {spring.mass:.4g} kg, stiffness {spring.linear_stiffness:.4g} N/m{cubic}, its top at rest at "
-                f"Ψ = {spring.equilibrium:.4g} m"
-            ),
-        )
+        stiffness = f"stiffness {spring.linear_stiffness:.4g} N/m{cubic}"
+        yield "spring", f"mass {spring.mass:.4g} kg, {stiffness}, its top at rest at Ψ = {spring.equilibrium:.4g} m"
+    for table, partner in scene.partners.items():
+        yield table, f"another body in its place: {kind_of(partner).replace('_', ' ')}"
     if scene.coupled:
         soft = f"λ = {contact.stiffness:.4g}, exponent {contact.exponent:.4g}"
         words = {"link": f"stiffness {contact.stiffness:.4g} N/m", "compliance": soft, "paper": soft}
@@ -44,8 +42,7 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
     for i, load in enumerate(scene.loads):
         what = f"{load.signal.replace('_', '-')} on the {load.on}, {load.peak:.4g} {load.unit}"
         yield f"load_{i}", what + (f", {load.frequency:.4g} Hz" if load.frequency else "")
-    coupling = scene.coupling
-    yield (
-        "steps",
-        f"{coupling.scheme} of degree {coupling.degree}, macro step {coupling.H:.4g} s, to {scene.time.t_end:.4g} s",
-    )
+    H = scene.coupling.macro_step
+    length = "macro steps that follow from tolerances" if H is None else f"macro step {H:.4g} s"
+    scheme = f"{scene.coupling.scheme} of degree {scene.coupling.degree}"
+    yield "steps", f"{scheme}, {length}, to {scene.time.t_end:.4g} s"
