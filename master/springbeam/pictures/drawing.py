@@ -265,7 +265,7 @@ def near_levels(scene: Scene, moving: Sequence[np.ndarray]) -> dict[str, float]:
     return {symbol: height for symbol, height in heights.items() if low - reach <= height <= high + reach}
 
 
-def much_smaller(trajectory: Trajectory, names: list[str]) -> list[str]:
-    """Return the one of two whose motion cannot be seen beside the other's, if it moves at all."""
-    ranges = {name: float(np.ptp(trajectory[name])) for name in names}
+def much_smaller(trajectory: Trajectory) -> list[str]:
+    """Return the one of two `POSITIONS` whose motion cannot be seen beside the other's, if it moves at all."""
+    ranges = {name: float(np.ptp(trajectory[name])) for name in present(trajectory, POSITIONS)}
     return [name for name, size in ranges.items() if 0.0 < size < 0.02 * max(ranges.values())]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -111,15 +111,14 @@ class Sketch:
 
 def sketches(trajectory: Trajectory, frames: Frames) -> list[Sketch]:
     """Return beam and spring; once more, enlarged, what is too small to be seen in that picture."""
-    found = [_bodies("motion", "Motion", trajectory, frames, (frames.low, frames.high), -0.02)]
+    found = [_sketch("motion", "Motion", trajectory, frames, (frames.low, frames.high))]
     if contact := _contact_heights(trajectory, frames):
-        found.append(_bodies("motion-contact", "The contact, enlarged", trajectory, frames, contact, _NEAR_TIP))
-    if frames.deflection is not None and "u_tip" in much_smaller(trajectory, present(trajectory, POSITIONS)):
+        found.append(_sketch("motion-contact", "The contact, enlarged", trajectory, frames, contact, _NEAR_TIP))
+    if frames.deflection is not None and "u_tip" in much_smaller(trajectory):
         reach = 1.1 * float(np.max(np.abs(frames.deflection)))
-        alone = _empty("motion-beam", "The beam alone, enlarged", trajectory, (-reach, reach), -0.02)
-        alone.quantity, alone.height = "beam alone u", 1.5
-        alone.moving = [_beam(trajectory)]
-        found.append(alone)
+        alone = replace(frames, y=None, levels={})
+        found.append(_sketch("motion-beam", "The beam alone, enlarged", trajectory, alone, (-reach, reach)))
+        found[-1].quantity, found[-1].height = "beam alone u", 1.5
     return found
 
 
@@ -134,8 +133,10 @@ def _contact_heights(trajectory: Trajectory, frames: Frames) -> tuple[float, flo
     return (low - room, high + room) if 0.0 < high - low < _SMALL * (frames.high - frames.low) else None
 
 
-def _empty(name: str, heading: str, trajectory: Trajectory, heights: tuple[float, float], begin: float) -> Sketch:
-    """Return the clamp and the undeformed beam between ``heights`` [m], from ``begin`` (a part of its length) on."""
+def _sketch(
+    name: str, heading: str, trajectory: Trajectory, frames: Frames, heights: tuple[float, float], begin: float = -0.02
+) -> Sketch:
+    """Return what there is between ``heights`` [m], from ``begin`` (a part of the beam's length) on."""
     unit = readable_unit([np.array(heights)], "m")
     low, high = unit.factor * heights[0], unit.factor * heights[1]
     along, length = length_along(trajectory.scene)
@@ -144,22 +145,12 @@ def _empty(name: str, heading: str, trajectory: Trajectory, heights: tuple[float
         sketch.x = (0.5 * length, 1.5 * length)
     else:
         sketch.blocks, sketch.rest = [Block(-0.02 * length, 0.0, low, high)], (0.0, length)
-    return sketch
-
-
-def _bodies(
-    name: str, heading: str, trajectory: Trajectory, frames: Frames, heights: tuple[float, float], begin: float
-) -> Sketch:
-    sketch = _empty(name, heading, trajectory, heights, begin)
-    _, length = length_along(trajectory.scene)
-    low, high = sketch.y
-    inside = {symbol: sketch.unit.factor * height for symbol, height in frames.levels.items()}
+    inside = {symbol: unit.factor * height for symbol, height in frames.levels.items()}
     sketch.levels = {symbol: height for symbol, height in inside.items() if low <= height <= high}
-    sketch.level_ends = length * (1.0 - _STOP_WIDTH), length * (1.0 + _STOP_WIDTH)
+    sketch.level_ends = left, right = length * (1.0 - _STOP_WIDTH), length * (1.0 + _STOP_WIDTH)
     if "φ" in sketch.levels:
         # Two blocks where a spring stands between them.
         inner = 1.2 * _COIL_WIDTH * length if frames.y is not None else 0.0
-        left, right = sketch.level_ends
         for edges in ((left, length - inner), (length + inner, right)):
             sketch.blocks.append(Block(*edges, low, sketch.levels["φ"]))
     if frames.y is not None:
@@ -168,12 +159,8 @@ def _bodies(
         sketch.moving.append(Moving("coil", length + half * _COIL_ACROSS, Look(VERMILLION, "spring", Line(1.2))))
         sketch.moving.append(Moving("top", ends, Look(VERMILLION, "its top y", Line(3.5))))
     if frames.deflection is not None:
-        sketch.moving.append(_beam(trajectory))
+        sketch.moving.append(Moving("beam", length * SHAPE_POINTS, Look(BLUE, "beam u", Line(3.0))))
     return sketch
-
-
-def _beam(trajectory: Trajectory) -> Moving:
-    return Moving("beam", length_along(trajectory.scene)[1] * SHAPE_POINTS, Look(BLUE, "beam u", Line(3.0)))
 
 
 def frames_of(trajectory: Trajectory) -> Frames | None:

@@ -95,7 +95,7 @@ def positions(trajectory: Trajectory) -> Panel:
 
 def enlarged(trajectory: Trajectory) -> Panel:
     """Return a panel of its own for the one of two positions whose motion is lost beside the other's."""
-    small = much_smaller(trajectory, present(trajectory, POSITIONS))
+    small = much_smaller(trajectory)
     looks = {name: Look(POSITIONS[name].colour, f"{POSITIONS[name].words}, enlarged") for name in small}
     name = "-".join(["position", *small])
     return _lines(trajectory, name, "The smaller one, enlarged", looks, "position", "m", height=1.2)
