@@ -225,25 +225,19 @@ def test_a_scene_without_a_beam_has_no_shapes(tmp_path):
 
 
 def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
-    recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path))
-    recorder.finish(
-        {
-            "count": np.int64(3),
-            "size": np.float64(0.5),
-            "flag": np.bool_(True),
-            "list": np.array([0.0, math.nan]),
-            "path": tmp_path,
-            "residual": math.nan,
-            "nested": {"worst": -math.inf},
-            "nothing": None,
-        }
-    )
+    given = {
+        "count": (np.int64(3), 3),
+        "size": (np.float64(0.5), 0.5),
+        "flag": (np.bool_(True), True),
+        "list": (np.array([0.0, math.nan]), [0.0, "NaN"]),
+        "path": (tmp_path, str(tmp_path)),
+        "nested": ({"worst": -math.inf}, {"worst": "-Infinity"}),
+        "nothing": (None, None),
+    }
+    FileRecorder(PAIR, RunDirectory.create(tmp_path)).finish({name: value for name, (value, _) in given.items()})
     summary = load_summary(tmp_path)
     del summary["scene"]
-    assert summary == {
-        "count": 3, "size": 0.5, "flag": True, "list": [0.0, "NaN"], "path": str(tmp_path),
-        "residual": "NaN", "nested": {"worst": "-Infinity"}, "nothing": None,
-    }  # fmt: skip
+    assert summary == {name: read for name, (_, read) in given.items()}
 
 
 def test_all_that_is_recorded_can_be_loaded_while_the_run_goes_on(tmp_path):

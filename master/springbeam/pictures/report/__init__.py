@@ -42,6 +42,14 @@ _HERE = Path(__file__).parent
 _EVENTS_SHOWN = 200
 _EVENT_UNITS = {"y": "m", "z": "m/s", "u_tip": "m", "v_tip": "m/s"}
 _FORCES_READ = ("contact_force", "foundation_force")
+#: Numbers of a summary in words, and how they are written.
+_NUMBERS = {
+    "macro_steps": ("macro steps", "{:.0f}"),
+    "iterations": ("iterations for the contact force", "{:.0f}"),
+    "wall_time": ("wall time", "{:.3g} s"),
+    "max_energy_residual": ("largest energy residual, relative", "{:.2g}"),
+    "max_velocity_mismatch": ("largest difference of joined velocities", "{:.4g} m/s"),
+}
 #: So many events of a kind in succession are a cascade.
 _CASCADE = 4
 
@@ -143,32 +151,18 @@ def _folded(events: list[Event]) -> Iterator[list[Event]]:
 
 def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
     """Return words and values for the table of numbers."""
-    summary, columns = trajectory.summary, trajectory.columns
-    time = columns["time"]
-    for key, words in (("macro_steps", "macro steps"), ("iterations", "iterations for the contact force")):
-        if key in summary:
-            yield words, f"{summary[key]}"
+    summary = trajectory.summary
+    for key, (words, form) in _NUMBERS.items():
+        if key in summary and (summary[key] or key != "max_velocity_mismatch"):
+            yield words, form.format(float(summary[key]))
     for body in ("beam", "spring"):
         if f"{body}_steps" in summary:
-            steps, rollbacks = summary[f"{body}_steps"], summary[f"{body}_rollbacks"]
-            yield f"steps of the {body} FMU", f"{steps}, {rollbacks} of them taken back"
-    if "wall_time" in summary:
-        yield "wall time", f"{summary['wall_time']:.3g} s"
-    if "max_energy_residual" in summary:
-        yield "largest energy residual, relative", f"{float(summary['max_energy_residual']):.2g}"
-    if summary.get("max_velocity_mismatch"):
-        yield "largest difference of joined velocities", f"{float(summary['max_velocity_mismatch']):.4g} m/s"
-    if not len(time):
-        return
-
-    def extreme(name: str, words: str, unit: str, pick: Any) -> tuple[str, str]:
-        row = int(pick(columns[name]))
-        return words, f"{columns[name][row]:.6g} {unit} at t = {time[row]:.6g} s"
-
-    for name, look in POSITIONS.items():
-        if name in columns:
-            yield extreme(name, f"lowest {look.words}", "m", np.argmin)
-            yield extreme(name, f"highest {look.words}", "m", np.argmax)
+            taken_back = summary[f"{body}_rollbacks"]
+            yield f"steps of the {body} FMU", f"{summary[f'{body}_steps']}, {taken_back} of them taken back"
+    for name in present(trajectory, POSITIONS) if len(trajectory) else ():
+        values = trajectory[name]
+        for words, row in (("lowest", np.argmin(values)), ("highest", np.argmax(values))):
+            yield f"{words} {POSITIONS[name].words}", f"{values[row]:.6g} m at t = {trajectory.time[row]:.6g} s"
 
 
 def _data(trajectory: Trajectory, drawn: list[Chart], moving: list[Sketch], frames: Frames | None) -> dict[str, Any]:
