@@ -199,7 +199,8 @@ def holds(text: str, name: str) -> bool:
 
 
 def missing(text: str) -> Iterator[str]:
-    """What a page names: `path/file.py`, `file.py: name`, `Class.member`, lines of tables with functions and files."""
+    """Names of a page that are not there: `path/file.py`, `file.py: name`, `name` of `file.py`, `Class.member`, and the
+    functions in a line of a table that ends with their files."""
     for span in re.findall(r"`([^`\n]+)`", text):
         if found := re.fullmatch(r"([\w/]+\.(?:py|cpp|hpp|c|xml|md))(?:: ([\w.]+))?", span):
             path, name = found.groups()
@@ -209,6 +210,9 @@ def missing(text: str) -> Iterator[str]:
             made = rf"(class|struct) {found[1]}\b|TEST\({found[1]},"
             if not any(re.search(made, source) and holds(source, found[2]) for source in SOURCES.values()):
                 yield span
+    for name, path in re.findall(r"`([\w.:]+)`(?: of | in | \()`([\w/]+\.(?:py|cpp|hpp))`", text):
+        if not any(holds(source, name) for source in sources(path)):
+            yield f"{name} of {path}"
     for line in text.splitlines():
         *_, names, paths, _ = ["", "", "", *re.split(r"(?<!\\)\|", line)]
         files = re.findall(r"`([\w/]+(?:\.py|\.cpp|\.hpp|/))`", paths)
