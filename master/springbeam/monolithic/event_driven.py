@@ -226,24 +226,17 @@ def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
         X[s.Y] = s.stop.position
     if scene.beam is not None and s.beam is not None:
         slope, rate = scene.beam.initial_deflection_slope, scene.beam.initial_velocity_slope
-        if scene.tip_target is not None:
+        if scene.tip_target is not None and scene.beam.approach == "undeformed":
             obstacle = scene.tip_target[1]
             gap = slope * scene.beam.length - obstacle
-            if gap < 0.0:
-                raise ValueError(
-                    f"[beam] initial_deflection_slope = {slope}: the tip starts {-gap} m below what it should hit"
-                )
-            if scene.beam.approach == "undeformed" and gap > 0.0:
-                if rate >= 0.0:
-                    raise ValueError(
-                        f"[beam] approach = 'undeformed' with initial_velocity_slope = {rate}: the tip never "
-                        "comes down; allowed: a negative slope, or approach = 'elastic'"
-                    )
+            if gap > 0.0:
                 time = -gap / (rate * scene.beam.length)
                 slope = obstacle / scene.beam.length
         X[s.A] = slope * s.beam.slope_shape
         X[s.V] = (rate + perturbation * inertia) * s.beam.slope_shape
         if scene.beam.approach == "elastic":
             s.settle(Phase("free"), X)
+        if s.alone:
+            s.synchronise(Phase("free"), X)
     X[s.T] = time
     return time, X

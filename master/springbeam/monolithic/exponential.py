@@ -78,8 +78,8 @@ class LinearForm:
     def __init__(self, system: HybridSystem, phase: Phase) -> None:
         self.system, self.phase = system, phase
         s, p = system, system.spring
-        joined, held = s.joined(phase), s.held(phase)
         self.spring_moves = s.has_spring and not phase.seated
+        joined, held = self.spring_moves and s.joined(phase), s.held(phase)
         self.linked, self.rest = self._split()
         self.pressed = s.law.acts(phase.contact) and self.rest != (0.0, 0.0)
         self.root_mass = float(np.sqrt(p.mass))

@@ -8,9 +8,10 @@ Dynamics, with u = bᵀa, p = f(t) − ω²(a + α_b ȧ) the beam's own forces a
 spring's (Ahn & Tate, eqs. (1)–(6), (8))::
 
     free    ä = p + b C,  m z' = s − C,           C = 0, or the force of the law (`laws`)
-    joined  ä = p + b C,  m z' = s − C,  u = y:   C = (s/m − bᵀp) / (bᵀb + 1/m)
+    joined  ä = p + b C,  m z' = s − C,  u = y:   C = (s − m bᵀp) / (1 + m bᵀb)
     elastic stop: no spring, y = φ, z = 0, and C the force of the law
-    seated  y = φ, z = 0, N = C − s;  joined: u = φ, C = −bᵀp / bᵀb;  without a spring: u = φ, N = C
+    seated  y = φ, z = 0, N = C − s;  joined: u = φ, C = −bᵀp / bᵀb
+    without a spring the tip is joined to an end with m = 0 and s = 0
 """
 
 from __future__ import annotations
@@ -38,9 +39,11 @@ class HybridSystem:
     def __init__(self, scene: Scene, beam: ModalBeam | None) -> None:
         self.scene, self.law, self.beam = scene, law_of(scene), beam
         self.has_spring = scene.spring is not None
-        #: Without a spring its terms vanish: no stiffness, and 1/m = 0.
+        #: Without a spring its terms vanish; a tip above no wall then is joined to an end that has no mass.
         self.spring = scene.spring or Spring(mass=1.0, linear_stiffness=0.0)
-        self.inverse_mass = 1.0 / self.spring.mass if self.has_spring else 0.0
+        self.mass = self.spring.mass if self.has_spring else 0.0
+        self.inverse_mass = 1.0 / self.mass if self.has_spring else 0.0
+        self.alone = not (self.has_spring or scene.elastic_stop)
         #: Without a stop nothing is ever seated on this one.
         self.stop = scene.stop or Stop(position=0.0)
         empty = np.zeros(0)
@@ -69,11 +72,11 @@ class HybridSystem:
 
     def joined(self, phase: Phase) -> bool:
         """Whether u = y holds as a constraint."""
-        return self.law.holds(phase.contact)
+        return self.alone or self.law.holds(phase.contact)
 
     def held(self, phase: Phase) -> bool:
         """Whether the tip stands on the foundation, u = φ."""
-        return phase.seated and (self.joined(phase) or not self.has_spring)
+        return phase.seated and self.joined(phase)
 
     def spring_force(self, y: np.ndarray, z: np.ndarray) -> np.ndarray:
         """s = f_s − α_s z − k1 y − k2 y³ [N]."""
@@ -112,7 +115,7 @@ class HybridSystem:
         if self.held(phase):
             return np.asarray(-(p @ self.b) / self.inverse_tip_mass)
         if self.joined(phase):
-            return np.asarray((s * self.inverse_mass - p @ self.b) / (self.inverse_tip_mass + self.inverse_mass))
+            return np.asarray((s - self.mass * (p @ self.b)) / (1.0 + self.mass * self.inverse_tip_mass))
         if self.law.acts(phase.contact):
             return self.law.force(penetration, rate)
         return np.zeros_like(s)
@@ -149,7 +152,7 @@ class HybridSystem:
         if self.held(phase):
             C = -(b @ J[V]) / self.inverse_tip_mass
         elif self.joined(phase):
-            C = (s * self.inverse_mass - b @ J[V]) / (self.inverse_tip_mass + self.inverse_mass)
+            C = (s - self.mass * (b @ J[V])) / (1.0 + self.mass * self.inverse_tip_mass)
         elif self.law.acts(phase.contact):
             slope, viscous = self.law.slopes(float(X[Y] - X[A] @ b), float(X[Z] - X[V] @ b))
             C[A], C[Y], C[V], C[Z] = -slope * b, slope, -viscous * b, viscous
@@ -191,16 +194,14 @@ class HybridSystem:
         """Energies [J] of states of shape (k, 2r + 5); ``e_load`` is minus the work of the loads."""
         a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
         p = self.spring
-        spring = (0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4) * float(
-            self.has_spring
-        )
+        spring = 0.5 * self.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
         contact = self.law.potential(y - a @ self.b) if self.law.counts(phase.contact) else np.zeros_like(y)
         return {
             "e_beam": 0.5 * np.sum(v**2 + self.stiffness * a**2, axis=-1),
             "e_spring": spring,
             "e_contact": contact,
             "e_dissipated": X[..., self.D],
-            "e_load": -(a @ self.load) - p.external_force * y * float(self.has_spring) - X[..., self.W],
+            "e_load": -(a @ self.load) - p.external_force * y - X[..., self.W],
         }
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:

@@ -45,7 +45,7 @@ class HybridState:
         if self.phase.seated:
             return [*watched, Watch("unseat", lambda m: m.N, "N")]
         if s.scene.stop is not None and not s.scene.elastic_stop:
-            return [*watched, Watch("stop", (lambda m: m.y - phi) if s.has_spring else (lambda m: m.u - phi), "m")]
+            return [*watched, Watch("stop", lambda m: m.y - phi, "m")]
         return watched
 
     def happen(self, event: Watch) -> None:
@@ -74,7 +74,7 @@ class HybridState:
         if s.two_ends and float(m.u - m.y) <= noise:
             if m.v <= m.z:
                 self._meet()
-        elif not s.has_spring and s.scene.stop is not None and m.u - s.stop.position <= noise:
+        elif s.alone and s.scene.stop is not None and m.u - s.stop.position <= noise:
             if m.v < 0.0:
                 self._hit_stop()
             elif m.v == 0.0 and m.a @ s.b < 0.0:
@@ -164,23 +164,18 @@ class HybridState:
         """Apply restitution e; impulses on the tip and of the foundation [N·s], speed afterwards [m/s]."""
         s, X = self.system, self.X
         on_tip = 0.0
-        if s.joined(self.phase) or not s.has_spring:
+        if s.joined(self.phase):
             on_tip = -(1.0 + e) * float(X[s.V] @ s.b) / s.inverse_tip_mass
             X[s.V] += s.b * on_tip
-            speed = float(X[s.V] @ s.b)
-        of_foundation = on_tip
-        if s.has_spring:
-            of_foundation += -(1.0 + e) * s.spring.mass * X[s.Z]
-            X[s.Z] = -e * X[s.Z]
-            speed = float(X[s.Z])
+        of_foundation = on_tip - (1.0 + e) * s.mass * float(X[s.Z])
+        X[s.Z] = -e * X[s.Z]
         s.settle(self.phase, X)
-        return on_tip, of_foundation, speed
+        return on_tip, of_foundation, float(X[s.Z])
 
     def _seat(self) -> None:
         s = self.system
         self.phase = Phase(self.phase.contact, seated=True)
-        if s.has_spring:
-            self.X[s.Y], self.X[s.Z] = s.stop.position, 0.0
+        self.X[s.Y], self.X[s.Z] = s.stop.position, 0.0
         s.synchronise(self.phase, self.X)
 
     def _unseat(self) -> None:
@@ -194,18 +189,16 @@ class HybridState:
         and the displacement by less than (velocity × remaining time) of the bounces left out.
         """
         s, phi = self.system, self.system.stop.position
-        reach = abs(s.spring.equilibrium - phi) if s.has_spring else 0.0
         deflection = float(np.abs(self.X[s.A]) @ np.abs(s.b))
-        return 1e-12 * max(reach, deflection, abs(phi), 1e-9)
+        return 1e-12 * max(abs(s.spring.equilibrium - phi), deflection, abs(phi), 1e-9)
 
     # All events -----------------------------------------------------------------------------------------------------
 
     def _place(self, level: float) -> None:
         """The spring top, and the tip that is joined to it, exactly where the event has them but for rounding."""
         s, X = self.system, self.X
-        if s.has_spring:
-            X[s.Y] = level
-        if s.joined(self.phase) or not s.has_spring:
+        X[s.Y] = level
+        if s.joined(self.phase):
             X[s.A] += s.b * ((level - float(X[s.A] @ s.b)) / s.inverse_tip_mass)
 
     def _mechanical_energy(self) -> float:
