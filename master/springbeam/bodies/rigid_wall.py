@@ -5,32 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..scene import Load
-from .protocol import NO_FORCE, Body, Force, Motion
+from .protocol import NO_FORCE, Force, Motion, Prescribed
 
 
-class RigidWall(Body):
+class RigidWall(Prescribed):
     """An end held at rest at ``position`` [m]: the foundation, an elastic stop, or a seated spring."""
 
-    CHECKPOINTED = ("_size",)
-
-    mass = float("inf")
+    CHECKPOINTED = ("_motion",)
 
     def __init__(self, position: float) -> None:
-        self._position = position
-        self._size = 0.0
-
-    def mark(self) -> None: ...
-
-    def rewind(self) -> None: ...
+        super().__init__(Motion(position, 0.0, 0.0, 0.0))
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        self._size = size
-        return self.motion()
-
-    def motion(self) -> Motion:
-        w, h = self._position, self._size
-        return Motion(w, 0.0, w * h, 0.5 * w * h * h)
-
-    def apply_impulse(self, impulse: float) -> None: ...
+        w = self._motion.displacement
+        self._motion = Motion(w, 0.0, w * size, 0.5 * w * size * size)
+        return self._motion
 
     def expect_loads(self, loads: Sequence[Load]) -> None: ...

@@ -108,7 +108,7 @@ class _Run:
         self.counts = {"steps": 0, "phases": 0}
         time, X = _start(self.system, velocity_perturbation)
         self.state = HybridState(self.system, time, X)
-        self.rows = Rows(self.system)
+        self.rows = Rows(self.state)
         self._happened: list[float] = []  #: times of what has ended a phase [s]
 
     def execute(self, sample_times: Sequence[float] | np.ndarray | None, time_limit: float | None) -> Trajectory:
@@ -137,7 +137,7 @@ class _Run:
                 reach, end = found[1], state.time + found[1]
             while self._due and self._due[0] < end:
                 at = self._due.popleft()
-                self.rows.record(at, segment.state(at - state.time), state)
+                self.rows.record(at, segment.state(at - state.time))
             state.time, state.X = end, segment.state(reach)
             state.X[self.system.T] = end
             self._record_due()
@@ -154,7 +154,7 @@ class _Run:
             elif end == kink:
                 self._begin_piece()
         self.system.loads.whole()
-        return self.rows.trajectory(state, self._summary(clock.perf_counter() - began))
+        return self.rows.trajectory(self._summary(clock.perf_counter() - began))
 
     def _samples(self, sample_times: Sequence[float] | np.ndarray | None) -> deque[float]:
         """Times of the rows [s], those of events apart."""
@@ -169,7 +169,7 @@ class _Run:
         return deque(samples[(samples >= start) & (samples <= self.t_end * (1.0 + 1e-15))].tolist())
 
     def _record(self) -> None:
-        self.rows.record(self.state.time, self.state.X, self.state)
+        self.rows.record(self.state.time, self.state.X)
 
     def _record_due(self) -> None:
         while self._due and self._due[0] <= self.state.time:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ..results.trajectory import Trajectory, columns_of, load_units
-from .hybrid_system import HybridSystem
 from .laws import Phase
 from .transitions import HybridState
 
@@ -15,26 +14,20 @@ _ENERGIES = ("e_beam", "e_spring", "e_contact", "e_dissipated", "e_impact_loss",
 
 
 class Rows:
-    """States recorded so far, the phase each belongs to, and what impacts had lost by then."""
+    """States recorded so far in a run, each with its time, its phase, and what impacts had lost by then."""
 
-    def __init__(self, system: HybridSystem) -> None:
-        self._system = system
-        self._times: list[float] = []
-        self._states: list[np.ndarray] = []
-        self._phases: list[Phase] = []
-        self._losses: list[float] = []
+    def __init__(self, state: HybridState) -> None:
+        self._state, self._system = state, state.system
+        self._rows: list[tuple[float, np.ndarray, Phase, float]] = []
 
-    def record(self, time: float, X: np.ndarray, state: HybridState) -> None:
-        """Keep ``X`` at ``time`` [s], in the phase of ``state``."""
-        self._times.append(time)
-        self._states.append(X.copy())
-        self._phases.append(state.phase)
-        self._losses.append(state.loss)
+    def record(self, time: float, X: np.ndarray) -> None:
+        """Keep ``X`` at ``time`` [s], in the phase in which the run is."""
+        self._rows.append((time, X.copy(), self._state.phase, self._state.loss))
 
-    def trajectory(self, state: HybridState, summary: dict[str, Any]) -> Trajectory:
-        """Return the result of the run that ended in ``state``, with its ledger added to ``summary``."""
+    def trajectory(self, summary: dict[str, Any]) -> Trajectory:
+        """Return the result of the run, with its ledger added to ``summary``."""
         s = self._system
-        states = np.array(self._states).reshape(len(self._times), s.size)
+        states = np.array([X for _, X, _, _ in self._rows]).reshape(len(self._rows), s.size)
         columns = self._columns(states)
         self._derive(columns)
         residual = columns["energy_residual"]
@@ -42,21 +35,21 @@ class Rows:
         largest = float(np.max(np.abs(residual)))
         summary["largest_energy_residual"] = largest
         summary["largest_relative_energy_residual"] = largest / scale if scale > 0.0 else 0.0
-        summary["seat_height"] = None if s.scene.stop is None else state.seat_height()
+        summary["seat_height"] = None if s.scene.stop is None else self._state.seat_height()
         deflection = s.shapes(states)
         shapes = None if deflection is None else (columns["time"], deflection)
         loads = s.loads.values(columns["time"])
         columns |= {name: loads[:, i] for i, name in enumerate(load_units(s.scene))}
         ordered = {name: columns[name] for name in columns_of(s.scene) if name in columns}
-        return Trajectory(s.scene, ordered, state.events, shapes, summary)
+        return Trajectory(s.scene, ordered, self._state.events, shapes, summary)
 
     def _columns(self, states: np.ndarray) -> dict[str, np.ndarray]:
         """What the equations of each row's phase give."""
-        s, phases = self._system, self._phases
+        s, phases = self._system, [phase for _, _, phase, _ in self._rows]
         columns: dict[str, np.ndarray] = {
-            "time": np.array(self._times),
+            "time": np.array([time for time, _, _, _ in self._rows]),
             "phase": np.array([phase.name for phase in phases], dtype="<U8"),
-            "e_impact_loss": np.array(self._losses),
+            "e_impact_loss": np.array([loss for _, _, _, loss in self._rows]),
         }
         for phase in set(phases):
             index = np.array([k for k, p in enumerate(phases) if p == phase])

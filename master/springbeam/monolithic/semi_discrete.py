@@ -80,14 +80,10 @@ class SemiDiscreteBeam:
         """Return the (k, 2N) matrix that takes q to u at k ``fractions`` of the length."""
         position = fractions * self.n_elements
         element = np.minimum(position.astype(int), self.n_elements - 1)
-        sampler = sp.lil_matrix((len(fractions), self.size))
-        for row, (e, part) in enumerate(zip(element, position - element, strict=True)):
-            values, _ = _lagrange(self.degree, np.array([part]))
-            for local, value in enumerate(values[0]):
-                node = e * self.degree + local
-                if node > 0:
-                    sampler[row, 2 * node - 1] = value
-        return sampler.tocsr()
+        nodes = element[:, None] * self.degree + np.arange(self.degree + 1)
+        values, _ = _lagrange(self.degree, position - element)
+        rows = np.arange(len(fractions))[:, None]
+        return _scatter(rows, 2 * nodes + 1, values[:, None, :], self.size + 2)[:, 2:]
 
 
 def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -150,13 +146,9 @@ def assemble(beam: Beam) -> SemiDiscreteBeam:
     strain = np.concatenate([bend, slide])
 
     elements = np.arange(n)
-    width = 2 * (p + 1)
-    columns = 2 * p * elements[:, None] + np.arange(width)  # with the clamped node's two unknowns still in front
-    M = _scatter(np.repeat(columns[:, :, None], width, axis=2), np.repeat(columns[:, None, :], width, axis=1), mass)
-    rows = len(strain) * elements[:, None] + np.arange(len(strain))
-    B = _scatter(
-        np.repeat(rows[:, :, None], width, axis=2), np.repeat(columns[:, None, :], len(strain), axis=1), strain
-    )
+    columns = 2 * p * elements[:, None] + np.arange(2 * (p + 1))  # with the clamped node's two unknowns still in front
+    M = _scatter(columns, columns, mass, 2 * (n * p + 1))
+    B = _scatter(len(strain) * elements[:, None] + np.arange(len(strain)), columns, strain, 2 * (n * p + 1))
     M = M[2:, 2:].tocsc()
     B = B[:, 2:].tocsr()
 
@@ -168,10 +160,11 @@ def assemble(beam: Beam) -> SemiDiscreteBeam:
     return SemiDiscreteBeam(n, p, beam.length, M, (B.T @ B).tocsc(), B, uniform[2:], hat[2:], slope[2:])
 
 
-def _scatter(rows: np.ndarray, columns: np.ndarray, element: np.ndarray) -> sp.csr_matrix:
-    values = np.broadcast_to(element, (len(rows), *element.shape))
-    shape = (int(rows.max()) + 1, int(columns.max()) + 1)
-    return sp.coo_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=shape).tocsr()
+def _scatter(rows: np.ndarray, columns: np.ndarray, elements: np.ndarray, width: int) -> sp.csr_matrix:
+    """Return the sum of ``elements`` (n, r, c), or one for all, at their ``rows`` (n, r) and ``columns`` (n, c)."""
+    i, j, values = np.broadcast_arrays(rows[:, :, None], columns[:, None, :], elements)
+    shape = (int(rows.max()) + 1, width)
+    return sp.coo_matrix((values.ravel(), (i.ravel(), j.ravel())), shape=shape).tocsr()
 
 
 @dataclass(frozen=True)
