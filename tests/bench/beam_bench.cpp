@@ -4,13 +4,11 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
-#include <array>
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
 #include <string>
 
-#include "../../fmus/adapter/instance.hpp"
 #include "../../src_beam/beam.hpp"
 #include "../../src_beam/timoshenko.hpp"
 #include "paired.hpp"
@@ -76,34 +74,6 @@ class BareModes {
  private:
   Eigen::ArrayXXd a_, rows_;
   Eigen::ArrayXd eta_, v_, next_;
-};
-
-/// beam.fmu without the library around it, called as an importer written in C would.
-class Fmu {
- public:
-  explicit Fmu(const beam::Parameters& p) {
-    set("young_modulus", fmi::Type::real, p.young_modulus);
-    set("shear_modulus", fmi::Type::real, p.shear_modulus);
-    set("n_elements", fmi::Type::integer, p.n_elements);
-    set("n_modes", fmi::Type::integer, p.n_modes);
-    set("integrator", fmi::Type::integer, static_cast<int>(p.integrator));
-    set("initial_velocity_slope", fmi::Type::real, p.initial_velocity_slope);
-    instance_.enter_initialization();
-    instance_.exit_initialization();
-  }
-  void step() { instance_.step(instance_.time(), h); }
-  void keep() { instance_.save(start_); }
-  void repeat() {
-    instance_.restore(start_);
-    step();
-  }
-
- private:
-  void set(const char* name, fmi::Type type, double value) {
-    instance_.set(static_cast<unsigned>(fmi::table().index(name)), type, value);
-  }
-  fmi::Instance instance_;
-  fmi::Snapshot start_;
 };
 
 /// A line of /proc/self/status [bytes].
@@ -173,12 +143,16 @@ int main(int argc, char** argv) {
         [&] { bare.solve_and_multiply(); });
   }
   {
-    Fmu fmu(paper(1000, 64));
+    const beam::Parameters p = paper(1000, 64);
+    bench::Fmu fmu({{"young_modulus", p.young_modulus},
+                    {"shear_modulus", p.shear_modulus},
+                    {"n_elements", p.n_elements},
+                    {"n_modes", p.n_modes},
+                    {"initial_velocity_slope", p.initial_velocity_slope}});
     BareModes bare(64);
     const double force = 1.0;
-    bench::compare("modal fmu", o, [&] { fmu.step(); }, [&] { bare.step(force); });
-    fmu.keep();
-    bench::compare("modal fmu repeated", o, [&] { fmu.repeat(); }, [&] { bare.step(force); });
+    bench::compare("modal fmu", o, [&] { fmu.step(h); }, [&] { bare.step(force); });
+    bench::compare("modal fmu repeated", o, [&] { fmu.repeat(h); }, [&] { bare.step(force); });
   }
   scaling(o);
   return 0;

@@ -7,7 +7,10 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
+#include <utility>
 #include <vector>
+
+#include "../../fmus/adapter/instance.hpp"
 
 namespace bench {
 
@@ -68,6 +71,30 @@ void compare(const char* name, const Options& o, const Ours& ours, const Rival& 
   print("rival", b);
   std::printf("}\n");
 }
+
+/// An FMU without the library around it, called as an importer written in C would.
+class Fmu {
+ public:
+  explicit Fmu(const std::vector<std::pair<const char*, double>>& values) {
+    for (const auto& [name, value] : values) {
+      const auto i = static_cast<unsigned>(fmi::table().index(name));
+      instance_.set(i, fmi::table().variables[i].type, value);
+    }
+    instance_.enter_initialization();
+    instance_.exit_initialization();
+    instance_.save(start_);
+  }
+  void step(double H) { instance_.step(instance_.time(), H); }
+  /// The step from the start.
+  void repeat(double H) {
+    instance_.restore(start_);
+    step(H);
+  }
+
+ private:
+  fmi::Instance instance_;
+  fmi::Snapshot start_;
+};
 
 /// The result of a computation that must not be left out.
 inline void keep(double value) {

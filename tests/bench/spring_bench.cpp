@@ -9,7 +9,6 @@
 #include <cstdlib>
 #include <stdexcept>
 
-#include "../../fmus/adapter/instance.hpp"
 #include "../../src_spring/spring.hpp"
 #include "paired.hpp"
 
@@ -122,32 +121,6 @@ double exact(const Problem& p) {
   return static_cast<double>(y);
 }
 
-/// spring.fmu without the library around it.
-class Fmu {
- public:
-  explicit Fmu(const Problem& p) {
-    set("linear_stiffness", p.k1);
-    set("cubic_stiffness", p.k2);
-    set("displacement", p.y);
-    set("velocity", p.z);
-    instance_.enter_initialization();
-    instance_.exit_initialization();
-    instance_.save(start_);
-  }
-  void step(double force, double H) {
-    instance_.restore(start_);
-    set("contact_force", force);
-    instance_.step(0.0, H);
-  }
-
- private:
-  void set(const char* name, double value) {
-    instance_.set(static_cast<unsigned>(fmi::table().index(name)), fmi::Type::real, value);
-  }
-  fmi::Instance instance_;
-  fmi::Snapshot start_;
-};
-
 void compare(const char* name, const Problem& p, double relative, const bench::Options& o) {
   spring::Parameters parameters;
   parameters.mass = p.m;
@@ -191,9 +164,12 @@ int main(int argc, char** argv) {
   stiff.k2 = 67.0;
   compare("fig4 1e-12", stiff, 1e-12, o);
 
-  spring::Parameters parameters;
   BareIda bare(soft, 1e-12, 1e-14);
-  Fmu fmu(soft);
-  bench::compare("fmu", o, [&] { fmu.step(soft.C, soft.H); }, [&] { bare.step(); });
+  bench::Fmu fmu({{"linear_stiffness", soft.k1},
+                  {"cubic_stiffness", soft.k2},
+                  {"displacement", soft.y},
+                  {"velocity", soft.z},
+                  {"contact_force", soft.C}});
+  bench::compare("fmu", o, [&] { fmu.repeat(soft.H); }, [&] { bare.step(); });
   return 0;
 }

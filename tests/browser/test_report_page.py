@@ -21,8 +21,6 @@ from springbeam.results.reading import load_trajectory
 from springbeam.results.trajectory import Trajectory
 from springbeam.scene import shipped_scenes
 
-pytestmark = pytest.mark.browser
-
 DESKTOP, PHONE = {"width": 1200, "height": 900}, {"width": 390, "height": 800}
 #: Shorter where nothing new happens later.
 T_END = {"soft": 0.3, "duffing": 4.0, "bar-impact": 2.2}

@@ -17,8 +17,6 @@ import numpy as np
 import pytest
 from importers import END, HERE, SIZE, SYSTEMS, System, installed, run
 
-pytestmark = pytest.mark.interop
-
 each_system = pytest.mark.parametrize("system", SYSTEMS, indirect=True)
 each_model = pytest.mark.parametrize("model", ["beam", "spring"])
 
