@@ -319,6 +319,7 @@ MISTAKES = {
     "accuracy in per cent": ("run soft --accuracy 5", ["--accuracy 5: must be between 0 and 1, as in"]),
     "mesh without accuracy": ("run soft --mesh", ["--mesh: picks a mesh that keeps an accuracy", "--accuracy 1e-3"]),
     "rows too close": ("run soft --output-interval 1e-9", ["--output-interval 1e-09: more than", "take a longer one"]),
+    "rows backwards": ("run soft --output-interval=-1", ["--output-interval -1: must be a time above 0 s"]),
     "rows with checkpoints": (
         "run soft --output-interval 1e-2 --checkpoint 1",
         ["--output-interval 0.01: --checkpoint"],

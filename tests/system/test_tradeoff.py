@@ -114,7 +114,7 @@ def test_every_axis_is_swept_that_the_law_has(law, there, absent):
 
 
 def test_command(tmp_path):
-    arguments = ["tradeoff", "duffing", "--until", "0.5", "--repeats", "1", "--json", "--out", str(tmp_path / "out")]
+    arguments = ["tradeoff", "duffing", "--until", "0.5", "--repeats", "2", "--json", "--out", str(tmp_path / "out")]
     result = command(*arguments)
     assert result.exit_code == 0, result.output
     table = json.loads(result.stdout)
@@ -123,6 +123,7 @@ def test_command(tmp_path):
     rows = list(csv.DictReader((tmp_path / "out" / "tradeoff.csv").open()))
     assert {row["family"] for row in rows} >= {"energy 0", "DOP853"}
     assert all(row["u_tip_max"] == "" for row in rows)
+    assert any(float(row["solve_spread"]) > 0.0 for row in rows)  # of both times
     assert (tmp_path / "out" / "tradeoff.png").stat().st_size > 10_000
 
 
