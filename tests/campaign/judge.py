@@ -16,7 +16,7 @@ from springbeam.run.outcome import RunStopped
 from springbeam.scene import Scene, SceneError
 from springbeam.scene.resolution import peak_force_doubt
 from springbeam.scene.suspicions import suspicions
-from springbeam.studies.tradeoff.errors import errors
+from springbeam.studies.tradeoff.points import errors
 
 #: Ways to run a scene: an accuracy, or [coupling] at the scene's own macro step.
 WAYS: dict[str, dict[str, Any]] = {

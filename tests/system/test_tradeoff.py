@@ -16,7 +16,7 @@ from springbeam.studies import tradeoff
 from springbeam.studies.study import record_all
 from springbeam.studies.tradeoff import Tradeoff
 from springbeam.studies.tradeoff.configurations import configurations
-from springbeam.studies.tradeoff.errors import errors
+from springbeam.studies.tradeoff.points import errors
 
 
 @pytest.fixture(scope="module")

@@ -27,8 +27,7 @@ from ..reference import comparable_until, refuse_without_reference
 from ..study import Found, Record, Study
 from ..tables import write_csv
 from .configurations import ALGORITHM_1, SCIPY_TOLERANCES, Configuration, configurations, finer
-from .errors import Errors, errors
-from .points import Point, Points
+from .points import Errors, Point, Points, errors
 
 __all__ = ["Point", "Points", "Tradeoff"]
 

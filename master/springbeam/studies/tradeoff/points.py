@@ -1,22 +1,77 @@
-"""The points of a tradeoff: each a configuration with its errors and its cost, and what they say together."""
+"""The points of a tradeoff: each a configuration with its errors against the reference and its cost.
+
+Errors are those of displacements, event times, impulses and energy.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from pydantic import TypeAdapter
 from rich.table import Table
 
+from ...results.contact_times import contact_time_difference, impulse_difference
+from ...results.trajectory import Trajectory
 from ..tables import table
 from .configurations import ALGORITHM_1
-from .errors import Errors
 
+#: Contacts shorter than this many macro steps are no evidence either way.
+_SHORT = 2.0
 #: Relative errors for which the cheapest configuration is named.
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
 #: Columns of the CSV file.
 _COSTS = ("solve", "solve_spread", "setup", "macro_steps", "beam_steps", "spring_steps", "rollbacks", "ida_steps")
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Relative errors over the compared window; ``None`` where the scene or the run lacks the quantity.
+
+    Displacements are relative to the largest deviation of the reference from its start, impulses to the sum of the
+    reference's, the energy residual to the largest energy.
+    """
+
+    u_tip_max: float | None
+    u_tip_l2: float | None  #: root mean square
+    y_max: float | None
+    y_l2: float | None
+    event_time: float  #: largest of a change of contact, from the nearest one of the reference [s]
+    impulse: float | None
+    energy: float | None
+
+    @property
+    def displacement(self) -> float:
+        """Return the larger of the maximum errors of u_tip and y, ∞ without any."""
+        return max((error for error in (self.u_tip_max, self.y_max) if error is not None), default=math.inf)
+
+
+def errors(run: Trajectory, reference: Trajectory, macro_step: float) -> Errors:
+    """Return the errors of ``run`` at those of its rows whose times the reference has.
+
+    ``macro_step`` [s] says which contacts are too short for the run to see.
+    """
+    index = np.searchsorted(reference.time, run.time).clip(max=len(reference) - 1)
+    rows = np.flatnonzero(reference.time[index] == run.time)
+    index = index[rows]
+    values: dict[str, float | None] = dict.fromkeys(("u_tip_max", "u_tip_l2", "y_max", "y_l2"))
+    for name in ("u_tip", "y"):
+        if name in run.columns and name in reference.columns:
+            exact = reference[name]
+            scale = float(np.abs(exact - exact[0]).max()) or 1.0
+            difference = (run[name][rows] - exact[index]) / scale
+            values[f"{name}_max"] = float(np.abs(difference).max())
+            values[f"{name}_l2"] = float(np.sqrt(np.mean(difference**2)))
+    residuals = (run.summary.get(key) for key in ("max_energy_residual", "largest_relative_energy_residual"))
+    return Errors(
+        **values,
+        event_time=contact_time_difference(run, reference, _SHORT * macro_step)[0],
+        impulse=impulse_difference(run, reference),
+        energy=next((float(residual) for residual in residuals if residual is not None), None),
+    )
 
 
 @dataclass(frozen=True)
