@@ -307,6 +307,13 @@ class DuffingBody(Body):
         return self.k1 * y + self.k2 * y**3 - self.external + self.damping * velocity
 
 
+class Upper(DuffingBody):
+    """A mass above: C lifts it."""
+
+    def advance(self, time, size, contact, foundation=NO_FORCE):
+        return super().advance(time, size, tuple(-c for c in contact), foundation)
+
+
 def _sum(coefficients: list[float], h: float) -> float:
     total = 0.0
     for c in reversed(coefficients):

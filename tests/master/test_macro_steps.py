@@ -7,7 +7,7 @@ from math import log2
 
 import numpy as np
 import pytest
-from bodies import DuffingBody
+from bodies import DuffingBody, Upper
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Motion
@@ -148,13 +148,6 @@ def test_work_is_that_of_the_force_on_the_gap():
     tau = 0.5 * H * (x + 1.0)
     expected = 0.5 * H * float(weights @ ([force.value(c, t) for t in tau] * g.deriv()(tau)))
     assert force.work(c, of_polynomial(g.coef, H)[1], H) == pytest.approx(expected, rel=1e-12)
-
-
-class Upper(DuffingBody):
-    """Takes +C, as a beam does."""
-
-    def advance(self, time, size, contact, foundation=NO_FORCE):
-        return super().advance(time, size, tuple(-c for c in contact), foundation)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, drift, modal_beam, orders
+from bodies import DuffingBody, Upper, drift, modal_beam, orders
 from scipy.linalg import expm
 
 from springbeam.bodies import force
@@ -14,13 +14,6 @@ from springbeam.coupling.protocol import NotConverged, Step, Window
 from springbeam.coupling.soft import SoftSolver
 
 DEGREES = [0, 1, 2]
-
-
-class Upper(DuffingBody):
-    """A mass above: C lifts it."""
-
-    def advance(self, time, size, contact, foundation=NO_FORCE):
-        return super().advance(time, size, tuple(-c for c in contact), foundation)
 
 
 def couple(law, degree: int, size: float, steps: int, upper: Body, lower: Body, tolerance: float = 1e-13):

@@ -33,13 +33,18 @@ def after_impact(n: int, stiffness: float = 100.0, **spring: float) -> tuple[Mod
     return beam, top
 
 
+def solve(tie: Tie, size: float, beam, spring, guess: Force = NO_FORCE, time: float = 0.0) -> Force:
+    """The force of a step from where the bodies are."""
+    for body in (beam, spring):
+        body.mark()
+    return tie.solve(beam, spring, Window(time, size, (beam.motion(), spring.motion())), guess)
+
+
 def couple(scheme: str, degree: int, size: float, steps: int, beam, spring) -> list[Row]:
     tie = Tie(scheme, degree, 1e-12)
     rows, guess = [], NO_FORCE
     for i in range(steps):
-        for body in (beam, spring):
-            body.mark()
-        f = tie.solve(beam, spring, Window(i * size, size, (beam.motion(), spring.motion())), guess)
+        f = solve(tie, size, beam, spring, guess, i * size)
         guess = force.shifted(f, size)
         rows.append(Row(beam.motion(), spring.motion(), f, drift((beam, spring))))
     return rows
@@ -90,9 +95,7 @@ def test_a_wild_guess_does_not_loosen_the_conditions(scheme, degree):
     beam, spring = after_impact(6)
     tie = Tie(scheme, degree, 1e-12)
     for guess in ((1e15, 0.0, 0.0), NO_FORCE, NO_FORCE):
-        for body in (beam, spring):
-            body.mark()
-        tie.solve(beam, spring, Window(0.0, size, (beam.motion(), spring.motion())), guess)
+        solve(tie, size, beam, spring, guess)
     assert abs(beam.motion().displacement - spring.motion().displacement) <= 1e-12 * size
 
 
@@ -185,23 +188,16 @@ class Deaf(DuffingBody):
 
 
 def test_not_converged_carries_the_gap_that_is_left():
-    beam, spring = modal_beam(4), Deaf()
-    tie = Tie("energy", 0, 1e-12)
-    for body in (beam, spring):
-        body.mark()
     with pytest.raises(NotConverged) as caught:
-        tie.solve(beam, spring, Window(0.0, 1e-3, (beam.motion(), spring.motion())), NO_FORCE)
+        solve(Tie("energy", 0, 1e-12), 1e-3, modal_beam(4), Deaf())
     # The tip, falling 1 mm, is on the other side of zero from where the end jumps to: 0.5 m at least.
     assert 0.499 <= caught.value.residual < float("inf")
     assert f"{caught.value.residual:.3g} m" in str(caught.value)
 
 
 def test_a_body_that_is_not_finite_does_not_converge():
-    beam, spring = modal_beam(4), DuffingBody(external=float("inf"))
+    spring = DuffingBody(external=float("inf"))
     spring._reach = lambda y, size: size  # its step control needs finite numbers
-    tie = Tie("energy", 0, 1e-12)
-    for body in (beam, spring):
-        body.mark()
     with pytest.raises(NotConverged) as caught:
-        tie.solve(beam, spring, Window(0.0, 1e-3, (beam.motion(), spring.motion())), NO_FORCE)
+        solve(Tie("energy", 0, 1e-12), 1e-3, modal_beam(4), spring)
     assert not caught.value.residual < float("inf")
