@@ -100,7 +100,7 @@ def test_spring_force_is_that_of_the_duffing_law(y, load):
 
 
 def test_a_phase_is_named_by_its_joint_unless_seated():
-    names = [str(Phase(joint, seated)) for joint in Joint for seated in (False, True)]
+    names = [Phase(joint, seated).name for joint in Joint for seated in (False, True)]
     assert names == ["free", "seated", "tied", "seated", "touch", "seated"]
 
 

@@ -42,9 +42,6 @@ class Phase:
         """Name in the column ``phase``."""
         return "seated" if self.seated else self.joint.value
 
-    def __str__(self) -> str:
-        return self.name
-
 
 @dataclass(frozen=True)
 class Impact:

@@ -70,12 +70,12 @@ def run(
     ResultsUnreadable, ResultsInUse
         If the results do not belong to ``start``, or another process is writing them.
     """
-    if scene.accuracy is not None and (upper or lower) is not None:
-        raise SceneError(
-            f"accuracy = {scene.accuracy:g}: is kept by pilot runs, and a body of your own can be run once; give "
-            "coupling.scheme, degree and macro_step instead"
-        )
     if scene.accuracy is not None:
+        if (upper or lower) is not None:
+            raise SceneError(
+                f"accuracy = {scene.accuracy:g}: is kept by pilot runs, and a body of your own can be run once; give "
+                "coupling.scheme, degree and macro_step instead"
+            )
         raise SceneError(
             f"accuracy = {scene.accuracy:g}: the settings that keep it are not picked yet; run "
             "springbeam.studies.accuracy.pick(scene).scene, or take accuracy out"
@@ -86,6 +86,7 @@ def run(
     if seconds is not None:
         if not isinstance(recorder, FileRecorder):
             raise TypeError("checkpoints belong to results in a directory")
+        _refuse_checkpoints(scene)
         checkpoints = Checkpoints(recorder, seconds, version("springbeam"), fingerprints(scene), before)
 
         def after_step(time: float, phase: str, macro_steps: int) -> None:
@@ -93,8 +94,6 @@ def run(
                 progress(time, phase, macro_steps)
             checkpoints.take_when_due(simulation)
 
-    if seconds is not None:
-        _refuse_checkpoints(scene)
     of_scene = _without_own(scene, upper=upper, lower=lower)
     start_time = 0.0 if upper is not None else scene.contact_time or 0.0
     paper = scene.contact.law == "paper"

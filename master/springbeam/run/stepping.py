@@ -120,10 +120,9 @@ class Pair(Checkpointed):
         if not self.law.soft:
             return State(time)
         tip, low = self.ends()
-        p = low.displacement - tip.displacement
-        at_start = self.law.force(p, low.velocity - tip.velocity)
-        joint = Joint.TIED if self.law.lasting else Joint.TOUCH if p > 0.0 else Joint.FREE
-        return State(time, Phase(joint), (at_start, 0.0, 0.0), smoothed=at_start)
+        at_start = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
+        phase = Phase(Joint.TIED) if self.law.lasting else Phase()
+        return State(time, phase, (at_start, 0.0, 0.0), smoothed=at_start)
 
     def coupling(self, phase: Phase) -> Coupling:
         """What couples the bodies in ``phase``: a soft law acts wherever the ends are."""
