@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as npst
 from matplotlib.image import imread
 from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
 
-from springbeam.pictures import plots, timeline
+from springbeam.pictures import comparison, plots, timeline
 from springbeam.pictures.drawing import (
     EVENT_LOOKS,
     NOT_RESOLVED,
@@ -173,6 +173,12 @@ def test_panels_are_painted_with_all_that_they_say():
     energies = figure_of(run, "gap_and_energy").axes[1]
     assert len(energies.collections) > 3
     assert [line.get_label() for line in energies.lines if line.get_label()[0] != "_"] == ["total"]
+
+
+def test_runs_in_which_nothing_moves_are_compared(tmp_path):
+    still = a_trajectory(SCENES["spring"], y=np.zeros(400), z=np.zeros(400))
+    comparison.draw({"one": still, "other": still}, tmp_path / "compared.png")
+    assert imread(tmp_path / "compared.png")[..., :3].std() > 0.02  # not blank
 
 
 # -- panels: what plots and report draw over time ---------------------------------------------------------------------

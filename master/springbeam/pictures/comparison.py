@@ -21,11 +21,11 @@ _PANELS = (
 
 
 def draw(runs: Mapping[str, Trajectory], path: Path) -> None:
-    """Draw runs by their names to ``path``; a panel shows what any of them has."""
+    """Draw runs by their names to ``path``: positions, and of the other panels those that any run has values for."""
     panels = [
         (columns, label, unit)
         for columns, label, unit in _PANELS
-        if any(run[name].any() for run in runs.values() for name in present(run, columns))
+        if unit == "m" or any(run[name].any() for run in runs.values() for name in present(run, columns))
     ]
     figure, axes = plt.subplots(
         len(panels), 1, sharex=True, squeeze=False, figsize=(9.0, 2.6 * len(panels)), layout="constrained"
