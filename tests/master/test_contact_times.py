@@ -21,47 +21,33 @@ def run(*events, phase="free"):
 
 
 CONTACT = run((0.1, "impact"), (0.4, "separation"))
-
-
-def test_a_shift_counts_in_full():
-    shifted = run((0.103, "impact"), (0.395, "separation"))
-    assert difference(CONTACT, shifted, window=0.01) == (pytest.approx(0.005), 2)
-    assert difference(shifted, CONTACT, window=0.01) == (pytest.approx(0.005), 2)
-
-
-def test_a_graze_and_a_flight_shorter_than_the_window_are_no_evidence():
-    graze = run((0.1, "impact"), (0.4, "separation"), (0.7, "impact"), (0.7, "separation"))
-    flight = run((0.1, "impact"), (0.1, "separation"), (0.105, "impact"), (0.4, "separation"))
-    for other in (graze, flight):
-        assert difference(CONTACT, other, window=0.01)[0] == 0.0
-        assert difference(other, CONTACT, window=0.01)[0] == 0.0
-
-
-def test_a_lasting_contact_that_one_run_lacks_counts():
-    second = run((0.1, "impact"), (0.4, "separation"), (0.7, "impact"), (0.8, "separation"))
-    assert difference(CONTACT, second, window=0.01)[0] == pytest.approx(0.3)  # to the end of the run
-    assert difference(second, CONTACT, window=0.2)[0] == 0.0
+GRAZE = run((0.1, "impact"), (0.4, "separation"), (0.7, "impact"), (0.7, "separation"))
+FLIGHT = run((0.1, "impact"), (0.1, "separation"), (0.105, "impact"), (0.4, "separation"))
+SECOND = run((0.1, "impact"), (0.4, "separation"), (0.7, "impact"), (0.8, "separation"))
+#: Strokes that die out are one however many.
+FEW = run((0.2, "stop_impact"), (0.25, "stop_impact"), (0.26, "seated"), (0.5, "unseated"))
+MANY = run(*((0.2 + 0.06 * (1 - 0.5**k), "stop_impact") for k in range(9)), (0.26, "seated"), (0.502, "unseated"))
 
 
 @pytest.mark.parametrize(
-    ("last", "phase", "distance"),
-    [((0.4, "release"), "free", 0.0), ((0.4, "release"), "touch", 0.6)],
-    ids=["opens", "goes on in touch"],
+    ("first", "second", "window", "expected", "number"),
+    [
+        (CONTACT, run((0.103, "impact"), (0.395, "separation")), 0.01, 0.005, 2),
+        (run((0.103, "impact"), (0.395, "separation")), CONTACT, 0.01, 0.005, 2),
+        # A graze and a flight shorter than the window are no evidence.
+        *((a, b, 0.01, 0.0, 2) for other in (GRAZE, FLIGHT) for a, b in ((CONTACT, other), (other, CONTACT))),
+        # A lasting contact that one run lacks counts to the end of the run.
+        (CONTACT, SECOND, 0.01, 0.3, 4),
+        (SECOND, CONTACT, 0.2, 0.0, 2),
+        # A release ends the contact only without a push.
+        (CONTACT, run((0.1, "impact"), (0.4, "release")), 0.01, 0.0, 2),
+        (CONTACT, run((0.1, "impact"), (0.4, "release"), phase="touch"), 0.01, 0.6, 1),
+        (FEW, MANY, 0.06, 0.002, 2),
+        (run((0.2, "stop_impact")), run((0.2, "stop_impact"), (0.6, "stop_impact")), 0.01, 0.4, 2),
+    ],
 )
-def test_a_release_ends_the_contact_only_without_a_push(last, phase, distance):
-    assert difference(CONTACT, run((0.1, "impact"), last, phase=phase), window=0.01)[0] == pytest.approx(distance)
-
-
-def test_strokes_that_die_out_are_one_however_many():
-    few = run((0.2, "stop_impact"), (0.25, "stop_impact"), (0.26, "seated"), (0.5, "unseated"))
-    many = run(*((0.2 + 0.06 * (1 - 0.5**k), "stop_impact") for k in range(9)), (0.26, "seated"), (0.502, "unseated"))
-    assert difference(few, many, window=0.06) == (pytest.approx(0.002), 2)
-
-
-def test_a_stroke_that_one_run_lacks_counts():
-    assert difference(run((0.2, "stop_impact")), run((0.2, "stop_impact"), (0.6, "stop_impact")), 0.01)[
-        0
-    ] == pytest.approx(0.4)
+def test_how_far_two_runs_are_apart(first, second, window, expected, number):
+    assert difference(first, second, window) == (pytest.approx(expected, abs=1e-15), number)
 
 
 def test_changes_of_contact_are_named_in_their_order():
