@@ -73,13 +73,10 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
     changes = _override(data, overrides)
     if accuracy is not None:
         data["accuracy"] = accuracy
-    for load in data["loads"] if isinstance(data.get("loads"), list) else ():
-        if isinstance(load, dict) and isinstance(load.get("file"), str):
-            load["file"] = os.path.abspath(path.parent / load["file"])
-    for table in ("beam", "spring"):
-        body = data.get(table)
-        if isinstance(body, dict) and isinstance(body.get("fmu"), str):
-            body["fmu"] = os.path.abspath(path.parent / body["fmu"])
+    loads = data["loads"] if isinstance(data.get("loads"), list) else []
+    for content, key in ((data.get("beam"), "fmu"), (data.get("spring"), "fmu"), *((load, "file") for load in loads)):
+        if isinstance(content, dict) and isinstance(content.get(key), str):
+            content[key] = os.path.abspath(path.parent / content[key])
     for (table, key), override in changes.items():
         if (picked := _picked(data, table, key)) is not None:
             raise SceneError(f"--set {override}: {picked}; leave one of the two out")
