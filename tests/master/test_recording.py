@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from runs import PAIR, SCENES
 
 from springbeam.results.directory import (
     ANIMATIONS,
@@ -30,13 +31,8 @@ from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.reading import load_events, load_summary, load_trajectory
 from springbeam.results.recording import MemoryRecorder, NonFiniteValue
 from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, Event, columns_of
-from springbeam.scene import SceneError, load_scene, with_changes
+from springbeam.scene import SceneError
 
-PAIR = load_scene("soft")
-BEAM_AND_STOP = with_changes(PAIR, spring=None)
-SPRING_AND_STOP = with_changes(PAIR, beam=None)
-BEAM = with_changes(PAIR, spring=None, stop=None)
-SPRING = with_changes(PAIR, beam=None, stop=None)
 SHAPE = np.linspace(0.0, 1.0, 21) ** 2
 
 
@@ -55,8 +51,8 @@ def record(recorder, rows=3, event=None):
         recorder.event(event)
 
 
-def filed(path, scene=PAIR, **arguments):
-    recorder = FileRecorder(scene, RunDirectory.create(path))
+def filed(path, **arguments):
+    recorder = FileRecorder(PAIR, RunDirectory.create(path))
     record(recorder, **arguments)
     recorder.finish({"status": "done", "macro_steps": 3})
     return recorder
@@ -71,17 +67,17 @@ OF_CONTACT = {
 
 
 @pytest.mark.parametrize(
-    ("scene", "without"),
+    ("has", "without"),
     [
-        (PAIR, set()),
-        (with_changes(PAIR, stop=None), {"foundation_force"}),
-        (BEAM_AND_STOP, {"y", "z", "e_spring", *OF_CONTACT}),
-        (BEAM, {"y", "z", "e_spring", *OF_CONTACT, "gap", "foundation_force"}),
-        (SPRING, {"u_tip", "v_tip", "e_beam", *OF_CONTACT, "gap", "foundation_force"}),
+        ("all", set()),
+        ("no stop", {"foundation_force"}),
+        ("no spring", {"y", "z", "e_spring", *OF_CONTACT}),
+        ("beam", {"y", "z", "e_spring", *OF_CONTACT, "gap", "foundation_force"}),
+        ("spring", {"u_tip", "v_tip", "e_beam", *OF_CONTACT, "gap", "foundation_force"}),
     ],
 )
-def test_columns_of_absent_bodies_are_left_out_in_order(scene, without):
-    assert columns_of(scene) == tuple(name for name in COLUMNS if name not in without)
+def test_columns_of_absent_bodies_are_left_out_in_order(has, without):
+    assert columns_of(SCENES[has]) == tuple(name for name in COLUMNS if name not in without)
 
 
 # -- what both recorders do ---------------------------------------------------------------------------------------
@@ -103,7 +99,7 @@ def make(request, tmp_path):
     return recorder
 
 
-@pytest.mark.parametrize("scene", [PAIR, BEAM_AND_STOP, SPRING_AND_STOP, BEAM, SPRING])
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
 def test_what_is_recorded_comes_back(make, scene):
     recorder = make(scene)
     event = Event(0.05, "stop_impact", y=-0.015 if scene.spring else None, impulse_foundation=0.1, energy_loss=1e-3)
@@ -119,6 +115,8 @@ def test_what_is_recorded_comes_back(make, scene):
     assert result.scene == scene
     if scene.beam is None:
         assert result.shapes is None
+        with pytest.raises(ValueError, match="without a beam"):
+            recorder.shape(0.0, SHAPE)
     else:
         times, shapes = result.shapes
         assert np.array_equal(times, result.time)
@@ -215,13 +213,6 @@ def test_files_are_plain_csv_and_json(tmp_path):
     assert summary["macro_steps"] == 3
     assert summary["scene"]["spring"]["cubic_stiffness"] == -0.2
     assert sorted(p.name for p in (tmp_path / "run").iterdir()) == WRITTEN
-
-
-def test_a_scene_without_a_beam_has_no_shapes(tmp_path):
-    recorder = filed(tmp_path / "run", SPRING)
-    assert not recorder.directory.shapes.exists()
-    with pytest.raises(ValueError, match="without a beam"):
-        recorder.shape(0.0, SHAPE)
 
 
 def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
@@ -379,7 +370,7 @@ def result_files(path):
     return {file.name: file.read_bytes() for file in path.glob("*.csv")}
 
 
-@pytest.mark.parametrize("scene", [PAIR, SPRING])
+@pytest.mark.parametrize("scene", [PAIR, SCENES["spring"]])
 def test_a_restored_recorder_writes_the_same_files(tmp_path, scene):
     event = Event(0.05, "impact", y=0.1)
     whole = FileRecorder(scene, RunDirectory.create(tmp_path / "whole"))
