@@ -268,6 +268,13 @@ def test_an_incomplete_last_line_is_left_out(tmp_path, name, cut):
         ("trajectory.csv", lambda text: text.replace("\n0.1,", "\n0.1,0.5,", 1), r"trajectory\.csv: "),
         ("trajectory.csv", lambda text: text.replace("\n0.1,", "\nnan,", 1), r"trajectory\.csv: time .* not finite"),
         ("trajectory.csv", lambda text: "", r"trajectory\.csv: empty"),
+        ("trajectory.csv", lambda text: text.replace("time,", "t,"), r"trajectory\.csv: line 1: no column time"),
+        ("trajectory.csv", lambda text: text.replace("\n0.1", "\n0.\udcff1"), r"trajectory\.csv: .*row"),
+        (
+            "events.csv",
+            lambda text: text + 999 * text.partition("\n")[2] + "\udcff\n",
+            r"events\.csv: line 1002: not an",
+        ),
         ("events.csv", lambda text: text.replace("impact", "bang"), r"events\.csv: line 2: not an event"),
         ("events.csv", lambda text: text.replace("0.5", "five"), r"events\.csv: line 2: .*five"),
         ("events.csv", lambda text: text.replace("time,", "t,"), r"events\.csv: line 1"),
@@ -284,7 +291,7 @@ def test_damage_is_named_by_file(tmp_path, name, damage, message):
     if damage is None:
         path.unlink()
     else:
-        path.write_text(damage(path.read_text(encoding="utf-8")), encoding="utf-8")
+        path.write_text(damage(path.read_text(encoding="utf-8")), encoding="utf-8", errors="surrogateescape")
     with pytest.raises((ResultsUnreadable, SceneError), match=message):
         load_trajectory(run.directory.path)
 

@@ -35,10 +35,9 @@ _SAME = 1e-12
 class FileRecorder(Recorder):
     """Streams into a `RunDirectory` and keeps nothing, so that memory does not grow with the run.
 
-    A row is in its file when `row` returns (what `springbeam.results.steps` keeps of its step, some rows later), and
-    ``summary.json`` says from the start which scene it belongs to: the
-    results of a run that was killed can be loaded. Results of an earlier run stay until this one has something to
-    record, and are gone then.
+    A row is in its file when `row` returns, its step some rows later, and ``summary.json`` says from the start which
+    scene it belongs to: the results of a run that was killed can be loaded. Results of an earlier run stay until this
+    one has something to record; then they are removed.
 
     Parameters
     ----------

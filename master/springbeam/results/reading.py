@@ -87,16 +87,19 @@ def load_events(directory: str | Path) -> Iterator[Event]:
 
 
 def _complete_lines(path: Path) -> tuple[tuple[str, ...], Iterator[str]]:
-    """Return the header and an iterator over the lines after it that end in a newline."""
+    """Return the header and an iterator over the lines after it that end in a newline.
+
+    A byte that is no text makes its line unreadable, not the file.
+    """
 
     def lines() -> Iterator[str]:
-        with path.open(encoding="utf-8", newline="\n") as file:
+        with path.open(encoding="utf-8", errors="replace", newline="\n") as file:
             yield from (line for line in file if line.endswith("\n"))
 
     try:
         everything = lines()
         header = next(everything, None)
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise ResultsUnreadable(f"{path}: {error}") from error
     if header is None:
         raise ResultsUnreadable(f"{path}: empty")
@@ -104,6 +107,8 @@ def _complete_lines(path: Path) -> tuple[tuple[str, ...], Iterator[str]]:
 
 
 def _read_table(path: Path, header: tuple[str, ...], lines: Iterator[str]) -> dict[str, np.ndarray]:
+    if "time" not in header:
+        raise ResultsUnreadable(f"{path}: line 1: no column time")
     kinds = [(name, f"U{PHASE_WIDTH}" if name == "phase" else "f8") for name in header]
     first = next(lines, None)
     if first is None:

@@ -64,7 +64,7 @@ class Recorder(ABC):
         self._phase_at = self.columns.index("phase") if "phase" in self.columns else -1
         self._numbers = [name for name in self.columns if name != "phase"]
         self._phases: set[str] = set()
-        self._steps = bytearray()  #: those that are nowhere else
+        self._steps = bytearray()  #: those that are in no file
 
     def row(self, values: Sequence[Any], step: bytes | None = None) -> None:
         """Record an accepted step: a value per column, in their order.
