@@ -172,7 +172,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
         monkeypatch.setattr(owner, name, watched)
 
     def phase(_: Pair, state: Any, *_arguments: Any) -> str:
-        return script.where if script.where == "location" else str(state.phase)
+        return script.where if script.where == "location" else state.phase.name
 
     watch(Pair, "attempt", phase)
     for owner, name, where in (
