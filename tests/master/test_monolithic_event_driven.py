@@ -316,6 +316,21 @@ def test_undeformed_approach_starts_at_contact() -> None:
     np.testing.assert_allclose(result.shapes[1][0], 0.01 * np.linspace(0.0, 1.0, 21), atol=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("speed", "e", "kind"), [(1.0, 0.5, "stop_impact"), (1.0, 0.0, "seated"), (0.0, 0.5, "seated")]
+)
+def test_a_tip_that_starts_on_the_stop_acts_on_it_at_once(speed: float, e: float, kind: str) -> None:
+    """It arrives with −speed, or a load presses it down; the row of that time is of what follows."""
+    start = {"initial_deflection_slope": 0.0, "initial_velocity_slope": -speed, "distributed_load": -5.0}
+    beam = {"n_elements": 8, "approach": "elastic", **start}
+    scene = with_changes(load_scene("beam-on-stop"), beam=beam, stop={"position": 0.0, "restitution": e})
+    result = simulate(scene, sample_times=[0.0], t_end=1e-4)
+    assert result.events[0].kind == kind
+    assert result.events[0].time == 0.0
+    assert result.v_tip[0] == pytest.approx(e * speed, abs=1e-14)
+    assert result.phase[0] == ("seated" if kind == "seated" else "free")
+
+
 def test_perturbation_shows_in_proportion() -> None:
     """An event time moves linearly with a small change of the initial velocity: the horizon can be measured."""
     scene = soft()

@@ -116,23 +116,17 @@ class Oscillators:
         force, force_dot = np.empty(shape), np.empty(shape)
         near = np.abs(self.fast) * size <= _SLOW
         if np.any(near):
-            kernel, kernel_dot = self._pick(near).kernels((TARGETS[:, None] - _ELAPSED) * size)
+            oscillators = Oscillators(self.omega2[near], self.alpha)
+            kernel, kernel_dot = oscillators.kernels((TARGETS[:, None] - _ELAPSED) * size)
             force[..., near] = np.matmul(_WEIGHTED * size, kernel)
             force_dot[..., near] = np.matmul(_WEIGHTED * size, kernel_dot)
         if not np.all(near):
             far = ~near
             slow, fast = self.slow[far], self.fast[far]
-            over = self.over[far]
-            with_fast = _convolve(fast, size)
-            with_slow = np.where(over, 0.0, with_fast.conj())
-            if np.any(over):
-                with_slow[..., over] = _convolve(slow[over], size)
+            with_slow, with_fast = _convolve(slow, size), _convolve(fast, size)
             force[..., far] = ((with_slow - with_fast) / (slow - fast)).real
             force_dot[..., far] = ((slow * with_slow - fast * with_fast) / (slow - fast)).real
         return StepWeights(S_dot + 2.0 * self.sigma * S, S, -self.omega2 * S, S_dot, force, force_dot)
-
-    def _pick(self, which: np.ndarray) -> Oscillators:
-        return self if np.all(which) else Oscillators(self.omega2[which], self.alpha)
 
     def components(self, xi: np.ndarray, xi_dot: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rates |s| [1/s] and amplitudes of the free motion about equilibrium under ``force``, both (2p,)."""
@@ -155,6 +149,6 @@ def _convolve(s: np.ndarray, size: float) -> np.ndarray:
     m = np.arange(STAGES)[:, None, None]
     with np.errstate(over="ignore", invalid="ignore"):
         bessel = np.sqrt(0.5 * np.pi / w) * ive(m + 0.5, w) * np.exp(np.abs(w.real) - w)
-    limit = 0.5 * (1.0 - (-1.0) ** m * np.exp(-2.0 * w)) / w
+        limit = 0.5 * (1.0 - (-1.0) ** m * np.exp(-2.0 * w)) / w
     responses = np.where(np.abs(w) > _LIMIT, limit, bessel)
     return np.asarray(size * np.einsum("tmk,mtp->tkp", _ON_PARTS, responses))

@@ -75,11 +75,9 @@ class HybridState:
             if m.v <= m.z:
                 self._meet()
         elif s.alone and s.scene.stop is not None and m.u - s.stop.position <= noise:
-            if m.v < 0.0:
+            onto_it = m.v < 0.0 or (m.v == 0.0 and m.a @ s.b < 0.0)
+            if onto_it:
                 self._hit_stop()
-            elif m.v == 0.0 and m.a @ s.b < 0.0:
-                self._seat()
-                self._emit("seated")
 
     # What laws ask --------------------------------------------------------------------------------------------------
 
