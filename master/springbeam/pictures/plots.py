@@ -25,7 +25,6 @@ from .drawing import (
     GREY,
     POSITIONS,
     VELOCITIES,
-    Unit,
     alternates,
     drawable,
     length_along,
@@ -103,7 +102,6 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     some = steps > 1e-6 * np.max(steps, initial=0.0)  # between rows of one event Δu is rounding
     velocities = np.diff(shapes, axis=0)[some] / steps[some, None]
     _curves(figure, left, trajectory, times, shapes, "deflection u", "m", bar=False)
-    _levels(left, trajectory, shapes)
     middles = 0.5 * (times[1:] + times[:-1])[some]
     _curves(figure, right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s", bar=True)
     seen = (trajectory["time"] >= times[0]) & (trajectory["time"] <= times[-1])
@@ -130,7 +128,6 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
     some = np.searchsorted(times, wanted)
     some = np.unique((np.append(some, some + 1) if jumpy else some).clip(max=len(times) - 1))
     _curves(figure, left, trajectory, times[some], shapes[some], "deflection u", "m", bar=True)
-    _levels(left, trajectory, shapes[some])
     _map(figure, right, trajectory, times, shapes)
     if jumpy:
         left.set_title("pairs of successive shapes: they alternate\nfrom step to step", **REMARK)
@@ -148,45 +145,42 @@ def _curves(
     *,
     bar: bool,
 ) -> None:
-    """Draw curves over x, coloured from early (dark) to late."""
+    """Draw curves over x, coloured from early (dark) to late; beside deflections [m] the levels that are near."""
     readable, clock = readable_unit([curves], unit), readable_unit([times], "s")
-    x, length = _positions_along(trajectory)
+    x = _along_the_beam(ax, trajectory)
     norm = Normalize(clock.factor * times[0], clock.factor * times[-1])
     lines = [np.column_stack([x, readable.factor * curve]) for curve in curves]
     ax.add_collection(LineCollection(lines, array=clock.factor * times, cmap=_CLOCK, norm=norm, linewidths=1.0))
     ax.axhline(0.0, color=GREY, lw=0.5, zorder=0)
     ax.set_xlim(x[0], x[-1])
-    ax.set_xlabel(f"position along the beam x [{length.name}]")
     ax.set_ylabel(f"{what} [{readable.name}]")
     ax.autoscale_view(scalex=False)
+    if unit == "m":
+        near = near_levels(trajectory.scene, [curves])
+        paint_levels(ax, {symbol: readable.factor * height for symbol, height in near.items()})
     if bar:
         mappable = ScalarMappable(norm, _CLOCK)
         figure.colorbar(mappable, ax=ax, label=f"time t [{clock.name}]", pad=0.05, aspect=30)
 
 
-def _levels(ax: Axes, trajectory: Trajectory, shapes: np.ndarray) -> None:
-    factor = readable_unit([shapes], "m").factor
-    near = near_levels(trajectory.scene, [shapes])
-    paint_levels(ax, {symbol: factor * height for symbol, height in near.items()})
-
-
 def _map(figure: Figure, ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray) -> None:
     """Draw the deflection over x and t."""
     readable, clock = readable_unit([shapes], "m"), readable_unit([times], "s")
-    x, length = _positions_along(trajectory)
+    x = _along_the_beam(ax, trajectory)
     distinct = np.r_[True, np.diff(times) > 0.0]
     times, shapes = times[distinct], shapes[distinct]
     largest = readable.factor * float(np.max(np.abs(shapes))) or 1.0
     mesh = ax.pcolormesh(x, clock.factor * times, readable.factor * shapes, cmap="PuOr", vmin=-largest, vmax=largest,
                          shading="gouraud", rasterized=True)  # fmt: skip
-    ax.set_xlabel(f"position along the beam x [{length.name}]")
     ax.set_ylabel(f"time t [{clock.name}]")
     figure.colorbar(mesh, ax=ax, label=f"deflection u [{readable.name}]", pad=0.02, aspect=30)
 
 
-def _positions_along(trajectory: Trajectory) -> tuple[np.ndarray, Unit]:
+def _along_the_beam(ax: Axes, trajectory: Trajectory) -> np.ndarray:
+    """Name the axis of positions, and return those of `SHAPE_POINTS` in its unit."""
     unit, length = length_along(trajectory.scene)
-    return length * SHAPE_POINTS, unit
+    ax.set_xlabel(f"position along the beam x [{unit.name}]")
+    return length * SHAPE_POINTS
 
 
 # -- (C), (D), (E): over time -------------------------------------------------------------------------------------
