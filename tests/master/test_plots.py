@@ -78,10 +78,7 @@ def texts(figure):
     return [text for text in found if text]
 
 
-FIGURES = ["shapes_after_contact", "shapes_later", "positions", "velocities_and_forces", "gap_and_energy"]
-
-
-@pytest.mark.parametrize("picture", FIGURES)
+@pytest.mark.parametrize("picture", plots._DRAWINGS)
 def test_axes_have_quantities_and_units_and_the_key_names_phases_and_events(picture):
     figure = figure_of(a_trajectory(events=EVERY_EVENT), picture)
     if picture.startswith("shapes"):
@@ -155,7 +152,7 @@ def test_shapes_that_alternate_are_drawn_in_pairs():
     assert {curve[-1, 1] for curve in figure.axes[0].collections[0].get_segments()} == {-1.0, 1.0}
 
 
-@pytest.mark.parametrize("picture", FIGURES)
+@pytest.mark.parametrize("picture", plots._DRAWINGS)
 def test_every_picture_of_a_run_that_is_not_resolved_carries_the_mark(picture):
     for resolved in (True, False):
         run = dataclasses.replace(a_trajectory(), summary={"resolved": resolved})

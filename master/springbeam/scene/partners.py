@@ -77,8 +77,7 @@ class RigidWall(Table):
     position: float = key("m", "where it is", 0.0)
 
 
-Element = PointMass | SpringDamper | RigidWall
-Partner = ForeignFmu | Element
+Partner = ForeignFmu | PointMass | SpringDamper | RigidWall
 #: The tables of partners by what names them: the key ``fmu``, or the value of ``element``.
 PARTNERS: dict[str, type[Table]] = {
     "fmu": ForeignFmu,
