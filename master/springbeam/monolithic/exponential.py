@@ -41,8 +41,6 @@ class _Weights:
     """Those of a step, and what follows from them for the phase; p modes, o interface outputs, k inputs."""
 
     modes: StepWeights
-    constant: np.ndarray  #: (targets, p): the response to c
-    constant_dot: np.ndarray
     interface: np.ndarray  #: (o, stages, k, stages): r at the Gauss points → w there
     interface_dot: np.ndarray
 
@@ -152,8 +150,8 @@ class LinearForm:
         return s.synchronise(self.phase, states)
 
     def load_at(self, times: np.ndarray) -> np.ndarray:
-        """The loads on the modes at ``times`` [s] of shape (...), (..., p)."""
-        return np.asarray(self.system.loads.values(times) @ self.loads)
+        """All loads on the modes at ``times`` [s] of shape (...), (..., p)."""
+        return np.asarray(self.constant + self.system.loads.values(times) @ self.loads)
 
     def forces_at(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
         """The forces r of one state, (k, 1)."""
@@ -187,8 +185,6 @@ class LinearForm:
         pairs = self.outputs[:, None, :] * self.inputs  # (o, k, p)
         return _Weights(
             modes=modes,
-            constant=self.constant * modes.force.sum(axis=1),
-            constant_dot=self.constant * modes.force_dot.sum(axis=1),
             interface=np.einsum("okp,ijp->oikj", pairs, modes.force[:-1]),
             interface_dot=np.einsum("okp,ijp->oikj", pairs, modes.force_dot[:-1]),
         )
@@ -201,7 +197,7 @@ class LinearForm:
         """
         if not len(self.omega2):
             return self.system.loads.longest_step
-        force = self.constant + r @ self.inputs + self.load_at(np.float64(time))
+        force = r @ self.inputs + self.load_at(np.float64(time))
         rates, amplitudes = self.oscillators.components(xi, xi_dot, force)
         order = np.argsort(-rates)
         rates, amplitudes = rates[order], amplitudes[order]
@@ -276,14 +272,11 @@ class ExponentialPropagator:
         form, X = self.form, self.X
         weights = form.weights(size)
         w = weights.modes
-        free = w.C * xi + w.S * xi_dot + weights.constant
-        free_dot = w.C_dot * xi + w.S_dot * xi_dot + weights.constant_dot
         s = form.system
         times = X[s.T] + size * GAUSS.nodes
-        if len(form.loads):
-            load = form.load_at(times)
-            free = free + np.einsum("ijp,jp->ip", w.force, load)
-            free_dot = free_dot + np.einsum("ijp,jp->ip", w.force_dot, load)
+        load = form.load_at(times)
+        free = w.C * xi + w.S * xi_dot + np.einsum("ijp,jp->ip", w.force, load)
+        free_dot = w.C_dot * xi + w.S_dot * xi_dot + np.einsum("ijp,jp->ip", w.force_dot, load)
         if len(form.inputs):
             r = self._forces(weights, free[:-1] @ form.outputs.T, free_dot[:-1] @ form.outputs.T, start)
             if r is None:
