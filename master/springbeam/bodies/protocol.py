@@ -37,6 +37,10 @@ class Motion(NamedTuple):
     integral_2: float  #: ∫∫ w dτ dτ over the last step [m·s²]
 
 
+#: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
+Ends = tuple[Motion, Motion]
+
+
 class Energies(NamedTuple):
     """All in J; ``dissipated`` since the start; ``load_potential`` is −(the work of the loads), up to a constant."""
 

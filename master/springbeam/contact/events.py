@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..bodies.protocol import Motion
+from ..bodies.protocol import Ends
 from ..results.paths import Means, Sample
 from ..scene import Beam, Scene, Spring
 from ..scene.statics import tip_compliance, tip_load_deflection
@@ -22,9 +22,6 @@ from .phases import Joint, Phase, spring_force
 
 _EPS = float(np.finfo(float).eps)
 _MAX_EVALUATIONS = 60
-
-#: The interface ends (tip, lower end).
-Ends = tuple[Motion, Motion]
 
 
 class EventFunction(Protocol):

@@ -12,7 +12,7 @@ from functools import cached_property
 from math import inf
 
 from ..bodies.checkpointed import Checkpointed
-from ..bodies.protocol import Motion
+from ..bodies.protocol import Ends, Motion
 from ..scene import Scene, Spring
 from ..scene.resolution import VIBRATION
 from ..scene.statics import tip_compliance, tip_load_deflection
@@ -130,9 +130,9 @@ class Transitions(Checkpointed):
         self,
         kind: str,
         phase: Phase,
-        start: tuple[Motion, Motion],
+        start: Ends,
         elapsed: float,
-        ends: tuple[Motion, Motion],
+        ends: Ends,
         end_force: float,
         tolerance: float,
     ) -> tuple[str, Phase, Impact]:
@@ -185,9 +185,9 @@ class Transitions(Checkpointed):
     def _strike(
         self,
         phase: Phase,
-        start: tuple[Motion, Motion],
+        start: Ends,
         elapsed: float,
-        ends: tuple[Motion, Motion],
+        ends: Ends,
         tolerance: float,
     ) -> tuple[str, Phase, Impact]:
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
@@ -211,7 +211,7 @@ class Transitions(Checkpointed):
             return "seated", Phase(joint, seated=True), foundation_impact(z, masses[0], v, masses[1], restitution=0.0)
         return "stop_impact", phase, foundation_impact(z, masses[0], v, masses[1], restitution=e)
 
-    def _striking(self, ends: tuple[Motion, Motion], tied: bool) -> tuple[float | None, float | None]:
+    def _striking(self, ends: Ends, tied: bool) -> tuple[float | None, float | None]:
         """Velocities (tip, spring top) [m/s] of those that strike the foundation; ``None`` for one that does not."""
         tip, low = ends
         return (

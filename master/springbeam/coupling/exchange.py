@@ -12,9 +12,9 @@ for the second body of ``gauss_seidel`` towards the force at the step's end with
 
 from __future__ import annotations
 
-from ..bodies.protocol import Body, Force
+from ..bodies.protocol import Body, Ends, Force
 from ..contact.laws import SoftLaw
-from .protocol import Booking, Coupling, Ends, Window
+from .protocol import Booking, Coupling, Window
 
 
 class Exchange(Coupling):

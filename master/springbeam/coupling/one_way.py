@@ -17,9 +17,9 @@ from __future__ import annotations
 from math import inf
 
 from ..bodies import force
-from ..bodies.protocol import Body, Force, Prescribed
+from ..bodies.protocol import Body, Ends, Force, Prescribed
 from ..contact.laws import SoftLaw
-from .protocol import Booking, Ends, Neglected, Step, Window
+from .protocol import Booking, Neglected, Step, Window
 from .soft import SoftSolver, penetration
 
 

@@ -6,10 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ..bodies.checkpointed import Checkpointed
-from ..bodies.protocol import NO_FORCE, Body, Force, Motion, StepRefused
+from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion, StepRefused
 
-#: The interface ends (tip, lower end): the spring top, or without a spring the foundation.
-Ends = tuple[Motion, Motion]
 #: Conditions on the gap over a step of size H as a linear map of an end's motion, each in metres.
 Conditions = Callable[[Motion, float], tuple[float, ...]]
 #: A relative error of a step, and the order in which it falls with the step's size.

@@ -16,11 +16,11 @@ from operator import add, neg, sub
 
 import numpy as np
 
-from ..bodies.protocol import Body, Force
+from ..bodies.protocol import Body, Ends, Force
 from ..contact.laws import SoftLaw
 from . import energy
 from .projection import Projection
-from .protocol import Booking, Ends, ErrorEstimate, NotConverged, Scales, Step, Window
+from .protocol import Booking, ErrorEstimate, NotConverged, Scales, Step, Window
 from .small import Matrix, Vector, inverse, times
 from .solver import StepSolver
 
@@ -170,7 +170,7 @@ class SoftSolver(StepSolver):
     ) -> tuple[Vector, Vector] | None:
         """Start from the law so soft that the bodies hardly feel it, and stiffen it from crossing to crossing.
 
-        To soften the law is to have bodies that are harder to move by as much, under forces as much larger.
+        The law softened by a factor s has its crossing where the law itself has one with E/s and a/s.
         """
         x = list(map(sub, x, times(inverse(descent), a)))
         a = [0.0] * len(a)

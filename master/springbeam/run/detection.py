@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ..bodies.protocol import Motion, StepRefused
+from ..bodies.protocol import Ends, Motion, StepRefused
 from ..contact.events import (
     EventFunction,
     EventFunctions,
@@ -17,7 +17,7 @@ from ..contact.events import (
     position_tolerance,
 )
 from ..contact.phases import Joint, common_velocity
-from ..coupling.protocol import Ends, Step
+from ..coupling.protocol import Step
 from ..results.paths import Path, Sample
 from ..results.trajectory import Event
 from ..scene import Scene

@@ -7,8 +7,8 @@ from math import inf, isfinite
 from typing import Any
 
 from ..bodies.checkpointed import Checkpointed
-from ..bodies.protocol import Body, Energies
-from ..coupling.protocol import Booking, Ends
+from ..bodies.protocol import Body, Ends, Energies
+from ..coupling.protocol import Booking
 from ..scene import Scene
 from ..scene.tables import ORDINARY_SCHEMES
 from .outcome import RunStopped

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 from ..bodies import force
 from ..bodies.checkpointed import Checkpointed
-from ..bodies.protocol import NO_FORCE, Body, Energies, Force
+from ..bodies.protocol import NO_FORCE, Body, Ends, Energies, Force
 from ..bodies.rigid_wall import RigidWall
 from ..contact.laws import Transmission, law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
-from ..coupling.protocol import Booking, Coupling, Ends, Step, Uncoupled, Window
+from ..coupling.protocol import Booking, Coupling, Step, Uncoupled, Window
 from ..scene import Scene
 from .loads import Loads
 
