@@ -10,7 +10,6 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 from zlib import crc32
 
@@ -59,9 +58,7 @@ class FileRecorder(Recorder):
     def __enter__(self) -> FileRecorder:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> None:
         if self.begun and not self.finished and error is not None:
             self.finish({"status": "stopped", "cause": f"{type(error).__name__}: {error}", "time": self.time})
         self.close()
