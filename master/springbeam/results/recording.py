@@ -156,14 +156,14 @@ class MemoryRecorder(Recorder):
         self._summary: dict[str, Any] = {}
 
     def _keep_row(self, numbers: list[float], phase: str) -> None:
-        self._rows.extend(numbers)
+        self._rows.fromlist(numbers)
         self._phase_of_row.append(phase)
 
     def _keep_event(self, event: Event) -> None:
         self._events.append(event)
 
     def _keep_shape(self, numbers: list[float]) -> None:
-        self._shapes.extend(numbers)
+        self._shapes.fromlist(numbers)
 
     def steps(self) -> np.ndarray | None:
         return steps_of(self._steps)
