@@ -15,17 +15,7 @@ from typing import Annotated
 
 import typer
 
-from . import (
-    compare,
-    doctor,
-    predict,
-    report,
-    resume,
-    run,
-    scenes,
-    studies,
-    verify,
-)
+from . import compare, doctor, predict, report, resume, run, scenes, studies, verify
 from .common import STOPPED, Command, Group
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."

@@ -20,16 +20,7 @@ from ..bodies.protocol import FmuError
 from ..scene import Beam, Scene, Spring, load_scene
 from ..scene.partners import kind_of
 from ..studies.tables import table
-from .common import (
-    BAD_INPUT,
-    DISAGREES,
-    JsonOption,
-    SettingsOption,
-    bad_input_reported,
-    console_for,
-    fail,
-    print_json,
-)
+from .common import BAD_INPUT, DISAGREES, JsonOption, SettingsOption, bad_input_reported, console_for, fail, print_json
 
 _REQUIRED = ("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly")
 _FOR_SWEEPS = ("distributed", "pyarrow")

@@ -10,14 +10,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from ..scene import load_scene
-from .common import (
-    JsonOption,
-    SceneArgument,
-    SettingsOption,
-    bad_input_reported,
-    console_for,
-    print_json,
-)
+from .common import JsonOption, SceneArgument, SettingsOption, bad_input_reported, console_for, print_json
 
 if TYPE_CHECKING:
     from ..studies.stability.predict import Prediction, SchemePrediction
