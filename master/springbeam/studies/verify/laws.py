@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from functools import partial
 from math import nan, pi, sin, sqrt
 
 import numpy as np
@@ -45,12 +46,12 @@ def _phase(degree: int, angle: float) -> float:
 
 def _halving(
     quantities: tuple[tuple[str, float, Callable[[Trajectory], float]], ...],
-    scene: Callable[[float], Scene],
+    scene: Callable[..., Scene],
     size: float,
     solver: float,
 ) -> Iterator[Check]:
     """Yield checks of what a run at H = ``size``/2 gives, bounded by its change from H = ``size``."""
-    coarse, fine = simulate(scene(size)), simulate(scene(0.5 * size))
+    coarse, fine = simulate(scene(macro_step=size)), simulate(scene(macro_step=0.5 * size))
     for name, value, of in quantities:
         bound = abs(of(fine) - of(coarse)) + solver * abs(value)
         yield Check(name, value, of(fine), bound, f"{_HALVED}; and {IDA}")
@@ -77,20 +78,17 @@ def compliant_impact() -> Iterator[Check]:
         assert hit.duration is not None
         whole, steps = hit.duration, 40
         law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q}
-
-        def scene(size: float, degree: int = 2, law: dict[str, object] = law, whole: float = whole) -> Scene:
-            return exact.free_masses(_TIP, _TOP, 1.0, 1.5 * whole, law, macro_step=size, degree=degree)
-
-        solver = _solver(scene(whole / steps), pi)
+        scene = partial(exact.free_masses, _TIP, _TOP, 1.0, 1.5 * whole, law, degree=2)
+        solver = _solver(scene(macro_step=whole / steps), pi)
         if q == 1.0:
             for degree in (0, 1, 2):
                 bound = whole * (_phase(degree, pi / steps) + solver)
-                lasts = _duration(simulate(scene(whole / steps, degree)))
+                lasts = _duration(simulate(scene(macro_step=whole / steps, degree=degree)))
                 yield Check(f"q = 1, degree {degree}: lasts [s]", whole, lasts, bound, f"{_PROJECTED}; and {IDA}")
         else:
             quantity = (f"q = {q:g}, degree 2: lasts [s]", whole, _duration)
             yield from _halving((quantity,), scene, 2.0 * whole / steps, solver)
-        run = simulate(scene(whole / 10.0))
+        run = simulate(scene(macro_step=whole / 10.0))
         tolerance = 15.0 * run.scene.coupling.tolerance
         reason = f"H a tenth of the contact: no energy lost but coupling.tolerance of each of 15 steps; and {IDA}"
         yield Check(f"q = {q:g}: part at [m/s]", 1.0, _parting(run), tolerance + solver, reason)
@@ -100,19 +98,15 @@ def hunt_crossley() -> Iterator[Check]:
     """C = λ_nc p₊^q (1 + χ ṗ), χ = 0.5 s/m: the masses part at w with χ w − ln(1 + χ w) as before, and w < 0."""
     for q in (1.0, 1.5, 3.0):
         hit = exact.impact(_REDUCED, 1.0, _STIFFNESS, q, 0.5)
-        undamped = exact.impact(_REDUCED, 1.0, _STIFFNESS, q).duration
-        assert undamped is not None
+        whole = exact.impact(_REDUCED, 1.0, _STIFFNESS, q).duration
+        assert whole is not None
         law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q, "damping": 0.5}
-        whole = undamped
-
-        def scene(size: float, law: dict[str, object] = law, whole: float = whole) -> Scene:
-            return exact.free_masses(_TIP, _TOP, 1.0, 2.0 * whole, law, macro_step=size, degree=2)
-
+        scene = partial(exact.free_masses, _TIP, _TOP, 1.0, 2.0 * whole, law, degree=2)
         quantities = (
             (f"q = {q:g}: part at [m/s]", hit.rebound, _parting),
             (f"q = {q:g}: dissipated [J]", hit.dissipated, lambda run: float(run["e_dissipated"][-1])),
         )
-        yield from _halving(quantities, scene, whole / 20.0, _solver(scene(whole / 20.0), pi))
+        yield from _halving(quantities, scene, whole / 20.0, _solver(scene(macro_step=whole / 20.0), pi))
 
 
 def linked_masses() -> Iterator[Check]:
@@ -135,10 +129,8 @@ def linked_masses() -> Iterator[Check]:
             name = f"degree {degree}, H = {size:g}: error [m]"
             yield Check(name, 0.0, error(run), bound, f"largest error over 1 s. {_PROJECTED}; and {IDA}")
 
-    def damped(size: float) -> Scene:
-        return exact.linked_masses(link, 3.0, T, macro_step=size, degree=2)
-
-    u, y = exact.linked(damped(0.025), M, K, np.ones(1), np.zeros(1), np.array([T]))[0]
+    damped = partial(exact.linked_masses, link, 3.0, T, degree=2)
+    u, y = exact.linked(damped(macro_step=0.025), M, K, np.ones(1), np.zeros(1), np.array([T]))[0]
     ends = (
         ("c = 3 N·s/m: u_tip(1) [m]", float(u), lambda run: float(run["u_tip"][-1])),
         ("c = 3 N·s/m: y(1) [m]", float(y), lambda run: float(run["y"][-1])),
@@ -152,13 +144,10 @@ def tied_masses() -> Iterator[Check]:
     The tie pulls as much as it presses: C = (k₁ − k₂) y/2.
     """
     T, omega = 1.0, sqrt(8.0) * pi
-
-    def scene(size: float) -> Scene:
-        return exact.tied_masses(4.0 * pi**2, 12.0 * pi**2, T, macro_step=size, degree=2)
-
+    scene = partial(exact.tied_masses, 4.0 * pi**2, 12.0 * pi**2, T, degree=2)
     quantities = (
         ("y(1) [m]", -0.5 / omega * sin(omega * T), lambda run: float(run["y"][-1])),
         ("lost in the impact [J]", 0.25, lambda run: float(run["e_impact_loss"][-1])),
         ("C(1) [N]", 2.0 * pi**2 / omega * sin(omega * T), lambda run: float(run["contact_force"][-1])),
     )
-    yield from _halving(quantities, scene, 0.01, _solver(scene(0.01), omega * T))
+    yield from _halving(quantities, scene, 0.01, _solver(scene(macro_step=0.01), omega * T))
