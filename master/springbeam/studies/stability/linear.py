@@ -124,10 +124,9 @@ class Step:
         self.body, self.h = body, h
         S = impulse_integrals(body.omega2, body.c, h)[:, :, None]
         c, omega2, b = (v[:, None] for v in (body.c, body.omega2, body.b))
-        self._free = ((S[0] + c * S[1], S[1]), (-omega2 * S[1], S[0]))
-        self._free_integrals = ((S[1] + c * S[2], S[2]), (S[2] + c * S[3], S[3]))
-        self._forced = [[b * S[j] for j in range(2 - row, 5 - row)] for row in (0, 1)]
-        self._forced_integrals = [[b * S[j] for j in range(3 + row, 6 + row)] for row in (0, 1)]
+        # Of ∫ᵏξ, k = 0, 1, 2, and of ξ̇, k = −1: what ξ₀, ξ̇₀ and each F_j add.
+        at_start = {k: (S[k] + c * S[k + 1], S[k + 1]) for k in (0, 1, 2)} | {-1: (-omega2 * S[1], S[0])}
+        self._rows = [(*at_start[k], [b * S[j] for j in range(k + 2, k + 5)]) for k in (0, -1, 1, 2)]
 
     def __call__(self, x: np.ndarray, forces: Sequence[np.ndarray | float] = ()) -> tuple[np.ndarray, np.ndarray]:
         """Return states and motions (`Motion` as rows, shape (4, columns)) after the step.
@@ -136,17 +135,14 @@ class Step:
         """
         r = len(self.body.b)
         xi, rate = x[:r], x[r:]
-
-        def response(free: tuple[np.ndarray, np.ndarray], forced: list[np.ndarray]) -> np.ndarray:
-            total = free[0] * xi + free[1] * rate
-            for f, g in zip(forces, forced, strict=False):
-                total = total + g * f
-            return np.asarray(total)
-
-        end = np.vstack([response(*pair) for pair in zip(self._free, self._forced, strict=True)])
-        integrals = [self.body.b @ response(*pair)
-                     for pair in zip(self._free_integrals, self._forced_integrals, strict=True)]  # fmt: skip
-        return end, np.array([self.body.displacement(end), self.body.velocity(end), *integrals])
+        rows = []
+        for of_place, of_rate, of_forces in self._rows:
+            row = of_place * xi + of_rate * rate
+            for f, g in zip(forces, of_forces, strict=False):
+                row = row + g * f
+            rows.append(row)
+        end, b = np.vstack(rows[:2]), self.body.b
+        return end, np.array([self.body.displacement(end), self.body.velocity(end), b @ rows[2], b @ rows[3]])
 
     def response(self, degree: int) -> tuple[np.ndarray, np.ndarray]:
         """Return states and motions from rest under P₀ … P_degree, a column each."""
