@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from references import kinds, linear, soft, tip_mass
+from references import kinds, linear, matrices, soft, tip_mass
 from scenes import scene_from_dict
 from scipy.special import ellipj, ellipk
 
@@ -16,6 +16,7 @@ from springbeam.monolithic.laws import Phase
 from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.results.trajectory import COLUMNS, EVENT_KINDS, Trajectory
 from springbeam.scene import Scene, load_scene, with_changes
+from springbeam.studies import exact
 
 
 def spring_only(t_end: float, stop: dict[str, float] | None = None, **spring: float) -> Scene:
@@ -148,6 +149,16 @@ def test_stiff_damped_beam_agrees_with_radau() -> None:
     assert one.events[1].z == pytest.approx(two.events[1].z, rel=1e-6)
     np.testing.assert_allclose(one.y, two.y, rtol=1e-6)
     assert one.summary["counts"]["steps"] < 200
+
+
+def test_tied_phase_is_the_matrix_exponential() -> None:
+    """With k2 = 0 the tied phase is linear: exp of the full first-order system in nodal unknowns."""
+    scene = soft(6, beam={"alpha_b": 1e-3}, spring={"cubic_stiffness": 0.0, "damping": 0.4, "external_force": -0.5})
+    (M, K, x), times = matrices(scene), np.array([0.01, 0.02, 0.04])
+    y, z = exact.tied(scene, M, K, -x, times)
+    result = simulate(scene, sample_times=times, t_end=0.04)
+    np.testing.assert_allclose(result.y, y, atol=1e-13)
+    np.testing.assert_allclose(result.z, z, atol=1e-12)
 
 
 # Impacts ----------------------------------------------------------------------------------------------------------

@@ -184,11 +184,9 @@ def test_only_the_spring_strikes_the_foundation_through_a_link() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("damping", [0.0, 1e-3])
-def test_a_tie_swings_in_the_modes_of_the_joined_system(method: str, damping: float) -> None:
-    """Above Ψ and below it, pressed and pulled: exp of the full first-order system in nodal unknowns."""
-    spring = {"initial_velocity": 0.2, "damping": 400.0 * damping, "external_force": 100.0 * damping}
-    scene = linear(contact={"law": "tie"}, stop=None, beam={"alpha_b": damping}, spring=spring, time={"t_end": 2.0})
+def test_a_tie_swings_in_the_modes_of_the_joined_system(method: str) -> None:
+    """Above Ψ and below it, pressed and pulled."""
+    scene = linear(contact={"law": "tie"}, stop=None, spring={"initial_velocity": 0.2}, time={"t_end": 2.0})
     times = np.linspace(0.05, 2.0, 40)
     result = simulate(scene, method=method, sample_times=times)
     M, K, x = matrices(scene)

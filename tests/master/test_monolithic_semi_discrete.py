@@ -46,12 +46,14 @@ def test_one_element_of_degree_three_or_more_is_statically_exact(degree: int, re
 @pytest.mark.parametrize(("degree", "n"), [(1, 40), (2, 16), (3, 8), (4, 5)])
 @pytest.mark.parametrize("reduced", [False, True])
 def test_the_order_of_the_frequencies_is_twice_the_degree(degree: int, n: int, reduced: bool) -> None:
-    exact = np.array(clamped_free_frequencies()[:4])
+    exact = np.array(clamped_free_frequencies()[:6])
     assert exact[0] == pytest.approx(1.27396492100357, abs=1e-12)
     elements = {"element_degree": degree, "reduced_integration": reduced}
-    errors = [modal_beam(beam(n_elements=m, **elements)).omega[:4] / exact - 1.0 for m in (n, 2 * n)]
-    orders = np.log2(errors[0] / errors[1])[2:]
-    assert np.all(np.abs(orders - 2 * degree) < 0.08 * degree)
+    errors = [modal_beam(beam(n_elements=m, **elements)).omega[:6] / exact - 1.0 for m in (n, 2 * n)]
+    orders = np.log2(errors[0] / errors[1])
+    # Of higher degrees the errors of the lowest modes are rounding, those of the highest not small yet.
+    judged = orders if degree == 1 else orders[2:4]
+    assert np.all(np.abs(judged - 2 * degree) < 0.08 * degree)
     if degree == 1 and not reduced:
         assert errors[1][0] * exact[0] == pytest.approx(1.67e-5, rel=0.3)
 
@@ -85,6 +87,11 @@ def test_forms_are_the_integrals_of_polynomials(degree: int) -> None:
     )
     assert d.hat_load @ q == pytest.approx(0.5 * hat, rel=1e-12)
     np.testing.assert_allclose(d.deflection_sampler() @ q, 0.5 * (SHAPE_POINTS * length) ** p, atol=1e-14)
+
+
+def test_shape_is_sampled_at_the_agreed_points() -> None:
+    d = assemble(beam(n_elements=7, length=3.0))
+    np.testing.assert_allclose(d.deflection_sampler() @ d.slope_shape, 3.0 * SHAPE_POINTS, atol=1e-15)
 
 
 def test_all_modes_reproduce_the_matrices() -> None:

@@ -322,7 +322,8 @@ def test_a_missing_capability_is_named_with_what_would_work(fmu, what):
     scene = pair(fmu("plain" if said else "oscillator", **said), **{"contact": {"damping": 0.0}, **changes})
     with pytest.raises(SceneError) as caught:
         simulate(scene)
-    assert all(text in str(caught.value) for text in (*words, "[spring]"))
+    lines = str(caught.value).splitlines()
+    assert any(all(text in line for text in (*words, "[spring]")) for line in lines)
 
 
 @pytest.mark.parametrize("lie", [name for name in oscillator.LIES if name not in ("none", "hang", *LATE)])
