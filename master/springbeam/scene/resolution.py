@@ -25,9 +25,9 @@ from .tables import Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
 TURN = 1.0
-#: Largest angle [rad] that a soft contact may turn in a macro step, where its force is of degree 1, 2 in time: there
-#: displacements are up to 1 % off (docs/coupling.md has more).
-CONTACT_TURN = {1: 1.0, 2: 3.0}
+#: Largest angle [rad] that a soft contact may turn in a macro step, where its force is of degree 1, 2 in time: at 2, it
+#: lasts π/2 steps (docs/coupling.md has the errors).
+CONTACT_TURN = {1: 1.0, 2: 2.0}
 #: What all steps of degree 0 together may turn it too little [rad], one that turns it by x by x³/12 as the midpoint
 #: rule does.
 CONTACT_LAG = 0.1
