@@ -34,18 +34,11 @@ std::unique_ptr<Beam> make_beam(const Parameters& parameters) {
 }
 
 void Beam::step(double size, const Polynomial& c, const Loads& loads) {
-  require_step_size(size);
   double inputs = 0.0;
   for (const double value : c) inputs += std::abs(value);
   loads.for_each([&inputs](std::size_t, const Polynomial& f) {
     for (const double value : f) inputs += std::abs(value);
   });
-  if (!(inputs < ordinary)) {
-    for (const double value : c) require_finite("tip_force and its derivatives", value);
-    loads.for_each([](std::size_t i, const Polynomial& f) {
-      for (const double value : f) require_finite(Loads::names[i], value);
-    });
-  }
   book();
   const Scalars before = now_;
   const double squares = advance(size, c, loads);
@@ -60,15 +53,12 @@ void Beam::step(double size, const Polynomial& c, const Loads& loads) {
 }
 
 void Beam::apply_tip_impulse(double impulse) {
-  require_finite("tip_impulse [N.s]", impulse);
   if (!std::isfinite(tip_velocity() + impulse / tip_mass())) throw_not_finite(0.0, {impulse, 0.0, 0.0}, {});
   book();
   strike(impulse);
 }
 
 void Beam::observe(double tip_force, const Loads& loads) {
-  require_finite("tip_force [N]", tip_force);
-  loads.for_each([](std::size_t i, const Polynomial& f) { require_finite(Loads::names[i], f[0]); });
   now_.tip_force = tip_force;
   now_.loads = {};
   loads.for_each([this](std::size_t i, const Polynomial& f) { now_.loads[i] = f[0]; });
@@ -147,7 +137,9 @@ void Beam::require_state(const std::vector<double>& state) const {
     throw std::invalid_argument("beam: a saved state of " + std::to_string(state.size()) +
                                 " numbers does not belong to this beam, whose states have " + std::to_string(size));
   }
-  for (const double value : state) require_finite("a number of the saved state", value);
+  for (const double value : state) {
+    if (!std::isfinite(value)) throw std::invalid_argument("beam: a saved state holds " + number(value));
+  }
 }
 
 void Beam::restore(const std::vector<double>& state) {

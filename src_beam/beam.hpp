@@ -112,8 +112,9 @@ class Beam {
   Beam(const Beam&) = delete;
   Beam& operator=(const Beam&) = delete;
 
-  /// Advance by `size` [s] > 0 under the tip force C [N] and the loads.
-  /// @throws std::invalid_argument for a step size that is not finite and > 0, or an input that is not finite
+  // Step sizes, forces and impulses are finite, sizes > 0: whoever takes them from outside has checked that.
+
+  /// Advance by `size` [s] under the tip force C [N] and the loads.
   /// @throws std::domain_error (state unchanged) if the result is not finite
   void step(double size, const Polynomial& tip_force, const Loads& loads);
 
@@ -197,7 +198,8 @@ class Beam {
   std::size_t motion_size_;
 };
 
-/// @throws std::invalid_argument naming the parameter, its value and what is allowed
+/// @pre each parameter is within its own limits, those of the table in fmus/beam/beam_fmu.cpp
+/// @throws std::invalid_argument naming the parameter, its value and what is allowed beside the others
 /// @throws std::runtime_error if the eigensolver does not converge
 std::unique_ptr<Beam> make_beam(const Parameters& parameters);
 

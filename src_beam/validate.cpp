@@ -26,26 +26,7 @@ std::string number(double value) {
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
-void reject_not_finite(const char* name, double value) { reject(name, value, "finite"); }
-
-void require_step_size(double size) { require_positive("step size [s]", size); }
-
 void validate(const Parameters& p) {
-  require_positive("density [kg/m3]", p.density);
-  require_positive("area [m2]", p.area);
-  require_positive("second_moment_of_area [m4]", p.second_moment_of_area);
-  require_positive("young_modulus [Pa]", p.young_modulus);
-  require_positive("shear_modulus [Pa]", p.shear_modulus);
-  require_positive("shear_coefficient", p.shear_coefficient);
-  require_positive("length [m]", p.length);
-  if (!(std::isfinite(p.alpha_b) && p.alpha_b >= 0.0)) reject("alpha_b [s]", p.alpha_b, "finite and >= 0");
-  require_finite("initial_deflection_slope", p.initial_deflection_slope);
-  require_finite("initial_velocity_slope [1/s]", p.initial_velocity_slope);
-  for (const double position : p.point_force_position) {
-    if (!(position >= 0.0 && position <= 1.0))
-      reject("point_force_position", position, "between 0 (the clamp) and 1 (the tip)");
-  }
-
   // Each factor may be harmless and the product still leave the range of a double.
   require_positive("density * area [kg/m]", p.density * p.area);
   require_positive("second_moment_of_area / area [m2]", p.second_moment_of_area / p.area);
@@ -53,21 +34,14 @@ void validate(const Parameters& p) {
   require_positive("shear_modulus * shear_coefficient / density [m2/s2]",
                    p.shear_modulus * p.shear_coefficient / p.density);
 
-  if (p.element_degree < 1 || p.element_degree > max_element_degree) {
-    reject("element_degree", p.element_degree, "between 1 and " + std::to_string(max_element_degree));
-  }
-  if (p.n_elements < 0 || p.n_elements > max_elements / p.element_degree) {
+  if (p.n_elements > max_elements / p.element_degree) {
     reject("n_elements", p.n_elements,
            "0 (no mesh) or between 1 and " + std::to_string(max_elements / p.element_degree) + " (" +
                std::to_string(max_elements) + " over element_degree)");
   }
-  if (p.mass_matrix != MassMatrix::consistent && p.mass_matrix != MassMatrix::averaged) {
-    reject("mass_matrix", static_cast<int>(p.mass_matrix),
-           std::string("1 (") + mass_matrix_names[0] + ") or 2 (" + mass_matrix_names[1] + ")");
-  }
   if (p.n_elements == 0) {
     const std::string without = "without a mesh (n_elements = 0)";
-    if (p.n_modes < 1 || p.n_modes > max_exact_modes)
+    if (p.n_modes == 0)
       reject("n_modes", p.n_modes, "between 1 and " + std::to_string(max_exact_modes) + " " + without);
     if (p.integrator != Integrator::modal)
       reject("integrator", static_cast<int>(p.integrator), std::string("1 (") + integrator_names[0] + ") " + without);
@@ -76,28 +50,18 @@ void validate(const Parameters& p) {
              p.reduced_integration ? 1 : static_cast<int>(p.mass_matrix), "left at its default " + without);
     return;
   }
-  switch (p.integrator) {
-    case Integrator::modal: {
-      const int unknowns = 2 * p.n_elements * p.element_degree;
-      const std::string mesh = std::to_string(p.n_elements) + " elements of degree " + std::to_string(p.element_degree);
-      if (p.n_modes < 0 || p.n_modes > unknowns) {
-        reject("n_modes", p.n_modes, "between 0 (all) and " + std::to_string(unknowns) + ", the unknowns of " + mesh);
-      }
-      const int most = std::min(unknowns / 2, max_dense_unknowns);
-      if (unknowns > max_dense_unknowns && (p.n_modes == 0 || p.n_modes > most)) {
-        reject("n_modes", p.n_modes,
-               "between 1 and " + std::to_string(most) + " with " + mesh + " (all modes only up to " +
-                   std::to_string(max_dense_unknowns) +
-                   " unknowns); keep fewer n_modes, or use the integrator generalized_alpha");
-      }
-      break;
-    }
-    case Integrator::generalized_alpha:
-      if (!(p.rho_inf >= 0.0 && p.rho_inf <= 1.0)) reject("rho_inf", p.rho_inf, "between 0 and 1");
-      break;
-    default:
-      reject("integrator", static_cast<int>(p.integrator),
-             std::string("1 (") + integrator_names[0] + ") or 2 (" + integrator_names[1] + ")");
+  if (p.integrator != Integrator::modal) return;
+  const int unknowns = 2 * p.n_elements * p.element_degree;
+  const std::string mesh = std::to_string(p.n_elements) + " elements of degree " + std::to_string(p.element_degree);
+  if (p.n_modes > unknowns) {
+    reject("n_modes", p.n_modes, "between 0 (all) and " + std::to_string(unknowns) + ", the unknowns of " + mesh);
+  }
+  const int most = std::min(unknowns / 2, max_dense_unknowns);
+  if (unknowns > max_dense_unknowns && (p.n_modes == 0 || p.n_modes > most)) {
+    reject("n_modes", p.n_modes,
+           "between 1 and " + std::to_string(most) + " with " + mesh + " (all modes only up to " +
+               std::to_string(max_dense_unknowns) +
+               " unknowns); keep fewer n_modes, or use the integrator generalized_alpha");
   }
 }
 

@@ -24,7 +24,7 @@ struct TipMessage {
 class HeldContact {
  public:
   /// `mass` of the spring [kg] > 0, step `size` H [s] > 0, `response` r₁ ≥ 0, r₂ [m/N].
-  /// @throws std::invalid_argument naming the value and what is allowed
+  /// @throws std::invalid_argument if r₁ is 0
   HeldContact(const Compliance& law, double mass, double size, const std::array<double, 2>& response);
 
   /// Where the top would be [m] after a step of H under a force [N] held over it; NaN if that is not known or would

@@ -1,4 +1,5 @@
-// What comes from outside, and its checks; messages name the quantity, its value and what is allowed.
+// What comes from outside. Each parameter is within its own limits, those of the table in fmus/spring/spring_fmu.cpp,
+// and inputs are finite: whoever takes them from outside has checked that.
 #pragma once
 
 #include <string>
@@ -39,10 +40,8 @@ struct Inputs {
 
 std::string number(double value);
 
-/// @throws std::invalid_argument
+/// @throws std::invalid_argument naming the parameter that cannot be beside the others, its value and what is allowed
 void check(const Parameters& parameters);
-/// @throws std::invalid_argument
-void check(const Inputs& inputs);
 
 /// |y| where a softening spring's potential has its hilltop, √(k1/|k2|); infinity for any other.
 double hilltop(const Parameters& parameters);

@@ -39,7 +39,7 @@ class Spring {
   Spring(const Spring&) = delete;
   Spring& operator=(const Spring&) = delete;
 
-  /// Advance by `size` [s] > 0. The work is bounded: a step that spans too much of the motion is refused.
+  /// Advance by `size` [s] > 0, finite. The work is bounded: a step that spans too much of the motion is refused.
   /// @throws StepFailure, Escape (state unchanged)
   void step(double size, const Inputs& inputs);
 

@@ -89,14 +89,5 @@ TEST(BeamForecast, LeavesNoTrace) {
   }
 }
 
-TEST(BeamForecast, RefusesWhatAStepRefusesAndLeavesNoTrace) {
-  const auto b = make_beam(general_beam(5));
-  stir(*b);
-  const std::vector<double> before = outputs(*b);
-  EXPECT_THROW(b->forecast(0.0), std::invalid_argument);
-  EXPECT_THROW(b->tip_response(-1.0), std::invalid_argument);
-  EXPECT_EQ(outputs(*b), before);
-}
-
 }  // namespace
 }  // namespace beam

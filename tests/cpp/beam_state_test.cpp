@@ -135,59 +135,24 @@ TEST(BeamState, AResultThatIsNotFiniteLeavesTheStateUnchanged) {
   }
 }
 
-TEST(BeamState, InputsThatAreNotFiniteAreRefused) {
-  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
-  const auto b = make_beam(general_beam(5));
-  const std::vector<double> before = outputs(*b);
-  for (const double size : {0.0, -0.1, nan, inf})
-    EXPECT_THROW(b->step(size, {0.0, 0.0, 0.0}, 0.0), std::invalid_argument);
-  EXPECT_THROW(b->step(0.1, {nan, 0.0, 0.0}, 0.0), std::invalid_argument);
-  EXPECT_THROW(b->step(0.1, {0.0, 0.0, inf}, 0.0), std::invalid_argument);
-  EXPECT_THROW(b->step(0.1, {0.0, 0.0, 0.0}, nan), std::invalid_argument);
-  EXPECT_THROW(b->apply_tip_impulse(nan), std::invalid_argument);
-  EXPECT_THROW(b->observe(0.0, inf), std::invalid_argument);
-  EXPECT_EQ(outputs(*b), before);
-}
-
 // The message names the parameter, its value and what is allowed.
-TEST(BeamState, ParametersAreChecked) {
+TEST(BeamState, ParametersThatDoNotGoTogetherAreRefused) {
   struct Refused {
     std::function<void(Parameters&)> change;
     std::vector<std::string> named;
   };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<Refused> all = {
-      {[](Parameters& p) { p.density = 0.0; }, {"density", "= 0 ", "> 0"}},
-      {[](Parameters& p) { p.area = -2.0; }, {"area", "= -2 "}},
-      {[&](Parameters& p) { p.second_moment_of_area = nan; }, {"second_moment_of_area", "nan"}},
-      {[](Parameters& p) { p.young_modulus = 0.0; }, {"young_modulus"}},
-      {[](Parameters& p) { p.shear_modulus = -1.0; }, {"shear_modulus"}},
-      {[](Parameters& p) { p.shear_coefficient = 0.0; }, {"shear_coefficient"}},
-      {[](Parameters& p) { p.length = 0.0; }, {"length"}},
-      {[](Parameters& p) { p.alpha_b = -1e-3; }, {"alpha_b", "-0.001", ">= 0"}},
-      {[](Parameters& p) { p.n_elements = -1; }, {"n_elements", "= -1 ", "between 1 and"}},
       {[](Parameters& p) { p.n_elements = 0; }, {"n_modes", "= 0 ", "between 1 and 10000", "without a mesh"}},
       {[](Parameters& p) { p.n_elements = 0, p.n_modes = 8, p.mass_matrix = MassMatrix::averaged; }, {"mass_matrix"}},
       {[](Parameters& p) { p.n_elements = 0, p.n_modes = 8, p.integrator = Integrator::generalized_alpha; },
        {"integrator", "without a mesh"}},
       {[](Parameters& p) { p.n_elements = 2000000; }, {"n_elements"}},
-      {[](Parameters& p) { p.element_degree = 0; }, {"element_degree", "= 0 ", "between 1 and 12"}},
-      {[](Parameters& p) { p.element_degree = 13; }, {"element_degree", "= 13 ", "between 1 and 12"}},
       {[](Parameters& p) { p.element_degree = 8, p.n_elements = 125001; }, {"n_elements", "125000", "element_degree"}},
       {[](Parameters& p) { p.element_degree = 2, p.n_modes = 201; }, {"n_modes", "200", "50 elements of degree 2"}},
       {[](Parameters& p) { p.element_degree = 11; }, {"n_modes", "= 0 ", "550", "1000 unknowns"}},
-      {[](Parameters& p) { p.n_modes = -1; }, {"n_modes", "= -1 "}},
       {[](Parameters& p) { p.n_modes = 101; }, {"n_modes", "= 101 ", "100"}},
       {[](Parameters& p) { p.n_elements = 501; }, {"n_modes", "= 0 ", "generalized_alpha", "fewer n_modes"}},
       {[](Parameters& p) { p.n_elements = 501, p.n_modes = 502; }, {"n_modes", "= 502 ", "501"}},
-      {[](Parameters& p) { p.mass_matrix = static_cast<MassMatrix>(3); }, {"mass_matrix", "= 3 ", "averaged"}},
-      {[](Parameters& p) { p.integrator = static_cast<Integrator>(3); }, {"integrator", "= 3 ", "modal"}},
-      {[](Parameters& p) { p.integrator = Integrator::generalized_alpha, p.rho_inf = 1.1; },
-       {"rho_inf", "between 0 and 1"}},
-      {[&](Parameters& p) { p.initial_deflection_slope = nan; }, {"initial_deflection_slope"}},
-      {[&](Parameters& p) { p.initial_velocity_slope = nan; }, {"initial_velocity_slope"}},
-      {[&](Parameters& p) { p.point_force_position[2] = nan; }, {"point_force_position", "between 0"}},
-      {[&](Parameters& p) { p.point_force_position[0] = -0.1; }, {"point_force_position", "-0.1"}},
       {[](Parameters& p) { p.density = 1e-200, p.area = 1e-200; }, {"density * area"}},
   };
   for (const Refused& refused : all) {
