@@ -2,9 +2,14 @@
 // Memory is allocated once; every start() re-initialises IDA completely, so the result depends on the arguments alone.
 #pragma once
 
+#include <nvector/nvector_serial.h>
+#include <sundials/sundials_context.h>
+#include <sundials/sundials_linearsolver.h>
+#include <sundials/sundials_matrix.h>
+
 #include <memory>
 #include <stdexcept>
-#include <string>
+#include <type_traits>
 #include <vector>
 
 namespace spring {
@@ -39,14 +44,13 @@ class IdaSolver {
  public:
   /// `crossings`: one entry per event function.
   IdaSolver(int unknowns, const std::vector<Crossing>& crossings);
-  ~IdaSolver();
-  IdaSolver(const IdaSolver&) = delete;
+  IdaSolver(const IdaSolver&) = delete;  // IDA knows where this is
   IdaSolver& operator=(const IdaSolver&) = delete;
 
   /// Fill in before start(): consistent Y(0), Y'(0) and the absolute tolerance of each unknown.
-  double* initial_value();
-  double* initial_derivative();
-  double* absolute_tolerance();
+  double* initial_value() { return N_VGetArrayPointer(Y0_.get()); }
+  double* initial_derivative() { return N_VGetArrayPointer(Yp0_.get()); }
+  double* absolute_tolerance() { return N_VGetArrayPointer(tolerance_.get()); }
 
   /// Start afresh at s = 0, for at most `most_steps` internal steps. `system` must stay alive until the last advance().
   void start(const ImplicitSystem& system, double relative_tolerance, double first_step, long most_steps);
@@ -55,21 +59,49 @@ class IdaSolver {
   /// Go on to s = 1 or to the next event, whichever comes first. @throws IdaError
   Outcome advance();
 
-  double s() const;                ///< reached
-  const double* value() const;     ///< Y(s)
-  bool occurred(int event) const;  ///< after Outcome::event
+  double s() const { return s_; }                                       ///< reached
+  const double* value() const { return N_VGetArrayPointer(Y_.get()); }  ///< Y(s)
+  /// After Outcome::event.
+  bool occurred(int event) const { return occurred_[static_cast<std::size_t>(event)] != 0; }
   /// After Outcome::event, for a distance among the event functions, followed by its rate: the distance passed 0, or is
   /// found below 0 at its minimum; s() and value() are then moved back to where it passed 0.
   bool fell(int distance);
   long steps() const;  ///< internal steps since start()
 
  private:
-  double event_value(int event) const;
+  template <class Handle, void (*destroy)(Handle)>
+  struct Destroy {
+    void operator()(Handle handle) const { destroy(handle); }
+  };
+  template <class Handle, void (*destroy)(Handle)>
+  using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Destroy<Handle, destroy>>;
+  static void free_context(SUNContext context);
+  static void free_solver(SUNLinearSolver solver);
+  static void free_ida(void* ida);
+  using Vector = Owned<N_Vector, N_VDestroy>;
+
+  static int residual(double s, N_Vector Y, N_Vector Yp, N_Vector F, void* solver);
+  static int jacobian(double s, double c, N_Vector Y, N_Vector Yp, N_Vector F, SUNMatrix J, void* solver, N_Vector,
+                      N_Vector, N_Vector);
+  static int events(double s, N_Vector Y, N_Vector Yp, double* g, void* solver);
+
+  Vector new_vector() const;
+  double event_value(int event);
   double last_step_start() const;
   void interpolate(double s);
 
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  int n_;
+  std::vector<Crossing> crossings_;
+  std::vector<int> occurred_;
+  std::vector<double> event_values_;
+  const ImplicitSystem* system_ = nullptr;
+  double s_ = 0.0;
+  long most_steps_ = 0;
+  Owned<SUNContext, free_context> context_;  // outlives everything made in it
+  Vector Y0_, Yp0_, tolerance_, Y_, Yp_;
+  Owned<SUNMatrix, SUNMatDestroy> J_;
+  Owned<SUNLinearSolver, free_solver> linear_solver_;
+  Owned<void*, free_ida> ida_;
 };
 
 }  // namespace spring
