@@ -193,9 +193,7 @@ void Spring::see(const Loads& loads, double t) {
   state_.tip_rate = rate(loads.tip, t);
 }
 
-void Spring::observe(const Inputs& inputs) {
-  see(Loads::from(parameters_, inputs), 0.0);
-}
+void Spring::observe(const Inputs& inputs) { see(Loads::from(parameters_, inputs), 0.0); }
 
 void Spring::apply_impulse(double impulse) {
   state_.z += impulse / parameters_.mass;
