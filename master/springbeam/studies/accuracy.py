@@ -170,21 +170,6 @@ class _Pilot:
     def residual(self) -> float:
         return float(self.run.summary["max_energy_residual"])
 
-    @property
-    def calls(self) -> int:
-        """doStep calls of both FMUs."""
-        return self.run.do_steps
-
-    @property
-    def spent(self) -> float:
-        """[s]"""
-        return float(self.run.summary["wall_time"])
-
-    @property
-    def displacements(self) -> list[str]:
-        """Columns of tip and spring top."""
-        return [name for name in ("u_tip", "y") if name in self.run.columns]
-
 
 @dataclass(frozen=True)
 class _Estimate:
@@ -205,7 +190,8 @@ class _Search:
         taken = choice(with_changes(scene, accuracy=None, coupling=changes))  # where everything is resolved
         self._scheme, self._degree = taken.scheme, taken.degree
         self._softly = scene.coupled and not scene.contact.rigid and self._degree == 2
-        self._runs, self._calls, self._spent, self._stopped = 0, 0, 0.0, 0
+        self._spent: list[tuple[int, float]] = []  #: doStep calls and time [s] of each pilot run
+        self._stopped = 0  #: pilot runs in a row that stopped early
         self._range = 0.0  #: of the spring top in the run before [m]
 
     def run(self) -> Picked:
@@ -222,9 +208,10 @@ class _Search:
                 estimate = self._estimate(coarse, fine)
                 worst = _SAFETY * max(estimate.displacement, estimate.event)
                 if worst <= self._accuracy and estimate.apart <= _UNRESOLVED:
+                    calls, times = zip(*self._spent[:-1], strict=True)
                     return Picked(
                         self._accuracy, fine.run, estimate.displacement, estimate.event, estimate.events,
-                        self._runs - 1, self._calls - fine.calls, self._spent - fine.spent,
+                        len(calls), sum(calls), sum(times),
                     )  # fmt: skip
                 steps = self._next(fine, estimate)
             coarse = fine
@@ -273,7 +260,9 @@ class _Search:
         return self._grown(fine, max(displacement, math.pow(margin * estimate.event, 1.0 / _EXPECTED_OF_EVENTS)))
 
     def _grown(self, last: _Pilot, growth: float) -> float:
-        return _rung(max(last.steps * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH), last.calls / _CALLS_PER_STEP))
+        return _rung(
+            max(last.steps * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH), last.run.do_steps / _CALLS_PER_STEP)
+        )
 
     # -- runs ---------------------------------------------------------------------------------------------------------
 
@@ -300,7 +289,7 @@ class _Search:
         pilot = _Pilot(steps, recorder.trajectory())
         if "y" in pilot.run.columns:
             self._range = float(np.ptp(pilot.run["y"]))
-        self._runs, self._calls, self._spent = self._runs + 1, self._calls + pilot.calls, self._spent + pilot.spent
+        self._spent.append((pilot.run.do_steps, float(pilot.run.summary["wall_time"])))
         return pilot
 
     # -- how accurate they are ----------------------------------------------------------------------------------------
@@ -342,7 +331,9 @@ class _Search:
             values, index = fine.run.at(np.clip(wanted, times[0], times[-1])).columns, np.arange(len(wanted))
             common = np.full(len(wanted), True)
         worst = 0.0
-        for name in fine.displacements:
+        for name in ("u_tip", "y"):
+            if name not in fine.run.columns:
+                continue
             scale = float(np.abs(fine.run[name] - fine.run[name][0]).max()) or 1.0
             difference = np.abs(others[name][common] - values[name][index[common]])
             worst = max(worst, float(difference.max(initial=0.0)) / scale)
