@@ -54,6 +54,16 @@ def test_crossing_of_a_start_on_zero_that_rises_first():
     assert Path.through(start, end, SIZE).falls_through_zero() == pytest.approx(0.5, abs=1e-12)
 
 
+def test_a_path_that_dips_falls_and_rises_through_zero():
+    """(x − 0.3)(x − 0.8) is lowest at 0.55."""
+    _, start, end = ends((0.24, -1.1, 1.0))
+    path = Path.through(start, end, SIZE)
+    bottom = path.lowest_inside()
+    assert bottom == pytest.approx(0.55, abs=1e-11)
+    assert path.falls_through_zero(bottom) == pytest.approx(0.3, abs=1e-12)
+    assert path.rises_through_zero(bottom) == pytest.approx(0.8, abs=1e-12)
+
+
 class Counted:
     """f = cos(ωτ) − level; falls through zero at acos(level)/ω."""
 

@@ -154,6 +154,12 @@ def clearance(start: Sample, end: Sample, size: float) -> tuple[float, float]:
     return min(points), max(points)
 
 
+def no_dip(start: Sample, end: Sample, size: float) -> bool:
+    """Tell whether what both samples hold stays above 0 between them: no dip is deeper than all that changes there."""
+    (f0, d0), (f1, d1) = start, end
+    return (f0 if f0 < f1 else f1) > abs(f1 - f0) + size / 3.0 * (abs(d0) + abs(d1))
+
+
 def locate(evaluate: Callable[[float], Sample], guess: float, size: float, tolerance: float, time: float) -> float:
     """Step size at which f = 0 to ``tolerance``, by Newton's method inside a bracket, then by secants.
 

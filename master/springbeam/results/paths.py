@@ -57,16 +57,24 @@ class Path(NamedTuple):
         turning = self.even + self.odd * tilt
         return a1 + s * (2.0 * a2 + 3.0 * a3 * s) - 2.0 * bubble * tilt * turning + 2.0 * bubble * bubble * self.odd
 
-    def falls_through_zero(self) -> float:
-        """Return s in [0, 1] where f, not below zero at the start but at the end, falls through it, by bisection.
+    def falls_through_zero(self, until: float = 1.0) -> float:
+        """Return s in [0, until] where f, not below zero at the start but at ``until``, falls through it, by bisection.
 
         A path that starts on zero and rises falls later; one that only falls, at once.
         """
-        low, high = 0.0, 1.0
+        low, high = 0.0, until
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if self.at(middle) >= 0.0 else (low, middle)
         return high if low > 0.0 else 0.0
+
+    def rises_through_zero(self, since: float) -> float:
+        """Return s in [since, 1] where f, below zero at ``since``, not at the end, rises through it, by bisection."""
+        low, high = since, 1.0
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.at(middle) < 0.0 else (low, middle)
+        return high
 
     def lowest_inside(self) -> float | None:
         """Return s in (0, 1) of the lowest minimum, ``None`` if there is none inside."""

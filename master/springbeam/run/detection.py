@@ -14,6 +14,7 @@ from ..contact.events import (
     clearance,
     gap,
     locate,
+    no_dip,
     position_tolerance,
 )
 from ..contact.phases import Joint, common_velocity
@@ -114,14 +115,13 @@ class Detector:
         if not functions:
             return step, None
         for _ in range(2 * len(functions) + 1):
-            candidates, third = [], step.size / 3.0
+            candidates = []
             starts = self._functions.samples(state.phase, step.start)
             ends = self._functions.samples(state.phase, step.end)
             for (kind, function), start, end in zip(functions, starts, ends, strict=True):
-                (f0, d0), (f1, d1) = start, end
-                # No dip is deeper than all that changes in the step.
-                if (f0 if f0 < f1 else f1) > abs(f1 - f0) + third * (abs(d0) + abs(d1)):
+                if no_dip(start, end, step.size):
                     continue
+                f0, _ = start
                 # A gap that a tie has left open, or a little below zero, is no event: only what falls further is.
                 floor = min(f0, 0.0) - self.tolerance(step.end)
                 bracket = self._bracket(state, function, step, floor, start, end)
@@ -204,18 +204,33 @@ class Detector:
         cut = self._pair.attempt(state, inside * step.size, step.start)
         return cut if any(cut.contact) else step
 
+    def soft_changes(self, state: State, step: Step) -> list[tuple[Joint, Event]]:
+        """Return where contact by a soft law opens or closes in ``step``, also for a part of it, and what it leads to.
 
-def soft_change(step: Step, joint: Joint) -> Event:
-    """Return where contact by a soft law has opened or closed in ``step``, which has led to ``joint``.
-
-    Nothing special happens there: the zero is that of the path of the gap.
-    """
-    sign = 1.0 if joint is Joint.TOUCH else -1.0  # opening, the penetration falls through zero
-    told = (gap(step.start), gap(step.end), gap.means(step.end, step.size))
-    start, end, means = ((sign * first, sign * second) for first, second in told)
-    at = Path.through(start, end, step.size, means).falls_through_zero()
-    (u, v), (y, z) = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
-    return Event(step.time + at * step.size, "impact" if joint is Joint.TOUCH else "separation", y, z, u, v)
+        Nothing special happens there: the zeros are those of the path of the gap.
+        """
+        touching = state.phase.joint is Joint.TOUCH
+        sign = -1.0 if touching else 1.0  # penetration or gap falls through zero
+        start, end = ((sign * value, sign * rate) for value, rate in (gap(step.start), gap(step.end)))
+        changed = (step.end[0].displacement < step.end[1].displacement) is not touching
+        if not changed and no_dip(start, end, step.size):
+            return []
+        mean, twice = gap.means(step.end, step.size)
+        path = Path.through(start, end, step.size, (sign * mean, sign * twice))
+        if changed:
+            places = [path.falls_through_zero()]
+        else:
+            inside = path.lowest_inside()
+            if inside is None or path.at(inside) >= -self.tolerance(step.end):
+                return []
+            places = [path.falls_through_zero(inside), path.rises_through_zero(inside)]
+        found = []
+        for at in places:
+            touching = not touching
+            joint, kind = (Joint.TOUCH, "impact") if touching else (Joint.FREE, "separation")
+            (u, v), (y, z) = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
+            found.append((joint, Event(step.time + at * step.size, kind, y, z, u, v)))
+        return found
 
 
 def _inside(start: Motion, end: Motion, size: float, s: float) -> Sample:

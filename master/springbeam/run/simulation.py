@@ -21,7 +21,7 @@ from ..scene import Scene
 from ..scene.automatic import decided
 from ..scene.resolution import CONTACT_STEPS, not_resolved, peak_force_doubt
 from .crowd import AT_ONCE, Crowd
-from .detection import Detector, soft_change
+from .detection import Detector
 from .ledger import Balance
 from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
@@ -245,12 +245,11 @@ class Simulation(Checkpointed):
         )
 
     def _note_soft_contact(self, step: Step) -> None:
-        state, (tip, low) = self._state, step.end
-        joint = Joint.TOUCH if tip.displacement < low.displacement else Joint.FREE
-        if joint is not state.phase.joint:
+        state = self._state
+        for joint, change in self._detector.soft_changes(state, step):
             state.phase = Phase(joint, state.phase.seated)
             self._events += 1
-            self._recorder.event(soft_change(step, joint))
+            self._recorder.event(change)
 
     # -- what is reported -------------------------------------------------------------------------------------------
 
