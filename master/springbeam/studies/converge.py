@@ -96,6 +96,7 @@ class Converge(Study):
     """A scene on finer and finer meshes, and with more and more modes of its own mesh."""
 
     kind: ClassVar[str] = "converge"
+    files: ClassVar[tuple[str, ...]] = ("converge.csv", "converge.png")
 
     scene: Scene
     levels: int = 4  #: of each sequence: n, 2n, 4n, … elements; modes by halves down from those that the scene keeps

@@ -22,7 +22,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module, metadata
 from itertools import chain, islice
@@ -47,12 +47,6 @@ _STUDIES = {
     "orders": ".crosscheck.orders:Orders",
     "critical": ".stability.critical:Critical",
 }
-#: Files that studies write (`Study.write`).
-_WRITTEN = (
-    *("sweep.parquet", "sweep.png", "bifurcation.png", "tradeoff.csv", "tradeoff.png", "converge.csv", "converge.png"),
-    *("stability.csv", "classes.png", "residuals.png", "garbage-*.toml", "critical.csv"),
-    *("crosscheck.csv", "crosscheck.png", "orders.csv"),
-)
 Record = dict[str, Any]
 #: ``report(record)``, called for each record that is new.
 Report = Callable[[Record], None]
@@ -77,6 +71,7 @@ class Study(BaseModel, ABC):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: ClassVar[str]  #: names the command, and the files of the results
+    files: ClassVar[tuple[str, ...]]  #: patterns of all that `write` may write
     #: Whether workers compute the cases; else they follow one another here, where they are timed or too few.
     parallel: ClassVar[bool] = False
 
@@ -144,7 +139,10 @@ class Records:
         self._settings, self.path = study.settings(), directory / FILE
         self.found: dict[str, Record] = {}
         self._whole = 0  #: bytes of complete lines
+        self._replaced = study.files  #: patterns of what the first record removes
         if replace:
+            with suppress(ResultsUnreadable, KeyError):
+                self._replaced += _class_of(_read(self.path)[0]["study"]).files
             return
         settings, self.found, self._whole = _read(self.path)
         if self._whole and settings != self._settings:
@@ -171,7 +169,7 @@ class Records:
             self._begun = True
             self._file.truncate(self._whole)  # without a line that was cut short
             if not self._whole:
-                for stale in chain.from_iterable(map(self.path.parent.glob, _WRITTEN)):
+                for stale in chain.from_iterable(map(self.path.parent.glob, self._replaced)):
                     stale.unlink()
                 self._write(self._settings)
         self._write({"case": name, "record": record})
@@ -195,6 +193,13 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Record], int]:
         raise ResultsUnreadable(f"{path}: not a file of records: {error}") from error
 
 
+def _class_of(kind: str) -> type[Study]:
+    """Return the class of studies of ``kind``. Raises KeyError if it is not known."""
+    module, name = _STUDIES[kind].split(":")
+    found: type[Study] = getattr(import_module(module, __package__), name)
+    return found
+
+
 def study_in(directory: Path) -> Study | None:
     """Return the study that ``directory`` holds, ``None`` if it holds none.
 
@@ -207,8 +212,7 @@ def study_in(directory: Path) -> Study | None:
     if not first:
         return None
     try:
-        module, name = _STUDIES[first["study"]].split(":")
-        study: Study = getattr(import_module(module, __package__), name).model_validate(first["settings"])
+        study = _class_of(first["study"]).model_validate(first["settings"])
     except (KeyError, ValidationError) as error:
         raise ResultsUnreadable(f"{directory / FILE}: holds no study that is known: {error}") from error
     if first != study.settings():

@@ -26,6 +26,7 @@ class Crosscheck(Study):
     """A scene beside the reference of its law."""
 
     kind: ClassVar[str] = "crosscheck"
+    files: ClassVar[tuple[str, ...]] = ("crosscheck.csv", "crosscheck.png")
 
     scene: Scene  #: its first quarter if quick
 

@@ -39,6 +39,7 @@ class Orders(Study):
     """
 
     kind: ClassVar[str] = "orders"
+    files: ClassVar[tuple[str, ...]] = ("orders.csv",)
 
     scene: Scene
     halvings: int = 3  #: one less if quick

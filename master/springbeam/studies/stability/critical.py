@@ -156,6 +156,7 @@ class Critical(Study):
     """Every scheme on the scene ``soft``, with linear spring and contact."""
 
     kind: ClassVar[str] = "critical"
+    files: ClassVar[tuple[str, ...]] = ("critical.csv",)
     parallel: ClassVar[bool] = True
 
     n_elements: int = 10  #: of the beam; 4 if quick

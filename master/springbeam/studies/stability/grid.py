@@ -33,6 +33,7 @@ class Grid(Study):
     """A Latin hypercube over all parameters, and slices through two of them."""
 
     kind: ClassVar[str] = "stability"
+    files: ClassVar[tuple[str, ...]] = ("stability.csv", "classes.png", "residuals.png", "garbage-*.toml")
     parallel: ClassVar[bool] = True
 
     samples: int = 300

@@ -30,6 +30,7 @@ class Sweep(Study):
     """What is swept: ``vary`` holds ``TABLE.KEY=VALUES``."""
 
     kind: ClassVar[str] = "sweep"
+    files: ClassVar[tuple[str, ...]] = (TABLE, PICTURE, stroboscopic.PICTURE)
     parallel: ClassVar[bool] = True
 
     scene: Scene

@@ -37,7 +37,7 @@ def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], metrics: Sequence[
     figure, panels = plt.subplots(
         high, wide, figsize=(4.0 * wide, 3.0 * high + 0.4), squeeze=False, layout="constrained"
     )
-    figure.suptitle(title or "sweep")
+    figure.suptitle(title or "sweep", wrap=True)
     for ax in panels.flat[len(shown) :]:
         ax.remove()
     for ax, name in zip(panels.flat, shown, strict=False):

@@ -58,6 +58,7 @@ class Tradeoff(Study):
     """All configurations of a scene; a case is a family of them, coarse to fine."""
 
     kind: ClassVar[str] = "tradeoff"
+    files: ClassVar[tuple[str, ...]] = ("tradeoff.csv", "tradeoff.png")
 
     scene: Scene  #: ends with the compared window
     repeats: int = 3  #: timings of each configuration, taken in turn; their median counts. 1 if quick
