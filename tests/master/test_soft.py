@@ -135,7 +135,7 @@ def test_forces_are_found_however_far_they_move_the_ends(depth, response):
 
 @pytest.mark.parametrize("law", [Compliance(1e4, 1.5, 0.5), Link(1e4, 3.0)], ids=repr)
 def test_a_step_made_at_degree_0_books_what_damping_takes_at_degree_0(law, monkeypatch):
-    """As if no force of degree 2 were found: energy to rounding, though the force belongs to another polynomial."""
+    """The solver fails at degree 2 in every step; energy to rounding all the same, at what degree 0 dissipates."""
     aim = SoftSolver.aim
 
     def fails_above_0(self, gap, a, descent, window):

@@ -212,10 +212,10 @@ class Simulation(Checkpointed):
         state, pair = self._state, self._pair
         if kind in ("separation", "release"):
             self._last_opening = state.time
-        if kind == "stop_impact":
-            self._rows.struck(state, self._steps.size)
         if kind == "impact":
             state.reclosed = state.time - self._last_opening <= AT_ONCE * self._steps.size
+        if kind == "stop_impact":
+            self._rows.struck(state, self._steps.size)
         ends = pair.ends()
         tolerance = self._detector.simultaneity_tolerance(ends) if kind == "impact" else self._detector.tolerance(ends)
         kind, phase, impact = self._transitions.after(
