@@ -6,6 +6,7 @@ Positions tell of meeting, release and the foundation (`springbeam.contact.event
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 
 from ..bodies.protocol import Ends, Motion, StepRefused
 from ..contact.events import (
@@ -229,7 +230,8 @@ class Detector:
             touching = not touching
             joint, kind = (Joint.TOUCH, "impact") if touching else (Joint.FREE, "separation")
             (u, v), (y, z) = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
-            found.append((joint, Event(step.time + at * step.size, kind, y, z, u, v)))
+            if all(map(isfinite, (u, v, y, z))):  # else the energies of the row are out of range too and stop the run
+                found.append((joint, Event(step.time + at * step.size, kind, y, z, u, v)))
         return found
 
 
