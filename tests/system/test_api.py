@@ -147,7 +147,7 @@ def test_without_the_extra_the_error_names_it(run, monkeypatch):
             raise ModuleNotFoundError(f"No module named {name!r}")
         return found(name, *arguments)
 
-    monkeypatch.setattr("springbeam.results.export.import_module", missing)
+    monkeypatch.setattr("springbeam.results.trajectory.import_module", missing)
     for hand_on in (run.to_pandas, run.to_xarray):
         with pytest.raises(ImportError, match=r"the extra 'data' brings it: pip install -e '\.\[data\]'"):
             hand_on()

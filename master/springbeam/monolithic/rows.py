@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..results.trajectory import Trajectory, columns_of, load_units
+from ..results.trajectory import Trajectory, columns_of
 from .laws import Phase
 from .transitions import HybridState
 
@@ -39,7 +39,7 @@ class Rows:
         deflection = s.shapes(states)
         shapes = None if deflection is None else (columns["time"], deflection)
         loads = s.loads.values(columns["time"])
-        columns |= {name: loads[:, i] for i, name in enumerate(load_units(s.scene))}
+        columns |= {f"load_{i}": values for i, values in enumerate(loads.T)}
         ordered = {name: columns[name] for name in columns_of(s.scene) if name in columns}
         return Trajectory(s.scene, ordered, self._state.events, shapes, summary)
 

@@ -60,7 +60,7 @@ class Recorder(ABC):
 
     def __init__(self, scene: Scene, columns: Sequence[str] | None = None) -> None:
         self.scene = scene
-        self.columns = columns_of(scene) if columns is None else tuple(columns)
+        self.columns = tuple(columns_of(scene) if columns is None else columns)
         self._phase_at = self.columns.index("phase") if "phase" in self.columns else -1
         self._numbers = [name for name in self.columns if name != "phase"]
         self._phases: set[str] = set()

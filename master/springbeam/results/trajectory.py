@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 #: Columns of a whole pair, in file order: the unit of each, and the part of a scene without which it is left out.
-#: ``phase`` has no unit; loads follow, `load_units`.
-_COLUMNS = {
+#: ``phase`` has no unit; the loads of a scene follow.
+COLUMNS = {
     "time": ("s", ""),
     "u_tip": ("m", "beam"),
     "v_tip": ("m/s", "beam"),
@@ -42,8 +43,6 @@ _COLUMNS = {
     "e_total": ("J", ""),
     "energy_residual": ("J", ""),
 }
-COLUMNS = tuple(_COLUMNS)
-COLUMN_UNITS = {name: unit for name, (unit, _) in _COLUMNS.items() if unit}
 EVENT_KINDS = ("impact", "stop_impact", "release", "retie", "separation", "seated", "unseated")
 #: Columns of the table of shapes: time [s] and deflections [m] at `SHAPE_POINTS`.
 SHAPE_COLUMNS = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
@@ -72,10 +71,11 @@ class Event:
 EVENT_COLUMNS = tuple(Event.__dataclass_fields__)
 
 
-def columns_of(scene: Scene) -> tuple[str, ...]:
-    """Return the columns of ``scene`` in file order: `COLUMNS` without those of absent bodies, and its loads.
+def columns_of(scene: Scene) -> dict[str, str]:
+    """Return the columns of ``scene`` in file order with their units, "" for ``phase``, which has none.
 
-    ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
+    They are `COLUMNS` without those of absent bodies, and its loads: ``load_0`` for ``loads.0``. ``gap`` is u_tip − y
+    of a pair, u_tip − φ of a beam above a stop.
     """
     beam, spring, stop = scene.upper is not None, scene.lower is not None, scene.stop is not None
     there = {
@@ -86,17 +86,8 @@ def columns_of(scene: Scene) -> tuple[str, ...]:
         "stop": stop and not scene.elastic_stop,
         "gap": beam and (spring or stop),
     }
-    return (*(name for name, (_, part) in _COLUMNS.items() if there[part]), *load_units(scene))
-
-
-def load_units(scene: Scene) -> dict[str, str]:
-    """Return the columns of the loads, ``load_0`` for ``loads.0``, and the unit of each."""
-    return {f"load_{i}": load.unit for i, load in enumerate(scene.loads)}
-
-
-def units_of(scene: Scene) -> dict[str, str]:
-    """Return the units of all columns of ``scene``; ``phase`` has none."""
-    return {**COLUMN_UNITS, **load_units(scene)}
+    units = {name: unit for name, (unit, part) in COLUMNS.items() if there[part]}
+    return units | {f"load_{i}": load.unit for i, load in enumerate(scene.loads)}
 
 
 def rounded(value: float, scale: float) -> str:
@@ -146,10 +137,20 @@ class Trajectory:
         return f"<Trajectory {self.scene.title!r}: {len(self)} rows, {span}{len(self.events)} events, {status}>"
 
     def _repr_html_(self) -> str:
-        """Show in a notebook what the run amounts to."""
-        from .export import as_html
+        """Show in a notebook what the run amounts to: its totals, as an HTML table."""
+        summary = self.summary
+        rows = [
+            ("rows, events", f"{len(self)}, {len(self.events)}"),
+            ("status", str(summary.get("status", "no summary"))),
+            *_at_call("results.totals").in_words(summary),
+            *(("warning", str(warning)) for warning in summary.get("warnings", ())),
+        ]
+        body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
+        return f"<table><caption>{escape(self.scene.title or 'a run')}</caption>{body}</table>"
 
-        return as_html(self)
+    def _units(self) -> dict[str, str]:
+        """Return the units of the columns that have one."""
+        return {name: unit for name, unit in columns_of(self.scene).items() if unit and name in self.columns}
 
     def at(self, times: Any) -> Trajectory:
         """Return the run at any ``times`` [s], shape (n,), with the same columns (`springbeam.results.dense`).
@@ -163,16 +164,32 @@ class Trajectory:
         return at(self, times)
 
     def to_pandas(self) -> DataFrame:
-        """Return the columns as a pandas DataFrame, a row per row; needs the extra ``data``."""
-        from .export import to_pandas
+        """Return the columns as a pandas DataFrame, with units; needs the extra ``data``.
 
-        return to_pandas(self)
+        Times of rows at an event repeat, so ``time`` is a column and not the index.
+        """
+        table: DataFrame = _of_extra("pandas").DataFrame(self.columns)
+        table.attrs["title"] = self.scene.title
+        table.attrs["units"] = self._units()
+        return table
 
     def to_xarray(self) -> Dataset:
-        """Return columns and shapes as an xarray Dataset with units, over ``time``; needs the extra ``data``."""
-        from .export import to_xarray
+        """Return the columns over ``time`` and the shapes over ``shape_time`` and ``x`` [m] as an xarray Dataset.
 
-        return to_xarray(self)
+        It has units, and needs the extra ``data``.
+        """
+        units = self._units()
+        variables: dict[str, Any] = {
+            name: ("time", values, {"units": units[name]} if name in units else {})
+            for name, values in self.columns.items()
+        }
+        coordinates = {"time": variables.pop("time")}
+        if self.shapes is not None and self.scene.beam is not None:
+            variables["deflection"] = (("shape_time", "x"), self.shapes[1], {"units": "m"})
+            coordinates["shape_time"] = ("shape_time", self.shapes[0], {"units": "s"})
+            coordinates["x"] = ("x", SHAPE_POINTS * self.scene.beam.length, {"units": "m"})
+        dataset: Dataset = _of_extra("xarray").Dataset(variables, coordinates, {"title": self.scene.title})
+        return dataset
 
     def plot(self, picture: str = "positions") -> Figure:
         """Return a matplotlib Figure: ``shapes_after_contact``, ``shapes_later``, ``positions``,
@@ -195,3 +212,14 @@ class Trajectory:
 def _at_call(module: str) -> Any:
     """Return a module that what a trajectory is does not depend on: references return trajectories as well."""
     return import_module(f"springbeam.{module}")
+
+
+def _of_extra(package: str) -> Any:
+    """Return a package that only the extra ``data`` brings. Raises ImportError, which says how to get it."""
+    try:
+        return import_module(package)
+    except ImportError as error:
+        raise ImportError(
+            f"{package} cannot be imported ({error}); the extra 'data' brings it: pip install -e '.[data]' in the "
+            "checkout of springbeam"
+        ) from error

@@ -14,7 +14,7 @@ from ..coupling.protocol import Step
 from ..results.paths import Path
 from ..results.recording import Recorder
 from ..results.steps import packed
-from ..results.trajectory import COLUMNS, load_units
+from ..results.trajectory import COLUMNS
 from ..scene import Scene
 from ..scene.resolution import VIBRATION
 from .ledger import Balance
@@ -48,7 +48,7 @@ class Rows(Checkpointed):
         length = scene.time.t_end - start_time or 1.0  # 0 where contact is at t_end: the one shape is that of the start
         self._shape_every = length / _SHAPES_OVER_RUN
         #: The columns of the scene, out of all.
-        known = (*COLUMNS, *load_units(scene))
+        known = (*COLUMNS, *(f"load_{i}" for i in range(len(scene.loads))))
         self._present = itemgetter(*(known.index(name) for name in recorder.columns))
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
         self.mismatch_at_stop = 0.0  #: the same over the speed with which the joined ends strike the foundation

@@ -10,7 +10,7 @@ import numpy as np
 from rich.text import Text
 
 from ...pictures.drawing import POSITIONS, present
-from ...results.trajectory import COLUMN_UNITS, Event, Trajectory
+from ...results.trajectory import Event, Trajectory, columns_of
 from ...scene import Scene, with_changes
 from ..reference import refuse_without_reference
 from ..study import Found, Record, Study
@@ -65,10 +65,10 @@ class Crosscheck(Study):
 
     def found(self, records: Mapping[str, Record]) -> Found:
         """Show what was compared: quantities, and changes of contact."""
-        record = records[_CASE]
+        record, units = records[_CASE], columns_of(self.scene)
         quantities = [
             (
-                f"{row['quantity']} [{COLUMN_UNITS[row['quantity']]}]",
+                f"{row['quantity']} [{units[row['quantity']]}]",
                 *(f"{row['error']:.2e}", f"{row['at']:.6g}", f"{row['l2']:.1e}", f"{row['bound']:.1e}"),
                 _verdict(row),
             )
