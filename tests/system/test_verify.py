@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +21,7 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
 from springbeam.studies import verify
 from springbeam.studies.verify.beam import _mesh_error, clamped_free_frequencies
-from springbeam.studies.verify.check import Check
+from springbeam.studies.verify.check import Check, section
 from springbeam.studies.verify.impact import _airy_overshoot
 from springbeam.studies.verify.table import report
 
@@ -32,20 +32,18 @@ def test_every_exact_solution_is_met_in_a_table_of_80_columns():
     By prototypes of others it is 24 % and 1.1 % with 25.
     """
     console = Console(record=True, width=80)
-    found = dict(report(verify.verify(), console))
+    found = report(verify.SECTIONS, console)
     printed = console.export_text()
     assert " 0 failed" in printed
     assert "FAIL" not in printed
     assert printed.count(" pass ") >= 70
-    for title, _ in verify.SECTIONS:
-        assert title in printed
+    assert all(section.title in printed for section in verify.SECTIONS)
     assert all(name in printed for name in ("quantity", "exact", "computed", "error", "bound"))
     assert max(len(line) for line in printed.splitlines()) <= 80
     assert "…" not in printed.replace("… one step late", "").replace("… Gauss–Seidel", "")  # nothing cut off
     assert "not representable" in printed  # why a row is not judged
     assert "not judged" in printed
-    checks = found["Impact: elastic bar on a rigid stop"]
-    errors = {check.quantity.partition(" ")[0]: check.error for check in checks if "ringing" in check.quantity}
+    errors = {check.quantity.partition(" ")[0]: check.error for check in found[verify.ringing.title]}
     assert 0.1 < errors["consistent"] < 0.3
     assert 0.0 < errors["averaged"] < 0.01
 
@@ -126,7 +124,7 @@ def base_as_force(patch: pytest.MonkeyPatch) -> None:
         (verify.slow_ramp, changed(FmuBeam, "shear_modulus", 1.01)),
         (verify.moving_base, base_as_force),
     ],
-    ids=lambda function: function.__name__,
+    ids=lambda given: getattr(given, "solution", given).__name__,
 )
 def test_a_mistake_of_one_percent_fails(section, mistake, monkeypatch: pytest.MonkeyPatch):
     mistake(monkeypatch)
@@ -134,12 +132,12 @@ def test_a_mistake_of_one_percent_fails(section, mistake, monkeypatch: pytest.Mo
 
 
 def test_json_is_the_checks_and_a_failed_one_is_exit_code_1(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(verify, "SECTIONS", (("Mesh", verify.mesh_convergence), ("Escape", verify.escape)))
+    monkeypatch.setattr(verify, "SECTIONS", (verify.mesh_convergence, verify.escape))
     result = command("verify", "--json")
     assert (result.exit_code, result.stderr) == (0, "")
     document = json.loads(result.stdout)
     assert document["passed"] is True
-    assert [section["title"] for section in document["sections"]] == ["Mesh", "Escape"]
+    assert [section["title"] for section in document["sections"]] == [section.title for section in verify.SECTIONS]
     for printed, check in zip(document["sections"][0]["checks"], verify.mesh_convergence(), strict=True):
         assert (printed["exact"], printed["computed"], printed["passed"]) == (check.exact, check.computed, check.passed)
     changed(FmuBeam, "density", 1.01)(monkeypatch)
@@ -151,15 +149,17 @@ def test_json_is_the_checks_and_a_failed_one_is_exit_code_1(monkeypatch: pytest.
     assert "FAIL" in result.output
 
 
-def test_what_cannot_be_computed_fails_with_its_cause(monkeypatch: pytest.MonkeyPatch):
-    def refused() -> list[Check]:
-        raise StepRefused("spring: too stiff")
+def test_a_case_that_cannot_be_computed_fails_alone_and_with_its_cause():
+    @section("Spring", (1.0,), (2.0,), (3.0,))
+    def refused(stiffness: float) -> Iterator[Check]:
+        if stiffness == 2.0:
+            raise StepRefused("spring: too stiff")
+        yield Check("y", stiffness, stiffness, 0.0, "")
 
-    monkeypatch.setattr(verify, "SECTIONS", (("Spring", refused),))
     console = Console(record=True, width=80)
-    ((_, (check,)),) = report(verify.verify(), console)
-    assert check.passed is False
-    assert "spring: too stiff" in console.export_text()
+    checks = report([refused], console)["Spring"]
+    assert [check.passed for check in checks] == [True, False, True]
+    assert "stiffness = 2.0: spring: too stiff" in console.export_text()
 
 
 # -- the exact values themselves ------------------------------------------------------------------------------------

@@ -14,16 +14,16 @@ def verify(as_json: JsonOption = False) -> None:
 
     Example: springbeam verify
     """
-    from ..studies.verify import verify
+    from ..studies.verify import SECTIONS
     from ..studies.verify.table import report
 
     with bad_input_reported():
-        sections = report(verify(), console_for(silent=as_json))
-    passed = all(check.passed is not False for _, section in sections for check in section)
+        found = report(SECTIONS, console_for(silent=as_json))
+    passed = all(check.passed is not False for checks in found.values() for check in checks)
     if as_json:
         described = [
-            {"title": title, "checks": [{**asdict(c), "error": c.error, "passed": c.passed} for c in section]}
-            for title, section in sections
+            {"title": title, "checks": [{**asdict(c), "error": c.error, "passed": c.passed} for c in checks]}
+            for title, checks in found.items()
         ]
         print_json({"passed": passed, "sections": described})
     if not passed:

@@ -1,10 +1,16 @@
-"""A number that is known exactly, and its value by the FMUs."""
+"""A number that is known exactly, and its value by the FMUs; sections of such numbers."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from inspect import signature
+from typing import Any
 
 import numpy as np
+
+from ...bodies.protocol import StepRefused
+from ...run.outcome import RunStopped
 
 EPS = float(np.finfo(float).eps)
 UNIT_FORCE = (1.0, 0.0, 0.0)
@@ -43,3 +49,27 @@ class Check:
         if self.bound is None:
             return None
         return self.error is not None and abs(self.error) <= self.bound
+
+
+@dataclass(frozen=True)
+class Section:
+    """An exact solution, and the cases in which the FMUs compute it, each by itself."""
+
+    title: str
+    solution: Callable[..., Iterator[Check]]
+    cases: tuple[tuple[Any, ...], ...]  #: what the solution is called with
+
+    def __call__(self) -> Iterator[Check]:
+        """Yield the checks of all cases; a case that cannot be computed is a failed check."""
+        names = signature(self.solution).parameters
+        for case in self.cases:
+            try:
+                yield from self.solution(*case)
+            except (StepRefused, RunStopped) as error:
+                given = "".join(f"{name} = {value}: " for name, value in zip(names, case, strict=True))
+                yield Check("not computed", None, None, 0.0, f"{given}{error}")
+
+
+def section(title: str, *cases: tuple[Any, ...]) -> Callable[[Callable[..., Iterator[Check]]], Section]:
+    """Return what makes a `Section` of an exact solution; without ``cases`` it is called once."""
+    return lambda solution: Section(title, solution, cases or ((),))

@@ -6,19 +6,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import closing
 from functools import partial
+from itertools import product
 from math import nan, pi, sin, sqrt
 
 import numpy as np
 from scipy.special import spherical_jn
 
-from ...bodies.fmu_bodies import FmuSpring
 from ...results.trajectory import Trajectory
 from ...run.runner import simulate
 from ...scene import Scene
 from .. import exact
-from .check import Check
+from .check import Check, section
 from .spring import IDA, ida_error
 
 #: The masses that meet [kg], and λ_nc between them [N/m^q].
@@ -29,13 +28,6 @@ _PROJECTED = (
     "a force without its Legendre terms above the degree d shifts the phase ωT by (2n+1) j_n(ωH/2)² of it, n = d + 1; "
     "next order (ωH)²"
 )
-
-
-def _solver(scene: Scene, radians: float) -> float:
-    """Return what IDA leaves of the motion over an angle [rad], as a share."""
-    assert scene.spring is not None
-    with closing(FmuSpring(scene.spring, 0.0)) as body:
-        return ida_error(body, radians)
 
 
 def _phase(degree: int, angle: float) -> float:
@@ -57,6 +49,13 @@ def _halving(
         yield Check(name, value, of(fine), bound, f"{_HALVED}; and {IDA}")
 
 
+def _lasts(q: float) -> float:
+    """Return how long the undamped contact of the free masses lasts [s]."""
+    duration = exact.impact(_REDUCED, 1.0, _STIFFNESS, q).duration
+    assert duration is not None
+    return duration
+
+
 def _parting(run: Trajectory) -> float:
     """Return the speed [m/s] at which tip and spring part, from the last row."""
     return float(run["v_tip"][-1] - run["z"][-1])
@@ -68,76 +67,73 @@ def _duration(run: Trajectory) -> float:
     return float(ends[0]) if ends else nan
 
 
-def compliant_impact() -> Iterator[Check]:
+@section("Law: free masses on normal compliance λ p^q", (1.0,), (1.5,), (3.0,))
+def compliant_impact(q: float) -> Iterator[Check]:
     """Free masses, 0.5 and 2 kg at 1 m/s, on λ_nc p₊^q: how long, and how fast they part; λ_nc = 1e4 N/m^q.
 
     q = 1 is half a period of √(λ_nc/μ); other q by the beta function. No energy is lost.
     """
-    for q in (1.0, 1.5, 3.0):
-        hit = exact.impact(_REDUCED, 1.0, _STIFFNESS, q)
-        assert hit.duration is not None
-        whole, steps = hit.duration, 40
-        law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q}
-        scene = partial(exact.free_masses, _TIP, _TOP, 1.0, 1.5 * whole, law, degree=2)
-        solver = _solver(scene(macro_step=whole / steps), pi)
-        if q == 1.0:
-            for degree in (0, 1, 2):
-                bound = whole * (_phase(degree, pi / steps) + solver)
-                lasts = _duration(simulate(scene(macro_step=whole / steps, degree=degree)))
-                yield Check(f"q = 1, degree {degree}: lasts [s]", whole, lasts, bound, f"{_PROJECTED}; and {IDA}")
-        else:
-            quantity = (f"q = {q:g}, degree 2: lasts [s]", whole, _duration)
-            yield from _halving((quantity,), scene, 2.0 * whole / steps, solver)
-        run = simulate(scene(macro_step=whole / 10.0))
-        tolerance = 15.0 * run.scene.coupling.tolerance
-        reason = f"H a tenth of the contact: no energy lost but coupling.tolerance of each of 15 steps; and {IDA}"
-        yield Check(f"q = {q:g}: part at [m/s]", 1.0, _parting(run), tolerance + solver, reason)
+    whole, steps, solver = _lasts(q), 40, ida_error(pi)
+    law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q}
+    scene = partial(exact.free_masses, _TIP, _TOP, 1.0, 1.5 * whole, law, degree=2)
+    if q == 1.0:
+        for degree in (0, 1, 2):
+            bound = whole * (_phase(degree, pi / steps) + solver)
+            lasts = _duration(simulate(scene(macro_step=whole / steps, degree=degree)))
+            yield Check(f"q = 1, degree {degree}: lasts [s]", whole, lasts, bound, f"{_PROJECTED}; and {IDA}")
+    else:
+        quantity = (f"q = {q:g}, degree 2: lasts [s]", whole, _duration)
+        yield from _halving((quantity,), scene, 2.0 * whole / steps, solver)
+    run = simulate(scene(macro_step=whole / 10.0))
+    tolerance = 15.0 * run.scene.coupling.tolerance
+    reason = f"H a tenth of the contact: no energy lost but coupling.tolerance of each of 15 steps; and {IDA}"
+    yield Check(f"q = {q:g}: part at [m/s]", 1.0, _parting(run), tolerance + solver, reason)
 
 
-def hunt_crossley() -> Iterator[Check]:
+@section("Law: Hunt & Crossley, χ = 0.5 s/m", (1.0,), (1.5,), (3.0,))
+def hunt_crossley(q: float) -> Iterator[Check]:
     """C = λ_nc p₊^q (1 + χ ṗ), χ = 0.5 s/m: the masses part at w with χ w − ln(1 + χ w) as before, and w < 0."""
-    for q in (1.0, 1.5, 3.0):
-        hit = exact.impact(_REDUCED, 1.0, _STIFFNESS, q, 0.5)
-        whole = exact.impact(_REDUCED, 1.0, _STIFFNESS, q).duration
-        assert whole is not None
-        law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q, "damping": 0.5}
-        scene = partial(exact.free_masses, _TIP, _TOP, 1.0, 2.0 * whole, law, degree=2)
-        quantities = (
-            (f"q = {q:g}: part at [m/s]", hit.rebound, _parting),
-            (f"q = {q:g}: dissipated [J]", hit.dissipated, lambda run: float(run["e_dissipated"][-1])),
-        )
-        yield from _halving(quantities, scene, whole / 20.0, _solver(scene(macro_step=whole / 20.0), pi))
+    hit, whole = exact.impact(_REDUCED, 1.0, _STIFFNESS, q, 0.5), _lasts(q)
+    law = {"law": "compliance", "stiffness": _STIFFNESS, "exponent": q, "damping": 0.5}
+    scene = partial(exact.free_masses, _TIP, _TOP, 1.0, 2.0 * whole, law, degree=2)
+    quantities = (
+        (f"q = {q:g}: part at [m/s]", hit.rebound, _parting),
+        (f"q = {q:g}: dissipated [J]", hit.dissipated, lambda run: float(run["e_dissipated"][-1])),
+    )
+    yield from _halving(quantities, scene, whole / 20.0, ida_error(pi))
 
 
-def linked_masses() -> Iterator[Check]:
-    """Unit masses held by 4π² each, on a link of 16π² N/m: u, y = (cos 2πt ± cos 6πt)/2; or c = 3 N·s/m as well.
+#: The link between unit masses that are held by 4π² N/m each [N/m], and the matrices of the tip.
+_LINK, _M, _K = 16.0 * pi**2, np.eye(1), np.full((1, 1), 4.0 * pi**2)
+
+
+@section("Law: two masses on a link", *product((0, 1, 2), (0.025, 0.0125)))
+def linked_masses(degree: int, size: float) -> Iterator[Check]:
+    """Unit masses held by 4π² each, on a link of 16π² N/m: u, y = (cos 2πt ± cos 6πt)/2.
 
     The link has 8/9 of the stiffness of the fast mode and none of the slow one's.
     """
-    link, T = 16.0 * pi**2, 1.0
-    M, K = np.eye(1), np.full((1, 1), 4.0 * pi**2)
+    run = simulate(exact.linked_masses(_LINK, 0.0, 1.0, macro_step=size, degree=degree))
+    masses = exact.linked(run.scene, _M, _K, np.ones(1), np.zeros(1), run["time"])
+    error = float(np.max(np.abs(np.column_stack([run["u_tip"], run["y"]]) - masses)))
+    bound = 0.5 * 6.0 * pi * 8.0 / 9.0 * _phase(degree, 6.0 * pi * size) + ida_error(6.0 * pi)
+    reason = f"largest error over 1 s. {_PROJECTED}; and {IDA}"
+    yield Check(f"degree {degree}, H = {size:g}: error [m]", 0.0, error, bound, reason)
 
-    def error(run: Trajectory) -> float:
-        masses = exact.linked(run.scene, M, K, np.ones(1), np.zeros(1), run["time"])
-        return float(np.max(np.abs(np.column_stack([run["u_tip"], run["y"]]) - masses)))
 
-    solver = _solver(exact.linked_masses(link, 0.0, T, macro_step=0.05), 6.0 * pi * T)
-    for degree in (0, 1, 2):
-        for size in (0.025, 0.0125):
-            run = simulate(exact.linked_masses(link, 0.0, T, macro_step=size, degree=degree))
-            bound = 0.5 * 6.0 * pi * T * 8.0 / 9.0 * _phase(degree, 6.0 * pi * size) + solver
-            name = f"degree {degree}, H = {size:g}: error [m]"
-            yield Check(name, 0.0, error(run), bound, f"largest error over 1 s. {_PROJECTED}; and {IDA}")
-
-    damped = partial(exact.linked_masses, link, 3.0, T, degree=2)
-    u, y = exact.linked(damped(macro_step=0.025), M, K, np.ones(1), np.zeros(1), np.array([T]))[0]
+@section("Law: two masses on a damped link, c = 3 N·s/m")
+def damped_link() -> Iterator[Check]:
+    """The masses of `linked_masses`, whose motion is a matrix exponential."""
+    scene = partial(exact.linked_masses, _LINK, 3.0, 1.0, degree=2)
+    u, y = exact.linked(scene(macro_step=0.025), _M, _K, np.ones(1), np.zeros(1), np.ones(1))[0]
     ends = (
-        ("c = 3 N·s/m: u_tip(1) [m]", float(u), lambda run: float(run["u_tip"][-1])),
-        ("c = 3 N·s/m: y(1) [m]", float(y), lambda run: float(run["y"][-1])),
+        ("u_tip(1) [m]", float(u), lambda run: float(run["u_tip"][-1])),
+        ("y(1) [m]", float(y), lambda run: float(run["y"][-1])),
     )
-    yield from _halving(ends, damped, 0.025, solver)
+    yield from _halving(ends, scene, 0.025, ida_error(6.0 * pi))
 
 
+@section("Law: two masses tied")
 def tied_masses() -> Iterator[Check]:
     """Unit masses held by 4π² and 12π² N/m, tied for good: one oscillator of ω² = 8π² from ẏ = −½ m/s, ¼ J lost.
 
@@ -150,4 +146,4 @@ def tied_masses() -> Iterator[Check]:
         ("lost in the impact [J]", 0.25, lambda run: float(run["e_impact_loss"][-1])),
         ("C(1) [N]", 2.0 * pi**2 / omega * sin(omega * T), lambda run: float(run["contact_force"][-1])),
     )
-    yield from _halving(quantities, scene, 0.01, _solver(scene(macro_step=0.01), omega * T))
+    yield from _halving(quantities, scene, 0.01, ida_error(omega * T))

@@ -16,10 +16,9 @@ from scipy.special import spherical_jn
 from ...run.runner import simulate
 from ...scene import Beam, Scene, Spring, scene_from_dict
 from .beam import clamped_free_frequencies, free_end, transfer_rate
-from .check import EPS, Check
+from .check import EPS, Check, section
 
 _N = 2 * 2 * 8  #: unknowns of the beam
-_ROUNDING = "rounding: ε N², N unknowns of the beam"
 
 
 def _scene(t_end: float, macro_step: float, loads: list[dict[str, Any]], **bodies: Any) -> Scene:
@@ -32,29 +31,28 @@ def _beam(**changes: Any) -> Any:
     return Beam.with_ones(n_elements=2, element_degree=8, approach="elastic", **changes)
 
 
-def resonance() -> Iterator[Check]:
-    """Amplitude and phase of the tip under a tip force of 1 N at ω₁, 0.8 ω₁ and 2.5 ω₁, after the transient.
+@section("Loads: a damped beam driven at its tip, amplitude and phase", (0.8,), (1.0,), (2.5,))
+def resonance(factor: float) -> Iterator[Check]:
+    """Amplitude and phase of the tip under a tip force of 1 N at ``factor`` ω₁, after the transient.
 
     Exact, of the beam itself: a transfer matrix with EI and KAG times 1 + iωα_b.
     """
     alpha, per_period = 0.4, 64
     first = clamped_free_frequencies()[0]
-    for factor in (0.8, 1.0, 2.5):
-        w = factor * first
-        H = 2.0 * pi / w / per_period
-        # The slowest transient, e^{−α_b ω₁² t/2}, is below rounding of the amplitude.
-        periods = int(40.0 / (0.5 * alpha * first**2) * w / (2.0 * pi)) + 1
-        drive = {"on": "tip", "signal": "harmonic", "frequency": w / (2.0 * pi)}
-        run = simulate(_scene(periods * per_period * H, H, [drive], beam=_beam(alpha_b=alpha)))
-        last = slice(-per_period, None)
-        found = 2j * np.mean(run.u_tip[last] * np.exp(-1j * w * run.time[last]))
-        exact = _tip_receptance(w, alpha)
-        left_out = 14.0 * float(spherical_jn(3, 0.5 * w * H)) * 4.0 / 3.0
-        reason = "what a polynomial of degree 2 leaves of the sine, 7 j₃(ωH/2) each way, on the static compliance 4/3"
-        name = f"{factor:g} ω₁"
-        yield Check(f"{name}: amplitude [m]", abs(exact), abs(found), left_out, reason)
-        angles = float(np.angle(exact)), float(np.angle(found))
-        yield Check(f"{name}: phase [rad]", *angles, left_out / abs(exact), reason)
+    w = factor * first
+    H = 2.0 * pi / w / per_period
+    # The slowest transient, e^{−α_b ω₁² t/2}, is below rounding of the amplitude.
+    periods = int(40.0 / (0.5 * alpha * first**2) * w / (2.0 * pi)) + 1
+    drive = {"on": "tip", "signal": "harmonic", "frequency": w / (2.0 * pi)}
+    run = simulate(_scene(periods * per_period * H, H, [drive], beam=_beam(alpha_b=alpha)))
+    last = slice(-per_period, None)
+    found = 2j * np.mean(run.u_tip[last] * np.exp(-1j * w * run.time[last]))
+    exact = _tip_receptance(w, alpha)
+    left_out = 14.0 * float(spherical_jn(3, 0.5 * w * H)) * 4.0 / 3.0
+    reason = "what a polynomial of degree 2 leaves of the sine, 7 j₃(ωH/2) each way, on the static compliance 4/3"
+    yield Check(f"{factor:g} ω₁: amplitude [m]", abs(exact), abs(found), left_out, reason)
+    angles = float(np.angle(exact)), float(np.angle(found))
+    yield Check(f"{factor:g} ω₁: phase [rad]", *angles, left_out / abs(exact), reason)
 
 
 def _tip_receptance(w: float, alpha: float) -> complex:
@@ -64,6 +62,7 @@ def _tip_receptance(w: float, alpha: float) -> complex:
     return complex(across[2, [1, 3]] @ start)
 
 
+@section("Loads: half-sine pulse on an oscillator")
 def pulse() -> Iterator[Check]:
     """Undamped spring, m = 1, k = 4π², under a half-sine pulse of F = 3 N and T = 0.3 s that begins off the macro grid.
 
@@ -87,27 +86,35 @@ def pulse() -> Iterator[Check]:
     yield Check("work on the spring [J]", worked, -float(run.e_load[-1]), bound * force, reason)
 
 
-def slow_ramp() -> Iterator[Check]:
-    """Static deflection of the tip after each kind of load on the beam has risen to 1 and its vibration has died out.
-
-    ∫ f (ξ²(3 − ξ)/6EI + ξ/KAG) dx, exact on any mesh that holds the static shape of a tip force.
-    """
-    kinds: list[tuple[str, dict[str, Any], float]] = [
+_RAMPS: tuple[tuple[str, dict[str, Any], float], ...] = (
+    *(
         (
             f"(x/L)^{i}",
             {"on": "beam", "shape": [0.0] * i + [1.0]},
             (3.0 / (i + 3) - 1.0 / (i + 4)) / 6.0 + 1.0 / (i + 2),
         )
         for i in range(4)
-    ]
-    kinds += [(f"point, {a:g} L", {"on": "beam", "at": a}, a * a * (3.0 - a) / 6.0 + a) for a in (0.3, 0.75)]
-    kinds += [("tip", {"on": "tip"}, 4.0 / 3.0), ("base", {"on": "base"}, -(1.0 / 8.0 + 1.0 / 2.0))]
-    for name, load, exact in kinds:
-        ramp = {**load, "signal": "ramp", "duration": 3.0}
-        run = simulate(_scene(200.0, 1.0, [ramp], beam=_beam(alpha_b=1.0)))
-        yield Check(f"{name}: u_tip [m]", exact, float(run.u_tip[-1]), _N**2 * EPS, _ROUNDING)
+    ),
+    *((f"point, {a:g} L", {"on": "beam", "at": a}, a * a * (3.0 - a) / 6.0 + a) for a in (0.3, 0.75)),
+    ("tip", {"on": "tip"}, 4.0 / 3.0),
+    ("base", {"on": "base"}, -(1.0 / 8.0 + 1.0 / 2.0)),
+)
 
 
+@section("Loads: static limit of a slow ramp, EI = KAG = L = 1", *_RAMPS)
+def slow_ramp(name: str, load: dict[str, Any], exact: float) -> Iterator[Check]:
+    """Static deflection of the tip after each kind of load on the beam has risen to 1 and its vibration has died out.
+
+    ∫ f (ξ²(3 − ξ)/6EI + ξ/KAG) dx, exact on any mesh that holds the static shape of a tip force.
+    """
+    ramp = {**load, "signal": "ramp", "duration": 3.0}
+    run = simulate(_scene(200.0, 1.0, [ramp], beam=_beam(alpha_b=1.0)))
+    yield Check(
+        f"{name}: u_tip [m]", exact, float(run.u_tip[-1]), _N**2 * EPS, "rounding: ε N², N unknowns of the beam"
+    )
+
+
+@section("Loads: a moving base and the equivalent loads")
 def moving_base() -> Iterator[Check]:
     """A base that accelerates by a(t) is the load −ρA a(t) on the beam and −m a(t) on the spring, through an impact."""
     beam = Beam.with_ones(density=2.0, area=1.5, n_elements=6, young_modulus=100.0, initial_velocity_slope=-1.0)

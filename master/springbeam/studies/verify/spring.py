@@ -9,38 +9,40 @@ from math import nan, pi, sqrt
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
-from ...bodies.fmu import Reals
 from ...bodies.fmu_bodies import FmuSpring
 from ...bodies.protocol import NO_FORCE, FmuError, StepRefused
 from ...scene import Spring
-from .check import Check
+from .check import Check, section
 
 IDA = "IDA: BDF of order ≤ 5 takes some ε^(−1/6) internal steps a radian, each of error ε: ωT·ε^(5/6)"
 
+_SPRINGS = ((3.0, -0.2, 0.5), (3.0, -0.2, 1.0), (150.0, 67.0, 0.5), (150.0, 67.0, 1.0))
 
-def duffing() -> Iterator[Check]:
+
+@section("Spring: Duffing (k1, k2, A), from rest", *_SPRINGS)
+def duffing(k1: float, k2: float, amplitude: float) -> Iterator[Check]:
     """Undamped Duffing spring, m = 1, from rest at A.
 
     Hardening: y = A cn(ωt|μ), ω² = k1 + k2A², μ = k2A²/2ω². Softening: y = A sn(ωt + K|μ), ω² = k1 + k2A²/2,
     μ = −k2A²/2ω². Period 4K(μ)/ω.
     """
-    for k1, k2, amplitude in ((3.0, -0.2, 0.5), (3.0, -0.2, 1.0), (150.0, 67.0, 0.5), (150.0, 67.0, 1.0)):
-        w2 = k1 + k2 * amplitude**2 * (1.0 if k2 > 0.0 else 0.5)
-        period = 4.0 * float(ellipk(abs(k2) * amplitude**2 / (2.0 * w2))) / sqrt(w2)
-        spring = Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=amplitude)
-        name = f"({k1:g}, {k2:g}, {amplitude:g})"
-        with closing(FmuSpring(spring, 0.0)) as body:
-            relative = ida_error(body, 2.0 * pi)
-            first, second = _falling_zeros(body, period / 18.5, 2)
-        with closing(FmuSpring(spring, 0.0)) as body:
-            for step in range(20):
-                body.advance(step * period / 20.0, period / 20.0, NO_FORCE)
-            back = body.motion()
-        yield Check(f"{name}: period [s]", period, second - first, relative * period, IDA)
-        yield Check(f"{name}: y(T) [m]", amplitude, back.displacement, relative * amplitude, IDA)
-        yield Check(f"{name}: ẏ(T) [m/s]", 0.0, back.velocity, relative * amplitude * 2.0 * pi / period, IDA)
+    w2 = k1 + k2 * amplitude**2 * (1.0 if k2 > 0.0 else 0.5)
+    period = 4.0 * float(ellipk(abs(k2) * amplitude**2 / (2.0 * w2))) / sqrt(w2)
+    spring = Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=amplitude)
+    name = f"({k1:g}, {k2:g}, {amplitude:g})"
+    relative = ida_error(2.0 * pi)
+    with closing(FmuSpring(spring, 0.0)) as body:
+        first, second = _falling_zeros(body, period / 18.5, 2)
+    with closing(FmuSpring(spring, 0.0)) as body:
+        for step in range(20):
+            body.advance(step * period / 20.0, period / 20.0, NO_FORCE)
+        back = body.motion()
+    yield Check(f"{name}: period [s]", period, second - first, relative * period, IDA)
+    yield Check(f"{name}: y(T) [m]", amplitude, back.displacement, relative * amplitude, IDA)
+    yield Check(f"{name}: ẏ(T) [m/s]", 0.0, back.velocity, relative * amplitude * 2.0 * pi / period, IDA)
 
 
+@section("Spring: escape of a softening spring")
 def escape() -> Iterator[Check]:
     """A softening spring escapes past the hilltop √(k1/|k2|) of its potential; from y = 0 with z > k1/√(2 m |k2|).
 
@@ -49,8 +51,7 @@ def escape() -> Iterator[Check]:
     k1, k2 = 3.0, -0.2
     hilltop, speed = sqrt(k1 / -k2), k1 / sqrt(-2.0 * k2)
     seconds, width = 20, 1e-11
-    with closing(FmuSpring(Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2), 0.0)) as body:
-        relative = ida_error(body, sqrt(k1) * seconds)
+    relative = ida_error(sqrt(k1) * seconds)
 
     def runs(position: float, velocity: float) -> bool:
         start = {"equilibrium": position, "initial_velocity": velocity}
@@ -72,9 +73,9 @@ def escape() -> Iterator[Check]:
     yield Check("escape from y = 0, ẏ [m/s]", speed, fastest, relative * speed, f"{IDA}, T = 20 s")
 
 
-def ida_error(body: FmuSpring, radians: float) -> float:
-    """Return the relative error that IDA's tolerance ε leaves over an angle ωT: `IDA`."""
-    return float(radians * Reals(body.fmu, "relative_tolerance").get()[0] ** (5.0 / 6.0))
+def ida_error(radians: float) -> float:
+    """Return the relative error that IDA's tolerance ε, the default of scenes, leaves over an angle ωT: `IDA`."""
+    return float(radians * Spring.with_ones().relative_tolerance ** (5.0 / 6.0))
 
 
 def _falling_zeros(body: FmuSpring, size: float, count: int) -> list[float]:

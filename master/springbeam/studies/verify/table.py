@@ -10,25 +10,22 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from .check import Check
-
-#: A title and its checks.
-Section = tuple[str, list[Check]]
+from .check import Check, Section
 
 
-def report(sections: Iterable[Section], console: Console) -> list[Section]:
-    """Print each section's table as it comes and a last line that counts; return the sections."""
-    began, printed = perf_counter(), []
-    for title, checks in sections:
-        console.print(Text(title, style="bold"))
+def report(sections: Iterable[Section], console: Console) -> dict[str, list[Check]]:
+    """Print each section's table as it comes and a last line that counts; return the checks by title."""
+    began, found = perf_counter(), dict[str, list[Check]]()
+    for section in sections:
+        checks = found[section.title] = list(section())
+        console.print(Text(section.title, style="bold"))
         console.print(_table(checks))
         console.print(_footnotes(checks))
         console.print()
-        printed.append((title, checks))
-    verdicts = [check.passed for _, checks in printed for check in checks]
+    verdicts = [check.passed for checks in found.values() for check in checks]
     counts = f"{verdicts.count(True)} passed, {verdicts.count(False)} failed, {verdicts.count(None)} reported without"
     console.print(f"{counts} judgement; {perf_counter() - began:.0f} s")
-    return printed
+    return found
 
 
 def _table(section: list[Check]) -> Table:
