@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -65,22 +64,10 @@ def compare(
 
 def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:
     """Return the values of the keys that are not the same in all scenes, ``None`` where a scene has no such key."""
-    flat = [dict(_flat(scene.model_dump(exclude_none=True))) for scene in scenes]
+    flat = [scene.flat() for scene in scenes]
     names = dict.fromkeys(name for keys in flat for name in keys)
     values = {name: [keys.get(name) for keys in flat] for name in names}
     return {name: found for name, found in values.items() if any(value != found[0] for value in found)}
-
-
-def _flat(scene: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield ``table.key`` and value, of loads ``loads.0.key``."""
-    for name, content in scene.items():
-        tables = {f"{name}.{i}": load for i, load in enumerate(content)} if name == "loads" else {name: content}
-        for table, keys in tables.items():
-            yield from (
-                ((f"{table}.{key}", value) for key, value in keys.items())
-                if isinstance(keys, dict)
-                else [(table, keys)]
-            )
 
 
 def results_of(runs: list[Trajectory]) -> dict[str, list[Any]]:

@@ -12,7 +12,7 @@ from functools import partial
 from .loads import MOST_POINTS
 from .messages import toml_of
 from .partners import ForeignFmu, RigidWall
-from .scene import TABLES, Scene
+from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
 from .suspicions import suspicions
 from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam
@@ -49,13 +49,12 @@ def _at(scene: Scene, place: str) -> str:
 
 def _extreme(scene: Scene) -> str:
     """Return the value furthest from 1, with its place."""
-    places = {
-        f"{table}.{key}": float(value)
-        for table in TABLES
-        for key, value in (scene.under(table) or ())
-        if isinstance(value, (int, float)) and value != 0.0
+    sizes = {
+        place: abs(math.log10(abs(value)))
+        for place, value in scene.flat().items()
+        if "." in place and isinstance(value, (int, float)) and value != 0.0
     }
-    return _at(scene, max(places, key=lambda place: abs(math.log10(abs(places[place])))))
+    return _at(scene, max(sizes, key=lambda place: sizes[place]))
 
 
 def _beam_quantities(beam: Beam) -> tuple[float, ...]:

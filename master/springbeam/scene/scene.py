@@ -61,6 +61,19 @@ class Scene(Table):
         content: Table | None = getattr(self, {"beam": "upper", "spring": "lower"}.get(table, table))
         return content
 
+    def flat(self) -> dict[str, Any]:
+        """Return the values of all keys that follow from no others, by ``"table.key"`` or ``"loads.0.key"``.
+
+        Those outside the tables go by their names.
+        """
+        data = self.model_dump(exclude_none=True)
+        data |= {f"loads.{i}": load for i, load in enumerate(data.pop("loads", ()))}
+        values: dict[str, Any] = {}
+        for name, content in data.items():
+            within = isinstance(content, dict)
+            values |= {f"{name}.{key}": value for key, value in content.items()} if within else {name: content}
+        return values
+
     @property
     def joins(self) -> bool:
         """Whether there are two bodies."""

@@ -105,25 +105,18 @@ def page(trajectory: Trajectory) -> str:
 
 def shipped_command(scene: Scene) -> str | None:
     """Return the command that runs ``scene`` from the shipped scene of its title; ``None`` if none is."""
-    wanted = _tables(scene)
-    for name, shipped in ((name, load_scene(name)) for name in shipped_scenes()):
-        given = _tables(shipped)
-        if given.keys() == wanted.keys() and shipped.title == scene.title:
+    wanted = scene.flat()
+    for name in shipped_scenes():
+        given = load_scene(name).flat()
+        tables, shipped = ({place.rpartition(".")[0] for place in values} for values in (wanted, given))
+        if given.get("title") == scene.title and tables == shipped:
             settings = [
-                f"--set {shlex.quote(f'{table}.{key}={value if isinstance(value, str) else json.dumps(value)}')}"
-                for table, content in wanted.items()
-                for key, value in content.items()
-                if given[table].get(key) != value
+                f"--set {shlex.quote(f'{place}={value if isinstance(value, str) else json.dumps(value)}')}"
+                for place, value in wanted.items()
+                if "." in place and given.get(place) != value
             ]
             return " ".join(["springbeam", "run", name, *settings])
     return None
-
-
-def _tables(scene: Scene) -> dict[str, dict[str, Any]]:
-    """Return the tables of a scene as ``--set`` names them."""
-    data = scene.model_dump(exclude_none=True)
-    tables = {name: content for name, content in data.items() if isinstance(content, dict)}
-    return tables | {f"loads.{i}": load for i, load in enumerate(data.get("loads", ()))}
 
 
 def _warnings(trajectory: Trajectory) -> list[str]:
