@@ -150,6 +150,6 @@ class Rows(Checkpointed):
 
     def _shape(self, beam: BeamBody, time: float, early: bool) -> None:
         self._shapes_left -= early
-        while self._next_shape <= time:
-            self._next_shape += self._shape_every
+        if time >= self._next_shape:
+            self._next_shape += self._shape_every * ((time - self._next_shape) // self._shape_every + 1.0)
         self._recorder.shape(time, beam.shape())
