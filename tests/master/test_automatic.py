@@ -13,7 +13,7 @@ from commands import command
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
-from springbeam.scene.automatic import choice, decided
+from springbeam.scene.automatic import choice, with_scheme_chosen
 from springbeam.scene.linearised import spring_frequency
 from springbeam.scene.resolution import STABLE, mesh_frequency, not_resolved, slowest_frequency
 from springbeam.studies.stability.linear import LinearBody, LinearPair, spectral_radius
@@ -93,7 +93,7 @@ def test_where_hermite_is_not_defined_it_is_not_taken():
     assert choice(with_changes(PAIR, beam={"integrator": "generalized_alpha"}))[:2] == ("energy", 0)
     assert choice(with_changes(PAIR, beam={"fidelity": "quasi_static"}))[:2] == ("energy", 2)
     for changes in ({"contact": {"law": "compliance"}}, {"beam": {"integrator": "generalized_alpha"}}):
-        assert decided(auto(**changes))[0].coupling.scheme == "energy"
+        assert with_scheme_chosen(auto(**changes))[0].coupling.scheme == "energy"
 
 
 @pytest.mark.parametrize("contact", [{"law": "compliance", "exponent": 1.5}, {"law": "link"}], ids=lambda c: c["law"])

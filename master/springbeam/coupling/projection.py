@@ -77,7 +77,7 @@ class Projection:
         if self._is_quotient and _changes(start, x[0]):
             return [(self.law.potential(x[0]) - self.law.potential(start)) / (x[0] - start)]
         path = b0, b1, b2, b3 = _path(start, x)
-        rule = self._where_it_acts(path, start, x[0])
+        rule = self._quadrature(path, start, x[0])
         law = self.law.force
         m0 = m1 = m2 = 0.0
         for s, weight in rule:
@@ -111,7 +111,7 @@ class Projection:
             of_mean = law.slope(mean)
             return [[of_mean * value for value in row] for row in self._by_x_projected]
         path = _path(start, x)
-        rule = self._where_it_acts(path, start, x[0])
+        rule = self._quadrature(path, start, x[0])
         rows = [[0.0] * len(x) for _ in x]
         for s, weight in rule:
             p, rate = _at(path, s, size)
@@ -131,18 +131,18 @@ class Projection:
         """Return ∫ D ṗ dτ ≥ 0 [J] over a step of ``size`` [s]."""
         path = _path(start, x)
         total = 0.0
-        for s, weight in self._where_it_acts(path, start, x[0]):
+        for s, weight in self._quadrature(path, start, x[0]):
             p, rate = _at(path, s, size)
             total += weight * self.law.resistance(p, rate)[0] * rate
         return 0.5 * size * total
 
-    def left_out(self, start: float, x: Vector) -> float:
+    def next_coefficient(self, start: float, x: Vector) -> float:
         """Return the Legendre coefficient of F(p̃) of degree d + 1 [N], the first that C leaves out."""
         path = _path(start, x)
         k = self.degree + 1
         polynomial = ([0.0, 1.0], [-0.5, 0.0, 1.5], [0.0, -1.5, 0.0, 2.5])[self.degree]
         total = 0.0
-        for s, weight in self._where_it_acts(path, start, x[0]):
+        for s, weight in self._quadrature(path, start, x[0]):
             value = sum(c * s**i for i, c in enumerate(polynomial))
             total += weight * value * self.law.force(_at(path, s)[0])
         return (k + 0.5) * total
@@ -158,7 +158,7 @@ class Projection:
         square = 2.0 * (b1 + b3) ** 2 + 8.0 / 3.0 * b2 * b2 + 1.6 * b3 * b3
         return missing / square if square > 0.0 else 0.0
 
-    def _where_it_acts(self, path: _Path, start: float, end: float) -> _Rule:
+    def _quadrature(self, path: _Path, start: float, end: float) -> _Rule:
         """Return a rule for the pieces of the step where the law acts, without points if there are none."""
         if not self.law.one_sided:
             return self._few

@@ -65,7 +65,7 @@ class Coupling(Checkpointed):
 
     #: Degree of the contact force over a step.
     degree: int = 0
-    #: Share of a step at which `told_force` has one order more than elsewhere.
+    #: Share of a step at which `force_without_mismatch` has one order more than elsewhere.
     sharpest: float = 1.0
     #: Whether the force does no net work but what is booked, at any step.
     energy_exact: bool = True
@@ -92,8 +92,11 @@ class Coupling(Checkpointed):
         """Return estimates of the step's error that its motion does not show by itself."""
         return []
 
-    def told_force(self, step: Step, reduced_mass: float) -> Force:
-        """Return the contact force of ``step`` as far as it tells of the ends [kg], without what the scheme adds."""
+    def force_without_mismatch(self, step: Step, reduced_mass: float) -> Force:
+        """Return C of ``step`` without what the scheme adds to turn a mismatch of the ends' velocities round.
+
+        ``reduced_mass`` is that of both ends [kg].
+        """
         return step.contact
 
     def neglected(self) -> Neglected | None:

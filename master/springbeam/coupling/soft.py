@@ -86,12 +86,12 @@ class SoftSolver(StepSolver):
     def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
         """Estimate from the part of the law's force that the polynomial leaves out: it changes velocities."""
         start, x = penetration(step, self.degree)
-        left_out = abs(self._projection.left_out(start, x))
-        if left_out == 0.0 or scales.reduced_mass == 0.0:
+        neglected = abs(self._projection.next_coefficient(start, x))
+        if neglected == 0.0 or scales.reduced_mass == 0.0:
             return []
-        return [(step.size * left_out / (6.0 * scales.reduced_mass * scales.speed), self.degree + 2)]
+        return [(step.size * neglected / (6.0 * scales.reduced_mass * scales.speed), self.degree + 2)]
 
-    def apart(self, gap: Vector, a: Vector, window: Window) -> bool:
+    def no_contact(self, gap: Vector, a: Vector, window: Window) -> bool:
         if any(a):
             return False
         tip, low = window.ends

@@ -68,7 +68,7 @@ class StepSolver(Coupling):
         self._expected = expected
         self.iterations = 0
 
-    def apart(self, gap: Vector, a: Vector, window: Window) -> bool:
+    def no_contact(self, gap: Vector, a: Vector, window: Window) -> bool:
         """Return whether nothing acts between the bodies under ``a``, nor should; parameters as of `aim`."""
         return False
 
@@ -102,7 +102,7 @@ class StepSolver(Coupling):
         lower_end = lower.advance(time, size, acting)
         r_lower = conditions(lower_end, size)
         gap = list(map(sub, r_upper, r_lower))
-        if self.apart(gap, a, window):
+        if self.no_contact(gap, a, window):
             return acting
         tried: Vector | None = a  # at the upper body in earnest; elsewhere its end is predicted
         known = self._sizes.get(size)

@@ -31,7 +31,7 @@ class Tie(StepSolver):
         self.energy_exact = scheme == "energy"
         self.sharpest = (energy if self.energy_exact else hermite).SHARPEST[degree]
 
-    def told_force(self, step: Step, reduced_mass: float) -> Force:
+    def force_without_mismatch(self, step: Step, reduced_mass: float) -> Force:
         """Return C without the image of the mismatch of the ends' velocities."""
         if not self.energy_exact or step.size == 0.0:
             return step.contact

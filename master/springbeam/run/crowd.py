@@ -7,7 +7,7 @@ from .outcome import RunStopped
 
 #: Events closer than this fraction of H are at once; so many of them and the contact is said to chatter. Impacts that
 #: die out are up to 370 (e = 0.997) between this and `_NO_TIME` of `springbeam.run.detection`, where they are seated.
-AT_ONCE, _MAX_AT_ONCE = 1e-6, 500
+SIMULTANEOUS, _MAX_SIMULTANEOUS = 1e-6, 500
 #: Events within H. Impacts that die out are up to 18,000 (e = 0.999); those of a lossy body on a lossless stop are
 #: without end.
 _MAX_IN_STEP = 20_000
@@ -16,21 +16,21 @@ _MAX_IN_STEP = 20_000
 class Crowd(Checkpointed):
     """The steps that events have cut, counted since ``time`` [s]."""
 
-    CHECKPOINTED = ("_at_once", "_in_step")
+    CHECKPOINTED = ("_simultaneous", "_in_step")
 
     def __init__(self, time: float) -> None:
         #: Events at once, and within one macro step: how many, and since when [s].
-        self._at_once = self._in_step = (0, time)
+        self._simultaneous = self._in_step = (0, time)
 
     def count(self, end: float, size: float, macro_step: float) -> None:
         """Count a step of ``size`` [s] that ends at ``end`` [s]. Raises RunStopped if events crowd."""
         if size >= macro_step:
-            self._at_once = self._in_step = (1, end)
+            self._simultaneous = self._in_step = (1, end)
             return
-        self._at_once = _counted(self._at_once, end, AT_ONCE * macro_step)
+        self._simultaneous = _counted(self._simultaneous, end, SIMULTANEOUS * macro_step)
         self._in_step = _counted(self._in_step, end, macro_step)
-        if self._at_once[0] > _MAX_AT_ONCE:
-            raise RunStopped(f"the contact chatters: {_MAX_AT_ONCE} events at once", end - size)
+        if self._simultaneous[0] > _MAX_SIMULTANEOUS:
+            raise RunStopped(f"the contact chatters: {_MAX_SIMULTANEOUS} events at once", end - size)
         if self._in_step[0] > _MAX_IN_STEP:
             raise RunStopped(
                 f"the contact chatters: {_MAX_IN_STEP} events within a macro step of {macro_step:g} s; a restitution "

@@ -88,7 +88,7 @@ class Detector:
                 return kind
         return None
 
-    def first(self, state: State, step: Step) -> tuple[Step, str | None]:
+    def first_event(self, state: State, step: Step) -> tuple[Step, str | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it."""
         step, found = self._first_by_position(state, step)
         if self._pair.opens_softly and step.size > 0.0:
@@ -98,7 +98,7 @@ class Detector:
                 step, found = self._first_by_position(state, touched)
         if step.size == 0.0:
             return step, found
-        unilateral = self._separation.first(state, step, self._steps.size)
+        unilateral = self._separation.first_event(state, step, self._steps.size)
         if unilateral is None:
             return self._pair.repeated(state, step), found
         cut, kind = unilateral

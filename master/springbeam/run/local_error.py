@@ -36,7 +36,7 @@ class LocalError(Checkpointed):
         self._highest = self._lowest
         self._fastest = 0.0  #: [m/s]
 
-    def of(self, state: State, step: Step, energy_scale: float) -> tuple[float, int]:
+    def estimate(self, state: State, step: Step, energy_scale: float) -> tuple[float, int]:
         """The step's error, 1 is the tolerance, and the order in which it falls with the size of the step.
 
         ``energy_scale`` is the largest energy so far [J].
@@ -69,11 +69,11 @@ class LocalError(Checkpointed):
 
     def _curve(self, errors: list[float], ranges: list[float], relative: float) -> tuple[float, int]:
         allowed = (self._absolute + relative * r for r in ranges)
-        told = zip(errors, ranges, allowed, self._told_apart(), strict=True)
+        told = zip(errors, ranges, allowed, self._rounding(), strict=True)
         ratios = [e / (a + least) for e, r, a, least in told if r > 0.0]
         return max(ratios, default=0.0), _CUBIC
 
-    def _told_apart(self) -> list[float]:
+    def _rounding(self) -> list[float]:
         """Up to where displacements of the ends are rounding, and the spring's tolerance [m]: no step is too long for
         that, though from rest the motion so far is shorter still."""
         reach = [max(abs(low), abs(high)) for low, high in zip(self._lowest, self._highest, strict=True)]

@@ -24,13 +24,13 @@ _SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
 class MacroGrid(Checkpointed):
     """The grid t₀ + k H up to t_end [s]."""
 
-    CHECKPOINTED = ("_index", "_struck")
+    CHECKPOINTED = ("_index", "_after_impact")
 
     def __init__(self, start: float, end: float, macro_step: float) -> None:
         self._start, self._end = start, end
         self.size = macro_step  #: H [s]
         self._index = 0
-        self._struck = False
+        self._after_impact = False
 
     def next(self, time: float, kink: float = inf) -> tuple[float, float]:
         """The time at which the step from ``time`` should end, and its size (exactly H where it is a whole one).
@@ -38,8 +38,8 @@ class MacroGrid(Checkpointed):
         It ends at ``kink`` [s], where a load jumps or bends, if that comes first or soon after.
         """
         H = self.size
-        if self._struck:
-            self._struck = False
+        if self._after_impact:
+            self._after_impact = False
             size = _AFTER_IMPACT * H
             if time + size < self._end:
                 return (time + size, size) if kink >= time + size + _SHORT_REMAINDER * H else (kink, kink - time)
@@ -63,7 +63,7 @@ class MacroGrid(Checkpointed):
 
     def shorten_after_impact(self) -> None:
         """Let the next step be short: an impact has just changed velocities, and ends that have met may part again."""
-        self._struck = True
+        self._after_impact = True
 
 
 class AdaptiveSteps(Checkpointed):

@@ -96,7 +96,7 @@ class Rows(Checkpointed):
             if early or time >= self._next_shape:
                 self._shape(pair.beam, time, early)
 
-    def struck(self, state: State, macro_step: float) -> None:
+    def note_stop_impact(self, state: State, macro_step: float) -> None:
         """Note how far the velocities of joined ends differ as they strike the foundation.
 
         Impacts less than ``macro_step`` [s] after another one, or at the start of a phase, are left out: they may be as
@@ -111,7 +111,7 @@ class Rows(Checkpointed):
         if speed > 0.0:
             self.mismatch_at_stop = max(self.mismatch_at_stop, abs(v - z) / speed)
 
-    def reached(self, step: Step) -> None:
+    def note_penetration(self, step: Step) -> None:
         """Note how deep the ends of a soft law have sunk into each other on ``step``, also inside it.
 
         A law that never opens is linear: how deep does not matter.

@@ -249,7 +249,7 @@ def _totals(simulation: Simulation | PaperLaw, scene: Scene, recorder: Recorder)
     steps = recorder.steps()
     if steps is None or isinstance(simulation, PaperLaw):
         return {}
-    return totals(scene, steps, recorder.events(), force_window(scene), free_at_end=simulation.apart)
+    return totals(scene, steps, recorder.events(), force_window(scene), free_at_end=simulation.free_at_end)
 
 
 def _calls(**bodies: Body | None) -> dict[str, int]:

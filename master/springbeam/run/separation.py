@@ -39,7 +39,7 @@ class Separation:
     def __init__(self, pair: Pair, no_time: float) -> None:
         self._pair, self._no_time = pair, no_time
 
-    def first(self, state: State, step: Step, macro_step: float) -> tuple[Step, str] | None:
+    def first_event(self, state: State, step: Step, macro_step: float) -> tuple[Step, str] | None:
         """Return ``step`` cut to the event, of size 0 if it is at the start, and its kind; ``None`` if none is due."""
         push = self._pushing(state.phase)
         if push is None:
@@ -63,7 +63,7 @@ class Separation:
         return None
 
     def _by_polynomial(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, str] | None:
-        f = self._told(state, step, push)
+        f = self._without_mismatch(state, step, push)
         falling = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
         if f[0] < 0.0:
             # The sign at the start may be a false alarm: it is one if the ends, let go, close.
@@ -77,7 +77,7 @@ class Separation:
         room = self._pair.loads.next_kink(state.time + self._no_time * macro_step) - state.time
         for _ in range(_MAX_LOOKS):
             size = min(max(zero / best, _SHORTEST_LOOK * macro_step), room)
-            g = self._told(state, self._pair.attempt(state, size, step.start), push)
+            g = self._without_mismatch(state, self._pair.attempt(state, size, step.start), push)
             value, slope = force.value(g, zero), g[1] + zero * g[2]
             change = -value / slope if slope < 0.0 else 0.0
             if not 0.0 < zero + change < step.size or abs(change) <= 1e-12 * macro_step:
@@ -85,9 +85,9 @@ class Separation:
             zero += change
         return self._pair.attempt(state, zero, step.start), push.event
 
-    def _told(self, state: State, step: Step, push: Push) -> Force:
+    def _without_mismatch(self, state: State, step: Step, push: Push) -> Force:
         """The force that pushes, without what the scheme adds to the contact's."""
-        contact = self._pair.told_force(state.phase, step)
+        contact = self._pair.force_without_mismatch(state.phase, step)
         f = push.force(step)
         return (
             f[0] + contact[0] - step.contact[0],

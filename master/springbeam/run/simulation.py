@@ -18,9 +18,9 @@ from ..results.recording import NonFiniteValue, Recorder
 from ..results.totals import shortest_contact
 from ..results.trajectory import Event
 from ..scene import Scene
-from ..scene.automatic import decided
+from ..scene.automatic import with_scheme_chosen
 from ..scene.resolution import CONTACT_STEPS, not_resolved, peak_force_doubt
-from .crowd import AT_ONCE, Crowd
+from .crowd import SIMULTANEOUS, Crowd
 from .detection import Detector
 from .ledger import Balance
 from .local_error import LocalError
@@ -77,7 +77,7 @@ class Simulation(Checkpointed):
         recorder: Recorder,
         progress: Progress | None = None,
     ) -> None:
-        scene, self._choice = decided(scene)
+        scene, self._choice = with_scheme_chosen(scene)
         self._scene, self._recorder, self._progress = scene, recorder, progress
         self._pair = Pair(scene, beam, spring)
         self._state = self._pair.initial_state(start_time)
@@ -143,7 +143,7 @@ class Simulation(Checkpointed):
                 state.accept(step, end)
                 self._macro_steps += 1
                 if self._pair.law.soft:
-                    self._rows.reached(step)
+                    self._rows.note_penetration(step)
                 if self._pair.opens_softly:
                     self._note_soft_contact(step)
             steps.reached(state.time)
@@ -166,7 +166,7 @@ class Simulation(Checkpointed):
                     return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
                 step = pair.attempt(state, size, start)
                 if self._error is None or self._holds(step, self._error):
-                    return self._detector.first(state, step)
+                    return self._detector.first_event(state, step)
                 pair.rewind()
                 size = self._steps.size
             except (StepRefused, OverflowError) as refused:
@@ -183,7 +183,7 @@ class Simulation(Checkpointed):
     def _holds(self, step: Step, local_error: LocalError) -> bool:
         """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set."""
         assert isinstance(self._steps, AdaptiveSteps)
-        error, order = local_error.of(self._state, step, self._balance.ledger.scale)
+        error, order = local_error.estimate(self._state, step, self._balance.ledger.scale)
         try:
             return self._steps.judge(step.size, error, order)
         except StepTooShort as too_short:
@@ -213,9 +213,9 @@ class Simulation(Checkpointed):
         if kind in ("separation", "release"):
             self._last_opening = state.time
         if kind == "impact":
-            state.reclosed = state.time - self._last_opening <= AT_ONCE * self._steps.size
+            state.reclosed = state.time - self._last_opening <= SIMULTANEOUS * self._steps.size
         if kind == "stop_impact":
-            self._rows.struck(state, self._steps.size)
+            self._rows.note_stop_impact(state, self._steps.size)
         ends = pair.ends()
         tolerance = self._detector.simultaneity_tolerance(ends) if kind == "impact" else self._detector.tolerance(ends)
         kind, phase, impact = self._transitions.after(
@@ -288,7 +288,7 @@ class Simulation(Checkpointed):
                 self._recorder.steps(),
                 self._recorder.events(),
                 CONTACT_STEPS * self._steps.size,
-                free_at_end=self.apart,
+                free_at_end=self.free_at_end,
             ),
             contact_frequency=rows.contact_frequency,
             contact_steps=rows.contact_steps,
@@ -298,8 +298,8 @@ class Simulation(Checkpointed):
             warnings.append(doubt)
         if rows.not_shown:
             warnings.append(NOT_SHOWN)
-        left_out = self._pair.joined.neglected()
-        neglected = {} if left_out is None else {"neglected_motion": left_out.motion, "neglected_share": left_out.share}
+        bound = self._pair.joined.neglected()
+        neglected = {} if bound is None else {"neglected_motion": bound.motion, "neglected_share": bound.share}
         coupling = {} if self._choice is None else {"coupling": self._choice._asdict()}
         return {
             **neglected,
@@ -318,6 +318,6 @@ class Simulation(Checkpointed):
         }
 
     @property
-    def apart(self) -> bool:
-        """Whether tip and lower end are apart."""
+    def free_at_end(self) -> bool:
+        """Whether no contact joins tip and lower end by now."""
         return self._state.phase.joint is Joint.FREE

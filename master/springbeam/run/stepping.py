@@ -113,7 +113,7 @@ class Pair(Checkpointed):
         self.opens_softly = self.law.soft and not self.law.lasting
         #: What couples the bodies where the law acts, and where the ends are apart.
         self.joined = coupling_of(scene, self.law)
-        self._apart = self.joined if self.law.soft else Uncoupled()
+        self._uncoupled = self.joined if self.law.soft else Uncoupled()
 
     def initial_state(self, time: float) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start."""
@@ -126,7 +126,7 @@ class Pair(Checkpointed):
 
     def coupling(self, phase: Phase) -> Coupling:
         """What couples the bodies in ``phase``: a soft law acts wherever the ends are."""
-        return self._apart if phase.joint is Joint.FREE else self.joined
+        return self._uncoupled if phase.joint is Joint.FREE else self.joined
 
     def mark(self) -> None:
         """Remember the bodies' states as those that steps start from."""
@@ -149,11 +149,11 @@ class Pair(Checkpointed):
         self.loads.act(time, size)
         window = _window_of(Window, (time, size, start))
         contact = self.coupling(phase).solve(self.upper, partner, window, state.guess(size))
-        foundation = self._held_down(time, size, contact) if phase.seated else NO_FORCE
+        foundation = self._foundation_force(time, size, contact) if phase.seated else NO_FORCE
         self._last = step = _step_of(Step, (time, size, contact, foundation, start, self.ends()))
         return step
 
-    def _held_down(self, time: float, size: float, contact: Force) -> Force:
+    def _foundation_force(self, time: float, size: float, contact: Force) -> Force:
         """The foundation's force N on the lower end that it holds; the spring advances at rest under it."""
         if self.spring is None:
             return contact
@@ -200,13 +200,13 @@ class Pair(Checkpointed):
         if self.upper.massless:
             low = self.lower.motion()
             return self.upper.holding_force(low.displacement, low.velocity)
-        return (
-            force.end_value(self.told_force(state.phase, step), step.size) if self.joined.degree > 0 else state.smoothed
-        )
+        if self.joined.degree == 0:
+            return state.smoothed
+        return force.end_value(self.force_without_mismatch(state.phase, step), step.size)
 
-    def told_force(self, phase: Phase, step: Step) -> Force:
-        """Return C of a step of ``phase``, as far as the motion of the ends determines it [N]."""
-        return self.coupling(phase).told_force(step, self.reduced_mass(phase))
+    def force_without_mismatch(self, phase: Phase, step: Step) -> Force:
+        """Return C of a step of ``phase`` [N], without what turns a mismatch of the ends' velocities round."""
+        return self.coupling(phase).force_without_mismatch(step, self.reduced_mass(phase))
 
     def reduced_mass(self, phase: Phase) -> float:
         """Reduced mass of both ends [kg]; the tip's mass while the lower end is seated."""

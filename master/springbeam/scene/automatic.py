@@ -27,7 +27,7 @@ def choice(scene: Scene) -> Choice:
     if scene.contact.law == "paper":
         return Choice("energy", 0, 'contact.law = "paper"')
     if scene.partners:
-        return Choice("energy", _told(scene), "a body that is not our own")
+        return Choice("energy", _highest_degree(scene), "a body that is not our own")
     if beam is None:
         return Choice("energy", 0, "one body")
     if beam.integrator != "modal":
@@ -50,13 +50,13 @@ def choice(scene: Scene) -> Choice:
     return Choice("energy", 0, f"ω₁H = {slowest * H:.3g} > {TURN:g}")
 
 
-def _told(scene: Scene) -> int:
+def _highest_degree(scene: Scene) -> int:
     """Return the highest degree that the bodies' tables speak of: of a foreign FMU, by its integrals."""
     integrals = [(body.integral, body.integral_2) for body in scene.foreign.values()]
     return min((2 if all(names) else 0 for names in integrals), default=2)
 
 
-def decided(scene: Scene) -> tuple[Scene, Choice | None]:
+def with_scheme_chosen(scene: Scene) -> tuple[Scene, Choice | None]:
     """Return the scene with a scheme and a degree in place of ``"auto"``, and the choice; ``None`` if it has one."""
     if scene.coupling.scheme != "auto":
         return scene, None

@@ -29,7 +29,7 @@ from ...results.trajectory import Trajectory
 from ...run.outcome import RunStopped
 from ...run.runner import simulate
 from ...scene import Scene, SceneError, with_changes
-from ...scene.automatic import decided
+from ...scene.automatic import with_scheme_chosen
 from ...scene.resolution import mesh_frequency
 from ...scene.statics import tip_compliance
 from ..reference import PERTURBATION, reference_and_perturbed, refuse_without_reference
@@ -210,6 +210,6 @@ def _compare_events(
         steps = (time - start) / size + 1.0
         # The unit of time in which the state changes as a whole is what the events so far have taken.
         bound = SAFETY * moved + IDA_TOLERANCE * steps * report.growth * max(time - start, size)
-        if kind in ("opens", "leaves") and decided(report.scene)[0].coupling.degree == 0:
+        if kind in ("opens", "leaves") and with_scheme_chosen(report.scene)[0].coupling.degree == 0:
             bound += 0.5 * size  # a force known by its means tells no better when it vanishes
         report.events.append(EventRow(kind, ours, time, bound, abs(ours - time) <= bound))

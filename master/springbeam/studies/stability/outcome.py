@@ -27,7 +27,7 @@ from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
 from ...run.runner import run
 from ...scene import Scene, SceneError, scene_from_dict
-from ...scene.automatic import decided
+from ...scene.automatic import with_scheme_chosen
 from .cells import scene_dict
 
 #: In the order in which pictures and tables show them; the last must stay empty.
@@ -101,7 +101,7 @@ def judged(run: Trajectory, cause: str = "") -> Outcome:
     if faults := list(_faults(run, outcome.overlap, scale)):
         outcome.kind, outcome.reason = "garbage", "; ".join(faults)
         return outcome
-    scene, _ = decided(run.scene)
+    scene, _ = with_scheme_chosen(run.scene)
     bound, _ = bounds(scene)
     said = [text for text in summary["warnings"] if "energy" in text]
     lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
