@@ -10,6 +10,7 @@ from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
 from springbeam.studies import sweep
 from springbeam.studies.study import Records, dask_cluster, record_all
+from springbeam.studies.sweep import picture
 from springbeam.studies.sweep.design import Axis, design, parse_axis, varied
 
 METRICS = ("y_min", "first_stop_impact", "energy_residual")
@@ -111,6 +112,27 @@ def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
         assert rows["y_min"][k] == run.y.min()
         assert rows["energy_residual"][k] == run.summary["max_energy_residual"]
         assert rows["first_stop_impact"][k] == next(e.time for e in run.events if e.kind == "stop_impact")
+
+
+@pytest.mark.parametrize(
+    ("values", "log", "borders"),
+    [([1.0, 2.0, 4.0], False, [0.5, 1.5, 3.0, 5.0]), ([1.0, 100.0], True, [0.1, 10.0, 1000.0])],
+)
+def test_cells_of_a_map_meet_halfway_between_their_values(values, log, borders):
+    """The lowest cell of a logarithmic key was below 0, and not to be seen."""
+    assert picture.borders_between(np.array(values), log) == pytest.approx(borders, rel=1e-12)
+
+
+def test_what_multiplies_a_scale_stands_in_the_title_where_nothing_is_over_it(tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(picture.plt, "close", figures.append)
+    columns = {"spring.mass": [1.0, 1.0, 2.0, 2.0], "spring.damping": [0.0, 1.0] * 2, "y_min": [0.0, 1e-7, 2e-7, 3e-7]}
+    axes = [parse_axis("spring.mass=1:2:2"), parse_axis("spring.damping=0:1:2")]
+    for several in (axes[:1], axes):
+        assert picture.draw(columns, several, ["y_min"], "", tmp_path / "sweep.png")
+        panels = figures.pop().axes
+        assert panels[0].get_title() == "y_min [m]   1e−7"
+        assert not panels[-1].yaxis.get_offset_text().get_visible()
 
 
 def test_rows_do_not_depend_on_the_number_of_workers(tmp_path):

@@ -40,12 +40,18 @@ def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], metrics: Sequence[
     figure.suptitle(title or "sweep", wrap=True)
     for ax in panels.flat[len(shown) :]:
         ax.remove()
+    scales = []
     for ax, name in zip(panels.flat, shown, strict=False):
-        ax.set_title(heading(name), fontsize="medium")
         if len(axes) == 1:
-            _curve(ax, columns[axes[0].name], numbers[name], axes[0])
+            scale = _curve(ax, columns[axes[0].name], numbers[name], axes[0])
         else:
-            _map(figure, ax, columns, numbers[name], axes)
+            scale = _map(figure, ax, columns, numbers[name], axes)
+        scales.append(scale)
+    figure.draw_without_rendering()  # which decides by what the numbers of a scale are multiplied
+    for ax, name, scale in zip(panels.flat, shown, scales, strict=False):
+        factor = scale.get_offset_text()
+        ax.set_title(f"{heading(name)}   {factor.get_text()}", fontsize="medium")
+        factor.set_visible(False)
     figure.savefig(path, dpi=100)
     plt.close(figure)
     return True
@@ -56,7 +62,8 @@ def _varies(values: np.ndarray) -> bool:
     return found.size > 1 and bool(np.ptp(found) > _ROUNDING * np.abs(found).max())
 
 
-def _curve(ax: Axes, at: list[Any], values: np.ndarray, axis: Axis) -> None:
+def _curve(ax: Axes, at: list[Any], values: np.ndarray, axis: Axis) -> YAxis:
+    """Draw values over those of a key; return the scale of the former."""
     failed = np.isnan(values)
     if any(isinstance(value, str) for value in at):
         ax.plot([str(v) for v in at], values, "o", color=BLUE)
@@ -71,9 +78,11 @@ def _curve(ax: Axes, at: list[Any], values: np.ndarray, axis: Axis) -> None:
             _logarithmic(ax.xaxis, position)
     ax.set_xlabel(_labelled(axis))
     ax.grid(alpha=0.3)
+    return ax.yaxis
 
 
-def _map(figure: Figure, ax: Axes, columns: dict[str, list[Any]], values: np.ndarray, axes: Sequence[Axis]) -> None:
+def _map(figure: Figure, ax: Axes, columns: dict[str, list[Any]], values: np.ndarray, axes: Sequence[Axis]) -> YAxis:
+    """Draw values over those of two keys; return the scale of the former."""
     levels = [list(dict.fromkeys(columns[axis.name])) for axis in axes]
     grid = len(values) == len(levels[0]) * len(levels[1]) and all(axis.values for axis in axes)
     words = [any(isinstance(v, str) for v in level) for level in levels]
@@ -82,7 +91,8 @@ def _map(figure: Figure, ax: Axes, columns: dict[str, list[Any]], values: np.nda
                 for level, word in zip(levels, words, strict=True))  # fmt: skip
         ascending = np.ix_(np.argsort(x), np.argsort(y))
         found = values.reshape(len(x), len(y))[ascending].T
-        picture: ScalarMappable = ax.pcolormesh(np.sort(x), np.sort(y), found, shading="nearest", cmap="cividis")
+        borders = (borders_between(np.sort(at), axis.log) for at, axis in zip((x, y), axes, strict=True))
+        picture: ScalarMappable = ax.pcolormesh(*borders, found, cmap="cividis")
     else:
         x, y = (np.array([level.index(v) for v in columns[a.name]] if word else columns[a.name], dtype=float)
                 for a, level, word in zip(axes, levels, words, strict=True))  # fmt: skip
@@ -98,7 +108,17 @@ def _map(figure: Figure, ax: Axes, columns: dict[str, list[Any]], values: np.nda
         elif grid and len(level) <= _FEW:
             set_ticks(level)
     ax.set(xlabel=_labelled(axes[0]), ylabel=_labelled(axes[1]))
-    figure.colorbar(picture, ax=ax)
+    return figure.colorbar(picture, ax=ax).ax.yaxis
+
+
+def borders_between(values: np.ndarray, log: bool) -> np.ndarray:
+    """Return the ends of cells around ascending values, shape (len(values) + 1,), halfway between; also of logarithms.
+
+    Of one value the cell has no width.
+    """
+    around = np.pad(np.log(values) if log else values, 1, "reflect", reflect_type="odd")
+    borders = 0.5 * (around[1:] + around[:-1])
+    return np.exp(borders) if log else borders
 
 
 def _labelled(axis: Axis) -> str:
