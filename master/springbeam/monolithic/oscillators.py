@@ -76,38 +76,29 @@ class Oscillators:
     def __init__(self, omega2: np.ndarray, alpha: float) -> None:
         self.omega2, self.alpha = omega2, alpha
         self.sigma = 0.5 * alpha * omega2
-        discriminant = self.sigma**2 - omega2
-        self.over = discriminant > 0.0
-        self.root = np.sqrt(np.abs(discriminant))  #: √|σ² − ω²|
-        apart = np.maximum(self.root, _CRITICAL * np.abs(self.sigma))
-        half = np.where(self.over, apart, 1j * apart)
-        fast = -self.sigma - np.where(self.over, np.copysign(apart, self.sigma), 1j * apart)
+        #: s₁, s₂ with |s₁| ≤ |s₂|, (p,) complex; apart, so that one can divide by their difference.
+        self.slow, self.fast = self._roots(_CRITICAL)
+
+    def _roots(self, apart: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return s₁ and s₂, nearer ones moved ``apart`` by this share of σ on either side."""
+        sigma, discriminant = self.sigma, self.sigma**2 - self.omega2
+        root = np.maximum(np.sqrt(np.abs(discriminant)), apart * np.abs(sigma))
+        over = discriminant > 0.0
+        half = np.where(over, np.copysign(root, sigma), 1j * root)
+        fast = -sigma - half
         # The product of the roots is ω²: their sum would cancel.
         with np.errstate(divide="ignore", invalid="ignore"):
-            slow = np.where(self.over & (fast != 0.0), omega2 / fast, -self.sigma + half)
-        #: s₁, s₂ with |s₁| ≤ |s₂|, (p,) complex.
-        self.slow, self.fast = slow, fast
+            slow = np.where(over & (fast != 0.0), self.omega2 / fast, -sigma + half)
+        return slow, fast
 
     def kernels(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """S and Ṡ at times ``tau``, shape tau.shape + (p,)."""
-        t = tau[..., None]
-        x = self.root * t
-        decay = np.exp(-self.sigma * t)
-        S = t * decay * np.sinc(x / np.pi)
-        S_dot = decay * np.cos(x) - self.sigma * S
-        if np.any(self.over):
-            over = self.over
-            sigma, x = self.sigma[over], x[..., over]
-            slow, fast = self.slow[over].real, self.fast[over].real
-            e_slow, e_fast = np.exp(slow * t), np.exp(fast * t)
-            clipped = np.clip(x, 1e-150, 1.0)
-            near = t * decay[..., over] * np.sinh(clipped) / clipped  # the roots are close
-            S_over = np.where(x < 1.0, near, (e_slow - e_fast) / (slow - fast))
-            S_dot[..., over] = np.where(
-                x < 1.0, 0.5 * (e_slow + e_fast) - sigma * S_over, (slow * e_slow - fast * e_fast) / (slow - fast)
-            )
-            S[..., over] = S_over
-        return S, S_dot
+        """S and Ṡ = s₁ S + e^{s₂τ} at times ``tau``, shape tau.shape + (p,)."""
+        t, (slow, fast) = tau[..., None], self._roots(0.0)
+        between = (fast - slow) * t
+        with np.errstate(divide="ignore", invalid="ignore"):
+            mean = np.where(between == 0.0, 1.0, np.expm1(between) / between)  # of e^{(s₂ − s₁)ν} over [0, τ]
+        S = t * np.exp(slow * t) * mean
+        return S.real, (slow * S + np.exp(fast * t)).real
 
     def weights(self, size: float) -> StepWeights:
         """Weights of a step of ``size`` [s]."""
