@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..results.trajectory import Event, Trajectory, columns_of
+from ..results.trajectory import Event, Trajectory
 from ..scene import Scene
+from .rows import finished
 from .semi_discrete import SemiDiscreteBeam
 
 
@@ -35,9 +36,7 @@ class StepLedger:
         self._scene, self._spring, self._alpha = scene, scene.spring, scene.beam.alpha_b
         self._discrete, self._load = discrete, load
         self._sampler = discrete.deflection_sampler()
-        self._rows: dict[str, list[float]] = {}
-        self._phases: list[str] = []
-        self._shapes: list[np.ndarray] = []
+        self._rows: list[dict[str, Any]] = []
         self._totals = {"e_dissipated": 0.0, "e_injected_beam": 0.0, "e_injected_spring": 0.0}
 
     def dissipate(self, h: float, before: PairState, after: PairState) -> None:
@@ -85,44 +84,32 @@ class StepLedger:
     ) -> None:
         """Add a row; the forces are means over the step that ends in it [N]."""
         d, (q, v, y, z) = self._discrete, state
-        e_beam = 0.5 * float(v @ (d.M @ v)) + 0.5 * float(np.sum((d.B @ q) ** 2))
-        e_spring = self._spring_energy(state)
-        e_load = -float(self._load @ q) - self._spring.external_force * y
-        row = {
+        row: dict[str, Any] = {
             "time": time,
+            "phase": phase,
+            "deflection": self._sampler @ q,
             "u_tip": float(q[-1]),
             "v_tip": float(v[-1]),
             "y": y,
             "z": z,
             "contact_force": on_tip,
             "compliance_force": inside,
-            "tie_reaction": on_tip - inside,
             "foundation_force": foundation,
-            "gap": float(q[-1]) - y,
-            "velocity_mismatch": float(v[-1]) - z if phase != "free" else 0.0,
-            "e_beam": e_beam,
-            "e_spring": e_spring,
+            "e_beam": 0.5 * float(v @ (d.M @ v)) + 0.5 * float(np.sum((d.B @ q) ** 2)),
+            "e_spring": self._spring_energy(state),
             "e_contact": 0.0,
             "e_impact_loss": 0.0,
-            "e_load": e_load,
-            "e_total": e_beam + e_spring + e_load + self._totals["e_dissipated"],
+            "e_load": -float(self._load @ q) - self._spring.external_force * y,
             "case": float(case),
             **self._totals,
         }
-        for name, value in row.items():
-            self._rows.setdefault(name, []).append(value)
-        self._phases.append(phase)
-        self._shapes.append(self._sampler @ q)
+        self._rows.append(row)
 
     def trajectory(self, events: list[Event], summary: dict[str, Any]) -> Trajectory:
         """Return the rows as a result, with what they sum up to added to ``summary``."""
-        columns: dict[str, np.ndarray] = {name: np.array(values) for name, values in self._rows.items()}
-        columns["phase"] = np.array(self._phases, dtype="<U8")
-        columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
-        extra = ("case", "e_injected_beam", "e_injected_spring")
-        ordered = {name: columns[name] for name in (*columns_of(self._scene), *extra) if name in columns}
+        columns = {name: np.array([row[name] for row in self._rows]) for name in self._rows[0]}
         after_contact = columns["case"][1:]
         summary["steps_apart"] = int(np.sum(after_contact == 11))
         summary["steps_joined"] = int(np.sum(after_contact == 14))
-        summary["largest_energy_residual"] = float(np.max(np.abs(columns["energy_residual"])))
-        return Trajectory(self._scene, ordered, events, (columns["time"], np.array(self._shapes)), summary)
+        extra = ("case", "e_injected_beam", "e_injected_spring")
+        return finished(self._scene, columns, columns.pop("deflection"), events, summary, extra)

@@ -1,12 +1,14 @@
-"""Rows of an event-driven run: states recorded with their phases, and the columns that follow from them."""
+"""Rows of a reference: states of an event-driven run, recorded with their phases, and the columns of its result."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ..results.trajectory import Trajectory, columns_of
+from ..results.trajectory import Event, Trajectory, columns_of
+from ..scene import Scene
 from .laws import Phase
 from .transitions import HybridState
 
@@ -29,19 +31,12 @@ class Rows:
         s = self._system
         states = np.array([X for _, X, _, _ in self._rows]).reshape(len(self._rows), s.size)
         columns = self._columns(states)
-        self._derive(columns)
-        residual = columns["energy_residual"]
-        scale = max(float(np.max(np.abs(columns[c]))) for c in ("e_beam", "e_spring", "e_contact", "e_load"))
-        largest = float(np.max(np.abs(residual)))
-        summary["largest_energy_residual"] = largest
-        summary["largest_relative_energy_residual"] = largest / scale if scale > 0.0 else 0.0
-        summary["seat_height"] = None if s.scene.stop is None else self._state.seat_height()
-        deflection = s.shapes(states)
-        shapes = None if deflection is None else (columns["time"], deflection)
+        if s.two_ends:
+            columns["compliance_force"] = s.law.inside(columns["contact_force"], columns["u_tip"])
         loads = s.loads.values(columns["time"])
         columns |= {f"load_{i}": values for i, values in enumerate(loads.T)}
-        ordered = {name: columns[name] for name in columns_of(s.scene) if name in columns}
-        return Trajectory(s.scene, ordered, self._state.events, shapes, summary)
+        summary["seat_height"] = None if s.scene.stop is None else self._state.seat_height()
+        return finished(s.scene, columns, s.shapes(states), self._state.events, summary)
 
     def _columns(self, states: np.ndarray) -> dict[str, np.ndarray]:
         """What the equations of each row's phase give."""
@@ -67,17 +62,33 @@ class Rows:
                 columns.setdefault(name, np.zeros(len(phases)))[index] = value
         return columns
 
-    def _derive(self, columns: dict[str, np.ndarray]) -> None:
-        """Add what follows from other columns."""
-        s = self._system
-        if s.two_ends:
-            columns["gap"] = columns["u_tip"] - columns["y"]
-            together = columns["phase"] != "free"
-            columns["velocity_mismatch"] = np.where(together, columns["v_tip"] - columns["z"], 0.0)
-            C = columns["contact_force"]
-            inside = s.law.inside(C, columns["u_tip"])
-            columns["compliance_force"], columns["tie_reaction"] = inside, C - inside
-        elif s.scene.stop is not None and s.beam is not None:
-            columns["gap"] = columns["u_tip"] - s.stop.position
-        columns["e_total"] = np.sum([columns[name] for name in _ENERGIES], axis=0)
-        columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
+
+def finished(
+    scene: Scene,
+    columns: dict[str, np.ndarray],
+    deflection: np.ndarray | None,
+    events: list[Event],
+    summary: dict[str, Any],
+    extra: Sequence[str] = (),
+) -> Trajectory:
+    """Return the result of a reference: ``columns``, what follows from them, and their balance in ``summary``.
+
+    ``deflection`` [m] is that at `springbeam.scene.statics.SHAPE_POINTS`, (rows, 21), or ``None`` without a beam;
+    ``extra`` names the columns that only this reference has.
+    """
+    if scene.coupled:
+        columns["gap"] = columns["u_tip"] - columns["y"]
+        together = columns["phase"] != "free"
+        columns["velocity_mismatch"] = np.where(together, columns["v_tip"] - columns["z"], 0.0)
+        columns["tie_reaction"] = columns["contact_force"] - columns["compliance_force"]
+    elif scene.stop is not None and deflection is not None:
+        columns["gap"] = columns["u_tip"] - scene.stop.position
+    columns["e_total"] = np.sum([columns[name] for name in _ENERGIES], axis=0)
+    columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
+    scale = max(float(np.max(np.abs(columns[c]))) for c in ("e_beam", "e_spring", "e_contact", "e_load"))
+    largest = float(np.max(np.abs(columns["energy_residual"])))
+    summary["largest_energy_residual"] = largest
+    summary["largest_relative_energy_residual"] = largest / scale if scale > 0.0 else 0.0
+    ordered = {name: columns[name] for name in (*columns_of(scene), *extra) if name in columns}
+    shapes = None if deflection is None else (columns["time"], deflection)
+    return Trajectory(scene, ordered, events, shapes, summary)
