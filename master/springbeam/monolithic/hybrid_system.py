@@ -27,6 +27,8 @@ from .semi_discrete import ModalBeam
 
 #: What rounding leaves of a sum that is exactly zero, as a share of its terms.
 _NOISE = 16.0 * float(np.finfo(float).eps)
+#: Its square is nothing beside any number.
+_COMPLEX_STEP = 1e-100
 
 
 class ReferenceFailure(RuntimeError):
@@ -89,78 +91,54 @@ class HybridSystem:
         p = self.load - self.stiffness * (a + self.alpha_b * v)
         s = self.spring_force(y, z) if self.has_spring else np.zeros_like(y)
         if len(self.loads):
-            values = self.loads.values(X[..., self.T])
+            values = self.loads.values(X[..., self.T].real)
             p, s = p + values @ self.loads.patterns, s + values @ self.loads.on_spring
         return p, s
 
     def load_power(self, X: np.ndarray) -> np.ndarray:
         """Return the power of the loads that vary [W] on states of shape (..., 2r + 5)."""
         speeds = X[..., self.V] @ self.loads.patterns.T + X[..., self.Z, None] * self.loads.on_spring
-        return np.asarray(np.sum(self.loads.values(X[..., self.T]) * speeds, axis=-1))
+        return np.asarray(np.sum(self.loads.values(X[..., self.T].real) * speeds, axis=-1))
 
     def motion(self, phase: Phase, X: np.ndarray) -> Motion:
         """Accelerations and interface quantities of states of shape (..., 2r + 5)."""
         a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
         u_tip, v_tip = a @ self.b, v @ self.b
         p, s = self._own_forces(X)
-        C = self._contact_force(phase, p, y - u_tip, z - v_tip, s)
+        if self.joined(phase):
+            by_beam, by_spring = self.multiplier(phase)
+            C = by_beam * (p @ self.b) + by_spring * s
+        else:
+            C = self.law.force(y - u_tip, z - v_tip) if self.law.acts(phase.contact) else np.zeros_like(y)
         N = C - s if phase.seated else np.zeros_like(y)
         z_dot = np.zeros_like(y) if phase.seated else (s - C) * self.inverse_mass
         return Motion(u_tip, v_tip, y, z, C, N, p + self.b * C[..., None], z_dot)
 
-    def _contact_force(
-        self, phase: Phase, p: np.ndarray, penetration: np.ndarray, rate: np.ndarray, s: np.ndarray
-    ) -> np.ndarray:
-        """C [N] of beam forces p (..., r), penetration y − u, its rate, and spring force s (...)."""
-        if self.held(phase):
-            return np.asarray(-(p @ self.b) / self.inverse_tip_mass)
-        if self.joined(phase):
-            return np.asarray((s - self.mass * (p @ self.b)) / (1.0 + self.mass * self.inverse_tip_mass))
-        if self.law.acts(phase.contact):
-            return self.law.force(penetration, rate)
-        return np.zeros_like(s)
+    def multiplier(self, phase: Phase) -> tuple[float, float]:
+        """Return what bᵀp and s are multiplied by in the C of ends that are joined."""
+        if phase.seated:
+            return -1.0 / self.inverse_tip_mass, 0.0
+        share = 1.0 / (1.0 + self.mass * self.inverse_tip_mass)
+        return -self.mass * share, share
 
     def derivative(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """dX/dt for one state."""
-        a, v, y, z = X[self.A], X[self.V], X[self.Y], X[self.Z]
-        p, s = self._own_forces(X)
-        C = self._contact_force(phase, p, y - a @ self.b, z - v @ self.b, s)
-        dX = np.empty_like(X)
-        dX[self.A] = v
-        dX[self.V] = p + self.b * C
-        dX[self.Y] = 0.0 if phase.seated else z
-        dX[self.Z] = 0.0 if phase.seated else (s - C) * self.inverse_mass
-        dX[self.D] = self.dissipation_rate(phase, X) if self.dissipative else 0.0
-        dX[self.W] = self.load_power(X) if len(self.loads) else 0.0
-        dX[self.T] = 1.0
+        """dX/dt of states of shape (..., 2r + 5), which may be complex."""
+        m = self.motion(phase, X)
+        dX = np.zeros_like(X)
+        dX[..., self.A], dX[..., self.V] = X[..., self.V], m.a
+        if not phase.seated:
+            dX[..., self.Y], dX[..., self.Z] = m.z, m.z_dot
+        if self.dissipative:
+            dX[..., self.D] = self.dissipation_rate(phase, X)
+        if len(self.loads):
+            dX[..., self.W] = self.load_power(X)
+        dX[..., self.T] = 1.0
         return dX
 
     def jacobian(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """∂(dX/dt)/∂X for one state, (2r + 5, 2r + 5), but for D and W, which nothing depends on, and the time."""
-        A, V, Y, Z, b = self.A, self.V, self.Y, self.Z, self.b
-        p = self.spring
-        J = np.zeros((self.size, self.size))
-        rows = np.arange(self.r)
-        J[rows, self.r + rows] = 1.0
-        J[self.r + rows, rows] = -self.stiffness
-        J[self.r + rows, self.r + rows] = -self.alpha_b * self.stiffness
-        s = np.zeros(self.size)
-        if self.has_spring:
-            s[Y] = -p.linear_stiffness - 3.0 * p.cubic_stiffness * X[Y] ** 2
-            s[Z] = -p.damping
-        C = np.zeros(self.size)
-        if self.held(phase):
-            C = -(b @ J[V]) / self.inverse_tip_mass
-        elif self.joined(phase):
-            C = (s - self.mass * (b @ J[V])) / (1.0 + self.mass * self.inverse_tip_mass)
-        elif self.law.acts(phase.contact):
-            slope, viscous = self.law.slopes(float(X[Y] - X[A] @ b), float(X[Z] - X[V] @ b))
-            C[A], C[Y], C[V], C[Z] = -slope * b, slope, -viscous * b, viscous
-        J[V] += np.outer(b, C)
-        if not phase.seated:
-            J[Y, Z] = 1.0
-            J[Z] = (s - C) * self.inverse_mass
-        return J
+        """∂(dX/dt)/∂X for one state, (2r + 5, 2r + 5), but for the time; by complex steps, exact to rounding."""
+        steps = X + 1j * _COMPLEX_STEP * np.eye(self.size)
+        return np.asarray(self.derivative(phase, steps).imag.T / _COMPLEX_STEP)
 
     def dissipation_rate(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """α_b ȧᵀω²ȧ + α_s z², and what the law takes [W]."""

@@ -11,7 +11,6 @@ force (results have it as `touch`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -33,8 +32,7 @@ class Phase(NamedTuple):
         return "seated" if self.seated else "touch" if self.contact == "slack" else self.contact
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """Interface quantities of states X, each with the leading shape of X."""
 
     u: np.ndarray  #: tip deflection [m]
@@ -96,11 +94,7 @@ class Law:
         return self.counts(contact) and contact != "slack"
 
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """Return C [N] at penetrations p [m] with rates ṗ [m/s]."""
-        raise NotImplementedError
-
-    def slopes(self, p: float, rate: float) -> tuple[float, float]:
-        """Return ∂C/∂p [N/m] and ∂C/∂ṗ [N·s/m]."""
+        """Return C [N] at penetrations p [m] with rates ṗ [m/s], which are complex where it is differentiated."""
         raise NotImplementedError
 
     def potential(self, p: np.ndarray) -> np.ndarray:
@@ -185,9 +179,6 @@ class Link(Law):
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         return np.asarray(self.stiffness * p + self.damping * rate)
 
-    def slopes(self, p: float, rate: float) -> tuple[float, float]:
-        return self.stiffness, self.damping
-
     def potential(self, p: np.ndarray) -> np.ndarray:
         return np.asarray(0.5 * self.stiffness * p**2)
 
@@ -211,10 +202,6 @@ class Compliance(Law):
 
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
         return self._elastic(p) * (1.0 + self.damping * rate)
-
-    def slopes(self, p: float, rate: float) -> tuple[float, float]:
-        slope = self.stiffness * self.exponent * max(p, 0.0) ** (self.exponent - 1.0)
-        return slope * (1.0 + self.damping * rate), self.damping * float(self._elastic(np.float64(p)))
 
     def potential(self, p: np.ndarray) -> np.ndarray:
         depth, q = np.maximum(p, 0.0), self.exponent

@@ -47,10 +47,8 @@ class QuasiStaticSystem(HybridSystem):
         #: Strain energy [J] under the loads that the tip's deflection does not tell.
         self._hidden = stored - 0.5 * k * rest**2
 
-    def _contact_force(
-        self, phase: Phase, p: np.ndarray, penetration: np.ndarray, rate: np.ndarray, s: np.ndarray
-    ) -> np.ndarray:
-        return np.asarray(-(p @ self.b)) if self.joined(phase) else np.zeros_like(s)
+    def multiplier(self, phase: Phase) -> tuple[float, float]:
+        return -1.0, 0.0
 
     def derivative(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         dX = super().derivative(phase, X)
