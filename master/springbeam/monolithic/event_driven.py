@@ -23,7 +23,7 @@ from .exponential import ExponentialPropagator, LinearForm
 from .hybrid_system import HybridSystem, ReferenceFailure
 from .laws import Phase
 from .location import EventLocator
-from .propagators import SCIPY_METHODS, Method, Propagator, RungeKuttaPropagator
+from .propagators import SCIPY_METHODS, Method, RungeKuttaPropagator
 from .quasi_static import QuasiStaticSystem
 from .rows import Rows
 from .semi_discrete import modal_beam
@@ -188,7 +188,7 @@ class _Run:
         """Integrate from here on anew: in another phase, or after a kink of a load."""
         self.counts["phases"] += 1
         state, self._phase_start = self.state, self.state.time
-        self._propagator: Propagator
+        self._propagator: ExponentialPropagator | RungeKuttaPropagator
         if self.method.name == "exponential":
             if state.phase not in self._forms:
                 self._forms[state.phase] = LinearForm(self.system, state.phase)

@@ -153,10 +153,6 @@ class LinearForm:
         """All loads on the modes at ``times`` [s] of shape (...), (..., p)."""
         return np.asarray(self.constant + self.system.loads.values(times) @ self.loads)
 
-    def forces_at(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
-        """The forces r of one state, (k, 1)."""
-        return self.forces((self.outputs @ xi)[:, None], (self.outputs @ xi_dot)[:, None], X)
-
     def forces(self, w: np.ndarray, w_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
         """R: forces (k, n) at interface displacements and velocities (o, n)."""
         s = self.system
@@ -237,12 +233,14 @@ class ExponentialPropagator:
         self.form, self.X = form, X
         self._speed = speed  #: largest interface velocity so far × √mass, the scale of `_TAIL`
         self._force_limit = np.inf  #: what resolving r allows [s]
-        self.elapsed = 0.0
+        self.elapsed = 0.0  #: since the start [s]
         self._size, self._steps = 0.0, 0  #: of the present interval, and how many are left
 
     def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
+        """Make one step towards ``remaining`` [s] from here, which is known to ``resolution`` [s]."""
         xi, xi_dot = self.form.pack(self.X)
-        r = self.form.forces_at(xi, xi_dot, self.X)
+        outputs = self.form.outputs
+        r = self.form.forces((outputs @ xi)[:, None], (outputs @ xi_dot)[:, None], self.X)
         limit = self.form.longest_step(xi, xi_dot, r[:, 0], float(self.X[self.form.system.T]))
         while True:
             size = self._next_size(remaining, resolution, min(limit, self._force_limit))

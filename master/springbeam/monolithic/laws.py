@@ -11,7 +11,7 @@ force (results have it as `touch`).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -52,16 +52,6 @@ class Watch(NamedTuple):
     function: Callable[[Motion], np.ndarray]
     unit: Literal["m", "m/s", "N"]  #: of its values; tells what rounding leaves of a zero
     level: float | None = None  #: where the spring's top is when it happens [m]
-
-
-class Ends(Protocol):
-    """What a law may ask about tip and spring top at an event."""
-
-    def below(self) -> bool:
-        """Return whether, sharing one velocity, they are below Ψ or about to be."""
-
-    def pressed(self) -> bool:
-        """Return whether C > 0 if they stay together."""
 
 
 class Law:
@@ -117,8 +107,11 @@ class Law:
             return [Watch("meet", lambda m: m.u - m.y, "m")]
         return [Watch("separate", lambda m: m.y - m.u, "m")]
 
-    def after(self, happened: str, ends: Ends) -> tuple[Contact, str | None]:
-        """Return the contact that follows what has happened, and the event's name in results if it is one there."""
+    def after(self, happened: str, together: Motion, noise: float) -> tuple[Contact, str | None]:
+        """Return the contact that follows what has happened, and the event's name in results if it is one there.
+
+        ``together`` is the motion if the ends stay together, ``noise`` what rounding leaves of a height that is 0 [m].
+        """
         return ("touch", "impact") if happened == "meet" else ("free", "separation")
 
 
@@ -142,11 +135,14 @@ class Transmission(Law):
             ]
         return [] if phase.seated else [Watch("release", lambda m: psi - m.y, "m", level=psi)]
 
-    def after(self, happened: str, ends: Ends) -> tuple[Contact, str | None]:
+    def after(self, happened: str, together: Motion, noise: float) -> tuple[Contact, str | None]:
         if happened == "meet":
-            return "tied" if ends.below() else "touch", "impact"
+            height = float(together.y) - self.equilibrium
+            if abs(height) <= noise:  # where they go tells
+                height = float(together.z) if together.z != 0.0 else float(together.z_dot)
+            return "tied" if height < 0.0 else "touch", "impact"
         if happened == "release":
-            return "touch" if ends.pressed() else "free", "release"
+            return "touch" if together.C > 0.0 else "free", "release"
         if happened == "retie":
             return "tied", "retie"
         return "free", "separation"
@@ -162,7 +158,7 @@ class Tie(Law):
         """Return zeros: nothing is compliant."""
         return np.zeros_like(C)
 
-    def after(self, happened: str, ends: Ends) -> tuple[Contact, str | None]:
+    def after(self, happened: str, together: Motion, noise: float) -> tuple[Contact, str | None]:
         return "tied", "impact"
 
 
@@ -221,10 +217,10 @@ class Compliance(Law):
             return [*watched, Watch("press", lambda m: m.v - m.z - fastest, "m/s")]
         return [*watched, Watch("slacken", lambda m: m.z - m.v + fastest, "m/s")]
 
-    def after(self, happened: str, ends: Ends) -> tuple[Contact, str | None]:
+    def after(self, happened: str, together: Motion, noise: float) -> tuple[Contact, str | None]:
         if happened == "slacken":
             return "slack", None
-        return ("touch", None) if happened == "press" else super().after(happened, ends)
+        return ("touch", None) if happened == "press" else super().after(happened, together, noise)
 
 
 #: By their names in a scene.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.integrate import DOP853, LSODA, Radau, solve_ivp
@@ -48,15 +48,6 @@ class Segment:
         return self.inside(tau)
 
 
-class Propagator(Protocol):
-    """Advances a state within one phase."""
-
-    elapsed: float  #: since the start of the phase [s]
-
-    def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
-        """One step towards ``remaining`` [s] from here, which is known to ``resolution`` [s]; it may end beyond."""
-
-
 class RungeKuttaPropagator:
     """scipy's DOP853, LSODA or Radau on the modal form."""
 
@@ -67,11 +58,13 @@ class RungeKuttaPropagator:
             self.options["jac"] = lambda _time, X: system.jacobian(phase, X)
         solver: Any = SCIPY_METHODS[method.name]
         self._solver = solver(self.rhs, 0.0, X.copy(), horizon, **self.options)
+        self.elapsed = 0.0  #: since the start [s]
 
     def rhs(self, _time: float, X: np.ndarray) -> np.ndarray:
         return self.system.derivative(self.phase, X)
 
     def advance(self, remaining: float, resolution: float = 0.0) -> Segment:
+        """Make one step, which may end before or beyond ``remaining``."""
         solver, count = self._solver, self.method.nodes
         start, begin = solver.y.copy(), solver.t
         message = solver.step()

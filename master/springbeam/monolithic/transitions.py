@@ -20,7 +20,7 @@ import numpy as np
 
 from ..results.trajectory import Event
 from .hybrid_system import HybridSystem
-from .laws import Phase, Watch
+from .laws import Contact, Phase, Watch
 
 
 class HybridState:
@@ -79,25 +79,14 @@ class HybridState:
             if onto_it:
                 self._hit_stop()
 
-    # What laws ask --------------------------------------------------------------------------------------------------
-
-    def below(self) -> bool:
-        """Whether tip and spring, together with one velocity, are (about to be) below Ψ, where the tie is bilateral."""
-        s, X = self.system, self.X
-        m = s.motion(Phase("tied"), X)
-        height = float(m.y) - s.spring.equilibrium
-        if abs(height) <= s.noise("m", X):
-            height = float(m.z) if m.z != 0.0 else float(m.z_dot)
-        return height < 0.0
-
-    def pressed(self) -> bool:
-        """Whether C > 0 if tip and spring stay together."""
-        return float(self.system.motion(Phase("touch"), self.X).C) > 0.0
-
     # Contact --------------------------------------------------------------------------------------------------------
 
+    def _after(self, happened: str) -> tuple[Contact, str | None]:
+        s, X = self.system, self.X
+        return s.law.after(happened, s.motion(Phase("tied"), X), s.noise("m", X))
+
     def _go_on(self, happened: str) -> None:
-        contact, kind = self.system.law.after(happened, self)
+        contact, kind = self._after(happened)
         self.phase = Phase(contact, self.phase.seated)
         lost = self.system.settle(self.phase, self.X)
         if kind is not None:
@@ -120,7 +109,7 @@ class HybridState:
             X[s.V] += s.b * impulse
             X[s.Z] -= impulse * s.inverse_mass
         was_seated = self.phase.seated
-        contact, kind = s.law.after("meet", self)
+        contact, kind = self._after("meet")
         self.phase = Phase(contact)
         s.synchronise(self.phase, X)
         assert kind is not None
