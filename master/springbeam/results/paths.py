@@ -22,9 +22,9 @@ _POINTS, _BISECTIONS = 16, 40
 
 
 class Path(NamedTuple):
-    """f(s) on [0, 1], s = τ/H: the cubic a₀ + a₁ s + a₂ s² + a₃ s³ and s²(1 − s)² [even + odd (2s − 1)]."""
+    """f(s) on [0, 1], s = τ/H: a cubic plus s²(1 − s)² [even + odd (2s − 1)]."""
 
-    cubic: tuple[float, float, float, float]
+    powers: tuple[float, float, float, float, float, float]  #: coefficients of 1, s … s⁵
     even: float
     odd: float
     size: float  #: H [s]
@@ -38,24 +38,29 @@ class Path(NamedTuple):
             beside = means[0] - 0.5 * (f0 + f1) - (d0 - d1) / 12.0
             twice = means[1] - (7.0 * f0 + 3.0 * f1) / 20.0 - (d0 / 20.0 - d1 / 30.0)
             even, odd = 30.0 * beside, 210.0 * (beside - 2.0 * twice)
-        return cls((f0, d0, 3.0 * rise - 2.0 * d0 - d1, d0 + d1 - 2.0 * rise), even, odd, size)
+        tilt, twist = even - odd, 2.0 * odd
+        a2, a3 = 3.0 * rise - 2.0 * d0 - d1 + tilt, d0 + d1 - 2.0 * rise - 2.0 * tilt + twist
+        return cls((f0, d0, a2, a3, tilt - 2.0 * twist, twist), even, odd, size)
 
     @property
     def beside_cubic(self) -> float:
         """Largest distance between path and cubic, at most."""
         return _EVEN * abs(self.even) + _ODD * abs(self.odd)
 
+    @property
+    def moments_beside_cubic(self) -> float:
+        """By how much path and cubic differ in ∫ f ds or in 2 ∫∫ f ds ds, whichever is more."""
+        mean = self.even / 30.0
+        return max(abs(mean), abs(mean - self.odd / 210.0))
+
     def at(self, s: float) -> float:
-        a0, a1, a2, a3 = self.cubic
-        bubble = s * (1.0 - s)
-        return a0 + s * (a1 + s * (a2 + s * a3)) + bubble * bubble * (self.even + self.odd * (2.0 * s - 1.0))
+        a0, a1, a2, a3, a4, a5 = self.powers
+        return a0 + s * (a1 + s * (a2 + s * (a3 + s * (a4 + s * a5))))
 
     def slope(self, s: float) -> float:
         """df/ds."""
-        _, a1, a2, a3 = self.cubic
-        bubble, tilt = s * (1.0 - s), 2.0 * s - 1.0
-        turning = self.even + self.odd * tilt
-        return a1 + s * (2.0 * a2 + 3.0 * a3 * s) - 2.0 * bubble * tilt * turning + 2.0 * bubble * bubble * self.odd
+        _, a1, a2, a3, a4, a5 = self.powers
+        return a1 + s * (2.0 * a2 + s * (3.0 * a3 + s * (4.0 * a4 + s * (5.0 * a5))))
 
     def falls_through_zero(self, until: float = 1.0) -> float:
         """Return s in [0, until] where f, not below zero at the start but at ``until``, falls through it, by bisection.

@@ -10,6 +10,7 @@ from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Motion
 from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Scales, Step
+from ..results.paths import Path
 from ..scene import Scene
 from .stepping import Pair, State
 
@@ -84,11 +85,6 @@ class LocalError(Checkpointed):
 
 
 def _beside_cubic(start: Motion, end: Motion, size: float) -> float:
-    """How far, as means over the step, the motion is from the cubic through its ends [m].
-
-    ∫w of the cubic is H (w₀ + w₁)/2 + H² (v₀ − v₁)/12, ∫∫w is H² (7w₀ + 3w₁)/20 + H³ (v₀/20 − v₁/30).
-    """
-    w0, v0, w1, v1 = *start[:2], *end[:2]
-    mean = end.integral / size - 0.5 * (w0 + w1) - size * (v0 - v1) / 12.0
-    moment = end.integral_2 / size**2 - (7.0 * w0 + 3.0 * w1) / 20.0 - size * (v0 / 20.0 - v1 / 30.0)
-    return max(abs(mean), 2.0 * abs(moment))
+    """How far, as means over the step, the motion is from the cubic through its ends [m]."""
+    means = end.integral / size, end.integral_2 / size**2
+    return Path.through(start[:2], end[:2], size, means).moments_beside_cubic
