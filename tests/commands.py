@@ -23,6 +23,21 @@ def command(*arguments: object) -> Result:
     return CliRunner(env=PLAIN).invoke(app, [str(argument) for argument in arguments], prog_name="springbeam")
 
 
+def printed(*arguments: object) -> str:
+    """Return what ``springbeam ARGUMENTS`` prints; it must end well and complain of nothing."""
+    result = command(*arguments)
+    assert (result.exit_code, result.stderr) == (0, ""), f"{result.output}\n{result.exception!r}"
+    return result.stdout
+
+
+def refused(*arguments: object) -> str:
+    """Return the error of ``springbeam ARGUMENTS``, which must be bad input: exit code 2 and nothing printed."""
+    result = command(*arguments)
+    assert (result.exit_code, result.stdout) == (2, ""), result.output
+    assert "Traceback" not in result.stderr
+    return result.stderr
+
+
 class Interrupt:
     """Ctrl-C at the call of this number."""
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import command
+from commands import printed
 
 from springbeam.results.directory import REPORT
 from springbeam.results.reading import load_trajectory
@@ -50,10 +50,8 @@ def run_and_report(folder: Path, scene: str) -> Path:
     directory = folder / scene
     if not directory.exists():
         shorter = ["--set", f"time.t_end={T_END[scene]}"] if scene in T_END else []
-        made = command("run", scene, "--out", directory, "--no-plots", *shorter)
-        assert made.exit_code == 0, made.output
-        made = command("report", directory)
-        assert made.exit_code == 0, made.output
+        printed("run", scene, "--out", directory, "--no-plots", *shorter)
+        printed("report", directory)
     return directory
 
 

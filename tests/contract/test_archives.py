@@ -9,7 +9,7 @@ from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
 import pytest
-from commands import command
+from commands import refused
 
 from springbeam.bodies import archive
 from springbeam.bodies.archive import UnsafeArchive, unpack
@@ -124,9 +124,6 @@ def test_our_own_are_unpacked_to_the_last_byte(fmu_folder: Path, tmp_path: Path,
 def test_the_command_names_file_and_member(folder: Path) -> None:
     with ZipFile(folder / "spring.fmu", "a") as file:
         file.writestr(named("../../evil"), b"evil")
-    result = command("run", "soft", "--out", folder / "out")
-    assert result.exit_code == 2
     said = f"error: {folder / 'spring.fmu'}: not a usable FMU: member '../../evil' leads"
-    assert result.output.startswith(said)
-    assert "Traceback" not in result.output
+    assert refused("run", "soft", "--out", folder / "out").startswith(said)
     assert not (folder / "out").exists()

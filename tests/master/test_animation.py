@@ -8,7 +8,7 @@ from itertools import pairwise
 import matplotlib
 import numpy as np
 import pytest
-from commands import command
+from commands import printed, refused
 from matplotlib.animation import FFMpegWriter
 from PIL import Image
 from runs import SCENES, a_trajectory
@@ -111,17 +111,12 @@ def test_a_missing_or_failing_ffmpeg_is_told_and_leaves_nothing(tmp_path, monkey
 
 def test_the_command_writes_a_gif_into_the_directory_and_says_where(tmp_path):
     directory = a_trajectory(n=30).save(tmp_path / "run")
-    result = command("animate", directory, "--seconds", 0.2, "--fps", 10)
-    assert (result.exit_code, result.stdout) == (0, f"{directory / 'animation.gif'}\n")
+    assert printed("animate", directory, "--seconds", 0.2, "--fps", 10) == f"{directory / 'animation.gif'}\n"
     with Image.open(directory / "animation.gif") as gif:
         assert gif.n_frames == 2
-    again = command("animate", directory, "--seconds", 0.2)
-    assert again.exit_code == 2
-    assert "already exists; --force replaces it" in again.stderr
+    assert "already exists; --force replaces it" in refused("animate", directory, "--seconds", 0.2)
 
 
 def test_a_run_of_one_row_has_nothing_to_animate(tmp_path):
     a_trajectory(n=1).save(tmp_path / "run")
-    result = command("animate", tmp_path / "run")
-    assert result.exit_code == 2
-    assert "nothing to animate" in result.stderr
+    assert "nothing to animate" in refused("animate", tmp_path / "run")

@@ -6,7 +6,7 @@ import csv
 import json
 
 import pytest
-from commands import command
+from commands import command, printed
 from rich.console import Console
 
 from springbeam import load_scene, with_changes
@@ -125,11 +125,11 @@ def test_the_paper_law_agrees_with_algorithm_1_up_to_t_end(t_end, steps, impact)
 def test_quick_compares_the_first_quarter_and_leaves_the_last_halving_out(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     settings = ["--set", "time.t_end=0.2", "--set", "coupling.macro_step=1e-3", "--quick", "--json"]
-    found = json.loads(command("crosscheck", "soft", *settings).stdout)
+    found = json.loads(printed("crosscheck", "soft", *settings))
     assert (found["passed"], found["scene"]["time"]["t_end"]) == (True, 0.05)
     rows = list(csv.DictReader((tmp_path / found["files"][0]).open()))
     assert [float(row["error"]) for row in rows] == [row["error"] for row in found["quantities"]]
-    found = json.loads(command("crosscheck", "soft", *settings, "--orders").stdout)
+    found = json.loads(printed("crosscheck", "soft", *settings, "--orders"))
     assert {len(row["errors"]) for row in found["orders"]} == {3}
     rows = list(csv.DictReader((tmp_path / found["files"][0]).open()))
     assert [float(row["order from H"]) for row in rows] == [row["orders"][0] for row in found["orders"]]

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import tomli_w
-from commands import command
+from commands import printed
 from test_faults import FILES, SCENE
 
 from springbeam.results.reading import load_trajectory
@@ -100,18 +100,15 @@ def check_interrupted(directory: Path, whole: dict[str, bytes], said: str, named
 def test_a_call_that_never_returns_can_be_interrupted(
     tmp_path: Path, scene: Path, number: signal.Signals, fmu: str, where: str
 ) -> None:
-    def done(*arguments: object) -> None:
-        assert command(*arguments, "--no-plots", "-q").exit_code == 0
-
     directory = tmp_path / "run"
-    done("run", scene, "--out", tmp_path / "whole")
+    printed("run", scene, "--out", tmp_path / "whole", "--no-plots", "-q")
     whole = contents(tmp_path / "whole")
     run = ("run", scene, "--out", directory, "--checkpoint", 0.02)
     said = interrupted(number, fmu, "fmi2DoStep", where, 3, *run)
     check_interrupted(directory, whole, said, f"fmi2DoStep of {fmu}.fmu")
     said = interrupted(number, fmu, "fmi2GetReal", "row", 50, "resume", directory)
     check_interrupted(directory, whole, said, f"fmi2GetReal of {fmu}.fmu")
-    done("resume", directory)
+    printed("resume", directory, "--no-plots", "-q")
     assert contents(directory) == whole
 
 

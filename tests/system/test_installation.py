@@ -11,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from commands import command
+from commands import command, printed
 from packaging.requirements import Requirement
 
 if sys.version_info >= (3, 11):
@@ -23,10 +23,9 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_doctor_finds_and_loads_both_fmus():
-    result = command("doctor")
-    assert result.exit_code == 0, result.output
-    assert metadata.version("springbeam") in result.stdout
-    assert len(re.findall(r"^(?:beam|spring)\.fmu +loads; binaries for linux64", result.stdout, re.M)) == 2
+    shown = printed("doctor")
+    assert metadata.version("springbeam") in shown
+    assert len(re.findall(r"^(?:beam|spring)\.fmu +loads; binaries for linux64", shown, re.M)) == 2
 
 
 def test_doctor_says_what_is_wrong(monkeypatch, tmp_path):

@@ -8,7 +8,7 @@ import json
 
 import numpy as np
 import pytest
-from commands import command
+from commands import printed
 
 from springbeam.monolithic import event_driven
 from springbeam.scene import SceneError, load_scene, with_changes
@@ -115,9 +115,7 @@ def test_every_axis_is_swept_that_the_law_has(law, there, absent):
 
 def test_command(tmp_path):
     arguments = ["tradeoff", "duffing", "--until", "0.5", "--repeats", "2", "--json", "--out", str(tmp_path / "out")]
-    result = command(*arguments)
-    assert result.exit_code == 0, result.output
-    table = json.loads(result.stdout)
+    table = json.loads(printed(*arguments))
     assert [row["error"] for row in table["cheapest"]] == [1e-2, 1e-4, 1e-6, 1e-8]
     assert table["cheapest"][3]["co_simulation"]["error"] <= 1e-8
     rows = list(csv.DictReader((tmp_path / "out" / "tradeoff.csv").open()))

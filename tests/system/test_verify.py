@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from commands import command
+from commands import command, printed
 from rich.console import Console
 from scipy.integrate import quad
 from scipy.special import airy
@@ -33,16 +33,16 @@ def test_every_exact_solution_is_met_in_a_table_of_80_columns():
     """
     console = Console(record=True, width=80)
     found = report(verify.SECTIONS, console)
-    printed = console.export_text()
-    assert " 0 failed" in printed
-    assert "FAIL" not in printed
-    assert printed.count(" pass ") >= 70
-    assert all(section.title in printed for section in verify.SECTIONS)
-    assert all(name in printed for name in ("quantity", "exact", "computed", "error", "bound"))
-    assert max(len(line) for line in printed.splitlines()) <= 80
-    assert "…" not in printed.replace("… one step late", "").replace("… Gauss–Seidel", "")  # nothing cut off
-    assert "not representable" in printed  # why a row is not judged
-    assert "not judged" in printed
+    shown = console.export_text()
+    assert " 0 failed" in shown
+    assert "FAIL" not in shown
+    assert shown.count(" pass ") >= 70
+    assert all(section.title in shown for section in verify.SECTIONS)
+    assert all(name in shown for name in ("quantity", "exact", "computed", "error", "bound"))
+    assert max(len(line) for line in shown.splitlines()) <= 80
+    assert "…" not in shown.replace("… one step late", "").replace("… Gauss–Seidel", "")  # nothing cut off
+    assert "not representable" in shown  # why a row is not judged
+    assert "not judged" in shown
     errors = {check.quantity.partition(" ")[0]: check.error for check in found[verify.ringing.title]}
     assert 0.1 < errors["consistent"] < 0.3
     assert 0.0 < errors["averaged"] < 0.01
@@ -133,13 +133,11 @@ def test_a_mistake_of_one_percent_fails(section, mistake, monkeypatch: pytest.Mo
 
 def test_json_is_the_checks_and_a_failed_one_is_exit_code_1(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(verify, "SECTIONS", (verify.mesh_convergence, verify.escape))
-    result = command("verify", "--json")
-    assert (result.exit_code, result.stderr) == (0, "")
-    document = json.loads(result.stdout)
+    document = json.loads(printed("verify", "--json"))
     assert document["passed"] is True
     assert [section["title"] for section in document["sections"]] == [section.title for section in verify.SECTIONS]
-    for printed, check in zip(document["sections"][0]["checks"], verify.mesh_convergence(), strict=True):
-        assert (printed["exact"], printed["computed"], printed["passed"]) == (check.exact, check.computed, check.passed)
+    for row, check in zip(document["sections"][0]["checks"], verify.mesh_convergence(), strict=True):
+        assert (row["exact"], row["computed"], row["passed"]) == (check.exact, check.computed, check.passed)
     changed(FmuBeam, "density", 1.01)(monkeypatch)
     result = command("verify", "--json")
     assert result.exit_code == 1
