@@ -1,11 +1,10 @@
 """Pure-Python test doubles of the two bodies, exact to rounding for a contact force quadratic in time.
 
-Independent of the FMUs and of `springbeam.monolithic`, so that the coupling is tested by itself:
+A beam has the modes of `springbeam.monolithic`; the steps share nothing with it nor with the FMUs, so that the coupling
+is tested by itself:
 
 * `ModalBody`: a linear body in its modes, each stepped by its matrix exponential;
 * `DuffingBody`: m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series of order 22.
-
-Both count their steps and rewinds.
 """
 
 from __future__ import annotations
@@ -13,21 +12,37 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import eigh, expm
+from scipy.linalg import expm
 
 from springbeam.bodies.force import combined, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
+from springbeam.monolithic.loads import Loads
+from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.recording import MemoryRecorder
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.outcome import RunStopped
 from springbeam.run.simulation import Simulation
 from springbeam.scene import Beam, Scene
-from springbeam.scene.statics import SHAPE_POINTS
-
-_EPS = float(np.finfo(float).eps)
 
 
-class ModalBody(BeamBody):
+class Double(Body):
+    """Counts its steps; goes back to what `STATE` names."""
+
+    STATE: tuple[str, ...]
+
+    def __init__(self):
+        self._integrals = (0.0, 0.0)
+        self._dissipated = self._work = 0.0
+        self.steps = 0
+
+    def mark(self):
+        self._marked = {name: getattr(self, name) for name in (*self.STATE, "_integrals", "_dissipated", "_work")}
+
+    def rewind(self):
+        vars(self).update(self._marked)
+
+
+class ModalBody(Double, BeamBody):
     """ä + α ω² ȧ + ω² a = b C + f per mode, w = bᵀa; F = +C.
 
     Parameters
@@ -40,42 +55,27 @@ class ModalBody(BeamBody):
         a → shape.
     """
 
+    STATE = ("a", "v")
+
     def __init__(self, omega, b, a, v, f=0.0, alpha=0.0, sampler=None):
+        super().__init__()
         self.omega, self.b = np.asarray(omega, float), np.asarray(b, float)
         self.a, self.v = np.array(a, float), np.array(v, float)
         self.f = np.broadcast_to(np.asarray(f, float), self.omega.shape)
         self.alpha, self._sampler = alpha, sampler
         self.mass = 1.0 / float(self.b @ self.b)
-        self._integrals = (0.0, 0.0)
-        self._dissipated = self._work = 0.0
         self._maps = {}
         self._load = np.zeros((3, len(self.omega)))
-        self.steps = self.rewinds = 0
-
-    def mark(self):
-        self._marked = (self.a, self.v, self._integrals, self._dissipated, self._work)
-        self._moved = False
-
-    def rewind(self):
-        if self._moved:
-            self.rewinds += 1
-            self.a, self.v, self._integrals, self._dissipated, self._work = self._marked
-            self._moved = False
+        self.patterns = []  #: what a unit of each load is in the modes
 
     def expect_loads(self, loads):
-        self._patterns = [self.pattern(load) for load in loads]
-
-    def pattern(self, load):
-        """What a unit of the load is in the modes; `beam_body` knows more than the tip."""
-        assert load.on == "tip"
-        return self.b
+        assert len(loads) == len(self.patterns)
 
     def set_loads(self, forces):
-        self._load = sum(np.outer(f, pattern) for f, pattern in zip(forces, self._patterns, strict=True))
+        self._load = sum(np.outer(f, pattern) for f, pattern in zip(forces, self.patterns, strict=True))
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self.steps += 1
-        self._moved = True
         p = np.outer(contact, self.b) + self._load
         p[0] += self.f
         before, (f, df, ddf) = self.a, self._load
@@ -126,75 +126,19 @@ class ModalBody(BeamBody):
 
     def apply_impulse(self, impulse: float):
         self.v = self.v + self.b * impulse
-        self._moved = True
 
     def shape(self) -> np.ndarray:
         return self._sampler @ self.a
 
 
 def beam_body(beam: Beam, slope: float | None = None) -> ModalBody:
-    """The scene's beam: P1 elements, full integration, all modes. ``slope`` replaces initial_deflection_slope."""
-    n, h = beam.n_elements, beam.length / beam.n_elements
-    bending = beam.young_modulus * beam.second_moment_of_area
-    shear = beam.shear_coefficient * beam.shear_modulus * beam.area
-    M, K = np.zeros((2 * n + 2,) * 2), np.zeros((2 * n + 2,) * 2)
-    m = h / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
-    k = np.array([[1.0, -1.0], [-1.0, 1.0]]) / h
-    s = 0.5 * np.array([[-1.0, 1.0], [-1.0, 1.0]])  # ∫ ψ_i ψ_j'
-    for i in range(n):
-        d = slice(2 * i, 2 * i + 4)
-        Ke, Me = np.zeros((4, 4)), np.zeros((4, 4))
-        Me[::2, ::2] = beam.density * beam.second_moment_of_area * m
-        Me[1::2, 1::2] = beam.density * beam.area * m
-        Ke[::2, ::2], Ke[1::2, 1::2] = bending * k + shear * m, shear * k
-        Ke[::2, 1::2], Ke[1::2, ::2] = -shear * s, -shear * s.T
-        M[d, d] += Me
-        K[d, d] += Ke
-    clamp_mass = M[2:, 1].copy()  # of the clamp's deflection on the others
-    M, K = M[2:, 2:], K[2:, 2:]
-    squares, basis = eigh(K, M)
-    x = np.zeros(2 * n)
-    x[1::2] = h * np.arange(1, n + 1)
-    load = np.zeros(2 * n)
-    load[1::2] = beam.distributed_load * h
-    load[-1] *= 0.5
-    load[-1] += beam.tip_load_coefficient * h / 3.0
-    load[-3] += beam.tip_load_coefficient * h / 6.0
-    nodes = np.linspace(0.0, 1.0, n + 1)
-    deflection = np.vstack([np.zeros((1, 2 * n)), basis[1::2]])
-    line = basis.T @ (M @ x)
-    gauss, weights = np.polynomial.legendre.leggauss(4)
-
-    def pattern(load):
-        if load.on == "tip":
-            return basis[-1]
-        if load.on == "base":
-            return -basis.T @ (M @ np.tile([0.0, 1.0], n)) - basis.T @ clamp_mass
-        at = np.zeros(n + 1)
-        if load.at is not None:
-            k = min(int(load.at * n), n - 1)
-            at[[k, k + 1]] = k + 1 - load.at * n, load.at * n - k
-        else:
-            for k in range(n):
-                s = 0.5 * (gauss + 1.0)
-                f = 0.5 * h * weights * np.polynomial.polynomial.polyval((k + s) / n, load.shape or [1.0])
-                at[[k, k + 1]] += f @ (1.0 - s), f @ s
-        return basis[1::2].T @ at[1:]
-
-    body = ModalBody(
-        np.sqrt(squares),
-        basis[-1],
-        (beam.initial_deflection_slope if slope is None else slope) * line,
-        beam.initial_velocity_slope * line,
-        basis.T @ load,
-        beam.alpha_b,
-        np.array([np.interp(SHAPE_POINTS, nodes, column) for column in deflection.T]).T,
-    )
-    body.pattern = pattern
-    return body
+    """The scene's beam. ``slope`` replaces initial_deflection_slope."""
+    m = modal_beam(beam)
+    a = (beam.initial_deflection_slope if slope is None else slope) * m.slope_shape
+    return ModalBody(m.omega, m.tip, a, beam.initial_velocity_slope * m.slope_shape, m.load, beam.alpha_b, m.sampler)
 
 
-def modal_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> ModalBody:
+def unit_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> ModalBody:
     """An undamped unit beam of ``n`` elements, EI = KAG = ``stiffness``, moving as u̇ = slope·x."""
     return beam_body(
         Beam.with_ones(n_elements=n, young_modulus=stiffness, shear_modulus=stiffness, initial_velocity_slope=slope)
@@ -204,26 +148,16 @@ def modal_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> ModalBo
 _ORDER = 22
 
 
-class DuffingBody(Body):
+class DuffingBody(Double):
     """m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series in steps short enough for rounding."""
 
+    STATE = ("y", "z")
+
     def __init__(self, mass=1.0, k1=3.0, k2=-0.2, y=0.0, z=0.0, damping=0.0, external=0.0):
+        super().__init__()
         self.mass, self.k1, self.k2, self.damping, self.external = mass, k1, k2, damping, external
         self.y, self.z = float(y), float(z)
-        self._integrals = (0.0, 0.0)
-        self._dissipated = self._work = 0.0
         self._load = NO_FORCE
-        self.steps = self.rewinds = 0
-
-    def mark(self):
-        self._marked = (self.y, self.z, self._integrals, self._dissipated, self._work)
-        self._moved = False
-
-    def rewind(self):
-        if self._moved:
-            self.rewinds += 1
-            self.y, self.z, self._integrals, self._dissipated, self._work = self._marked
-            self._moved = False
 
     def expect_loads(self, loads):
         self._shares = [-self.mass if load.on == "base" else 1.0 for load in loads]
@@ -236,7 +170,6 @@ class DuffingBody(Body):
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self.steps += 1
-        self._moved = True
         f0, f1, f2 = (n - p + f for n, p, f in zip(foundation, contact, self._load, strict=True))
         start = self.motion()
         f0 += self.external
@@ -300,7 +233,6 @@ class DuffingBody(Body):
 
     def apply_impulse(self, impulse: float):
         self.z += impulse / self.mass
-        self._moved = True
 
     def holding_force(self, displacement, velocity):
         y = displacement
@@ -328,6 +260,8 @@ def bodies(scene: Scene) -> tuple[ModalBody | None, DuffingBody | None]:
         target = scene.tip_target
         kinematic = scene.beam.approach == "undeformed" and target is not None
         beam = beam_body(scene.beam, target[1] / scene.beam.length if kinematic else None)
+        patterns = Loads(scene, modal_beam(scene.beam)).patterns
+        beam.patterns = [row for load, row in zip(scene.loads, patterns, strict=True) if load.on != "spring"]
     if (p := scene.spring) is not None:
         spring = DuffingBody(
             p.mass,

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import modal_beam, simulate
+from bodies import simulate, unit_beam
 
 from springbeam.bodies.protocol import NO_FORCE, Motion
 from springbeam.bodies.rigid_wall import RigidWall
@@ -83,7 +83,7 @@ def test_a_resonant_force_keeps_to_the_bound() -> None:
     """The worst case: a force that reverses in step with the first mode adds 2 φ²C/ω² each half period."""
     beam = Beam.with_ones(n_elements=5, young_modulus=100.0, shear_modulus=100.0)
     stiffness = 1.0 / statics.tip_compliance(beam)
-    body = modal_beam(5, slope=0.0)
+    body = unit_beam(5, slope=0.0)
     half = np.pi / body.omega[0]
     variation = previous = largest = 0.0
     for step in range(40):
@@ -100,7 +100,7 @@ def test_a_resonant_force_keeps_to_the_bound() -> None:
 
 def test_both_ends_known_leave_nothing_to_solve() -> None:
     """The beam drives and the spring is seated: C is the discrete gradient of where the tip has gone."""
-    beam, start = modal_beam(6), 1e-3
+    beam, start = unit_beam(6), 1e-3
     beam.mark()
     law = Compliance(*LAW)
     one_way = OneWay(law, 0, 1e-12, upper_drives=True, driver_stiffness=1e6)

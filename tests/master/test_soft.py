@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, Upper, drift, modal_beam, orders
+from bodies import DuffingBody, Upper, drift, orders, unit_beam
 from scipy.linalg import expm
 
 from springbeam.bodies import force
@@ -39,7 +39,7 @@ def couple(law, degree: int, size: float, steps: int, upper: Body, lower: Body, 
 @pytest.mark.parametrize("stiffness", [1e2, 1e4, 1e6, 1e8, 1e10])
 def test_energy_is_conserved_at_any_stiffness(stiffness, q, degree):
     """H = 2 ms, up to √(λ/m_tip) H = 10⁴: rounding of 100 steps, C (1e-13 relative) times what p changes."""
-    rows, energies, _ = couple(Compliance(stiffness, q), degree, 2e-3, 100, modal_beam(4), DuffingBody(k1=3.0, k2=-0.2))
+    rows, energies, _ = couple(Compliance(stiffness, q), degree, 2e-3, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
     assert rows[:, 4].max() > 0.0
     assert np.abs(energies - energies[0]).max() < 1e-11 * energies[0]
 
@@ -48,7 +48,7 @@ def test_energy_is_conserved_at_any_stiffness(stiffness, q, degree):
 @pytest.mark.parametrize("mass", [1e-6, 1e6])
 @pytest.mark.parametrize("size", [1e-4, 1e-2])
 def test_energy_is_conserved_where_masses_differ_by_a_million(mass, degree, size):
-    _, energies, _ = couple(Compliance(1e5, 1.5), degree, size, 50, modal_beam(4), DuffingBody(mass, 3.0, 0.0))
+    _, energies, _ = couple(Compliance(1e5, 1.5), degree, size, 50, unit_beam(4), DuffingBody(mass, 3.0, 0.0))
     assert np.abs(energies - energies[0]).max() < 1e-11 * energies[0]
 
 
@@ -60,7 +60,7 @@ def test_the_order_is_twice_the_number_of_coefficients(degree, order, q):
     counts = (4, 8, 16) if degree == 2 else (16, 32, 64)
 
     def last(d: int, n: int) -> np.ndarray:
-        return couple(law, d, t / n, n, modal_beam(2, slope=-0.3), DuffingBody(k1=3.0, k2=-0.2))[0][-1, [0, 2]]
+        return couple(law, d, t / n, n, unit_beam(2, slope=-0.3), DuffingBody(k1=3.0, k2=-0.2))[0][-1, [0, 2]]
 
     exact = last(2, 8 * counts[-1])
     errors = [np.abs(last(degree, n) - exact).max() for n in counts]
@@ -71,7 +71,7 @@ def test_the_order_is_twice_the_number_of_coefficients(degree, order, q):
 def test_a_step_of_contact_costs_two_advances_of_each():
     """The guess and the force found, and now and then one more; the beam's response is measured once."""
     for degree in DEGREES:
-        upper, lower = modal_beam(4), DuffingBody(k1=3.0, k2=-0.2)
+        upper, lower = unit_beam(4), DuffingBody(k1=3.0, k2=-0.2)
         couple(Compliance(1e4, 1.5), degree, 1e-3, 200, upper, lower)
         assert upper.steps <= 2.1 * 200
         assert lower.steps <= 2.2 * 200
@@ -100,7 +100,7 @@ def test_two_masses_on_a_link(degree, bounds):
 @pytest.mark.parametrize("size", [1e-3, 2e-2])
 def test_what_damping_takes_is_booked(law, degree, size):
     """The bodies' and the law's energies and what the law dissipated: constant to rounding, at any step."""
-    _, energies, coupling = couple(law, degree, size, 100, modal_beam(4), DuffingBody(k1=3.0, k2=-0.2))
+    _, energies, coupling = couple(law, degree, size, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
     assert coupling.dissipated > 1e-4
     assert np.abs(energies - energies[0]).max() < 1e-12 * energies[0]
 
@@ -144,7 +144,7 @@ def test_a_step_made_at_degree_0_books_what_damping_takes_at_degree_0(law, monke
         return aim(self, gap, a, descent, window)
 
     monkeypatch.setattr(SoftSolver, "aim", fails_above_0)
-    _, energies, coupling = couple(law, 2, 2e-2, 100, modal_beam(4), DuffingBody(k1=3.0, k2=-0.2))
+    _, energies, coupling = couple(law, 2, 2e-2, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))
     assert coupling.reduced >= 12
     assert coupling.dissipated > 1e-4
     assert np.abs(energies - energies[0]).max() < 1e-12 * energies[0]

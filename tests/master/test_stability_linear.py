@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, ModalBody, modal_beam
+from bodies import DuffingBody, ModalBody, unit_beam
 from scipy.linalg import expm
 
 from springbeam.bodies.protocol import NO_FORCE
@@ -33,7 +33,7 @@ EXCHANGES = [("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel",
 @lru_cache(maxsize=8)
 def pair(n: int = 4, mass: float = 1.0, stiffness: float = 0.0, k: float = 3.0, damping: float = 0.0) -> LinearPair:
     """An undamped unit beam, EI = KAG = 100, and a linear spring."""
-    beam = modal_beam(n)
+    beam = unit_beam(n)
     modes = LinearBody(beam.omega**2, np.zeros_like(beam.omega), beam.b)
     spring = LinearBody(np.array([k / mass]), np.zeros(1), np.array([mass**-0.5]))
     return LinearPair(modes, spring, stiffness, damping)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, ModalBody, drift, modal_beam, orders
+from bodies import DuffingBody, ModalBody, drift, orders, unit_beam
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE, Force, Motion
@@ -26,7 +26,7 @@ class Row(NamedTuple):
 
 def after_impact(n: int, stiffness: float = 100.0, **spring: float) -> tuple[ModalBody, DuffingBody]:
     """A beam that has just met a spring top at rest inelastically."""
-    beam, top = modal_beam(n, stiffness), DuffingBody(**spring)
+    beam, top = unit_beam(n, stiffness), DuffingBody(**spring)
     j = 1.0 / (1.0 / beam.mass + 1.0 / top.mass)
     beam.apply_impulse(j)
     top.apply_impulse(-j)
@@ -189,7 +189,7 @@ class Deaf(DuffingBody):
 
 def test_not_converged_carries_the_gap_that_is_left():
     with pytest.raises(NotConverged) as caught:
-        solve(Tie("energy", 0, 1e-12), 1e-3, modal_beam(4), Deaf())
+        solve(Tie("energy", 0, 1e-12), 1e-3, unit_beam(4), Deaf())
     # The tip, falling 1 mm, is on the other side of zero from where the end jumps to: 0.5 m at least.
     assert 0.499 <= caught.value.residual < float("inf")
     assert f"{caught.value.residual:.3g} m" in str(caught.value)
@@ -199,5 +199,5 @@ def test_a_body_that_is_not_finite_does_not_converge():
     spring = DuffingBody(external=float("inf"))
     spring._reach = lambda y, size: size  # its step control needs finite numbers
     with pytest.raises(NotConverged) as caught:
-        solve(Tie("energy", 0, 1e-12), 1e-3, modal_beam(4), spring)
+        solve(Tie("energy", 0, 1e-12), 1e-3, unit_beam(4), spring)
     assert not caught.value.residual < float("inf")
