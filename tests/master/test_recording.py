@@ -124,12 +124,13 @@ def test_what_is_recorded_comes_back(make, scene):
 
 
 def test_columns_may_be_chosen(make):
-    recorder = make(PAIR, ("time", "y"))
-    recorder.row((0.0, 1.5))
-    recorder.row([np.float64(1.0), np.float32(0.25)])
+    recorder = make(PAIR, ("time", "phase", "y"))
+    recorder.row((0.0, "free", 1.5))
+    recorder.row([np.float64(1.0), "seated", np.float32(0.25)])
     recorder.finish({})
     result = make.trajectory(recorder)
-    assert {name: values.tolist() for name, values in result.columns.items()} == {"time": [0, 1], "y": [1.5, 0.25]}
+    found = {name: values.tolist() for name, values in result.columns.items()}
+    assert found == {"time": [0, 1], "phase": ["free", "seated"], "y": [1.5, 0.25]}
 
 
 def test_nothing_that_is_not_finite_reaches_a_file(make):
@@ -161,14 +162,12 @@ def test_nothing_that_is_not_finite_reaches_a_file(make):
     "bad",
     [
         lambda r: r.row((0.0, 1.0)),
-        lambda r: r.row(a_row(phase="a,b")),
-        lambda r: r.row(a_row(phase="a\nb")),
+        lambda r: r.row(a_row(phase="tied,")),
         lambda r: r.row(a_row(phase="")),
-        lambda r: r.row(a_row(phase="x" * 33)),
         lambda r: r.event(Event(0.0, "bang")),
         lambda r: r.shape(0.0, np.zeros(20)),
     ],
-    ids=["short", "comma", "newline", "empty", "long", "kind", "points"],
+    ids=["short", "phase", "no phase", "kind", "points"],
 )
 def test_what_a_file_cannot_hold_is_refused(make, bad):
     recorder = make()
@@ -185,9 +184,9 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 @given(values=st.lists(st.tuples(finite, finite), min_size=1, max_size=40))
 def test_numbers_survive_a_file_bit_for_bit(tmp_path_factory, values):
     path = tmp_path_factory.mktemp("run")
-    recorder = FileRecorder(PAIR, RunDirectory(path), ("time", "y"))
+    recorder = FileRecorder(PAIR, RunDirectory(path), ("time", "phase", "y"))
     for time, y in values:
-        recorder.row((time, y))
+        recorder.row((time, "tied", y))
         recorder.event(Event(time, "release", y=y, impulse_contact=y))
         recorder.shape(time, np.full(21, y))
     recorder.finish({})
@@ -270,6 +269,11 @@ def test_an_incomplete_last_line_is_left_out(tmp_path, name, cut):
         ("trajectory.csv", lambda text: "", r"trajectory\.csv: empty"),
         ("trajectory.csv", lambda text: text.replace("time,", "t,"), r"trajectory\.csv: line 1: no column time"),
         ("trajectory.csv", lambda text: text.replace("\n0.1", "\n0.\udcff1"), r"trajectory\.csv: .*row"),
+        (
+            "trajectory.csv",
+            lambda text: text.replace(",free", ",freed"),
+            r"trajectory\.csv: 'freed' is no phase; phases are",
+        ),
         (
             "events.csv",
             lambda text: text + 999 * text.partition("\n")[2] + "\udcff\n",

@@ -121,9 +121,8 @@ def test_the_same_run_gives_the_same_page():
 
 def test_what_a_scene_says_is_text_not_markup():
     scene = PAIR.model_copy(update={"title": "</script><script>alert(1)</script>"})
-    found = Page(page(a_trajectory(scene, phase=np.full(400, "</script>x"))))
+    found = Page(page(a_trajectory(scene)))
     assert found.headings[0] == scene.title
-    assert set(found.data["motion"]["phase"]) == {"</script>x"}
     assert found.texts["<script>"].count("alert(1)") == 0
 
 

@@ -10,27 +10,12 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..results.trajectory import EVENT_KINDS, Trajectory
+from ..results.trajectory import EVENT_KINDS, PHASES, Trajectory
 from ..scene import Scene
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILLION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 GREY, STONE = "#777777", "#B8B8B8"
-
-PHASE_SHADES = {"free": "#FFFFFF", "tied": "#D6EAF7", "touch": "#FFF1B8", "seated": "#CFE8DD"}
-OTHER_SHADES = ("#EADCE7", "#E4E4E4", "#F7DCC8")
-_PHASE_WORDS = {
-    "free": "free",
-    "tied": "tied (u = y < Ψ)",
-    "touch": "touch (y ≥ Ψ)",
-    "seated": "seated (at φ)",
-}
-#: What phases are called where the law means another thing by them.
-_PHASE_WORDS_OF_LAWS = {
-    "compliance": {"touch": "in contact (u < y)"},
-    "tie": {"tied": "tied (u = y)"},
-    "link": {"tied": "joined by the link"},
-}
 
 
 class Line(NamedTuple):
@@ -51,7 +36,7 @@ class Marker(NamedTuple):
 
 
 class Look(NamedTuple):
-    """Colour, words and line of a quantity, or marker of a kind of event."""
+    """Colour and words of a phase, line of a quantity, or marker of a kind of event."""
 
     colour: str
     words: str
@@ -59,6 +44,19 @@ class Look(NamedTuple):
     marker: Marker | None = None
 
 
+#: Phases and the shades behind them.
+PHASE_LOOKS = {
+    "free": Look("#FFFFFF", "free"),
+    "tied": Look("#D6EAF7", "tied (u = y < Ψ)"),
+    "touch": Look("#FFF1B8", "touch (y ≥ Ψ)"),
+    "seated": Look("#CFE8DD", "seated (at φ)"),
+}
+#: What phases are called where the law means another thing by them.
+_PHASE_WORDS_OF_LAWS = {
+    "compliance": {"touch": "in contact (u < y)"},
+    "tie": {"tied": "tied (u = y)"},
+    "link": {"tied": "joined by the link"},
+}
 EVENT_LOOKS = {
     "impact": Look(VERMILLION, "impact tip–spring", marker=Marker("▼", "v", "triangle-down")),
     "stop_impact": Look(BLACK, "impact on foundation", marker=Marker("▲", "^", "triangle-up")),
@@ -68,7 +66,7 @@ EVENT_LOOKS = {
     "seated": Look(GREY, "seated", marker=Marker("◀", "<", "triangle-left")),
     "unseated": Look(GREY, "unseated", marker=Marker("▶", ">", "triangle-right")),
 }
-assert tuple(EVENT_LOOKS) == EVENT_KINDS
+assert (tuple(PHASE_LOOKS), tuple(EVENT_LOOKS)) == (PHASES, EVENT_KINDS)
 #: More events than this are not drawn through all panels.
 MANY_EVENTS = 60
 
@@ -213,15 +211,12 @@ def shaded_phases(trajectory: Trajectory) -> list[tuple[Look, list[tuple[float, 
         spans.setdefault(phase, []).append((start, end))
     if spans.keys() == {"free"}:
         return []
-    others = iter(OTHER_SHADES * len(spans))
     scene = trajectory.scene
-    words = _PHASE_WORDS | _PHASE_WORDS_OF_LAWS.get(scene.contact.law, {})
+    words = {name: look.words for name, look in PHASE_LOOKS.items()}
+    words |= _PHASE_WORDS_OF_LAWS.get(scene.contact.law, {})
     if scene.spring is None:
         words = {name: text.replace("y", "φ") for name, text in words.items()}
-    return [
-        (Look(PHASE_SHADES.get(phase) or next(others), words.get(phase, phase)), found)
-        for phase, found in spans.items()
-    ]
+    return [(Look(PHASE_LOOKS[phase].colour, words[phase]), found) for phase, found in spans.items()]
 
 
 def drawable(trajectory: Trajectory) -> bool:

@@ -70,8 +70,7 @@ class FileRecorder(Recorder):
 
     def _keep_row(self, numbers: list[float], phase: str) -> None:
         fields: list[float | str] = [*numbers]
-        if self._phase_at >= 0:
-            fields.insert(self._phase_at, phase)
+        fields.insert(self._phase_at, phase)
         self._file(TRAJECTORY).write(_line(fields))
         self.time = numbers[0]
         if len(self._steps) >= _STEPS_TOGETHER:

@@ -13,7 +13,7 @@ import numpy as np
 from ..scene import scene_from_dict
 from .directory import ResultsUnreadable, RunDirectory
 from .steps import steps_of
-from .trajectory import EVENT_COLUMNS, EVENT_KINDS, PHASE_WIDTH, SHAPE_COLUMNS, Event, Trajectory
+from .trajectory import EVENT_COLUMNS, EVENT_KINDS, PHASES, SHAPE_COLUMNS, Event, Trajectory
 
 
 def load_trajectory(directory: str | Path) -> Trajectory:
@@ -109,7 +109,7 @@ def _complete_lines(path: Path) -> tuple[tuple[str, ...], Iterator[str]]:
 def _read_table(path: Path, header: tuple[str, ...], lines: Iterator[str]) -> dict[str, np.ndarray]:
     if "time" not in header:
         raise ResultsUnreadable(f"{path}: line 1: no column time")
-    kinds = [(name, f"U{PHASE_WIDTH}" if name == "phase" else "f8") for name in header]
+    kinds = [(name, "U8" if name == "phase" else "f8") for name in header]
     first = next(lines, None)
     if first is None:
         table = np.empty(0, dtype=kinds)
@@ -119,10 +119,10 @@ def _read_table(path: Path, header: tuple[str, ...], lines: Iterator[str]) -> di
         except ValueError as error:
             raise ResultsUnreadable(f"{path}: after the header: {error}") from None
     columns = {name: np.ascontiguousarray(table[name]) for name in header}
-    if "phase" in columns:
-        phase = columns["phase"]
-        columns["phase"] = phase.astype(f"U{max(1, int(np.char.str_len(phase).max(initial=1)))}")
     for name, values in columns.items():
-        if name != "phase" and not np.isfinite(values).all():
+        if name == "phase":
+            if unknown := set(values.tolist()).difference(PHASES):
+                raise ResultsUnreadable(f"{path}: {unknown.pop()!r} is no phase; phases are {', '.join(PHASES)}")
+        elif not np.isfinite(values).all():
             raise ResultsUnreadable(f"{path}: {name} holds a number that is not finite")
     return columns

@@ -19,7 +19,7 @@ from .steps import steps_of
 from .trajectory import (
     EVENT_COLUMNS,
     EVENT_KINDS,
-    PHASE_WIDTH,
+    PHASES,
     SHAPE_COLUMNS,
     Event,
     Trajectory,
@@ -55,15 +55,14 @@ class Recorder(ABC):
     scene
         The scene as run.
     columns
-        Names in row order, starting with ``time``; default `columns_of(scene)`.
+        Names in row order, starting with ``time``, ``phase`` among them; default `columns_of(scene)`.
     """
 
     def __init__(self, scene: Scene, columns: Sequence[str] | None = None) -> None:
         self.scene = scene
         self.columns = tuple(columns_of(scene) if columns is None else columns)
-        self._phase_at = self.columns.index("phase") if "phase" in self.columns else -1
+        self._phase_at = self.columns.index("phase")
         self._numbers = [name for name in self.columns if name != "phase"]
-        self._phases: set[str] = set()
         self._steps = bytearray()  #: those that are in no file
 
     def row(self, values: Sequence[Any], step: bytes | None = None) -> None:
@@ -80,11 +79,9 @@ class Recorder(ABC):
         if len(values) != len(self.columns):
             raise ValueError(f"row of {len(values)} values for {len(self.columns)} columns")
         values = list(values)
-        phase = ""
-        if self._phase_at >= 0:
-            phase = values.pop(self._phase_at)
-            if phase not in self._phases:
-                self._check_phase(phase)
+        phase = values.pop(self._phase_at)
+        if phase not in PHASES:
+            raise ValueError(f"phase {phase!r}; allowed: {', '.join(PHASES)}")
         numbers = list(map(float, values))
         _refuse_non_finite(self._numbers, numbers)
         if step is not None:
@@ -129,7 +126,7 @@ class Recorder(ABC):
 
     @abstractmethod
     def _keep_row(self, numbers: list[float], phase: str) -> None:
-        """Keep a row that has been checked: its numbers without the phase, which is "" in a row without one."""
+        """Keep a row that has been checked: its numbers, and its phase."""
 
     @abstractmethod
     def _keep_event(self, event: Event) -> None:
@@ -138,11 +135,6 @@ class Recorder(ABC):
     @abstractmethod
     def _keep_shape(self, numbers: list[float]) -> None:
         """Keep the numbers of `SHAPE_COLUMNS`, which have been checked."""
-
-    def _check_phase(self, phase: str) -> None:
-        if not phase.isprintable() or not 0 < len(phase) <= PHASE_WIDTH or set(phase) & set(',"\\'):
-            raise ValueError(f"phase {phase!r} cannot be written to a file")
-        self._phases.add(phase)
 
 
 class MemoryRecorder(Recorder):

@@ -43,11 +43,11 @@ COLUMNS = {
     "e_total": ("J", ""),
     "energy_residual": ("J", ""),
 }
+#: What the column ``phase`` may hold.
+PHASES = ("free", "tied", "touch", "seated")
 EVENT_KINDS = ("impact", "stop_impact", "release", "retie", "separation", "seated", "unseated")
 #: Columns of the table of shapes: time [s] and deflections [m] at `SHAPE_POINTS`.
 SHAPE_COLUMNS = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
-#: Most characters of a phase's name.
-PHASE_WIDTH = 32
 #: A number below this share of its table's largest is a zero, rounded.
 _NOISE = 1e-13
 
