@@ -9,9 +9,8 @@ __version__: str
 
 if TYPE_CHECKING:
     from .api import load, simulate
-    from .bodies.elements import PointMass, SpringDamper
+    from .bodies.elements import PointMass, RigidWall, SpringDamper
     from .bodies.protocol import Body, Energies, Motion
-    from .bodies.rigid_wall import RigidWall
     from .results.trajectory import Event, Trajectory
     from .run.outcome import RunStopped
     from .run.runner import resume
@@ -41,9 +40,8 @@ _HOME = {
     name: home
     for home, names in {
         "api": ("load", "simulate"),
-        "bodies.elements": ("PointMass", "SpringDamper"),
+        "bodies.elements": ("PointMass", "RigidWall", "SpringDamper"),
         "bodies.protocol": ("Body", "Energies", "Motion"),
-        "bodies.rigid_wall": ("RigidWall",),
         "results.trajectory": ("Event", "Trajectory"),
         "run.outcome": ("RunStopped",),
         "run.runner": ("resume",),

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from bodies import simulate, unit_beam
 
+from springbeam.bodies.elements import RigidWall
 from springbeam.bodies.protocol import NO_FORCE, Motion
-from springbeam.bodies.rigid_wall import RigidWall
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.one_way import OneWay
 from springbeam.coupling.projection import Projection

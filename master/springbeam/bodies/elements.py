@@ -1,19 +1,20 @@
-"""Simple partners that need no FMU: a free mass, a mass on a linear spring and damper.
+"""Simple partners that need no FMU: a free mass, a mass on a linear spring and damper, an end that moves as told.
 
-They fit in either place. Each step is exact: the state with the polynomial force and the integrals is one linear
-system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H). What damping takes is the quadratic form
+They fit in either place. Each step of a mass is exact: the state with the polynomial force and the integrals is one
+linear system, s = (x, ẋ, F, Ḟ, F̈, ∫x, ∫∫x), ṡ = A s, stepped by exp(A H). What damping takes is the quadratic form
 ∫ c ẋ² dτ = sᵀ W s, by W(2h) = W(h) + E(h)ᵀ W(h) E(h), E(h) = exp(A h).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
+from ..scene import Load
 from .end_loaded import EndLoaded
 from .protocol import NO_FORCE, Body, Energies, Force, Motion
-from .rigid_wall import RigidWall
 
 _SIZES_REMEMBERED = 64
 #: Terms of the series of W over a step that A does not turn by more than 1.
@@ -52,23 +53,16 @@ class SpringDamper(EndLoaded):
         self._state = (displacement, velocity)
         self._integrals = (0.0, 0.0)
         self._dissipated = 0.0
-        self._maps: dict[float, tuple[np.ndarray, np.ndarray | None]] = {}
-        self.mark()
+        self._maps = lru_cache(_SIZES_REMEMBERED)(self._map)
 
     def take_place(self, *, upper: bool) -> None:
         self._sign = 1.0 if upper else -1.0
-
-    def mark(self) -> None:
-        self._marked = (self._state, self._integrals, self._dissipated, self._load_work)
-
-    def rewind(self) -> None:
-        self._state, self._integrals, self._dissipated, self._load_work = self._marked
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         before, on_end = self.motion(), self._on_end
         forces = [self._sign * c + n + q for c, n, q in zip(contact, foundation, on_end, strict=True)]
         forces[0] += self._load + self._stiffness * self._rest
-        step, lost = self._maps.get(size) or self._map(size)
+        step, lost = self._maps(size)
         start = np.array([*self._state, *forces, 0.0, 0.0])
         x, v, once, twice = (step @ start).tolist()
         if lost is not None:
@@ -97,10 +91,7 @@ class SpringDamper(EndLoaded):
             small = expm(A * h)
             for _ in range(doublings):
                 lost, small = lost + small.T @ lost @ small, small @ small
-        if len(self._maps) >= _SIZES_REMEMBERED:
-            self._maps.clear()
-        found = self._maps[size] = (expm(A * size)[[0, 1, 5, 6]], lost)
-        return found
+        return expm(A * size)[[0, 1, 5, 6]], lost
 
     def motion(self) -> Motion:
         return Motion(*self._state, *self._integrals)
@@ -126,6 +117,43 @@ class PointMass(SpringDamper):
         self, mass: float, displacement: float = 0.0, velocity: float = 0.0, external_force: float = 0.0
     ) -> None:
         super().__init__(mass, displacement=displacement, velocity=velocity, external_force=external_force)
+
+
+class Prescribed(Body):
+    """An end that moves as told, whatever acts on it: a driving body, seen from the driven one."""
+
+    mass = float("inf")
+
+    def __init__(self, motion: Motion) -> None:
+        self._motion = motion
+
+    def mark(self) -> None: ...
+
+    def rewind(self) -> None: ...
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        return self._motion
+
+    def motion(self) -> Motion:
+        return self._motion
+
+    def apply_impulse(self, impulse: float) -> None: ...
+
+
+class RigidWall(Prescribed):
+    """An end held at rest at ``position`` [m]: the foundation, an elastic stop, or a seated spring."""
+
+    CHECKPOINTED = ("_motion",)
+
+    def __init__(self, position: float) -> None:
+        super().__init__(Motion(position, 0.0, 0.0, 0.0))
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        w = self._motion.displacement
+        self._motion = Motion(w, 0.0, w * size, 0.5 * w * size * size)
+        return self._motion
+
+    def expect_loads(self, loads: Sequence[Load]) -> None: ...
 
 
 #: The elements by their names in a scene; the keys of their tables are the parameters.

@@ -89,6 +89,7 @@ class FmuBody(Body):
         raise NotImplementedError
 
     def set_loads(self, forces: Sequence[Force]) -> None:
+        super().set_loads(forces)
         values, slopes = [], []
         for name, shares in self._shares.items():
             f, df, ddf = combined([share for _, share in shares], [forces[number] for number, _ in shares])
@@ -262,10 +263,6 @@ class FmuSpring(FmuBody, EndLoaded):
     def expect_loads(self, loads: Sequence[Load]) -> None:
         FmuBody.expect_loads(self, loads)
         EndLoaded.expect_loads(self, loads)
-
-    def set_loads(self, forces: Sequence[Force]) -> None:
-        FmuBody.set_loads(self, forces)
-        EndLoaded.set_loads(self, forces)
 
     def energies(self) -> Energies:
         kinetic, potential, dissipated, *work = self._stored()

@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isfinite, sqrt
 from pathlib import Path
@@ -71,7 +71,6 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings, by_substeps: bool) -> None:
         self._spec, self._found, self._by_substeps = spec, found, by_substeps
-        self.abilities = found.abilities
         names, energies = spec.named(spec.MOTION), spec.named(spec.ENERGIES)
         self._MOTION = tuple(name for name in names if name is not None)
         self._at = [None if name is None else self._MOTION.index(name) for name in names]
@@ -86,8 +85,8 @@ class ForeignBody(FmuBody, EndLoaded):
         self._time = start_time  #: of the present state [s]
         self._held: dict[float, float] = {}  #: holding forces [N] by displacement [m]
         fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
-        self.repeatable = found.abilities.state and bool(fmu.says.canGetAndSetFMUstate)
-        self.any_size = found.abilities.any_size
+        state = found.abilities.state and bool(fmu.says.canGetAndSetFMUstate)
+        self.abilities = replace(found.abilities, state=state)
         super().__init__(fmu)
 
     def _prepare(self, fmu: Fmu) -> None:
@@ -118,18 +117,18 @@ class ForeignBody(FmuBody, EndLoaded):
         return self._spec.mass or self._found.mass
 
     def mark(self) -> None:
-        if self.repeatable:
+        if self.abilities.state:
             super().mark()
         else:
             self.fmu.moved = False
-        self._marked = (self.received, self._load_work, self._time)
+        self._marked_work = (self.received, self._load_work, self._time)
 
     def rewind(self) -> None:
         if self.fmu.moved:
-            if not self.repeatable:
+            if not self.abilities.state:
                 raise BodyFailed(f"{self.fmu.path}: a step had to be repeated, and its state cannot be restored")
             super().rewind()
-            self.received, self._load_work, self._time = self._marked
+            self.received, self._load_work, self._time = self._marked_work
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         up, sign, start = self._upward, self._spec.force_sign, self._current

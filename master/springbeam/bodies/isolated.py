@@ -38,9 +38,7 @@ _LOOK = 0.2
 #: Most processes that wait for another body of their FMU.
 _MOST_IDLE = 4
 #: What the process may say instead of an answer.
-FAILURES: dict[str, type[Exception]] = {
-    failure.__name__: failure for failure in (FmuError, BodyFailed, StepRefused, SceneError)
-}
+FAILURES = (BodyFailed, StepRefused, SceneError)
 #: A method and its arguments.
 Call = tuple[Any, ...]
 
@@ -124,8 +122,8 @@ class FmuProcess:
             said = f"interrupted, for it has not returned within {waited:.3g} s from {self._doing}"
             raise FmuError(f"{self._file[0]}: {said}") from None
         self._until = inf
-        if kind in FAILURES:
-            raise FAILURES[kind](value)
+        if kind == "failed":
+            raise value
         return value, told
 
     def _why_it_ended(self, patience: float) -> str:
@@ -197,7 +195,6 @@ class IsolatedBody(EndLoaded):
 
     def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings, by_substeps: bool) -> None:
         self.path, self.abilities = spec.fmu, found.abilities
-        self.repeatable, self.any_size = found.abilities.state, found.abilities.any_size
         self._waiting: list[Call] = []
         self._process: FmuProcess | None = FmuProcess.of(_file(spec.fmu))
         try:
@@ -219,11 +216,11 @@ class IsolatedBody(EndLoaded):
 
     def mark(self) -> None:
         self._waiting.append(("mark",))
-        self._marked = (self._motion, self._received)
+        self._marked_motion = (self._motion, self._received)
 
     def rewind(self) -> None:
         self._waiting.append(("rewind",))
-        self._motion, self._received = self._marked
+        self._motion, self._received = self._marked_motion
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self._ask(f"its step at t = {time:.9g} s", "advance", time, size, contact, foundation)

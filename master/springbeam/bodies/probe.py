@@ -70,7 +70,7 @@ class Bench:
         )
         body = self.renewed()
         self.says = says = body.fmu.says
-        state, any_size = body.repeatable, bool(says.canHandleVariableCommunicationStepSize)
+        state, any_size = body.abilities.state, bool(says.canHandleVariableCommunicationStepSize)
         serialized = state and bool(says.canSerializeFMUstate)
         self.abilities = replace(self.abilities, state=state, serialized=serialized, any_size=any_size)
         self.sizes = [H * share for share in _SIZES] if any_size else [H]
@@ -95,7 +95,7 @@ class Bench:
     def run(self, size: float, forces: Sequence[Force], impulse: float = 0.0) -> list[Sample]:
         """Return the samples at the start and after each step of ``size`` [s] under a force C and an ``impulse``."""
         body = self._body
-        if body is None or (body.fmu.moved and not body.repeatable):
+        if body is None or (body.fmu.moved and not body.abilities.state):
             body = self.renewed()
         body.rewind()
         samples = [self._sample(body)]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..scene import Load, SceneError
+from .abilities import Abilities
 from .checkpointed import Checkpointed
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
@@ -66,21 +67,21 @@ class Body(Checkpointed):
         """Whether the end has no inertia: it then has the velocity of what it is joined to, and springs back alone."""
         return self.mass == 0.0
 
-    #: Whether `rewind` works; if not, a step is made once, by the schemes that never repeat one.
-    repeatable: bool = True
-    #: Whether steps may have any size.
-    any_size: bool = True
+    #: Where its state cannot be saved, a step is made once, by the schemes that never repeat one.
+    abilities = Abilities()
 
     def take_place(self, *, upper: bool) -> None:
         """Learn, before the run, whether it is the upper body; one that fits in either place needs to know."""
 
     def mark(self) -> None:
-        """Remember the present state as the one ``rewind`` returns to."""
-        raise NotImplementedError
+        """Remember the present state as the one ``rewind`` returns to: the values of what `CHECKPOINTED` names."""
+        if not self.CHECKPOINTED:
+            raise NotImplementedError(f"{type(self).__name__} has neither mark nor CHECKPOINTED")
+        self._marked = {name: getattr(self, name) for name in self.CHECKPOINTED}
 
     def rewind(self) -> None:
-        """Return to the marked state. Costs nothing if nothing happened since."""
-        raise NotImplementedError
+        """Return to the marked state."""
+        vars(self).update(self._marked)
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         """Advance from ``time`` by ``size`` [s] and return `motion`. Raises StepRefused; ``rewind`` then recovers."""
@@ -150,24 +151,3 @@ class BeamBody(Body):
     def shape(self) -> np.ndarray:
         """Return the deflection [m] at `springbeam.scene.statics.SHAPE_POINTS`, shape (21,)."""
         raise NotImplementedError
-
-
-class Prescribed(Body):
-    """An end that moves as told, whatever acts on it: a driving body, seen from the driven one."""
-
-    mass = float("inf")
-
-    def __init__(self, motion: Motion) -> None:
-        self._motion = motion
-
-    def mark(self) -> None: ...
-
-    def rewind(self) -> None: ...
-
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        return self._motion
-
-    def motion(self) -> Motion:
-        return self._motion
-
-    def apply_impulse(self, impulse: float) -> None: ...

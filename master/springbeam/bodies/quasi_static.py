@@ -18,6 +18,7 @@ polynomial force would not do: without damping it jumps whenever C does.) Nothin
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from operator import mul
 
 import numpy as np
@@ -57,14 +58,7 @@ class QuasiStaticBeam(BeamBody):
         self._w, self._velocity = tip - self._rest, velocity
         self._integrals = (0.0, 0.0)  #: of u_tip over the last step, as in `Motion`
         self._dissipated = 0.0
-        self._responses: dict[float, list[list[float]]] = {}  #: by the size of the step
-        self.mark()
-
-    def mark(self) -> None:
-        self._marked = (self._w, self._velocity, self._integrals, self._dissipated)
-
-    def rewind(self) -> None:
-        self._w, self._velocity, self._integrals, self._dissipated = self._marked
+        self._responses = lru_cache(_SIZES_REMEMBERED)(self._response)
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self._follow_force(size, contact)
@@ -81,14 +75,9 @@ class QuasiStaticBeam(BeamBody):
         return self.motion()
 
     def _follow_force(self, size: float, contact: Force) -> None:
-        rows = self._responses.get(size)
-        if rows is None:
-            if len(self._responses) >= _SIZES_REMEMBERED:
-                self._responses.clear()
-            rows = self._responses[size] = self._response(size)
         k = self._stiffness
         given = [*(c / k for c in force.legendre(contact, size, self._degree)), self._w]
-        self._w, self._velocity, first, second, *rate = [sum(map(mul, row, given)) for row in rows]
+        self._w, self._velocity, first, second, *rate = [sum(map(mul, row, given)) for row in self._responses(size)]
         self._integrate(size, first, second)
         mean_square = sum(c * c / (2 * j + 1) for j, c in enumerate(rate))
         self._dissipated += self._alpha * k * size * mean_square

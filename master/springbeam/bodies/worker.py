@@ -48,8 +48,8 @@ def main() -> None:
             return
         try:
             values = [call(*asked) for asked in calls]
-        except tuple(FAILURES.values()) as failure:
-            answer(next(name for name, kind in FAILURES.items() if isinstance(failure, kind)), str(failure), None)
+        except FAILURES as failure:
+            answer("failed", failure, None)
         else:
             answer("done", values[-1] if values else None, None if body is None else body.told())
 

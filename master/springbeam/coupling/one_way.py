@@ -17,7 +17,8 @@ from __future__ import annotations
 from math import inf
 
 from ..bodies import force
-from ..bodies.protocol import Body, Ends, Force, Prescribed
+from ..bodies.elements import Prescribed
+from ..bodies.protocol import Body, Ends, Force
 from ..contact.laws import SoftLaw
 from .protocol import Booking, Neglected, Step, Window
 from .soft import SoftSolver, penetration

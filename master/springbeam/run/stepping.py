@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from ..bodies import force
 from ..bodies.checkpointed import Checkpointed
+from ..bodies.elements import RigidWall
 from ..bodies.protocol import NO_FORCE, Body, Ends, Energies, Force
-from ..bodies.rigid_wall import RigidWall
 from ..contact.laws import Transmission, law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
@@ -97,9 +97,9 @@ class Pair(Checkpointed):
         self.bodies: list[Body] = [body for body in (beam, spring) if body is not None]
         for body in self.bodies:
             body.take_place(upper=body is beam)
-        self.repeatable = all(body.repeatable for body in self.bodies)
+        self.repeatable = all(body.abilities.state for body in self.bodies)
         #: Whether a step can be repeated with another size.
-        self.divides = self.repeatable and all(body.any_size for body in self.bodies)
+        self.divides = self.repeatable and all(body.abilities.any_size for body in self.bodies)
         #: Ψ: where the ends of a rigid law are tied below [m].
         self.equilibrium = scene.spring.equilibrium if scene.spring is not None else self.lower.motion().displacement
         #: Where the ends are; looked up once, since every step asks a few times.
