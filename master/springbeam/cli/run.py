@@ -21,7 +21,7 @@ from ..results.recording import NonFiniteValue, replay
 from ..results.trajectory import Trajectory
 from ..run.checkpoint import Checkpoint
 from ..scene import Scene, load_scene
-from ..scene.estimates import implausible
+from ..scene.suspicions import implausible
 from .common import (
     BAD_INPUT,
     STOPPED,

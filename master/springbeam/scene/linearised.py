@@ -8,20 +8,24 @@ from __future__ import annotations
 from math import sqrt
 
 from .scene import Scene
-from .statics import shear_stiffness, tip_compliance
+from .statics import initial_kinetic_energy, shear_stiffness, tip_compliance
 
 
 def contact_energy(scene: Scene) -> float:
-    """Return the energy at first contact [J]: of u̇ = s₁x, the shear of u = s₀x with θ = 0, the spring, and loads."""
+    """Return the energy at first contact [J]: of the beam, the spring, and loads."""
     energy = 0.0
     if (spring := scene.spring) is not None:
         y, z = spring.equilibrium, spring.initial_velocity
         energy += 0.5 * (spring.mass * z * z + spring.linear_stiffness * y * y) + 0.25 * spring.cubic_stiffness * y**4
-    if (beam := scene.beam) is not None:
-        energy += beam.density * beam.area * beam.initial_velocity_slope**2 * beam.length**3 / 6.0
-        slope = beam.initial_deflection_slope + (scene.contact_time or 0.0) * beam.initial_velocity_slope
-        energy += 0.5 * shear_stiffness(beam) * beam.length * slope**2
-    return max(energy, 0.0) + _load_energy(scene)
+    return max(energy + beam_energy(scene), 0.0) + _load_energy(scene)
+
+
+def beam_energy(scene: Scene) -> float:
+    """Return the energy of the beam at first contact [J]: of u̇ = s₁x, and the shear of a straight u with θ = 0."""
+    if (beam := scene.beam) is None:
+        return 0.0
+    slope = beam.initial_deflection_slope + (scene.contact_time or 0.0) * beam.initial_velocity_slope
+    return initial_kinetic_energy(beam) + 0.5 * shear_stiffness(beam) * beam.length * slope**2
 
 
 def _load_energy(scene: Scene) -> float:

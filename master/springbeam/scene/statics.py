@@ -56,6 +56,11 @@ def tip_inertia(beam: Beam) -> float:
     return beam.length * float(_WEIGHTS @ density) / tip_compliance(beam) ** 2
 
 
+def initial_kinetic_energy(beam: Beam) -> float:
+    """Return the kinetic energy [J] of u̇ = s₁ x, in which the beam starts."""
+    return beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
+
+
 def lowest_frequency(beam: Beam) -> float:
     """Return the lowest frequency, clamped and free [rad/s], by Ritz's method.
 
@@ -124,8 +129,7 @@ def tip_reach(beam: Beam) -> float:
 
     That is by its loads, or by a static deflection that holds the kinetic energy of the start.
     """
-    mass = beam.density * beam.area * beam.length
-    swing = beam.length * abs(beam.initial_velocity_slope) * math.sqrt(mass * tip_compliance(beam) / 3.0)
+    swing = math.sqrt(2.0 * initial_kinetic_energy(beam) * tip_compliance(beam))
     return max(swing, abs(tip_load_deflection(beam)))
 
 

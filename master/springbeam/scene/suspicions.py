@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
-from .estimates import implausible
+from .linearised import beam_energy
 from .scene import Scene
-from .statics import locking, shear_stiffness, tip_inertia
+from .statics import initial_kinetic_energy, locking, tip_compliance, tip_inertia
 from .well import spring_energy, well_depth
 
-
-def _beam_energy(scene: Scene) -> float:
-    """Return the energy of the beam as it arrives [J]: of motion and of a straight slope's shear, without its loads."""
-    if (beam := scene.beam) is None or beam.fidelity == "quasi_static":
-        return 0.0
-    target, slope = scene.tip_target, beam.initial_deflection_slope
-    if beam.approach == "undeformed" and target is not None:
-        slope = target[1] / beam.length
-    kinetic = beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
-    return kinetic + 0.5 * shear_stiffness(beam) * beam.length * slope**2
+#: What beams are made of: from foam to the heaviest metals [kg/m³], from gels to diamond [Pa].
+_DENSITIES, _MODULI = (10.0, 25e3), (1e4, 2e12)
+#: E/G: 2 to 3 of isotropic solids, up to some 100 of laminates.
+_YOUNG_OVER_SHEAR = (0.5, 200.0)
+#: Length over radius of gyration: below, no beam theory holds; above, it is a thread.
+_SLENDERNESS = (3.0, 3e4)
+#: Lowest frequency [Hz] of anything that a macroscopic beam is.
+_FREQUENCIES = (1e-2, 1e7)
+#: Speed of the tip over that of sound in the beam, about its largest strain: no solid stays elastic beyond.
+_MOST_STRAIN = 0.05
 
 
 def suspicions(scene: Scene) -> list[str]:
@@ -33,7 +34,8 @@ def suspicions(scene: Scene) -> list[str]:
     found += implausible(scene)
     beam, spring = scene.beam, scene.spring
     if spring is not None and spring.cubic_stiffness < 0.0:
-        energy, depth = spring_energy(spring) + _beam_energy(scene), well_depth(scene)
+        arriving = 0.0 if scene.massless else beam_energy(scene)
+        energy, depth = spring_energy(spring) + arriving, well_depth(scene)
         if energy > depth:
             deep = f"well is {depth:.3g} J deep" if depth > -math.inf else "well is gone under external_force"
             found.append(
@@ -53,9 +55,50 @@ def suspicions(scene: Scene) -> list[str]:
                 f"spring's mass; the joined motion is about {math.sqrt(1.0 + share) - 1.0:.0%} too fast"
             )
         if beam.approach == "undeformed" and beam.initial_velocity_slope != 0.0:
-            energy = beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
             found.append(
-                f'[beam] fidelity = "quasi_static": the beam arrives without its kinetic energy, {energy:.3g} J; the '
-                "result lacks its impact and the vibration that follows"
+                '[beam] fidelity = "quasi_static": the beam arrives without its kinetic energy, '
+                f"{initial_kinetic_energy(beam):.3g} J; the result lacks its impact and the vibration that follows"
             )
     return found
+
+
+def implausible(scene: Scene) -> Iterator[str]:
+    """Yield what can hardly be meant of our beam, as lines ``[table] key = value: why, and what may be meant``.
+
+    A beam with area = 1 is taken to be in units of its own: nothing is said about it.
+    """
+    beam = scene.beam
+    if beam is None or 1.0 in (beam.area, beam.density):
+        return
+    E, rho = beam.young_modulus, beam.density
+    for key, value, (low, high), unit, known, (other, factor) in (
+        ("young_modulus", E, _MODULI, "Pa", "rubber about 1e6, aluminium 7e10, steel 2.1e11", ("GPa", 1e9)),
+        ("density", rho, _DENSITIES, "kg/m³", "aluminium 2700, steel 7850", ("g/cm³", 1e3)),
+    ):
+        if not low <= value <= high:
+            meant = f"; in {other} it would be {value * factor:.3g} {unit}" if low <= value * factor <= high else ""
+            yield f"[beam] {key} = {value:g}: in {unit}, no solid has it ({known}){meant}"
+    ratio = E / beam.shear_modulus
+    if beam.poisson_ratio is None and not _YOUNG_OVER_SHEAR[0] <= ratio <= _YOUNG_OVER_SHEAR[1]:
+        yield (
+            f"[beam] shear_modulus = {beam.shear_modulus:g}: young_modulus is {ratio:.3g} times as large; for an "
+            "isotropic solid it is 2 to 3 times, and poisson_ratio gives it"
+        )
+    slenderness = beam.length / math.sqrt(beam.second_moment_of_area / beam.area)
+    if not _SLENDERNESS[0] <= slenderness <= _SLENDERNESS[1]:
+        looks = "thicker than long" if slenderness < _SLENDERNESS[0] else "a thread"
+        yield (
+            f"[beam] length = {beam.length:g}: with this section the beam is {looks} (length over radius of gyration "
+            f"{slenderness:.2g}); is a length in mm?"
+        )
+    # Rayleigh's quotient for the static shape of a tip force: within 2 % if slender, 10 % if not.
+    period = 2.0 * math.pi * math.sqrt(tip_compliance(beam) * tip_inertia(beam))
+    if beam.fidelity == "dynamic" and not _FREQUENCIES[0] <= (frequency := 1.0 / period) <= _FREQUENCIES[1]:
+        yield f"[beam]: its lowest frequency is {frequency:.2g} Hz; check length, section, density and young_modulus"
+    speed = abs(beam.initial_velocity_slope) * beam.length
+    sound = math.sqrt(E / rho)
+    if speed > _MOST_STRAIN * sound:
+        yield (
+            f"[beam] the tip starts with {speed:.3g} m/s, {speed / sound:.2g} times the speed of sound in the beam "
+            f"({sound:.3g} m/s): bending would strain it as much, which no solid does elastically"
+        )
