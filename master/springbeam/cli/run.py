@@ -151,7 +151,7 @@ def picked(scene: Scene, mesh: bool = False) -> Trajectory | None:
 
     try:
         with watched(lambda cause: f"a pilot run for accuracy = {scene.accuracy:g}: {cause}"):
-            return pick_mesh(scene) if mesh else pick(scene).trajectory()
+            return pick_mesh(scene) if mesh else pick(scene)
     except RunStopped as stopped:
         fail(STOPPED, f"a pilot run for accuracy = {scene.accuracy:g} {stopped}")
 

@@ -67,51 +67,6 @@ _CALLS_PER_STEP = 8.0
 _CONTACT_TURN, _SECOND, _SOFT_ORDER = 16.0, 2.0, 2.0
 
 
-@dataclass(frozen=True)
-class Picked:
-    """A scene that keeps the accuracy, and what is known about it."""
-
-    asked: float
-    run: Trajectory  #: the last pilot run, which keeps it
-    displacement_error: float  #: estimate, relative to the largest change of the tip (or spring top)
-    #: Estimate of the largest error of a change of contact, relative to the time that is run, and of the sums of the
-    #: impacts' impulses, relative to these.
-    event_error: float
-    events: int  #: changes of contact that this is about, those further apart than two steps of the coarser run
-    pilot_runs: int
-    pilot_steps: int  #: doStep calls of the pilot runs before the last
-    pilot_time: float  #: [s]
-
-    @property
-    def scene(self) -> Scene:
-        """The scene with what was picked; it asks for no accuracy."""
-        return self.run.scene
-
-    def trajectory(self) -> Trajectory:
-        """Return the run, with what was picked and found in its summary."""
-        found = self.run.summary
-        # What a run says of its steps is a guess; two runs that agree know better.
-        warnings = [warning for warning in found["warnings"] if not warning.startswith("not resolved")]
-        return replace(self.run, summary={**found, "resolved": True, "warnings": warnings, "accuracy": self.summary()})
-
-    def summary(self) -> dict[str, Any]:
-        """Return what goes into ``summary.json``."""
-        coupling, spring = self.scene.coupling, self.scene.spring
-        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree, "macro_step": coupling.H}
-        if spring is not None:
-            picked["ida_relative_tolerance"] = spring.relative_tolerance
-        return {
-            "asked": self.asked,
-            "picked": picked,
-            "estimated_displacement_error": self.displacement_error,
-            "estimated_event_error": self.event_error,
-            "events_compared": self.events,
-            "pilot_runs": self.pilot_runs,
-            "pilot_steps": self.pilot_steps,
-            "pilot_time": self.pilot_time,
-        }
-
-
 def simulate(
     scene: Scene, progress: Progress | None = None, *, upper: Body | None = None, lower: Body | None = None
 ) -> Trajectory:
@@ -139,11 +94,16 @@ def simulate(
     """
     if scene.accuracy is None or upper is not None or lower is not None:
         return runner.simulate(scene, progress, upper=upper, lower=lower)
-    return pick(scene).trajectory()
+    return pick(scene)
 
 
-def pick(scene: Scene) -> Picked:
-    """Return settings with which ``scene`` keeps its ``accuracy``, and the run with them.
+def pick(scene: Scene) -> Trajectory:
+    """Return a run of ``scene`` that keeps its ``accuracy``; its scene has the settings that were picked.
+
+    ``accuracy`` of its summary says what was asked and picked, with estimates of the errors: of the displacement,
+    relative to the largest change of the tip (or spring top), and of the events, the larger of the latest change of
+    contact, relative to the time that is run, and of the impacts' impulses, relative to their sum. Compared are changes
+    of contact further apart than two steps of the coarser one of the last two runs.
 
     Raises
     ------
@@ -173,7 +133,7 @@ class _Pilot:
 
 @dataclass(frozen=True)
 class _Estimate:
-    """Errors of the finer one of two runs, as in `Picked`."""
+    """Errors of the finer one of two runs, relative as `pick` tells them."""
 
     displacement: float
     expected: float  #: ``displacement`` if the order of convergence holds
@@ -194,7 +154,7 @@ class _Search:
         self._stopped = 0  #: pilot runs in a row that stopped early
         self._range = 0.0  #: of the spring top in the run before [m]
 
-    def run(self) -> Picked:
+    def run(self) -> Trajectory:
         coarse, estimate = None, None
         steps = self._first()
         while steps <= _MOST:
@@ -208,11 +168,7 @@ class _Search:
                 estimate = self._estimate(coarse, fine)
                 worst = _SAFETY * max(estimate.displacement, estimate.event)
                 if worst <= self._accuracy and estimate.apart <= _UNRESOLVED:
-                    calls, times = zip(*self._spent[:-1], strict=True)
-                    return Picked(
-                        self._accuracy, fine.run, estimate.displacement, estimate.event, estimate.events,
-                        len(calls), sum(calls), sum(times),
-                    )  # fmt: skip
+                    return self._told(fine.run, estimate)
                 steps = self._next(fine, estimate)
             coarse = fine
         if estimate is None:
@@ -223,6 +179,27 @@ class _Search:
             f"accuracy = {self._accuracy:g}: not reached with {_MOST} steps, {found}; ask for less, shorten [time] "
             "t_end, or take a coarser mesh"
         )
+
+    def _told(self, run: Trajectory, estimate: _Estimate) -> Trajectory:
+        """Return ``run`` with what was picked and found in its summary."""
+        coupling, spring = run.scene.coupling, run.scene.spring
+        picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree, "macro_step": coupling.H}
+        if spring is not None:
+            picked["ida_relative_tolerance"] = spring.relative_tolerance
+        calls, times = zip(*self._spent[:-1], strict=True)
+        accuracy = {
+            "asked": self._accuracy,
+            "picked": picked,
+            "estimated_displacement_error": estimate.displacement,
+            "estimated_event_error": estimate.event,
+            "events_compared": estimate.events,
+            "pilot_runs": len(calls),
+            "pilot_steps": sum(calls),
+            "pilot_time": sum(times),
+        }
+        # What a run says of its steps is a guess; two runs that agree know better.
+        warnings = [warning for warning in run.summary["warnings"] if not warning.startswith("not resolved")]
+        return replace(run, summary={**run.summary, "resolved": True, "warnings": warnings, "accuracy": accuracy})
 
     # -- how many steps ---------------------------------------------------------------------------------------------
 

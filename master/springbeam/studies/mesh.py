@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -49,18 +48,17 @@ def pick_mesh(scene: Scene) -> Trajectory:
         mesh = {"n_modes": factor * beam.n_modes}
         if not exact:
             mesh["n_elements"] = factor * beam.n_elements
-        fine = pick(with_changes(scene, accuracy=None, beam=mesh).model_copy(update={"accuracy": _SHARE * asked}))
-        made = fine.trajectory()
+        fine = pick(with_changes(scene, accuracy=_SHARE * asked, beam=mesh))
         if coarse is not None:
-            difference = _difference(coarse, made)
+            difference = _difference(coarse, fine)
             order = math.log(before / difference, RATIO) if 0.0 < difference < before < math.inf else _LOWEST
             error = difference / (RATIO ** min(max(order, _LOWEST), _HIGHEST) - 1.0)
             if error <= _SHARE * asked:
-                found = {"asked": asked, "picked": {**made.summary["accuracy"]["picked"], **mesh}}
-                accuracy = {**made.summary["accuracy"], **found, "estimated_mesh_error": error}
-                return replace(made, summary={**made.summary, "accuracy": accuracy})
+                found = fine.summary["accuracy"]
+                found |= {"asked": asked, "picked": {**found["picked"], **mesh}, "estimated_mesh_error": error}
+                return fine
             before = difference
-        coarse, factor = made, RATIO * factor
+        coarse, factor = fine, RATIO * factor
     kind, count = ("modes", beam.n_modes) if exact else ("elements", beam.n_elements)
     reached = f"{factor // RATIO * count} {kind} still leave some {error:.1e}"
     raise SceneError(
