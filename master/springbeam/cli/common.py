@@ -153,7 +153,14 @@ def bad_input_reported() -> Iterator[None]:
     except FileExistsError as error:
         fail(BAD_INPUT, f"{error.filename}: is a file; --out DIR names a directory, new or without results")
     except OSError as error:
-        fail(BAD_INPUT, f"{error.filename or 'results'}: {error.strerror or error}")
+        fail(BAD_INPUT, cause_of(error, "results"))
+
+
+def cause_of(error: BaseException, place: Path | str) -> str:
+    """Return an error in words; of a file it names the file, or the ``place`` where nothing knows which."""
+    if isinstance(error, OSError):
+        return f"{error.filename or place}: {error.strerror or error}"
+    return "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
 
 
 @contextmanager

@@ -32,6 +32,7 @@ from .common import (
     SceneArgument,
     SettingsOption,
     bad_input_reported,
+    cause_of,
     console_for,
     fail,
     print_json,
@@ -205,7 +206,7 @@ def _draw(console: Console, directory: RunDirectory) -> str | None:
     except KeyboardInterrupt:
         return "interrupted while drawing"
     except OSError as error:
-        return f"no pictures: {error.filename or directory.path}: {error.strerror or error}"
+        return f"no pictures: {cause_of(error, directory.path)}"
     if pictures:
         console.print(Text(f"pictures  {directory.path / '*.png'} ({len(pictures)})"), soft_wrap=True)
     return None
@@ -216,7 +217,7 @@ def _thin_out(directory: RunDirectory, interval: float) -> str | None:
     try:
         leave_rows_at_multiples(directory, interval)
     except OSError as error:
-        return f"rows of every step: {error.filename or directory.path}: {error.strerror or error}"
+        return f"rows of every step: {cause_of(error, directory.path)}"
     return None
 
 
@@ -265,19 +266,13 @@ def _run_into(
             else:
                 run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start)
             return None
-        except (RunStopped, NonFiniteValue) as error:
-            return f"the run stopped early: {ended('stopped', str(error))}"
-        except (OSError, FmuError) as error:
-            if not recorder.begun:
+        except (RunStopped, NonFiniteValue, OSError, FmuError, KeyboardInterrupt) as error:
+            if not recorder.begun and not isinstance(error, RunStopped | NonFiniteValue):
                 raise
-            cause = str(error)
-            if isinstance(error, OSError):
-                cause = f"{error.filename or recorder.directory.path}: {error.strerror or error}"
+            cause = cause_of(error, recorder.directory.path)
+            if isinstance(error, KeyboardInterrupt):
+                return ended("interrupted", cause)
             return f"the run stopped early: {ended('stopped', cause)}"
-        except KeyboardInterrupt:
-            if not recorder.begun:
-                raise
-            return ended("interrupted", "interrupted")
 
 
 class _ProgressBar:

@@ -26,6 +26,7 @@ from .common import (
     NoPlotsOption,
     QuietOption,
     bad_input_reported,
+    cause_of,
     console_for,
     fail,
     print_json,
@@ -149,14 +150,10 @@ def _going_on(records: Records, total: int) -> Iterator[Callable[[str], str]]:
         yield cut_short
     except ConnectionError as error:
         fail(BAD_INPUT, str(error))
-    except KeyboardInterrupt:
-        fail(STOPPED, cut_short("interrupted"))
-    except (RunStopped, ReferenceFailure) as error:
-        fail(STOPPED, cut_short(str(error)))
-    except OSError as error:
-        if not records.found:
+    except (KeyboardInterrupt, RunStopped, ReferenceFailure, OSError) as error:
+        if isinstance(error, OSError) and not records.found:
             raise
-        fail(STOPPED, cut_short(f"{error.filename or directory}: {error.strerror or error}"))
+        fail(STOPPED, cut_short(cause_of(error, directory)))
 
 
 def _computed(
