@@ -10,7 +10,7 @@ from commands import printed, refused
 
 from springbeam.run.runner import simulate
 from springbeam.scene import load_scene, with_changes
-from springbeam.studies.converge import settled
+from springbeam.studies.converge import Converge, settled
 from springbeam.studies.mesh import pick_mesh
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
@@ -38,6 +38,16 @@ def test_linear_elements_converge_by_order_two(tmp_path):
     assert [level["n_modes"] for level in found["modes"]["levels"]] == [1, 3, 6, 12]
     assert found["elements"]["settled"]["first_separation"]["limit"] is None  # there is none
     assert {file.name for file in (tmp_path / "found").iterdir()} == {"study.jsonl", "converge.csv", "converge.png"}
+
+
+@pytest.mark.parametrize("asked", [{"coupling": {"relative_tolerance": 1e-4}}, {"accuracy": 1e-3}])
+def test_finer_steps_follow_from_what_the_scene_asks_for(asked):
+    """Neither is a macro step, which there is none of to be halved: one was an error, the other changed nothing."""
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 5}, time={"t_end": 0.06}, **asked)
+    study = Converge(scene=scene, metric=("y_end",), quick=True)
+    (*_, finest), finer = study.sequences()["elements"], list(study.cases().values())[-1]
+    given, changed = (study.record(mesh)["values"]["y_end"] for mesh in (finest, finer))
+    assert 0.0 < abs(changed - given) < 1e-8
 
 
 def test_an_accuracy_with_the_mesh_is_kept_beside_a_mesh_that_is_much_finer():

@@ -19,6 +19,7 @@ from rich.text import Text
 from ..pictures.drawing import BLACK
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, with_changes
+from ..scene.tables import STEP_KEY, TOLERANCE_KEYS
 from .accuracy import simulate
 from .study import Found, Record, Study
 from .sweep.metrics import METRICS, heading
@@ -43,11 +44,11 @@ class Mesh:
 
     n_elements: int  #: 0: exact modes without a mesh
     n_modes: int  #: kept; 0: all
-    halved: bool = False  #: with half the macro step: what the time steps change
+    finer_steps: bool = False  #: what the time steps change
 
     @property
     def name(self) -> str:
-        return f"{self.n_elements} elements, {self.n_modes or 'all'} modes{', half the step' * self.halved}"
+        return f"{self.n_elements} elements, {self.n_modes or 'all'} modes{', finer steps' * self.finer_steps}"
 
 
 @dataclass(frozen=True)
@@ -128,25 +129,25 @@ class Converge(Study):
         return found
 
     def cases(self) -> dict[str, Mesh]:
-        """Return all meshes, the finest one with half the macro step too."""
+        """Return all meshes, the finest one with finer steps too."""
         sequences = self.sequences()
         finest = next(iter(sequences.values()))[-1]
         meshes = [mesh for sequence in sequences.values() for mesh in sequence]
-        return {mesh.name: mesh for mesh in [*meshes, replace(finest, halved=True)]}
+        return {mesh.name: mesh for mesh in [*meshes, replace(finest, finer_steps=True)]}
 
     def record(self, case: Mesh) -> Record:
         """Run one mesh. ``unknowns`` are the modes that take part; a value is ``None`` where it did not happen."""
         mesh = {"n_elements": case.n_elements} if case.n_elements else {}
         scene = with_changes(self.scene, beam={**mesh, "n_modes": case.n_modes})
-        if case.halved and scene.accuracy is None:
-            scene = with_changes(scene, coupling={"macro_step": 0.5 * scene.coupling.H})
+        if case.finer_steps:
+            scene = _with_finer_steps(scene)
         assert scene.beam is not None
         quantities, cause, began = self.metric or QUANTITIES, "", perf_counter()
         try:
             made = simulate(scene)
             values = {name: METRICS[name](made) for name in quantities}
-        except RunStopped as stopped:
-            values, cause = dict.fromkeys(quantities), stopped.cause
+        except (RunStopped, SceneError) as stopped:  # a SceneError if the accuracy cannot be reached
+            values, cause = dict.fromkeys(quantities), str(stopped)
         mesh |= {"n_elements": case.n_elements, "n_modes": case.n_modes, "unknowns": scene.beam.modes_kept}
         return {**mesh, "values": values, "seconds": perf_counter() - began, "cause": cause}
 
@@ -163,28 +164,30 @@ class Converge(Study):
 
     def found(self, records: Mapping[str, Record]) -> Found:
         """Judge how the quantities settle."""
-        quantities, halved = self.quantities(records), list(records.values())[-1]
-        document: dict[str, Any] = {"halved_macro_step": halved}
+        quantities, by_steps = self.quantities(records), list(records.values())[-1]
+        document: dict[str, Any] = {"finer_steps": by_steps}
         shown: list[Any] = [Text(self.scene.title or "(untitled scene)", style="bold")]
         refinements = self.refinements(records)
         for refinement in refinements:
             settled = {name: asdict(refinement.settled(name)) for name in quantities}
             document[refinement.refined] = {"levels": refinement.levels, "settled": settled}
-            rows = [_row(name, refinement, refinements[0].levels, halved) for name in quantities]
-            names = ("", "as given", "extrapolated", "error", "order", "by H/2")
+            rows = [_row(name, refinement, refinements[0].levels, by_steps) for name in quantities]
+            names = ("", "as given", "extrapolated", "error", "order", "by steps")
             shown.append(table(names, rows, f"more {refinement.refined}"))
             meshes = ("{n_elements} el. {unknowns} modes {seconds:.2g} s".format(**x) for x in refinement.levels)
             shown.append(Text(f"runs      {', '.join(meshes)}"))
         shown += [Text(f"stopped   {name}: {r['cause']}") for name, r in records.items() if r["cause"]]
         shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
-        shown.append("by H/2: what half the macro step changes on the finest mesh")
+        shown.append(
+            "by steps: what half the macro step, or a tenth of accuracy or tolerances, changes on the finest mesh"
+        )
         return Found(document, shown)
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
         """Write a row per run, and draw how far each quantity is from its limit."""
         quantities, refinements = self.quantities(records), self.refinements(records)
         levels = [(sequence.refined, level) for sequence in refinements for level in sequence.levels]
-        levels.append(("macro step halved", list(records.values())[-1]))
+        levels.append(("steps", list(records.values())[-1]))
         rows = [
             {"refined": refined, **{name: level[name] for name in ("n_elements", "n_modes", "unknowns")}}
             | {"wall_time": level["seconds"], **{name: level["values"][name] for name in quantities}}
@@ -197,9 +200,19 @@ class Converge(Study):
         return files
 
 
-def _row(name: str, refinement: Refinement, elements: Sequence[Record], halved: Record) -> tuple[str, ...]:
+def _with_finer_steps(scene: Scene) -> Scene:
+    """Return ``scene`` with half the macro step, or with a tenth of what its steps follow from."""
+    if scene.accuracy is not None:
+        return with_changes(scene, accuracy=0.1 * scene.accuracy)
+    if not scene.coupling.adaptive:
+        return with_changes(scene, coupling={STEP_KEY: 0.5 * scene.coupling.H})
+    given = {name: getattr(scene.coupling, name) for name in TOLERANCE_KEYS}
+    return with_changes(scene, coupling={name: 0.1 * value for name, value in given.items() if value is not None})
+
+
+def _row(name: str, refinement: Refinement, elements: Sequence[Record], by_steps: Record) -> tuple[str, ...]:
     """Return a quantity for a terminal: of the mesh as given, and where finer ones or more modes lead."""
-    given, last, by_time = (level["values"][name] for level in (elements[0], elements[-1], halved))
+    given, last, finer = (level["values"][name] for level in (elements[0], elements[-1], by_steps))
     settled = refinement.settled(name)
     error = "" if settled.change is None else f"({settled.change:.1e})"
     if given is not None and settled.limit is not None:
@@ -210,7 +223,7 @@ def _row(name: str, refinement: Refinement, elements: Sequence[Record], halved: 
         _number(settled.limit, ".6g"),
         error,
         _number(settled.order, ".1f"),
-        "" if last is None or by_time is None else f"{by_time - last:.1e}",
+        "" if last is None or finer is None else f"{finer - last:.1e}",
     )
 
 
