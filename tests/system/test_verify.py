@@ -15,6 +15,7 @@ from scipy.special import airy
 
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.bodies.protocol import StepRefused
+from springbeam.cli.verify import report
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.tie import SCHEMES
 from springbeam.monolithic.semi_discrete import modal_beam
@@ -23,7 +24,6 @@ from springbeam.studies import verify
 from springbeam.studies.verify.beam import _mesh_error, clamped_free_frequencies
 from springbeam.studies.verify.check import Check, section
 from springbeam.studies.verify.impact import _airy_overshoot
-from springbeam.studies.verify.table import report
 
 
 def test_every_exact_solution_is_met_in_a_table_of_80_columns():

@@ -23,7 +23,7 @@ from ..scene.tables import STEP_KEY, TOLERANCE_KEYS
 from .accuracy import simulate
 from .study import Found, Record, Study
 from .sweep.metrics import METRICS, heading
-from .tables import table, write_csv
+from .tables import number, table, write_csv
 
 #: Quantities that are compared unless others are asked for, those that a scene has.
 QUANTITIES = (
@@ -219,16 +219,12 @@ def _row(name: str, refinement: Refinement, elements: Sequence[Record], by_steps
         error = f"{given - settled.limit:.1e}"
     return (
         heading(name),
-        _number(given, ".6g"),
-        _number(settled.limit, ".6g"),
+        number(given, ".6g"),
+        number(settled.limit, ".6g"),
         error,
-        _number(settled.order, ".1f"),
+        number(settled.order, ".1f"),
         "" if last is None or finer is None else f"{finer - last:.1e}",
     )
-
-
-def _number(value: float | None, form: str) -> str:
-    return "" if value is None else format(value, form)
 
 
 def draw(title: str, sequences: Sequence[Refinement], quantities: Sequence[str], path: Path) -> Path:

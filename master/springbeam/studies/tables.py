@@ -22,6 +22,11 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = ""
     return made
 
 
+def number(value: float | None, form: str, lacking: str = "") -> str:
+    """Return a number as ``form`` says, or ``lacking`` where there is none."""
+    return lacking if value is None else format(value, form)
+
+
 def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
     """Write rows with the keys of the first as header, ``None`` and NaN left empty; return the path."""
     with path.open("w", newline="", encoding="utf-8") as file:
