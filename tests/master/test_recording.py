@@ -404,7 +404,7 @@ def test_a_restored_recorder_writes_the_same_files(tmp_path, scene):
     assert len(load_trajectory(tmp_path / "killed")) == 5
     assert resumed.time == 0.4
     record(resumed, rows=7, event=event)
-    assert resumed.save()["files"] == {name: (f.size, f.crc) for name, f in whole._files.items()}
+    assert resumed.save()["files"] == {path.name: (f.size, f.crc) for path, f in whole._files.items()}
     resumed.finish({"status": "done"})
     assert result_files(tmp_path / "killed") == result_files(tmp_path / "whole")
 
@@ -421,7 +421,7 @@ def test_a_restored_recorder_writes_the_same_files(tmp_path, scene):
 )
 def test_results_that_have_changed_are_not_continued_nor_touched(tmp_path, name, damage, message):
     recorder = filed(tmp_path, event=Event(0.1, "impact"))
-    saved = {"time": 0.2, "files": {name: (f.size, f.crc) for name, f in recorder._files.items()}}
+    saved = {"time": 0.2, "files": {path.name: (f.size, f.crc) for path, f in recorder._files.items()}}
     with (tmp_path / "trajectory.csv").open("a") as file:
         file.write("more\n")
     if name == "trajectory.csv" and message == "fewer than the":

@@ -29,7 +29,6 @@ PICTURES = (
 #: What `springbeam report` and `springbeam animate` may leave there.
 REPORT = "report.html"
 ANIMATIONS = ("animation.gif", "animation.mp4")
-TRAJECTORY, EVENTS, SHAPES, STEPS = "trajectory.csv", "events.csv", "shapes.csv", "steps.bin"
 
 
 class ResultsExist(FileExistsError):
@@ -49,10 +48,10 @@ class RunDirectory:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self.trajectory = self.path / TRAJECTORY
-        self.events = self.path / EVENTS
-        self.shapes = self.path / SHAPES
-        self.steps = self.path / STEPS  #: what `springbeam.results.steps` says of each step, as doubles
+        self.trajectory = self.path / "trajectory.csv"
+        self.events = self.path / "events.csv"
+        self.shapes = self.path / "shapes.csv"
+        self.steps = self.path / "steps.bin"  #: what `springbeam.results.steps` says of each step, as doubles
         self.summary = self.path / "summary.json"
         #: It exists until the run is done (`springbeam.run.checkpoint`).
         self.checkpoint = self.path / "run.checkpoint"

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic_core import to_json
 
 from ..scene import Scene
-from .directory import EVENTS, SHAPES, STEPS, TRAJECTORY, ResultsUnreadable, RunDirectory, lock
+from .directory import ResultsUnreadable, RunDirectory, lock
 from .reading import load_events, load_trajectory
 from .recording import Recorder, replay, with_scene
 from .steps import STEP, steps_of
@@ -50,10 +50,15 @@ class FileRecorder(Recorder):
         self.finished = False
         #: Time of the last row [s]; ``None`` before the first.
         self.time: float | None = None
-        self._headers: dict[str, Sequence[str]] = {TRAJECTORY: self.columns, EVENTS: EVENT_COLUMNS, STEPS: ()}
+        #: The columns of each file; one that is no table has none.
+        self._columns: dict[Path, Sequence[str]] = {
+            directory.trajectory: self.columns,
+            directory.events: EVENT_COLUMNS,
+            directory.steps: (),
+        }
         if scene.beam is not None:
-            self._headers[SHAPES] = SHAPE_COLUMNS
-        self._files: dict[str, _Lines] = {}
+            self._columns[directory.shapes] = SHAPE_COLUMNS
+        self._files: dict[Path, _Lines] = {}
 
     def __enter__(self) -> FileRecorder:
         return self
@@ -71,7 +76,7 @@ class FileRecorder(Recorder):
     def _keep_row(self, numbers: list[float], phase: str) -> None:
         fields: list[float | str] = [*numbers]
         fields.insert(self._phase_at, phase)
-        self._file(TRAJECTORY).write(_line(fields))
+        self._file(self.directory.trajectory).write(_line(fields))
         self.time = numbers[0]
         if len(self._steps) >= _STEPS_TOGETHER:
             self._write_steps()
@@ -80,7 +85,7 @@ class FileRecorder(Recorder):
         waiting, self._steps = self._steps, bytearray()
         if waiting:
             steps_of(waiting)
-            self._file(STEPS).write(waiting)
+            self._file(self.directory.steps).write(waiting)
 
     def steps(self) -> np.ndarray | None:
         self._write_steps()
@@ -93,10 +98,11 @@ class FileRecorder(Recorder):
 
     def _keep_event(self, event: Event) -> None:
         values = [getattr(event, name) for name in EVENT_COLUMNS]
-        self._file(EVENTS).write(_line(["" if v is None else v if isinstance(v, str) else float(v) for v in values]))
+        fields = ["" if v is None else v if isinstance(v, str) else float(v) for v in values]
+        self._file(self.directory.events).write(_line(fields))
 
     def _keep_shape(self, numbers: list[float]) -> None:
-        self._file(SHAPES).write(_line(numbers))
+        self._file(self.directory.shapes).write(_line(numbers))
 
     def finish(self, summary: Mapping[str, Any]) -> None:
         self._begin()
@@ -118,7 +124,7 @@ class FileRecorder(Recorder):
         self._write_steps()
         for lines in self._files.values():
             os.fsync(lines.file.fileno())
-        return {"time": self.time, "files": {name: (f.size, f.crc) for name, f in self._files.items()}}
+        return {"time": self.time, "files": {path.name: (f.size, f.crc) for path, f in self._files.items()}}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on from what `save` of a recorder in the same directory returned; later rows are removed.
@@ -131,11 +137,11 @@ class FileRecorder(Recorder):
             If another process is writing them.
         """
         with ExitStack() as opened:
-            files: dict[str, _Lines] = {}
-            for name in self._headers:
-                files[name] = _Lines(self.directory.path / name, *saved["files"][name])
-                opened.callback(files[name].file.close)
-            lock(files[TRAJECTORY].file)
+            files: dict[Path, _Lines] = {}
+            for path in self._columns:
+                files[path] = _Lines(path, *saved["files"][path.name])
+                opened.callback(files[path].file.close)
+            lock(files[self.directory.trajectory].file)
             for lines in files.values():
                 lines.check()
             opened.pop_all()
@@ -146,52 +152,45 @@ class FileRecorder(Recorder):
         self._write_summary({"status": "running"})
         self._reserve_summary()
 
-    def _file(self, name: str) -> _Lines:
-        if not self._files:
-            self._begin()
-        return self._files[name]
+    def _file(self, path: Path) -> _Lines:
+        self._begin()
+        return self._files[path]
 
     def _begin(self) -> None:
         """Write the files with their headers, which then replace earlier results."""
         if self._files:
             return
-        headers = {name: (",".join(names) + "\n").encode() if names else b"" for name, names in self._headers.items()}
-        parts = {name: self.directory.path / f"{name}.part" for name in headers}
+        headers = {path: ",".join(names).encode() + b"\n" if names else b"" for path, names in self._columns.items()}
         try:
-            for name, header in headers.items():
-                parts[name].write_bytes(header)
+            for path, header in headers.items():
+                _part(path).write_bytes(header)
             self._reserve_summary()
         except OSError:
-            for part in (*parts.values(), self._summary_part):
+            for path in (*headers, self.directory.summary):
                 with suppress(OSError):
-                    part.unlink()
+                    _part(path).unlink()
             raise
         for file in self.directory.results():
             file.unlink()
-        for name, part in parts.items():
-            path = self.directory.path / name
-            os.replace(part, path)
-            self._files[name] = _Lines(path, len(headers[name]), crc32(headers[name]))
-        lock(self._files[TRAJECTORY].file)
+        for path, header in headers.items():
+            os.replace(_part(path), path)
+            self._files[path] = _Lines(path, len(header), crc32(header))
+        lock(self._files[self.directory.trajectory].file)
         # Last: where there is a summary, there is a run that can be loaded.
         self._write_summary({"status": "running"})
         self._reserve_summary()
 
-    @property
-    def _summary_part(self) -> Path:
-        return self.directory.summary.with_suffix(".json.part")
-
     def _reserve_summary(self) -> None:
         """Keep room on the disk for the last summary, which has to be written also when the disk is full."""
-        self._summary_part.write_bytes(b" " * _SUMMARY_ROOM)
+        _part(self.directory.summary).write_bytes(b" " * _SUMMARY_ROOM)
 
     def _write_summary(self, summary: Mapping[str, Any]) -> None:
-        text = as_json(with_scene(summary, self.scene))
+        text, part = as_json(with_scene(summary, self.scene)), _part(self.directory.summary)
         # A reader, or a run killed at this moment, finds the old summary or the new one, never half of it.
-        with self._summary_part.open("r+b" if self._summary_part.exists() else "wb") as file:
+        with part.open("r+b" if part.exists() else "wb") as file:
             file.write(text + b"\n")
             file.truncate()
-        os.replace(self._summary_part, self.directory.summary)
+        os.replace(part, self.directory.summary)
 
 
 def save(run: Trajectory, directory: str | Path, *, replace: bool) -> Path:
@@ -216,7 +215,7 @@ def leave_rows_at_multiples(directory: RunDirectory, interval: float) -> None:
     rows = run.at(np.clip(times, run.time[0], run.time[-1]))
     table = ",".join(run.columns).encode() + b"\n"
     table += b"".join(map(_line, zip(*(values.tolist() for values in rows.columns.values()), strict=True)))
-    part = directory.trajectory.with_suffix(".csv.part")
+    part = _part(directory.trajectory)
     try:
         part.write_bytes(table)
     except OSError:
@@ -224,6 +223,11 @@ def leave_rows_at_multiples(directory: RunDirectory, interval: float) -> None:
         raise
     directory.steps.unlink()
     os.replace(part, directory.trajectory)
+
+
+def _part(path: Path) -> Path:
+    """Return the file in which ``path`` is written before it takes its place."""
+    return path.with_name(f"{path.name}.part")
 
 
 class _Lines:

@@ -26,15 +26,11 @@ def load_trajectory(directory: str | Path) -> Trajectory:
     """
     run = RunDirectory(directory)
     summary = load_summary(run.path)
-    header, lines = _complete_lines(run.trajectory)
-    columns = _read_table(run.trajectory, header, lines)
+    columns = _read_table(run.trajectory)
     shapes = None
     if run.shapes.exists():
-        header, lines = _complete_lines(run.shapes)
-        if header != SHAPE_COLUMNS:
-            raise ResultsUnreadable(f"{run.shapes}: line 1: not the columns of shapes.csv")
-        table = _read_table(run.shapes, header, lines)
-        shapes = (table["time"], np.column_stack([table[name] for name in header[1:]]))
+        table = _read_table(run.shapes, SHAPE_COLUMNS)
+        shapes = (table["time"], np.column_stack([table[name] for name in SHAPE_COLUMNS[1:]]))
     scene = scene_from_dict(summary["scene"], source=f"{run.summary}: scene")
     return Trajectory(scene, columns, list(load_events(run.path)), shapes, summary, _read_steps(run, columns["time"]))
 
@@ -70,9 +66,7 @@ def load_summary(directory: str | Path) -> dict[str, Any]:
 def load_events(directory: str | Path) -> Iterator[Event]:
     """Read the events of a run directory, one at a time."""
     path = RunDirectory(directory).events
-    header, lines = _complete_lines(path)
-    if header != EVENT_COLUMNS:
-        raise ResultsUnreadable(f"{path}: line 1: not the columns of events.csv")
+    _, lines = _complete_lines(path, EVENT_COLUMNS)
     for number, line in enumerate(lines, start=2):
         fields = line.rstrip("\n").split(",")
         if len(fields) != len(EVENT_COLUMNS) or fields[1] not in EVENT_KINDS:
@@ -86,8 +80,8 @@ def load_events(directory: str | Path) -> Iterator[Event]:
             raise ResultsUnreadable(f"{path}: line {number}: {error}") from None
 
 
-def _complete_lines(path: Path) -> tuple[tuple[str, ...], Iterator[str]]:
-    """Return the header and an iterator over the lines after it that end in a newline.
+def _complete_lines(path: Path, columns: tuple[str, ...] | None = None) -> tuple[tuple[str, ...], Iterator[str]]:
+    """Return the header, which must be ``columns`` if given, and the lines after it that end in a newline.
 
     A byte that is no text makes its line unreadable, not the file.
     """
@@ -103,10 +97,14 @@ def _complete_lines(path: Path) -> tuple[tuple[str, ...], Iterator[str]]:
         raise ResultsUnreadable(f"{path}: {error}") from error
     if header is None:
         raise ResultsUnreadable(f"{path}: empty")
-    return tuple(header.rstrip("\n").split(",")), everything
+    found = tuple(header.rstrip("\n").split(","))
+    if columns not in (None, found):
+        raise ResultsUnreadable(f"{path}: line 1: not the columns of {path.name}")
+    return found, everything
 
 
-def _read_table(path: Path, header: tuple[str, ...], lines: Iterator[str]) -> dict[str, np.ndarray]:
+def _read_table(path: Path, columns: tuple[str, ...] | None = None) -> dict[str, np.ndarray]:
+    header, lines = _complete_lines(path, columns)
     if "time" not in header:
         raise ResultsUnreadable(f"{path}: line 1: no column time")
     kinds = [(name, "U8" if name == "phase" else "f8") for name in header]
@@ -118,11 +116,11 @@ def _read_table(path: Path, header: tuple[str, ...], lines: Iterator[str]) -> di
             table = np.loadtxt(chain([first], lines), dtype=kinds, delimiter=",", comments=None, ndmin=1)
         except ValueError as error:
             raise ResultsUnreadable(f"{path}: after the header: {error}") from None
-    columns = {name: np.ascontiguousarray(table[name]) for name in header}
-    for name, values in columns.items():
+    found = {name: np.ascontiguousarray(table[name]) for name in header}
+    for name, values in found.items():
         if name == "phase":
             if unknown := set(values.tolist()).difference(PHASES):
                 raise ResultsUnreadable(f"{path}: {unknown.pop()!r} is no phase; phases are {', '.join(PHASES)}")
         elif not np.isfinite(values).all():
             raise ResultsUnreadable(f"{path}: {name} holds a number that is not finite")
-    return columns
+    return found

@@ -34,7 +34,7 @@ class Signal:
 
     def __init__(self, load: Load, macro_step: float | None) -> None:
         self._load = load
-        self._end = inf if load.end is None else load.end
+        self._end = load.end
         self.kinks = load.kinks(macro_step)
 
     def over(self, time: float, size: float) -> Force:

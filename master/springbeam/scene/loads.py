@@ -7,7 +7,7 @@ the load; lines that are empty or begin with # are skipped, and the first may na
 from __future__ import annotations
 
 from functools import lru_cache
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -33,10 +33,6 @@ _OF_SIGNALS = ("frequency", "phase", "start", "duration", "file", "interpolation
 _CLOSE = 0.25
 #: Most different places of point forces on a beam.
 MOST_POINTS = 4
-
-
-class TableFault(ValueError):
-    """The file of a table is not one; the message names line and column."""
 
 
 class Load(Table):
@@ -85,6 +81,8 @@ class Load(Table):
                 raise ValueError(f'{name} = {getattr(self, name)!r}: is for on = "beam", this load is on = "{self.on}"')
         if self.shape is not None and self.at is not None:
             raise ValueError(f"at = {self.at}: a load has a shape or acts at a point; leave one of the two out")
+        if self.signal == "table":
+            _ = self.record  # refuses what is no table
         return self
 
     @property
@@ -93,11 +91,11 @@ class Load(Table):
         return {"beam": "N" if self.at is not None else "N/m", "base": "m/s²"}.get(self.on, "N")
 
     @property
-    def end(self) -> float | None:
-        """Time [s] from which on the load is 0; ``None`` if there is none."""
+    def end(self) -> float:
+        """Time [s] from which on the load is 0; ∞ if there is none."""
         if self.signal == "table":
             return self.start + float(self.record.x[-1])
-        return None if self.duration is None or self.signal == "ramp" else self.start + self.duration
+        return inf if self.duration is None or self.signal == "ramp" else self.start + self.duration
 
     @property
     def peak(self) -> float:
@@ -130,19 +128,14 @@ class Load(Table):
 
     @property
     def record(self) -> PPoly:
-        """The table, as the polynomials between its lines. Raises TableFault, or OSError."""
+        """The table, as the polynomials between its lines. Raises ValueError, which names its line and column."""
         assert self.file is not None
         path = Path(self.file)
-        return _record(path, path.stat().st_mtime_ns, self.interpolation)
-
-    def fault(self) -> str | None:
-        """Return what is wrong with the table, with line and column; ``None`` if nothing is, or there is none."""
         try:
-            if self.signal == "table":
-                _ = self.record
-        except (TableFault, OSError) as error:
-            return str(error.strerror) if isinstance(error, OSError) else str(error)
-        return None
+            return _record(path, path.stat().st_mtime_ns, self.interpolation)
+        except (OSError, ValueError) as error:
+            why = error.strerror if isinstance(error, OSError) else error
+            raise ValueError(f'file = "{path}": {why}') from error
 
     def value(self, times: Any) -> np.ndarray:
         """Return the signal at ``times`` [s], any shape, in `unit`; where it jumps, the value after the jump."""
@@ -152,7 +145,7 @@ class Load(Table):
         if self.signal == "table":
             record = self.record
             return np.asarray(self.amplitude * np.where((t >= record.x[0]) & (t <= record.x[-1]), record(t), 0.0))
-        duration = np.inf if self.duration is None else self.duration
+        duration = inf if self.duration is None else self.duration
         if self.signal == "ramp":
             return self.amplitude * np.clip(t / duration, 0.0, 1.0)
         wave = np.ones_like(t)
@@ -176,11 +169,11 @@ def _record(path: Path, modified: int, interpolation: str) -> PPoly:
 
 
 def _columns(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return times [s] and values of a table. Raises TableFault, or OSError."""
+    """Return times [s] and values of a table. Raises ValueError, or OSError."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
-        raise TableFault(f"not a text in UTF-8: {error.reason} at byte {error.start}") from error
+        raise ValueError(f"not a text in UTF-8: {error.reason} at byte {error.start}") from error
     rows: list[tuple[float, float]] = []
     named = False
     for number, line in enumerate(lines, 1):
@@ -188,20 +181,20 @@ def _columns(path: Path) -> tuple[np.ndarray, np.ndarray]:
             continue
         cells = [cell.strip() for cell in line.split(",")]
         if len(cells) != 2:
-            raise TableFault(f"line {number}: {len(cells)} columns; a table has two, time and value")
+            raise ValueError(f"line {number}: {len(cells)} columns; a table has two, time and value")
         found = [_number(cell) for cell in cells]
         if not rows and not named and found == [None, None]:
             named = True
             continue
         for column, (cell, value) in enumerate(zip(cells, found, strict=True), 1):
             if value is None:
-                raise TableFault(f"line {number}, column {column}: {cell[:40]!r} is not a finite number")
+                raise ValueError(f"line {number}, column {column}: {cell[:40]!r} is not a finite number")
         time, value = (x for x in found if x is not None)
         if rows and time <= rows[-1][0]:
-            raise TableFault(f"line {number}, column 1: {time!r} s comes after {rows[-1][0]!r} s; times must increase")
+            raise ValueError(f"line {number}, column 1: {time!r} s comes after {rows[-1][0]!r} s; times must increase")
         rows.append((time, value))
     if len(rows) < 2:
-        raise TableFault(f"{len(rows)} lines with numbers; a table needs two at least")
+        raise ValueError(f"{len(rows)} lines with numbers; a table needs two at least")
     times, values = np.array(rows).T
     return times, values
 

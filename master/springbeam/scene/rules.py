@@ -328,8 +328,6 @@ def _loads_act(scene: Scene, at: At) -> Iterator[str]:
             )
         if scene.contact.law == "paper":
             yield f"{on}: {at('contact.law')} is Algorithm 1, which knows constant loads only; take another law"
-        if (fault := load.fault()) is not None:
-            yield f'[loads.{number}] file = "{load.file}": {fault}'
 
 
 _CHECKS = (
