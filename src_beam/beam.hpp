@@ -8,14 +8,14 @@
 #include <memory>
 #include <vector>
 
+#include "../fmus/common/polynomial.hpp"
+
 namespace beam {
 
-// An int, so that whatever an FMU parameter says reaches the check.
-enum class Integrator : int { modal = 1, generalized_alpha = 2 };  // NOLINT(performance-enum-size)
-inline constexpr std::array<const char*, 2> integrator_names{"modal", "generalized_alpha"};  ///< numbered from 1
+using common::Polynomial;
 
-enum class MassMatrix : int { consistent = 1, averaged = 2 };  // NOLINT(performance-enum-size)
-inline constexpr std::array<const char*, 2> mass_matrix_names{"consistent", "averaged"};  ///< numbered from 1
+enum class Integrator { modal = 1, generalized_alpha = 2 };
+enum class MassMatrix { consistent = 1, averaged = 2 };
 
 /// Highest polynomial degree of an element.
 inline constexpr int max_element_degree = 12;
@@ -49,12 +49,6 @@ struct Parameters {
   std::array<double, 4> point_force_position{0.5, 0.5, 0.5, 0.5};  ///< x/L of the point forces
 };
 
-/// f(τ) = f[0] + f[1] τ + f[2] τ²/2, τ [s] from a step's start: a value and its first two time derivatives there.
-using Polynomial = std::array<double, 3>;
-
-inline double value_at(const Polynomial& f, double t) { return f[0] + t * (f[1] + 0.5 * t * f[2]); }
-inline double mean_over(const Polynomial& f, double h) { return f[0] + h * (f[1] / 2.0 + h * f[2] / 6.0); }
-
 /// What acts on the beam beside the tip force: each load has a shape in space and is a polynomial in time. The moving
 /// clamp's frame is not inertial: in it the beam is under the uniform load −ρA a.
 class Loads {
@@ -71,6 +65,8 @@ class Loads {
       "distributed_load", "distributed_load_1", "distributed_load_2",  "distributed_load_3",
       "point_force[1]",   "point_force[2]",     "point_force[3]",      "point_force[4]",
       "tip_load",         "base_acceleration",  "tip_load_coefficient"};
+  /// Of each load its value at one instant, or its mean.
+  using Values = std::array<double, count>;
 
   Loads() = default;
   Loads(const Polynomial& uniform) { set(distributed, uniform); }  // NOLINT(google-explicit-constructor)
@@ -90,14 +86,16 @@ class Loads {
       if ((acting_ >> shape & 1U) != 0) use(shape, values_[shape]);
     }
   }
+  Values at(double t) const {
+    Values values{};
+    for_each([&](std::size_t shape, const Polynomial& f) { values[shape] = value(f, t); });
+    return values;
+  }
 
  private:
   std::array<Polynomial, count> values_{};
   unsigned acting_ = 0;  ///< a bit per shape
 };
-
-/// Of each load: what it is at one instant, or its mean.
-using LoadValues = std::array<double, Loads::count>;
 
 /// Points at which the shape is reported: x = 0, L/20, …, L.
 inline constexpr int shape_points = 21;
@@ -125,7 +123,7 @@ class Beam {
   /// Take C [N] and the loads' values as acting now, for tip_acceleration() and load_potential(), which otherwise refer
   /// to the end of the last step. The motion does not depend on it.
   void observe(double tip_force, const Loads& loads);
-  const LoadValues& loads() const { return now_.loads; }  ///< acting now
+  const Loads::Values& loads() const { return now_.loads; }  ///< acting now
 
   virtual double tip_displacement() const = 0;                            ///< u(L) [m]
   virtual double tip_velocity() const = 0;                                ///< u_t(L) [m/s]
@@ -174,7 +172,7 @@ class Beam {
   struct Scalars {
     double integral, integral_2, dissipated, load_work;
     double tip_force;  // C [N] and the loads at the end of the last step, or as observed since
-    LoadValues loads;
+    Loads::Values loads;
   };
 
   /// Makes the step and changes `now_`, but for the loads. Returns a sum of squares of the new motion, see `ordinary`.

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "validate.hpp"
+#include "../fmus/common/text.hpp"
 
 namespace beam {
 namespace {
@@ -362,7 +362,7 @@ Modes exact_modes(const Parameters& p) {
       (p.initial_deflection_slope != 0.0 || p.initial_velocity_slope != 0.0)) {
     throw std::invalid_argument("beam: n_modes = " + std::to_string(n) +
                                 " is not allowed; the kinetic energy of a start u = s x would be " +
-                                number(1.0 + error) + " times the true one; keep more modes, or use a mesh");
+                                common::number(1.0 + error) + " times the true one; keep more modes, or use a mesh");
   }
   return modes;
 }

@@ -27,7 +27,7 @@ long exact_mode_count(const Parameters& parameters, double omega);
 /// and each load and the start u = x get a multiple of κ_k tip_k with which the static u(L), or the start's, is exact
 /// too. The weights fall fast enough for the tip to follow slow forces as if all modes were there, to the third order
 /// in 1/n, and no mode is added whose frequency is out of line with the others: that would ring after an impact.
-/// @pre validate(parameters) passed
+/// @pre the parameters passed the check of make_beam()
 /// @throws std::invalid_argument if the beam starts with u = s x and so few modes do not hold the energy of that
 /// @throws std::runtime_error if the parameters leave the range of floating-point numbers
 Modes exact_modes(const Parameters& parameters);

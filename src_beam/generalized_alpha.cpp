@@ -126,10 +126,10 @@ struct StepMatrix {
 /// with other forces solves once.
 struct FreeStep {
   double size = 0.0;  // 0: none
-  LoadValues loads{};
+  Loads::Values loads{};
   VectorXd q, v, w;
 
-  bool holds(double h, const LoadValues& mean_loads, const VectorXd& q_now, const VectorXd& v_now) const {
+  bool holds(double h, const Loads::Values& mean_loads, const VectorXd& q_now, const VectorXd& v_now) const {
     return h == size && mean_loads == loads && q_now == q && v_now == v;
   }
 };
@@ -191,11 +191,10 @@ class GeneralizedAlphaBeam final : public Beam {
     v0_.swap(v_);
     a0_.swap(a_);
     if (!midpoint_) before_ = last_;
-    LoadValues seen{};  // by the scheme
-    loads.for_each([&](std::size_t i, const Polynomial& f) {
-      seen[i] = midpoint_ ? mean_over(f, h) : value_at(f, (1.0 - alpha_f_) * h);
-    });
-    now_.dissipated += midpoint_ ? midpoint_step(S, h, mean_over(c, h), seen) : alpha_step(S, h, c, loads, seen);
+    Loads::Values seen{};  // by the scheme
+    loads.for_each(
+        [&](std::size_t i, const Polynomial& f) { seen[i] = midpoint_ ? mean(f, h) : value(f, (1.0 - alpha_f_) * h); });
+    now_.dissipated += midpoint_ ? midpoint_step(S, h, mean(c, h), seen) : alpha_step(S, h, c, loads, seen);
     loads.for_each([&](std::size_t i, const Polynomial&) { now_.load_work += seen[i] * shape(i).dot(q_ - q0_); });
     const double u0 = q0_[mesh_.tip_index()], u1 = q_[mesh_.tip_index()];
     now_.integral = 0.5 * h * (u0 + u1);
@@ -229,7 +228,7 @@ class GeneralizedAlphaBeam final : public Beam {
   }
 
   /// Makes q_ and v_ from q0_ and v0_; returns the loss.
-  double midpoint_step(const StepMatrix& S, double h, double force, const LoadValues& loads) {
+  double midpoint_step(const StepMatrix& S, double h, double force, const Loads::Values& loads) {
     const VectorXd &q = q0_, &v = v0_;
     if (!free_.holds(h, loads, q, v)) {
       free_.size = 0.0;
@@ -254,32 +253,29 @@ class GeneralizedAlphaBeam final : public Beam {
   }
 
   /// Makes q_, v_ and a_ from q0_, v0_ and a0_; returns the loss.
-  double alpha_step(const StepMatrix& S, double h, const Polynomial& c, const Loads& loads, const LoadValues& seen) {
+  double alpha_step(const StepMatrix& S, double h, const Polynomial& c, const Loads& loads, const Loads::Values& seen) {
     const VectorXd &q = q0_, &v = v0_;
     VectorXd a = a0_;
-    LoadValues start{};
-    loads.for_each([&start](std::size_t i, const Polynomial& f) { start[i] = f[0]; });
-    if (add_missing_force(c[0], start)) {
+    if (add_missing_force(c[0], loads.at(0.0))) {
       solve(S, w_);
       a += (1.0 - alpha_m_) * w_;
     }
     const double f = 1.0 - alpha_f_;
     rhs_ = load_of(seen) / mu_;
-    rhs_[mesh_.tip_index()] += value_at(c, f * h) / mu_;
+    rhs_[mesh_.tip_index()] += value(c, f * h) / mu_;
     w_ = alpha_ * (v + (f * (1.0 - gamma_) * h) * a) + q + (f * h) * (v + ((0.5 - beta_) * h) * a);
     mesh_.add_products(-alpha_m_, a, -1.0, w_, rhs_);
     solve(S, a_);
     q_ = q + h * (v + h * ((0.5 - beta_) * a + beta_ * a_));
     v_ = v + h * ((1.0 - gamma_) * a + gamma_ * a_);
-    last_ = {value_at(c, h), 0.0, 1.0, {}};
-    loads.for_each([&](std::size_t i, const Polynomial& f) { last_.loads[i] = value_at(f, h); });
+    last_ = {value(c, h), 0.0, 1.0, loads.at(h)};
     if (alpha_ == 0.0) return 0.0;
     w_ = f * v_ + alpha_f_ * v;
     return mu_ * alpha_ * (q_ - q).dot(mesh_.stiffness_times(w_));
   }
 
   /// rhs_ = the force that the acceleration at the step's start does not know of yet; false if there is none.
-  bool add_missing_force(double tip_force, LoadValues loads) {
+  bool add_missing_force(double tip_force, Loads::Values loads) {
     if (last_.started == 0.0) {
       rhs_ = load_of(loads) / mu_ - mesh_.stiffness_times(VectorXd(q0_ + alpha_ * v0_));
       rhs_[mesh_.tip_index()] += tip_force / mu_;
@@ -287,7 +283,7 @@ class GeneralizedAlphaBeam final : public Beam {
     }
     for (std::size_t i = 0; i < loads.size(); ++i) loads[i] = (loads[i] - last_.loads[i]) / mu_;
     tip_force -= last_.tip_force;
-    if (loads == LoadValues{} && tip_force == 0.0 && last_.impulse == 0.0) return false;
+    if (loads == Loads::Values{} && tip_force == 0.0 && last_.impulse == 0.0) return false;
     rhs_ = load_of(loads);
     rhs_[mesh_.tip_index()] += tip_force / mu_;
     if (last_.impulse != 0.0) rhs_ -= (alpha_ * last_.impulse) * mesh_.stiffness_times(tip_response_);
@@ -300,7 +296,7 @@ class GeneralizedAlphaBeam final : public Beam {
   }
 
   /// Σ values·F; valid until the next call.
-  const VectorXd& load_of(const LoadValues& values) const {
+  const VectorXd& load_of(const Loads::Values& values) const {
     load_.setZero(mesh_.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (values[i] != 0.0) load_ += values[i] * shape(i);
@@ -360,7 +356,7 @@ class GeneralizedAlphaBeam final : public Beam {
     double tip_force;   // at the end of the last step, as the loads: what a_ knows of
     double impulse;     // since then [N·s]
     double started;     // 0 before the first step, when a_ knows of nothing
-    LoadValues loads;
+    Loads::Values loads;
   };
   static constexpr Index remembered = sizeof(Last) / sizeof(double);
   Last last_{}, before_{};

@@ -6,8 +6,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include "validate.hpp"
-
 namespace beam {
 
 using Eigen::Index;

@@ -50,7 +50,7 @@ class Timoshenko {
   /// M = CᵀC, C = matrixU(); banded as it is ordered.
   using MassFactor = Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
 
-  /// @pre validate(parameters) passed
+  /// @pre the parameters passed the check of make_beam()
   /// @throws std::invalid_argument if what follows from the parameters overflows or vanishes
   explicit Timoshenko(const Parameters& parameters);
 

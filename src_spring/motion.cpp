@@ -6,7 +6,7 @@ namespace spring {
 namespace {
 
 /// Coefficient k of a force as a power series.
-double coefficient(const Quadratic& force, std::size_t k) { return k < 2 ? force[k] : k == 2 ? force[2] / 2 : 0.0; }
+double coefficient(const Polynomial& force, std::size_t k) { return k < 2 ? force[k] : k == 2 ? force[2] / 2 : 0.0; }
 
 }  // namespace
 
@@ -21,8 +21,8 @@ Loads Loads::from(const Parameters& parameters, const Inputs& inputs) {
   return loads;
 }
 
-Quadratic load_of(const Parameters& parameters, const Inputs& inputs) {
-  Quadratic load;
+Polynomial load_of(const Parameters& parameters, const Inputs& inputs) {
+  Polynomial load;
   for (std::size_t i = 0; i < 3; ++i)
     load[i] = inputs.external_force[i] - parameters.mass * inputs.base_acceleration[i];
   return load;
@@ -91,9 +91,9 @@ double Motion::rate(double reach, const Compliance::Slopes& contact) const {
   return std::sqrt(stiffness / mass_) + (damping_ + contact.force_by_rate) / mass_;
 }
 
-Quadratic Motion::holding_force(double y, const Loads& loads, bool touching, double depth) const {
+Polynomial Motion::holding_force(double y, const Loads& loads, bool touching, double depth) const {
   Compliance::Along contact;
-  Quadratic force{(k1_ + k2_ * y * y) * y, 0.0, 0.0};
+  Polynomial force{(k1_ + k2_ * y * y) * y, 0.0, 0.0};
   for (std::size_t k = 0; k < 3; ++k) {
     if (touching) compliance_.extend(contact, k, {depth, -loads.tip[1], -loads.tip[2] / 2}, 1.0);
     force[k] += (contact.elastic[k] + contact.damping[k]) * (k == 2 ? 2.0 : 1.0) - loads.force[k];

@@ -8,20 +8,19 @@
 
 #include "compliance.hpp"
 #include "parameters.hpp"
-#include "polynomial.hpp"
 #include "taylor.hpp"
 
 namespace spring {
 
 /// What acts from outside over a segment, τ from its start.
 struct Loads {
-  Quadratic force;    ///< F [N]
-  Quadratic tip;      ///< u_tip [m]
+  Polynomial force;   ///< F [N]
+  Polynomial tip;     ///< u_tip [m]
   bool held = false;  ///< something is in contact with the top, and may hold it
 
   static Loads from(const Parameters& parameters, const Inputs& inputs);
   Loads from_time(double t) const { return {shifted(force, t), shifted(tip, t), held}; }
-  Loads scaled(double size) const { return {spring::scaled(force, size), spring::scaled(tip, size), held}; }
+  Loads scaled(double size) const { return {common::scaled(force, size), common::scaled(tip, size), held}; }
 };
 
 /// A motion near a segment's start: Taylor coefficients in s = τ/H of y, of y², of the depth y − u_tip and of the
@@ -36,7 +35,7 @@ struct Expansion {
 };
 
 /// f_s − m a [N]
-Quadratic load_of(const Parameters& parameters, const Inputs& inputs);
+Polynomial load_of(const Parameters& parameters, const Inputs& inputs);
 
 class Motion {
  public:
@@ -77,7 +76,7 @@ class Motion {
   double rate(double reach, const Compliance::Slopes& contact) const;
 
   /// Force that would hold the top at y, at rest, with its first two derivatives: −F + k1 y + k2 y³ + C. [N, N/s, N/s²]
-  Quadratic holding_force(double y, const Loads& loads, bool touching, double depth) const;
+  Polynomial holding_force(double y, const Loads& loads, bool touching, double depth) const;
 
   /// What F and the spring, where it pushes that way, add to a motion of the top at y in direction `sense`. [N]
   double push_outwards(double y, double sense, double force) const {

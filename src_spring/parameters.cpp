@@ -1,15 +1,14 @@
 #include "parameters.hpp"
 
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
+#include "../fmus/common/text.hpp"
+
 namespace spring {
-std::string number(double value) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, 12).ptr};
-}
+
+using common::number;
 
 double hilltop(const Parameters& p) {
   return p.linear_stiffness > 0.0 && p.cubic_stiffness < 0.0 ? std::sqrt(p.linear_stiffness / -p.cubic_stiffness)

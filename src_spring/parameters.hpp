@@ -2,11 +2,11 @@
 // and inputs are finite: whoever takes them from outside has checked that.
 #pragma once
 
-#include <string>
-
-#include "polynomial.hpp"
+#include "../fmus/common/polynomial.hpp"
 
 namespace spring {
+
+using common::Polynomial;
 
 enum class ContactLaw { external = 1, normal_compliance = 2 };
 
@@ -31,14 +31,12 @@ struct Parameters {
 
 /// Held or polynomial over one step; τ from its start.
 struct Inputs {
-  Quadratic contact_force{};      ///< C [N], positive presses the spring down
-  Quadratic foundation_force{};   ///< N ≥ 0 [N], upward; used when the stop inside is not enabled
-  Quadratic external_force{};     ///< f_s [N]
-  Quadratic base_acceleration{};  ///< a of the foundation [m/s²]: y is relative to it, so that it acts as −m a
-  Quadratic tip_displacement{};   ///< u_tip [m]; read by normal_compliance only
+  Polynomial contact_force{};      ///< C [N], positive presses the spring down
+  Polynomial foundation_force{};   ///< N ≥ 0 [N], upward; used when the stop inside is not enabled
+  Polynomial external_force{};     ///< f_s [N]
+  Polynomial base_acceleration{};  ///< a of the foundation [m/s²]: y is relative to it, so that it acts as −m a
+  Polynomial tip_displacement{};   ///< u_tip [m]; read by normal_compliance only
 };
-
-std::string number(double value);
 
 /// @throws std::invalid_argument naming the parameter that cannot be beside the others, its value and what is allowed
 void check(const Parameters& parameters);

@@ -19,7 +19,7 @@ enum Unknown { eta, zeta, n, P, e, unknowns };
 Seated::Seated(const Motion& motion, const Laws& laws)
     : Segment(motion, laws, unknowns, {Crossing::falling, Crossing::rising}) {}
 
-bool Seated::holds(const Quadratic& holding_force) {
+bool Seated::holds(const Polynomial& holding_force) {
   return Watch::direction({holding_force[0], holding_force[1], holding_force[2] / 2}) >= 0.0;
 }
 
@@ -80,7 +80,7 @@ Seated::Event Seated::run(const Start& start) {
       event = Event::contact;
   }
   const double H = start.size, t = elapsed(), y = laws_.stop_position;
-  const double impulse = H * (spring::integral(N_, solver_.s()) + solver_.value()[P]);
+  const double impulse = H * (solver_.s() * mean(N_, solver_.s()) + solver_.value()[P]);
   reached_ = {y, 0.0, y * t, y * t * t / 2, solver_.value()[e], impulse};
   return event;
 }
@@ -89,10 +89,10 @@ bool Seated::residual(double s, const double* Y, const double* Yp, double* F) co
   const double H = start_.size, y = laws_.stop_position + Y[eta];
   Compliance::Effect contact{};
   if (touching_) contact = motion_.compliance().continued(contact_depth(Y[eta], s), contact_rate(H * Y[zeta], s) / H);
-  const double outer = spring::value(loads_.force, s);
+  const double outer = value(loads_.force, s);
   F[eta] = Y[eta];
   F[zeta] = Y[zeta];
-  F[n] = spring::value(N_, s) + Y[n] + motion_.mass() * motion_.acceleration(y, Y[zeta], outer, contact.force);
+  F[n] = value(N_, s) + Y[n] + motion_.mass() * motion_.acceleration(y, Y[zeta], outer, contact.force);
   F[P] = Yp[P] - Y[n];
   F[e] = Yp[e] - H * contact.dissipation;
   return std::isfinite(F[n]) && std::isfinite(F[e]);
@@ -117,13 +117,13 @@ void Seated::jacobian(double s, double c, const double* Y, const double*, double
 
 void Seated::events(double s, const double* Y, double* g) const noexcept {
   const double H = start_.size, rate = contact_rate(0.0, s);
-  double force_rate = -spring::rate(loads_.force, s);
+  double force_rate = -common::rate(loads_.force, s);
   if (touching_) {
     const auto contact = motion_.compliance().slopes(contact_depth(Y[eta], s), rate / H);
     force_rate += contact.force_by_depth * rate - contact.force_by_rate * loads_.tip[2] / H;
   }
   contact_events(Y[eta], 0.0, s, g);
-  g[own_] = release_watch_.distance(spring::value(N_, s) + Y[n], s);
+  g[own_] = release_watch_.distance(value(N_, s) + Y[n], s);
   g[own_ + 1] = release_watch_.rate(force_rate, s);
 }
 

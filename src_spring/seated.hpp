@@ -16,7 +16,7 @@ class Seated final : public Segment {
   Seated(const Motion& motion, const Laws& laws);
 
   /// N and its rates at the start; the top stays where the first that is not 0 is positive (or all are 0).
-  static bool holds(const Quadratic& holding_force);
+  static bool holds(const Polynomial& holding_force);
 
   /// @pre holds(), y = φ, z = 0
   Event run(const Start& start) override;
@@ -28,7 +28,7 @@ class Seated final : public Segment {
  private:
   void prepare();
 
-  Quadratic N_;  ///< over s
+  Polynomial N_;  ///< over s
   Watch release_watch_;
 };
 

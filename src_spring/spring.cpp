@@ -4,9 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "../fmus/common/text.hpp"
 #include "flat.hpp"
 
 namespace spring {
+
+using common::number;
+
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();

@@ -67,7 +67,7 @@ class Spring {
   double acceleration() const;    ///< ż [m/s²]
   double reaction() const;        ///< C of the law inside [N]; 0 for external
   double contact_energy() const;  ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
-  Quadratic tip() const { return {state_.tip, state_.tip_rate, 0.0}; }  ///< u_tip [m] and its rate; no curvature
+  Polynomial tip() const { return {state_.tip, state_.tip_rate, 0.0}; }  ///< u_tip [m] and its rate; no curvature
 
   /// The whole dynamic state as a flat vector of fixed length.
   void save(std::vector<double>& state) const;

@@ -6,10 +6,13 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "text.hpp"
+#include "../common/text.hpp"
 #include "version.hpp"
 
 namespace fmi {
+
+using common::number;
+
 namespace {
 
 struct Unit {
@@ -64,7 +67,7 @@ std::string attribute(const char* name, const std::string& value) {
 
 std::string value_text(const Variable& v, double value) {
   if (v.type == Type::boolean) return value != 0.0 ? "true" : "false";
-  if (v.type == Type::real) return text(value);
+  if (v.type == Type::real) return number(value);
   return std::to_string(static_cast<long>(value));
 }
 
@@ -120,7 +123,7 @@ void write_variable(std::ostream& out, const Variable& v, std::size_t reference)
     if (std::isfinite(v.min)) out << attribute("min", value_text(v, v.min));
     if (std::isfinite(v.max)) out << attribute("max", value_text(v, v.max));
   }
-  if (v.type == Type::real && v.nominal != 1.0) out << attribute("nominal", text(v.nominal));
+  if (v.type == Type::real && v.nominal != 1.0) out << attribute("nominal", number(v.nominal));
   if (!v.get || v.exact) out << attribute("start", value_text(v, v.start));
   out << "/>\n    </ScalarVariable>\n";
 }
@@ -180,9 +183,9 @@ std::string document(const Table& t, const std::string& identity, const std::str
   for (const auto& [name, text] : log_categories) {
     out << "    <Category" << attribute("name", name) << attribute("description", text) << "/>\n";
   }
-  out << "  </LogCategories>\n  <DefaultExperiment startTime=\"0\"" << attribute("stopTime", text(t.stop_time))
-      << (t.tolerance > 0.0 ? attribute("tolerance", text(t.tolerance)) : "")
-      << attribute("stepSize", text(t.step_size)) << "/>\n  <ModelVariables>\n";
+  out << "  </LogCategories>\n  <DefaultExperiment startTime=\"0\"" << attribute("stopTime", number(t.stop_time))
+      << (t.tolerance > 0.0 ? attribute("tolerance", number(t.tolerance)) : "")
+      << attribute("stepSize", number(t.step_size)) << "/>\n  <ModelVariables>\n";
   for (std::size_t i = 0; i < t.variables.size(); ++i) {
     out << "    <!-- index " << i + 1 << " -->\n";
     write_variable(out, t.variables[i], i);
@@ -206,8 +209,8 @@ std::string guid(const Table& table) {
   const std::string content = document(table, "", "");
   std::ostringstream hex;  // two differently seeded halves make the 128 bits of a GUID
   hex << std::hex;
-  const std::uint64_t halves[] = {hash(content.data(), content.size()),
-                                  hash(content.data(), content.size(), 0x9ae16a3b2f90404fULL)};
+  const std::uint64_t halves[] = {common::hash(content.data(), content.size()),
+                                  common::hash(content.data(), content.size(), 0x9ae16a3b2f90404fULL)};
   for (std::uint64_t half : halves) {
     hex.width(16);
     hex.fill('0');

@@ -5,29 +5,32 @@
 #include <limits>
 #include <stdexcept>
 
+#include "../common/text.hpp"
 #include "description.hpp"
-#include "text.hpp"
 
 namespace fmi {
+
+using common::number;
+
 namespace {
 
 const char* name(Type type) { return type_names[static_cast<int>(type)]; }
 
 double finite(const Variable& v, double value) {
   if (!std::isfinite(value)) {
-    throw Discarded("'" + v.name + "' = " + text(value) + " is not finite: the inputs are too large");
+    throw Discarded("'" + v.name + "' = " + number(value) + " is not finite: the inputs are too large");
   }
   return value;
 }
 
 void require_allowed(const Variable& v, double value) {
-  if (!std::isfinite(value)) throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not finite");
+  if (!std::isfinite(value)) throw std::invalid_argument("'" + v.name + "' = " + number(value) + " is not finite");
   if (value <= 0.0 && v.min == std::numeric_limits<double>::min()) {
-    throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not > 0");
+    throw std::invalid_argument("'" + v.name + "' = " + number(value) + " is not > 0");
   }
   if (value < v.min || value > v.max) {
-    throw std::invalid_argument("'" + v.name + "' = " + text(value) + " is not in [" + text(v.min) + ", " +
-                                text(v.max) + "]");
+    throw std::invalid_argument("'" + v.name + "' = " + number(value) + " is not in [" + number(v.min) + ", " +
+                                number(v.max) + "]");
   }
 }
 
@@ -36,7 +39,7 @@ void require_allowed(const Variable& v, const Polynomial& p) {
   require_allowed(v, p[0]);
   const bool whole = p[0] == std::floor(p[0]) && std::abs(p[0]) <= std::numeric_limits<int>::max();
   if ((v.type == Type::integer && !whole) || (v.type == Type::boolean && p[0] != 0.0 && p[0] != 1.0)) {
-    throw std::invalid_argument("'" + v.name + "' = " + text(p[0]) + " is not of its type, " + name(v.type));
+    throw std::invalid_argument("'" + v.name + "' = " + number(p[0]) + " is not of its type, " + name(v.type));
   }
   const auto possible = [&v](double derivative) {
     return std::isnan(derivative) || (v.continuous_input() && std::isfinite(derivative));
@@ -80,9 +83,9 @@ void Instance::reset() {
 }
 
 void Instance::setup(double start, double stop, double tolerance) {
-  if (!std::isfinite(start)) throw std::invalid_argument("startTime = " + text(start) + " is not finite");
+  if (!std::isfinite(start)) throw std::invalid_argument("startTime = " + number(start) + " is not finite");
   if (std::isnan(stop) || stop < start) {
-    throw std::invalid_argument("stopTime = " + text(stop) + " is not after startTime = " + text(start));
+    throw std::invalid_argument("stopTime = " + number(stop) + " is not after startTime = " + number(start));
   }
   time_ = start;
   stop_time_ = stop;
@@ -107,7 +110,7 @@ void Instance::ensure_built() {
     const double value = v.get ? v.get(*model_) : 0.0;
     if (!std::isfinite(value)) {
       throw std::invalid_argument("the parameters leave the range of floating-point numbers: '" + v.name +
-                                  "' would be " + text(value));
+                                  "' would be " + number(value));
     }
   }
   built_ = true;
@@ -183,7 +186,7 @@ void Instance::set_derivative(unsigned reference, int order, double value) {
                                 "': orders 1 and 2 are possible");
   }
   if (!std::isfinite(value)) {
-    throw std::invalid_argument("derivative of '" + v.name + "' = " + text(value) + " is not finite");
+    throw std::invalid_argument("derivative of '" + v.name + "' = " + number(value) + " is not finite");
   }
   const std::size_t place = place_[reference];
   use(place)[static_cast<std::size_t>(order)] = value;
@@ -220,18 +223,19 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
 }
 
 void Instance::step(double time, double size) {
-  if (!std::isfinite(time)) throw std::invalid_argument("currentCommunicationPoint = " + text(time));
+  if (!std::isfinite(time)) throw std::invalid_argument("currentCommunicationPoint = " + number(time));
   if (!std::isfinite(size) || size <= 0.0) {
-    throw std::invalid_argument("communicationStepSize = " + text(size) + ": must be finite and > 0");
+    throw std::invalid_argument("communicationStepSize = " + number(size) + ": must be finite and > 0");
   }
   // Importers add up or multiply their times; both round.
   const double rounding = 64.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(time), std::abs(time_));
   if (std::abs(time - time_) > 1e-9 * size + rounding) {
-    throw std::invalid_argument("currentCommunicationPoint = " + text(time) + ", but the slave is at " + text(time_));
+    throw std::invalid_argument("currentCommunicationPoint = " + number(time) + ", but the slave is at " +
+                                number(time_));
   }
   if (time + size > stop_time_ + 1e-6 * size + 1e-9 * std::abs(stop_time_)) {
-    throw std::invalid_argument("a step from " + text(time) + " to " + text(time + size) + " goes past the stop time " +
-                                text(stop_time_));
+    throw std::invalid_argument("a step from " + number(time) + " to " + number(time + size) +
+                                " goes past the stop time " + number(stop_time_));
   }
   ensure_built();
   push_inputs();

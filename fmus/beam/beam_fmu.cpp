@@ -48,7 +48,7 @@ struct BeamModel final : fmi::Model {
   }
 
   void observe() override {
-    const beam::LoadValues before = forecasts() ? beam->loads() : beam::LoadValues{};
+    const Loads::Values before = forecasts() ? beam->loads() : Loads::Values{};
     beam->observe(tip_force[0], loads);
     if (forecasts() && beam->loads() != before) look_ahead();
   }
@@ -130,13 +130,12 @@ fmi::Table make_table() {
   t.tolerance = 1e-6;  // for the tool's own use
   t.choices.push_back({"MassMatrix",
                        "mass of an element",
-                       {std::string(beam::mass_matrix_names[0]) + ", its kinetic energy exact",
-                        std::string(beam::mass_matrix_names[1]) +
-                            " with the lumped one, so that short waves travel at the right speed"}});
+                       {"consistent, its kinetic energy exact",
+                        "averaged with the lumped one, so that short waves travel at the right speed"}});
   t.choices.push_back({"Integrator",
                        "time integration of the beam",
-                       {std::string(beam::integrator_names[0]) + ", the exact step of each mode under polynomial loads",
-                        std::string(beam::integrator_names[1]) + ", with rho_inf = 1 the midpoint rule"}});
+                       {"modal, the exact step of each mode under polynomial loads",
+                        "generalized_alpha, with rho_inf = 1 the midpoint rule"}});
 
   fmi::TableBuilder<BeamModel> add(t);
   const auto parameter = [&](const char* name, const char* unit, auto field, const char* text) -> fmi::Variable& {

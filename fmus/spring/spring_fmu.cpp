@@ -14,6 +14,7 @@
 #include "../../src_spring/parameters.hpp"
 #include "../../src_spring/spring.hpp"
 #include "../adapter/table.hpp"
+#include "../common/text.hpp"
 
 namespace {
 
@@ -66,8 +67,8 @@ struct SpringModel final : fmi::Model {
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
     const bool goes_on = held && size > rounding * held->size();
     if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
-      throw fmi::Discarded("a step of " + spring::number(size) + " s, but communication_step = " +
-                           spring::number(held->size()) + " s: steps must have that size, or the parameter be 0");
+      throw fmi::Discarded("a step of " + common::number(size) + " s, but communication_step = " +
+                           common::number(held->size()) + " s: steps must have that size, or the parameter be 0");
     }
     std::vector<double> before;
     if (impulse != 0.0 || held) save(before);
@@ -155,15 +156,17 @@ struct SpringModel final : fmi::Model {
   static bool is_set(double derivative) { return !std::isnan(derivative); }
 
   /// The tip from now on: tip_velocity is its rate where tip_displacement has no derivative.
-  spring::Quadratic tip() const {
-    const auto& [u, rate, curvature] = reached ? *reached : tip_displacement;
-    if (!is_set(rate)) return {u, tip_velocity[0], is_set(curvature) ? curvature : tip_velocity[1]};
-    return {u, rate, is_set(curvature) ? curvature : 0.0};
+  fmi::Polynomial tip() const {
+    fmi::Polynomial tip = reached ? *reached : tip_displacement;
+    const double curvature = is_set(tip[1]) ? 0.0 : tip_velocity[1];
+    if (!is_set(tip[1])) tip[1] = tip_velocity[0];
+    if (!is_set(tip[2])) tip[2] = curvature;
+    return tip;
   }
 
   void keep_tip() {
     if (held) return;
-    const spring::Quadratic tip = spring->tip();
+    const fmi::Polynomial tip = spring->tip();
     reached = {tip[0], tip[1] == tip_velocity[0] ? fmi::unset : tip[1], fmi::unset};
   }
 
@@ -172,7 +175,7 @@ struct SpringModel final : fmi::Model {
     if (warned_) return;
     if (held && held->missed() >= most_missed) {
       warning = "the tip was not where it was foreseen in " + std::to_string(held->missed()) + " steps, by up to " +
-                spring::number(held->farthest()) +
+                common::number(held->farthest()) +
                 " m, so the contact gains or loses energy. Connect tip_displacement and tip_velocity_forecast of the "
                 "beam to the inputs of these names and reaction to its tip_force; set communication_step in both to "
                 "the step size, tip_response and tip_response_2 to the beam's; pass values on between the steps only, "

@@ -12,7 +12,6 @@
 #include "beam.hpp"
 #include "beam_testing.hpp"
 #include "timoshenko.hpp"
-#include "validate.hpp"
 
 namespace beam {
 namespace {

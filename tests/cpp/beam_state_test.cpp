@@ -15,7 +15,6 @@
 namespace beam {
 namespace {
 
-using testing::Force;
 using testing::general_beam;
 using testing::mechanical_energy;
 using testing::outputs;

@@ -17,11 +17,9 @@ namespace {
 
 using testing::changed;
 using testing::every_load;
-using testing::Force;
 using testing::general_beam;
 using testing::mechanical_energy;
 using testing::Noise;
-using testing::shifted;
 using testing::unit_beam;
 using testing::with_integrator;
 
@@ -34,14 +32,14 @@ TEST(BeamStep, OneModalStepEqualsTenShorterOnes) {
         p.initial_deflection_slope = 0.03;
         p.initial_velocity_slope = 0.5;
         p.point_force_position = {0.0, 0.37, 0.5, 1.0};
-        const Force c = {0.3, -2.0 / H, 5.0 / (H * H)};
+        const Polynomial c = {0.3, -2.0 / H, 5.0 / (H * H)};
         Noise noise;
         const Loads loads = every_load(H, noise);
         const auto once = make_beam(p), often = make_beam(p);
         once->step(H, c, loads);
         double integral = 0.0, integral_2 = 0.0;
         for (int i = 0; i < 10; ++i) {
-          const auto later = [t = i * H / 10](const Force& f) { return shifted(f, t); };
+          const auto later = [t = i * H / 10](const Polynomial& f) { return shifted(f, t); };
           often->step(H / 10, later(c), changed(loads, later));
           integral += often->tip_displacement_integral();
           integral_2 += often->tip_displacement_integral_2() + (9 - i) * H / 10 * often->tip_displacement_integral();
@@ -66,7 +64,7 @@ TEST(BeamStep, IntegralsAreThoseOfTheDisplacement) {
   Parameters p = general_beam(15);
   p.alpha_b = 1e-3;
   p.initial_velocity_slope = 0.5;
-  const Force c = {0.3, -2.0, 30.0};
+  const Polynomial c = {0.3, -2.0, 30.0};
   const double H = 0.2;
   const auto once = make_beam(p), often = make_beam(p);
   once->step(H, c, 0.6);
@@ -145,8 +143,10 @@ TEST(BeamStep, MidpointRuleSeesTheMeanOfForceAndLoad) {
   Parameters p = with_integrator(general_beam(10), Integrator::generalized_alpha);
   const auto a = make_beam(p), b = make_beam(p);
   const double H = 0.05;
-  const Force c = {1.0, -3.0, 40.0};
-  const auto mean = [H](const Force& f) { return Force{f[0] + f[1] * H / 2.0 + f[2] * H * H / 6.0, 0.0, 0.0}; };
+  const Polynomial c = {1.0, -3.0, 40.0};
+  const auto mean = [H](const Polynomial& f) {
+    return Polynomial{f[0] + f[1] * H / 2.0 + f[2] * H * H / 6.0, 0.0, 0.0};
+  };
   Noise noise;
   const Loads loads = every_load(H, noise);
   a->step(H, c, loads);
@@ -167,7 +167,7 @@ TEST(BeamStep, GeneralizedAlphaConvergesToTheModalSolutionInSecondOrder) {
         p.alpha_b = alpha_b;
         p.initial_velocity_slope = 0.4;
         const auto exact = make_beam(p), b = make_beam(with_integrator(p, Integrator::generalized_alpha, rho_inf));
-        const Force c = {0.5, -1.0, 3.0};
+        const Polynomial c = {0.5, -1.0, 3.0};
         const double H = 1.0 / steps;
         for (int i = 0; i < steps; ++i) {
           if (i == steps / 2) {
@@ -214,7 +214,7 @@ TEST(BeamStep, AVaryingLoadIsSeenInSecondOrder) {
     Parameters p = general_beam(6);
     p.alpha_b = 1e-3;
     const auto exact = make_beam(p);
-    const Force load = {0.4, 30.0, -600.0};
+    const Polynomial load = {0.4, 30.0, -600.0};
     exact->step(0.1, {}, load);
     double previous = 0.0;
     for (const int n : {400, 800}) {
@@ -251,7 +251,7 @@ TEST(BeamStep, EnergyIdentityHoldsToRounding) {
           worst = std::max(worst, std::fabs(mechanical_energy(*b) - before - 0.5 * J * (v + b->tip_velocity())));
         }
         const double H = i % 13 == 0 ? 0.003 : 0.01;
-        const Force force = {noise(), c.polynomial ? 10.0 * noise() : 0.0, c.polynomial ? 1e3 * noise() : 0.0};
+        const Polynomial force = {noise(), c.polynomial ? 10.0 * noise() : 0.0, c.polynomial ? 1e3 * noise() : 0.0};
         const double mean = force[0] + H * (force[1] / 2.0 + H * force[2] / 6.0);
         const auto total = [&b] { return mechanical_energy(*b) + b->dissipated_energy() - b->load_work(); };
         const double before = total(), u = b->tip_displacement();
@@ -280,7 +280,7 @@ TEST(BeamStep, PolynomialForceDoesTheWorkThatTheIntegralsSay) {
     const double H = 0.02;
     double worst = 0.0;
     for (int i = 0; i < 300; ++i) {
-      const Force c = {noise(), 50.0 * noise(), 3e3 * noise()};
+      const Polynomial c = {noise(), 50.0 * noise(), 3e3 * noise()};
       const double before = mechanical_energy(*b) + b->dissipated_energy(), u = b->tip_displacement();
       b->step(H, c, 0.0);
       const double I1 = b->tip_displacement_integral(), I2 = b->tip_displacement_integral_2();
@@ -323,7 +323,7 @@ TEST(BeamStep, AccelerationIsTheDerivativeOfTheVelocity) {
   p.initial_velocity_slope = 1.0;
   const double e = 1e-6;
   const auto a = make_beam(p), b = make_beam(p), c = make_beam(p);
-  const Force force = {0.2, 3.0, -20.0};
+  const Polynomial force = {0.2, 3.0, -20.0};
   const double t = 0.1;
   a->step(t - e, force, 0.4);
   b->step(t, force, 0.4);

@@ -12,8 +12,6 @@
 
 namespace beam::testing {
 
-using Force = std::array<double, 3>;
-
 /// κ = EI = KAG, everything else 1: section 6 of the paper.
 inline Parameters unit_beam(int n_elements, double kappa = 1.0) {
   Parameters p;
@@ -101,9 +99,6 @@ inline const std::vector<double>& clamped_free_frequencies() {
   return omega;
 }
 
-/// C(τ) seen from τ₀ on: the same polynomial re-expanded.
-inline Force shifted(const Force& c, double t) { return {c[0] + t * (c[1] + 0.5 * t * c[2]), c[1] + t * c[2], c[2]}; }
-
 /// Every load at once, each with f₀, f₁/H and f₂/H² of the order 1 made by `noise`.
 template <class Noise>
 Loads every_load(double H, Noise& noise) {
@@ -119,7 +114,7 @@ Loads every_load(double H, Noise& noise) {
 template <class Change>
 Loads changed(const Loads& loads, const Change& change) {
   Loads other;
-  loads.for_each([&](std::size_t i, const Force& f) { other.set(i, change(f)); });
+  loads.for_each([&](std::size_t i, const Polynomial& f) { other.set(i, change(f)); });
   return other;
 }
 

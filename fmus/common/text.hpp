@@ -1,4 +1,4 @@
-// Numbers as text and bytes as a number.
+// Numbers as text, bytes as a number.
 #pragma once
 
 #include <charconv>
@@ -6,12 +6,12 @@
 #include <cstdint>
 #include <string>
 
-namespace fmi {
+namespace common {
 
-/// The shortest decimal that reads back as the same double, for the XML and for messages.
-inline std::string text(double value) {
-  char buffer[32];
-  return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
+/// The shortest decimal that reads back as the same double.
+inline std::string number(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
 
 /// FNV-1a.
@@ -20,4 +20,4 @@ inline std::uint64_t hash(const char* bytes, std::size_t size, std::uint64_t see
   return seed;
 }
 
-}  // namespace fmi
+}  // namespace common
