@@ -2,40 +2,49 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "description.hpp"
 
 namespace fmi {
 
-Component::Component(Logger logger, bool debug) : logger_(std::move(logger)), debug_(debug) {
+Component::Component(const fmi2CallbackFunctions* functions, const char* name, bool debug)
+    : callbacks_(functions ? *functions : fmi2CallbackFunctions{}), name_(name), debug_(debug) {
   for (const LogCategory& category : log_categories) categories_.insert(category.name);
 }
 
-void Component::log(Status status, const char* category, const std::string& message) const {
-  if (!logger_) return;
-  if (status == Status::ok && !(debug_ && (categories_.count(category) || categories_.count("logAll")))) return;
-  logger_(status, category, message);
+void Component::log(fmi2Status status, const char* category, const std::string& message) const {
+  if (!callbacks_.logger) return;
+  if (status == fmi2OK && !(debug_ && (categories_.count(category) || categories_.count("logAll")))) return;
+  // Some importers treat the message as a printf format, some print it as it is: both get a readable text.
+  std::string format;
+  for (const char c : message) format += c == '%' ? std::string("%%") : std::string(1, c);
+  callbacks_.logger(callbacks_.componentEnvironment, name_.c_str(), status, category, format.c_str());
 }
 
-std::vector<std::string> Component::set_debugging(bool on, std::size_t n, const char* const categories[]) {
+bool Component::set_debugging(bool on, std::size_t n, const fmi2String categories[]) {
   std::set<std::string> chosen;
-  std::vector<std::string> unknown;
   for (const LogCategory& category : log_categories) {
     if (n == 0) chosen.insert(category.name);
   }
+  bool all_known = true;
   for (std::size_t i = 0; i < n; ++i) {
     require(categories[i], "a category");
     const std::string name = categories[i];
     const auto same = [&](const LogCategory& category) { return name == category.name; };
-    const bool known = std::any_of(std::begin(log_categories), std::end(log_categories), same);
-    known ? void(chosen.insert(name)) : unknown.push_back(name);
+    if (std::any_of(std::begin(log_categories), std::end(log_categories), same)) {
+      chosen.insert(name);
+    } else {
+      all_known = false;
+      log(fmi2Warning, "logStatusWarning", "fmi2SetDebugLogging: there is no log category '" + name + "'");
+    }
   }
   debug_ = on;
   categories_ = chosen;
-  return unknown;
+  return all_known;
 }
 
-Snapshot& Component::state(void* key) {
+Snapshot& Component::state(fmi2FMUstate key) {
   const auto found = states_.find(key);
   if (found == states_.end()) {
     throw std::invalid_argument("the FMU state was not made by this instance, or is already freed");
@@ -43,20 +52,20 @@ Snapshot& Component::state(void* key) {
   return *found->second;
 }
 
-void* Component::keep(Snapshot snapshot) {
+fmi2FMUstate Component::keep(Snapshot snapshot) {
   auto owned = std::make_unique<Snapshot>(std::move(snapshot));
-  void* const key = owned.get();
+  const fmi2FMUstate key = owned.get();
   states_[key] = std::move(owned);
   return key;
 }
 
-void Component::free_state(void* key) {
+void Component::free_state(fmi2FMUstate key) {
   state(key);
   states_.erase(key);
 }
 
 const char* Component::phase_text() const {
-  const Phase p = instance.phase;
+  const Phase p = instance.progress.phase;
   return p == instantiated     ? "before initialization"
          : p == initialization ? "in initialization mode"
          : p == step_complete  ? "between steps"
@@ -64,10 +73,10 @@ const char* Component::phase_text() const {
                                : "after an error (restore a state or reset first)";
 }
 
-Status Component::fail(const char* function, const char* why) {
-  log(Status::error, "logStatusError", std::string(function) + ": " + why);
-  instance.phase = error;
-  return Status::error;
+fmi2Status Component::fail(const char* function, const char* why) {
+  log(fmi2Error, "logStatusError", std::string(function) + ": " + why);
+  instance.progress.phase = error;
+  return fmi2Error;
 }
 
 }  // namespace fmi

@@ -1,38 +1,30 @@
 // The FMI 2.0 co-simulation functions over Component. Each states in which phases it may be called (FMI 2.0.4,
 // section 4.2.4).
 #include <cstddef>
+#include <initializer_list>
 #include <limits>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "component.hpp"
 #include "description.hpp"
-#include "fmi2Functions.h"
 
 namespace {
 
 using fmi::any_phase;
 using fmi::Component;
+using fmi::guard;
+using fmi::Progress;
 using fmi::require;
-using fmi::Status;
 using fmi::Type;
 
-// Some importers treat the message as a printf format, some print it as it is: both get a readable text.
-void report(const fmi2CallbackFunctions& callbacks, const std::string& name, Status status, const char* category,
-            const std::string& message) {
-  std::string format;
-  for (const char c : message) format += c == '%' ? std::string("%%") : std::string(1, c);
-  callbacks.logger(callbacks.componentEnvironment, name.c_str(), static_cast<fmi2Status>(status), category,
-                   format.c_str());
-}
-
-template <class Body>
-fmi2Status guard(fmi2Component c, const char* function, unsigned legal, const Body& body) noexcept {
-  if (!c) return fmi2Error;
-  Component& component = *static_cast<Component*>(c);
-  return static_cast<fmi2Status>(component.guard(function, legal, [&] { body(component); }));
+/// @throws std::invalid_argument if one of the arrays of `n` values is missing
+void require_arrays(size_t n, std::initializer_list<std::pair<const void*, const char*>> arrays) {
+  if (n == 0) return;
+  for (const auto& [array, name] : arrays) require(array, name);
 }
 
 /// Made once: it hashes the whole description.
@@ -41,10 +33,43 @@ const std::string& guid() {
   return text;
 }
 
-void no_strings(const fmi2ValueReference vr[], size_t n) {
-  if (n == 0) return;
-  require(vr, "vr");
-  throw std::invalid_argument("value reference " + std::to_string(vr[0]) + " is not a String; there are none");
+template <class Value>
+fmi2Status get(fmi2Component c, const char* function, const fmi2ValueReference vr[], size_t n, Value values[],
+               Type type) {
+  return guard(c, function, any_phase, [&](Component& k) {
+    require_arrays(n, {{vr, "vr"}, {values, "value"}});
+    for (size_t i = 0; i < n; ++i) values[i] = static_cast<Value>(k.instance.get(vr[i], type));
+  });
+}
+
+template <class Value>
+fmi2Status set(fmi2Component c, const char* function, const fmi2ValueReference vr[], size_t n, const Value values[],
+               Type type) {
+  return guard(c, function, fmi::settable, [&](Component& k) {
+    require_arrays(n, {{vr, "vr"}, {values, "value"}});
+    for (size_t i = 0; i < n; ++i) {
+      k.instance.set(vr[i], type, static_cast<double>(type == Type::boolean ? Value(values[i] != 0) : values[i]));
+    }
+  });
+}
+
+fmi2Status no_strings(fmi2Component c, const char* function, unsigned legal, const fmi2ValueReference vr[], size_t n) {
+  return guard(c, function, legal, [&](Component&) {
+    if (n == 0) return;
+    require(vr, "vr");
+    throw std::invalid_argument("value reference " + std::to_string(vr[0]) + " is not a String; there are none");
+  });
+}
+
+/// Strictly the status functions belong to a step in progress or failed; asking after a completed one does no harm.
+template <class Value, class Get>
+fmi2Status get_status(fmi2Component c, const char* function, bool known, const char* why_not, Value* value,
+                      const Get& status_of) {
+  return guard(c, function, fmi::stepped, [&](Component& k) {
+    require(value, "value");
+    if (!known) throw fmi::Discarded(why_not);
+    *value = status_of(k.instance.progress);
+  });
 }
 
 }  // namespace
@@ -56,45 +81,34 @@ const char* fmi2GetVersion(void) { return fmi2Version; }
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String,
                               const fmi2CallbackFunctions* functions, fmi2Boolean, fmi2Boolean loggingOn) {
-  const auto refuse = [&](const std::string& why) -> fmi2Component {
-    if (functions && functions->logger) {
-      report(*functions, instanceName ? instanceName : "?", Status::error, "logStatusError", "fmi2Instantiate: " + why);
-    }
-    return nullptr;
-  };
+  std::unique_ptr<Component> component;
   try {
-    if (!instanceName || !*instanceName) return refuse("instanceName is empty");
-    if (fmuType != fmi2CoSimulation) return refuse("only co-simulation is provided");
-    if (!fmuGUID) return refuse("fmuGUID is NULL");
-    if (guid() != fmuGUID) return refuse("fmuGUID = " + std::string(fmuGUID) + " is not that of this FMU, " + guid());
-    Component::Logger logger;
-    if (functions && functions->logger) {
-      // A copy: the importer's struct may be gone after this call.
-      logger = [callbacks = *functions, name = std::string(instanceName)](auto... message) {
-        report(callbacks, name, message...);
-      };
-    }
-    auto component = std::make_unique<Component>(logger, loggingOn != fmi2False);
-    component->log(Status::ok, "logEvents", "instantiated");
-    return component.release();
-  } catch (const std::exception& e) {
-    return refuse(e.what());
+    component = std::make_unique<Component>(functions, instanceName ? instanceName : "?", loggingOn != fmi2False);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
   }
+  const auto status = guard(component.get(), "fmi2Instantiate", fmi::instantiated, [&](Component& k) {
+    if (!instanceName || !*instanceName) throw std::invalid_argument("instanceName is empty");
+    if (fmuType != fmi2CoSimulation) throw std::invalid_argument("only co-simulation is provided");
+    require(fmuGUID, "fmuGUID");
+    if (guid() != fmuGUID) {
+      throw std::invalid_argument("fmuGUID = " + std::string(fmuGUID) + " is not that of this FMU, " + guid());
+    }
+    k.log(fmi2OK, "logEvents", "instantiated");
+  });
+  return status == fmi2OK ? component.release() : nullptr;
 }
 
 void fmi2FreeInstance(fmi2Component c) { delete static_cast<Component*>(c); }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-  std::vector<std::string> unknown;
+  bool all_known = true;
   const fmi2Status status = guard(c, "fmi2SetDebugLogging", any_phase, [&](Component& k) {
-    if (nCategories > 0) require(categories, "categories");
-    unknown = k.set_debugging(loggingOn != fmi2False, nCategories, categories);
-    for (const std::string& name : unknown) {
-      k.log(Status::warning, "logStatusWarning", "fmi2SetDebugLogging: there is no log category '" + name + "'");
-    }
+    require_arrays(nCategories, {{categories, "categories"}});
+    all_known = k.set_debugging(loggingOn != fmi2False, nCategories, categories);
   });
-  return unknown.empty() ? status : fmi2Warning;
+  return all_known ? status : fmi2Warning;
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
@@ -108,56 +122,56 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
   return guard(c, "fmi2EnterInitializationMode", fmi::instantiated, [](Component& k) {
-    k.instance.enter_initialization();
-    k.log(Status::ok, "logEvents", "entered initialization mode");
+    k.instance.progress.phase = fmi::initialization;
+    k.log(fmi2OK, "logEvents", "entered initialization mode");
   });
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
   return guard(c, "fmi2ExitInitializationMode", fmi::initialization, [](Component& k) {
     k.instance.exit_initialization();
-    k.log(Status::ok, "logEvents", "initialized");
+    k.log(fmi2OK, "logEvents", "initialized");
   });
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
   return guard(c, "fmi2Terminate", fmi::step_complete, [](Component& k) {
-    k.instance.terminate();
-    k.log(Status::ok, "logEvents", "terminated");
+    k.instance.progress.phase = fmi::terminated;
+    k.log(fmi2OK, "logEvents", "terminated");
   });
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
   return guard(c, "fmi2Reset", any_phase, [](Component& k) {
     k.instance.reset();
-    k.log(Status::ok, "logEvents", "reset");
+    k.log(fmi2OK, "logEvents", "reset");
   });
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
-  return guard(c, "fmi2GetReal", any_phase, [&](Component& k) { k.get(vr, nvr, value, Type::real); });
+  return get(c, "fmi2GetReal", vr, nvr, value, Type::real);
 }
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
-  return guard(c, "fmi2GetInteger", any_phase, [&](Component& k) { k.get(vr, nvr, value, Type::integer); });
+  return get(c, "fmi2GetInteger", vr, nvr, value, Type::integer);
 }
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[]) {
-  return guard(c, "fmi2GetBoolean", any_phase, [&](Component& k) { k.get(vr, nvr, value, Type::boolean); });
+  return get(c, "fmi2GetBoolean", vr, nvr, value, Type::boolean);
 }
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String[]) {
-  return guard(c, "fmi2GetString", any_phase, [&](Component&) { no_strings(vr, nvr); });
+  return no_strings(c, "fmi2GetString", any_phase, vr, nvr);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
-  return guard(c, "fmi2SetReal", fmi::settable, [&](Component& k) { k.set(vr, nvr, value, Type::real); });
+  return set(c, "fmi2SetReal", vr, nvr, value, Type::real);
 }
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[]) {
-  return guard(c, "fmi2SetInteger", fmi::settable, [&](Component& k) { k.set(vr, nvr, value, Type::integer); });
+  return set(c, "fmi2SetInteger", vr, nvr, value, Type::integer);
 }
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[]) {
-  return guard(c, "fmi2SetBoolean", fmi::settable, [&](Component& k) { k.set(vr, nvr, value, Type::boolean); });
+  return set(c, "fmi2SetBoolean", vr, nvr, value, Type::boolean);
 }
 fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String[]) {
-  return guard(c, "fmi2SetString", fmi::settable, [&](Component&) { no_strings(vr, nvr); });
+  return no_strings(c, "fmi2SetString", fmi::settable, vr, nvr);
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {
@@ -216,11 +230,8 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
   return guard(c, "fmi2GetDirectionalDerivative", fmi::after_instantiation, [&](Component& k) {
-    if (nUnknown == 0) return;
-    require(vUnknown_ref, "vUnknown_ref");
-    require(dvUnknown, "dvUnknown");
-    if (nKnown > 0) require(vKnown_ref, "vKnown_ref");
-    if (nKnown > 0) require(dvKnown, "dvKnown");
+    require_arrays(nUnknown, {{vUnknown_ref, "vUnknown_ref"}, {dvUnknown, "dvUnknown"}});
+    require_arrays(nKnown, {{vKnown_ref, "vKnown_ref"}, {dvKnown, "dvKnown"}});
     for (size_t i = 0; i < nUnknown; ++i) {
       double sum = 0.0;
       for (size_t j = 0; j < nKnown; ++j) {
@@ -234,10 +245,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
   return guard(c, "fmi2SetRealInputDerivatives", fmi::settable, [&](Component& k) {
-    if (nvr == 0) return;
-    require(vr, "vr");
-    require(order, "order");
-    require(value, "value");
+    require_arrays(nvr, {{vr, "vr"}, {order, "order"}, {value, "value"}});
     for (size_t i = 0; i < nvr; ++i) k.instance.set_derivative(vr[i], order[i], value[i]);
   });
 }
@@ -245,10 +253,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
   return guard(c, "fmi2GetRealOutputDerivatives", fmi::stepped, [&](Component& k) {
-    if (nvr == 0) return;
-    require(vr, "vr");
-    require(order, "order");
-    require(value, "value");
+    require_arrays(nvr, {{vr, "vr"}, {order, "order"}, {value, "value"}});
     for (size_t i = 0; i < nvr; ++i) value[i] = k.instance.output_derivative(vr[i], order[i]);
   });
 }
@@ -259,9 +264,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     k.instance.step(currentCommunicationPoint, communicationStepSize);
     // Only told: the step is done, and some masters stop at any status but fmi2OK.
     const std::string warning = k.instance.take_warning();
-    if (!warning.empty()) k.log(Status::warning, "logStatusWarning", "fmi2DoStep: " + warning);
+    if (!warning.empty()) k.log(fmi2Warning, "logStatusWarning", "fmi2DoStep: " + warning);
   });
-  if (c) static_cast<Component*>(c)->instance.last_status = status;
+  if (c) static_cast<Component*>(c)->instance.progress.last_status = status;
   return status;
 }
 
@@ -269,44 +274,30 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
   return guard(c, "fmi2CancelStep", 0, [](Component&) {});  // no step is ever in progress
 }
 
-// Strictly the status functions belong to a step in progress or failed; asking after a completed one does no harm.
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status* value) {
-  return guard(c, "fmi2GetStatus", fmi::stepped, [&](Component& k) {
-    require(value, "value");
-    if (s != fmi2DoStepStatus) throw fmi::Discarded("only fmi2DoStepStatus is a status");
-    *value = static_cast<fmi2Status>(k.instance.last_status);
-  });
+  return get_status(c, "fmi2GetStatus", s == fmi2DoStepStatus, "only fmi2DoStepStatus is a status", value,
+                    [](const Progress& p) { return static_cast<fmi2Status>(p.last_status); });
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real* value) {
-  return guard(c, "fmi2GetRealStatus", fmi::stepped, [&](Component& k) {
-    require(value, "value");
-    if (s != fmi2LastSuccessfulTime) throw fmi::Discarded("only fmi2LastSuccessfulTime is a Real");
-    *value = k.instance.time();
-  });
+  return get_status(c, "fmi2GetRealStatus", s == fmi2LastSuccessfulTime, "only fmi2LastSuccessfulTime is a Real", value,
+                    [](const Progress& p) { return p.time; });
 }
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind, fmi2Integer* value) {
-  return guard(c, "fmi2GetIntegerStatus", fmi::stepped, [&](Component&) {
-    require(value, "value");
-    throw fmi::Discarded("no status is an Integer");
-  });
+  return get_status(c, "fmi2GetIntegerStatus", false, "no status is an Integer", value,
+                    [](const Progress&) { return 0; });
 }
 
+// The slave never ends a simulation by itself.
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean* value) {
-  return guard(c, "fmi2GetBooleanStatus", fmi::stepped, [&](Component&) {
-    require(value, "value");
-    if (s != fmi2Terminated) throw fmi::Discarded("only fmi2Terminated is a Boolean");
-    *value = fmi2False;  // the slave never ends a simulation by itself
-  });
+  return get_status(c, "fmi2GetBooleanStatus", s == fmi2Terminated, "only fmi2Terminated is a Boolean", value,
+                    [](const Progress&) { return fmi2False; });
 }
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String* value) {
-  return guard(c, "fmi2GetStringStatus", fmi::stepped, [&](Component&) {
-    require(value, "value");
-    if (s != fmi2PendingStatus) throw fmi::Discarded("only fmi2PendingStatus is a String");
-    *value = "no step is pending";
-  });
+  return get_status(c, "fmi2GetStringStatus", s == fmi2PendingStatus, "only fmi2PendingStatus is a String", value,
+                    [](const Progress&) { return "no step is pending"; });
 }
 
 }  // extern "C"

@@ -69,17 +69,12 @@ Instance::Instance() : table_(table()), place_(table_.variables.size()) {
 
 void Instance::reset() {
   model_ = make_model();
-  built_ = false;
+  progress = {};
   std::vector<double> starts;
   starts.reserve(fixed_.size());
   for (const Variable* v : fixed_) starts.push_back(v->start);
   settings_ = std::make_shared<const std::vector<double>>(std::move(starts));
   values_.assign(inputs_.size(), idle);
-  time_ = 0.0;
-  stop_time_ = std::numeric_limits<double>::infinity();
-  tolerance_ = 0.0;
-  last_status = 0;
-  phase = instantiated;
 }
 
 void Instance::setup(double start, double stop, double tolerance) {
@@ -87,25 +82,21 @@ void Instance::setup(double start, double stop, double tolerance) {
   if (std::isnan(stop) || stop < start) {
     throw std::invalid_argument("stopTime = " + number(stop) + " is not after startTime = " + number(start));
   }
-  time_ = start;
-  stop_time_ = stop;
-  if (tolerance != tolerance_) built_ = false;
-  tolerance_ = tolerance;
+  progress.time = start;
+  progress.stop_time = stop;
+  if (tolerance != progress.tolerance) progress.built = false;
+  progress.tolerance = tolerance;
 }
-
-void Instance::enter_initialization() { phase = initialization; }
 
 void Instance::exit_initialization() {
   ensure_built();
-  phase = step_complete;
+  progress.phase = step_complete;
 }
 
-void Instance::terminate() { phase = terminated; }
-
 void Instance::ensure_built() {
-  if (built_) return;
+  if (progress.built) return;
   for (std::size_t i = 0; i < fixed_.size(); ++i) fixed_[i]->set(*model_, {(*settings_)[i], 0.0, 0.0});
-  model_->build(tolerance_);
+  model_->build(progress.tolerance);
   for (const Variable& v : table_.variables) {
     const double value = v.get ? v.get(*model_) : 0.0;
     if (!std::isfinite(value)) {
@@ -113,7 +104,7 @@ void Instance::ensure_built() {
                                   "' would be " + number(value));
     }
   }
-  built_ = true;
+  progress.built = true;
   push_inputs();
   model_->observe();
 }
@@ -123,7 +114,7 @@ void Instance::push_inputs() {
 }
 
 void Instance::show(const Variable& v, std::size_t input) {
-  if (!built_) return;
+  if (!progress.built) return;
   v.set(*model_, values_[input]);
   model_->observe();
 }
@@ -149,8 +140,9 @@ const Variable& Instance::variable(unsigned reference, Type type, const char* wh
 double Instance::get(unsigned reference, Type type) {
   const Variable& v = variable(reference, type, "get");
   if (v.causality == Causality::input) return values_[place_[reference]][0];
-  if (v.causality == Causality::parameter || (phase == instantiated && v.exact)) return (*settings_)[place_[reference]];
-  if (phase == instantiated) {
+  if (v.causality == Causality::parameter || (progress.phase == instantiated && v.exact))
+    return (*settings_)[place_[reference]];
+  if (progress.phase == instantiated) {
     throw std::invalid_argument("'" + v.name + "' is not known before fmi2EnterInitializationMode");
   }
   ensure_built();
@@ -162,7 +154,7 @@ void Instance::set(unsigned reference, Type type, double value) {
   if (v.get && !v.exact) {
     throw std::invalid_argument("'" + v.name + "' is calculated and cannot be set");
   }
-  if (is_setting(v) && (phase & ~(instantiated | initialization)) != 0) {
+  if (is_setting(v) && (progress.phase & ~(instantiated | initialization)) != 0) {
     throw std::invalid_argument("'" + v.name + "' can only be set before fmi2ExitInitializationMode");
   }
   require_allowed(v, value);
@@ -171,7 +163,7 @@ void Instance::set(unsigned reference, Type type, double value) {
     auto changed = std::make_shared<std::vector<double>>(*settings_);
     (*changed)[place] = value;
     settings_ = std::move(changed);
-    built_ = false;
+    progress.built = false;
     return;
   }
   use(place)[0] = value;
@@ -207,7 +199,7 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
   const Variable& of = variable(unknown, Type::real, "differentiate");
   const Variable& by = variable(known, Type::real, "differentiate by");
   if (of.causality != Causality::output) throw std::invalid_argument("'" + of.name + "' is not an output");
-  if (is_setting(by) && phase == initialization) {
+  if (is_setting(by) && progress.phase == initialization) {
     throw Discarded("derivatives by parameters and start values, such as '" + by.name + "', are not available");
   }
   if (!by.continuous_input()) throw std::invalid_argument("'" + by.name + "' is not a continuous input");
@@ -228,36 +220,32 @@ void Instance::step(double time, double size) {
     throw std::invalid_argument("communicationStepSize = " + number(size) + ": must be finite and > 0");
   }
   // Importers add up or multiply their times; both round.
-  const double rounding = 64.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(time), std::abs(time_));
-  if (std::abs(time - time_) > 1e-9 * size + rounding) {
+  const double rounding =
+      64.0 * std::numeric_limits<double>::epsilon() * std::max(std::abs(time), std::abs(progress.time));
+  if (std::abs(time - progress.time) > 1e-9 * size + rounding) {
     throw std::invalid_argument("currentCommunicationPoint = " + number(time) + ", but the slave is at " +
-                                number(time_));
+                                number(progress.time));
   }
-  if (time + size > stop_time_ + 1e-6 * size + 1e-9 * std::abs(stop_time_)) {
+  if (time + size > progress.stop_time + 1e-6 * size + 1e-9 * std::abs(progress.stop_time)) {
     throw std::invalid_argument("a step from " + number(time) + " to " + number(time + size) +
-                                " goes past the stop time " + number(stop_time_));
+                                " goes past the stop time " + number(progress.stop_time));
   }
   ensure_built();
   push_inputs();
   model_->step(size);
   for (const std::size_t i : used_) values_[i] = {inputs_[i]->consumed ? 0.0 : values_[i][0], unset, unset};
-  time_ = time + size;
+  progress.time = time + size;
 }
 
 void Instance::save(Snapshot& s) const {
-  s.phase = static_cast<int>(phase);
-  s.last_status = last_status;
-  s.time = time_;
-  s.stop_time = stop_time_;
-  s.tolerance = tolerance_;
+  s.progress = progress;
   s.settings = settings_;
   if (s.foreign) s.inputs.clear();  // it may know inputs that are not used here
   s.inputs.resize(values_.size(), idle);
   for (const std::size_t i : used_) s.inputs[i] = values_[i];
-  s.built = built_;
   s.foreign = false;
   s.numerics.clear();
-  if (built_) model_->save(s.numerics);
+  if (progress.built) model_->save(s.numerics);
 }
 
 void Instance::restore(Snapshot& s) {
@@ -266,21 +254,19 @@ void Instance::restore(Snapshot& s) {
     for (std::size_t i = 0; i < inputs_.size(); ++i) require_allowed(*inputs_[i], s.inputs[i]);
     for (std::size_t i = 0; i < inputs_.size(); ++i) use(i);
   }
-  built_ = built_ && s.built && tolerance_ == s.tolerance && (settings_ == s.settings || *settings_ == *s.settings);
+  progress.built = progress.built && s.progress.built && progress.tolerance == s.progress.tolerance &&
+                   (settings_ == s.settings || *settings_ == *s.settings);
   settings_ = s.settings;
   for (const std::size_t i : used_) values_[i] = s.inputs[i];
-  tolerance_ = s.tolerance;
-  if (s.built) {
+  progress.tolerance = s.progress.tolerance;
+  if (s.progress.built) {
     ensure_built();
     push_inputs();
     if (s.foreign) model_->require_state(s.numerics);
     model_->restore(s.numerics);
   }
   s.foreign = false;
-  time_ = s.time;
-  stop_time_ = s.stop_time;
-  last_status = s.last_status;
-  phase = static_cast<Phase>(s.phase);
+  progress = s.progress;
 }
 
 }  // namespace fmi

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -13,26 +12,14 @@
 
 namespace fmi {
 
-/// The states of section 4.2.4 that a slave which completes every step at once can be in, as bits.
-enum Phase : unsigned {
-  instantiated = 1U << 0,
-  initialization = 1U << 1,
-  step_complete = 1U << 2,
-  terminated = 1U << 3,
-  error = 1U << 4,
-};
-
 class Instance {
  public:
   Instance();
 
-  Phase phase = instantiated;
-  int last_status = 0;  ///< of the last step
+  Progress progress;
 
   void setup(double start, double stop, double tolerance);
-  void enter_initialization();
   void exit_initialization();
-  void terminate();
   void reset();
 
   /// @throws Discarded if an output has no finite value under the inputs that were set since the last step
@@ -47,7 +34,6 @@ class Instance {
 
   /// @throws Discarded, std::invalid_argument
   void step(double time, double size);
-  double time() const { return time_; }
   /// What the model has to say after a step; empty if nothing.
   std::string take_warning() { return std::exchange(model_->warning, {}); }
 
@@ -73,10 +59,6 @@ class Instance {
   std::shared_ptr<const std::vector<double>> settings_;  ///< of the fixed; saved states share it
   std::vector<Polynomial> values_;                       ///< of the inputs
   std::vector<std::size_t> used_;                        ///< inputs that were ever set: the others cost nothing
-  bool built_ = false;
-  double time_ = 0.0;
-  double stop_time_ = std::numeric_limits<double>::infinity();
-  double tolerance_ = 0.0;  ///< relative, asked for by the importer; 0 = none
 };
 
 }  // namespace fmi

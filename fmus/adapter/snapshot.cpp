@@ -42,11 +42,12 @@ std::size_t count(const Snapshot& s) {
 std::size_t serialized_size(const Snapshot& snapshot) { return sizeof(Header) + count(snapshot) * sizeof(double); }
 
 void serialize(const Snapshot& s, const std::string& guid, char* bytes) {
+  const Progress& p = s.progress;
   std::vector<double> values{
-      static_cast<double>(s.phase), static_cast<double>(s.last_status),    s.time, s.stop_time, s.tolerance,
-      s.built ? 1.0 : 0.0,          static_cast<double>(s.numerics.size())};
+      static_cast<double>(p.phase), static_cast<double>(p.last_status),    p.time, p.stop_time, p.tolerance,
+      p.built ? 1.0 : 0.0,          static_cast<double>(s.numerics.size())};
   values.insert(values.end(), s.settings->begin(), s.settings->end());
-  for (const Polynomial& p : s.inputs) values.insert(values.end(), p.begin(), p.end());
+  for (const Polynomial& input : s.inputs) values.insert(values.end(), input.begin(), input.end());
   values.insert(values.end(), s.numerics.begin(), s.numerics.end());
 
   Header header{};
@@ -94,12 +95,12 @@ Snapshot deserialize(const char* bytes, std::size_t size, const std::string& gui
     refuse("it says what no instance says of itself");
   }
   Snapshot s;
-  s.phase = static_cast<int>(values[0]);
-  s.last_status = static_cast<int>(values[1]);
-  s.time = values[2];
-  s.stop_time = values[3];
-  s.tolerance = values[4];
-  s.built = values[5] != 0.0;
+  s.progress = {static_cast<Phase>(static_cast<int>(values[0])),
+                static_cast<int>(values[1]),
+                values[2],
+                values[3],
+                values[4],
+                values[5] != 0.0};
   s.foreign = true;
   const double* from = values.data();
   s.settings = std::make_shared<const std::vector<double>>(from + fixed_count, from + inputs_begin);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -11,11 +12,26 @@
 
 namespace fmi {
 
+/// The states of FMI 2.0.4, section 4.2.4, that a slave which completes every step at once can be in, as bits.
+enum Phase : unsigned {
+  instantiated = 1U << 0,
+  initialization = 1U << 1,
+  step_complete = 1U << 2,
+  terminated = 1U << 3,
+  error = 1U << 4,
+};
+
+/// How far an instance is in its life.
+struct Progress {
+  Phase phase = instantiated;
+  int last_status = 0;  ///< of the last step
+  double time = 0.0, stop_time = std::numeric_limits<double>::infinity();
+  double tolerance = 0.0;  ///< relative, asked for by the importer; 0 = none
+  bool built = false;      ///< the model is, with the present settings
+};
+
 struct Snapshot {
-  int phase = 0;
-  int last_status = 0;
-  double time = 0.0, stop_time = 0.0, tolerance = 0.0;
-  bool built = false;
+  Progress progress;
   bool foreign = false;                                 ///< came as bytes: what its numbers mean is not checked yet
   std::shared_ptr<const std::vector<double>> settings;  ///< of what is set before the start: shared, as it stays
   std::vector<Polynomial> inputs;

@@ -80,11 +80,10 @@ class Fmu {
       const auto i = static_cast<unsigned>(fmi::table().index(name));
       instance_.set(i, fmi::table().variables[i].type, value);
     }
-    instance_.enter_initialization();
     instance_.exit_initialization();
     instance_.save(start_);
   }
-  void step(double H) { instance_.step(instance_.time(), H); }
+  void step(double H) { instance_.step(instance_.progress.time, H); }
   /// The step from the start.
   void repeat(double H) {
     instance_.restore(start_);

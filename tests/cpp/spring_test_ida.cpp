@@ -227,7 +227,7 @@ TEST(Motion, ExcessAccelerationIsTheDifference) {
   const Motion motion(p);
   constexpr double H = 0.2;
   Loads loads;
-  loads.force = scaled({1.0, -2.0, 3.0}, H);
+  loads.force = common::scaled({1.0, -2.0, 3.0}, H);
   const Series y = expanded(motion, 0.15, 0.5, loads, H, false, 0.0);
   for (const int order : {0, 2, 4, max_order}) {
     const Taylor R(y, order);
@@ -236,7 +236,7 @@ TEST(Motion, ExcessAccelerationIsTheDifference) {
       const double q = 0.02, w = -0.3;
       double second = 0.0;
       for (int k = order; k >= 2; --k) second = second * s + k * (k - 1) * y[static_cast<std::size_t>(k)];
-      const double acceleration = motion.acceleration(R(s) + q, R.rate(s) / H + w, spring::value(loads.force, s), 0.0);
+      const double acceleration = motion.acceleration(R(s) + q, R.rate(s) / H + w, value(loads.force, s), 0.0);
       EXPECT_NEAR(motion.excess_acceleration(R(s), q, w, remainder(s), 0.0), acceleration - second / (H * H),
                   1000 * epsilon)
           << order << " " << s;
