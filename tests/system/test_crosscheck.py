@@ -63,6 +63,11 @@ def test_any_elements_and_loads_pass(t_end, degree, loads, beam):
     assert report.horizon == pytest.approx(t_end)
 
 
+def test_a_looser_tolerance_of_the_spring_is_part_of_the_bound():
+    """IDA then errs by 2e-8, whatever the macro step; bounds of 1e-12 a step called that wrong."""
+    assert crosscheck(with_changes(load_scene("duffing"), spring={"relative_tolerance": 1e-4})).passed
+
+
 WRONG = {
     "mass": {"spring": {"mass": 1.01}},
     "sign of the cubic term": {"spring": {"cubic_stiffness": 0.2}},

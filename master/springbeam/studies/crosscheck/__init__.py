@@ -13,13 +13,13 @@ Nothing in it knows the reference, so a wrong sign, mass or law, which converges
 Nonsmooth trajectories separate: comparable is what comes before the first change of contact that the macro step, or a
 tiny perturbation of the reference, moves to another place in the order of events.
 
-``comparison`` is the study, ``report`` holds what is found, ``sampling`` the values compared; ``orders`` observes
-orders.
+``comparison`` is the study, ``sampling`` has the values compared; ``orders`` observes orders.
 """
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -33,7 +33,6 @@ from ...scene.automatic import with_scheme_chosen
 from ...scene.resolution import mesh_frequency
 from ...scene.statics import tip_compliance
 from ..reference import PERTURBATION, reference_and_perturbed, refuse_without_reference
-from .report import IDA_TOLERANCE, SAFETY, EventRow, QuantityRow, Report
 from .sampling import DISPLACEMENTS, SHORT, VELOCITIES, at, away_from, macro_points, quantities, sample
 
 #: A scene whose comparable window is shorter than this many macro steps is resolved further, 4 times at a go.
@@ -42,6 +41,64 @@ _ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 16
 _WINDOW_STEPS = 400
 #: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
 _RESOLVED, _RESOLVED_VELOCITY = 0.05, 0.25
+#: Factor on what halving the macro step changes.
+_SAFETY = 4.0
+#: Least relative error of a step, where IDA's tolerance is not a looser one.
+_LEAST = 1e-12
+
+
+@dataclass(frozen=True)
+class QuantityRow:
+    """One compared quantity."""
+
+    quantity: str
+    error: float  #: max norm, in the quantity's unit
+    at: float  #: where it occurred [s]
+    l2: float  #: root mean square over the window
+    bound: float  #: at that time
+    passed: bool
+    times: np.ndarray  #: of the compared rows [s]
+    errors: np.ndarray
+    bounds: np.ndarray
+
+    @classmethod
+    def judged(cls, name: str, times: np.ndarray, error: np.ndarray, bound: np.ndarray) -> QuantityRow:
+        """Judge the errors of a quantity at ``times`` [s]; the row shows the largest, or the furthest out of bounds."""
+        worst, top = int(np.argmax(error / bound)), int(np.argmax(error))
+        at = worst if error[worst] > bound[worst] else top
+        return cls(
+            name, float(error[at]), float(times[at]), float(np.sqrt(np.mean(error**2))), float(bound[at]),
+            bool(np.all(error <= bound)), times, error, bound,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class EventRow:
+    """One change of contact."""
+
+    kind: str
+    time: float | None  #: ``None`` if the co-simulation lacks it
+    reference: float
+    bound: float
+    passed: bool
+
+
+@dataclass
+class Report:
+    """What `crosscheck` found."""
+
+    scene: Scene  #: as compared: the macro step and t_end may be finer and shorter than asked
+    reference: Trajectory
+    trajectory: Trajectory
+    horizon: float  #: comparable up to here [s]
+    growth: float  #: of a perturbation of the reference up to the horizon
+    rows: list[QuantityRow] = field(default_factory=list)
+    events: list[EventRow] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def passed(self) -> bool:
+        return all(row.passed for row in self.rows) and all(row.passed for row in self.events)
 
 
 def crosscheck(scene: Scene) -> Report:
@@ -101,7 +158,7 @@ def _crosscheck_paper(scene: Scene) -> Report:
         q, exact = ours[name][:n], reference[name][:n]
         scale = float(np.abs(exact).max()) or 1.0
         steps = np.arange(1, n + 1)
-        bound = SAFETY * np.maximum.accumulate(np.abs(moved[name][:n] - exact)) + IDA_TOLERANCE * steps * scale
+        bound = _SAFETY * np.maximum.accumulate(np.abs(moved[name][:n] - exact)) + _step_error(scene) * steps * scale
         report.rows.append(QuantityRow.judged(name, ours.time[:n], np.abs(q - exact), bound))
     report.notes.append(
         f"bounds from Algorithm 1 with 4/3 of its stiffness: as much as the midpoint rule changes a step of {h:g} s"
@@ -169,9 +226,15 @@ def _compare_quantity(report: Report, name: str, runs: tuple[Trajectory, ...]) -
     growth = np.maximum(1.0, np.maximum.accumulate(grown))
     report.growth = max(report.growth, float(growth[-1]))
     steps = (times - coarse.time[0]) / size + 1.0
-    floor = IDA_TOLERANCE * steps + SAFETY * (_rounding(report.scene) + coarse.summary.get("neglected_share", 0.0))
-    bound = SAFETY * np.maximum.accumulate(np.abs(q - q_fine)) + floor * growth * scale
+    always = _SAFETY * (_rounding(report.scene) + coarse.summary.get("neglected_share", 0.0))
+    floor = _step_error(report.scene) * steps + always
+    bound = _SAFETY * np.maximum.accumulate(np.abs(q - q_fine)) + floor * growth * scale
     report.rows.append(QuantityRow.judged(name, times, np.abs(q - q_reference), bound))
+
+
+def _step_error(scene: Scene) -> float:
+    """Return the relative error that the spring's integrator may make in a step."""
+    return _LEAST if scene.spring is None else max(_LEAST, scene.spring.relative_tolerance)
 
 
 def _rounding(scene: Scene) -> float:
@@ -209,7 +272,7 @@ def _compare_events(
             moved = max(moved, abs(ours - fine[i].time))
         steps = (time - start) / size + 1.0
         # The unit of time in which the state changes as a whole is what the events so far have taken.
-        bound = SAFETY * moved + IDA_TOLERANCE * steps * report.growth * max(time - start, size)
+        bound = _SAFETY * moved + _step_error(report.scene) * steps * report.growth * max(time - start, size)
         if kind in ("opens", "leaves") and with_scheme_chosen(report.scene)[0].coupling.degree == 0:
             bound += 0.5 * size  # a force known by its means tells no better when it vanishes
         report.events.append(EventRow(kind, ours, time, bound, abs(ours - time) <= bound))
