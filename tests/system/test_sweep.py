@@ -125,7 +125,7 @@ def test_cells_of_a_map_meet_halfway_between_their_values(values, log, borders):
 
 def test_what_multiplies_a_scale_stands_in_the_title_where_nothing_is_over_it(tmp_path, monkeypatch):
     figures = []
-    monkeypatch.setattr(picture.plt, "close", figures.append)
+    monkeypatch.setattr(picture.Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
     columns = {"spring.mass": [1.0, 1.0, 2.0, 2.0], "spring.damping": [0.0, 1.0] * 2, "y_min": [0.0, 1e-7, 2e-7, 3e-7]}
     axes = [parse_axis("spring.mass=1:2:2"), parse_axis("spring.damping=0:1:2")]
     for several in (axes[:1], axes):

@@ -13,7 +13,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, ClassVar
 
-import matplotlib.pyplot as plt
+from matplotlib.figure import Figure
 from rich.text import Text
 
 from ..pictures.drawing import BLACK
@@ -229,10 +229,8 @@ def _row(name: str, refinement: Refinement, elements: Sequence[Record], by_steps
 
 def draw(title: str, sequences: Sequence[Refinement], quantities: Sequence[str], path: Path) -> Path:
     """Draw to ``path`` how far each quantity is from its limit over the size of the mesh, a panel a sequence."""
-    figure, panels = plt.subplots(
-        1, len(sequences), figsize=(6.0 * len(sequences), 5.0), squeeze=False, layout="constrained"
-    )
-    for ax, sequence in zip(panels.flat, sequences, strict=True):
+    figure = Figure(figsize=(6.0 * len(sequences), 5.0), layout="constrained")
+    for ax, sequence in zip(figure.subplots(1, len(sequences), squeeze=False).flat, sequences, strict=True):
         for name, sizes, errors in _errors(sequence, quantities):
             ax.loglog(sizes, errors, ".-", label=name)
         ax.set(xlabel=f"{sequence.refined} of the beam", title=f"more {sequence.refined}")
@@ -247,7 +245,6 @@ def draw(title: str, sequences: Sequence[Refinement], quantities: Sequence[str],
             ax.text(0.5, 0.5, "no quantity converges monotonically", transform=ax.transAxes, ha="center", color=BLACK)
     figure.suptitle(f"{title}: convergence with the mesh")
     figure.savefig(path, dpi=110)
-    plt.close(figure)
     return path
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -36,7 +36,8 @@ def draw(ended: Sequence[Ended], directory: Path) -> list[Path]:
     ):
         wide = 4
         high = -(-(len(SLICES) + 1) // wide)
-        figure, axes = plt.subplots(high, wide, figsize=(4.2 * wide, 3.6 * high), squeeze=False, layout="constrained")
+        figure = Figure(figsize=(4.2 * wide, 3.6 * high), layout="constrained")
+        axes = figure.subplots(high, wide)
         for ax, s in zip(axes.flat, SLICES, strict=False):
             _map(ax, s, _rows(s, ended), panel)
         for ax in axes.flat[len(SLICES) :]:
@@ -45,7 +46,6 @@ def draw(ended: Sequence[Ended], directory: Path) -> list[Path]:
         legend(figure, axes)
         paths.append(directory / f"{name}.png")
         figure.savefig(paths[-1], dpi=100)
-        plt.close(figure)
     return paths
 
 
@@ -94,7 +94,7 @@ def _residuals(ax: Axes, grid: Rows) -> None:
 
 
 def _residual_legend(figure: Figure, axes: np.ndarray) -> None:
-    mappable = plt.cm.ScalarMappable(LogNorm(*_RESIDUALS), "cividis")
+    mappable = ScalarMappable(LogNorm(*_RESIDUALS), "cividis")
     figure.colorbar(mappable, ax=axes, label="largest energy residual / largest energy so far (grey: refused)",
                     shrink=0.6)  # fmt: skip
 

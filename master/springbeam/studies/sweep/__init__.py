@@ -16,7 +16,7 @@ from ...run.outcome import RunStopped
 from ...scene import Scene, SceneError
 from ..accuracy import simulate
 from ..study import Found, Record, Study
-from . import stroboscopic
+from . import picture, stroboscopic
 from .design import Axis, Sampling, compatible, design, parse_axis, varied
 from .metrics import METRICS, PRINCIPAL
 
@@ -99,15 +99,12 @@ class Sweep(Study):
         """Write ``sweep.parquet`` with a row per run, and draw what one or two keys change."""
         import pyarrow.parquet as pq
 
-        from .picture import draw
-
         files = [directory / TABLE]
         pq.write_table(self._table(records), files[0])
         if pictures:
             columns, axes = rows(directory), self.axes
-            picture = directory / PICTURE
-            if draw(columns, axes, self.metric or PRINCIPAL, self.scene.title, picture):
-                files.append(picture)
+            if picture.draw(columns, axes, self.metric or PRINCIPAL, self.scene.title, directory / PICTURE):
+                files.append(directory / PICTURE)
             if self.stroboscopic and stroboscopic.draw(columns, axes, directory):
                 files.append(directory / stroboscopic.PICTURE)
         return files

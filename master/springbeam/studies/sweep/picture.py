@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import XAxis, YAxis
@@ -34,26 +33,21 @@ def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], metrics: Sequence[
         return False
     wide = min(3, len(shown))
     high = -(-len(shown) // wide)
-    figure, panels = plt.subplots(
-        high, wide, figsize=(4.0 * wide, 3.0 * high + 0.4), squeeze=False, layout="constrained"
-    )
+    figure = Figure(figsize=(4.0 * wide, 3.0 * high + 0.4), layout="constrained")
     figure.suptitle(title or "sweep", wrap=True)
-    for ax in panels.flat[len(shown) :]:
-        ax.remove()
-    scales = []
-    for ax, name in zip(panels.flat, shown, strict=False):
-        if len(axes) == 1:
-            scale = _curve(ax, columns[axes[0].name], numbers[name], axes[0])
-        else:
-            scale = _map(figure, ax, columns, numbers[name], axes)
-        scales.append(scale)
+    panels = [figure.add_subplot(high, wide, place) for place in range(1, len(shown) + 1)]
+    scales = [
+        _curve(ax, columns[axes[0].name], numbers[name], axes[0])
+        if len(axes) == 1
+        else _map(figure, ax, columns, numbers[name], axes)
+        for ax, name in zip(panels, shown, strict=True)
+    ]
     figure.draw_without_rendering()  # which decides by what the numbers of a scale are multiplied
-    for ax, name, scale in zip(panels.flat, shown, scales, strict=False):
+    for ax, name, scale in zip(panels, shown, scales, strict=True):
         factor = scale.get_offset_text()
         ax.set_title(f"{heading(name)}   {factor.get_text()}", fontsize="medium")
         factor.set_visible(False)
     figure.savefig(path, dpi=100)
-    plt.close(figure)
     return True
 
 
@@ -75,8 +69,8 @@ def _curve(ax: Axes, at: list[Any], values: np.ndarray, axis: Axis) -> YAxis:
             low = ax.get_ylim()[0]
             ax.plot(position[failed], np.full(failed.sum(), low), "x", color=VERMILLION, clip_on=False)
         if axis.log:
-            _logarithmic(ax.xaxis, position)
-    ax.set_xlabel(_labelled(axis))
+            logarithmic(ax.xaxis, position)
+    ax.set_xlabel(labelled(axis))
     ax.grid(alpha=0.3)
     return ax.yaxis
 
@@ -104,10 +98,10 @@ def _map(figure: Figure, ax: Axes, columns: dict[str, list[Any]], values: np.nda
         if word:
             set_ticks(range(len(level)), [str(v) for v in level])
         elif axis.log:
-            _logarithmic(drawn, np.array(level, dtype=float))
+            logarithmic(drawn, np.array(level, dtype=float))
         elif grid and len(level) <= _FEW:
             set_ticks(level)
-    ax.set(xlabel=_labelled(axes[0]), ylabel=_labelled(axes[1]))
+    ax.set(xlabel=labelled(axes[0]), ylabel=labelled(axes[1]))
     return figure.colorbar(picture, ax=ax).ax.yaxis
 
 
@@ -121,13 +115,13 @@ def borders_between(values: np.ndarray, log: bool) -> np.ndarray:
     return np.asarray(np.exp(borders) if log else borders)
 
 
-def _labelled(axis: Axis) -> str:
+def labelled(axis: Axis) -> str:
     """Return a varied key with its unit."""
     unit = unit_of(axis.table, axis.key)
     return f"{axis.name} [{unit}]" if unit != "–" else axis.name
 
 
-def _logarithmic(axis: XAxis | YAxis, values: np.ndarray) -> None:
+def logarithmic(axis: XAxis | YAxis, values: np.ndarray) -> None:
     """Make an axis logarithmic, with plain numbers at decades, and at 2 and 5 if there are few."""
     (axis.axes.set_xscale if isinstance(axis, XAxis) else axis.axes.set_yscale)("log")
     wide = np.max(values) > 20.0 * np.min(values)

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from ...pictures.drawing import BLUE, VERMILLION
 from ...results.trajectory import Trajectory
 from ...scene import Load, Scene, SceneError
 from .design import Axis
+from .picture import labelled, logarithmic
 
 #: What is kept of each run beside its metrics: positions at equal phase [m], and half the range of the motion [m].
 POINTS, PEAK = "stroboscopic", "peak_response"
@@ -46,7 +47,8 @@ def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], directory: Path) -
     if len(axes) != 1 or any(isinstance(value, str) for value in columns[axes[0].name]):
         return False
     at = np.array(columns[axes[0].name], dtype=float)
-    figure, (upper, lower) = plt.subplots(2, 1, figsize=(7.0, 7.0), sharex=True, layout="constrained")
+    figure = Figure(figsize=(7.0, 7.0), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
     for x, positions in zip(at, columns[POINTS], strict=True):
         if positions is not None:
             upper.plot(np.full(len(positions), x), positions, ".", color=BLUE, markersize=2.0)
@@ -54,11 +56,10 @@ def draw(columns: dict[str, list[Any]], axes: Sequence[Axis], directory: Path) -
     peaks = np.array([np.nan if peak is None else peak for peak in columns[PEAK]], dtype=float)
     lower.plot(at[order], peaks[order], ".-", color=VERMILLION, linewidth=1.0)
     upper.set_ylabel("position once a period of the drive [m]")
-    lower.set(ylabel="half the range of the motion [m]", xlabel=axes[0].name)
+    lower.set(ylabel="half the range of the motion [m]", xlabel=labelled(axes[0]))
     for ax in (upper, lower):
         ax.grid(alpha=0.3)
         if axes[0].log:
-            ax.set_xscale("log")
+            logarithmic(ax.xaxis, at)
     figure.savefig(directory / PICTURE, dpi=100)
-    plt.close(figure)
     return True

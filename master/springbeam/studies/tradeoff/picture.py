@@ -6,8 +6,8 @@ import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from ...pictures.drawing import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILLION
 from ...scene import Scene
@@ -36,7 +36,8 @@ def draw(scene: Scene, found: Points, notes: Sequence[str], path: Path) -> Path:
     same = [p for p in found.points if not p.refined and p.errors is not None]
     models = [p for p in found.points if p.refined and p.errors is not None]
     columns = 3 if models else 2
-    figure, axes = plt.subplots(1, columns, figsize=(6.0 * columns, 6.5), layout="constrained")
+    figure = Figure(figsize=(6.0 * columns, 6.5), layout="constrained")
+    axes = figure.subplots(1, columns)
     _curves(axes[0], same, lambda p: p.solve * 1e3)
     front = found.front()
     axes[0].plot(
@@ -60,7 +61,6 @@ def draw(scene: Scene, found: Points, notes: Sequence[str], path: Path) -> Path:
         title="\n".join(lines) or None, title_fontsize="small", alignment="left",
     )  # fmt: skip
     figure.savefig(path, dpi=110)
-    plt.close(figure)
     return path
 
 
