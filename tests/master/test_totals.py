@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from springbeam.results.steps import STEP
-from springbeam.results.totals import totals
+from springbeam.results.totals import shortest_contact, totals
 from springbeam.results.trajectory import Event
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.resolution import force_window, slowest_frequency
@@ -85,6 +85,16 @@ def test_durations_and_rebound():
     assert numbers["contact_duration_total"] == pytest.approx(0.2 + 0.1 + 0.1, rel=1e-14)
     assert numbers["rebound_velocity"] == 0.25  # of the last contact that has opened
     assert "rebound_velocity" not in found(steps, events[0], apart=False)
+
+
+def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_an_impulse():
+    """0.2 s at 1 N; then 0.1 s without force, and one whose end came just before an interruption."""
+    steps = steps_with(lambda t: (float(t < 0.4), 0.0, 0.0), np.linspace(0.0, 0.8, 9))
+    times = (0.1, 0.3, 0.5, 0.6, 0.75, 0.9)
+    events = [Event(time, ("impact", "separation")[k % 2]) for k, time in enumerate(times)]
+    assert shortest_contact(steps, events, 1.0, free_at_end=True) == pytest.approx(0.2, rel=1e-14)
+    assert shortest_contact(steps, events, 0.15, free_at_end=True) == np.inf
+    assert shortest_contact(steps[:0], events, 1.0, free_at_end=True) == np.inf
 
 
 def test_a_tie_has_neither_duration_nor_rebound():

@@ -105,12 +105,15 @@ def totals(
 def shortest_contact(steps: np.ndarray | None, events: Iterable[Event], below: float, *, free_at_end: bool) -> float:
     """Return how long the shortest contact or rest on the foundation that has ended lasts [s]; ∞ if not ``below`` [s].
 
-    Those that pass on hardly any impulse are left out. Other parameters as of `totals`.
+    Those that pass on hardly any impulse are left out, and one whose end has no row, of a run that was interrupted
+    there. Other parameters as of `totals`.
     """
-    events = list(events)
+    if steps is None or len(steps) == 0:
+        return inf
+    events = [event for event in events if event.time <= steps["time"][-1]]
     intervals = [*tip_contacts(events, inf, free_at_end=free_at_end), *foundation_contacts(events, inf)]
     short = [(since, until) for since, until in intervals if 0.0 < until - since < below]
-    if not short or steps is None:
+    if not short:
         return inf
     before, after = _cumulative(steps, events)
     first, last = (np.searchsorted(steps["time"], times) for times in np.transpose(short))
