@@ -60,22 +60,47 @@ def test_each_fmu_of_a_scene_is_loaded_once_and_no_other(counted, name):
     assert set(scene.fmus) == {body for body in ("beam", "spring") if getattr(scene, body) is not None}
 
 
-@pytest.mark.parametrize("coupling", [{}, {"degree": 2}, {"scheme": "hermite", "degree": 1}])
-def test_flight_before_contact_costs_one_step_of_each_body(counted, coupling):
-    """The elastic approach: nothing is iterated, nothing taken back, no slope of a force is set."""
-    approach = {"approach": "elastic", "initial_deflection_slope": 0.5, "n_elements": 10}
-    run, calls = counted(
-        with_changes(load_scene("soft"), beam=approach, time={"t_end": 0.05}, coupling={"macro_step": 1e-3, **coupling})
-    )
+SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3})
+APART = with_changes(SOFT, beam={"approach": "elastic", "initial_deflection_slope": 0.5}, time={"t_end": 0.05})
+PULSE = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.01}
+PAIR = ("beam", "spring")
+#: Scenes without contact or impact, how many macro steps they have, and their FMUs.
+FLIGHTS: dict[str, tuple[Scene, int, tuple[str, ...]]] = {
+    "energy 0": (APART, 50, PAIR),
+    "energy 2": (with_changes(APART, coupling={"degree": 2}), 50, PAIR),
+    "hermite 1": (with_changes(APART, coupling={"scheme": "hermite", "degree": 1}), 50, PAIR),
+    "compliance": (with_changes(APART, contact={"law": "compliance"}), 50, PAIR),
+    "loads": (with_changes(APART, loads=[PULSE, {"on": "beam", "at": 0.5, "amplitude": 0.1}]), 50, PAIR),
+    "spring alone": (with_changes(load_scene("duffing"), time={"t_end": 0.2}), 20, ("spring",)),
+    "beam alone": (with_changes(load_scene("beam-on-stop"), time={"t_end": 0.02}, stop=None), 20, ("beam",)),
+    "quasi-static": (
+        with_changes(
+            SOFT,
+            beam={"fidelity": "quasi_static", "approach": "elastic", "initial_velocity_slope": 0.0},
+            spring={"equilibrium": -0.01, "initial_velocity": -0.001},
+            contact={"law": "compliance"},
+            coupling={"feedback": "beam_drives"},
+            time={"t_end": 0.04},
+        ),
+        40,
+        ("spring",),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_flight_costs_one_step_of_each_fmu(counted, name):
+    """Nothing is iterated, nothing taken back; no slope of an input is set, but of a load in the 10 steps it varies."""
+    scene, n, fmus = FLIGHTS[name]
+    run, calls = counted(scene)
     assert set(run.phase) == {"free"}
-    assert run.summary["macro_steps"] == 50
-    assert run.summary["iterations"] == 0
-    for body in ("beam", "spring"):
-        assert calls[body, "fmi2DoStep"] == 50
-        assert calls[body, "fmi2SetReal"] == 51  # the parameters, then the force; no load, no impulse
-        assert calls[body, SET_SLOPES] == 0
-        assert calls[body, "fmi2GetFMUstate"] == 50
-        assert calls[body, "fmi2SetFMUstate"] == 0
+    assert (run.summary["macro_steps"], run.summary["iterations"]) == (n, 0)
+    assert {body for body, _ in calls} == set(fmus)
+    for body in fmus:
+        # Values are set with the parameters, then with each force; no load and no impulse by itself.
+        made = [calls[body, f"fmi2{function}"] for function in ("DoStep", "GetFMUstate", "SetFMUstate", "SetReal")]
+        assert made == [n, n, 0, n + 1]
+        assert calls[body, SET_SLOPES] == (10 if (name, body) == ("loads", "beam") else 0)
 
 
 @pytest.mark.parametrize(
@@ -90,55 +115,17 @@ def test_a_tied_step_costs_two_steps_of_each_body(H, scheme, degree):
         assert summary[f"{body}_steps"] <= 2 * summary["macro_steps"] + 3 * (degree + 1)
 
 
-def test_a_load_sets_slopes_while_it_varies_and_makes_no_other_call(counted):
-    """Without loads these are 50 steps, 51 fmi2SetReal and no slopes (above); the pulse lasts for 10 steps."""
-    approach = {"approach": "elastic", "initial_deflection_slope": 0.5, "n_elements": 10}
-    pulse = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.01}
-    scene = with_changes(load_scene("soft"), beam=approach, time={"t_end": 0.05}, coupling={"macro_step": 1e-3})
-    run, calls = counted(with_changes(scene, loads=[pulse, {"on": "beam", "at": 0.5, "amplitude": 0.1}]))
-    assert run.summary["macro_steps"] == 50
-    assert calls["beam", SET_SLOPES] == 10
-    assert calls["spring", SET_SLOPES] == 0
-    for body in ("beam", "spring"):
-        assert (calls[body, "fmi2DoStep"], calls[body, "fmi2SetReal"]) == (50, 51)
-
-
-def test_a_compliant_pair_apart_costs_one_step_of_each_body(counted):
-    apart = {"approach": "elastic", "initial_deflection_slope": 0.5, "n_elements": 10}
-    law = {"law": "compliance"}
-    run, calls = counted(with_changes(load_scene("soft"), beam=apart, contact=law, time={"t_end": 0.05}))
-    assert run.summary["iterations"] == 0
-    assert calls["beam", "fmi2DoStep"] == calls["spring", "fmi2DoStep"] == run.summary["macro_steps"] == 200
-
-
 def test_nothing_is_stepped_before_the_undeformed_tip_arrives(counted):
     """Contact at 0.5 s, after 500 macro steps that are not made; then 10 that are, the first one cut in two."""
-    beam = {"initial_deflection_slope": 0.5, "n_elements": 10}
-    scene = with_changes(load_scene("soft"), beam=beam, time={"t_end": 0.51}, coupling={"macro_step": 1e-3})
-    run, calls = counted(scene)
+    run, calls = counted(with_changes(SOFT, beam={"initial_deflection_slope": 0.5}, time={"t_end": 0.51}))
     assert run.time[0] == 0.5
     assert run.summary["macro_steps"] == 11
     assert calls["beam", "fmi2GetFMUstate"] == calls["spring", "fmi2GetFMUstate"] == 12  # the impact's, and each step's
 
 
-@pytest.mark.parametrize("name", ["duffing", "beam-on-stop"])
-def test_a_body_alone_takes_one_step_a_macro_step_but_for_events(counted, name):
-    scene = load_scene(name)
-    flight = with_changes(scene, time={"t_end": 20.0 * scene.coupling.macro_step}, stop=None)
-    run, calls = counted(flight)
-    (body,) = scene.fmus
-    assert calls[body, "fmi2DoStep"] == run.summary["macro_steps"] == 20
-    assert calls[body, "fmi2SetFMUstate"] == 0
-    assert calls[body, SET_SLOPES] == 0
-    assert run.summary["iterations"] == 0
-
-
 def test_a_constant_force_sets_no_slopes_and_one_that_varies_does(counted):
-    scene = with_changes(
-        load_scene("soft"), beam={"n_elements": 10}, time={"t_end": 0.02}, coupling={"macro_step": 1e-3}
-    )
     for degree in (0, 1):
-        _, calls = counted(with_changes(scene, coupling={"degree": degree}))
+        _, calls = counted(with_changes(SOFT, time={"t_end": 0.02}, coupling={"degree": degree}))
         assert (calls["beam", SET_SLOPES] > 0) == (degree > 0)
 
 
@@ -178,18 +165,3 @@ def test_one_way_coupling_steps_the_driving_fmu_once(counted):
     assert calls["beam", "fmi2DoStep"] == run.summary["macro_steps"] == both.summary["macro_steps"] == 200
     assert beam_steps > 250
     assert calls["beam", "fmi2SetFMUstate"] == 0
-
-
-def test_a_quasi_static_beam_that_drives_leaves_one_fmu_and_no_iteration_while_apart(counted):
-    beam = {"fidelity": "quasi_static", "approach": "elastic", "initial_velocity_slope": 0.0}
-    scene = with_changes(
-        load_scene("soft"),
-        beam=beam,
-        spring={"equilibrium": -0.01, "initial_velocity": -0.001},
-        contact={"law": "compliance"},
-        coupling={"feedback": "beam_drives"},
-        time={"t_end": 0.01},
-    )
-    run, calls = counted(scene)
-    assert {body for body, _ in calls} == {"spring"}
-    assert calls["spring", "fmi2DoStep"] == run.summary["macro_steps"] == 40
