@@ -136,6 +136,15 @@ def decimated(time: np.ndarray, values: np.ndarray, columns: int = PIXEL_COLUMNS
     return np.unique(keep)
 
 
+def pairs(times: np.ndarray, number: int) -> np.ndarray:
+    """Return the rows of ``number`` pairs of successive times, evenly spread.
+
+    Single rows of what alternates from row to row might all be of one kind.
+    """
+    first = np.searchsorted(times, np.linspace(times[0], times[-1], number))
+    return np.unique(np.append(first, first + 1).clip(max=len(times) - 1))
+
+
 class EventMark(NamedTuple):
     """The events of one kind: look and marker with how many they are, times [s] and what each lost [J]."""
 

@@ -19,6 +19,7 @@ from .drawing import (
     length_along,
     much_smaller,
     near_levels,
+    pairs,
     present,
     readable_unit,
 )
@@ -180,8 +181,9 @@ def frames_of(trajectory: Trajectory) -> Frames | None:
         return None
     if len(time) < 2 or time[-1] <= time[0]:
         return None
-    some = _thinned(time)
-    time, deflection = time[some], None if deflection is None else deflection[some]
+    if len(time) > MOST_FRAMES:
+        some = pairs(time, MOST_FRAMES // 2)
+        time, deflection = time[some], None if deflection is None else deflection[some]
     row = np.searchsorted(rows, time, side="right") - 1
     y = trajectory["y"][row] if "y" in trajectory.columns else None
     moving = [part for part in (deflection, y) if part is not None]
@@ -191,12 +193,3 @@ def frames_of(trajectory: Trajectory) -> Frames | None:
     span = high - low or 1.0
     foot = low - _COIL * span if y is not None else low - 2.0 * _ROOM * span
     return Frames(time, row, deflection, y, near, foot, high + _ROOM * span, foot)
-
-
-def _thinned(time: np.ndarray) -> np.ndarray:
-    """Return the indices of at most `MOST_FRAMES`: pairs at evenly spaced times, since every second one of frames that
-    alternate would hide it."""
-    if len(time) <= MOST_FRAMES:
-        return np.arange(len(time))
-    first = np.searchsorted(time, np.linspace(time[0], time[-1], MOST_FRAMES // 2))
-    return np.unique(np.append(first, first + 1).clip(max=len(time) - 1))

@@ -12,9 +12,8 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
 from ..results.directory import PICTURES
@@ -29,6 +28,7 @@ from .drawing import (
     drawable,
     length_along,
     near_levels,
+    pairs,
     present,
     readable_unit,
 )
@@ -101,9 +101,9 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
     steps = np.diff(times)
     some = steps > 1e-6 * np.max(steps, initial=0.0)  # between rows of one event Δu is rounding
     velocities = np.diff(shapes, axis=0)[some] / steps[some, None]
-    _curves(figure, left, trajectory, times, shapes, "deflection u", "m", bar=False)
+    _curves(left, trajectory, times, shapes, "deflection u", "m", bar=False)
     middles = 0.5 * (times[1:] + times[:-1])[some]
-    _curves(figure, right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s", bar=True)
+    _curves(right, trajectory, middles, velocities, "mean velocity Δu/Δt", "m/s", bar=True)
     seen = (trajectory["time"] >= times[0]) & (trajectory["time"] <= times[-1])
     fastest = float(np.max(np.abs(trajectory["v_tip"][seen]), initial=0.0))
     if fastest > 3.0 * float(np.max(np.abs(velocities))):
@@ -123,34 +123,24 @@ def _shapes_later(trajectory: Trajectory) -> Figure | None:
     figure = figure_for(trajectory, "(B) Subsequent motion of the beam", 3.6)
     left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
     jumpy = alternates(shapes[:, -1])
-    # Of shapes that alternate, evenly spaced ones may all be of one kind: pairs show both.
-    wanted = np.linspace(times[0], times[-1], _SHAPES_LATER // 2 if jumpy else _SHAPES_LATER)
-    some = np.searchsorted(times, wanted)
-    some = np.unique((np.append(some, some + 1) if jumpy else some).clip(max=len(times) - 1))
-    _curves(figure, left, trajectory, times[some], shapes[some], "deflection u", "m", bar=True)
-    _map(figure, right, trajectory, times, shapes)
+    evenly = np.searchsorted(times, np.linspace(times[0], times[-1], _SHAPES_LATER))
+    some = pairs(times, _SHAPES_LATER // 2) if jumpy else np.unique(evenly)
+    _curves(left, trajectory, times[some], shapes[some], "deflection u", "m", bar=True)
+    _map(right, trajectory, times, shapes)
     if jumpy:
         left.set_title("pairs of successive shapes: they alternate\nfrom step to step", **REMARK)
     return figure
 
 
 def _curves(
-    figure: Figure,
-    ax: Axes,
-    trajectory: Trajectory,
-    times: np.ndarray,
-    curves: np.ndarray,
-    what: str,
-    unit: str,
-    *,
-    bar: bool,
+    ax: Axes, trajectory: Trajectory, times: np.ndarray, curves: np.ndarray, what: str, unit: str, *, bar: bool
 ) -> None:
     """Draw curves over x, coloured from early (dark) to late; beside deflections [m] the levels that are near."""
     readable, clock = readable_unit([curves], unit), readable_unit([times], "s")
     x = _along_the_beam(ax, trajectory)
-    norm = Normalize(clock.factor * times[0], clock.factor * times[-1])
-    lines = [np.column_stack([x, readable.factor * curve]) for curve in curves]
-    ax.add_collection(LineCollection(lines, array=clock.factor * times, cmap=_CLOCK, norm=norm, linewidths=1.0))
+    segments = [np.column_stack([x, readable.factor * curve]) for curve in curves]
+    lines = LineCollection(segments, array=clock.factor * times, cmap=_CLOCK, linewidths=1.0)
+    ax.add_collection(lines)
     ax.axhline(0.0, color=GREY, lw=0.5, zorder=0)
     ax.set_xlim(x[0], x[-1])
     ax.set_ylabel(f"{what} [{readable.name}]")
@@ -159,11 +149,10 @@ def _curves(
         near = near_levels(trajectory.scene, [curves])
         paint_levels(ax, {symbol: readable.factor * height for symbol, height in near.items()})
     if bar:
-        mappable = ScalarMappable(norm, _CLOCK)
-        figure.colorbar(mappable, ax=ax, label=f"time t [{clock.name}]", pad=0.05, aspect=30)
+        ax.figure.colorbar(lines, ax=ax, label=f"time t [{clock.name}]", pad=0.05, aspect=30)
 
 
-def _map(figure: Figure, ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray) -> None:
+def _map(ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray) -> None:
     """Draw the deflection over x and t."""
     readable, clock = readable_unit([shapes], "m"), readable_unit([times], "s")
     x = _along_the_beam(ax, trajectory)
@@ -173,7 +162,7 @@ def _map(figure: Figure, ax: Axes, trajectory: Trajectory, times: np.ndarray, sh
     mesh = ax.pcolormesh(x, clock.factor * times, readable.factor * shapes, cmap="PuOr", vmin=-largest, vmax=largest,
                          shading="gouraud", rasterized=True)  # fmt: skip
     ax.set_ylabel(f"time t [{clock.name}]")
-    figure.colorbar(mesh, ax=ax, label=f"deflection u [{readable.name}]", pad=0.02, aspect=30)
+    ax.figure.colorbar(mesh, ax=ax, label=f"deflection u [{readable.name}]", pad=0.02, aspect=30)
 
 
 def _along_the_beam(ax: Axes, trajectory: Trajectory) -> np.ndarray:
