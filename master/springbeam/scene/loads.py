@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, field_serializer, model_validator
+from pydantic import Field, model_validator
 
 from .tables import Table, key
 
@@ -58,10 +58,6 @@ class Load(Table):
     )  # fmt: skip
     file: str | None = key("–", "file of a table, relative to that of the scene", None, otherwise="needed with table")
     interpolation: Literal["linear", "cubic"] = key("–", "between the lines of a table", "linear")
-
-    @field_serializer("shape")
-    def _as_in_a_file(self, shape: tuple[float, ...] | None) -> list[float] | None:
-        return None if shape is None else list(shape)
 
     @model_validator(mode="after")
     def _keys_of_signal(self) -> Load:
