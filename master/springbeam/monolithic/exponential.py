@@ -12,8 +12,6 @@ so that no event slips through between two nodes. Beams whose fast modes stay si
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.linalg
 
@@ -34,15 +32,6 @@ _UNSEEN_DISPLACEMENT, _UNSEEN_FORCE, _UNSEEN_ENERGY = 1e-12, 1e-9, 1e-13
 _TAIL = 1e-12
 _SMALLEST_SHARE = 2.0**-60
 _CACHED_SIZES = 64
-
-
-@dataclass(frozen=True)
-class _Weights:
-    """Those of a step, and what follows from them for the phase; p modes, o interface outputs, k inputs."""
-
-    modes: StepWeights
-    interface: np.ndarray  #: (o, stages, k, stages): r at the Gauss points → w there
-    interface_dot: np.ndarray
 
 
 class LinearForm:
@@ -116,7 +105,7 @@ class LinearForm:
         self.extra_damping = p.damping - s.alpha_b * p.linear_stiffness
         self.oscillators = Oscillators(self.omega2, s.alpha_b)
         self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
-        self._cache: dict[str, _Weights] = {}
+        self._cache: dict[str, StepWeights] = {}
 
     def _split(self) -> tuple[float, tuple[float, float] | None]:
         """`linked`, and the (k, c) that it leaves of a linear law; ``None`` where the law is not linear."""
@@ -165,25 +154,16 @@ class LinearForm:
             result[-1] = s.law.force(p, rate) if self.rest is None else self.rest[0] * p + self.rest[1] * rate
         return result
 
-    def weights(self, size: float) -> _Weights:
+    def weights(self, size: float) -> StepWeights:
         """Weights of a step of ``size`` [s]; the last ones used are kept."""
         key = f"{size:.12e}"
         known = self._cache.pop(key, None)
         if known is None:
-            known = self._new_weights(size)
+            known = self.oscillators.weights(size)
             if len(self._cache) >= _CACHED_SIZES:
                 self._cache.pop(next(iter(self._cache)))
         self._cache[key] = known
         return known
-
-    def _new_weights(self, size: float) -> _Weights:
-        modes = self.oscillators.weights(size)
-        pairs = self.outputs[:, None, :] * self.inputs  # (o, k, p)
-        return _Weights(
-            modes=modes,
-            interface=np.einsum("okp,ijp->oikj", pairs, modes.force[:-1]),
-            interface_dot=np.einsum("okp,ijp->oikj", pairs, modes.force_dot[:-1]),
-        )
 
     def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray, time: float) -> float:
         """Step size [s] that resolves the free motion seen in displacements, contact forces and dissipation.
@@ -268,26 +248,20 @@ class ExponentialPropagator:
     def _step(self, size: float, xi: np.ndarray, xi_dot: np.ndarray, start: np.ndarray) -> Segment | None:
         """One step, or None where it is too long for the forces r, whose values at its start are given."""
         form, X = self.form, self.X
-        weights = form.weights(size)
-        w = weights.modes
+        w = form.weights(size)
         s = form.system
         times = X[s.T] + size * GAUSS.nodes
         load = form.load_at(times)
-        free = w.C * xi + w.S * xi_dot + np.einsum("ijp,jp->ip", w.force, load)
-        free_dot = w.C_dot * xi + w.S_dot * xi_dot + np.einsum("ijp,jp->ip", w.force_dot, load)
-        if len(form.inputs):
-            r = self._forces(weights, free[:-1] @ form.outputs.T, free_dot[:-1] @ form.outputs.T, start)
-            if r is None:
-                return None
-            load = r.T @ form.inputs
-            free = free + np.einsum("ikj,kj->ij", w.force, load)
-            free_dot = free_dot + np.einsum("ikj,kj->ij", w.force_dot, load)
-            root_mobility = np.sqrt(form.mobility)
-            self._speed = max(self._speed, float(np.max(np.abs(free_dot @ form.inputs.T / root_mobility))))
-            tail = np.sum(np.abs(r @ GAUSS.transform[-2:].T), axis=1)
-            if np.any(tail * size * root_mobility > _TAIL * self._speed):
-                return None
-        states = form.unpack(free, free_dot, X)
+        r = self._forces(w, xi, xi_dot, load, start)
+        if r is None:
+            return None
+        xi, xi_dot = w.motion(xi, xi_dot, load + r.T @ form.inputs)
+        root_mobility = np.sqrt(form.mobility)
+        self._speed = max(self._speed, float(np.max(np.abs(xi_dot @ form.inputs.T / root_mobility), initial=0.0)))
+        tail = np.sum(np.abs(r @ GAUSS.transform[-2:].T), axis=1)
+        if np.any(tail * size * root_mobility > _TAIL * self._speed):
+            return None
+        states = form.unpack(xi, xi_dot, X)
         if not np.all(np.isfinite(states)):
             return None
         states[:-1, s.T], states[-1, s.T] = times, X[s.T] + size
@@ -306,14 +280,17 @@ class ExponentialPropagator:
 
         return Segment(nodes, states, inside)
 
-    def _forces(self, w: _Weights, free: np.ndarray, free_dot: np.ndarray, start: np.ndarray) -> np.ndarray | None:
-        """r = R(w, ẇ) at the Gauss points by fixed-point iteration; ``free`` (stages, o) is w without r."""
-        r = np.repeat(start, STAGES, axis=1)
+    def _forces(
+        self, w: StepWeights, xi: np.ndarray, xi_dot: np.ndarray, load: np.ndarray, start: np.ndarray
+    ) -> np.ndarray | None:
+        """r = R(w, ẇ) at the Gauss points, (k, stages), by fixed-point iteration; ``load`` are all other forces."""
+        form, r = self.form, np.repeat(start, STAGES, axis=1)
+        if not len(r):
+            return r
         for iteration in range(_MAX_ITERATIONS):
-            displacement = free.T + np.tensordot(w.interface, r, axes=2)
-            velocity = free_dot.T + np.tensordot(w.interface_dot, r, axes=2)
+            displacements, velocities = w.motion(xi, xi_dot, load + r.T @ form.inputs)
             with np.errstate(over="ignore", invalid="ignore"):  # an escaping spring; found below
-                new = self.form.forces(displacement, velocity, self.X)
+                new = form.forces(form.outputs @ displacements[:-1].T, form.outputs @ velocities[:-1].T, self.X)
             if not np.all(np.isfinite(new)):
                 return None
             change, scale = np.max(np.abs(new - r)), np.max(np.abs(new))

@@ -61,6 +61,11 @@ class StepWeights:
     force: np.ndarray  #: (targets, stages, p): ∫₀^τ S(τ − ν) ℓ_k(ν) dν
     force_dot: np.ndarray  #: the same with Ṡ
 
+    def motion(self, xi: np.ndarray, xi_dot: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ξ and ξ̇ at the targets, (targets, p), from those at the start and forces ``load`` (stages, p)."""
+        moved = self.C * xi + self.S * xi_dot + np.einsum("ijp,jp->ip", self.force, load)
+        return moved, self.C_dot * xi + self.S_dot * xi_dot + np.einsum("ijp,jp->ip", self.force_dot, load)
+
 
 class Oscillators:
     """p oscillators.
