@@ -99,7 +99,7 @@ class _Run:
     def __init__(self, scene: Scene, method: Method, velocity_perturbation: float, t_end: float | None) -> None:
         self.scene, self.method, self.system = scene, method, _system(scene)
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
-        if self.system.two_ends and self.system.law.rigid and scene.contact.impact == "rest":
+        if scene.coupled and self.system.law.rigid and scene.contact.impact == "rest":
             raise ValueError(
                 "contact.impact = 'rest' leaves tip and spring with different velocities, which the rigid tie of law "
                 f"'{scene.contact.law}' excludes; allowed here: 'inelastic', 'tip'"

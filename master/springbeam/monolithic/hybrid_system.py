@@ -67,11 +67,6 @@ class HybridSystem:
     def dissipative(self) -> bool:
         return self.alpha_b > 0.0 or self.spring.damping > 0.0 or self.law.dissipative
 
-    @property
-    def two_ends(self) -> bool:
-        """Whether the law acts between the tip and a lower end, the spring top or an elastic stop at y = φ."""
-        return self.scene.coupled
-
     def joined(self, phase: Phase) -> bool:
         """Whether u = y holds as a constraint."""
         return self.alone or self.law.holds(phase.contact)
@@ -80,16 +75,13 @@ class HybridSystem:
         """Whether the tip stands on the foundation, u = φ."""
         return phase.seated and self.joined(phase)
 
-    def spring_force(self, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """s = f_s − α_s z − k1 y − k2 y³ [N]."""
-        p = self.spring
-        return np.asarray(p.external_force - p.damping * z - (p.linear_stiffness + p.cubic_stiffness * y**2) * y)
-
     def _own_forces(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return p, (..., r), and s [N], (...), of states."""
         a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
-        p = self.load - self.stiffness * (a + self.alpha_b * v)
-        s = self.spring_force(y, z) if self.has_spring else np.zeros_like(y)
+        p, spring, s = self.load - self.stiffness * (a + self.alpha_b * v), self.spring, np.zeros_like(y)
+        if self.has_spring:
+            elastic = (spring.linear_stiffness + spring.cubic_stiffness * y**2) * y
+            s = spring.external_force - spring.damping * z - elastic
         if len(self.loads):
             values = self.loads.values(X[..., self.T].real)
             p, s = p + values @ self.loads.patterns, s + values @ self.loads.on_spring

@@ -31,7 +31,7 @@ class Rows:
         s = self._system
         states = np.array([X for _, X, _, _ in self._rows]).reshape(len(self._rows), s.size)
         columns = self._columns(states)
-        if s.two_ends:
+        if s.scene.coupled:
             columns["compliance_force"] = s.law.inside(columns["contact_force"], columns["u_tip"])
         loads = s.loads.values(columns["time"])
         columns |= {f"load_{i}": values for i, values in enumerate(loads.T)}

@@ -41,7 +41,7 @@ class HybridState:
     def watched(self) -> list[Watch]:
         """Return the functions that are ≥ 0 as long as the phase lasts."""
         s, phi = self.system, self.system.stop.position
-        watched = s.law.watched(self.phase) if s.two_ends else []
+        watched = s.law.watched(self.phase) if s.scene.coupled else []
         if self.phase.seated:
             return [*watched, Watch("unseat", lambda m: m.N, "N")]
         if s.scene.stop is not None and not s.scene.elastic_stop:
@@ -71,7 +71,7 @@ class HybridState:
             return
         m = s.motion(self.phase, X)
         noise = s.noise("m", X)
-        if s.two_ends and float(m.u - m.y) <= noise:
+        if s.scene.coupled and float(m.u - m.y) <= noise:
             if m.v <= m.z:
                 self._meet()
         elif s.alone and s.scene.stop is not None and m.u - s.stop.position <= noise:
