@@ -27,7 +27,7 @@ def test_legendre_coefficients_and_derivatives_are_one_polynomial(a, size):
     assert force.legendre(f, size, len(a) - 1) == pytest.approx(a, abs=bound)
     for tau in (0.0, 0.31 * size, size):
         assert force.value(f, tau) == pytest.approx(exact(tau), abs=2 * bound)
-    assert force.end_value(f, size) == pytest.approx(sum(a), abs=2 * bound)  # P_k(1) = 1
+    assert force.value(f, size) == pytest.approx(sum(a), abs=2 * bound)  # P_k(1) = 1
     assert force.mean(f, size) == pytest.approx(a[0], abs=2 * bound)  # P_k ⊥ 1 for k > 0
 
 
@@ -41,7 +41,7 @@ def test_cut_above_a_degree_is_the_best_fit():
 def test_shifted_is_the_same_polynomial():
     f, size = force.derivatives((0.7, -2.3, 1.9), 0.25), 0.25
     g = force.shifted(f, size)
-    assert g[0] == force.end_value(f, size)
+    assert g[0] == force.value(f, size)
     assert [force.value(g, tau) for tau in (-0.25, 0.1)] == pytest.approx(
         [force.value(f, tau + size) for tau in (-0.25, 0.1)], rel=1e-14
     )

@@ -125,7 +125,7 @@ def smooth_phase(scheme: str, degree: int, count: int) -> tuple[np.ndarray, np.n
     size = T / count
     rows = couple(scheme, degree, size, count, *after_impact(3))
     u = np.array([(row.beam.displacement, row.beam.velocity) for row in rows[:-1]]).T
-    c = [0.5 * (force.end_value(a.force, size) + b.force[0]) for a, b in pairwise(rows)]
+    c = [0.5 * (force.value(a.force, size) + b.force[0]) for a, b in pairwise(rows)]
     return u[0], u[1], np.array(c)
 
 

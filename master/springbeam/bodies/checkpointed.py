@@ -24,7 +24,8 @@ class Checkpointed:
 
     def save(self) -> dict[str, Any]:
         """The attributes that are checkpointed, by name, parts as nested dicts; lists and arrays are the run's own."""
-        return {name: _saved(getattr(self, name)) for name in self.checkpointed_names()}
+        parts = {name: getattr(self, name) for name in self.checkpointed_names()}
+        return {name: part.save() if isinstance(part, Checkpointed) else part for name, part in parts.items()}
 
     def restore(self, saved: dict[str, Any]) -> None:
         """Continue from what `save` of an equal part returned. Raises ValueError if it was another kind of part."""
@@ -37,7 +38,3 @@ class Checkpointed:
                 part.restore(saved[name])
             else:
                 setattr(self, name, saved[name])
-
-
-def _saved(value: Any) -> Any:
-    return value.save() if isinstance(value, Checkpointed) else value

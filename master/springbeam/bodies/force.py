@@ -22,11 +22,6 @@ def derivatives(a: Sequence[float], size: float) -> Force:
     return (a[0] - a[1] + a[2], (2.0 * a[1] - 6.0 * a[2]) / size, 12.0 * a[2] / (size * size))
 
 
-def end_value(force: Force, size: float) -> float:
-    """C(H) [N]."""
-    return force[0] + size * (force[1] + 0.5 * size * force[2])
-
-
 def value(force: Force, tau: float) -> float:
     """C(τ) [N]."""
     return force[0] + tau * (force[1] + 0.5 * tau * force[2])
@@ -46,13 +41,13 @@ def work_on(force: Force, start: Motion, end: Motion, size: float) -> float:
     """Return ∫ C ẇ dτ [J] over a step on an end that moves from ``start`` to ``end``, by parts: C Δw − ∫ Ċ Δw."""
     w0 = start.displacement
     once, twice = end.integral - w0 * size, end.integral_2 - 0.5 * w0 * size * size
-    return end_value(force, size) * (end.displacement - w0) - force[1] * once - force[2] * (size * once - twice)
+    return value(force, size) * (end.displacement - w0) - force[1] * once - force[2] * (size * once - twice)
 
 
 def variation(force: Force, size: float) -> float:
     """∫ |Ċ| dτ [N] over a step."""
     turn = -force[1] / force[2] if force[2] != 0.0 else 0.0
-    values = [force[0], value(force, turn) if 0.0 < turn < size else force[0], end_value(force, size)]
+    values = [force[0], value(force, turn) if 0.0 < turn < size else force[0], value(force, size)]
     return abs(values[1] - values[0]) + abs(values[2] - values[1])
 
 

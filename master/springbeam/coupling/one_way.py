@@ -63,7 +63,7 @@ class OneWay(SoftSolver):
         super().accept(step)
         contact, size = step.contact, step.size
         self._variation += abs(contact[0] - self._force) + force.variation(contact, size)
-        self._force = force.end_value(contact, size)
+        self._force = force.value(contact, size)
         tip, low = step.end
         self._deepest = max(self._deepest, low.displacement - tip.displacement)
         driver = 0 if self._upper_drives else 1

@@ -166,7 +166,7 @@ class _Algorithm:
     # Algorithm ------------------------------------------------------------------------------------------------------
 
     def run(self) -> Trajectory:
-        self.time = 0.0
+        self.time, self._began = 0.0, clock.perf_counter()
         self._events: list[Event] = []
         state = PairState(*self._initial_beam(), self.spring.equilibrium, self.spring.initial_velocity)
         touched = self.beam.approach == "undeformed"
@@ -176,7 +176,7 @@ class _Algorithm:
         stiffness = self.scene.contact.stiffness if touched else 0.0
         whole, rest = self.scene.equal_steps
         steps = whole + (rest > 0.0)
-        begin, began = self.time, clock.perf_counter()
+        begin = self.time
         for step in range(1, steps + 1):
             if step > whole:
                 self._set_step(rest)
@@ -185,7 +185,7 @@ class _Algorithm:
                 try:
                     state, stiffness = self._contact_step(state, stiffness)
                 except AlgorithmFailure as failure:
-                    failure.trajectory = self._trajectory((clock.perf_counter() - began) / step)
+                    failure.trajectory = self._trajectory(step)
                     raise
                 continue
             state = self._free_beam_step(state)  # lines 1–4
@@ -193,7 +193,7 @@ class _Algorithm:
                 touched, stiffness = True, self.scene.contact.stiffness  # line 6
                 state = self._first_contact(state)  # line 5
             self.ledger.record(self.time, state, "tied" if touched else "free")
-        return self._trajectory((clock.perf_counter() - began) / max(steps, 1))
+        return self._trajectory(steps)
 
     def _initial_beam(self) -> tuple[np.ndarray, np.ndarray]:
         slope, rate = self.beam.initial_deflection_slope, self.beam.initial_velocity_slope
@@ -286,7 +286,7 @@ class _Algorithm:
 
     # Result ---------------------------------------------------------------------------------------------------------
 
-    def _trajectory(self, time_per_step: float) -> Trajectory:
+    def _trajectory(self, steps: int) -> Trajectory:
         def mean(*solves: str) -> float:
             counts = [k for solve in solves for k in self.iterations[solve]]
             return float(np.mean(counts)) if counts else 0.0
@@ -298,7 +298,7 @@ class _Algorithm:
             "spring_joined": mean("joined"),
             "spring": mean("predicted", "joined"),
             "solves": len(self.iterations["predicted"]) + len(self.iterations["joined"]),
-            "time_per_step": time_per_step,
+            "time_per_step": (clock.perf_counter() - self._began) / max(steps, 1),
         }
         summary = {
             "reference": "algorithm1",

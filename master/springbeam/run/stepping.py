@@ -202,7 +202,7 @@ class Pair(Checkpointed):
             return self.upper.holding_force(low.displacement, low.velocity)
         if self.joined.degree == 0:
             return state.smoothed
-        return force.end_value(self.force_without_mismatch(state.phase, step), step.size)
+        return force.value(self.force_without_mismatch(state.phase, step), step.size)
 
     def force_without_mismatch(self, phase: Phase, step: Step) -> Force:
         """Return C of a step of ``phase`` [N], without what turns a mismatch of the ends' velocities round."""
