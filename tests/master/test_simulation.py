@@ -195,6 +195,15 @@ def test_a_bouncing_mass_comes_to_rest_after_its_geometric_series(e, size):
     assert trajectory.z[-1] == 0.0
 
 
+@pytest.mark.parametrize("size", [0.01, 0.1])
+def test_a_top_that_rests_where_its_spring_is_unloaded_stays_there(size):
+    """N = 0 from then on, which is no pull; it was left after three macro steps, so that no two runs agreed when."""
+    scene = {"spring": {"equilibrium": 1e-3}, "stop": {"position": 0.0, "restitution": 0.0}}
+    trajectory = simulate(scene_from_dict({**scene, "time": {"t_end": 3.0}, "coupling": {"macro_step": size}}))
+    assert kinds(trajectory) == ["seated"]
+    assert trajectory.events[0].time == pytest.approx(np.pi / 2, rel=1e-11)
+
+
 # -- steps that fail ------------------------------------------------------------------------------------------------
 
 

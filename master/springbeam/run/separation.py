@@ -142,5 +142,5 @@ def _zero_of_means(points: list[tuple[float, float]], start: float) -> float | N
             return before + (time - before) * higher / (higher - mean) - start
         if higher > mean > 0.0:
             return time + (time - before) * mean / (higher - mean) - start
-        return 0.0 if mean <= 0.0 else None
+        return 0.0 if mean < 0.0 else None
     return 0.0 if mean <= 0.0 and points[-1][1] < 0.0 else None
