@@ -266,7 +266,7 @@ class Spring(Table):
     external_force: float = key("N", "constant force f_s on the top, upward", 0.0)
     initial_velocity: float = key("m/s", "velocity of the top at the start, upward", 0.0)
     relative_tolerance: float = key("–", "relative tolerance of IDA, which integrates it", 1e-12, gt=0.0, le=1e-2)
-    absolute_tolerance: float = key("m, m/s", "absolute tolerance of IDA, of y and z", 1e-14, gt=0.0, le=1e-2)
+    absolute_tolerance: float = key("m, m/s", "absolute tolerance of IDA, of y and z", 1e-30, gt=0.0, le=1e-2)
 
 
 class Stop(Table):

@@ -38,10 +38,8 @@ _MOST, _MOST_STOPPED = 50_000, 6
 _SAFETY = 1.5
 #: Runs that differ by more are both unresolved, whatever their order [of the motion].
 _UNRESOLVED = 0.02
-#: The coupling's and IDA's tolerance over the accuracy, and the bounds of the latter.
-_SHARE, _TIGHTEST, _LOOSEST = 1e-3, 1e-12, 1e-8
-#: IDA's absolute tolerance over its relative one and the range of the spring top.
-_IDA_ABSOLUTE = 1e-2
+#: The coupling's and IDA's relative tolerance over the accuracy, and the bounds of the latter; IDA's absolute one [m].
+_SHARE, _TIGHTEST, _LOOSEST, _ABSOLUTE = 1e-3, 1e-12, 1e-8, 1e-30
 
 #: Fewest macro steps, where bodies are coupled and where not; of a first run with bodies whose motion nobody knows.
 _FEWEST, _UNCOUPLED, _PARTNERS = 8, 4, 64
@@ -152,7 +150,6 @@ class _Search:
         self._softly = scene.coupled and not scene.contact.rigid and self._degree == 2
         self._spent: list[tuple[int, float]] = []  #: doStep calls and time [s] of each pilot run
         self._stopped = 0  #: pilot runs in a row that stopped early
-        self._range = 0.0  #: of the spring top in the run before [m]
 
     def run(self) -> Trajectory:
         coarse, estimate = None, None
@@ -249,11 +246,7 @@ class _Search:
         tolerance = max(_SHARE * self._accuracy, _TIGHTEST)
         tables: dict[str, dict[str, Any]] = {"coupling": {**coupling, "tolerance": tolerance}}
         if self._scene.spring is not None:
-            tolerance = min(tolerance, _LOOSEST)
-            tables["spring"] = {"relative_tolerance": tolerance}
-            if self._range > 0.0:
-                absolute = min(_IDA_ABSOLUTE * tolerance * self._range, _LOOSEST)
-                tables["spring"]["absolute_tolerance"] = max(absolute, np.finfo(float).tiny)
+            tables["spring"] = {"relative_tolerance": min(tolerance, _LOOSEST), "absolute_tolerance": _ABSOLUTE}
         scene = with_changes(self._scene, accuracy=None, **tables)
         recorder = MemoryRecorder(scene)
         try:
@@ -264,8 +257,6 @@ class _Search:
             if self._stopped == _MOST_STOPPED:
                 raise
         pilot = _Pilot(steps, recorder.trajectory())
-        if "y" in pilot.run.columns:
-            self._range = float(np.ptp(pilot.run["y"]))
         self._spent.append((pilot.run.do_steps, float(pilot.run.summary["wall_time"])))
         return pilot
 
