@@ -45,9 +45,11 @@ Timoshenko::Timoshenko(const Parameters& p)
   }
 }
 
-// q is the element's part of the unknowns, its bubbles and its right node; θ̃₀ and u₀ are those of its left node.
+// Of the element whose bubbles and right node begin at x[first]; its left node is before them, or it is the clamp.
 template <typename Degree>
-Timoshenko::Strains Timoshenko::strains(Degree p, double theta0, double u0, const double* q) const {
+Timoshenko::Strains Timoshenko::strains(Degree p, const double* x, Index first) const {
+  const double* q = x + first;
+  const double theta0 = first > 0 ? *(q - 2) : 0.0, u0 = first > 0 ? *(q - 1) : 0.0;
   const double half = 0.5 / r_, theta1 = q[2 * p - 2], u1 = q[2 * p - 1];
   Strains s;
   s.h_kappa[0] = theta1 - theta0;
@@ -65,11 +67,12 @@ Timoshenko::Strains Timoshenko::strains(Degree p, double theta0, double u0, cons
   return s;
 }
 
-// q points to the field's part of the element; its unknowns are every other one.
+// Of the element where this field's unknowns, every other one, begin at x[first].
 template <typename Degree>
-Timoshenko::Field Timoshenko::field(Degree p, double left, const double* q) const {
+Timoshenko::Field Timoshenko::field(Degree p, const double* x, Index first) const {
+  const double* q = x + first;
   Field v;
-  v.left = left;
+  v.left = first > 1 ? *(q - 2) : 0.0;
   v.right = q[2 * p - 2];
   for (Index k = 2; k <= p; ++k) {
     const double part = q[2 * k - 4] / static_cast<double>(2 * k - 1);
@@ -91,16 +94,13 @@ template <typename Degree>
 void Timoshenko::multiply_mass(Degree p, const double* x, double* __restrict y) const {
   const Index block = 2 * p;
   for (Index f = 0; f < 2; ++f) {
-    double node = 0.0;        // value at the left end; the clamp to begin with
     double l = 0.0, r = 0.0;  // linear part of the element to the left
     for (Index e = 0; e < n_; ++e) {
-      const double* q = x + e * block + f;
       double* out = y + e * block + f;
-      const Field v = field(p, node, q);
+      const Field v = field(p, x, e * block + f);
       if (e > 0) *(out - 2) = end_ * (l + ratio_ * (r + v.left) + v.right);
       l = v.left;
       r = v.right;
-      node = q[block - 2];
       // Moments of the field with P_j: with P_0 and P_1 from the ends, with the others h f_j/(2j+1).
       std::array<double, max_element_degree + 1> moment;
       moment[0] = 3.0 * end_ * (l + r);
@@ -118,12 +118,10 @@ template <typename Degree>
 void Timoshenko::multiply_stiffness(Degree p, const double* x, double* __restrict y) const {
   const double lever = 0.5 * h_ / r_;
   const Index block = 2 * p;
-  double theta0 = 0.0, u0 = 0.0;
   double moment = 0.0, shear = 0.0;  // of the element to the left
   for (Index e = 0; e < n_; ++e) {
-    const double* q = x + e * block;
     double* out = y + e * block;
-    Strains s = strains(p, theta0, u0, q);
+    Strains s = strains(p, x, e * block);
     for (Index j = 0; j < p; ++j) {  // strains become stresses
       const double legendre = static_cast<double>(2 * j + 1);
       s.h_kappa[j] *= bending_stiffness(p, j) / (h_ * legendre);
@@ -141,8 +139,6 @@ void Timoshenko::multiply_stiffness(Degree p, const double* x, double* __restric
     }
     moment = moment1;
     shear = shear1;
-    theta0 = q[block - 2];
-    u0 = q[block - 1];
   }
   y[tip_rotation_index()] = moment - lever * shear;
   y[tip_index()] = shear;
@@ -150,11 +146,10 @@ void Timoshenko::multiply_stiffness(Degree p, const double* x, double* __restric
 
 void Timoshenko::add_linear_products(double a, const double* x, double c, const double* z, double* __restrict y) const {
   const double m = a * end_, lever = 0.5 * h_ / r_, bend = c * b_top_ / h_, slide = c * s_;
-  double theta0 = 0.0, u0 = 0.0;                      // of z, at the left node
   double moment = 0.0, shear = 0.0;                   // of the element to the left
   double left[2] = {0.0, 0.0}, here[2] = {0.0, 0.0};  // x at the nodes before the left one and there
   for (Index i = 0; i < size(); i += 2) {
-    const Strains s = strains(Linear(), theta0, u0, z + i);
+    const Strains s = strains(Linear(), z, i);
     const double moment1 = bend * s.h_kappa[0], shear1 = slide * s.gamma[0];
     if (i > 0) {
       y[i - 2] += m * (left[0] + 2.0 * ratio_ * here[0] + x[i]) + ((moment - moment1) - lever * (shear + shear1));
@@ -166,8 +161,6 @@ void Timoshenko::add_linear_products(double a, const double* x, double c, const 
     }
     moment = moment1;
     shear = shear1;
-    theta0 = z[i];
-    u0 = z[i + 1];
   }
   y[tip_rotation_index()] += m * (left[0] + ratio_ * here[0]) + (moment - lever * shear);
   y[tip_index()] += m * (left[1] + ratio_ * here[1]) + shear;
@@ -239,16 +232,13 @@ void Timoshenko::flexibility_times(const double* x, double* y) const {
 }
 
 void Timoshenko::weighted_strains(const double* x, double* out) const {
-  double theta0 = 0.0, u0 = 0.0;
   for (Index i = 0; i < size(); i += 2 * p_) {
-    const Strains s = strains(p_, theta0, u0, x + i);
+    const Strains s = strains(p_, x, i);
     for (Index j = 0; j < p_; ++j) {
       const double legendre = static_cast<double>(2 * j + 1);
       out[i + 2 * j] = std::sqrt(bending_stiffness(p_, j) / (h_ * legendre)) * s.h_kappa[j];
       out[i + 2 * j + 1] = std::sqrt(s_ * h_ / legendre) * s.gamma[j];
     }
-    theta0 = x[i + 2 * p_ - 2];
-    u0 = x[i + 2 * p_ - 1];
   }
 }
 
@@ -264,34 +254,29 @@ void require_factor(const Timoshenko::MassFactor& factor) {
 
 template <typename Degree>
 double Timoshenko::sum_mass(Degree p, const double* x) const {
-  double linear = 0.0, rest = 0.0, theta0 = 0.0, u0 = 0.0;
+  double linear = 0.0, rest = 0.0;
   for (Index i = 0; i < size(); i += 2 * p) {
-    const double* q = x + i;
-    const Field t = field(p, theta0, q), u = field(p, u0, q + 1);
+    const Field t = field(p, x, i), u = field(p, x, i + 1);
     for (const Field& f : {t, u}) {
       linear += (ratio_ - 1.0) * (f.left * f.left + f.right * f.right) + (f.left + f.right) * (f.left + f.right);
     }
     for (Index j = 2; j <= p; ++j) {
       rest += (j < p ? 1.0 : top_) * (t.f[j] * t.f[j] + u.f[j] * u.f[j]) / static_cast<double>(2 * j + 1);
     }
-    theta0 = q[2 * p - 2];
-    u0 = q[2 * p - 1];
   }
   return linear * end_ + h_ * rest;
 }
 
 template <typename Degree>
 double Timoshenko::sum_stiffness(Degree p, const double* x) const {
-  double bend = 0.0, top = 0.0, shear = 0.0, theta0 = 0.0, u0 = 0.0;
+  double bend = 0.0, top = 0.0, shear = 0.0;
   for (Index i = 0; i < size(); i += 2 * p) {
-    const Strains s = strains(p, theta0, u0, x + i);
+    const Strains s = strains(p, x, i);
     for (Index j = 0; j < p; ++j) {
       const double kappa = s.h_kappa[j] / h_, legendre = static_cast<double>(2 * j + 1);
       (j + 1 < p ? bend : top) += kappa * kappa / legendre;
       shear += s.gamma[j] * s.gamma[j] / legendre;
     }
-    theta0 = x[i + 2 * p - 2];
-    u0 = x[i + 2 * p - 1];
   }
   return h_ * (b_ * bend + b_top_ * top + s_ * shear);
 }
@@ -329,9 +314,8 @@ Eigen::SparseMatrix<double> Timoshenko::mass() const {
   // Of one field over (left node, bubbles, right node), column by column.
   Eigen::MatrixXd element(p_ + 1, p_ + 1);
   for (Index j = 0; j <= p_; ++j) {
-    Eigen::VectorXd unit = Eigen::VectorXd::Zero(2 * p_);
-    if (j > 0) unit[2 * j - 2] = 1.0;
-    const Field v = field(p_, j == 0 ? 1.0 : 0.0, unit.data());
+    const Eigen::VectorXd unit = Eigen::VectorXd::Unit(2 * (p_ + 1), 2 * j);
+    const Field v = field(p_, unit.data(), 2);
     element(0, j) = end_ * (ratio_ * v.left + v.right);
     element(p_, j) = end_ * (v.left + ratio_ * v.right);
     double below[2] = {3.0 * end_ * (v.left + v.right), end_ * (v.right - v.left)};
@@ -347,9 +331,8 @@ Eigen::SparseMatrix<double> Timoshenko::mass() const {
 Eigen::SparseMatrix<double> Timoshenko::stiffness() const {
   std::vector<Strains> columns;
   for (Index i = 0; i < 2 * (p_ + 1); ++i) {
-    Eigen::VectorXd unit = Eigen::VectorXd::Zero(2 * (p_ + 1));
-    unit[i] = 1.0;
-    columns.push_back(strains(p_, unit[0], unit[1], unit.data() + 2));
+    const Eigen::VectorXd unit = Eigen::VectorXd::Unit(2 * (p_ + 1), i);
+    columns.push_back(strains(p_, unit.data(), 2));
   }
   return assemble([&](Index i, Index j) {
     const Strains &a = columns[i], &b = columns[j];

@@ -106,9 +106,9 @@ class Timoshenko {
   /// Known to the compiler, the degree of linear elements makes products three times as fast.
   using Linear = std::integral_constant<Eigen::Index, 1>;
   template <typename Degree>
-  Strains strains(Degree p, double theta0, double u0, const double* q) const;
+  Strains strains(Degree p, const double* x, Eigen::Index first) const;
   template <typename Degree>
-  Field field(Degree p, double left, const double* q) const;
+  Field field(Degree p, const double* x, Eigen::Index first) const;
   template <typename Degree>
   void multiply_mass(Degree p, const double* x, double* y) const;
   void add_linear_products(double a, const double* x, double c, const double* z, double* y) const;
