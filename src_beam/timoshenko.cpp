@@ -10,6 +10,13 @@ namespace beam {
 
 using Eigen::Index;
 
+namespace {
+
+/// An unknown of a node; the clamp is before the first.
+double at_node(const double* x, Index i) { return i >= 0 ? x[i] : 0.0; }
+
+}  // namespace
+
 /// Legendre coefficients of an element's strains, j < p: h κ_j [m] and γ_j [–].
 struct Timoshenko::Strains {
   std::array<double, max_element_degree> h_kappa, gamma;
@@ -49,8 +56,8 @@ Timoshenko::Timoshenko(const Parameters& p)
 template <typename Degree>
 Timoshenko::Strains Timoshenko::strains(Degree p, const double* x, Index first) const {
   const double* q = x + first;
-  const double theta0 = first > 0 ? *(q - 2) : 0.0, u0 = first > 0 ? *(q - 1) : 0.0;
-  const double half = 0.5 / r_, theta1 = q[2 * p - 2], u1 = q[2 * p - 1];
+  const double half = 0.5 / r_, theta0 = at_node(x, first - 2), theta1 = q[2 * p - 2];
+  const double u0 = at_node(x, first - 1), u1 = q[2 * p - 1];
   Strains s;
   s.h_kappa[0] = theta1 - theta0;
   s.gamma[0] = (u1 - u0) / h_ - half * (theta0 + theta1);
@@ -72,7 +79,7 @@ template <typename Degree>
 Timoshenko::Field Timoshenko::field(Degree p, const double* x, Index first) const {
   const double* q = x + first;
   Field v;
-  v.left = first > 1 ? *(q - 2) : 0.0;
+  v.left = at_node(x, first - 2);
   v.right = q[2 * p - 2];
   for (Index k = 2; k <= p; ++k) {
     const double part = q[2 * k - 4] / static_cast<double>(2 * k - 1);
@@ -146,24 +153,21 @@ void Timoshenko::multiply_stiffness(Degree p, const double* x, double* __restric
 
 void Timoshenko::add_linear_products(double a, const double* x, double c, const double* z, double* __restrict y) const {
   const double m = a * end_, lever = 0.5 * h_ / r_, bend = c * b_top_ / h_, slide = c * s_;
-  double moment = 0.0, shear = 0.0;                   // of the element to the left
-  double left[2] = {0.0, 0.0}, here[2] = {0.0, 0.0};  // x at the nodes before the left one and there
+  double moment = 0.0, shear = 0.0;  // of the element to the left
   for (Index i = 0; i < size(); i += 2) {
     const Strains s = strains(Linear(), z, i);
     const double moment1 = bend * s.h_kappa[0], shear1 = slide * s.gamma[0];
     if (i > 0) {
-      y[i - 2] += m * (left[0] + 2.0 * ratio_ * here[0] + x[i]) + ((moment - moment1) - lever * (shear + shear1));
-      y[i - 1] += m * (left[1] + 2.0 * ratio_ * here[1] + x[i + 1]) + (shear - shear1);
-    }
-    for (Index f = 0; f < 2; ++f) {
-      left[f] = here[f];
-      here[f] = x[i + f];
+      y[i - 2] +=
+          m * (at_node(x, i - 4) + 2.0 * ratio_ * x[i - 2] + x[i]) + ((moment - moment1) - lever * (shear + shear1));
+      y[i - 1] += m * (at_node(x, i - 3) + 2.0 * ratio_ * x[i - 1] + x[i + 1]) + (shear - shear1);
     }
     moment = moment1;
     shear = shear1;
   }
-  y[tip_rotation_index()] += m * (left[0] + ratio_ * here[0]) + (moment - lever * shear);
-  y[tip_index()] += m * (left[1] + ratio_ * here[1]) + shear;
+  const Index turn = tip_rotation_index(), tip = tip_index();
+  y[turn] += m * (at_node(x, turn - 2) + ratio_ * x[turn]) + (moment - lever * shear);
+  y[tip] += m * (at_node(x, tip - 2) + ratio_ * x[tip]) + shear;
 }
 
 void Timoshenko::add_products(double a, const Eigen::VectorXd& x, double c, const Eigen::VectorXd& z,
