@@ -81,17 +81,27 @@ void moments(double sigma, Moments& of_C, Moments& of_sigma_S) {
 
 /// The two wave numbers at a frequency and what the frequency equation makes of them.
 struct Waves {
-  double a, b, c, p1, p2, r;
+  double a, b, c;
+  double root;  ///< √((a − b)²/4 + c)
+  double p1, p2, r;
   Wave first, second;
 
   /// `per_omega2`: a, b, c over ω².
   Waves(const std::array<double, 3>& per_omega2, double omega)
-      : Waves(per_omega2[0] * omega * omega, per_omega2[1] * omega * omega, per_omega2[2] * omega * omega) {}
+      : a(per_omega2[0] * omega * omega),
+        b(per_omega2[1] * omega * omega),
+        c(per_omega2[2] * omega * omega),
+        root(std::sqrt(0.25 * (b - a) * (b - a) + c)),
+        p1(b > a ? 0.5 * (b - a) + root : c / (root + 0.5 * (a - b))),
+        p2(-c / p1),
+        r(c / (p1 * p1)),
+        first((c - a * b) / (0.5 * (a + b) + root)),
+        second(-0.5 * (a + b) - root) {}
 
   /// F, and ω² dF/dω²; both divided by e^{√σ₁} where σ₁ > 0.
   double F() const { return 2.0 * first.one + (r + 1.0 / r) * first.C * second.C - (a + b) * first.S * second.S; }
   double slope() const {
-    const double half = 0.5 * (b - a), root = std::sqrt(half * half + c);
+    const double half = 0.5 * (b - a);
     const double change_root = (half * half + 0.5 * c) / root;
     const double change_2 = -0.5 * (a + b) - change_root;
     const double change_1 = (2.0 * a * b - c - first.sigma * change_2) / second.sigma;
@@ -106,18 +116,6 @@ struct Waves {
     const double X = first.S * second.C + r * second.S * first.C;
     return first.zeros + second.zeros - (X * first.C * second.C < 0.0 ? 1 : 0) + (F() * X < 0.0 ? 1 : 0);
   }
-
- private:
-  Waves(double a_, double b_, double c_) : Waves(a_, b_, c_, std::sqrt(0.25 * (b_ - a_) * (b_ - a_) + c_)) {}
-  Waves(double a_, double b_, double c_, double root)
-      : a(a_),
-        b(b_),
-        c(c_),
-        p1(b > a ? 0.5 * (b - a) + root : c / (root + 0.5 * (a - b))),
-        p2(-c / p1),
-        r(c / (p1 * p1)),
-        first((c - a * b) / (0.5 * (a + b) + root)),
-        second(-0.5 * (a + b) - root) {}
 };
 
 class Cantilever {
