@@ -32,19 +32,20 @@ enum Unknown { q, p, A, B, e, unknowns };
 // spring pushes as hard as 1e12 linear springs would pull.
 constexpr double runaway = 1e6;
 
-std::vector<Crossing> crossings(const Laws& laws) {
+std::vector<Crossing> crossings(const Parameters& parameters) {
   std::vector<Crossing> all;
-  if (std::isfinite(laws.hilltop)) all = {Crossing::falling};
-  if (laws.stop) all.insert(all.end(), {Crossing::falling, Crossing::rising});
+  if (std::isfinite(parameters.hilltop())) all = {Crossing::falling};
+  if (parameters.stop_enabled) all.insert(all.end(), {Crossing::falling, Crossing::rising});
   return all;
 }
 
 }  // namespace
 
-Flight::Flight(const Motion& motion, const Laws& laws)
-    : Segment(motion, laws, unknowns, crossings(laws)),
-      hilltop_(std::isfinite(laws.hilltop) ? own_ : -1),
-      stop_(laws.stop ? std::max(hilltop_ + 1, own_) : -1) {}
+Flight::Flight(const Motion& motion, const Parameters& parameters)
+    : Segment(motion, parameters, unknowns, crossings(parameters)),
+      peak_(parameters.hilltop()),
+      hilltop_(std::isfinite(peak_) ? own_ : -1),
+      stop_(parameters.stop_enabled ? std::max(hilltop_ + 1, own_) : -1) {}
 
 void Flight::prepare() {
   const Start& start = start_;
@@ -57,7 +58,7 @@ void Flight::prepare() {
   };
   touching_ = false;
   extend_to(least_order + 1);
-  if (laws_.compliance && Watch::direction(motion.depth) > 0.0) {
+  if (parameters_.compliant() && Watch::direction(motion.depth) > 0.0) {
     touching_ = true;
     motion = Expansion(start.y, z, start.depth, loads_, H);
     extend_to(least_order + 1);
@@ -65,7 +66,7 @@ void Flight::prepare() {
   if (start.released) motion.y[2] = 0.0;
   const Series &y = motion.y, &depth = motion.depth;
   meet(touching_, depth);
-  if (laws_.stop) {
+  if (parameters_.stop_enabled) {
     Series gap = y;
     gap[0] = start.gap;
     stop_watch_ = Watch(gap);
@@ -81,7 +82,7 @@ void Flight::prepare() {
   const bool smooth = !touching_ || contact.polynomial() || start.depth > 2.0 * depth_travel;
   const std::size_t most = smooth ? max_order : contact.analytic() ? least_order : 2;
   held_ = touching_ || start.loads.held;
-  height_ = held_ ? runaway * laws_.hilltop : laws_.hilltop;
+  height_ = held_ ? runaway * peak_ : peak_;
 
   // Tolerances: of y and z by what they and their change over the step (or over 1/rate) are, then scaled.
   const double span = std::min(H, 1.0 / std::max(rate, std::numeric_limits<double>::min()));
@@ -90,7 +91,8 @@ void Flight::prepare() {
   const double displacement = std::abs(start.y) + velocity * span;
   const double share = safety / (1.0 + safety_per_rate * std::min(H * rate, resolved_limit));
   const auto tolerance_of = [&](double size, double least) {
-    return std::max({share * (laws_.relative_tolerance * size + laws_.absolute_tolerance), finest * size, least});
+    return std::max(
+        {share * (parameters_.relative_tolerance * size + parameters_.absolute_tolerance), finest * size, least});
   };
   const double tolerance_z = tolerance_of(velocity, std::max(noise, smallest));
   const double tolerance_y = tolerance_of(displacement, std::max(noise * span, smallest));
@@ -103,7 +105,7 @@ void Flight::prepare() {
 
   // R ends where the first term that it leaves out is small. The first step is as long as that keeps the error of the
   // low orders that IDA begins with.
-  const double small = H * share * laws_.relative_tolerance * velocity / first_step_margin;
+  const double small = H * share * parameters_.relative_tolerance * velocity / first_step_margin;
   const auto neglected = [&] {
     const auto k = static_cast<double>(motion.highest);
     return k * std::abs(y[motion.highest]) + H * rate * (H * rate) * std::abs(y[motion.highest - 1]);
@@ -123,7 +125,7 @@ void Flight::prepare() {
   }
   const double levels = std::ceil(-std::log2(h));
   if (std::isnan(levels)) throw IdaError("values leave the range of floating-point numbers");
-  const bool watched = laws_.stop || laws_.compliance;
+  const bool watched = parameters_.stop_enabled || parameters_.compliant();
   const double least = order > 2 && !watched ? 0.0 : least_halvings;
   int halvings = static_cast<int>(std::clamp(levels, least, double{most_halvings}));
   if (touching_ && order <= 2) {
@@ -150,7 +152,7 @@ void Flight::prepare() {
   Y[p] = Yp[q] = y[1] - R_.rate(0.0);
   Yp[p] = order == 0 ? 2.0 * y[2] : 0.0;
   if (order == 0) Yp[e] = H * (motion_.damping() * z * z + lost);
-  const double relative = std::max(share * laws_.relative_tolerance, 50.0 * epsilon);
+  const double relative = std::max(share * parameters_.relative_tolerance, 50.0 * epsilon);
   solver_.start(*this, relative, std::ldexp(1.0, -halvings), start.most_steps);
 }
 
@@ -169,10 +171,16 @@ Flight::Event Flight::run(const Start& start) {
       event = Event::contact;
   }
   finish();
-  if (event == Event::none && laws_.to(height_, reached_.y) < 0.0 && escapes()) event = Event::hilltop;
-  if (event == Event::none && laws_.stop && start.gap + (reached_.y - start.y) < -solver_.absolute_tolerance()[q])
+  if (event == Event::none && below_height(reached_.y) < 0.0 && escapes()) event = Event::hilltop;
+  if (event == Event::none && parameters_.stop_enabled &&
+      start.gap + (reached_.y - start.y) < -solver_.absolute_tolerance()[q])
     throw IdaError("the top passed the stop unnoticed");
   return event;
+}
+
+/// A stop at the lower hilltop or above keeps the top from the lower one.
+double Flight::below_height(double y) const {
+  return height_ - (parameters_.stop_enabled && parameters_.stop_position >= -peak_ ? y : std::abs(y));
 }
 
 /// Past the hilltop the spring pushes outwards: a top that moves outwards comes back only if something else pulls.
@@ -231,7 +239,7 @@ void Flight::jacobian(double s, double c, const double* Y, const double*, double
 
 void Flight::events(double s, const double* Y, double* g) const noexcept {
   const double rise = R_.rise(s) + Y[q], slope = R_.rate(s) + Y[p];
-  if (hilltop_ >= 0) g[hilltop_] = laws_.to(height_, start_.y + rise);
+  if (hilltop_ >= 0) g[hilltop_] = below_height(start_.y + rise);
   if (stop_ >= 0) {
     g[stop_] = stop_watch_.distance(start_.gap + rise, s);
     g[stop_ + 1] = stop_watch_.rate(slope, s);

@@ -17,7 +17,7 @@ namespace spring {
 
 class Flight final : public Segment {
  public:
-  Flight(const Motion& motion, const Laws& laws);
+  Flight(const Motion& motion, const Parameters& parameters);
 
   Event run(const Start& start) override;
 
@@ -27,9 +27,11 @@ class Flight final : public Segment {
 
  private:
   void prepare();
-  bool escapes() const;  ///< once past `height_`
+  double below_height(double y) const;  ///< how far |y| is below `height_` [m]
+  bool escapes() const;                 ///< once past `height_`
   void finish();
 
+  const double peak_;         ///< |y| of the hilltop; infinity: none
   const int hilltop_, stop_;  ///< event functions, as contact_
   Taylor R_;
   Motion::Remainder remainder_;

@@ -110,8 +110,9 @@ IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings)
   check(IDASetNonlinConvCoef(ida, newton_share), "IDASetNonlinConvCoef");
   if (crossings.empty()) return;
   check(IDARootInit(ida, static_cast<int>(crossings.size()), events), "IDARootInit");
-  std::vector<int> directions;
-  for (const Crossing crossing : crossings) directions.push_back(static_cast<int>(crossing));
+  std::vector<int> directions(crossings.size());
+  std::transform(crossings.begin(), crossings.end(), directions.begin(),
+                 [](Crossing c) { return static_cast<int>(c); });
   check(IDASetRootDirection(ida, directions.data()), "IDASetRootDirection");
   check(IDASetNoInactiveRootWarn(ida), "IDASetNoInactiveRootWarn");
 }

@@ -10,9 +10,9 @@ namespace spring {
 
 using common::number;
 
-double hilltop(const Parameters& p) {
-  return p.linear_stiffness > 0.0 && p.cubic_stiffness < 0.0 ? std::sqrt(p.linear_stiffness / -p.cubic_stiffness)
-                                                             : std::numeric_limits<double>::infinity();
+double Parameters::hilltop() const {
+  return linear_stiffness > 0.0 && cubic_stiffness < 0.0 ? std::sqrt(linear_stiffness / -cubic_stiffness)
+                                                         : std::numeric_limits<double>::infinity();
 }
 
 void check(const Parameters& p) {
@@ -21,11 +21,11 @@ void check(const Parameters& p) {
                                 ", cubic_stiffness = " + number(p.cubic_stiffness) +
                                 ": a softening spring (cubic_stiffness < 0) needs linear_stiffness > 0, "
                                 "else there is no potential well");
-  if (std::abs(p.displacement) > hilltop(p))
+  if (std::abs(p.displacement) > p.hilltop())
     throw std::invalid_argument("spring: displacement = " + number(p.displacement) +
                                 ": the start of a softening spring must be within the hilltop of its potential, "
                                 "|y| <= sqrt(linear_stiffness/|cubic_stiffness|) = " +
-                                number(hilltop(p)));
+                                number(p.hilltop()));
   if (p.stop_enabled && p.displacement < p.stop_position)
     throw std::invalid_argument("spring: displacement = " + number(p.displacement) +
                                 ": must not start below stop_position = " + number(p.stop_position));

@@ -27,6 +27,10 @@ struct Parameters {
   double restitution = 1.0;     ///< e in [0, 1]
   double relative_tolerance = 1e-12;
   double absolute_tolerance = 1e-14;
+
+  bool compliant() const { return contact_law == ContactLaw::normal_compliance; }
+  /// |y| where a softening spring's potential has its hilltop, √(k1/|k2|); infinity for any other.
+  double hilltop() const;
 };
 
 /// Held or polynomial over one step; τ from its start.
@@ -40,8 +44,5 @@ struct Inputs {
 
 /// @throws std::invalid_argument naming the parameter that cannot be beside the others, its value and what is allowed
 void check(const Parameters& parameters);
-
-/// |y| where a softening spring's potential has its hilltop, √(k1/|k2|); infinity for any other.
-double hilltop(const Parameters& parameters);
 
 }  // namespace spring

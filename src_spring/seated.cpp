@@ -16,20 +16,20 @@ enum Unknown { eta, zeta, n, P, e, unknowns };
 
 }  // namespace
 
-Seated::Seated(const Motion& motion, const Laws& laws)
-    : Segment(motion, laws, unknowns, {Crossing::falling, Crossing::rising}) {}
+Seated::Seated(const Motion& motion, const Parameters& parameters)
+    : Segment(motion, parameters, unknowns, {Crossing::falling, Crossing::rising}) {}
 
 bool Seated::holds(const Polynomial& holding_force) {
   return Watch::direction({holding_force[0], holding_force[1], holding_force[2] / 2}) >= 0.0;
 }
 
 void Seated::prepare() {
-  const double H = start_.size, y = laws_.stop_position;
+  const double H = start_.size, y = parameters_.stop_position;
   const Compliance& contact = motion_.compliance();
   const auto& u = loads_.tip;
 
   const Series depth{start_.depth, -u[1], -u[2] / 2};
-  meet(laws_.compliance && Watch::direction(depth) > 0.0, depth);
+  meet(parameters_.compliant() && Watch::direction(depth) > 0.0, depth);
 
   N_ = scaled(motion_.holding_force(y, start_.loads, touching_, start_.depth), H);
   const double depth_travel = std::abs(u[1]) + std::abs(u[2]) / 2, depth_rate = depth[1] / H;
@@ -42,12 +42,13 @@ void Seated::prepare() {
   const double scale =
       motion_.mass() * motion_.acceleration_scale(y, 0.0, start_.loads.force[0], force) + std::abs(deepest - force);
   const double tolerance_N =
-      std::max(safety * (laws_.relative_tolerance * scale + laws_.absolute_tolerance), noise_margin * epsilon * scale);
+      std::max(safety * (parameters_.relative_tolerance * scale + parameters_.absolute_tolerance),
+               noise_margin * epsilon * scale);
   double* tolerance = solver_.absolute_tolerance();
-  tolerance[eta] = tolerance[zeta] = safety * laws_.absolute_tolerance;
+  tolerance[eta] = tolerance[zeta] = safety * parameters_.absolute_tolerance;
   tolerance[n] = tolerance_N;
   tolerance[P] = H * tolerance_N;
-  tolerance[e] = (depth_travel + laws_.absolute_tolerance) * tolerance_N;
+  tolerance[e] = (depth_travel + parameters_.absolute_tolerance) * tolerance_N;
 
   // First step: N − N_R starts flat and must still be within the tolerance after it.
   int halvings = least_halvings;
@@ -65,7 +66,7 @@ void Seated::prepare() {
   std::fill(Y, Y + unknowns, 0.0);
   std::fill(Yp, Yp + unknowns, 0.0);
   if (touching_) Yp[e] = H * contact.continued(start_.depth, depth_rate).dissipation;
-  const double relative = std::max(safety * laws_.relative_tolerance, 50.0 * epsilon);
+  const double relative = std::max(safety * parameters_.relative_tolerance, 50.0 * epsilon);
   solver_.start(*this, relative, std::ldexp(1.0, -halvings), start_.most_steps);
 }
 
@@ -79,14 +80,14 @@ Seated::Event Seated::run(const Start& start) {
     else if (contact_ >= 0 && solver_.fell(contact_))
       event = Event::contact;
   }
-  const double H = start.size, t = elapsed(), y = laws_.stop_position;
+  const double H = start.size, t = elapsed(), y = parameters_.stop_position;
   const double impulse = H * (solver_.s() * mean(N_, solver_.s()) + solver_.value()[P]);
   reached_ = {y, 0.0, y * t, y * t * t / 2, solver_.value()[e], impulse};
   return event;
 }
 
 bool Seated::residual(double s, const double* Y, const double* Yp, double* F) const noexcept {
-  const double H = start_.size, y = laws_.stop_position + Y[eta];
+  const double H = start_.size, y = parameters_.stop_position + Y[eta];
   Compliance::Effect contact{};
   if (touching_) contact = motion_.compliance().continued(contact_depth(Y[eta], s), contact_rate(H * Y[zeta], s) / H);
   const double outer = value(loads_.force, s);
@@ -99,7 +100,7 @@ bool Seated::residual(double s, const double* Y, const double* Yp, double* F) co
 }
 
 void Seated::jacobian(double s, double c, const double* Y, const double*, double* J) const noexcept {
-  const double H = start_.size, y = laws_.stop_position + Y[eta];
+  const double H = start_.size, y = parameters_.stop_position + Y[eta];
   Compliance::Slopes contact{};
   if (touching_) contact = motion_.compliance().slopes(contact_depth(Y[eta], s), contact_rate(H * Y[zeta], s) / H);
   const auto at = [J](int row, int column) -> double& { return J[column * unknowns + row]; };

@@ -13,7 +13,7 @@ namespace spring {
 
 class Seated final : public Segment {
  public:
-  Seated(const Motion& motion, const Laws& laws);
+  Seated(const Motion& motion, const Parameters& parameters);
 
   /// N and its rates at the start; the top stays where the first that is not 0 is positive (or all are 0).
   static bool holds(const Polynomial& holding_force);

@@ -12,12 +12,13 @@ std::vector<Crossing> after_contact(bool compliance, const std::vector<Crossing>
 
 }  // namespace
 
-Segment::Segment(const Motion& motion, const Laws& laws, int unknowns, const std::vector<Crossing>& crossings)
+Segment::Segment(const Motion& motion, const Parameters& parameters, int unknowns,
+                 const std::vector<Crossing>& crossings)
     : motion_(motion),
-      laws_(laws),
-      contact_(laws.compliance ? 0 : -1),
-      own_(contact_ + (laws.compliance ? 2 : 1)),
-      solver_(unknowns, after_contact(laws.compliance, crossings)) {}
+      parameters_(parameters),
+      contact_(parameters.compliant() ? 0 : -1),
+      own_(contact_ + (parameters.compliant() ? 2 : 1)),
+      solver_(unknowns, after_contact(parameters.compliant(), crossings)) {}
 
 void Segment::begin(const Start& start) {
   start_ = start;

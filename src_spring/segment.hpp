@@ -5,7 +5,6 @@
 // below 0 between two internal steps is noticed. See watch.hpp for gaps that start at 0.
 #pragma once
 
-#include <cmath>
 #include <vector>
 
 #include "ida_solver.hpp"
@@ -14,18 +13,6 @@
 #include "watch.hpp"
 
 namespace spring {
-
-/// Which laws an object has; fixes the event functions.
-struct Laws {
-  double hilltop;  ///< infinity: none
-  bool stop;
-  double stop_position;
-  bool compliance;
-  double relative_tolerance, absolute_tolerance;
-
-  /// How far the top is from ±height [m]; a stop at the lower hilltop or above keeps it from the lower one.
-  double to(double height, double y) const { return height - (stop && stop_position >= -hilltop ? y : std::abs(y)); }
-};
 
 /// Where a segment starts, and what may be known better than by subtraction.
 struct Start {
@@ -55,7 +42,7 @@ class Segment : public ImplicitSystem {
 
  protected:
   /// `crossings` of the event functions that follow those of the contact.
-  Segment(const Motion& motion, const Laws& laws, int unknowns, const std::vector<Crossing>& crossings);
+  Segment(const Motion& motion, const Parameters& parameters, int unknowns, const std::vector<Crossing>& crossings);
 
   /// Takes over where the segment starts.
   void begin(const Start& start);
@@ -66,7 +53,7 @@ class Segment : public ImplicitSystem {
   void contact_events(double rise, double slope, double s, double* g) const;
 
   const Motion& motion_;
-  const Laws laws_;
+  const Parameters& parameters_;
   const int contact_;  ///< its event functions, −1 if there are none. A distance is followed by its rate
   const int own_;      ///< the first of the other ones
   IdaSolver solver_;

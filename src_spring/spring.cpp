@@ -26,8 +26,7 @@ class Spring::Step {
  public:
   Step(Spring& spring, double size, const Loads& loads)
       : motion_(spring.motion_),
-        laws_(spring.laws_),
-        restitution_(spring.parameters_.restitution),
+        parameters_(spring.parameters_),
         flight_(spring.flight_),
         seat_(spring.seat_),
         state_(spring.state_),
@@ -45,8 +44,8 @@ class Spring::Step {
                               " s after the step's start",
                           t_);
       now_ = loads_.from_time(t_);
-      depth_ = !laws_.compliance ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
-      if (laws_.stop) land();
+      depth_ = !parameters_.compliant() ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
+      if (parameters_.stop_enabled) land();
       if (seat_ && state_.seated != 0.0)
         advance(*seat_);
       else
@@ -65,14 +64,14 @@ class Spring::Step {
 
   bool touching() const {
     const auto& u = now_.tip;
-    return laws_.compliance && Watch::direction({depth_, state_.z - u[1], -u[2] / 2}) > 0.0;
+    return parameters_.compliant() && Watch::direction({depth_, state_.z - u[1], -u[2] / 2}) > 0.0;
   }
 
   /// At the foundation: rebound, or come to rest, or leave.
   /// Deviation: impacts that die out are cut short when the top, pressed down, would rise no higher than the solver's
   /// tolerance of y; its last velocity is then lost too.
   void land() {
-    const double gap = state_.y - laws_.stop_position;
+    const double gap = state_.y - parameters_.stop_position;
     if (gap > 0.0) {
       state_.seated = 0.0;
       return;
@@ -82,8 +81,8 @@ class Spring::Step {
     const double before = state_.z;
     if (before < 0.0) {
       const double pull = std::max(N[0], 0.0) / motion_.mass();  // −ÿ
-      const double rebound = -restitution_ * before;
-      const double tolerance = laws_.relative_tolerance * std::abs(state_.y) + laws_.absolute_tolerance;
+      const double rebound = -parameters_.restitution * before;
+      const double tolerance = parameters_.relative_tolerance * std::abs(state_.y) + parameters_.absolute_tolerance;
       const bool dies_out = pressed && rebound * rebound <= 2.0 * pull * tolerance;
       state_.z = dies_out ? 0.0 : rebound;
       state_.stop_impulse += motion_.mass() * (state_.z - before);
@@ -94,7 +93,7 @@ class Spring::Step {
 
   /// One segment, and what it did.
   void advance(Segment& segment) {
-    const double gap = laws_.stop ? state_.y - laws_.stop_position : 1.0;
+    const double gap = parameters_.stop_enabled ? state_.y - parameters_.stop_position : 1.0;
     const Start start{state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_};
     const auto event = attempt(segment, start);
     const auto& [y, z, integral, integral_2, dissipated, impulse] = segment.reached();
@@ -107,12 +106,13 @@ class Spring::Step {
     t_ += segment.elapsed();
     if (event == Segment::Event::hilltop)
       throw Escape("spring: y = " + number(state_.y) +
-                       " m has run away, past the hilltop |y| = " + number(laws_.hilltop) +
+                       " m has run away, past the hilltop |y| = " + number(parameters_.hilltop()) +
                        " m of the softening spring, reached " + number(t_) + " s after the step's start",
                    t_);
     // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
-    if (laws_.stop)
-      state_.y = event == Segment::Event::stop ? laws_.stop_position : std::max(state_.y, laws_.stop_position);
+    if (parameters_.stop_enabled)
+      state_.y =
+          event == Segment::Event::stop ? parameters_.stop_position : std::max(state_.y, parameters_.stop_position);
     released_ = event == Segment::Event::release;
     if (released_) state_.seated = 0.0;
     meeting_ = event == Segment::Event::contact;
@@ -141,8 +141,7 @@ class Spring::Step {
   }
 
   const Motion& motion_;
-  const Laws& laws_;
-  const double restitution_;
+  const Parameters& parameters_;
   Flight& flight_;
   std::optional<Seated>& seat_;
   State state_;
@@ -158,13 +157,8 @@ class Spring::Step {
 };
 
 Spring::Spring(const Parameters& p)
-    : parameters_((check(p), p)),
-      motion_(p),
-      laws_{hilltop(p),           p.stop_enabled,      p.stop_position, p.contact_law == ContactLaw::normal_compliance,
-            p.relative_tolerance, p.absolute_tolerance},
-      flight_(motion_, laws_),
-      state_{p.displacement, p.velocity} {
-  if (laws_.stop) seat_.emplace(motion_, laws_);
+    : parameters_((check(p), p)), motion_(p), flight_(motion_, parameters_), state_{p.displacement, p.velocity} {
+  if (parameters_.stop_enabled) seat_.emplace(motion_, parameters_);
 }
 
 void Spring::step(double size, const Inputs& inputs) {
@@ -208,7 +202,7 @@ double Spring::acceleration() const {
   return seated() ? 0.0 : motion_.acceleration(state_.y, state_.z, state_.force, reaction());
 }
 double Spring::reaction() const {
-  return laws_.compliance ? motion_.compliance().force(depth(), state_.z - state_.tip_rate) : 0.0;
+  return parameters_.compliant() ? motion_.compliance().force(depth(), state_.z - state_.tip_rate) : 0.0;
 }
 double Spring::kinetic_energy() const { return parameters_.mass / 2 * state_.z * state_.z; }
 double Spring::potential_energy() const { return motion_.potential_energy(state_.y); }

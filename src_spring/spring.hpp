@@ -87,12 +87,11 @@ class Spring {
   };
   class Step;
   void see(const Loads& loads, double t);
-  double depth() const { return laws_.compliance ? state_.y - state_.tip : -1.0; }
+  double depth() const { return parameters_.compliant() ? state_.y - state_.tip : -1.0; }
   bool finite() const;
 
   const Parameters parameters_;
   const Motion motion_;
-  const Laws laws_;
   Flight flight_;
   std::optional<Seated> seat_;
   State state_;

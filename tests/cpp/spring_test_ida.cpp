@@ -90,8 +90,6 @@ Parameters nonlinear() {
   return p;
 }
 
-Laws laws_of(const Parameters& p) { return {hilltop(p), true, p.stop_position, true, 1e-12, 1e-14}; }
-
 }  // namespace
 
 // cos ωs falls through the level at s = arccos(level)/ω. IDA's own bracket is 100 ulp; ours ends at an ulp, and then
@@ -188,7 +186,7 @@ TEST(Flight, JacobianMatchesDifferences) {
   for (const auto& [damping, speed] : std::array<std::pair<double, double>, 3>{{{0.0, 0.4}, {0.8, 0.4}, {0.8, 3.0}}}) {
     p.compliance_damping = damping;
     const Motion motion(p);
-    Flight flight(motion, laws_of(p));
+    Flight flight(motion, p);
     loads.tip = {0.05, speed, -1.0};
     // Touching, δ = 0.1; unresolved steps have another reference polynomial.
     for (const double size : {H, 40 * H}) {
@@ -207,7 +205,7 @@ TEST(Seated, JacobianMatchesDifferences) {
   for (const auto& [damping, speed] : std::array<std::pair<double, double>, 3>{{{0.0, 0.4}, {0.8, 0.4}, {0.8, 3.0}}}) {
     p.compliance_damping = damping;
     const Motion motion(p);
-    Seated seated(motion, laws_of(p));
+    Seated seated(motion, p);
     loads.tip = {-0.3, speed, -1.0};
     EXPECT_EQ(seated.run({-0.2, 0.0, loads, 0.02, 0.0, 0.1, false, 100000}), Seated::Event::none);
     const double d = 1e-5;
