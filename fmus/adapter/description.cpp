@@ -1,7 +1,7 @@
 #include "description.hpp"
 
 #include <cmath>
-#include <cstdint>
+#include <cstdio>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -207,18 +207,13 @@ std::size_t Table::index(const std::string& name) const {
 
 std::string guid(const Table& table) {
   const std::string content = document(table, "", "");
-  std::ostringstream hex;  // two differently seeded halves make the 128 bits of a GUID
-  hex << std::hex;
-  const std::uint64_t halves[] = {common::hash(content.data(), content.size()),
-                                  common::hash(content.data(), content.size(), 0x9ae16a3b2f90404fULL)};
-  for (std::uint64_t half : halves) {
-    hex.width(16);
-    hex.fill('0');
-    hex << half;
-  }
-  const std::string h = hex.str();
-  return "{" + h.substr(0, 8) + "-" + h.substr(8, 4) + "-" + h.substr(12, 4) + "-" + h.substr(16, 4) + "-" +
-         h.substr(20) + "}";
+  // Two differently seeded halves make the 128 bits of a GUID.
+  const unsigned long long first = common::hash(content.data(), content.size()),
+                           second = common::hash(content.data(), content.size(), 0x9ae16a3b2f90404fULL);
+  char text[39];
+  std::snprintf(text, sizeof text, "{%08llx-%04llx-%04llx-%04llx-%012llx}", first >> 32, first >> 16 & 0xffff,
+                first & 0xffff, second >> 48, second & 0xffffffffffffULL);
+  return text;
 }
 
 std::string description(const Table& table, const std::string& source_files) {

@@ -182,13 +182,12 @@ class TableBuilder {
   }
 
   Variable& add(const std::string& name, const std::string& unit, const std::string& description, Causality causality) {
-    Variable v;
+    Variable& v = table_.variables.emplace_back();
     v.name = name;
     v.unit = unit;
     v.description = description;
     v.causality = causality;
-    table_.variables.push_back(std::move(v));
-    return table_.variables.back();
+    return v;
   }
 
   Table& table_;

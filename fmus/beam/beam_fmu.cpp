@@ -285,17 +285,15 @@ fmi::Table make_table() {
   add.output("tip_response_2", "m/N", "the same at the end of the step after, without a force meanwhile",
              [](const BeamModel& m) { return m.tip_response[1]; })
       .from(motion);
-  for (const bool rotation : {false, true}) {
+  const auto shape = [&](const std::string& name, const char* unit, const std::string& text,
+                         double (BeamModel::*at)(std::size_t) const) {
     for (std::size_t i = 0; i < beam::shape_points; ++i) {
-      const std::string index = "[" + std::to_string(i + 1) + "]", x = " at x = L*" + std::to_string(i) + "/20";
-      if (rotation) {
-        add.local("rotation" + index, "rad", "rotation of the cross-section" + x,
-                  [i](const BeamModel& m) { return m.rotation(i); });
-      } else {
-        add.local("deflection" + index, "m", "deflection" + x, [i](const BeamModel& m) { return m.deflection(i); });
-      }
+      add.local(name + "[" + std::to_string(i + 1) + "]", unit, text + " at x = L*" + std::to_string(i) + "/20",
+                [i, at](const BeamModel& m) { return (m.*at)(i); });
     }
-  }
+  };
+  shape("deflection", "m", "deflection", &BeamModel::deflection);
+  shape("rotation", "rad", "rotation of the cross-section", &BeamModel::rotation);
   return t;
 }
 

@@ -29,8 +29,8 @@ struct FmuParameters : Parameters {
 
 struct SpringModel final : fmi::Model {
   FmuParameters parameters;
-  fmi::Polynomial contact_force{}, foundation_force{}, external_force{}, base_acceleration{}, tip_velocity{},
-      forecast{};
+  spring::Inputs inputs;  ///< but for the tip
+  fmi::Polynomial tip_velocity{}, forecast{};
   fmi::Polynomial tip_displacement{0.0, fmi::unset, fmi::unset};  ///< as set
   std::optional<fmi::Polynomial> reached;  ///< what it was extrapolated to, until it is set or used again
   double impulse = 0.0;
@@ -43,7 +43,7 @@ struct SpringModel final : fmi::Model {
     if (p.displacement == 0.0) p.displacement = parameters.equilibrium;
     if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
     held.reset();
-    if (p.contact_law == spring::ContactLaw::normal_compliance && parameters.communication_step > 0.0) {
+    if (p.compliant() && parameters.communication_step > 0.0) {
       p.contact_law = spring::ContactLaw::external;
       spring.emplace(p);  // checks the parameters
       held.emplace(law(), p.mass, parameters.communication_step,
@@ -80,10 +80,10 @@ struct SpringModel final : fmi::Model {
       return !held || (std::isfinite(held->force()) && std::isfinite(contact_energy()));
     };
     if (!has_force()) discard(no_force);
-    const spring::Inputs inputs = acting();
+    const spring::Inputs present = acting();
     try {
       if (impulse != 0.0) spring->apply_impulse(impulse);
-      spring->step(size, inputs);
+      spring->step(size, present);
     } catch (const spring::StepFailure& e) {
       discard(e.what());
     } catch (const std::domain_error& e) {
@@ -145,7 +145,7 @@ struct SpringModel final : fmi::Model {
   }
   /// y − u_tip [m]; negative without a law inside
   double depth() const {
-    const bool inside = !held && parameters.contact_law == spring::ContactLaw::normal_compliance;
+    const bool inside = !held && parameters.compliant();
     return inside ? spring->displacement() - spring->tip()[0] : -1.0;
   }
   spring::Compliance::Slopes law_slopes() const {
@@ -180,7 +180,7 @@ struct SpringModel final : fmi::Model {
                 "beam to the inputs of these names and reaction to its tip_force; set communication_step in both to "
                 "the step size, tip_response and tip_response_2 to the beam's; pass values on between the steps only, "
                 "for both FMUs alike (Jacobi). Loads on the beam that change much within a step show here, too";
-    } else if (!held && forecast[0] != 0.0 && parameters.contact_law == spring::ContactLaw::normal_compliance) {
+    } else if (!held && forecast[0] != 0.0 && parameters.compliant()) {
       warning =
           "tip_velocity_forecast arrives but is not used, as communication_step = 0: a contact that the steps do not "
           "resolve gains energy. Set communication_step, tip_response and tip_response_2 to those of the beam, or "
@@ -193,39 +193,31 @@ struct SpringModel final : fmi::Model {
 
   /// What acts from now on, but for what the contact law does not read.
   spring::Inputs acting() const {
-    spring::Inputs inputs;
-    if (held) {
-      inputs.contact_force[0] = held->force();
-    } else if (parameters.contact_law == spring::ContactLaw::external) {
-      inputs.contact_force = contact_force;
-    }
-    inputs.foundation_force = foundation_force;
-    inputs.external_force = external_force;
-    inputs.base_acceleration = base_acceleration;
-    inputs.tip_displacement = tip();
-    return inputs;
+    spring::Inputs present = inputs;
+    if (parameters.compliant()) present.contact_force = {held ? held->force() : 0.0, 0.0, 0.0};
+    present.tip_displacement = tip();
+    return present;
   }
 
   /// Where the top would be after the next step, other inputs staying as they are; the spring is left as it was.
   spring::HeldContact::Top trial() {
-    std::vector<double> present;
-    spring->save(present);
-    spring::Inputs inputs = acting();
-    for (auto* input :
-         {&inputs.contact_force, &inputs.foundation_force, &inputs.external_force, &inputs.base_acceleration})
+    std::vector<double> start;
+    spring->save(start);
+    spring::Inputs next = acting();
+    for (auto* input : {&next.foundation_force, &next.external_force, &next.base_acceleration})
       (*input)[1] = (*input)[2] = 0.0;
-    return [this, present, inputs, work = 0L](double force) mutable {
+    return [this, start, next, work = 0L](double force) mutable {
       if (work > most_trial_work) return unknown;
-      inputs.contact_force[0] = force;
+      next.contact_force[0] = force;
       const long before = spring->ida_steps();
       try {
-        spring->step(held->size(), inputs);
+        spring->step(held->size(), next);
       } catch (const spring::StepFailure&) {
         return unknown;  // the step itself will tell
       }
       work += spring->ida_steps() - before;
       const double reached = spring->displacement();
-      spring->restore(present);
+      spring->restore(start);
       return reached;
     };
   }
@@ -301,23 +293,21 @@ fmi::Table make_table() {
       .range(std::numeric_limits<double>::min(), 1e-2)
       .typical(1e-14);
 
-  add.input(
-      "contact_force", "N",
-      "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next step "
-      "only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2",
-      &SpringModel::contact_force);
-  add.input("foundation_force", "N",
-            "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled",
-            &SpringModel::foundation_force);
+  const auto input = [&](const char* name, const char* unit, fmi::Polynomial spring::Inputs::*field, const char* text) {
+    add.input(name, unit, text, [field](SpringModel& m, const fmi::Polynomial& value) { m.inputs.*field = value; });
+  };
+  input("contact_force", "N", &spring::Inputs::contact_force,
+        "contact force C, positive presses the spring down; its derivatives of order 1 and 2 hold for the next step "
+        "only: C(tau) = C + C' tau + C'' tau^2/2; ignored when contact_law = 2");
+  input("foundation_force", "N", &spring::Inputs::foundation_force,
+        "foundation force N, positive upward; derivatives as for contact_force; ignored when stop_enabled");
   add.impulse("impulse", "N.s", "upward impulse, applied at the start of the next step, then 0 again",
               &SpringModel::impulse);
-  add.input("external_force", "N", "external force f_s, positive upward; derivatives as for contact_force",
-            &SpringModel::external_force);
-  add.input(
-      "base_acceleration", "m/s2",
-      "acceleration a of the foundation, upward; all displacements are relative to it, so that it acts as a force of "
-      "-mass*a; derivatives as for contact_force",
-      &SpringModel::base_acceleration);
+  input("external_force", "N", &spring::Inputs::external_force,
+        "external force f_s, positive upward; derivatives as for contact_force");
+  input("base_acceleration", "m/s2", &spring::Inputs::base_acceleration,
+        "acceleration a of the foundation, upward; all displacements are relative to it, so that it acts as a force of "
+        "-mass*a; derivatives as for contact_force");
   add.input("tip_displacement", "m",
             "displacement of the beam's tip, read by contact_law = 2; extrapolated over the step by its derivatives or "
             "else by tip_velocity",
