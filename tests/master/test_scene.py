@@ -198,7 +198,7 @@ def test_what_needs_a_macro_step_says_so():
         ("time.=1", ["TABLE.KEY=VALUE"]),
         (".t_end=1", ["TABLE.KEY=VALUE"]),
         ("", ["TABLE.KEY=VALUE"]),
-        ("title.x=1", ["title is not a table"]),
+        ("title.x=1", ["[title]: not a table; tables: time"]),
         ("time.end=1", ["[time] end", "t_end"]),
         ("time.t_end=", ['[time] t_end = ""', "finite number"]),
         ("time.t_end=nan", ["t_end = nan", "finite number"]),

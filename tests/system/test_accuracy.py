@@ -328,7 +328,9 @@ def test_what_it_picks_cannot_be_given_beside_it(key, asking):
     assert (changed.accuracy, getattr(changed.coupling, key)) == (None, value)
     for arguments in ([str(asking)], ["soft", "--accuracy", "1e-4"]):
         setting = f"coupling.{key}={value}"
-        assert f"--set {setting}: accuracy = 0.0001 picks" in refused("run", *arguments, "--set", setting)
+        assert f"--set {setting}: [coupling] {key}: accuracy = 0.0001 picks" in refused(
+            "run", *arguments, "--set", setting
+        )
 
 
 def test_command(tmp_path):

@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from .loads import Load
 from .messages import explain, nearest, one_line
 from .partners import kind_of
 from .rules import impossible
@@ -70,20 +71,19 @@ def load_scene(path_or_name: str | Path, overrides: Iterable[str] = (), accuracy
         raise SceneError(f"{path}: a number in it has more digits than can be read") from error
     except RecursionError as error:
         raise SceneError(f"{path}: nested too deeply; a scene has tables of plain values") from error
-    changes = _override(data, overrides)
+    settings = _settings(overrides)
     if accuracy is not None:
         data["accuracy"] = accuracy
-    loads = data["loads"] if isinstance(data.get("loads"), list) else []
-    for content, key in ((data.get("beam"), "fmu"), (data.get("spring"), "fmu"), *((load, "file") for load in loads)):
-        if isinstance(content, dict) and isinstance(content.get(key), str):
-            content[key] = os.path.abspath(path.parent / content[key])
-    for (table, key), override in changes.items():
-        if (picked := _picked(data, table, key)) is not None:
-            raise SceneError(f"--set {override}: {picked}; leave one of the two out")
     try:
+        for table, given in settings.items():
+            _change(data, table, {key: parse_value(text.partition("=")[2].strip()) for key, text in given.items()})
+        named = ((data.get("beam"), "fmu"), (data.get("spring"), "fmu"), *((load, "file") for load in _loads(data)))
+        for content, key in named:
+            if isinstance(content, dict) and isinstance(content.get(key), str):
+                content[key] = os.path.abspath(path.parent / content[key])
         return scene_from_dict(data, source=str(path))
     except SceneError as error:
-        raise SceneError(_blamed(str(error), str(path), changes)) from None
+        raise SceneError(_blamed(str(error), str(path), settings)) from None
 
 
 def _line_of(error: Exception, text: str) -> str:
@@ -93,16 +93,15 @@ def _line_of(error: Exception, text: str) -> str:
     return f": {one_line(lines[int(found[1]) - 1].strip())}" if found and int(found[1]) <= len(lines) else ""
 
 
-def _blamed(message: str, path: str, changes: Mapping[tuple[str, str], str]) -> str:
+def _blamed(message: str, path: str, settings: Mapping[str, Mapping[str, str]]) -> str:
     """Return the message with ``--set`` named instead of the file in lines about a value given there."""
     lines = []
     for line in message.splitlines():
         said = line.removeprefix(f"{path}: ")
         found = re.match(r"\[([\w.]+)\](?: (\w+))?", said)
-        given = [
-            text for (table, key), text in changes.items() if found and found[1] == table and found[2] in (key, None)
-        ]
-        source = f"--set {given[-1]}" if given else f"{path} with --set" if changes else path
+        there = settings.get(found[1], {}) if found else {}
+        given = [text for key, text in there.items() if found and found[2] in (key, None)]
+        source = f"--set {given[-1]}" if given else f"{path} with --set" if settings else path
         lines.append(f"{source}: {said}")
     return "\n".join(lines)
 
@@ -130,26 +129,13 @@ def with_changes(scene: Scene, **changes: Any) -> Scene:
     SceneError
         If the changed scene cannot be run, or its ``accuracy`` would overrule a change.
     """
-    data = scene.model_dump(exclude_none=True, exclude_unset=True)
-    for name, change in changes.items():
-        if isinstance(change, Mapping):
-            _change(name, _table(data, name), change)
-        else:
-            data[name] = change
+    within = {table: keys for table, keys in changes.items() if isinstance(keys, Mapping)}
+    whole = {name: content for name, content in changes.items() if name not in within}
+    data = scene.model_dump(exclude_none=True, exclude_unset=True) | whole
     data = {name: content for name, content in data.items() if content is not None}
-    for table, change in changes.items():
-        for key in change if isinstance(change, Mapping) else ():
-            if (picked := _picked(data, table, key)) is not None:
-                raise SceneError(f"[{table}] {key}: {picked}; with_changes(scene, accuracy=None, …) takes it out")
+    for table, keys in within.items():
+        _change(data, table, keys)
     return scene_from_dict(data)
-
-
-def _picked(data: Mapping[str, Any], table: str, key: str) -> str | None:
-    """Return why a key of ``data`` would play no part, ``None`` if it does."""
-    accuracy = data.get("accuracy")
-    if accuracy is None or key not in PICKED_BY_ACCURACY.get(table, ()):
-        return None
-    return f"accuracy = {accuracy} picks {table}.{key} itself"
 
 
 def _scene_file(path_or_name: str | Path) -> Path:
@@ -168,42 +154,41 @@ def _scene_file(path_or_name: str | Path) -> Path:
     raise SceneError(f"{path_or_name}: {what}; {nearest(path.stem, shipped)}shipped scenes: {', '.join(shipped)}")
 
 
-def _override(data: dict[str, Any], overrides: Iterable[str]) -> dict[tuple[str, str], str]:
-    """Set what the overrides say, and return them by table and key; of two for one key the last counts."""
-    given: dict[tuple[str, str], str] = {}
-    values: dict[str, dict[str, Any]] = {}
+def _settings(overrides: Iterable[str]) -> dict[str, dict[str, str]]:
+    """Return the overrides by table and key; of two for one key the last counts."""
+    settings: dict[str, dict[str, str]] = {}
     for override in overrides:
-        target, separator, text = override.partition("=")
+        target, separator, _ = override.partition("=")
         split = split_key(target)
         if not separator or split is None:
             raise SceneError(f"--set {override}: must be TABLE.KEY=VALUE, as in coupling.macro_step=1e-3")
         table, key = split
-        try:
-            found = _table(data, table)
-        except SceneError as error:
-            raise SceneError(f"--set {override}: {error}") from None
-        if not isinstance(found, dict):
-            raise SceneError(f"--set {override}: {table} is not a table; tables: {', '.join(TABLES)}")
-        given[table, key] = override
-        values.setdefault(table, {})[key] = parse_value(text.strip())
-    for table, changes in values.items():
-        _change(table, _table(data, table), changes)
-    return given
+        settings.setdefault(table, {})[key] = override
+    return settings
 
 
-def _table(data: dict[str, Any], name: str) -> Any:
-    """Return the content of a table, made where it is missing. Raises SceneError if there is no such load."""
-    if not re.fullmatch(r"loads\.\d+", name):
-        return data.setdefault(name, {})
-    loads, index = data.get("loads", []), int(name.partition(".")[2])
-    if not isinstance(loads, list) or index >= len(loads):
-        number = len(loads) if isinstance(loads, list) else 0
-        raise SceneError(f"{name}: the scene has {number} [[loads]], and the first is loads.0")
-    return loads[index]
+def _loads(data: Mapping[str, Any]) -> list[Any]:
+    """Return the loads; none where they are no list, which `scene_from_dict` refuses."""
+    return list(loads) if isinstance(loads := data.get("loads"), (list, tuple)) else []
 
 
-def _change(table: str, content: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Set keys of a table; one way to give a thing takes the place of another, unless both are new."""
+def _change(data: dict[str, Any], table: str, changes: Mapping[str, Any]) -> None:
+    """Set keys of a table, made where it is missing.
+
+    One way to give a thing takes the place of another, unless both are new. Raises SceneError if there is no such
+    table or load, or if the scene's accuracy picks one of the keys.
+    """
+    loads = {f"loads.{i}": load for i, load in enumerate(_loads(data))}
+    if table_of(table) is Load and table not in loads:
+        raise SceneError(f"[{table}]: the scene has {len(loads)} [[loads]], and the first is loads.0")
+    content = loads[table] if table in loads else data.setdefault(table, {})
+    if not isinstance(content, dict):
+        raise SceneError(f"[{table}]: not a table; tables: {', '.join(TABLES)}")
+    for key in changes:
+        if data.get("accuracy") is not None and key in PICKED_BY_ACCURACY.get(table, ()):
+            raise SceneError(
+                f"[{table}] {key}: accuracy = {data['accuracy']} picks {table}.{key} itself; leave one of the two out"
+            )
     given = {key for key, value in changes.items() if value is not None}
     model = table_of(table)
     for ways in model.WAYS if model else ():

@@ -6,7 +6,7 @@ import math
 import re
 from typing import Annotated, Any
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from .loads import Load
 from .partners import ForeignFmu, LowerBody, Partner, UpperBody
@@ -38,13 +38,6 @@ class Scene(Table):
     contact: Contact = Contact()
     coupling: Coupling = Coupling()
     loads: Annotated[tuple[Load, ...], Field(strict=False)] = ()
-
-    @model_serializer(mode="wrap")
-    def _only_what_there_is(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        data: dict[str, Any] = dump(self)
-        if loads := data.pop("loads", ()):
-            data["loads"] = list(loads)
-        return data
 
     @property
     def beam(self) -> Beam | None:

@@ -104,7 +104,8 @@ class Table(BaseModel):
 
     @model_serializer(mode="wrap")
     def _as_given(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: value for name, value in handler(self).items() if name not in self._followed}
+        data = handler(self)
+        return {name: value for name, value in data.items() if name not in self._followed and value not in ((), [])}
 
 
 class Time(Table):
