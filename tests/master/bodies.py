@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from functools import reduce
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.polynomial import polyint, polymul, polyval
@@ -18,6 +19,7 @@ from scipy.linalg import expm
 
 from springbeam.bodies.force import combined, shifted, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
+from springbeam.coupling.protocol import Step, Window
 from springbeam.monolithic.loads import Loads
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.recording import MemoryRecorder
@@ -296,6 +298,34 @@ def orders(errors, sizes) -> list[float]:
     return [float(np.log(e0 / e1) / np.log(h0 / h1)) for (e0, e1), (h0, h1) in pairs]
 
 
-def drift(bodies_) -> float:
-    """Total mechanical energy with what was dissipated and the loads' potential [J]."""
-    return sum(sum(body.energies()) for body in bodies_)
+class Row(NamedTuple):
+    """A coupled pair after a step."""
+
+    upper: Motion
+    lower: Motion
+    force: Force  #: over the step
+    energy: float  #: of both bodies, and what the coupling books [J]
+
+
+def solve(coupling, size: float, upper: Body, lower: Body, guess: Force = NO_FORCE, time: float = 0.0) -> Force:
+    """Make a step from where the bodies are, and return its contact force."""
+    for body in (upper, lower):
+        body.mark()
+    return coupling.solve(upper, lower, Window(time, size, (upper.motion(), lower.motion())), guess)
+
+
+def couple(coupling, size: float, steps: int, upper: Body, lower: Body) -> list[Row]:
+    """Make ``steps`` steps; the first row is the start."""
+
+    def row(contact: Force) -> Row:
+        ends = (upper.motion(), lower.motion())
+        booked = coupling.booking(ends)
+        return Row(*ends, contact, sum(upper.energies()) + sum(lower.energies()) + booked.stored + booked.dissipated)
+
+    rows = [row(NO_FORCE)]
+    for i in range(steps):
+        guess, start = shifted(rows[-1].force, size), rows[-1][:2]
+        contact = solve(coupling, size, upper, lower, guess, i * size)
+        coupling.accept(Step(i * size, size, contact, NO_FORCE, start, (upper.motion(), lower.motion())))
+        rows.append(row(contact))
+    return rows

@@ -7,13 +7,12 @@ from math import log2
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, Upper
+from bodies import DuffingBody, Upper, couple
 
 from springbeam.bodies import force
-from springbeam.bodies.protocol import NO_FORCE, Motion
+from springbeam.bodies.protocol import Motion
 from springbeam.coupling.energy import created_mismatch
 from springbeam.coupling.hermite import gap_inside
-from springbeam.coupling.protocol import Window
 from springbeam.coupling.tie import Tie
 from springbeam.run.local_error import _beside_cubic
 from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
@@ -154,11 +153,8 @@ def test_work_is_that_of_the_force_on_the_gap():
 def test_free_masses_create_no_mismatch(degree):
     """w⁺ = −(−1)^d w exactly: what they start with is not the step's error."""
     size = 0.1
-    upper, b = Upper(mass=2.0, k1=0.0, k2=0.0, z=-0.7), DuffingBody(mass=3.0, k1=0.0, k2=0.0, z=0.4)
-    for body in (upper, b):
-        body.mark()
-    start = (upper.motion(), b.motion())
-    Tie("energy", degree, 1e-12).solve(upper, b, Window(0.0, size, start), NO_FORCE)
-    gaps = [Motion(*np.subtract(*ends)) for ends in (start, (upper.motion(), b.motion()))]
+    upper, lower = Upper(mass=2.0, k1=0.0, k2=0.0, z=-0.7), DuffingBody(mass=3.0, k1=0.0, k2=0.0, z=0.4)
+    rows = couple(Tie("energy", degree, 1e-12), size, 1, upper, lower)
+    gaps = [Motion(*np.subtract(row.upper, row.lower)) for row in rows]
     assert gaps[1].velocity == pytest.approx(-((-1) ** degree) * gaps[0].velocity, rel=1e-9)
     assert created_mismatch(*gaps, degree) < 1e-9 * abs(gaps[0].velocity)

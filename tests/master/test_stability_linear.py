@@ -6,13 +6,11 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, ModalBody, unit_beam
+from bodies import DuffingBody, ModalBody, solve, unit_beam
 from scipy.linalg import expm
 
-from springbeam.bodies.protocol import NO_FORCE
 from springbeam.contact.laws import Link
 from springbeam.coupling.exchange import Exchange
-from springbeam.coupling.protocol import Window
 from springbeam.coupling.soft import SoftSolver
 from springbeam.coupling.tie import Tie
 from springbeam.scene import load_scene, with_changes
@@ -88,10 +86,6 @@ def solved(p: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
     for unit in np.eye(2 * r + 2):
         beam = ModalBody(np.sqrt(p.beam.omega2), p.beam.b, unit[:r], unit[r : 2 * r])
         spring = DuffingBody(mass, float(p.spring.omega2[0]) * mass, 0.0, *(unit[2 * r :] * mass**-0.5))
-        ends = (beam, spring)
-        for body in ends:
-            body.mark()
-        motions = (ends[0].motion(), ends[1].motion())
         law = Link(p.stiffness, p.damping)
         if not p.soft:
             coupling = Tie(scheme, degree, 1e-13)
@@ -99,7 +93,7 @@ def solved(p: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
             coupling = SoftSolver(law, degree, 1e-14)
         else:
             coupling = Exchange(law, scheme == "gauss_seidel", degree)
-        coupling.solve(*ends, Window(0.0, h, motions), NO_FORCE)
+        solve(coupling, h, beam, spring)
         columns.append(np.concatenate([beam.a, beam.v, np.array([spring.y, spring.z]) * mass**0.5]))
     return np.array(columns).T
 

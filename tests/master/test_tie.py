@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, ModalBody, drift, orders, unit_beam
+from bodies import DuffingBody, ModalBody, couple, orders, solve, unit_beam
 
 from springbeam.bodies import force
-from springbeam.bodies.protocol import NO_FORCE, Force, Motion
-from springbeam.coupling.protocol import NotConverged, Window
+from springbeam.bodies.protocol import NO_FORCE
+from springbeam.coupling.protocol import NotConverged
 from springbeam.coupling.tie import Tie
 
 SCHEMES = [("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2)]
-
-
-class Row(NamedTuple):
-    beam: Motion
-    spring: Motion
-    force: Force
-    energy: float  #: after the step
 
 
 def after_impact(n: int, stiffness: float = 100.0, **spring: float) -> tuple[ModalBody, DuffingBody]:
@@ -33,23 +25,6 @@ def after_impact(n: int, stiffness: float = 100.0, **spring: float) -> tuple[Mod
     return beam, top
 
 
-def solve(tie: Tie, size: float, beam, spring, guess: Force = NO_FORCE, time: float = 0.0) -> Force:
-    """The force of a step from where the bodies are."""
-    for body in (beam, spring):
-        body.mark()
-    return tie.solve(beam, spring, Window(time, size, (beam.motion(), spring.motion())), guess)
-
-
-def couple(scheme: str, degree: int, size: float, steps: int, beam, spring) -> list[Row]:
-    tie = Tie(scheme, degree, 1e-12)
-    rows, guess = [], NO_FORCE
-    for i in range(steps):
-        f = solve(tie, size, beam, spring, guess, i * size)
-        guess = force.shifted(f, size)
-        rows.append(Row(beam.motion(), spring.motion(), f, drift((beam, spring))))
-    return rows
-
-
 # -- the conditions -------------------------------------------------------------------------------------------------
 
 
@@ -59,8 +34,8 @@ def test_the_conditions_of_the_scheme_hold(scheme, degree, mass):
     """To the tolerance, 1e-12 of the motion over the step: here H·|u̇| ≤ 2 mm."""
     size = 2e-3
     beam, spring = after_impact(6, mass=mass, k2=300.0)
-    for row in couple(scheme, degree, size, 20, beam, spring):
-        gap = np.subtract(row.beam, row.spring)
+    for row in couple(Tie(scheme, degree, 1e-12), size, 20, beam, spring):
+        gap = np.subtract(row.upper, row.lower)
         s = (gap[2] - 2.0 * gap[3] / size) / size  # mean of s·g, s = 2τ/H − 1
         vanishing = {
             "energy": (gap[0], gap[2] / size, s),
@@ -74,13 +49,13 @@ def test_the_reported_integrals_are_those_of_the_gap(scheme, degree):
     """The step repeated to Gauss points: ∫g and ∫τg vanish as integrals of what the ends really do."""
     size = 5e-3
     beam, spring = after_impact(3)
-    (row,) = couple(scheme, degree, size, 1, beam, spring)
+    contact = solve(Tie(scheme, degree, 1e-12), size, beam, spring)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     gaps = []
     for x in nodes:
         for body in (beam, spring):
             body.rewind()
-            body.advance(0.0, 0.5 * (x + 1.0) * size, row.force)
+            body.advance(0.0, 0.5 * (x + 1.0) * size, contact)
         gaps.append(beam.motion().displacement - spring.motion().displacement)
     moments = [float(np.sum(weights * np.array(gaps) * nodes**j)) for j in range(degree if scheme == "energy" else 1)]
     assert np.abs(gaps).max() > 1e-9  # the gap itself does not vanish
@@ -110,9 +85,8 @@ def test_energy_schemes_conserve_energy(degree, frequency, mass, k2):
     mismatched velocities, and up to 1000 times that is accepted where the bodies' rounding is; hermite changes it by
     1e-4 and more."""
     beam, spring = after_impact(6, 1e6, mass=mass, k1=3.0, k2=k2)
-    start = drift((beam, spring))
-    rows = couple("energy", degree, frequency / beam.omega.max(), 60, beam, spring)
-    assert max(abs(row.energy - start) for row in rows) < 1e-8 * start
+    start, *rows = couple(Tie("energy", degree, 1e-12), frequency / beam.omega.max(), 60, beam, spring)
+    assert max(abs(row.energy - start.energy) for row in rows) < 1e-8 * start.energy
 
 
 # -- orders ---------------------------------------------------------------------------------------------------------
@@ -123,8 +97,8 @@ T = 0.064
 def smooth_phase(scheme: str, degree: int, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """u, u̇ and the mean of both limits of C at the macro points inside (0, T), shape (count − 1,) each."""
     size = T / count
-    rows = couple(scheme, degree, size, count, *after_impact(3))
-    u = np.array([(row.beam.displacement, row.beam.velocity) for row in rows[:-1]]).T
+    _, *rows = couple(Tie(scheme, degree, 1e-12), size, count, *after_impact(3))
+    u = np.array([(row.upper.displacement, row.upper.velocity) for row in rows[:-1]]).T
     c = [0.5 * (force.value(a.force, size) + b.force[0]) for a, b in pairwise(rows)]
     return u[0], u[1], np.array(c)
 
@@ -171,9 +145,9 @@ def test_a_step_costs_two_beam_advances_and_two_to_three_of_the_spring(scheme, d
     """Regular steps, after the response matrices are known: guess and check of the beam; the spring's iterations."""
     size, count = 1e-3, 60
     beam, spring = after_impact(10)
-    couple(scheme, degree, size, 2, beam, spring)
+    couple(Tie(scheme, degree, 1e-12), size, 2, beam, spring)
     beam.steps = spring.steps = 0
-    couple(scheme, degree, size, count, beam, spring)
+    couple(Tie(scheme, degree, 1e-12), size, count, beam, spring)
     assert beam.steps <= 2 * count + 3  # three: the response is measured anew by a new solver
     assert spring.steps <= springs * count
 
