@@ -17,6 +17,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyint, polymul, polyval
 from scipy.linalg import expm
 
+from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.force import combined, shifted, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
 from springbeam.coupling.protocol import Step, Window
@@ -251,10 +252,12 @@ def _value(coefficients: list[float], h: float) -> float:
     return reduce(lambda total, c: total * h + c, reversed(coefficients))
 
 
-def bodies(scene: Scene) -> tuple[ModalBody | None, DuffingBody | None]:
-    """The scene's bodies at `first_contact`."""
+def bodies(scene: Scene) -> tuple[BeamBody | None, DuffingBody | None]:
+    """The scene's bodies at `first_contact`; a beam without inertia is that of the package, which is exact."""
     beam = spring = None
-    if scene.beam is not None:
+    if scene.massless:
+        beam, _ = load_bodies(scene.model_copy(update={"lower": None}), scene.contact_time or 0.0)
+    elif scene.beam is not None:
         target = scene.tip_target
         kinematic = scene.beam.approach == "undeformed" and target is not None
         beam = beam_body(scene.beam, target[1] / scene.beam.length if kinematic else None)
@@ -274,7 +277,14 @@ def bodies(scene: Scene) -> tuple[ModalBody | None, DuffingBody | None]:
 
 
 def simulate(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> Trajectory:
-    """The master's run with the doubles (``wrap`` may replace them); ``summary["stopped"]`` holds a RunStopped."""
+    """The master's run with the doubles (``wrap`` may replace them), which must not stop."""
+    trajectory, stopped = stopping(scene, wrap)
+    assert stopped is None
+    return trajectory
+
+
+def stopping(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> tuple[Trajectory, RunStopped | None]:
+    """The run of `simulate`, and what stopped it."""
     beam, spring = wrap(*bodies(scene))
     recorder = MemoryRecorder(scene)
     simulation = Simulation(scene, (scene.contact_time or 0.0), beam, spring, recorder)
@@ -285,11 +295,10 @@ def simulate(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> Trajecto
         stopped = error
     recorder.finish(simulation.summary())
     trajectory = recorder.trajectory()
-    trajectory.summary["stopped"] = stopped
     trajectory.summary["work"] = {
         name: body.steps for name, body in (("beam", beam), ("spring", spring)) if hasattr(body, "steps")
     }
-    return trajectory
+    return trajectory, stopped
 
 
 def orders(errors, sizes) -> list[float]:

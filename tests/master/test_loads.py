@@ -116,7 +116,6 @@ def test_half_sine_base_and_table_are_met_to_a_nanometre():
 def test_the_ledger_closes_under_all_kinds_of_loads(scheme, degree, law):
     scene = with_changes(soft(*SIGNALS, t_end=0.2, scheme=scheme, degree=degree), contact={"law": law, "exponent": 1.5})
     run = simulate(with_changes(scene, beam={"alpha_b": 1e-3}, spring={"damping": 0.3}))
-    assert run.summary["stopped"] is None
     assert run.summary["max_energy_residual"] < 1e-11
     assert np.ptp(run.e_load) > 1e-3 * run.e_total[0]
     assert run["load_1"] == pytest.approx(5.0 * np.sin(24.0 * np.pi * run.time + 0.3))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import bodies
 import numpy as np
 import pytest
-from bodies import DuffingBody, orders
+from bodies import DuffingBody, orders, simulate
 from scenes import scene_from_dict
 from scipy.sparse.linalg import spsolve
 
@@ -16,7 +15,6 @@ from springbeam.contact.phases import Joint, Phase, meeting
 from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.contact_times import contact_changes
-from springbeam.results.trajectory import Trajectory
 from springbeam.run.stepping import Pair
 from springbeam.scene import Beam, Scene, statics, suspicions
 from springbeam.scene.statics import SHAPE_POINTS
@@ -132,22 +130,6 @@ def scene(**tables: dict[str, Any]) -> Scene:
         "coupling": {"macro_step": 0.01},
     }  # fmt: skip
     return scene_from_dict({table: {**data.get(table, {}), **tables.get(table, {})} for table in {**data, **tables}})
-
-
-def simulate(given: Scene) -> Trajectory:
-    """With an exact spring, so that the coupling is tested by itself."""
-
-    def without_inertia(_: object, spring: DuffingBody) -> tuple[QuasiStaticBeam, DuffingBody]:
-        rate = given.beam.initial_velocity_slope * given.beam.length
-        tip = (given.initial_tip or 0.0) + (given.contact_time or 0.0) * rate
-        beam = QuasiStaticBeam(given.beam, given.coupling.degree, tip, rate)
-        if given.beam.approach == "elastic":
-            beam.release()
-        return beam, spring
-
-    run = bodies.simulate(given, without_inertia)
-    assert run.summary["stopped"] is None
-    return run
 
 
 @pytest.mark.parametrize("alpha", [0.0, 0.02, 0.4])

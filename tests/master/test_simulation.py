@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import simulate
+from bodies import simulate, stopping
 from scenes import scene_from_dict
 
 from springbeam.bodies.protocol import StepRefused
@@ -188,7 +188,6 @@ def test_a_bouncing_mass_comes_to_rest_after_its_geometric_series(e, size):
         "coupling": {"macro_step": size},
     })  # fmt: skip
     trajectory = simulate(scene)
-    assert trajectory.summary["stopped"] is None
     assert [event.kind for event in trajectory.events].count("seated") == 1
     assert trajectory.events[-1].time == pytest.approx(rest, abs=(2e-8 * v / g + 1e-9 * size) / (1.0 - e))
     assert trajectory.e_impact_loss[-1] == pytest.approx(g * d, rel=1e-12)
@@ -247,8 +246,7 @@ def test_a_step_that_is_always_refused_stops_the_run_with_cause_and_time():
         return own(time, size, *forces)
 
     scene = soft(time={"t_end": 0.05})
-    stopped, whole = simulate(scene, wrapped(advance=advance)), simulate(scene)
-    cause = stopped.summary["stopped"]
+    (stopped, cause), whole = stopping(scene, wrapped(advance=advance)), simulate(scene)
     assert cause.cause == "the spring is broken"
     # Halving reaches the limit to H/2²⁰.
     assert cause.time == pytest.approx(0.0205, abs=2e-9)
@@ -262,8 +260,7 @@ def test_a_value_that_is_not_finite_stops_the_run():
         values = own()
         return values if values.kinetic < 2e-3 else values._replace(kinetic=float("nan"))
 
-    stopped = simulate(soft(), wrapped(energies=energies))
-    cause = stopped.summary["stopped"]
+    stopped, cause = stopping(soft(), wrapped(energies=energies))
     assert "e_spring" in cause.cause
     assert stopped.time[-1] < cause.time <= 0.3
     assert np.isfinite(stopped.e_total).all()
@@ -310,7 +307,6 @@ def test_the_ledger_closes(degree, size):
         coupling={"scheme": "energy", "degree": degree, "macro_step": size},
     )
     trajectory = simulate(scene)
-    assert trajectory.summary["stopped"] is None
     assert trajectory.summary["max_energy_residual"] < 1e-11
     assert trajectory.e_dissipated[-1] > 1e-3
     assert trajectory.e_impact_loss[-1] == pytest.approx(sum(e.energy_loss for e in trajectory.events), rel=1e-14)
@@ -355,13 +351,11 @@ def test_energy_that_appears_is_named(scheme, degree, share, warns, stops):
         values = own()
         return values._replace(kinetic=values.kinetic + share * total * (values.kinetic > 0.0))
 
-    trajectory = simulate(scene, wrapped(energies=energies))
+    trajectory, stopped = stopping(scene, wrapped(energies=energies))
     named = [w for w in trajectory.summary["warnings"] if "changed the energy" in w]
     assert len(named) == warns
-    if stops:
-        assert named[0] in str(trajectory.summary["stopped"])
-    else:
-        assert trajectory.summary["stopped"] is None
+    assert (stopped is not None) is stops
+    assert not stops or named[0] in str(stopped)
 
 
 @pytest.mark.parametrize("restitution", [0.5, 0.7, 0.9])
