@@ -39,6 +39,7 @@ class Findings:
     abilities: Abilities
     mass: float  #: that a force meets at first [kg]
     velocity: float  #: at the start [m/s]
+    H: float  #: a macro step, for trial steps [s]
     faults: tuple[str, ...] = ()  #: what it says, or a scene says of it, and is not so
 
 
@@ -206,8 +207,7 @@ class ForeignBody(FmuBody, EndLoaded):
         """
         if (known := self._held.get(displacement)) is not None:
             return known
-        size = self._size
-
+        size = self._size or self._found.H
         load, self._on_end = self._on_end, NO_FORCE
 
         def pushed(upward: float) -> Motion:

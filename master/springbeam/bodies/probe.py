@@ -55,7 +55,7 @@ class Bench:
     def __init__(
         self, spec: ForeignFmu, upper: bool, start_time: float, H: float, stage: Callable[[str], None]
     ) -> None:
-        self.spec, self._start, self.stage = spec, start_time, stage
+        self.spec, self._start, self._H, self.stage = spec, start_time, H, stage
         #: What is upward for the force C.
         self.upward = 1.0 if upper else -1.0
         self.faults: list[str] = []
@@ -81,7 +81,7 @@ class Bench:
         self.stage("instantiation")
         self.abilities = replace(self.abilities, **abilities)
         self._body = body = ForeignBody(
-            self.spec, self.upward > 0.0, self._start, Findings(self.abilities, 1.0, 0.0), by_substeps=False
+            self.spec, self.upward > 0.0, self._start, Findings(self.abilities, 1.0, 0.0, self._H), by_substeps=False
         )
         self.stage("saving the state")
         body.mark()
@@ -140,7 +140,7 @@ def examine(bench: Bench) -> Findings:
         mass = _check_impulse(bench, spec.mass or mass, length / H)
     velocity = start.v if bench.abilities.velocity else _velocity(bench)
     bench.close()
-    return Findings(bench.abilities, mass, velocity, tuple(bench.faults))
+    return Findings(bench.abilities, mass, velocity, H, tuple(bench.faults))
 
 
 def _check_state(bench: Bench) -> None:
