@@ -25,7 +25,7 @@ class Abilities:
 
     @property
     def degree(self) -> int:
-        """Highest degree of the contact force over a step; integrals that are not told are found by substeps."""
+        """Return the highest degree of the contact force; integrals that are not told are found by substeps."""
         return min(2 if self.any_size else self.integrals, self.slopes)
 
 

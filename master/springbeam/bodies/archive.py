@@ -14,7 +14,7 @@ _ENCRYPTED = 0x1
 
 
 def fmu_directory() -> Path:
-    """Where ``beam.fmu`` and ``spring.fmu`` are: $SPRINGBEAM_FMUS, the installed package, or the checkout."""
+    """Return where ``beam.fmu`` and ``spring.fmu`` are: $SPRINGBEAM_FMUS, the installed package, or the checkout."""
     chosen = os.environ.get("SPRINGBEAM_FMUS")
     if chosen:
         return Path(chosen)

@@ -19,11 +19,11 @@ class Checkpointed:
 
     @classmethod
     def checkpointed_names(cls) -> tuple[str, ...]:
-        """`CHECKPOINTED`, or all fields of a dataclass."""
+        """Return `CHECKPOINTED`, or all fields of a dataclass."""
         return tuple(field.name for field in fields(cls)) if is_dataclass(cls) else cls.CHECKPOINTED
 
     def save(self) -> dict[str, Any]:
-        """The attributes that are checkpointed, by name, parts as nested dicts; lists and arrays are the run's own."""
+        """Return the checkpointed attributes by name, parts as nested dicts; lists and arrays are the run's own."""
         parts = {name: getattr(self, name) for name in self.checkpointed_names()}
         return {name: part.save() if isinstance(part, Checkpointed) else part for name, part in parts.items()}
 

@@ -136,7 +136,7 @@ class Fmu(Checkpointed):
             raise FmuError(f"{self.path}: cannot be instantiated: {self._cause(error)}") from error
 
     def _prepare_parameters(self, parameters: Mapping[str, Value]) -> None:
-        """Calls that set the parameters."""
+        """Prepare the calls that set the parameters. Raises FmuError for one that cannot be set so."""
         kinds = self._functions.KINDS
         #: Where the value of a parameter is.
         self._parameters: dict[str, tuple[Any, int]] = {}
@@ -200,7 +200,7 @@ class Fmu(Checkpointed):
             raise FmuError(f"{self.path}: has no variable {name!r}{meant}") from None
 
     def references(self, names: Sequence[str], kind: str) -> Any:
-        """Value references of variables of one type, as an array of C."""
+        """Return value references of variables of one type, as an array of C. Raises FmuError."""
         for name in names:
             if (variable := self.variable(name)).type != kind:
                 raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, expected {kind}")
@@ -228,7 +228,7 @@ class Fmu(Checkpointed):
         self.rewinds += 1
 
     def step(self, time: float, size: float) -> None:
-        """fmi2DoStep, after its inputs have been set. Raises StepRefused."""
+        """Make a step (fmi2DoStep) with the inputs that have been set. Raises StepRefused."""
         self.steps += 1
         self._time.value, self._size.value = time, size
         status = self._do_step()
@@ -247,7 +247,7 @@ class Fmu(Checkpointed):
         raise StepRefused(f"{self._name}: {cause}{reached}")
 
     def failed(self, status: int, what: str) -> FmuError:
-        """The error of a call that returned ``status``, with what the FMU has logged."""
+        """Return the error of a call that returned ``status``, with what the FMU has logged."""
         self._worst = max(self._worst, status)
         return FmuError(f"{self.path}: {what}: {self._cause(f'it returned {_STATUS[status]}')}")
 
@@ -310,7 +310,7 @@ _CALLED_BY = {
 
 
 def call_under_way(frame: FrameType | None) -> str:
-    """Which FMU a thread is calling, and the time at which its last step began, in words; else the line it is in.
+    """Say which FMU a thread is calling, and the time at which its last step began; else the line it is in.
 
     ``frame`` is the innermost one of the thread. Found there when it is asked for, the call costs a run nothing.
     """

@@ -63,7 +63,7 @@ class FmuBody(Body):
         self._begin()
 
     def _prepare_inputs(self, loads: Sequence[str]) -> None:
-        """Calls that set the forces and ``loads``, inputs of the FMU, and their derivatives."""
+        """Prepare the calls that set the forces and ``loads``, inputs of the FMU, and their derivatives."""
         fmu, names = self.fmu, (*self._FORCES, *loads)
         n = self._number = len(names)
         Reals(fmu, *names)  # a wrong reference is found before the run
@@ -129,7 +129,7 @@ class FmuBody(Body):
         self._current = self._current._replace(velocity=self._current.velocity + impulse / self.mass)
 
     def _advance(self, time: float, size: float, inputs: Sequence[float]) -> Motion:
-        """``inputs`` at the start of the step: the forces and loads, then the two derivatives of each."""
+        """Step under ``inputs`` at the start of the step: forces and loads, then the two derivatives of each."""
         fmu, n = self.fmu, self._number
         if not isfinite(sum(inputs)):
             raise StepRefused(f"{fmu.path.name}: the force it should step under is not finite: {list(inputs[:n])}")
@@ -159,7 +159,7 @@ class FmuBody(Body):
         raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
 
     def _stored(self) -> tuple[float, ...]:
-        """The energies [J]; the kinetic one with the impulse that is still pending."""
+        """Return the energies [J]; the kinetic one has the impulse that is still pending."""
         energies = self._energies.get()
         if self._pending != 0.0:
             before = self._current.velocity - self._pending / self.mass
@@ -184,7 +184,7 @@ class FmuBeam(FmuBody, BeamBody):
     _FORCES = ("tip_force",)
 
     def __init__(self, beam: Beam, start_time: float, deflection_slope: float, loads: Sequence[Load] = ()) -> None:
-        """At ``start_time`` [s], with u = ``deflection_slope``·x; ``loads`` say where point forces may act."""
+        """Start at ``start_time`` [s] with u = ``deflection_slope``·x; ``loads`` say where point forces may act."""
         self._points = sorted({load.at for load in loads if load.at is not None})
         self._constants = {"distributed_load": beam.distributed_load}
         parameters: dict[str, float | int | bool] = {name: value for name, value in beam if name not in beam.GIVEN_ONLY}
@@ -222,7 +222,7 @@ class FmuBeam(FmuBody, BeamBody):
         return _energies_of(Energies, (kinetic, strain, dissipated, -load if self._bears_loads else load))
 
     def shape(self) -> np.ndarray:
-        """Deflection [m] at `SHAPE_POINTS`, shape (21,)."""
+        """Return the deflection [m] at `SHAPE_POINTS`, shape (21,)."""
         self._shape.get()
         return np.array(np.frombuffer(self._shape.values))
 

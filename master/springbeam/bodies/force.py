@@ -14,7 +14,7 @@ _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4)[0] + 1) / 2, np.polynomia
 
 
 def derivatives(a: Sequence[float], size: float) -> Force:
-    """(C, Ċ, C̈) at the step's start [N, N/s, N/s²] of Legendre coefficients ``a`` [N] (1 to 3 of them)."""
+    """Return (C, Ċ, C̈) at the step's start [N, N/s, N/s²] of 1 to 3 Legendre coefficients ``a`` [N]."""
     if len(a) == 1:
         return (a[0], 0.0, 0.0)
     if len(a) == 2:
@@ -23,17 +23,17 @@ def derivatives(a: Sequence[float], size: float) -> Force:
 
 
 def value(force: Force, tau: float) -> float:
-    """C(τ) [N]."""
+    """Return C(τ) [N]."""
     return force[0] + tau * (force[1] + 0.5 * tau * force[2])
 
 
 def mean(force: Force, size: float) -> float:
-    """∫ C dτ / H [N]."""
+    """Return ∫ C dτ / H [N]."""
     return force[0] + size * (force[1] / 2.0 + size * force[2] / 6.0)
 
 
 def work(force: Force, gap: Motion, size: float) -> float:
-    """∫ C ġ dτ [J] over a step that starts and ends with the gap closed: −∫ Ċ g dτ, ``gap`` at its end."""
+    """Return ∫ C ġ dτ [J] over a step that starts and ends with the gap closed: −∫ Ċ g dτ, ``gap`` at its end."""
     return -force[1] * gap.integral - force[2] * (size * gap.integral - gap.integral_2)
 
 
@@ -45,14 +45,14 @@ def work_on(force: Force, start: Motion, end: Motion, size: float) -> float:
 
 
 def variation(force: Force, size: float) -> float:
-    """∫ |Ċ| dτ [N] over a step."""
+    """Return ∫ |Ċ| dτ [N] over a step."""
     turn = -force[1] / force[2] if force[2] != 0.0 else 0.0
     values = [force[0], value(force, turn) if 0.0 < turn < size else force[0], value(force, size)]
     return abs(values[1] - values[0]) + abs(values[2] - values[1])
 
 
 def sign_changes(force: Force, size: float) -> list[float]:
-    """Where C passes through zero inside the step, ascending."""
+    """Return where C passes through zero inside the step, ascending."""
     c, b, a = force[0], force[1], 0.5 * force[2]
     if a == 0.0:
         roots = [-c / b] if b != 0.0 else []
@@ -79,14 +79,14 @@ def combined(shares: Sequence[float], forces: Sequence[Force]) -> Force:
 
 
 def legendre(force: Force, size: float, degree: int) -> list[float]:
-    """The degree + 1 Legendre coefficients of the polynomial (cut above ``degree``)."""
+    """Return the degree + 1 Legendre coefficients of the polynomial (cut above ``degree``)."""
     value, slope, bend = force[0], size * force[1], size * size * force[2]
     mean = value + slope / 2.0 + bend / 6.0
     return [mean] if degree == 0 else [mean, slope / 2.0 + bend / 4.0, bend / 12.0][: degree + 1]
 
 
 def _unit_response(k: int) -> tuple[float, float, float, float]:
-    """∫ P_k(2x − 1) (1 − x)ⁿ/n! dx over [0, 1] for n = 1, 0, 2, 3: in the order of `Motion`."""
+    """Return ∫ P_k(2x − 1) (1 − x)ⁿ/n! dx over [0, 1] for n = 1, 0, 2, 3: in the order of `Motion`."""
     p = _WEIGHTS * np.polynomial.legendre.legval(2.0 * _NODES - 1.0, [0.0] * k + [1.0])
     left = 1.0 - _NODES
     return float(p @ left), float(p.sum()), float(p @ left**2) / 2.0, float(p @ left**3) / 6.0
@@ -96,6 +96,6 @@ _UNIT_RESPONSES = [_unit_response(k) for k in range(3)]
 
 
 def free_mass_response(degree: int, size: float, mass: float) -> list[Motion]:
-    """Motion of a free mass [kg] from rest under −P_k, k = 0 … degree: how a spring answers when H is small."""
+    """Return the motion of a free mass [kg] from rest under −P_k, k = 0 … degree: any spring's if H is small."""
     scales = [-(size**n) / mass for n in (2, 1, 3, 4)]
     return [Motion(*map(mul, unit, scales)) for unit in _UNIT_RESPONSES[: degree + 1]]

@@ -103,7 +103,7 @@ class Body(Checkpointed):
         return self.energies()
 
     def apply_impulse(self, impulse: float) -> None:
-        """Upward impulse [N·s]."""
+        """Change the velocity of the end at once by an upward impulse [N·s]."""
         raise NotImplementedError
 
     def holding_force(self, displacement: float, velocity: float) -> float:

@@ -83,7 +83,7 @@ class QuasiStaticBeam(BeamBody):
         self._dissipated += self._alpha * k * size * mean_square
 
     def _response(self, size: float) -> list[list[float]]:
-        """Rows over (Legendre coefficients of C/k, w at the start), shape (d + 5, d + 2).
+        """Return rows over (Legendre coefficients of C/k, w at the start), shape (d + 5, d + 2).
 
         They give w and ẇ at the end, ∫w, ∫∫w, and the d + 1 Legendre coefficients of ẇ.
         """
@@ -103,13 +103,13 @@ class QuasiStaticBeam(BeamBody):
         return Motion(self._rest + self._w, self._velocity, *self._integrals)
 
     def energies(self) -> Energies:
-        """The strain energy of w and the loads together, and the loads' potential, −(their work)."""
+        """Return the strain energy of w and the loads together, and the loads' potential, −(their work)."""
         k, w, rest = self._stiffness, self._w, self._rest
         strain = 0.5 * k * w * w + k * w * rest + 0.5 * self._load_energy
         return Energies(0.0, strain, self._dissipated, -k * w * rest - self._load_energy)
 
     def shape(self) -> np.ndarray:
-        """Deflection [m] at `SHAPE_POINTS`, shape (21,)."""
+        """Return the deflection [m] at `SHAPE_POINTS`, shape (21,)."""
         return self._load_shape + self._stiffness * self._w * self._tip_shape
 
     def apply_impulse(self, impulse: float) -> None:

@@ -119,7 +119,7 @@ class _Algorithm:
     # Laws -----------------------------------------------------------------------------------------------------------
 
     def _compliance(self, w: float, stiffness: float) -> tuple[float, float]:
-        """λ (Ψ − w)₊^p and its derivative by w."""
+        """Return λ (Ψ − w)₊^p and its derivative by w."""
         depth = max(self.spring.equilibrium - w, 0.0)
         p = self.scene.contact.exponent
         slope = -p * stiffness * depth ** (p - 1.0) if depth > 0.0 else 0.0
@@ -139,11 +139,11 @@ class _Algorithm:
         raise AlgorithmFailure(f"Newton's method for the {solve} position does not converge at t = {self.time:.6g} s")
 
     def _spring_step(self, y: float, z: float, guess: float, stiffness: float, solve: str) -> float:
-        """yˡ⁺¹ from (53) and (54), N = 0."""
+        """Return yˡ⁺¹ from (53) and (54), N = 0."""
         return self._newton(lambda Y: self._foundation_force(y, z, Y, stiffness), guess, solve)
 
     def _foundation_force(self, y: float, z: float, Y: float, stiffness: float) -> tuple[float, float]:
-        """N of (53) for a step from (y, z) that ends at ``Y``, and its derivative by ``Y``."""
+        """Return N of (53) for a step from (y, z) that ends at ``Y``, and its derivative by ``Y``."""
         p, h = self.spring, self.h
         force, slope = self._compliance(Y, stiffness)
         value = (
@@ -229,7 +229,7 @@ class _Algorithm:
         return after
 
     def _tip(self, q: np.ndarray, v: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
-        """u_tip by (62), which is nonlinear only there, and what the beam would do without a force on it."""
+        """Return u_tip by (62), which is nonlinear only there, and what the beam would do without a force on it."""
         h, response = self.h, self.tip_response
         before = self._compliance(q[-1], stiffness)[0]
         known = self.solve(self._right_side(q, v))
@@ -242,14 +242,13 @@ class _Algorithm:
         return self._newton(equation, float(q[-1]), "beam"), known
 
     def _beam(self, known: np.ndarray, u: float) -> tuple[np.ndarray, float]:
-        """All rows of (62) but the tip's, with u_tip given, and the force there that does so, its mean over the step
-        [N]."""
+        """Return q by (62) with u_tip given in place of its row, and the mean force on the tip that does so [N]."""
         h, response = self.h, self.tip_response
         force = (u - known[-1]) / response[-1]
         return known + response * force, float(force / (2.0 * h**2))
 
     def _contact_step(self, before: PairState, stiffness: float) -> tuple[PairState, float]:
-        """Lines 8–30: the state at l + 1 and λ_nc as the step leaves it."""
+        """Make lines 8–30; return the state at l + 1, and λ_nc as the step leaves it."""
         h, psi, (q, v, y, z) = self.h, self.spring.equilibrium, before
         u_new, known = self._tip(q, v, stiffness)  # line 9
         y_new = self._spring_step(y, z, y, stiffness, "predicted")  # line 10

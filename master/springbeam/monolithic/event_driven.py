@@ -157,7 +157,7 @@ class _Run:
         return self.rows.trajectory(self._summary(clock.perf_counter() - began))
 
     def _samples(self, sample_times: Sequence[float] | np.ndarray | None) -> deque[float]:
-        """Times of the rows [s], those of events apart."""
+        """Return the times of the rows [s] but for those of events."""
         start = self.state.time
         if sample_times is None:
             H = self.scene.coupling.macro_step or (self.t_end - start) / _SAMPLES
@@ -216,7 +216,7 @@ def _system(scene: Scene) -> HybridSystem:
 
 
 def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
-    """Time [s] and state at the start, where an undeformed tip arrives; ``perturbation`` as in `simulate`."""
+    """Return time [s] and state at the start, where an undeformed tip arrives; ``perturbation``: see `simulate`."""
     scene, X, time = s.scene, np.zeros(s.size), 0.0
     inertia = s.inverse_tip_mass not in (0.0, np.inf)
     if s.has_spring:

@@ -108,7 +108,7 @@ class LinearForm:
         self._cache: dict[str, StepWeights] = {}
 
     def _split(self) -> tuple[float, tuple[float, float] | None]:
-        """`linked`, and the (k, c) that it leaves of a linear law; ``None`` where the law is not linear."""
+        """Return `linked`, and the (k, c) that it leaves of a linear law, ``None`` where the law is not linear."""
         s = self.system
         if s.law.linear is None:
             return 0.0, None
@@ -121,7 +121,7 @@ class LinearForm:
         return 0.0, (k, c)
 
     def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(ξ, ξ̇) of a state."""
+        """Return (ξ, ξ̇) of a state."""
         s = self.system
         x, x_dot = X[s.A], X[s.V]
         if self.spring_moves:
@@ -129,7 +129,7 @@ class LinearForm:
         return (x, x_dot) if self.basis is None else ((x - self.offset) @ self.basis, x_dot @ self.basis)
 
     def unpack(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
-        """States of shape (k, 2r + 5) from modes of shape (k, p); X supplies what does not move."""
+        """Return states of shape (k, 2r + 5) from modes of shape (k, p); X supplies what does not move."""
         s = self.system
         x, x_dot = (xi, xi_dot) if self.basis is None else (xi @ self.basis.T + self.offset, xi_dot @ self.basis.T)
         states = np.repeat(X[None, :], len(xi), axis=0)
@@ -139,11 +139,11 @@ class LinearForm:
         return s.synchronise(self.phase, states)
 
     def load_at(self, times: np.ndarray) -> np.ndarray:
-        """All loads on the modes at ``times`` [s] of shape (...), (..., p)."""
+        """Return all loads on the modes, (..., p), at ``times`` [s] of shape (...)."""
         return np.asarray(self.constant + self.system.loads.values(times) @ self.loads)
 
     def forces(self, w: np.ndarray, w_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
-        """R: forces (k, n) at interface displacements and velocities (o, n)."""
+        """Return R: forces (k, n) at interface displacements and velocities (o, n)."""
         s = self.system
         result = np.empty((len(self.inputs), w.shape[1]))
         if self.spring_moves:
@@ -155,7 +155,7 @@ class LinearForm:
         return result
 
     def weights(self, size: float) -> StepWeights:
-        """Weights of a step of ``size`` [s]; the last ones used are kept."""
+        """Return the weights of a step of ``size`` [s]; the last ones used are kept."""
         key = f"{size:.12e}"
         known = self._cache.pop(key, None)
         if known is None:
@@ -166,7 +166,7 @@ class LinearForm:
         return known
 
     def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray, time: float) -> float:
-        """Step size [s] that resolves the free motion seen in displacements, contact forces and dissipation.
+        """Return the step [s] that resolves the free motion seen in displacements, contact forces and dissipation.
 
         ``r`` (k,) are the forces at the start, at ``time`` [s]. What is left out is no error: it only may hide an event
         as small.
@@ -236,7 +236,7 @@ class ExponentialPropagator:
                 raise ReferenceFailure(f"no step resolves the interface force in phase {self.form.phase.name}")
 
     def _next_size(self, remaining: float, resolution: float, limit: float) -> float:
-        """The interval to the target in 2ᵏ equal steps, k changing on the way: sizes recur, as weights are dear."""
+        """Divide the way to the target into 2ᵏ equal steps, k changing on it: sizes recur, as weights are dear."""
         if abs(remaining - self._steps * self._size) > resolution or self._steps == 0:
             self._size, self._steps = remaining, 1
         while self._size > limit:
@@ -246,7 +246,7 @@ class ExponentialPropagator:
         return self._size
 
     def _step(self, size: float, xi: np.ndarray, xi_dot: np.ndarray, start: np.ndarray) -> Segment | None:
-        """One step, or None where it is too long for the forces r, whose values at its start are given."""
+        """Make one step, or None where it is too long for the forces r, whose values at its start are given."""
         form, X = self.form, self.X
         w = form.weights(size)
         s = form.system
@@ -283,7 +283,7 @@ class ExponentialPropagator:
     def _forces(
         self, w: StepWeights, xi: np.ndarray, xi_dot: np.ndarray, load: np.ndarray, start: np.ndarray
     ) -> np.ndarray | None:
-        """r = R(w, ẇ) at the Gauss points, (k, stages), by fixed-point iteration; ``load`` are all other forces."""
+        """Solve r = R(w, ẇ) at the Gauss points, (k, stages), by iteration; ``load`` are all other forces."""
         form, r = self.form, np.repeat(start, STAGES, axis=1)
         if not len(r):
             return r

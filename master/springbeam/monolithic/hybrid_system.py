@@ -93,7 +93,7 @@ class HybridSystem:
         return np.asarray(np.sum(self.loads.values(X[..., self.T].real) * speeds, axis=-1))
 
     def motion(self, phase: Phase, X: np.ndarray) -> Motion:
-        """Accelerations and interface quantities of states of shape (..., 2r + 5)."""
+        """Return accelerations and interface quantities of states of shape (..., 2r + 5)."""
         a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
         u_tip, v_tip = a @ self.b, v @ self.b
         p, s = self._own_forces(X)
@@ -114,7 +114,7 @@ class HybridSystem:
         return -self.mass * share, share
 
     def derivative(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """dX/dt of states of shape (..., 2r + 5), which may be complex."""
+        """Return dX/dt of states of shape (..., 2r + 5), which may be complex."""
         m = self.motion(phase, X)
         dX = np.zeros_like(X)
         dX[..., self.A], dX[..., self.V] = X[..., self.V], m.a
@@ -128,12 +128,12 @@ class HybridSystem:
         return dX
 
     def jacobian(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """∂(dX/dt)/∂X for one state, (2r + 5, 2r + 5), but for the time; by complex steps, exact to rounding."""
+        """Return ∂(dX/dt)/∂X of one state, (2r + 5, 2r + 5), but for the time: by complex steps, exact to rounding."""
         steps = X + 1j * _COMPLEX_STEP * np.eye(self.size)
         return np.asarray(self.derivative(phase, steps).imag.T / _COMPLEX_STEP)
 
     def dissipation_rate(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """α_b ȧᵀω²ȧ + α_s z², and what the law takes [W]."""
+        """Return α_b ȧᵀω²ȧ + α_s z², and what the law takes [W]."""
         v, z = X[..., self.V], X[..., self.Z]
         rate = np.asarray(self.alpha_b * (v**2 @ self.stiffness) + self.spring.damping * z**2)
         if not (self.law.dissipative and self.law.counts(phase.contact)):
@@ -142,7 +142,7 @@ class HybridSystem:
         return np.asarray(rate + self.law.dissipation(phase.contact, penetration, closing))
 
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """X, in place, with what rounding leaves of the phase's constraint removed: y = u, or u = φ when seated."""
+        """Remove from X, in place, what rounding leaves of the constraint, y = u or, seated, u = φ; return X."""
         if self.held(phase):
             towards = self.b / self.inverse_tip_mass
             X[..., self.A] += (self.stop.position - X[..., self.A] @ self.b)[..., None] * towards
@@ -161,7 +161,7 @@ class HybridSystem:
         return None if self.beam is None else np.asarray(states[:, self.A] @ self.beam.sampler.T)
 
     def energies(self, X: np.ndarray, phase: Phase) -> dict[str, np.ndarray]:
-        """Energies [J] of states of shape (k, 2r + 5); ``e_load`` is minus the work of the loads."""
+        """Return energies [J] of states of shape (k, 2r + 5); ``e_load`` is minus the work of the loads."""
         a, v, y, z = X[..., self.A], X[..., self.V], X[..., self.Y], X[..., self.Z]
         p = self.spring
         spring = 0.5 * self.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
@@ -175,7 +175,7 @@ class HybridSystem:
         }
 
     def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
-        """What rounding leaves of a displacement, velocity or contact force that is exactly zero."""
+        """Return what rounding leaves of a displacement, velocity or contact force that is exactly zero."""
         a, v, b = np.abs(X[self.A]), np.abs(X[self.V]), np.abs(self.b)
         if unit == "m":
             return _NOISE * (float(a @ b) + abs(float(X[self.Y])) + abs(self.stop.position))

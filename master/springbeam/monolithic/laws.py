@@ -28,7 +28,7 @@ class Phase(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The phase as results have it."""
+        """Return the phase as results have it."""
         return "seated" if self.seated else "touch" if self.contact == "slack" else self.contact
 
 
@@ -193,7 +193,7 @@ class Compliance(Law):
         self.dissipative = self.damping > 0.0
 
     def _elastic(self, p: np.ndarray) -> np.ndarray:
-        """F [N]."""
+        """Return F [N]."""
         return np.asarray(self.stiffness * np.maximum(p, 0.0) ** self.exponent)
 
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:

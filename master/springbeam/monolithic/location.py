@@ -84,7 +84,7 @@ def _root(g: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _early_crossing(g: Callable[[float], float], first: float, noise: float) -> float:
-    """A function that starts at zero and is negative at the first node: where it was positive between them."""
+    """Return where a function falls to zero that starts there, is positive, and is negative at the first node."""
     high = first
     for _ in range(60):
         low = 0.5 * high

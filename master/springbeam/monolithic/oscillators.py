@@ -59,7 +59,7 @@ class StepWeights:
     C_dot: np.ndarray  #: ξ₀ → ξ̇
     S_dot: np.ndarray  #: ξ̇₀ → ξ̇
     force: np.ndarray  #: (targets, stages, p): ∫₀^τ S(τ − ν) ℓ_k(ν) dν
-    force_dot: np.ndarray  #: the same with Ṡ
+    force_dot: np.ndarray  #: … with Ṡ in place of S
 
     def motion(self, xi: np.ndarray, xi_dot: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return ξ and ξ̇ at the targets, (targets, p), from those at the start and forces ``load`` (stages, p)."""
@@ -97,7 +97,7 @@ class Oscillators:
         return slow, fast
 
     def kernels(self, tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """S and Ṡ = s₁ S + e^{s₂τ} at times ``tau``, shape tau.shape + (p,)."""
+        """Return S and Ṡ = s₁ S + e^{s₂τ} at times ``tau``, shape tau.shape + (p,)."""
         t, (slow, fast) = tau[..., None], self._roots(0.0)
         between = (fast - slow) * t
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -106,7 +106,7 @@ class Oscillators:
         return S.real, (slow * S + np.exp(fast * t)).real
 
     def weights(self, size: float) -> StepWeights:
-        """Weights of a step of ``size`` [s]."""
+        """Return the weights of a step of ``size`` [s]."""
         S, S_dot = self.kernels(TARGETS * size)
         shape = (len(TARGETS), STAGES, len(self.omega2))
         force, force_dot = np.empty(shape), np.empty(shape)
@@ -125,7 +125,7 @@ class Oscillators:
         return StepWeights(S_dot + 2.0 * self.sigma * S, S, -self.omega2 * S, S_dot, force, force_dot)
 
     def components(self, xi: np.ndarray, xi_dot: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rates |s| [1/s] and amplitudes of the free motion about equilibrium under ``force``, both (2p,)."""
+        """Return rates |s| [1/s] and amplitudes of the free motion about equilibrium under ``force``, both (2p,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             xi = xi - np.where(self.omega2 != 0.0, force / self.omega2, 0.0)
             of_slow = np.abs((xi_dot - self.fast * xi) / (self.slow - self.fast))
@@ -136,7 +136,7 @@ class Oscillators:
 
 
 def _convolve(s: np.ndarray, size: float) -> np.ndarray:
-    """∫₀^τ e^{s(τ − ν)} ℓ_k(ν) dν at the targets, for roots s: (targets, stages, len(s)).
+    """Return ∫₀^τ e^{s(τ − ν)} ℓ_k(ν) dν at the targets, for roots s: (targets, stages, len(s)).
 
     On [0, 1], ∫ e^{z(1 − x)} P_m(2x − 1) dx = e^{−w} i_m(w) with w = −z/2 and i_m the modified spherical Bessel
     functions (Abramowitz & Stegun, 10.1.14 and 10.2.2).

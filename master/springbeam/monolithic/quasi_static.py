@@ -59,7 +59,7 @@ class QuasiStaticSystem(HybridSystem):
         return dX
 
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """X, in place, with the tip where the phase has it: on the spring, or relaxing by itself."""
+        """Put the tip of X, in place, where the phase has it, on the spring or relaxing by itself; return X."""
         if self.joined(phase):
             X[..., self.A], X[..., self.V] = X[..., [self.Y]], X[..., [self.Z]]
         elif self.alpha_b > 0.0:
@@ -84,7 +84,7 @@ class QuasiStaticSystem(HybridSystem):
 
 
 def _statics(beam: Beam) -> tuple[float, float, float]:
-    """(k, u_F, ½ work of the loads) by the influence function G(x, ξ) of a unit force at ξ."""
+    """Return (k, u_F, ½ work of the loads) by the influence function G(x, ξ) of a unit force at ξ."""
     L, h = beam.length, beam.length / beam.n_elements
     EI = beam.young_modulus * beam.second_moment_of_area
     KAG = beam.shear_coefficient * beam.area * beam.shear_modulus

@@ -39,7 +39,7 @@ class Rows:
         return finished(s.scene, columns, s.shapes(states), self._state.events, summary)
 
     def _columns(self, states: np.ndarray) -> dict[str, np.ndarray]:
-        """What the equations of each row's phase give."""
+        """Return what the equations of each row's phase give."""
         s, phases = self._system, [phase for _, _, phase, _ in self._rows]
         columns: dict[str, np.ndarray] = {
             "time": np.array([time for time, _, _, _ in self._rows]),

@@ -87,7 +87,7 @@ class SemiDiscreteBeam:
 
 
 def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values and derivatives at ``x`` in [0, 1] of the Lagrange polynomials on the p + 1 Gauss–Lobatto nodes there.
+    """Return values and slopes at ``x`` in [0, 1] of the Lagrange polynomials on the p + 1 Gauss–Lobatto nodes.
 
     Shapes (len(x), p + 1). The nodes are the ends and the zeros of P_p'.
     """
@@ -99,13 +99,13 @@ def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _lobatto(degree: int) -> np.ndarray:
-    """The p + 1 Gauss–Lobatto nodes in [0, 1]."""
+    """Return the p + 1 Gauss–Lobatto nodes in [0, 1]."""
     inner = roots_jacobi(degree - 1, 1, 1)[0] if degree > 1 else np.zeros(0)  # of P_p'
     return np.concatenate([[0.0], 0.5 + 0.5 * inner, [1.0]])
 
 
 def _gauss(points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights of the Gauss–Legendre rule on [0, 1]."""
+    """Return nodes and weights of the Gauss–Legendre rule on [0, 1]."""
     nodes, weights = legendre.leggauss(points)
     return 0.5 + 0.5 * nodes, 0.5 * weights
 
@@ -249,7 +249,7 @@ def _without_mesh(discrete: SemiDiscreteBeam, beam: Beam) -> ModalBeam:
 
 
 def singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (ascending) and orthonormal modes of factorᵀfactor, which has as many rows as columns or more."""
+    """Return ascending frequencies and orthonormal modes of factorᵀfactor; factor has no fewer rows than columns."""
     _, sigma, vt = scipy.linalg.svd(factor, full_matrices=False)
     return sigma[::-1], vt[::-1].T
 
@@ -279,7 +279,7 @@ def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
 
 
 def _rayleigh_ritz(discrete: SemiDiscreteBeam, space: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies and modes in a space, given by its columns."""
+    """Return frequencies and modes in a space, given by its columns."""
     L = np.linalg.cholesky(space.T @ (discrete.M @ space))
     orthonormal = scipy.linalg.solve_triangular(L, space.T, lower=True).T
     omega, vectors = singular_modes(discrete.B @ orthonormal)

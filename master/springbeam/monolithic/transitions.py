@@ -63,7 +63,7 @@ class HybridState:
         self.system.synchronise(self.phase, self.X)
 
     def start(self) -> None:
-        """First contact, and its impact, where tip and obstacle touch at the start, or are joined from there on."""
+        """Make first contact, and its impact, where tip and obstacle touch at the start or are joined from there on."""
         s, X = self.system, self.X
         if s.law.start != "free":
             if self.phase.contact == "free":
@@ -122,7 +122,7 @@ class HybridState:
     # Foundation -----------------------------------------------------------------------------------------------------
 
     def _hit_stop(self) -> None:
-        """Newton's impact law on the foundation, and whether it was the last bounce."""
+        """Apply Newton's impact law on the foundation, and seat what has bounced for the last time."""
         s, e = self.system, self.system.stop.restitution
         self._place(s.stop.position)
         arriving = self.X.copy()
@@ -148,7 +148,7 @@ class HybridState:
             self._unseat()
 
     def _bounce(self, e: float) -> tuple[float, float, float]:
-        """Apply restitution e; impulses on the tip and of the foundation [N·s], speed afterwards [m/s]."""
+        """Apply restitution e; return the impulses on the tip and of the foundation [N·s] and the speed left [m/s]."""
         s, X = self.system, self.X
         on_tip = 0.0
         if s.joined(self.phase):
@@ -182,7 +182,7 @@ class HybridState:
     # All events -----------------------------------------------------------------------------------------------------
 
     def _place(self, level: float) -> None:
-        """The spring top, and the tip that is joined to it, exactly where the event has them but for rounding."""
+        """Put the spring top, and the tip that is joined to it, where the event has them but for rounding."""
         s, X = self.system, self.X
         X[s.Y] = level
         if s.joined(self.phase):
