@@ -332,6 +332,10 @@ MISTAKES = {
     "animation of another kind": ("animate done --out a.webm", ["a.webm: an animation is a .gif or a .mp4 file"]),
     "resume of a run that is done": ("resume done", ["done: the run is done, nothing to resume"]),
     "resume of what is no run": ("resume empty", ["empty: holds no run"]),
+    "predict without a macro step": (
+        "predict soft --set coupling.relative_tolerance=1e-4",
+        ["[coupling] macro_step: needed here; this scene gives tolerances instead"],
+    ),
     "sweep of nothing": ("sweep soft", ["--vary: nothing varies", "TABLE.KEY=VALUES"]),
     "sweep of a range": ("sweep soft --vary spring.mass=1:2", ["--vary spring.mass: a range", "--samples, or a count"]),
     "sweep with dots": ("sweep soft --vary spring.mass=1..2", ["--vary spring.mass=1..2:", "LOW:HIGH:COUNT"]),

@@ -33,7 +33,7 @@ def predict(
 
     with bad_input_reported():
         what = load_scene(scene, settings or ())
-    prediction = prediction_of(what)
+        prediction = prediction_of(what)
     if as_json:
         print_json(asdict(prediction))
     console = console_for(silent=as_json)
