@@ -16,7 +16,7 @@ from springbeam.monolithic import event_driven
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.contact_times import contact_changes
 from springbeam.run.stepping import Pair
-from springbeam.scene import Beam, Scene, statics, suspicions
+from springbeam.scene import Beam, Coupling, Scene, statics, suspicions
 from springbeam.scene.statics import SHAPE_POINTS
 
 BEAM = Beam.with_ones(
@@ -156,6 +156,19 @@ def test_tied_it_is_a_spring_in_parallel(degree: int, sizes: tuple[float, float]
         assert np.abs(run.u_tip - run.y).max() < 1e-12 * 0.6 * size + 1e-15
         assert run.e_dissipated[-1] > 0.0 if alpha else run.e_dissipated[-1] == 0.0
     assert orders(errors, sizes)[0] == pytest.approx(order, abs=0.25)
+
+
+@pytest.mark.parametrize(
+    "coupling", [{"macro_step": 0.02}, {"macro_step": 0.02, "degree": 1}, {"relative_tolerance": 1e-4, "degree": 2}]
+)
+def test_where_the_force_vanishes_as_the_spring_falls_through_its_equilibrium_the_ends_stay_joined(coupling) -> None:
+    """Without loads C = k u_tip vanishes at Ψ = 0: rounding decided whether the tip stayed up there, free."""
+    given = scene(beam={"distributed_load": 0.0}, time={"t_end": 10.0})
+    run = simulate(given.model_copy(update={"coupling": Coupling(**coupling)}))
+    omega = np.sqrt((3.0 + 1.0 / statics.tip_compliance(given.beam)) / 2.0)
+    assert {e.kind for e in run.events[1:]} <= {"release", "impact", "retie"}
+    # Joined, it is one oscillator; of degree 0, 500 steps of ω H = 0.084 lag by (ω H)³/12 each.
+    assert run.y == pytest.approx(-0.5 / omega * np.sin(omega * run.time), abs=0.03 * 0.5 / omega)
 
 
 LIFE = {

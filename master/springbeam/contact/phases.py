@@ -155,24 +155,29 @@ class Transitions(Checkpointed):
         if kind == "unseated":
             return kind, Phase(phase.joint), Impact()
         assert kind == "separation"
+        if phase.joint is Joint.TOUCH and low.velocity < 0.0 and self._at_equilibrium(low, tolerance):
+            return "retie", Phase(Joint.TIED, phase.seated), Impact()  # C vanishes at Ψ, where they are tied again
         opened = Phase(Joint.FREE, seated=phase.seated and self._mass is not None)
         return kind, opened, self._part(opened, tip, low)
 
     def _meet(self, phase: Phase, tip: Motion, low: Motion, tolerance: float) -> tuple[Phase, Impact]:
         assert self._tip_mass is not None
         assert self._mass is not None
-        psi = self._equilibrium
         impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
-        at_equilibrium = abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
         if self._law.lasting:
             tied = True
-        elif at_equilibrium:
+        elif self._at_equilibrium(low, tolerance):
             tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
         else:
-            tied = low.displacement < psi
+            tied = low.displacement < self._equilibrium
         # A top that stands on the foundation is driven into it, and strikes it at once; a massless tip cannot do that.
         return Phase(Joint.TIED if tied else Joint.TOUCH, phase.seated and self._tip_mass == 0.0), impact
+
+    def _at_equilibrium(self, low: Motion, tolerance: float) -> bool:
+        """Whether the lower end is at Ψ, to rounding."""
+        psi = self._equilibrium
+        return abs(low.displacement - psi) <= 4.0 * tolerance + 1e-12 * abs(psi)
 
     def _rises_from_rest(self) -> bool:
         """Whether a massless tip and the spring, at rest together at Ψ, are pushed up."""

@@ -158,36 +158,40 @@ class Simulation(Checkpointed):
         state, pair = self._state, self._pair
         pair.mark()
         start = pair.ends()
-        halvings = 0
+        halvings, cause = 0, ""
         while True:
             try:
                 at_start = self._detector.at_start(state, start)
                 if at_start is not None:
                     return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
                 step = pair.attempt(state, size, start)
-                if self._error is None or self._holds(step, self._error):
+                if self._error is None or self._holds(step, self._error, cause):
                     return self._detector.first_event(state, step)
                 pair.rewind()
                 size = self._steps.size
             except (StepRefused, OverflowError) as refused:
                 if pair.repeatable:
                     pair.rewind()
+                cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
                 if halvings == _MAX_HALVINGS or not pair.divides:
                     residual = refused.residual if isinstance(refused, NotConverged) else None
-                    cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
                     raise RunStopped(cause, state.time, residual) from refused
                 halvings += 1
                 self._halvings += 1
                 size *= 0.5
 
-    def _holds(self, step: Step, local_error: LocalError) -> bool:
-        """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set."""
+    def _holds(self, step: Step, local_error: LocalError, refused: str) -> bool:
+        """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set.
+
+        ``refused`` says why longer ones were, or nothing: none that is too short for its tolerance hides that.
+        """
         assert isinstance(self._steps, AdaptiveSteps)
         error, order = local_error.estimate(self._state, step, self._balance.ledger.scale)
         try:
             return self._steps.judge(step.size, error, order)
         except StepTooShort as too_short:
-            raise RunStopped(f"{too_short}, where it is {error:.3g} of it", step.time) from too_short
+            cause = refused or f"{too_short}, where it is {error:.3g} of it"
+            raise RunStopped(cause, step.time) from too_short
 
     # -- events -----------------------------------------------------------------------------------------------------
 
@@ -217,7 +221,8 @@ class Simulation(Checkpointed):
         if kind == "stop_impact":
             self._rows.note_stop_impact(state, self._steps.size)
         ends = pair.ends()
-        tolerance = self._detector.simultaneity_tolerance(ends) if kind == "impact" else self._detector.tolerance(ends)
+        meets = kind in ("impact", "separation")  # at Ψ, where it means something else
+        tolerance = self._detector.simultaneity_tolerance(ends) if meets else self._detector.tolerance(ends)
         kind, phase, impact = self._transitions.after(
             kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
         )
