@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scenes import scene_from_dict
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
@@ -117,6 +118,15 @@ def test_without_coupling_the_rows_describe_the_motion():
 def test_a_tolerance_below_rounding_stops_by_name():
     with pytest.raises(RunStopped, match=r"above the tolerance, down to a macro step of .* where it is"):
         simulate(soft(1e-17, "hermite", 2))
+
+
+def test_a_spring_that_runs_away_is_the_cause_not_the_step_that_follows_it():
+    """Towards its pole the motion outgrows any step: shorter ones were tried until one was below rounding."""
+    tables = {"time": {"t_end": 2.0}, "contact": {"law": "tie"}, "coupling": {"relative_tolerance": 1e-3}}
+    beam = {"young_modulus": 3.0, "shear_modulus": 3.0, "n_elements": 10, "initial_velocity_slope": -1.0}
+    spring = {"linear_stiffness": 3.0, "cubic_stiffness": -4000.0}
+    with pytest.raises(RunStopped, match="has run away, past the hilltop"):
+        simulate(scene_from_dict({**tables, "beam": beam, "spring": spring}))
 
 
 def test_from_rest_rounding_is_no_error():
