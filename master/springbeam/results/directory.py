@@ -56,16 +56,11 @@ class RunDirectory:
         #: It exists until the run is done (`springbeam.run.checkpoint`).
         self.checkpoint = self.path / "run.checkpoint"
 
-    @property
-    def pictures(self) -> list[Path]:
-        """The pictures that exist."""
-        return [self.path / name for name in PICTURES if (self.path / name).exists()]
-
     def results(self) -> list[Path]:
         """Return the result files that exist, and the files made from them."""
         files = (self.summary, self.trajectory, self.events, self.shapes, self.steps, self.checkpoint)
-        made = (self.path / name for name in (REPORT, *ANIMATIONS))
-        return [file for file in (*files, *self.pictures, *made) if file.exists()]
+        made = (self.path / name for name in (*PICTURES, REPORT, *ANIMATIONS))
+        return [file for file in (*files, *made) if file.exists()]
 
     def discard(self) -> None:
         """Remove the directory if nothing is in it."""

@@ -147,7 +147,7 @@ class FileRecorder(Recorder):
             opened.pop_all()
         self._files = files
         for lines in files.values():
-            lines.cut()
+            lines.file.truncate(lines.size)
         self.time = saved["time"]
         self._write_summary({"status": "running"})
         self._reserve_summary()
@@ -250,10 +250,6 @@ class _Lines:
             raise ResultsUnreadable(f"{self.path}: {self.size - left} bytes, fewer than the {self.size} once written")
         if found != self.crc:
             raise ResultsUnreadable(f"{self.path}: changed since it was written")
-
-    def cut(self) -> None:
-        """Remove what follows the lines written."""
-        self.file.truncate(self.size)
 
     def write(self, line: bytes | bytearray) -> None:
         written = self.file.write(line)

@@ -7,7 +7,7 @@ the load; lines that are empty or begin with # are skipped, and the first may na
 from __future__ import annotations
 
 from functools import lru_cache
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -179,13 +179,13 @@ def _columns(path: Path) -> tuple[np.ndarray, np.ndarray]:
         if len(cells) != 2:
             raise ValueError(f"line {number}: {len(cells)} columns; a table has two, time and value")
         found = [_number(cell) for cell in cells]
-        if not rows and not named and found == [None, None]:
-            named = True
-            continue
-        for column, (cell, value) in enumerate(zip(cells, found, strict=True), 1):
-            if value is None:
-                raise ValueError(f"line {number}, column {column}: {cell[:40]!r} is not a finite number")
-        time, value = (x for x in found if x is not None)
+        if wrong := [column for column, value in enumerate(found) if not isfinite(value)]:
+            if len(wrong) == 2 and not rows and not named:
+                named = True
+                continue
+            cell = cells[wrong[0]][:40]
+            raise ValueError(f"line {number}, column {wrong[0] + 1}: {cell!r} is not a finite number")
+        time, value = found
         if rows and time <= rows[-1][0]:
             raise ValueError(f"line {number}, column 1: {time!r} s comes after {rows[-1][0]!r} s; times must increase")
         rows.append((time, value))
@@ -195,9 +195,9 @@ def _columns(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return times, values
 
 
-def _number(text: str) -> float | None:
+def _number(text: str) -> float:
+    """Return a number, NaN for what is none."""
     try:
-        value = float(text)
+        return float(text)
     except ValueError:
-        return None
-    return value if isfinite(value) else None
+        return nan

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import tomli_w
@@ -114,38 +115,25 @@ def _alternatives(model: type[Table], ways: Ways) -> Iterator[dict[str, Any]]:
         yield {"properties": dict.fromkeys(everything, False)}
 
 
-#: Of the scene that `springbeam new` writes: an aluminium beam, 0.8 m × 30 × 3 mm, above a rubber bumper above a stop.
-_BEGINNING: dict[str, dict[str, Any]] = {
-    "time": {"t_end": 0.3},
-    "beam": {
-        "density": 2700.0, "length": 0.8, "width": 0.03, "height": 0.003, "young_modulus": 7.0e10,
-        "poisson_ratio": 0.33, "alpha_b": 2.0e-5, "n_elements": 10, "element_degree": 4, "n_modes": 12,
-        "approach_speed": 1.0,
-    },
-    "spring": {"mass": 0.02, "damping": 2.0, "linear_stiffness": 5.0e3, "cubic_stiffness": 1.0e8},
-    "stop": {"position": -0.005, "restitution": 0.5},
-    "contact": {"law": "compliance", "stiffness": 2.0e5, "exponent": 1.5},
-    "coupling": {"scheme": "auto", "macro_step": 1.0e-4},
-}  # fmt: skip
-
-
 def beginning(title: str) -> str:
-    """Return a scene file to start from, with the meaning and unit of each key beside it."""
+    """Return a scene file to start from: ``beginning.toml``, with the meaning and unit of each key beside it.
+
+    It has an aluminium beam, 0.8 m × 30 × 3 mm, above a rubber bumper above a stop.
+    """
     lines = [
         tomli_w.dumps({"title": title}).strip(),
         "",
         "# All values are SI, up is positive. springbeam keys lists every key, springbeam predict checks the values.",
+        "",
     ]
-    for table, content in _BEGINNING.items():
-        model = TABLES[table]
-        lines += ["", f"[{table}]  # {about(table).partition('. ')[0].rstrip('.')}."]
-        for name, value in content.items():
-            field = model.model_fields[name]
-            unit = "" if extra(field, "unit") == "–" else f" [{extra(field, 'unit')}]"
-            text = (
-                f"{value:.1e}".replace("e+", "e")
-                if isinstance(value, float) and value >= 1e4
-                else tomli_w.dumps({"": value})[5:].strip()
-            )
-            lines.append(f"{name} = {text}".ljust(32) + f"# {field.description}{unit}")
+    table = ""
+    for line in Path(__file__).with_name("beginning.toml").read_text(encoding="utf-8").splitlines():
+        name, comment = line.partition(" = ")[0].strip("[]"), ""
+        if line.startswith("["):
+            table, comment = name, f"  # {about(name).partition('. ')[0].rstrip('.')}."
+        elif line:
+            field = TABLES[table].model_fields[name]
+            unit = extra(field, "unit")
+            comment = " " * (32 - len(line)) + f"# {field.description}" + ("" if unit == "–" else f" [{unit}]")
+        lines.append(line + comment)
     return "\n".join(lines) + "\n"

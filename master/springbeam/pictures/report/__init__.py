@@ -33,8 +33,8 @@ from ..drawing import (
     shaded_phases,
     time_unit,
 )
-from ..frames import Frames, Sketch, frames_of, sketches
-from .charts import Chart, backdrop, charts, moving_chart, moving_parts
+from ..frames import COIL_HEIGHTS, Frames, Sketch, frames_of, sketches
+from .charts import Chart, backdrop, charts, moving_chart
 from .described import described
 
 _HERE = Path(__file__).parent
@@ -173,7 +173,12 @@ def _data(trajectory: Trajectory, drawn: list[Chart], moving: list[Sketch], fram
             "readings": list(_readings(trajectory, frames)),
             "deflection": frames.deflection,
             "y": frames.y,
-            "parts": {sketch.name: moving_parts(frames, sketch) for sketch in moving},
+            "foot": frames.foot,
+            "coil": COIL_HEIGHTS,
+            "parts": {
+                sketch.name: {"factor": sketch.unit.factor, "traces": [part for part, _, _ in sketch.moving]}
+                for sketch in moving
+            },
         }
     return data
 

@@ -22,7 +22,7 @@ from ..drawing import (
     shaded_phases,
     time_unit,
 )
-from ..frames import COIL_HEIGHTS, Frames, Sketch
+from ..frames import Frames, Sketch
 from ..panels import Curve, Panel, panels
 
 _GRID = "#E3E3E3"
@@ -128,7 +128,7 @@ def _timeline(trajectory: Trajectory) -> Chart:
 
 
 def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
-    """Draw a sketch at the first frame; `moving_parts` tells how the page's script moves it."""
+    """Draw a sketch at the first frame; the page's script moves it."""
     figure = go.Figure(layout=_layout(_height_of(sketch.height)))
     figure.update_layout(hovermode="closest", margin_r=30, showlegend=len(sketch.moving) > 1)
     figure.update_xaxes(
@@ -153,16 +153,6 @@ def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
             hovertemplate=None if part == "coil" else f"%{{y:.6g}} {sketch.unit.name}",
         )  # fmt: skip
     return Chart(sketch.name, sketch.heading, figure)
-
-
-def moving_parts(frames: Frames, sketch: Sketch) -> dict[str, Any]:
-    """Return what the page's script needs to move the chart of ``sketch``: its traces by part, factor of heights."""
-    return {
-        "factor": sketch.unit.factor,
-        "traces": [moving.part for moving in sketch.moving],
-        "foot": frames.foot,
-        "heights": COIL_HEIGHTS.tolist(),
-    }
 
 
 def _height_of(inches: float) -> int:

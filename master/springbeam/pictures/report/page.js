@@ -76,7 +76,7 @@
   const heights = (part, move, k) => {
     if (part === "beam") return motion.deflection[k].map((u) => move.factor * u);
     if (part === "top") return [move.factor * motion.y[k], move.factor * motion.y[k]];
-    return move.heights.map((s) => move.factor * (move.foot + s * (motion.y[k] - move.foot)));
+    return motion.coil.map((s) => move.factor * (motion.foot + s * (motion.y[k] - motion.foot)));
   };
 
   function show(k) {
