@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -184,6 +185,19 @@ def test_on_a_resolved_beam_each_step_triples_the_velocity() -> None:
 def test_unknown_readings_are_refused(choice: dict[str, str], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         simulate(small(), **choice)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"loads": [{"on": "tip", "amplitude": 1.0}]},
+        {"beam": {"fidelity": "quasi_static"}},
+        {"beam": {"mesh": "none", "n_modes": 4}},
+    ],
+)
+def test_what_the_paper_does_not_have_is_refused(changes: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"knows no .* needs a dynamic"):
+        simulate(with_changes(load_scene("soft"), **changes))
 
 
 def test_start_velocity_follows_the_scene() -> None:

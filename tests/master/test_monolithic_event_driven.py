@@ -355,8 +355,9 @@ def test_perturbation_shows_in_proportion() -> None:
 def test_sampling_does_not_change_the_run() -> None:
     scene = soft(time={"t_end": 0.2})
     coarse = simulate(scene, sample_times=[0.0, 0.2])
-    fine = simulate(scene, sample_times=np.linspace(0.0, 0.2, 301))
+    fine = simulate(scene, sample_times=np.linspace(0.2, 0.0, 301))
     assert len(coarse) == 2
+    assert np.all(np.diff(fine.time) > 0.0)
     assert len(fine) == 301
     for a, b in zip(coarse.events, fine.events, strict=True):
         assert a.time == pytest.approx(b.time, abs=1e-13)
@@ -374,6 +375,22 @@ def test_sampling_does_not_change_the_run() -> None:
 def test_refuses_what_it_does_not_define(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         simulate(soft(**changes))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"sample_times": []}, "no row lies between the start of the run, 0.02 s, and its end, 0.1 s"),
+        ({"sample_times": [0.3]}, "no row lies"),
+        ({"t_end": 0.01}, "its end, 0.01 s"),
+        ({"method": "Euler"}, "method = 'Euler': one of exponential"),
+        ({"method": "DOP853", "nodes": 1}, "nodes = 1: at least 2"),
+    ],
+)
+def test_a_run_that_cannot_be_is_refused(arguments: dict[str, Any], message: str) -> None:
+    scene = soft(beam={"initial_deflection_slope": 0.03}, spring={"equilibrium": 0.01}, time={"t_end": 0.1})
+    with pytest.raises(ValueError, match=message):
+        simulate(scene, **arguments)
 
 
 def test_stiff_beam_of_the_paper_is_resolved() -> None:

@@ -62,12 +62,11 @@ def simulate(
     nodes
         Points of a scipy step at which events are looked for; 2, its ends, is what `scipy.integrate.solve_ivp` does.
     sample_times
-        Times of the rows [s]. Default: multiples of ``coupling.macro_step`` from the start (1000 of them where
-        the scene gives tolerances instead), and a row before and after each event.
+        Times of the rows [s], as far as they lie in the run. Default: multiples of ``coupling.macro_step`` from the
+        start (1000 of them where the scene gives tolerances instead), and a row before and after each event.
     velocity_perturbation
         Added to ``initial_velocity_slope`` [1/s], or to the spring's initial velocity [m/s] without a beam that has
-        inertia: two runs
-        that differ by it show how long a trajectory can be compared at all.
+        inertia: two runs that differ by it show how long a trajectory can be compared at all.
     t_end
         Ends the run earlier than the scene does [s].
     time_limit
@@ -83,7 +82,7 @@ def simulate(
     ReferenceFailure
         If an integration or the event logic cannot go on, or ``time_limit`` is over.
     ValueError
-        If the scene is outside what this reference defines.
+        If the scene or an argument is outside what this reference defines, or no row lies in the run.
     """
     if scene.massless:
         if method not in ("exponential", "DOP853"):
@@ -91,6 +90,8 @@ def simulate(
         method = "DOP853"
     if method not in ("exponential", *SCIPY_METHODS):
         raise ValueError(f"method = {method!r}: one of exponential, {', '.join(SCIPY_METHODS)}")
+    if nodes < 2:
+        raise ValueError(f"nodes = {nodes}: at least 2, the ends of a step")
     run = _Run(scene, Method(method, rtol, atol, nodes), velocity_perturbation, t_end)
     return run.execute(sample_times, time_limit)
 
@@ -162,11 +163,14 @@ class _Run:
         if sample_times is None:
             H = self.scene.coupling.macro_step or (self.t_end - start) / _SAMPLES
             count = int(np.floor((self.t_end - start) / H * (1.0 + 1e-12)))
-            grid = start + H * np.arange(count + 1)
+            grid = start + H * np.arange(max(count, 0) + 1)
             samples = np.append(grid, self.t_end) if self.t_end - grid[-1] > 1e-9 * H else grid
         else:
             samples = np.asarray(sample_times, dtype=float)
-        return deque(samples[(samples >= start) & (samples <= self.t_end * (1.0 + 1e-15))].tolist())
+        within = np.sort(samples[(samples >= start) & (samples <= self.t_end * (1.0 + 1e-15))])
+        if not len(within):
+            raise ValueError(f"no row lies between the start of the run, {start:g} s, and its end, {self.t_end:g} s")
+        return deque(within.tolist())
 
     def _record(self) -> None:
         self.rows.record(self.state.time, self.state.X)
