@@ -38,31 +38,29 @@ _MOST, _MOST_STOPPED = 50_000, 6
 _SAFETY = 1.5
 #: Runs that differ by more are both unresolved, whatever their order [of the motion].
 _UNRESOLVED = 0.02
-#: The coupling's and IDA's relative tolerance over the accuracy, and the bounds of the latter; IDA's absolute one [m].
-_SHARE, _TIGHTEST, _LOOSEST, _ABSOLUTE = 1e-3, 1e-12, 1e-8, 1e-30
+#: The coupling's and IDA's tolerance over the accuracy, and the least of them.
+_SHARE, _TIGHTEST = 1e-3, 1e-12
 
-#: Fewest macro steps, where bodies are coupled and where not; of a first run with bodies whose motion nobody knows.
-_FEWEST, _UNCOUPLED, _PARTNERS = 8, 4, 64
-#: Growth of their number from run to run: at least, at most, and after a run that stopped early.
-_LEAST_GROWTH, _MOST_GROWTH, _AFTER_STOP = 1.2, 4.0, 1.4
+#: Fewest macro steps, and those of a first run with bodies whose motion nobody knows.
+_FEWEST, _PARTNERS = 8, 64
+#: Growth of their number from run to run: at least, at most, and after a run that tells nothing of its error.
+_LEAST_GROWTH, _MOST_GROWTH, _BLIND_GROWTH = 1.2, 4.0, 2.0
 #: Order of the error of `hermite`; the lowest that is relied on, and the highest of the time of an event.
 _ORDER, _LOWEST, _OF_EVENTS = 6.0, 1.0, 2.5
 #: Orders by which a third run and any after it are made finer. (The lower one of events is no thrift: with 5 for both
 #: one promise of 100 was missed.)
 _EXPECTED, _EXPECTED_OF_EVENTS = 5.0, 3.5
-#: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a beam and a spring
-#: alone by, which err only where they miss a contact; and ω α_b above which waves die out within two periods and need
-#: no resolution.
-_TURN, _BEAM_ALONE, _SPRING_ALONE, _DIES_OUT = 26.0, 2.0, 4.0, 0.15
+#: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a body alone by,
+#: which errs only where it misses a contact; and ω α_b above which waves die out within two periods and need no
+#: resolution.
+_TURN, _ALONE, _DIES_OUT = 26.0, 2.0, 0.15
 #: Displacement error over energy residual of `hermite`, in runs with changes of contact after the first.
 _AMPLIFIED = 10.0
-#: doStep calls per macro step of a run that pays for its events rather than its steps: more steps cost hardly more.
-_CALLS_PER_STEP = 8.0
 
 # Soft laws, by `energy` 2.
-#: What the first macro step turns the contact by [rad], over accuracy^(1/4); growth to the second run; and the order
-#: that is relied on (docs/accuracy.md has those measured).
-_CONTACT_TURN, _SECOND, _SOFT_ORDER = 16.0, 2.0, 2.0
+#: What the first macro step turns the contact by [rad], over accuracy^(1/4), and the order that is relied on
+#: (docs/accuracy.md has those measured).
+_CONTACT_TURN, _SOFT_ORDER = 16.0, 2.0
 
 
 def simulate(
@@ -157,7 +155,7 @@ class _Search:
         while steps <= _MOST:
             fine = self._pilot(steps)
             if fine.run.summary["status"] != "done":
-                steps = _rung(steps * _AFTER_STOP)
+                steps = _rung(steps * _BLIND_GROWTH)
                 continue
             if coarse is None:
                 steps = self._second(fine)
@@ -204,11 +202,11 @@ class _Search:
         """Return the number of macro steps of the first run."""
         beam, spring, span = self._scene.beam, self._scene.spring, self._span
         if not self._scene.coupled and self._scene.stop is None and not self._scene.loads:
-            return _UNCOUPLED  # exact but for IDA
+            return _FEWEST  # exact but for IDA
         of_load = max((load.rate for load in self._scene.loads), default=0.0)
         of_spring = max(of_load, 0.0 if spring is None else spring_frequency(self._scene))
         if beam is None:
-            return _rung(max(of_spring * span / _SPRING_ALONE, _PARTNERS if self._scene.partners else 0.0))
+            return _rung(max(of_spring * span / _ALONE, _PARTNERS if self._scene.partners else 0.0))
         if self._softly and not self._scene.partners:
             return _rung(max(contact_frequency(self._scene), of_spring) * span / (_CONTACT_TURN * self._accuracy**0.25))
         if beam.fidelity == "quasi_static":
@@ -217,11 +215,11 @@ class _Search:
         waves = min(shear_frequency(beam), fastest_frequency(beam))
         if beam.alpha_b > 0.0:
             waves = min(waves, _DIES_OUT / beam.alpha_b)
-        turn = _BEAM_ALONE if self._scene.lower is None else _TURN * self._accuracy ** (1.0 / _ORDER)
+        turn = _ALONE if self._scene.lower is None else _TURN * self._accuracy ** (1.0 / _ORDER)
         return _rung(max(waves, of_spring) * span / turn)
 
     def _second(self, first: _Pilot) -> float:
-        growth = _SECOND if self._softly else _LEAST_GROWTH
+        growth = _BLIND_GROWTH if self._softly else _LEAST_GROWTH
         if self._scheme == "hermite":
             amplified = _AMPLIFIED if _parts(first.run) else 1.0
             growth = math.pow(amplified * first.residual / self._accuracy, 1.0 / _ORDER)
@@ -234,9 +232,7 @@ class _Search:
         return self._grown(fine, max(displacement, math.pow(margin * estimate.event, 1.0 / _EXPECTED_OF_EVENTS)))
 
     def _grown(self, last: _Pilot, growth: float) -> float:
-        return _rung(
-            max(last.steps * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH), last.run.do_steps / _CALLS_PER_STEP)
-        )
+        return _rung(last.steps * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH))
 
     # -- runs ---------------------------------------------------------------------------------------------------------
 
@@ -246,7 +242,7 @@ class _Search:
         tolerance = max(_SHARE * self._accuracy, _TIGHTEST)
         tables: dict[str, dict[str, Any]] = {"coupling": {**coupling, "tolerance": tolerance}}
         if self._scene.spring is not None:
-            tables["spring"] = {"relative_tolerance": min(tolerance, _LOOSEST), "absolute_tolerance": _ABSOLUTE}
+            tables["spring"] = {"relative_tolerance": tolerance}
         scene = with_changes(self._scene, accuracy=None, **tables)
         recorder = MemoryRecorder(scene)
         try:
