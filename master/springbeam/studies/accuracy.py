@@ -47,9 +47,8 @@ _FEWEST, _PARTNERS = 8, 64
 _LEAST_GROWTH, _MOST_GROWTH, _BLIND_GROWTH = 1.2, 4.0, 2.0
 #: Order of the error of `hermite`; the lowest that is relied on, and the highest of the time of an event.
 _ORDER, _LOWEST, _OF_EVENTS = 6.0, 1.0, 2.5
-#: Orders by which a third run and any after it are made finer. (The lower one of events is no thrift: with 5 for both
-#: one promise of 100 was missed.)
-_EXPECTED, _EXPECTED_OF_EVENTS = 5.0, 3.5
+#: Order by which a third run and any after it are made finer.
+_EXPECTED = 3.5
 #: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a body alone by,
 #: which errs only where it misses a contact; and ω α_b above which waves die out within two periods and need no
 #: resolution.
@@ -228,8 +227,7 @@ class _Search:
     def _next(self, fine: _Pilot, estimate: _Estimate) -> float:
         """Return the number of steps of a run whose estimate, after ``estimate``, is expected to hold."""
         margin = _SAFETY**2 / self._accuracy
-        displacement = math.pow(margin * estimate.expected, 1.0 / _EXPECTED)
-        return self._grown(fine, max(displacement, math.pow(margin * estimate.event, 1.0 / _EXPECTED_OF_EVENTS)))
+        return self._grown(fine, math.pow(margin * max(estimate.expected, estimate.event), 1.0 / _EXPECTED))
 
     def _grown(self, last: _Pilot, growth: float) -> float:
         return _rung(last.steps * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH))
