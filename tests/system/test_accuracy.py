@@ -138,13 +138,14 @@ def test_soft_laws_keep_it_at_both_ends_and_in_the_times_of_contact(tables, accu
 
 def test_a_search_costs_little_more_than_the_run_that_it_finds():
     """Each pilot run has at least 1.2 times the steps of the one before: those before the last cost about as much."""
-    shares = []
+    before, last = [], []
     for tables in SCENES.values():
         for accuracy in (1e-3, 1e-4, 1e-5):
             run = simulate(scene_from_dict({**tables, "accuracy": accuracy}))
-            shares.append(run.summary["accuracy"]["pilot_steps"] / run.do_steps)
-    assert np.median(shares) <= 1.0
-    assert max(shares) <= 2.0
+            before.append(run.summary["accuracy"]["pilot_steps"])
+            last.append(run.do_steps)
+    assert np.median(np.divide(before, last)) <= 1.0
+    assert sum(before) <= 1.2 * sum(last)
 
 
 @pytest.mark.parametrize("number", [9, 19])
@@ -153,7 +154,7 @@ def test_a_spring_alone_is_right_with_an_accuracy_and_says_so(number):
     (verdict,) = judge.judge(1, number, ["--accuracy 1e-3"])
     assert (verdict.outcome, verdict.told, verdict.judged, verdict.silent) == ("done", False, True, False)
     assert max(verdict.y, verdict.time, verdict.impulse) <= 1e-7
-    assert verdict.calls <= 60
+    assert verdict.calls <= 100
     assert judge.from_dict(verdict.as_dict()) == verdict
 
 
@@ -208,12 +209,12 @@ def test_the_papers_law_has_no_accuracy():
 
 @pytest.mark.parametrize("reach", [1e3, 1.0, 1e-9, 1e-15])
 @pytest.mark.parametrize(
-    ("asked", "rows", "bound"), [({"accuracy": 1e-3}, 9, 1e-7), ({"coupling": {"macro_step": 0.1}}, 51, 1e-10)]
+    ("asked", "rows", "bound"), [({"accuracy": 1e-3}, 13, 1e-7), ({"coupling": {"macro_step": 0.1}}, 51, 1e-10)]
 )
 def test_the_size_of_the_motion_does_not_matter(reach, asked, rows, bound):
     """IDA's absolute tolerance was 1e-14 m or more whatever the scene: a motion of nanometres had its energy changed.
 
-    With an accuracy IDA is asked for 1e-4 of that.
+    With an accuracy of 1e-3 its relative tolerance is 1e-6.
     """
     spring = {"linear_stiffness": 100.0, "damping": 0.2, "equilibrium": reach}
     run = simulate(scene_from_dict({"time": {"t_end": 5.0}, "spring": spring, **asked}))
