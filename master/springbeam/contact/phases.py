@@ -155,8 +155,8 @@ class Transitions(Checkpointed):
         if kind == "unseated":
             return kind, Phase(phase.joint), Impact()
         assert kind == "separation"
-        if phase.joint is Joint.TOUCH and low.velocity < 0.0 and self._at_equilibrium(low, tolerance):
-            return "retie", Phase(Joint.TIED, phase.seated), Impact()  # C vanishes at Ψ, where they are tied again
+        if self._tip_mass == 0.0 and low.velocity < 0.0 and self._at_equilibrium(low, tolerance):
+            return "retie", Phase(Joint.TIED), Impact()  # C vanishes at Ψ, where they are tied again
         opened = Phase(Joint.FREE, seated=phase.seated and self._mass is not None)
         return kind, opened, self._part(opened, tip, low)
 
