@@ -1,22 +1,23 @@
-"""Frequencies of a scene where it is stiffest, for what must be known before it runs.
+"""Energies of a scene, and its frequencies where it is stiffest, for what must be known before it runs.
 
-The hardening spring at the largest deflection that the energy at first contact allows; a softening one at rest.
+It is stiffest where its hardening spring is deflected as far as the energy at first contact allows; a softening spring,
+at rest. What a softening spring holds, and from which energy on it escapes, is told by its well.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from math import acos, cos, inf, pi, sqrt
 
 from .scene import Scene
 from .statics import initial_kinetic_energy, shear_stiffness, tip_compliance
+from .tables import Spring
 
 
 def contact_energy(scene: Scene) -> float:
     """Return the energy at first contact [J]: of the beam, the spring, and loads."""
     energy = 0.0
     if (spring := scene.spring) is not None:
-        y, z = spring.equilibrium, spring.initial_velocity
-        energy += 0.5 * (spring.mass * z * z + spring.linear_stiffness * y * y) + 0.25 * spring.cubic_stiffness * y**4
+        energy = spring_energy(spring) + spring.external_force * spring.equilibrium  # without its load
     return max(energy + beam_energy(scene), 0.0) + _load_energy(scene)
 
 
@@ -83,3 +84,39 @@ def spring_frequency(scene: Scene) -> float:
     """Return √(k/m) of the spring at its stiffest [rad/s], 0 where it does not oscillate."""
     assert scene.spring is not None
     return sqrt(max(spring_stiffness(scene), 0.0) / scene.spring.mass)
+
+
+# -- the well of a softening spring ---------------------------------------------------------------------------------
+
+
+def _potential(spring: Spring, y: float) -> float:
+    """Return the potential of the spring and its load at ``y`` [J]."""
+    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    return y * (y * (0.5 * k1 + 0.25 * k2 * y * y) - spring.external_force)
+
+
+def spring_energy(spring: Spring) -> float:
+    """Return the energy of the spring and its load at the start [J]."""
+    return 0.5 * spring.mass * spring.initial_velocity**2 + _potential(spring, spring.equilibrium)
+
+
+def largest_load(spring: Spring) -> float:
+    """Return the largest load under which a softening spring has an equilibrium, 2/3 k1 √(k1/3|k2|) [N]."""
+    return 2.0 / 3.0 * spring.linear_stiffness * sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
+
+
+def well_depth(scene: Scene) -> float:
+    """Return the potential [J] at the lower rim of a softening spring's well; a rim below the foundation is none.
+
+    −∞ where the load leaves no well. The rims are the outer roots of k1 y + k2 y³ = f_s: y = 2a cos θ with
+    a² = k1/3|k2| and cos 3θ = −f_s/(2|k2|a³) (Viète).
+    """
+    spring = scene.spring
+    assert spring is not None
+    a = sqrt(spring.linear_stiffness / (-3.0 * spring.cubic_stiffness))
+    if not abs(spring.external_force) < largest_load(spring):
+        return -inf
+    theta = acos(-spring.external_force / largest_load(spring)) / 3.0
+    low, high = 2.0 * a * cos(theta + 2.0 / 3.0 * pi), 2.0 * a * cos(theta)
+    barred = scene.stop is not None and scene.stop.position > low
+    return min(_potential(spring, y) for y in ((high,) if barred else (low, high)))

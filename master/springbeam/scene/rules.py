@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from .linearised import largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS
 from .messages import toml_of
 from .partners import ForeignFmu, RigidWall
@@ -16,7 +17,6 @@ from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
 from .suspicions import suspicions
 from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam
-from .well import largest_load, spring_energy, well_depth
 
 #: More are a mistyped macro step: two weeks at a microsecond a step.
 MOST_MACRO_STEPS = 1e12

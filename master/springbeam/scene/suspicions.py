@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from .linearised import beam_energy
+from .linearised import beam_energy, spring_energy, well_depth
 from .scene import Scene
 from .statics import initial_kinetic_energy, locking, tip_compliance, tip_inertia
-from .well import spring_energy, well_depth
 
 #: What beams are made of: from foam to the heaviest metals [kg/m³], from gels to diamond [Pa].
 _DENSITIES, _MODULI = (10.0, 25e3), (1e4, 2e12)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,10 +16,9 @@ from ...contact.laws import Transmission, law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene, suspicions
 from ...scene.automatic import Choice, choice
-from ...scene.estimates import Estimates, estimates
 from ...scene.linearised import contact_depth, spring_frequency, spring_stiffness
 from ...scene.resolution import STABLE
-from ...scene.statics import shear_stiffness
+from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from ..schemes import RIGID, SOFT
 from .linear import LinearBody, LinearPair, spectral_radius
 
@@ -42,6 +42,19 @@ class SchemePrediction:
     degree: int
     spectral_radius: float  #: at the scene's macro step
     critical_step: float | None  #: smallest unstable H [s]; None: none found, see `critical_step`
+
+
+class Estimates(NamedTuple):
+    """What a scene is, by hand calculation; ``None`` where it has no such thing."""
+
+    beam_mass: float | None  #: ρAL [kg]
+    frequency: float | None  #: lowest of the beam, tip free, without a mesh [Hz]
+    tip_stiffness: float | None  #: static, 1/(L³/3EI + L/KAG) [N/m]
+    locking: float | None  #: the static stiffness of the mesh over that of the beam
+    spring_mass: float | None  #: [kg]
+    spring_stiffness: float | None  #: k1 [N/m]
+    contact_time: float | None  #: first contact of an undeformed approach [s]
+    contact_duration: float | None  #: half a period of spring and beam together [s]
 
 
 @dataclass(frozen=True)
@@ -119,7 +132,7 @@ def predict(scene: Scene) -> Prediction:
             f"H <= {RESOLVED / modal.omega[0]:.3g} s resolves it"
         )
     return Prediction(
-        estimates=estimates(scene),
+        estimates=_estimates(scene),
         frequencies=() if modal is None else tuple(float(omega) / (2.0 * math.pi) for omega in modal.omega[:3]),
         macro_step=H,
         threshold=THRESHOLD,
@@ -135,6 +148,26 @@ def predict(scene: Scene) -> Prediction:
         schemes=schemes,
         auto=choice(scene) if schemes else None,
         notes=tuple(notes),
+    )
+
+
+def _estimates(scene: Scene) -> Estimates:
+    """Return what ``scene`` is, by hand calculation."""
+    beam, spring = scene.beam, scene.spring
+    duration = None
+    if beam is not None and spring is not None and not scene.contact.lasting:
+        stiffness = spring.linear_stiffness + 1.0 / tip_compliance(beam)
+        if stiffness > 0.0:
+            duration = math.pi * math.sqrt((spring.mass + tip_inertia(beam)) / stiffness)
+    return Estimates(
+        beam_mass=None if beam is None else beam.density * beam.area * beam.length,
+        frequency=None if beam is None or scene.massless else lowest_frequency(beam) / (2.0 * math.pi),
+        tip_stiffness=None if beam is None else 1.0 / tip_compliance(beam),
+        locking=None if beam is None else locking(beam),
+        spring_mass=None if spring is None else spring.mass,
+        spring_stiffness=None if spring is None else spring.linear_stiffness,
+        contact_time=scene.contact_time,
+        contact_duration=duration,
     )
 
 
