@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from springbeam.bodies.protocol import StepRefused
 from springbeam.monolithic import event_driven
 from springbeam.results.trajectory import Event, Trajectory
 from springbeam.scene import Scene, load_scene, with_changes
+from springbeam.scene.reading import tomllib
 
 
 def soft(n: int = 6, **tables: dict[str, Any]) -> Scene:
@@ -94,29 +96,18 @@ def test_a_soft_contact_that_begins_at_the_start_is_an_impact_whatever_rounding_
     assert min(gaps) < 0.0 <= max(gaps)
 
 
-def scene_of(size: float, scheme: str, degree: int, stop: dict | None = None, *, beam: dict, spring: dict) -> Scene:
-    tables: dict[str, Any] = {"time": {"t_end": 0.4}, "beam": beam, "spring": spring}
-    tables["coupling"] = {"scheme": scheme, "degree": degree, "macro_step": size}
-    return scene_from_dict(tables if stop is None else {**tables, "stop": stop})
+SCENES = tomllib.loads(Path(__file__).with_name("simulation.toml").read_text(encoding="utf-8"))
+
+
+def named(name: str, size: float, scheme: str, degree: int) -> Scene:
+    return scene_from_dict({**SCENES[name], "coupling": {"scheme": scheme, "degree": degree, "macro_step": size}})
 
 
 @pytest.mark.parametrize(("degree", "bound"), [(1, 5e-4), (2, 1e-6)])
 def test_a_contact_that_ends_at_once_does_not_stick(degree, bound):
     """A second meeting above Ψ: it separates by itself. A contact that stuck would be wrong by the displacement
     itself; left is O(H²) of the mismatched velocities at degree 1, O(H⁴) at degree 2."""
-    scene = scene_of(
-        5e-4,
-        "energy",
-        degree,
-        beam={
-            "n_elements": 8,
-            "young_modulus": 17.0,
-            "shear_modulus": 290.0,
-            "initial_velocity_slope": -0.28,
-            "distributed_load": 1.216,
-        },
-        spring={"mass": 0.63, "linear_stiffness": 51.0, "cubic_stiffness": -0.2, "damping": 0.79},
-    )
+    scene = named("ends at once", 5e-4, "energy", degree)
     trajectory, exact = simulate(scene), reference(scene)
     assert kinds(trajectory)[:4] == kinds(exact)[:4] == ["impact", "release", "impact", "separation"]
     assert max(error(trajectory, exact, q) for q in ("u_tip", "y")) < bound
@@ -125,21 +116,7 @@ def test_a_contact_that_ends_at_once_does_not_stick(degree, bound):
 @pytest.mark.parametrize("scheme", ["energy", "hermite"])
 def test_a_spring_leaves_the_foundation_and_is_seated_again_when_the_reference_says(scheme):
     """Bounces die out (e = 0.3), N vanishes, bounces die out again: a false re-seat would hold y at φ for good."""
-    scene = scene_of(
-        1e-3,
-        scheme,
-        2,
-        {"position": -0.043, "restitution": 0.3},
-        beam={
-            "n_elements": 8,
-            "young_modulus": 29.0,
-            "shear_modulus": 29.0,
-            "initial_velocity_slope": -0.86,
-            "initial_deflection_slope": 0.1,
-            "approach": "elastic",
-        },
-        spring={"mass": 0.15, "linear_stiffness": 8.6, "cubic_stiffness": 5.0, "damping": 0.36},
-    )
+    scene = named("seated twice", 1e-3, scheme, 2)
     trajectory, exact = simulate(scene), reference(scene)
     assert max(error(trajectory, exact, q) for q in ("u_tip", "y")) < 1e-8
     for kind in ("seated", "unseated"):
@@ -154,20 +131,7 @@ def test_a_spring_leaves_the_foundation_and_is_seated_again_when_the_reference_s
 def test_an_inelastic_foundation_is_left_at_once(size, bound):
     """e = 0 with a load that lifts: seated and unseated at one time, and the motion after it is that of the reference.
     Degree 0 errs by O(H²) in the velocities handed to each event, with a sign that depends on the grid."""
-    scene = scene_of(
-        size,
-        "energy",
-        0,
-        {"position": -0.012, "restitution": 0.0},
-        beam={
-            "n_elements": 4,
-            "young_modulus": 410.0,
-            "shear_modulus": 410.0,
-            "initial_velocity_slope": -1.1,
-            "distributed_load": 2.989,
-        },
-        spring={"mass": 1.0, "linear_stiffness": 3.3, "cubic_stiffness": 5.0, "damping": 0.23},
-    )
+    scene = named("left at once", size, "energy", 0)
     trajectory, exact = simulate(scene), reference(scene)
     assert kinds(trajectory)[:4] == kinds(exact)[:4] == ["impact", "seated", "unseated", "release"]
     assert [e.time for e in trajectory.events[:4]] == pytest.approx([e.time for e in exact.events[:4]], abs=1e-6)

@@ -18,6 +18,7 @@ from springbeam.results.reading import load_trajectory
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.runner import run
 from springbeam.scene import SceneError, load_scene, with_changes
+from springbeam.scene.reading import tomllib
 from springbeam.studies.accuracy import simulate
 from springbeam.studies.crosscheck import crosscheck
 from springbeam.studies.crosscheck.orders import Orders
@@ -28,51 +29,9 @@ from springbeam.studies.tradeoff import Tradeoff
 sys.path.append(str(Path(__file__).parents[1] / "campaign"))
 import judge
 
-STIFF_ON_SOFT = {
-    "time": {"t_end": 0.25},
-    "beam": {"young_modulus": 400.0, "shear_modulus": 150.0, "n_elements": 12, "initial_velocity_slope": -0.6},
-    "spring": {"mass": 0.4, "linear_stiffness": 40.0, "cubic_stiffness": 10.0, "damping": 0.2},
-}
-WITH_STOP = {
-    "time": {"t_end": 0.2},
-    "beam": {
-        "young_modulus": 60.0,
-        "shear_modulus": 80.0,
-        "n_elements": 8,
-        "alpha_b": 1e-3,
-        "initial_velocity_slope": -1.5,
-    },
-    "spring": {"mass": 0.7, "linear_stiffness": 5.0, "cubic_stiffness": -0.3},
-    "stop": {"position": -0.04, "restitution": 0.6},
-}
-SPRING_ALONE = {
-    "time": {"t_end": 5.0},
-    "spring": {"equilibrium": 0.4, "linear_stiffness": 4.0, "cubic_stiffness": -1.0},
-}
-ONE_CONTACT = {  # the highest frequencies of the mesh are not resolved at 1e-3
-    "time": {"t_end": 0.07},
-    "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 50, "initial_velocity_slope": -1.0},
-    "spring": {"linear_stiffness": 3.0, "cubic_stiffness": -0.2},
-}
-TIES = {  # of few modes, with a release, a separation, and contact again
-    "time": {"t_end": 0.896},
-    "beam": {
-        "young_modulus": 150.0,
-        "shear_modulus": 90.0,
-        "second_moment_of_area": 0.3,
-        "n_elements": 20,
-        "n_modes": 6,
-        "initial_velocity_slope": -1.2,
-    },
-    "spring": {"mass": 0.6, "linear_stiffness": 12.0},
-}
-SCENES = {
-    "beam-spring": STIFF_ON_SOFT,
-    "with-stop": WITH_STOP,
-    "spring": SPRING_ALONE,
-    "one contact": ONE_CONTACT,
-    "ties": TIES,
-}
+SCENES = tomllib.loads(Path(__file__).with_name("accuracy.toml").read_text(encoding="utf-8"))
+SHORT_CONTACTS = SCENES.pop("short contacts")
+STIFF_ON_SOFT, WITH_STOP = SCENES["stiff on soft"], SCENES["with stop"]
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5])
@@ -91,22 +50,6 @@ def test_the_promise_is_kept(tables, accuracy):
         assert abs(strikes[0][0] - strikes[1][0]) <= accuracy * tables["time"]["t_end"]
 
 
-SHORT_CONTACTS = {  # y moves 13 times as far as the tip
-    "time": {"t_end": 0.004470453098},
-    "beam": {
-        "area": 1.7241,
-        "second_moment_of_area": 0.000295626,
-        "young_modulus": 622509.5222,
-        "shear_modulus": 108177.5999,
-        "length": 0.14349,
-        "n_elements": 17,
-        "initial_velocity_slope": -40.9046,
-        "reduced_integration": True,
-    },
-    "spring": {"mass": 0.02554560592, "linear_stiffness": 10563.5196, "cubic_stiffness": 33266100.0},
-    "stop": {"position": -0.000291454, "restitution": 0.259},
-    "contact": {"law": "compliance", "stiffness": 33828000.0, "exponent": 3.0},
-}
 SOFT = {
     "short contacts": SHORT_CONTACTS,
     "compliance": {**STIFF_ON_SOFT, "contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}},

@@ -20,6 +20,7 @@ from springbeam.cli import app
 from springbeam.cli.run import _ProgressBar
 from springbeam.results.reading import load_summary
 from springbeam.scene import load_scene, reference, scene_keys, shipped_scenes, with_changes
+from springbeam.scene.reading import tomllib
 from springbeam.studies.stability.predict import predict
 from springbeam.studies.sweep.metrics import METRICS
 
@@ -274,83 +275,7 @@ def test_commands_scenes_and_keys_are_completed(line, completed):
 # -- the likeliest mistakes: one error with place and remedy, exit code 2, nothing done --------------------------------
 
 TOML = "[time]\nt_end = 0.6\n\n[spring]\nmass = 1,0\n"
-MISTAKES = {
-    "scene misspelt": ("run sotf --json", ["sotf: no such file", "did you mean soft?", "steel-bumper"]),
-    "scene's file is not there": ("run my_scene.toml", ["my_scene.toml: no such file", "shipped scenes: bar-impact"]),
-    "a folder for a scene": ("run empty", ["empty: is a directory", "shipped scenes: bar-impact"]),
-    "command misspelt": ("rnu soft", ["No such command 'rnu'", "Did you mean 'run'?"]),
-    "command forgotten": ("soft", ["soft is a scene, not a command", "Did you mean springbeam run soft?"]),
-    "scene forgotten": ("run", ["Missing argument 'SCENE'", "Try 'springbeam run -h' for help"]),
-    "option misspelt": ("run soft --no-plot", ["No such option: --no-plot", "--no-plots"]),
-    "key misspelt": (
-        "run soft --set beam.densty=2",
-        ["--set beam.densty=2: [beam] densty: unknown key", "did you mean density?", "young_modulus"],
-    ),
-    "table misspelt": ("run soft --set beem.density=2", ["--set beem.density=2: [beem]", "did you mean beam?"]),
-    "table forgotten": ("run soft --set density=2", ["--set density=2: must be TABLE.KEY=VALUE, as in"]),
-    "value forgotten": ("run soft --set beam.density", ["--set beam.density: must be TABLE.KEY=VALUE, as in"]),
-    "--set forgotten": ("run soft beam.density=2", ["Unexpected argument", "Did you mean --set beam.density=2?"]),
-    "decimal comma": (
-        "run soft --set beam.density=1,5",
-        ["--set beam.density=1,5:", "must be a finite number greater than 0"],
-    ),
-    "unit in the value": ("run soft --set time.t_end=600ms", ["--set time.t_end=600ms:", '"600ms": must be a finite']),
-    "no stiffness": (
-        "run soft --set beam.young_modulus=0",
-        ["--set beam.young_modulus=0: [beam] young_modulus = 0: must be a finite number greater than 0"],
-    ),
-    "negative stiffness": ("run soft --set beam.young_modulus=-100", ["= -100: must be", "greater than 0"]),
-    "H longer than the run": (
-        "run soft --set coupling.macro_step=5",
-        ["--set coupling.macro_step=5:", "must be at most [time] t_end = 0.6"],
-    ),
-    "run shorter than H": (
-        "run soft --set time.t_end=1e-4",
-        ["soft.toml with --set: [coupling] macro_step", "must be at most [time] t_end = 0.0001"],
-    ),
-    "not TOML": ("run comma.toml", ["comma.toml: not TOML", "at line 5, column 9", "mass = 1,0"]),
-    "accuracy in per cent": ("run soft --accuracy 5", ["--accuracy 5: must be between 0 and 1, as in"]),
-    "mesh without accuracy": ("run soft --mesh", ["--mesh: picks a mesh that keeps an accuracy", "--accuracy 1e-3"]),
-    "rows too close": ("run soft --output-interval 1e-9", ["--output-interval 1e-09: more than", "take a longer one"]),
-    "rows backwards": ("run soft --output-interval=-1", ["--output-interval -1: must be a time above 0 s"]),
-    "rows with checkpoints": (
-        "run soft --output-interval 1e-2 --checkpoint 1",
-        ["--output-interval 0.01: --checkpoint"],
-    ),
-    "table of keys misspelt": ("keys beem", ["beem: unknown table; allowed: time, beam, spring"]),
-    "key to list misspelt": ("keys beam.densty", ["beam.densty: unknown key; allowed: density, length"]),
-    "new scene that is there": ("new comma", ["comma.toml: already there; give another NAME"]),
-    "results are there": ("run soft --out done", ["done already holds results", "--force replaces", "--out DIR"]),
-    "a file for a directory": ("run soft --out comma.toml", ["comma.toml: is a file; --out DIR names a directory"]),
-    "report of a scene": ("report soft", ["soft: no such directory; did you mean results/soft?"]),
-    "report of an empty folder": ("report empty", ["empty: holds no run; runs here: results/soft"]),
-    "animation of a file": ("animate comma.toml", ["comma.toml: is no directory; runs here: results/soft"]),
-    "report into no folder": ("report done --out no/report.html", ["no/report.html: No such file"]),
-    "animation into no folder": ("animate done --out no/run.gif", ["No such file or directory"]),
-    "animation of no frames": ("animate done --fps 0", ["--fps", "greater than or equal to 1"]),
-    "animation of no time": ("animate done --seconds 0", ["--seconds", "greater than or equal to 0.1"]),
-    "animation of another kind": ("animate done --out a.webm", ["a.webm: an animation is a .gif or a .mp4 file"]),
-    "resume of a run that is done": ("resume done", ["done: the run is done, nothing to resume"]),
-    "resume of what is no run": ("resume empty", ["empty: holds no run"]),
-    "predict without a macro step": (
-        "predict soft --set coupling.relative_tolerance=1e-4",
-        ["[coupling] macro_step: needed here; this scene gives tolerances instead"],
-    ),
-    "sweep of nothing": ("sweep soft", ["--vary: nothing varies", "TABLE.KEY=VALUES"]),
-    "sweep of a range": ("sweep soft --vary spring.mass=1:2", ["--vary spring.mass: a range", "--samples, or a count"]),
-    "sweep with dots": ("sweep soft --vary spring.mass=1..2", ["--vary spring.mass=1..2:", "LOW:HIGH:COUNT"]),
-    "sweep of words": ("sweep soft --vary spring.mass=1,heavy", ["'heavy' is no value of mass"]),
-    "sweep's key misspelt": ("sweep soft --vary spring.mas=1,2", ["--vary spring.mas=1,2:", "did you mean mass?"]),
-    "sweep of no metric": (
-        "sweep soft --vary spring.mass=1,2 --metric speed",
-        ["--metric speed: unknown; allowed: u_tip"],
-    ),
-    "stability of nothing": (
-        "stability --samples 0 --resolution 0",
-        ["no cells: --samples and --resolution are both 0"],
-    ),
-    "crosscheck without a reference": ("crosscheck soft --set contact.impact=rest", ["'rest'", "'inelastic' or 'tip'"]),
-}
+MISTAKES = tomllib.loads(Path(__file__).with_name("mistakes.toml").read_text(encoding="utf-8"))
 
 
 @pytest.fixture
@@ -371,7 +296,7 @@ def contents(folder):
 
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_is_one_error_with_place_and_remedy(desk, mistake):
-    line, fragments = MISTAKES[mistake]
+    line, *fragments = MISTAKES[mistake]
     before = contents(desk)
     said = " ".join(re.sub("[│╭╮╰╯─]", " ", refused(*line.split())).split())
     for fragment in fragments:
