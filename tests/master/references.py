@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scenes import scene_from_dict
 
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.trajectory import Trajectory
@@ -21,6 +22,26 @@ def soft(n_elements: int = 6, **tables: Any) -> Scene:
 def linear(**tables: Any) -> Scene:
     """Return the scene of `soft` with a linear spring."""
     return soft(**{**tables, "spring": {"cubic_stiffness": 0.0, **tables.get("spring", {})}})
+
+
+def dips(restitution: float, turn: float) -> tuple[Scene, list[float]]:
+    """Return a spring of ω = 10 rad/s that swings 0.1 m about 0, by steps of ``turn`` [rad], and when it strikes [s].
+
+    The foundation is at −0.08 m: above it for (π − acos(0.08/A))·2/ω after each impact, A² = 0.08² + (e z/ω)². The dips
+    become as shallow as 1e-5 m.
+    """
+    tables = {
+        "time": {"t_end": 5.0},
+        "spring": {"mass": 1.0, "linear_stiffness": 100.0, "equilibrium": 0.1},
+        "stop": {"position": -0.08, "restitution": restitution},
+        "coupling": {"macro_step": turn / 10.0},
+    }
+    times, time, speed = [], np.arccos(-0.8) / 10.0, 0.6
+    while time < 5.0:
+        times.append(float(time))
+        speed *= restitution
+        time += 0.2 * (np.pi - np.arccos(0.08 / np.hypot(0.08, speed / 10.0)))
+    return scene_from_dict(tables), times
 
 
 def kinds(trajectory: Trajectory) -> list[str]:

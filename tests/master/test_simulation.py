@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bodies import simulate, stopping
+from references import dips, kinds
 from scenes import scene_from_dict
 
 from springbeam.bodies.protocol import StepRefused
@@ -24,10 +25,6 @@ def soft(n: int = 6, **tables: dict[str, Any]) -> Scene:
     tables.setdefault("time", {"t_end": 0.3})
     coupling = {"scheme": "hermite", "degree": 2, "macro_step": 1e-3}
     return with_changes(load_scene("soft"), **{**tables, "coupling": {**coupling, **tables.get("coupling", {})}})
-
-
-def kinds(trajectory: Trajectory) -> list[str]:
-    return [event.kind for event in trajectory.events]
 
 
 def reference(scene: Scene) -> Trajectory:
@@ -325,25 +322,8 @@ def test_energy_that_appears_is_named(scheme, degree, share, warns, stops):
 @pytest.mark.parametrize("restitution", [0.5, 0.7, 0.9])
 @pytest.mark.parametrize("turn", [0.2, 1.0, 3.0])
 def test_no_shallow_dip_to_the_foundation_is_missed(restitution, turn):
-    """A spring of ω = 10 rad/s swings 0.1 m about 0, the foundation is at −0.08 m: above it for (π − acos(0.08/A))·2/ω
-    after each impact, A² = 0.08² + (e z/ω)². The dips become as shallow as 1e-5 m, the steps are up to 3 rad long."""
-    omega, floor = 10.0, 0.08
-    scene = scene_from_dict(
-        {
-            "time": {"t_end": 5.0},
-            "spring": {"mass": 1.0, "linear_stiffness": omega**2, "equilibrium": 0.1},
-            "stop": {"position": -floor, "restitution": restitution},
-            "coupling": {"macro_step": turn / omega},
-        }
-    )
-    run = simulate(scene)
-    time, speed = np.arccos(-floor / 0.1) / omega, omega * np.sqrt(0.1**2 - floor**2)
-    times = []
-    while time < 5.0:
-        times.append(time)
-        speed *= restitution
-        time += 2.0 / omega * (np.pi - np.arccos(floor / np.hypot(floor, speed / omega)))
-    found = [event.time for event in run.events if event.kind == "stop_impact"]
+    scene, times = dips(restitution, turn)
+    found = [event.time for event in simulate(scene).events if event.kind == "stop_impact"]
     assert found == pytest.approx(times, abs=1e-10)
 
 

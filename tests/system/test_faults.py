@@ -13,34 +13,14 @@ import pytest
 import tomli_w
 from commands import command
 from faulty import NAMES, Fault, Script, installed
-from scenes import completed
 
 from springbeam.results.reading import load_trajectory
+from springbeam.scene.reading import tomllib
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
-#: Every phase and every kind of event within 0.6 s.
-SCENE: dict[str, dict[str, Any]] = {
-    "time": {"t_end": 0.6},
-    "beam": {
-        "n_elements": 8,
-        "young_modulus": 29.0,
-        "shear_modulus": 29.0,
-        "distributed_load": -2.0,
-        "initial_velocity_slope": -0.86,
-        "initial_deflection_slope": 0.1,
-        "approach": "elastic",
-    },
-    "spring": {
-        "mass": 0.15,
-        "linear_stiffness": 8.6,
-        "cubic_stiffness": 5.0,
-        "damping": 0.36,
-        "external_force": 0.3,
-    },
-    "stop": {"position": -0.043, "restitution": 0.3},
-    "coupling": {"macro_step": 2e-3},
-}
+PATH = Path(__file__).with_name("faults.toml")
+SCENE: dict[str, Any] = tomllib.loads(PATH.read_text(encoding="utf-8"))
 COMPLIANCE = {"law": "compliance", "stiffness": 1e3, "exponent": 1.5}
 #: Tables that differ, and where the master comes by.
 LAWS: dict[str, tuple[dict[str, dict[str, Any]], tuple[str, ...]]] = {
@@ -63,8 +43,8 @@ Run = Callable[..., tuple[int, Path, Script]]
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     def started(law: str, *faults: Fault, name: str = "faulty") -> tuple[int, Path, Script]:
         changes, _ = LAWS[law]
-        scene = {table: {**SCENE.get(table, {}), **changes.get(table, {})} for table in {**SCENE, **changes}}
-        (tmp_path / "scene.toml").write_text(tomli_w.dumps(completed(scene)))
+        scene = SCENE | {table: {**SCENE[table], **change} for table, change in changes.items()}
+        (tmp_path / "scene.toml").write_text(tomli_w.dumps(scene))
         with monkeypatch.context() as patch:
             script = installed(patch, *faults)
             result = command("run", tmp_path / "scene.toml", "--out", tmp_path / name, "--no-plots", "-q")

@@ -9,9 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-import tomli_w
 from commands import printed
-from test_faults import FILES, SCENE
+from test_faults import FILES, PATH, SCENE
 
 from springbeam.results.reading import load_trajectory
 
@@ -34,13 +33,6 @@ installed(pytest.MonkeyPatch(), Fault(fmu, function, where, "hang", skip=int(ski
 sys.argv = ["springbeam", *arguments]
 cli.main()
 """
-
-
-@pytest.fixture
-def scene(tmp_path: Path) -> Path:
-    path = tmp_path / "scene.toml"
-    path.write_text(tomli_w.dumps(SCENE))
-    return path
 
 
 def interrupted(number: signal.Signals, fmu: str, function: str, where: str, skip: int, *arguments: object) -> str:
@@ -98,12 +90,12 @@ def check_interrupted(directory: Path, whole: dict[str, bytes], said: str, named
     ids=["tied", "location"],
 )
 def test_a_call_that_never_returns_can_be_interrupted(
-    tmp_path: Path, scene: Path, number: signal.Signals, fmu: str, where: str
+    tmp_path: Path, number: signal.Signals, fmu: str, where: str
 ) -> None:
     directory = tmp_path / "run"
-    printed("run", scene, "--out", tmp_path / "whole", "--no-plots", "-q")
+    printed("run", PATH, "--out", tmp_path / "whole", "--no-plots", "-q")
     whole = contents(tmp_path / "whole")
-    run = ("run", scene, "--out", directory, "--checkpoint", 0.02)
+    run = ("run", PATH, "--out", directory, "--checkpoint", 0.02)
     said = interrupted(number, fmu, "fmi2DoStep", where, 3, *run)
     check_interrupted(directory, whole, said, f"fmi2DoStep of {fmu}.fmu")
     said = interrupted(number, fmu, "fmi2GetReal", "row", 50, "resume", directory)
@@ -112,8 +104,8 @@ def test_a_call_that_never_returns_can_be_interrupted(
     assert contents(directory) == whole
 
 
-def test_a_call_that_never_returns_before_the_first_row_leaves_nothing(tmp_path: Path, scene: Path) -> None:
-    run = ("run", scene, "--out", tmp_path / "run")
+def test_a_call_that_never_returns_before_the_first_row_leaves_nothing(tmp_path: Path) -> None:
+    run = ("run", PATH, "--out", tmp_path / "run")
     said = interrupted(signal.SIGINT, "beam", "fmi2ExitInitializationMode", "start", 0, *run)
     assert said == "error: interrupted: initialisation of beam.fmu at t = 0 s has not returned within 0.5 s\n"
     assert not (tmp_path / "run").exists()
