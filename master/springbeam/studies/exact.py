@@ -66,11 +66,9 @@ def free_masses(
     )
 
 
-def linked_masses(
-    stiffness: float, damping: float, t_end: float, own: float = 4.0 * np.pi**2, **coupling: Any
-) -> Scene:
-    """Return a scene of two unit masses, each held by ``own`` [N/m], on a link [N/m, N·s/m]; the tip starts at 1 m."""
-    link = {"law": "link", "stiffness": stiffness, "damping": damping}
+def linked_masses(stiffness: float, damping: float, t_end: float, **coupling: Any) -> Scene:
+    """Return a scene of two unit masses, each held by 4π² N/m, on a link [N/m, N·s/m]; the tip starts at 1 m."""
+    link, own = {"law": "link", "stiffness": stiffness, "damping": damping}, 4.0 * np.pi**2
     return _held_masses(own, own, link, t_end, {"initial_deflection_slope": 1.0}, coupling)
 
 

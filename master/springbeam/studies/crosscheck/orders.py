@@ -18,6 +18,9 @@ from ..study import Found, Record, Study
 from ..tables import table, write_csv
 from .sampling import SHORT, away_from, quantities, sample
 
+#: How often the macro step is halved; once less if quick.
+_HALVINGS = 3
+
 
 @dataclass(frozen=True)
 class OrderRow:
@@ -42,13 +45,12 @@ class Orders(Study):
     files: ClassVar[tuple[str, ...]] = ("orders.csv",)
 
     scene: Scene
-    halvings: int = 3  #: one less if quick
 
     def cases(self) -> dict[str, int | None]:
         """Return the halvings, ``None`` for the reference. Raises SceneError if the law does not converge."""
         if self.scene.contact.law == "paper":
             raise SceneError("contact.law = 'paper': Algorithm 1 does not converge; --orders needs another law")
-        halvings = range(self.halvings + 1 - self.quick)
+        halvings = range(_HALVINGS + 1 - self.quick)
         return {"reference": None, **{f"H/{2**k}" if k else "H": k for k in halvings}}
 
     @property

@@ -159,8 +159,6 @@ class Critical(Study):
     files: ClassVar[tuple[str, ...]] = ("critical.csv",)
     parallel: ClassVar[bool] = True
 
-    n_elements: int = 10  #: of the beam; 4 if quick
-
     def cases(self) -> dict[str, tuple[str, float, str, int]]:
         """Return law, λ [N/m], scheme and degree."""
         ends = [*(("compliance", value) for value in STIFFNESSES), ("transmission", 0.0)]
@@ -173,8 +171,7 @@ class Critical(Study):
     def record(self, case: Sequence[Any]) -> Record:
         """Compare one coupling."""
         law, stiffness, scheme, degree = case
-        n_elements = 4 if self.quick else self.n_elements
-        return asdict(comparison(linear_scene(law, stiffness, scheme, degree, n_elements)))
+        return asdict(comparison(linear_scene(law, stiffness, scheme, degree, 4 if self.quick else 10)))
 
     def found(self, records: Mapping[str, Record]) -> Found:
         """Judge whether predicted and measured agree."""
