@@ -15,6 +15,7 @@ from springbeam import load_scene, with_changes
 from springbeam.scene import Scene
 from springbeam.scene.automatic import choice
 from springbeam.studies.study import record_all
+from springbeam.studies.tables import number
 from springbeam.studies.tradeoff import Point, Points, Tradeoff
 from springbeam.studies.tradeoff.picture import draw
 
@@ -46,8 +47,7 @@ def cell(point: Point | None) -> str:
 def cheapest(found: Points) -> list[str]:
     rows = []
     for best in found.cheapest():
-        ratio = f"{best.ratio:.3g}" if best.ours and best.scipy else ""
-        rows.append([f"{best.target:.0e}", cell(best.ours), cell(best.scipy), ratio])
+        rows.append([f"{best.target:.0e}", cell(best.ours), cell(best.scipy), number(best.ratio, ".3g")])
     return table(["error", "cheapest here: solve [ms]", "cheapest of scipy: solve [ms]", "ratio"], rows)
 
 

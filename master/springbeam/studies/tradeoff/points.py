@@ -16,7 +16,7 @@ from rich.table import Table
 
 from ...results.contact_times import contact_time_difference, impulse_difference
 from ...results.trajectory import Trajectory
-from ..tables import table
+from ..tables import number, table
 from .configurations import ALGORITHM_1
 
 #: Contacts shorter than this many macro steps are no evidence either way.
@@ -110,7 +110,7 @@ class Point:
 
     @property
     def displacement(self) -> float:
-        return float("inf") if self.errors is None else self.errors.displacement
+        return math.inf if self.errors is None else self.errors.displacement
 
     def row(self) -> dict[str, Any]:
         """Return the row of the CSV file."""
@@ -136,10 +136,9 @@ class Cheapest:
     scipy: Point | None
 
     @property
-    def ratio(self) -> float:
-        if self.ours is None or self.scipy is None:
-            return float("nan")
-        return self.scipy.solve / self.ours.solve
+    def ratio(self) -> float | None:
+        """How many times as long scipy takes."""
+        return self.scipy.solve / self.ours.solve if self.ours and self.scipy else None
 
 
 @dataclass(frozen=True)
@@ -188,15 +187,14 @@ class Points:
 
     def tables(self) -> Iterator[Table]:
         """Yield for a terminal the cheapest, and the front."""
-        cheapest = []
-        for choice in self.cheapest():
-            both = [
-                cell
-                for point in (choice.ours, choice.scipy)
-                for cell in (("none gets there", "") if point is None else (point.name, f"{1e3 * point.solve:.3g}"))
-            ]
-            ratio = f"{choice.ratio:.1f}" if choice.ours and choice.scipy else ""
-            cheapest.append((f"{choice.target:.0e}", *both, ratio))
+
+        def shown(point: Point | None) -> tuple[str, str]:
+            return ("none gets there", "") if point is None else (point.name, f"{1e3 * point.solve:.3g}")
+
+        cheapest = [
+            (f"{best.target:.0e}", *shown(best.ours), *shown(best.scipy), number(best.ratio, ".1f"))
+            for best in self.cheapest()
+        ]
         names = ("error", "co-simulation", "[ms]", "scipy", "[ms]", "ratio")
         yield table(names, cheapest, "cheapest for an error (solve time)", words=("co-simulation", "scipy"))
         front = [
