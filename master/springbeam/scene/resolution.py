@@ -1,16 +1,7 @@
 """Judge whether the macro step resolves the motion, and say what would.
 
-A run is called *not resolved* if (``docs/coupling.md``, "Is the motion resolved?")
-
-* the slowest oscillation of a body, or a load, turns more than `TURN` in a macro step: its rows are aliased;
-* tip and lower end turn more than `CONTACT_TURN` against each other on a soft contact law, or with degree 0 in all
-  steps together more than `CONTACT_LAG` too little;
-* `hermite` is used where the fastest mode kept turns more than `STABLE` in a macro step;
-* the velocities of the joined ends differ by more than `MISMATCH` of their largest speed, or of that with which they
-  strike the foundation; or
-* a contact or a rest on the foundation lasts less than `CONTACT_STEPS` macro steps: one polynomial tells when it ends.
-
-Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
+When a run is called *not resolved*, and why, is in ``docs/coupling.md``, "Is the motion resolved?"; the constants are
+its limits. Frequencies are those of the beam, not of its mesh, so that asking costs next to nothing;
 `springbeam.studies.stability.predict` has the mesh's.
 """
 

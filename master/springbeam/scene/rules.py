@@ -219,15 +219,13 @@ def _inertia_needed(scene: Scene, at: At) -> Iterator[str]:
     name, law = at("beam.fidelity"), at("contact.law")
     if scene.lower is None:
         yield f'{name}: a beam without inertia needs a [spring]; use fidelity = "dynamic"'
-    if contact.law == "compliance" and scene.coupling.feedback != "beam_drives":
-        yield (
-            f'{name}: the tip between the beam and {law} would have no inertia; use law = "transmission", '
-            'fidelity = "dynamic", or neglect the force on the beam: [coupling] feedback = "beam_drives"'
-        )
-    if contact.law == "link":
-        yield (
-            f'{name}: the tip between the beam and {law} would have no inertia; use law = "tie" or fidelity = "dynamic"'
-        )
+    remedies = {
+        "compliance": 'law = "transmission", fidelity = "dynamic", or neglect the force on the beam: [coupling] '
+        'feedback = "beam_drives"',
+        "link": 'law = "tie" or fidelity = "dynamic"',
+    }
+    if contact.law in remedies and scene.coupling.feedback != "beam_drives":
+        yield f"{name}: the tip between the beam and {law} would have no inertia; use {remedies[contact.law]}"
     if contact.law == "paper":
         yield f'{name}: {law} integrates the beam by (62); use fidelity = "dynamic"'
     if contact.law == "transmission" and contact.impact == "tip":
