@@ -97,58 +97,60 @@ Timoshenko::Field Timoshenko::field(Degree p, const double* x, Index first) cons
   return v;
 }
 
-template <typename Degree>
-void Timoshenko::multiply_mass(Degree p, const double* x, double* __restrict y) const {
-  const Index block = 2 * p;
-  for (Index f = 0; f < 2; ++f) {
-    double l = 0.0, r = 0.0;  // linear part of the element to the left
-    for (Index e = 0; e < n_; ++e) {
-      double* out = y + e * block + f;
-      const Field v = field(p, x, e * block + f);
-      if (e > 0) *(out - 2) = end_ * (l + ratio_ * (r + v.left) + v.right);
-      l = v.left;
-      r = v.right;
-      // Moments of the field with P_j: with P_0 and P_1 from the ends, with the others h f_j/(2j+1).
-      std::array<double, max_element_degree + 1> moment;
-      moment[0] = 3.0 * end_ * (l + r);
-      moment[1] = end_ * (r - l);
-      for (Index k = 2; k <= p; ++k) {
-        moment[k] = (k < p ? h_ : h_ * top_) * v.f[k] / static_cast<double>(2 * k + 1);
-        out[2 * k - 4] = (moment[k] - moment[k - 2]) / static_cast<double>(2 * k - 1);
+void Timoshenko::mass_times(const double* x, double* __restrict y) const {
+  with_degree([=](auto p) {
+    const Index block = 2 * p;
+    for (Index f = 0; f < 2; ++f) {
+      double l = 0.0, r = 0.0;  // linear part of the element to the left
+      for (Index e = 0; e < n_; ++e) {
+        double* out = y + e * block + f;
+        const Field v = field(p, x, e * block + f);
+        if (e > 0) *(out - 2) = end_ * (l + ratio_ * (r + v.left) + v.right);
+        l = v.left;
+        r = v.right;
+        // Moments of the field with P_j: with P_0 and P_1 from the ends, with the others h f_j/(2j+1).
+        std::array<double, max_element_degree + 1> moment;
+        moment[0] = 3.0 * end_ * (l + r);
+        moment[1] = end_ * (r - l);
+        for (Index k = 2; k <= p; ++k) {
+          moment[k] = (k < p ? h_ : h_ * top_) * v.f[k] / static_cast<double>(2 * k + 1);
+          out[2 * k - 4] = (moment[k] - moment[k - 2]) / static_cast<double>(2 * k - 1);
+        }
       }
+      y[(n_ - 1) * block + f + block - 2] = end_ * (l + ratio_ * r);
     }
-    y[(n_ - 1) * block + f + block - 2] = end_ * (l + ratio_ * r);
-  }
+  });
 }
 
-template <typename Degree>
-void Timoshenko::multiply_stiffness(Degree p, const double* x, double* __restrict y) const {
-  const double lever = 0.5 * h_ / r_;
-  const Index block = 2 * p;
-  double moment = 0.0, shear = 0.0;  // of the element to the left
-  for (Index e = 0; e < n_; ++e) {
-    double* out = y + e * block;
-    Strains s = strains(p, x, e * block);
-    for (Index j = 0; j < p; ++j) {  // strains become stresses
-      const double legendre = static_cast<double>(2 * j + 1);
-      s.h_kappa[j] *= bending_stiffness(p, j) / (h_ * legendre);
-      s.gamma[j] *= s_ / legendre;
+void Timoshenko::stiffness_times(const double* x, double* __restrict y) const {
+  with_degree([=](auto p) {
+    const double lever = 0.5 * h_ / r_;
+    const Index block = 2 * p;
+    double moment = 0.0, shear = 0.0;  // of the element to the left
+    for (Index e = 0; e < n_; ++e) {
+      double* out = y + e * block;
+      Strains s = strains(p, x, e * block);
+      for (Index j = 0; j < p; ++j) {  // strains become stresses
+        const double legendre = static_cast<double>(2 * j + 1);
+        s.h_kappa[j] *= bending_stiffness(p, j) / (h_ * legendre);
+        s.gamma[j] *= s_ / legendre;
+      }
+      const double moment1 = p > 1 ? s.h_kappa[0] - lever * s.gamma[1] : s.h_kappa[0], shear1 = s.gamma[0];
+      if (e > 0) {
+        *(out - 2) = (moment - moment1) - lever * (shear + shear1);
+        *(out - 1) = shear - shear1;
+      }
+      for (Index k = 2; k <= p; ++k) {
+        const double jump = k < p ? s.gamma[k - 2] - s.gamma[k] : s.gamma[k - 2];
+        out[2 * k - 4] = 2.0 * s.h_kappa[k - 1] + 2.0 * lever / static_cast<double>(2 * k - 1) * jump;
+        out[2 * k - 3] = 2.0 * s.gamma[k - 1];
+      }
+      moment = moment1;
+      shear = shear1;
     }
-    const double moment1 = p > 1 ? s.h_kappa[0] - lever * s.gamma[1] : s.h_kappa[0], shear1 = s.gamma[0];
-    if (e > 0) {
-      *(out - 2) = (moment - moment1) - lever * (shear + shear1);
-      *(out - 1) = shear - shear1;
-    }
-    for (Index k = 2; k <= p; ++k) {
-      const double jump = k < p ? s.gamma[k - 2] - s.gamma[k] : s.gamma[k - 2];
-      out[2 * k - 4] = 2.0 * s.h_kappa[k - 1] + 2.0 * lever / static_cast<double>(2 * k - 1) * jump;
-      out[2 * k - 3] = 2.0 * s.gamma[k - 1];
-    }
-    moment = moment1;
-    shear = shear1;
-  }
-  y[tip_rotation_index()] = moment - lever * shear;
-  y[tip_index()] = shear;
+    y[tip_rotation_index()] = moment - lever * shear;
+    y[tip_index()] = shear;
+  });
 }
 
 void Timoshenko::add_linear_products(double a, const double* x, double c, const double* z, double* __restrict y) const {
@@ -177,14 +179,6 @@ void Timoshenko::add_products(double a, const Eigen::VectorXd& x, double c, cons
   } else {
     y += a * mass_times(x) + c * stiffness_times(z);
   }
-}
-
-void Timoshenko::mass_times(const double* x, double* y) const {
-  p_ == 1 ? multiply_mass(Linear(), x, y) : multiply_mass(p_, x, y);
-}
-
-void Timoshenko::stiffness_times(const double* x, double* y) const {
-  p_ == 1 ? multiply_stiffness(Linear(), x, y) : multiply_stiffness(p_, x, y);
 }
 
 void Timoshenko::flexibility_times(const double* x, double* y) const {
@@ -256,41 +250,35 @@ void require_factor(const Timoshenko::MassFactor& factor) {
   if (factor.info() != Eigen::Success) throw std::runtime_error("beam: the mass matrix cannot be factorised");
 }
 
-template <typename Degree>
-double Timoshenko::sum_mass(Degree p, const double* x) const {
-  double linear = 0.0, rest = 0.0;
-  for (Index i = 0; i < size(); i += 2 * p) {
-    const Field t = field(p, x, i), u = field(p, x, i + 1);
-    for (const Field& f : {t, u}) {
-      linear += (ratio_ - 1.0) * (f.left * f.left + f.right * f.right) + (f.left + f.right) * (f.left + f.right);
+double Timoshenko::mass_norm2(const Eigen::VectorXd& q) const {
+  return with_degree([this, x = q.data()](auto p) {
+    double linear = 0.0, rest = 0.0;
+    for (Index i = 0; i < size(); i += 2 * p) {
+      const Field t = field(p, x, i), u = field(p, x, i + 1);
+      for (const Field& f : {t, u}) {
+        linear += (ratio_ - 1.0) * (f.left * f.left + f.right * f.right) + (f.left + f.right) * (f.left + f.right);
+      }
+      for (Index j = 2; j <= p; ++j) {
+        rest += (j < p ? 1.0 : top_) * (t.f[j] * t.f[j] + u.f[j] * u.f[j]) / static_cast<double>(2 * j + 1);
+      }
     }
-    for (Index j = 2; j <= p; ++j) {
-      rest += (j < p ? 1.0 : top_) * (t.f[j] * t.f[j] + u.f[j] * u.f[j]) / static_cast<double>(2 * j + 1);
-    }
-  }
-  return linear * end_ + h_ * rest;
+    return linear * end_ + h_ * rest;
+  });
 }
 
-template <typename Degree>
-double Timoshenko::sum_stiffness(Degree p, const double* x) const {
-  double bend = 0.0, top = 0.0, shear = 0.0;
-  for (Index i = 0; i < size(); i += 2 * p) {
-    const Strains s = strains(p, x, i);
-    for (Index j = 0; j < p; ++j) {
-      const double kappa = s.h_kappa[j] / h_, legendre = static_cast<double>(2 * j + 1);
-      (j + 1 < p ? bend : top) += kappa * kappa / legendre;
-      shear += s.gamma[j] * s.gamma[j] / legendre;
+double Timoshenko::stiffness_norm2(const Eigen::VectorXd& q) const {
+  return with_degree([this, x = q.data()](auto p) {
+    double bend = 0.0, top = 0.0, shear = 0.0;
+    for (Index i = 0; i < size(); i += 2 * p) {
+      const Strains s = strains(p, x, i);
+      for (Index j = 0; j < p; ++j) {
+        const double kappa = s.h_kappa[j] / h_, legendre = static_cast<double>(2 * j + 1);
+        (j + 1 < p ? bend : top) += kappa * kappa / legendre;
+        shear += s.gamma[j] * s.gamma[j] / legendre;
+      }
     }
-  }
-  return h_ * (b_ * bend + b_top_ * top + s_ * shear);
-}
-
-double Timoshenko::mass_norm2(const Eigen::VectorXd& x) const {
-  return p_ == 1 ? sum_mass(Linear(), x.data()) : sum_mass(p_, x.data());
-}
-
-double Timoshenko::stiffness_norm2(const Eigen::VectorXd& x) const {
-  return p_ == 1 ? sum_stiffness(Linear(), x.data()) : sum_stiffness(p_, x.data());
+    return h_ * (b_ * bend + b_top_ * top + s_ * shear);
+  });
 }
 
 // All entries of every element, also where they are 0: M and K have one pattern.

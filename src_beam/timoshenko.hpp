@@ -103,21 +103,17 @@ class Timoshenko {
   }
   struct Strains;
   struct Field;
-  /// Known to the compiler, the degree of linear elements makes products three times as fast.
+  /// Calls use(p). Known to the compiler, the degree of linear elements makes products three times as fast.
   using Linear = std::integral_constant<Eigen::Index, 1>;
+  template <typename Use>
+  auto with_degree(const Use& use) const {
+    return p_ == 1 ? use(Linear()) : use(p_);
+  }
   template <typename Degree>
   Strains strains(Degree p, const double* x, Eigen::Index first) const;
   template <typename Degree>
   Field field(Degree p, const double* x, Eigen::Index first) const;
-  template <typename Degree>
-  void multiply_mass(Degree p, const double* x, double* y) const;
   void add_linear_products(double a, const double* x, double c, const double* z, double* y) const;
-  template <typename Degree>
-  void multiply_stiffness(Degree p, const double* x, double* y) const;
-  template <typename Degree>
-  double sum_mass(Degree p, const double* x) const;
-  template <typename Degree>
-  double sum_stiffness(Degree p, const double* x) const;
   double bending_stiffness(Eigen::Index p, Eigen::Index j) const { return j + 1 < p ? b_ : b_top_; }
   template <typename Entry>
   Eigen::SparseMatrix<double> assemble(const Entry& entry) const;
