@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -29,36 +30,16 @@ constexpr double residual_tolerance = 1e-6;
 /// that enter it with φ(L)/ω².
 constexpr double rank_tolerance = 1e-12;
 
-/// y = ν K⁻¹ x for Spectra, which wants to set a shift: ours is 0. The factor ν lifts the eigenvalues ν/ω² to where
-/// Spectra's convergence test, which has an absolute part of 4e-11, is relative.
-class Flexibility {
- public:
+/// y = A x for Spectra, which wants to set a shift: ours is 0.
+struct Operator {
   using Scalar = double;
-  Flexibility(const Timoshenko& mesh, double factor) : mesh_(mesh), factor_(factor) {}
-  Index rows() const { return mesh_.size(); }
-  Index cols() const { return mesh_.size(); }
+  Index size;
+  std::function<void(const double* x, double* y)> times;
+
+  Index rows() const { return size; }
+  Index cols() const { return size; }
   void set_shift(double) {}
-  void perform_op(const double* x, double* y) const {
-    mesh_.flexibility_times(x, y);
-    Eigen::Map<VectorXd>(y, mesh_.size()) *= factor_;
-  }
-
- private:
-  const Timoshenko& mesh_;
-  double factor_;
-};
-
-/// y = M x for Spectra.
-class Mass {
- public:
-  using Scalar = double;
-  explicit Mass(const Timoshenko& mesh) : mesh_(mesh) {}
-  Index rows() const { return mesh_.size(); }
-  Index cols() const { return mesh_.size(); }
-  void perform_op(const double* x, double* y) const { mesh_.mass_times(x, y); }
-
- private:
-  const Timoshenko& mesh_;
+  void perform_op(const double* x, double* y) const { times(x, y); }
 };
 
 }  // namespace
@@ -71,11 +52,11 @@ namespace Spectra {
 /// rounding is of the order √N ε. It then always stops after five vain passes, 4 of 5 seconds with 10⁵ elements.
 /// Here scalar products below √N ε‖f‖ count as zero. Elsewhere as in the original; without it, only slower.
 template <>
-class ArnoldiOp<double, SymGEigsShiftInvertOp<beam::Flexibility, beam::Mass>, beam::Mass> {
+class ArnoldiOp<double, SymGEigsShiftInvertOp<beam::Operator, beam::Operator>, beam::Operator> {
  public:
-  using Operator = SymGEigsShiftInvertOp<beam::Flexibility, beam::Mass>;
+  using ShiftInvert = SymGEigsShiftInvertOp<beam::Operator, beam::Operator>;
 
-  ArnoldiOp(const Operator& op, const beam::Mass& mass) : op_(op), mass_(mass), My_(op.rows()) {}
+  ArnoldiOp(const ShiftInvert& op, const beam::Operator& mass) : op_(op), mass_(mass), My_(op.rows()) {}
 
   Eigen::Index rows() const { return op_.rows(); }
   void perform_op(const double* x, double* y) const { op_.perform_op(x, y); }
@@ -99,8 +80,8 @@ class ArnoldiOp<double, SymGEigsShiftInvertOp<beam::Flexibility, beam::Mass>, be
   }
 
  private:
-  const Operator& op_;
-  const beam::Mass& mass_;
+  const ShiftInvert& op_;
+  const beam::Operator& mass_;
   mutable Eigen::VectorXd My_;
 };
 
@@ -118,11 +99,16 @@ MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
   const VectorXd shape = mesh.flexibility_times(mesh.unit_tip_force());
   const double lowest = shape[mesh.tip_index()] / mesh.mass_norm2(shape);
 
-  Flexibility flexibility(mesh, 1e8 * lowest);
-  Mass mass(mesh);
+  // ν K⁻¹: the factor ν lifts the eigenvalues ν/ω² to where Spectra's convergence test, which has an absolute part of
+  // 4e-11, is relative.
+  Operator flexibility{mesh.size(), [&mesh, factor = 1e8 * lowest](const double* x, double* y) {
+                         mesh.flexibility_times(x, y);
+                         Eigen::Map<VectorXd>(y, mesh.size()) *= factor;
+                       }};
+  Operator mass{mesh.size(), [&mesh](const double* x, double* y) { mesh.mass_times(x, y); }};
   const Index subspace = std::min(mesh.size(), std::max(2 * count, count + 20));
-  Spectra::SymGEigsShiftSolver<Flexibility, Mass, Spectra::GEigsMode::ShiftInvert> solver(flexibility, mass, count,
-                                                                                          subspace, 0.0);
+  Spectra::SymGEigsShiftSolver<Operator, Operator, Spectra::GEigsMode::ShiftInvert> solver(flexibility, mass, count,
+                                                                                           subspace, 0.0);
   solver.init();  // a fixed pseudo-random start
   const Index converged = solver.compute(Spectra::SortRule::LargestMagn, 300, 1e-12, Spectra::SortRule::SmallestAlge);
   if (converged < count) {
