@@ -25,13 +25,7 @@ constexpr long most_stalled = 100;  ///< events without progress
 class Spring::Step {
  public:
   Step(Spring& spring, double size, const Loads& loads)
-      : motion_(spring.motion_),
-        parameters_(spring.parameters_),
-        flight_(spring.flight_),
-        seat_(spring.seat_),
-        state_(spring.state_),
-        size_(size),
-        loads_(loads) {}
+      : spring_(spring), parameters_(spring.parameters_), state_(spring.state_), size_(size), loads_(loads) {}
 
   State run() {
     state_.integral = state_.integral_2 = state_.stop_force = state_.stop_impulse = 0.0;
@@ -46,10 +40,10 @@ class Spring::Step {
       now_ = loads_.from_time(t_);
       depth_ = !parameters_.compliant() ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
       if (parameters_.stop_enabled) land();
-      if (seat_ && state_.seated != 0.0)
-        advance(*seat_);
+      if (spring_.seat_ && state_.seated != 0.0)
+        advance(*spring_.seat_);
       else
-        advance(flight_);
+        advance(spring_.flight_);
     }
     state_.stop_force = held_ / size_;
     return state_;
@@ -76,17 +70,17 @@ class Spring::Step {
       state_.seated = 0.0;
       return;
     }
-    const auto N = motion_.holding_force(state_.y, now_, touching(), depth_);
+    const auto N = spring_.motion_.holding_force(state_.y, now_, touching(), depth_);
     const bool pressed = Seated::holds(N);
     const double before = state_.z;
     if (before < 0.0) {
-      const double pull = std::max(N[0], 0.0) / motion_.mass();  // −ÿ
+      const double pull = std::max(N[0], 0.0) / parameters_.mass;  // −ÿ
       const double rebound = -parameters_.restitution * before;
       const double tolerance = parameters_.relative_tolerance * std::abs(state_.y) + parameters_.absolute_tolerance;
       const bool dies_out = pressed && rebound * rebound <= 2.0 * pull * tolerance;
       state_.z = dies_out ? 0.0 : rebound;
-      state_.stop_impulse += motion_.mass() * (state_.z - before);
-      state_.impact_loss += motion_.mass() / 2 * (before * before - state_.z * state_.z);
+      state_.stop_impulse += parameters_.mass * (state_.z - before);
+      state_.impact_loss += parameters_.mass / 2 * (before * before - state_.z * state_.z);
     }
     state_.seated = state_.z == 0.0 && pressed && !released_ ? 1.0 : 0.0;
   }
@@ -140,10 +134,8 @@ class Spring::Step {
     }
   }
 
-  const Motion& motion_;
+  Spring& spring_;
   const Parameters& parameters_;
-  Flight& flight_;
-  std::optional<Seated>& seat_;
   State state_;
   const double size_;
   const Loads loads_;
@@ -203,6 +195,10 @@ double Spring::acceleration() const {
 }
 double Spring::reaction() const {
   return parameters_.compliant() ? motion_.compliance().force(depth(), state_.z - state_.tip_rate) : 0.0;
+}
+Compliance::Slopes Spring::reaction_slopes() const {
+  if (depth() <= 0.0) return {};
+  return motion_.compliance().slopes(depth(), state_.z - state_.tip_rate);
 }
 double Spring::kinetic_energy() const { return parameters_.mass / 2 * state_.z * state_.z; }
 double Spring::potential_energy() const { return motion_.potential_energy(state_.y); }

@@ -64,8 +64,10 @@ class Spring {
   double kinetic_energy() const;                                      ///< ½ m z² [J]
   double potential_energy() const;                                    ///< ½ k1 y² + ¼ k2 y⁴ [J]
   // Under the inputs at the end of the last step, or as observed since:
-  double acceleration() const;    ///< ż [m/s²]
-  double reaction() const;        ///< C of the law inside [N]; 0 for external
+  double acceleration() const;                 ///< ż [m/s²]
+  double reaction() const;                     ///< C of the law inside [N]; 0 for external
+  Compliance::Slopes reaction_slopes() const;  ///< of it
+  double elastic_reaction() const { return motion_.compliance().elastic(depth()); }  ///< λ_nc (y − u_tip)₊^p [N]
   double contact_energy() const;  ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
   Polynomial tip() const { return {state_.tip, state_.tip_rate, 0.0}; }  ///< u_tip [m] and its rate; no curvature
 

@@ -46,7 +46,8 @@ struct SpringModel final : fmi::Model {
     if (p.compliant() && parameters.communication_step > 0.0) {
       p.contact_law = spring::ContactLaw::external;
       spring.emplace(p);  // checks the parameters
-      held.emplace(law(), p.mass, parameters.communication_step,
+      held.emplace(spring::Compliance(p.compliance_stiffness, p.compliance_exponent, p.compliance_damping), p.mass,
+                   parameters.communication_step,
                    std::array<double, 2>{parameters.tip_response, parameters.tip_response_2});
     } else {
       spring.emplace(p);
@@ -99,16 +100,16 @@ struct SpringModel final : fmi::Model {
   double reaction() const { return held ? held->force() : spring->reaction(); }
   double contact_energy() const { return held ? held->energy(spring->displacement()) : spring->contact_energy(); }
   double reaction_rate() const {
-    const auto slopes = law_slopes();
+    const auto slopes = spring->reaction_slopes();
     return slopes.force_by_depth * (spring->velocity() - spring->tip()[1]) +
            slopes.force_by_rate * (spring->acceleration() - tip()[2]);
   }
   // Of what the held force follows before its first step only the value is known, later it follows nothing.
-  double reaction_by_tip_displacement() const { return by_tip(-law_slopes().force_by_depth); }
+  double reaction_by_tip_displacement() const { return by_tip(-spring->reaction_slopes().force_by_depth); }
   double reaction_by_tip_velocity() const {
-    return by_tip(is_set((reached ? *reached : tip_displacement)[1]) ? 0.0 : -law_slopes().force_by_rate);
+    return by_tip(is_set((reached ? *reached : tip_displacement)[1]) ? 0.0 : -spring->reaction_slopes().force_by_rate);
   }
-  double contact_energy_by_tip_displacement() const { return by_tip(-law().elastic(depth())); }
+  double contact_energy_by_tip_displacement() const { return by_tip(-spring->elastic_reaction()); }
   double dissipated_energy() const { return spring->dissipated_energy() + (held ? held->dissipated() : 0.0); }
 
   void save(std::vector<double>& state) const override {
@@ -140,17 +141,6 @@ struct SpringModel final : fmi::Model {
 
   bool warned_ = false;
 
-  spring::Compliance law() const {
-    return {parameters.compliance_stiffness, parameters.compliance_exponent, parameters.compliance_damping};
-  }
-  /// y − u_tip [m]; negative without a law inside
-  double depth() const {
-    const bool inside = !held && parameters.compliant();
-    return inside ? spring->displacement() - spring->tip()[0] : -1.0;
-  }
-  spring::Compliance::Slopes law_slopes() const {
-    return depth() > 0.0 ? law().slopes(depth(), spring->velocity() - spring->tip()[1]) : spring::Compliance::Slopes{};
-  }
   double by_tip(double partial) const { return !held ? partial : held->started() ? 0.0 : unknown; }
 
   static bool is_set(double derivative) { return !std::isnan(derivative); }
@@ -233,7 +223,9 @@ auto of(Value (Spring::*value)() const) {
   return [value](const SpringModel& m) { return ((*m.spring).*value)(); };
 }
 
-fmi::Table make_table() {
+}  // namespace
+
+fmi::Table fmi::make_table() {
   fmi::Table t;
   t.identifier = "spring";
   t.title = "DuffingSpring";
@@ -365,13 +357,6 @@ fmi::Table make_table() {
   add.output("internal_steps", "", "steps that IDA took since the start",
              [](const SpringModel& m) { return static_cast<double>(m.spring->ida_steps()); });
   return t;
-}
-
-}  // namespace
-
-const fmi::Table& fmi::table() {
-  static const Table instance = make_table();
-  return instance;
 }
 
 std::unique_ptr<fmi::Model> fmi::make_model() { return std::make_unique<SpringModel>(); }
