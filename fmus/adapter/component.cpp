@@ -8,14 +8,12 @@
 
 namespace fmi {
 
-Component::Component(const fmi2CallbackFunctions* functions, const char* name, bool debug)
-    : callbacks_(functions ? *functions : fmi2CallbackFunctions{}), name_(name), debug_(debug) {
-  for (const LogCategory& category : log_categories) categories_.insert(category.name);
-}
+Component::Component(const fmi2CallbackFunctions* functions, const char* name, bool log_events)
+    : callbacks_(functions ? *functions : fmi2CallbackFunctions{}), name_(name), events_(log_events) {}
 
 void Component::log(fmi2Status status, const char* category, const std::string& message) const {
   if (!callbacks_.logger) return;
-  if (status == fmi2OK && !(debug_ && (categories_.count(category) || categories_.count("logAll")))) return;
+  if (status == fmi2OK && !events_) return;
   // Some importers treat the message as a printf format, some print it as it is: both get a readable text.
   std::string format;
   for (const char c : message) format += c == '%' ? std::string("%%") : std::string(1, c);
@@ -23,24 +21,17 @@ void Component::log(fmi2Status status, const char* category, const std::string& 
 }
 
 bool Component::set_debugging(bool on, std::size_t n, const fmi2String categories[]) {
-  std::set<std::string> chosen;
-  for (const LogCategory& category : log_categories) {
-    if (n == 0) chosen.insert(category.name);
-  }
-  bool all_known = true;
+  bool all_known = true, events = n == 0;
   for (std::size_t i = 0; i < n; ++i) {
     require(categories[i], "a category");
     const std::string name = categories[i];
     const auto same = [&](const LogCategory& category) { return name == category.name; };
-    if (std::any_of(std::begin(log_categories), std::end(log_categories), same)) {
-      chosen.insert(name);
-    } else {
-      all_known = false;
-      log(fmi2Warning, "logStatusWarning", "fmi2SetDebugLogging: there is no log category '" + name + "'");
-    }
+    events = events || name == "logEvents" || name == "logAll";
+    if (std::any_of(std::begin(log_categories), std::end(log_categories), same)) continue;
+    all_known = false;
+    log(fmi2Warning, "logStatusWarning", "fmi2SetDebugLogging: there is no log category '" + name + "'");
   }
-  debug_ = on;
-  categories_ = chosen;
+  events_ = on && events;
   return all_known;
 }
 

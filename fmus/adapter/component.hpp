@@ -6,7 +6,6 @@
 #include <exception>
 #include <map>
 #include <memory>
-#include <set>
 #include <stdexcept>
 #include <string>
 
@@ -29,11 +28,11 @@ inline void require(const void* pointer, const char* what) {
 class Component {
  public:
   /// `functions` may be NULL, and gone after the call.
-  Component(const fmi2CallbackFunctions* functions, const char* name, bool debug);
+  Component(const fmi2CallbackFunctions* functions, const char* name, bool log_events);
 
   Instance instance;
 
-  /// Messages that are no warning, discard or error are sent if debugging is on for their category.
+  /// Events, with fmi2OK, are sent if debugging is on for them; warnings and failures always.
   void log(fmi2Status status, const char* category, const std::string& message) const;
   /// No category: all of them. Returns whether all of them exist; a warning names each that does not.
   bool set_debugging(bool on, std::size_t n, const fmi2String categories[]);
@@ -50,8 +49,7 @@ class Component {
  private:
   const fmi2CallbackFunctions callbacks_;
   const std::string name_;
-  bool debug_;
-  std::set<std::string> categories_;  ///< switched on for debugging
+  bool events_;  ///< whether they are logged
   std::map<fmi2FMUstate, std::unique_ptr<Snapshot>> states_;
 };
 

@@ -15,6 +15,6 @@ int main(int argc, char** argv) {
     }
     source_files.assign(std::istreambuf_iterator<char>(list), {});
   }
-  std::cout << fmi::description(fmi::table(), source_files);
+  std::cout << fmi::description(source_files);
   return std::cout.good() ? 0 : 1;
 }

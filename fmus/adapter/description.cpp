@@ -196,17 +196,7 @@ std::string document(const Table& t, const std::string& identity, const std::str
   return out.str();
 }
 
-}  // namespace
-
-std::size_t Table::index(const std::string& name) const {
-  for (std::size_t i = 0; i < variables.size(); ++i) {
-    if (variables[i].name == name) return i;
-  }
-  throw std::logic_error("no variable '" + name + "'");
-}
-
-std::string guid(const Table& table) {
-  const std::string content = document(table, "", "");
+std::string make_guid(const std::string& content) {
   // Two differently seeded halves make the 128 bits of a GUID.
   const unsigned long long first = common::hash(content.data(), content.size()),
                            second = common::hash(content.data(), content.size(), 0x9ae16a3b2f90404fULL);
@@ -216,8 +206,25 @@ std::string guid(const Table& table) {
   return text;
 }
 
-std::string description(const Table& table, const std::string& source_files) {
-  return document(table, guid(table), source_files);
+}  // namespace
+
+std::size_t Table::index(const std::string& name) const {
+  for (std::size_t i = 0; i < variables.size(); ++i) {
+    if (variables[i].name == name) return i;
+  }
+  throw std::logic_error("no variable '" + name + "'");
 }
+
+const Table& table() {
+  static const Table instance = make_table();
+  return instance;
+}
+
+const std::string& guid() {
+  static const std::string made = make_guid(document(table(), "", ""));
+  return made;
+}
+
+std::string description(const std::string& source_files) { return document(table(), guid(), source_files); }
 
 }  // namespace fmi

@@ -8,10 +8,10 @@
 namespace fmi {
 
 /// A hash of everything the description says: two FMUs with the same GUID have the same variables.
-std::string guid(const Table& table);
+const std::string& guid();
 
 /// `source_files`: names in sources/, one per line, empty if the FMU carries none.
-std::string description(const Table& table, const std::string& source_files = "");
+std::string description(const std::string& source_files);
 
 struct LogCategory {
   const char *name, *description;

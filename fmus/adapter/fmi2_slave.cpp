@@ -17,6 +17,7 @@ namespace {
 using fmi::any_phase;
 using fmi::Component;
 using fmi::guard;
+using fmi::guid;
 using fmi::Progress;
 using fmi::require;
 using fmi::Type;
@@ -25,12 +26,6 @@ using fmi::Type;
 void require_arrays(size_t n, std::initializer_list<std::pair<const void*, const char*>> arrays) {
   if (n == 0) return;
   for (const auto& [array, name] : arrays) require(array, name);
-}
-
-/// Made once: it hashes the whole description.
-const std::string& guid() {
-  static const std::string text = fmi::guid(fmi::table());
-  return text;
 }
 
 template <class Value>

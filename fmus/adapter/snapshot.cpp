@@ -29,8 +29,15 @@ static_assert(sizeof(Header) == 72, "the header has no padding");
 
 constexpr std::size_t fixed_count = 7;  ///< doubles before the settings
 
-std::size_t count(const Snapshot& s) {
-  return fixed_count + s.settings->size() + 3 * s.inputs.size() + s.numerics.size();
+std::vector<double> packed(const Snapshot& s) {
+  const Progress& p = s.progress;
+  std::vector<double> values{
+      static_cast<double>(p.phase), static_cast<double>(p.last_status),    p.time, p.stop_time, p.tolerance,
+      p.built ? 1.0 : 0.0,          static_cast<double>(s.numerics.size())};
+  values.insert(values.end(), s.settings->begin(), s.settings->end());
+  for (const Polynomial& input : s.inputs) values.insert(values.end(), input.begin(), input.end());
+  values.insert(values.end(), s.numerics.begin(), s.numerics.end());
+  return values;
 }
 
 [[noreturn]] void refuse(const std::string& why) {
@@ -39,17 +46,10 @@ std::size_t count(const Snapshot& s) {
 
 }  // namespace
 
-std::size_t serialized_size(const Snapshot& snapshot) { return sizeof(Header) + count(snapshot) * sizeof(double); }
+std::size_t serialized_size(const Snapshot& s) { return sizeof(Header) + packed(s).size() * sizeof(double); }
 
 void serialize(const Snapshot& s, const std::string& guid, char* bytes) {
-  const Progress& p = s.progress;
-  std::vector<double> values{
-      static_cast<double>(p.phase), static_cast<double>(p.last_status),    p.time, p.stop_time, p.tolerance,
-      p.built ? 1.0 : 0.0,          static_cast<double>(s.numerics.size())};
-  values.insert(values.end(), s.settings->begin(), s.settings->end());
-  for (const Polynomial& input : s.inputs) values.insert(values.end(), input.begin(), input.end());
-  values.insert(values.end(), s.numerics.begin(), s.numerics.end());
-
+  const std::vector<double> values = packed(s);
   Header header{};
   std::memcpy(header.magic, magic, sizeof magic);
   header.byte_order = byte_order;

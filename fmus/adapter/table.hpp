@@ -76,8 +76,10 @@ struct Table {
 };
 
 /// Each FMU defines these two (fmus/beam/beam_fmu.cpp, fmus/spring/spring_fmu.cpp).
-const Table& table();
+Table make_table();
 std::unique_ptr<Model> make_model();
+
+const Table& table();  ///< made once
 
 /// Adds variables bound to a concrete model `M`.
 template <class M>

@@ -119,7 +119,9 @@ auto of(Value (Beam::*value)() const) {
   return [value](const BeamModel& m) { return ((*m.beam).*value)(); };
 }
 
-fmi::Table make_table() {
+}  // namespace
+
+fmi::Table fmi::make_table() {
   fmi::Table t;
   t.identifier = "beam";
   t.title = "TimoshenkoBeam";
@@ -295,13 +297,6 @@ fmi::Table make_table() {
   shape("deflection", "m", "deflection", &BeamModel::deflection);
   shape("rotation", "rad", "rotation of the cross-section", &BeamModel::rotation);
   return t;
-}
-
-}  // namespace
-
-const fmi::Table& fmi::table() {
-  static const Table instance = make_table();
-  return instance;
 }
 
 std::unique_ptr<fmi::Model> fmi::make_model() { return std::make_unique<BeamModel>(); }

@@ -35,6 +35,7 @@
 #include <thread>
 #include <vector>
 
+#include "../common/text.hpp"
 #include "description.hpp"
 #include "fmi2Functions.h"
 #include "table.hpp"
@@ -47,11 +48,8 @@ constexpr std::size_t trace_length = 60;
 using Reference = fmi2ValueReference;
 using Bits = std::vector<std::uint64_t>;
 
+using fmi::guid;
 const std::vector<fmi::Variable>& variables() { return fmi::table().variables; }
-const std::string& guid() {
-  static const std::string text = fmi::guid(fmi::table());
-  return text;
-}
 
 // -- what happened -------------------------------------------------------------------------------------------------
 
@@ -211,7 +209,7 @@ class Instance {
   Instance& operator=(const Instance&) = delete;
   ~Instance() { free(); }
 
-  bool instantiate(Random& random) {
+  void instantiate(Random& random) {
     const fmi2CallbackFunctions callbacks{log, nullptr, nullptr, nullptr, this};
     logging = random.chance(0.1);
     ++trace.calls;
@@ -223,7 +221,6 @@ class Instance {
     stop = std::numeric_limits<double>::infinity();
     wild = false;
     messages.clear();
-    return true;
   }
 
   void free() {
@@ -464,7 +461,7 @@ class Episode {
     k.instantiate(random_);
   }
 
-  void instantiate_wrongly(Instance& k) {
+  void instantiate_wrongly(Instance&) {
     const fmi2CallbackFunctions callbacks{nullptr, nullptr, nullptr, nullptr, nullptr};
     const fmi2CallbackFunctions* functions = random_.chance(0.5) ? &callbacks : nullptr;
     fmi2Component c = nullptr;
@@ -488,7 +485,6 @@ class Episode {
         return;
     }
     promise(c == nullptr, "fmi2Instantiate accepted what is wrong");
-    (void)k;
   }
 
   // -- values
@@ -900,7 +896,6 @@ class Episode {
     if (blobs_.empty() || k.states.size() > 20) return;
     std::vector<char> blob = random_.pick(blobs_);
     const std::size_t how = random_.below(5);
-    bool forged = false;
     unsigned expected = ok;
     if (how == 1) {  // truncated or longer
       blob.resize(random_.below(blob.size() + 40));
@@ -911,7 +906,6 @@ class Episode {
       expected = any_phase;
     } else if (how == 3) {  // numbers replaced, and the checksum made right again
       forge(blob);
-      forged = true;
       expected = ok | error_status;
     } else if (how == 4) {  // nonsense
       for (char& b : blob) b = static_cast<char>(random_.bits());
@@ -924,7 +918,6 @@ class Episode {
                [&] { return fmi2DeSerializeFMUstate(k.c, exact.data(), exact.size(), &made.key); });
     promise((status == fmi2OK) == (made.key != nullptr), "fmi2DeSerializeFMUstate: state and status disagree");
     if (status != fmi2OK) return;
-    (void)forged;
     made.forged = true;  // of another history than this instance's: only the general promises are checked
     k.states.push_back(made);
   }
@@ -946,9 +939,7 @@ class Episode {
       const std::size_t at = random_.chance(0.4) ? random_.below(std::min<std::size_t>(n, 7)) : random_.below(n);
       std::memcpy(&blob[header + at * sizeof value], &value, sizeof value);
     }
-    std::uint64_t hash = 0xcbf29ce484222325ULL;
-    for (std::size_t i = header; i < blob.size(); ++i)
-      hash = (hash ^ static_cast<unsigned char>(blob[i])) * 0x100000001b3ULL;
+    const std::uint64_t hash = common::hash(&blob[header], blob.size() - header);
     std::memcpy(&blob[checksum_at], &hash, sizeof hash);
   }
 
