@@ -103,10 +103,8 @@ class Fmu(Checkpointed):
         if self.says.canGetAndSetFMUstate:
             self._get_state = self.prepared("GetFMUState", byref(self._state))
             self._set_state = self.prepared("SetFMUState", self._state)
-        self._before, self._enter = functions.entering(self._start_time)
-        self._exit = self.prepared("ExitInitializationMode")
         try:
-            self._prepare_parameters(parameters)
+            self._initialising = functions.initialising(self._start_time, self._prepared_parameters(parameters))
             self.initialise(start_time)
         except BaseException:
             self.close()
@@ -135,12 +133,12 @@ class Fmu(Checkpointed):
         except OSError as error:
             raise FmuError(f"{self.path}: cannot be instantiated: {self._cause(error)}") from error
 
-    def _prepare_parameters(self, parameters: Mapping[str, Value]) -> None:
-        """Prepare the calls that set the parameters. Raises FmuError for one that cannot be set so."""
+    def _prepared_parameters(self, parameters: Mapping[str, Value]) -> list[Call]:
+        """Return the calls that set the parameters. Raises FmuError for one that cannot be set so."""
         kinds = self._functions.KINDS
         #: Where the value of a parameter is.
         self._parameters: dict[str, tuple[Any, int]] = {}
-        self._set_parameters: list[Call] = []
+        calls = []
         for name in parameters:
             variable = self.variable(name)
             if variable.type not in kinds:
@@ -162,13 +160,14 @@ class Fmu(Checkpointed):
                 *[value.encode() if isinstance(value, str) else value for value in given]
             )
             references = self.references(names, kind)
-            self._set_parameters.append(self._functions.accessor("Set", kind, references, values))
+            calls.append(self._functions.accessor("Set", kind, references, values))
             self._parameters.update((name, (values, i)) for i, name in enumerate(names))
+        return calls
 
     def initialise(self, time: float) -> None:
         """Set parameters and start values and leave initialization mode at ``time`` [s]."""
         self._start_time.value = time
-        for call in (*self._before, *self._set_parameters, self._enter, self._exit):
+        for call in self._initialising:
             if (status := call()) > WARNING:
                 raise self.failed(status, "cannot be initialised")
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from ctypes import Array, byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_void_p, cdll
 from functools import partial
 from pathlib import Path
@@ -123,8 +123,8 @@ class Functions:
         """Return what gets or sets (``verb`` "Get", "Set") variables of one kind, by arrays of C."""
         return self.prepared(verb + self.KINDS[kind].function, references, c_size_t(len(references)), values)
 
-    def entering(self, time: c_double) -> tuple[list[Call], Call]:
-        """Return the calls before the parameters are set, and what enters initialization mode at ``time``."""
+    def initialising(self, time: c_double, given: Sequence[Call]) -> list[Call]:
+        """Return the calls that bring a new instance to its first step at ``time``; ``given`` set its parameters."""
         raise NotImplementedError
 
     def stepping(self, time: c_double, size: c_double) -> Call:
@@ -175,10 +175,11 @@ class Fmi2(Functions):
         )
         return made
 
-    def entering(self, time: c_double) -> tuple[list[Call], Call]:
+    def initialising(self, time: c_double, given: Sequence[Call]) -> list[Call]:
         no, nothing = c_int(0), c_double(0.0)
         set_up = self.prepared("SetupExperiment", no, nothing, time, no, nothing)
-        return [set_up], self.prepared("EnterInitializationMode")
+        enter, leave = self.prepared("EnterInitializationMode"), self.prepared("ExitInitializationMode")
+        return [set_up, *given, enter, leave]
 
     def stepping(self, time: c_double, size: c_double) -> Call:
         return self.prepared("DoStep", time, size, c_int(0))
@@ -225,9 +226,10 @@ class Fmi3(Functions):
         n = c_size_t(len(references))
         return self.prepared(verb + self.KINDS[kind].function, references, n, values, n)
 
-    def entering(self, time: c_double) -> tuple[list[Call], Call]:
+    def initialising(self, time: c_double, given: Sequence[Call]) -> list[Call]:
         no, nothing = c_bool(False), c_double(0.0)
-        return [], self.prepared("EnterInitializationMode", no, nothing, time, no, nothing)
+        enter = self.prepared("EnterInitializationMode", no, nothing, time, no, nothing)
+        return [*given, enter, self.prepared("ExitInitializationMode")]
 
     def stepping(self, time: c_double, size: c_double) -> Call:
         event, end, early = c_bool(), c_bool(), c_bool()

@@ -20,7 +20,7 @@ from contextlib import suppress
 from functools import lru_cache
 from math import inf
 from pathlib import Path
-from time import monotonic
+from time import monotonic, sleep
 from typing import Any, ClassVar
 
 from ..scene import Load, SceneError
@@ -83,12 +83,11 @@ class FmuProcess:
         return cls(file)
 
     def _look_after(self) -> None:
-        gone = threading.Event()
         while self._process.poll() is None:
             if monotonic() > self._until:
                 self._late = True
                 self._process.kill()
-            gone.wait(_LOOK)
+            sleep(_LOOK)
 
     def ask(self, calls: Sequence[Call], doing: str, patience: float) -> tuple[Any, Any]:
         """Make ``calls``; return what the last one returns, and what the body says of itself then.

@@ -61,7 +61,12 @@ class QuasiStaticBeam(BeamBody):
         self._responses = lru_cache(_SIZES_REMEMBERED)(self._response)
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        self._follow_force(size, contact)
+        k = self._stiffness
+        given = [*(c / k for c in force.legendre(contact, size, self._degree)), self._w]
+        self._w, self._velocity, first, second, *rate = [sum(map(mul, row, given)) for row in self._responses(size)]
+        self._integrate(size, first, second)
+        mean_square = sum(c * c / (2 * j + 1) for j, c in enumerate(rate))
+        self._dissipated += self._alpha * k * size * mean_square
         return self.motion()
 
     def advance_alone(self, time: float, size: float) -> Motion:
@@ -73,14 +78,6 @@ class QuasiStaticBeam(BeamBody):
         self._integrate(size, first, alpha * (start * size - first))
         self._dissipated += 0.5 * self._stiffness * (start * start - self._w * self._w)
         return self.motion()
-
-    def _follow_force(self, size: float, contact: Force) -> None:
-        k = self._stiffness
-        given = [*(c / k for c in force.legendre(contact, size, self._degree)), self._w]
-        self._w, self._velocity, first, second, *rate = [sum(map(mul, row, given)) for row in self._responses(size)]
-        self._integrate(size, first, second)
-        mean_square = sum(c * c / (2 * j + 1) for j, c in enumerate(rate))
-        self._dissipated += self._alpha * k * size * mean_square
 
     def _response(self, size: float) -> list[list[float]]:
         """Return rows over (Legendre coefficients of C/k, w at the start), shape (d + 5, d + 2).
