@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -140,12 +141,8 @@ class _Algorithm:
                 return x
         raise AlgorithmFailure(f"Newton's method for the {solve} position does not converge at t = {self.time:.6g} s")
 
-    def _spring_step(self, y: float, z: float, guess: float, stiffness: float, solve: str) -> float:
-        """Return yˡ⁺¹ from (53) and (54), N = 0."""
-        return self._newton(lambda Y: self._foundation_force(y, z, Y, stiffness), guess, solve)
-
-    def _foundation_force(self, y: float, z: float, Y: float, stiffness: float) -> tuple[float, float]:
-        """Return N of (53) for a step from (y, z) that ends at ``Y``, and its derivative by ``Y``."""
+    def _foundation_force(self, y: float, z: float, stiffness: float, Y: float) -> tuple[float, float]:
+        """Return N of (53) with (54) for a step from (y, z) that ends at ``Y``, and its derivative by ``Y``."""
         p, h = self.spring, self.h
         force, slope = self._compliance(Y, stiffness)
         value = (
@@ -253,7 +250,7 @@ class _Algorithm:
         """Make lines 8–30; return the state at l + 1, and λ_nc as the step leaves it."""
         h, psi, (q, v, y, z) = self.h, self.spring.equilibrium, before
         u_new, known = self._tip(q, v, stiffness)  # line 9
-        y_new = self._spring_step(y, z, y, stiffness, "predicted")  # line 10
+        y_new = self._newton(partial(self._foundation_force, y, z, stiffness), y, "predicted")  # line 10, N = 0
         case, foundation, y_used = 0, 0.0, y
         acting = stiffness
         if psi < y_new < u_new:  # lines 11–13: the interior of (62) does not see λ_nc
@@ -263,11 +260,11 @@ class _Algorithm:
             stiffness = acting = self.scene.contact.stiffness  # line 15
             u_temp = u_new  # line 16
             y_used = y if self.y_temp == "guess" else u_temp
-            y_new = self._spring_step(y_used, z, u_temp, stiffness, "joined")  # line 17
+            y_new = self._newton(partial(self._foundation_force, y_used, z, stiffness), u_temp, "joined")  # line 17
             u_new = y_new  # line 18
             if y_new <= self.phi:  # lines 20–24
                 u_new = y_new = self.phi
-                foundation, _ = self._foundation_force(y, z, y_new, stiffness)
+                foundation, _ = self._foundation_force(y, z, stiffness, y_new)
         q_new, on_tip = self._beam(known, u_new)  # lines 13, 19, 22
         v_new = 2.0 * (q_new - q) / h - v  # line 29
         z_base = y_used if self.y_temp == "both" and case == 14 else y

@@ -124,14 +124,13 @@ class _Run:
         while self.t_end - state.time > 1e-14 * self.t_end:
             if time_limit is not None and clock.perf_counter() - began > time_limit:
                 raise ReferenceFailure(f"takes more than {time_limit:g} s; it is at t = {state.time:.6g} s")
-            kink = self.system.loads.next_kink(state.time)
-            target = min(self._due[0] if self._due else self.t_end, kink)
+            target = min(self._due[0] if self._due else self.t_end, self._kink)
             segment = self._propagator.advance(max(target - state.time, 1e-16 * self.t_end), 4.0 * np.spacing(target))
             self.counts["steps"] += 1
             found = self._locator.first(segment)
             if found is None:
                 reach, end = segment.size, self._phase_start + self._propagator.elapsed
-                for exact in (kink, target):
+                for exact in (self._kink, target):
                     if abs(end - exact) <= 1e-14 * self.t_end:
                         end = exact  # the sum is off by rounding
             else:
@@ -152,7 +151,7 @@ class _Run:
                 if len(state.events) > _MOST_EVENTS or self._chatters():
                     raise ReferenceFailure(f"{len(state.events)} events by t = {end!r} s: they do not end")
                 self._begin_phase()
-            elif end == kink:
+            elif end == self._kink:
                 self._begin_piece()
         self.system.loads.whole()
         return self.rows.trajectory(self._summary(clock.perf_counter() - began))
@@ -192,13 +191,14 @@ class _Run:
         """Integrate from here on anew: in another phase, or after a kink of a load."""
         self.counts["phases"] += 1
         state, self._phase_start = self.state, self.state.time
+        self._kink = self.system.loads.smooth_from(state.time)
         self._propagator: ExponentialPropagator | RungeKuttaPropagator
         if self.method.name == "exponential":
             if state.phase not in self._forms:
                 self._forms[state.phase] = LinearForm(self.system, state.phase)
             self._propagator = ExponentialPropagator(self._forms[state.phase], state.X)
             return
-        horizon = max(min(self.t_end, self.system.loads.next_kink(state.time)) - state.time, 1e-300)
+        horizon = max(min(self.t_end, self._kink) - state.time, 1e-300)
         self._propagator = RungeKuttaPropagator(self.system, state.phase, state.X, horizon, self.method)
 
     def _summary(self, wall_time: float) -> dict[str, Any]:

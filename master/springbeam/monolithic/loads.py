@@ -49,8 +49,8 @@ class Loads:
     def __len__(self) -> int:
         return len(self._loads)
 
-    def next_kink(self, time: float) -> float:
-        """Return when a load jumps or bends next [s], and let `values` be smooth up to there."""
+    def smooth_from(self, time: float) -> float:
+        """Let `values` be smooth up to when a load jumps or bends next; return that [s]."""
         kink = next((kink for kink in self.kinks if kink > time), np.inf)
         self._until = np.nextafter(kink, 0.0)
         return kink

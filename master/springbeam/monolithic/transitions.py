@@ -137,7 +137,9 @@ class HybridState:
             contact_impulse, foundation_impulse, _ = self._bounce(0.0)
         self.phase = free_phase
         if seats:
-            self._seat()
+            self.phase = Phase(self.phase.contact, seated=True)
+            self.X[s.Y], self.X[s.Z] = s.stop.position, 0.0
+            s.synchronise(self.phase, self.X)
         self._emit(
             "seated" if seats else "stop_impact",
             impulse_contact=contact_impulse,
@@ -158,12 +160,6 @@ class HybridState:
         X[s.Z] = -e * X[s.Z]
         s.settle(self.phase, X)
         return on_tip, of_foundation, float(X[s.Z])
-
-    def _seat(self) -> None:
-        s = self.system
-        self.phase = Phase(self.phase.contact, seated=True)
-        self.X[s.Y], self.X[s.Z] = s.stop.position, 0.0
-        s.synchronise(self.phase, self.X)
 
     def _unseat(self) -> None:
         self.phase = Phase(self.phase.contact)
