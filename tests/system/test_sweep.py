@@ -35,6 +35,7 @@ def planned(*texts, scene=None, **options):
         ("beam.n_elements=10:40:4", (10, 20, 30, 40)),
         ("coupling.scheme=energy,hermite", ("energy", "hermite")),
         ("beam.reduced_integration=true,false", (True, False)),
+        ("spring.force_sign=1,-1", (1, -1)),
     ],
 )
 def test_an_axis(text, values):
@@ -57,6 +58,11 @@ def test_an_axis(text, values):
         ("spring.mass=1:2:3:4", "LOW:HIGH:COUNT"),
         ("spring.mass=a:b:3", "LOW:HIGH:COUNT"),
         ("spring.mass=1:inf:3", "LOW:HIGH:COUNT"),
+        ("coupling.scheme=energy,2", "2 is no value of scheme"),
+        ("beam.reduced_integration=true,2", "2 is no value of reduced_integration"),
+        ("spring.mass=1,true", "True is no value of mass"),
+        ("spring.mass=1979-05-27,2", "is no value of mass"),
+        (f"beam.n_elements=2,{2**53 + 1}", "is no value of n_elements"),
     ],
 )
 def test_a_wrong_axis_is_named(text, words):

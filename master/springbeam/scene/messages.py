@@ -35,7 +35,9 @@ def key_kind(table: str, key: str) -> type:
         return float
     if field is None:
         raise SceneError(f"[{table}] {key}: unknown key; {_nearest_key(table, key)}")
-    kinds = {get_origin(part) or part for part in _alternatives(field.annotation)}
+    kinds = {
+        type(get_args(part)[0]) if get_origin(part) is Literal else part for part in _alternatives(field.annotation)
+    }
     return next((kind for kind in (int, bool, float) if kind in kinds), str)
 
 

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 from rich.text import Text
 
 from ...run.outcome import RunStopped
-from ...scene import Scene, SceneError
+from ...scene import Scene, SceneError, key_kind
 from ..accuracy import simulate
 from ..study import Found, Record, Study
 from . import picture, stroboscopic
@@ -114,9 +114,8 @@ class Sweep(Study):
 
         cases, names = self.cases(), [axis.name for axis in self.axes]
         fields = [("index", pa.int64())]
-        for name, sample in zip(names, cases["0"], strict=True):
-            kind = pa.bool_() if isinstance(sample, bool) else pa.string() if isinstance(sample, str) else pa.float64()
-            fields.append((name, kind))
+        types = {bool: pa.bool_(), str: pa.string()}
+        fields += [(axis.name, types.get(key_kind(axis.table, axis.key), pa.float64())) for axis in self.axes]
         fields += [(name, pa.string()) for name in ("status", "error", "warnings")]
         fields += [(name, pa.float64()) for name in self.metrics]
         if self.stroboscopic:

@@ -18,6 +18,8 @@ from ...scene.tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS
 Sampling = Literal["random", "latin_hypercube"]
 #: A mistyped count, not a sweep.
 MOST_RUNS = 10_000_000
+#: Whole numbers beyond are none in a column of floating-point numbers.
+_LARGEST_WHOLE = 2**53
 
 
 @dataclass(frozen=True)
@@ -71,8 +73,9 @@ def parse_axis(text: str) -> Axis:
     parts = [part.strip() for part in values.split(":")]
     if len(parts) == 1:
         listed = tuple(parse_value(value.strip()) for value in values.split(","))
-        if kind is not str and (words := [value for value in listed if isinstance(value, str)]):
-            raise _wrong(text, f"{words[0]!r} is no value of {key}; a list is 1,2,5, a range LOW:HIGH:COUNT")
+        for value in listed:
+            if not _is(kind, value):
+                raise _wrong(text, f"{value!r} is no value of {key}; a list is 1,2,5, a range LOW:HIGH:COUNT")
         return Axis(table, key, listed)
     log = parts[-1] == "log"
     parts = parts[:-1] if log else parts
@@ -89,6 +92,13 @@ def parse_axis(text: str) -> Axis:
         raise _wrong(text, f"at most {MOST_RUNS} values are allowed")
     axis = Axis(table, key, (), low, high, log, kind is int)
     return replace(axis, values=tuple(axis.at(k / (count - 1)) for k in range(count)))
+
+
+def _is(kind: type, value: Any) -> bool:
+    """Tell whether a column of values of ``kind`` can hold ``value``, allowed or not."""
+    if kind in (str, bool):
+        return isinstance(value, kind)
+    return isinstance(value, float) or (type(value) is int and abs(value) <= _LARGEST_WHOLE)
 
 
 def _wrong(text: str, why: str) -> SceneError:
