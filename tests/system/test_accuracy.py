@@ -185,13 +185,15 @@ def test_a_run_may_be_shorter_than_the_default_macro_step(law, tmp_path):
 
 @pytest.mark.parametrize("scheme", ["hermite", "jacobi"])
 def test_what_it_replaces_need_not_fit(scheme):
-    """A scheme that the integrator or the law does not take: the accuracy picks one that it does."""
+    """A scheme that the integrator or the law does not take, a tolerance of IDA's: the accuracy picks its own."""
     tables = {**STIFF_ON_SOFT, "time": {"t_end": 0.05}, "accuracy": 1e-2}
     if scheme == "hermite":
         tables["beam"] = {**tables["beam"], "integrator": "generalized_alpha"}
     else:
         tables["contact"] = {"law": "compliance"}
+    tables["spring"] = {**tables["spring"], "absolute_tolerance": 1e-2}
     run = simulate(scene_from_dict({**tables, "coupling": {"scheme": scheme, "degree": 1}}))
+    assert run.scene.spring.absolute_tolerance < 1e-14
     assert (run.scene.coupling.scheme, run.scene.coupling.degree) == ("energy", 0 if scheme == "hermite" else 2)
 
 

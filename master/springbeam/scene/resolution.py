@@ -25,6 +25,10 @@ CONTACT_LAG = 0.1
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
+#: What all steps of generalized-α together may turn the fastest waves that an impact sets off too little [rad].
+WAVE_LAG = 1.0
+#: ω α_b above which waves die out within two periods and need no resolution.
+DIES_OUT = 0.15
 #: Velocity mismatch of tip and spring top, relative to their speed, above which the motion is called unresolved, where
 #: the force is of degree 0, 1, 2: what is below is wrong by more than 1 % in few scenes (docs/accuracy.md).
 MISMATCH = (0.15, 0.1, 0.1)
@@ -46,7 +50,7 @@ def not_resolved(
     mismatch_at_stop: float = 0.0,
     shortest_contact: float = inf,
     contact_frequency: float = 0.0,
-    contact_steps: int = 0,
+    contact_steps: float = 0.0,
 ) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
@@ -74,7 +78,10 @@ def not_resolved(
                     f"Velocities, forces and times of events are samples of a faster motion; coupling.macro_step <= "
                     f"{_rounded_down(TURN / omega)} resolves it{else_}"
                 )
-        if lost := _contact_lost(scene, contact_frequency, H, contact_steps) or _unstable(scene, H):
+        if scene.massless and scene.contact.rigid:  # the ends are one oscillator, in its steps as in a soft contact's
+            contact_frequency, contact_steps = _joined_frequency(scene), scene.duration / H
+        lost = _contact_lost(scene, contact_frequency, H, contact_steps)
+        if lost := lost or _unstable(scene, H) or _waves_lag(scene, H):
             return lost
     allowed = MISMATCH[scene.coupling.degree]
     if mismatch > allowed * speed:
@@ -95,18 +102,20 @@ def not_resolved(
     )
 
 
-def _contact_lost(scene: Scene, omega: float, H: float, steps: int) -> str | None:
-    """Return in words why ``steps`` of H [s] do not follow a soft contact of ``omega`` [rad/s]; ``None`` if they do."""
+def _contact_lost(scene: Scene, omega: float, H: float, steps: float) -> str | None:
+    """Return in words why ``steps`` of H [s] do not follow a contact of ``omega`` [rad/s]; ``None`` if they do."""
     projected = scene.coupling.scheme == "energy"
     degree = scene.coupling.degree if projected else 0
     lag = steps * (omega * H) ** 3 / 12.0  # of all steps of degree 0: it falls with the square of their size
     excess = sqrt(lag / CONTACT_LAG) if degree == 0 else omega * H / CONTACT_TURN[degree]
     if steps == 0 or excess <= 1.0:
         return None
-    higher = ", a higher coupling.degree allows longer ones" if projected and degree < max(CONTACT_TURN) else ""
+    raises = projected and degree < max(CONTACT_TURN) and (scene.beam is None or scene.beam.integrator == "modal")
+    higher = ", a higher coupling.degree allows longer ones" if raises else ""
+    where = "together" if scene.massless else "on the contact law at its deepest penetration"
     return (
         f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step, {steps * omega * H:.2g} rad in all,"
-        f" on the contact law at its deepest penetration. Velocities, forces and times of contact are samples of a "
+        f" {where}. Velocities, forces and times of contact are samples of a "
         f"faster motion; coupling.macro_step <= {_rounded_down(H / excess)} resolves it{higher}"
     )
 
@@ -126,6 +135,24 @@ def _unstable(scene: Scene, H: float) -> str | None:
     )
 
 
+def _waves_lag(scene: Scene, H: float) -> str | None:
+    """Return in words why generalized-α in steps of H [s] does not follow what an impact sets off; ``None`` if it does.
+
+    It leaves no mismatch of velocities that would tell.
+    """
+    beam, meets = scene.beam, scene.spring is not None or scene.stop is not None
+    if beam is None or beam.integrator == "modal" or scene.massless or not meets or not scene.contact.rigid:
+        return None
+    lag = scene.duration / H * (impact_frequency(beam) * H) ** 3 / 12.0
+    if lag <= WAVE_LAG:
+        return None
+    return (
+        f"not resolved: generalized-α turns the fastest waves that an impact sets off {lag:.2g} rad too little in all; "
+        f"coupling.macro_step <= {_rounded_down(H * sqrt(WAVE_LAG / lag))} resolves them, beam.alpha_b > 0 lets them "
+        'die out, and beam.integrator = "modal" is exact'
+    )
+
+
 def force_window(scene: Scene) -> float:
     """Return over which time the contact force is averaged before its peak is taken [s].
 
@@ -141,10 +168,8 @@ def force_window(scene: Scene) -> float:
         return WINDOW * 2.0 * pi / sqrt(stiffness * sum(1.0 / mass for mass in masses))
     if beam is not None and beam.fidelity == "dynamic":
         return WINDOW * 2.0 * pi / slowest_frequency(beam)
-    if beam is not None and spring is not None:
-        together = spring_stiffness(scene) + 1.0 / tip_compliance(beam)
-        if together > 0.0:
-            return WINDOW * 2.0 * pi * sqrt(spring.mass / together)
+    if (together := _joined_frequency(scene)) > 0.0:
+        return WINDOW * 2.0 * pi / together
     return WINDOW * scene.time.t_end
 
 
@@ -212,6 +237,20 @@ def _rounded_down(size: float) -> str:
 def slowest_frequency(beam: Beam) -> float:
     """Return the lowest frequency of the beam, with its tip free [rad/s]."""
     return lowest_frequency(beam) * sqrt(locking(beam))
+
+
+def _joined_frequency(scene: Scene) -> float:
+    """Return the frequency of the spring and a beam without inertia together [rad/s]; 0 if none holds the mass."""
+    beam, spring = scene.beam, scene.spring
+    if beam is None or spring is None:
+        return 0.0
+    return sqrt(max(spring_stiffness(scene) + 1.0 / tip_compliance(beam), 0.0) / spring.mass)
+
+
+def impact_frequency(beam: Beam) -> float:
+    """Return the highest frequency of the waves that an impact sets off and that do not die out at once [rad/s]."""
+    waves = min(shear_frequency(beam), fastest_frequency(beam))
+    return waves if beam.alpha_b == 0.0 else min(waves, DIES_OUT / beam.alpha_b)
 
 
 def fastest_frequency(beam: Beam) -> float:

@@ -165,6 +165,11 @@ class Scene(Table):
         return 0.0 if math.isclose(tip, target, rel_tol=1e-12) else tip - target
 
     @property
+    def duration(self) -> float:
+        """How long is run [s]: from `contact_time` on if the tip arrives undeformed."""
+        return self.time.t_end - (self.contact_time or 0.0)
+
+    @property
     def contact_time(self) -> float | None:
         """First contact t_c [s] of an undeformed approach; ``None`` where there is none to compute beforehand."""
         clearance = self.initial_clearance
@@ -181,7 +186,7 @@ class Scene(Table):
 
         A remainder that is next to nothing joins the step before it.
         """
-        H, span = self.coupling.H, self.time.t_end - (self.contact_time or 0.0)
+        H, span = self.coupling.H, self.duration
         whole = math.floor(span / H * (1.0 + 1e-12))
         rest = span - whole * H
         if rest <= _SAME * H:

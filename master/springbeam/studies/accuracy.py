@@ -28,7 +28,7 @@ from ..run.outcome import Progress, RunStopped
 from ..scene import Scene, SceneError, with_changes
 from ..scene.automatic import choice
 from ..scene.linearised import spring_frequency
-from ..scene.resolution import fastest_frequency, shear_frequency
+from ..scene.resolution import impact_frequency
 from ..scene.statics import tip_compliance
 from .stability.predict import contact_frequency
 
@@ -38,8 +38,8 @@ _MOST, _MOST_STOPPED = 50_000, 6
 _SAFETY = 1.5
 #: Runs that differ by more are both unresolved, whatever their order [of the motion].
 _UNRESOLVED = 0.02
-#: The coupling's and IDA's tolerance over the accuracy, and the least of them.
-_SHARE, _TIGHTEST = 1e-3, 1e-12
+#: The coupling's and IDA's relative tolerance over the accuracy, and the least of them; IDA's absolute one [m].
+_SHARE, _TIGHTEST, _ABSOLUTE = 1e-3, 1e-12, 1e-30
 
 #: Fewest macro steps, and those of a first run with bodies whose motion nobody knows.
 _FEWEST, _PARTNERS = 8, 64
@@ -50,9 +50,8 @@ _ORDER, _LOWEST, _OF_EVENTS = 6.0, 1.0, 2.5
 #: Order by which a third run and any after it are made finer.
 _EXPECTED = 3.5
 #: What the first macro step turns the fastest wave by [rad], over accuracy^(1/order); what it turns a body alone by,
-#: which errs only where it misses a contact; and ω α_b above which waves die out within two periods and need no
-#: resolution.
-_TURN, _ALONE, _DIES_OUT = 26.0, 2.0, 0.15
+#: which errs only where it misses a contact.
+_TURN, _ALONE = 26.0, 2.0
 #: Displacement error over energy residual of `hermite`, in runs with changes of contact after the first.
 _AMPLIFIED = 10.0
 
@@ -140,7 +139,7 @@ class _Estimate:
 class _Search:
     def __init__(self, scene: Scene, accuracy: float) -> None:
         self._scene, self._accuracy = scene, accuracy
-        self._span = scene.time.t_end - (scene.contact_time or 0.0)
+        self._span = scene.duration
         changes = {"scheme": "auto", "degree": 0, "macro_step": 1e-9 * self._span}
         taken = choice(with_changes(scene, accuracy=None, coupling=changes))  # where everything is resolved
         self._scheme, self._degree = taken.scheme, taken.degree
@@ -211,11 +210,8 @@ class _Search:
         if beam.fidelity == "quasi_static":
             assert spring is not None
             return _rung(math.hypot(of_spring, 1.0 / math.sqrt(tip_compliance(beam) * spring.mass)) * span)
-        waves = min(shear_frequency(beam), fastest_frequency(beam))
-        if beam.alpha_b > 0.0:
-            waves = min(waves, _DIES_OUT / beam.alpha_b)
         turn = _ALONE if self._scene.lower is None else _TURN * self._accuracy ** (1.0 / _ORDER)
-        return _rung(max(waves, of_spring) * span / turn)
+        return _rung(max(impact_frequency(beam), of_spring) * span / turn)
 
     def _second(self, first: _Pilot) -> float:
         growth = _BLIND_GROWTH if self._softly else _LEAST_GROWTH
@@ -240,7 +236,7 @@ class _Search:
         tolerance = max(_SHARE * self._accuracy, _TIGHTEST)
         tables: dict[str, dict[str, Any]] = {"coupling": {**coupling, "tolerance": tolerance}}
         if self._scene.spring is not None:
-            tables["spring"] = {"relative_tolerance": tolerance}
+            tables["spring"] = {"relative_tolerance": tolerance, "absolute_tolerance": _ABSOLUTE}
         scene = with_changes(self._scene, accuracy=None, **tables)
         recorder = MemoryRecorder(scene)
         try:

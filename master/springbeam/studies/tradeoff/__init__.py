@@ -189,7 +189,7 @@ def _hopeless(configuration: Configuration) -> bool:
     scene = configuration.scene
     if configuration.method not in _EXPLICIT or scene.beam is None:
         return False
-    return mesh_frequency(scene.beam) * (scene.time.t_end - (scene.contact_time or 0.0)) > _MOST_TURNS
+    return mesh_frequency(scene.beam) * scene.duration > _MOST_TURNS
 
 
 def _largest_displacement(scene: Scene) -> float:

@@ -61,7 +61,7 @@ def _changed(scene: Scene, **tables: Any) -> Iterator[Scene]:
 
 
 def _sizes(scene: Scene) -> list[float]:
-    span = scene.time.t_end - (scene.contact_time or 0.0)
+    span = scene.duration
     sizes = [scene.coupling.H * 2.0**k for k in range(_COARSEST, _FINEST - 1, -1)]
     return [H for H in sizes if _FEWEST_STEPS <= span / H <= _MOST_STEPS]
 
@@ -91,7 +91,7 @@ def _best_schemes(scene: Scene) -> list[tuple[str, int]]:
 
 
 def _adaptive(scene: Scene) -> Iterator[Configuration]:
-    beam, span = scene.beam, scene.time.t_end - (scene.contact_time or 0.0)
+    beam, span = scene.beam, scene.duration
     if beam is not None and beam.fidelity == "dynamic" and slowest_frequency(beam) * span > _MOST_TURNS:
         return
     for scheme, degree in _best_schemes(scene):
