@@ -14,7 +14,7 @@ import tomli_w
 from commands import command, printed, refused
 from scipy.linalg import expm
 
-from springbeam import SceneError, load_scene, resume, simulate, with_changes
+from springbeam import SceneError, SpringDamper, load_scene, resume, simulate, with_changes
 from springbeam.bodies import isolated
 from springbeam.bodies.factory import findings
 from springbeam.bodies.protocol import FmuError
@@ -131,6 +131,12 @@ def test_two_foreign_fmus_are_the_elements_that_they_describe(fmu):
     for run in runs:
         assert np.abs(np.array([run.u_tip, run.y]) - linked(run.time)).max() < 1e-10
         assert run.summary["max_energy_residual"] < 1e-12
+
+
+@pytest.mark.parametrize("wrong", [{"mass": 0.0}, {"mass": -1.0}, {"mass": np.inf}, {"mass": 1.0, "damping": -1.0}])
+def test_an_element_refuses_what_no_mass_or_damper_is(wrong):
+    with pytest.raises(ValueError, match="a mass is positive and finite, damping not negative"):
+        SpringDamper(**wrong)
 
 
 BEAM_NAMES = {

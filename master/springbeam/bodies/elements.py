@@ -33,6 +33,8 @@ class SpringDamper(EndLoaded):
         x [m] and ẋ [m/s] at the start.
     external_force
         f, constant, upward [N].
+
+    Raises ValueError for a mass or a damping that cannot be.
     """
 
     CHECKPOINTED = ("_state", "_integrals", "_dissipated", "_load_work")
@@ -47,6 +49,8 @@ class SpringDamper(EndLoaded):
         velocity: float = 0.0,
         external_force: float = 0.0,
     ) -> None:
+        if not (0.0 < mass < float("inf") and damping >= 0.0):
+            raise ValueError(f"mass = {mass}, damping = {damping}: a mass is positive and finite, damping not negative")
         self.mass, self._stiffness, self._damping, self._rest = mass, stiffness, damping, rest
         self._load, self._sign = external_force, 1.0
         self._state = (displacement, velocity)
