@@ -264,7 +264,7 @@ def test_an_incomplete_last_line_is_left_out(tmp_path, name, cut):
     ("name", "damage", "message"),
     [
         ("trajectory.csv", lambda text: text.replace("0.1,", "0.1.1,", 1), r"trajectory\.csv: .*row"),
-        ("trajectory.csv", lambda text: text.replace("\n0.1,", "\n0.1,0.5,", 1), r"trajectory\.csv: "),
+        ("trajectory.csv", lambda text: text.replace("\n0.1,", "\n0.1,0.5,", 1), r"csv: after the header: .* row 2$"),
         ("trajectory.csv", lambda text: text.replace("\n0.1,", "\nnan,", 1), r"trajectory\.csv: time .* not finite"),
         ("trajectory.csv", lambda text: "", r"trajectory\.csv: empty"),
         ("trajectory.csv", lambda text: text.replace("time,", "t,"), r"trajectory\.csv: line 1: no column time"),
@@ -283,10 +283,11 @@ def test_an_incomplete_last_line_is_left_out(tmp_path, name, cut):
         ("events.csv", lambda text: text.replace("0.5", "five"), r"events\.csv: line 2: .*five"),
         ("events.csv", lambda text: text.replace("time,", "t,"), r"events\.csv: line 1"),
         ("shapes.csv", lambda text: text.replace("u_0", "w_0"), r"shapes\.csv: line 1"),
-        ("summary.json", lambda text: text[:-20], r"summary\.json: "),
+        ("summary.json", lambda text: text[:-20], r"summary\.json: not JSON: .* line"),
         ("summary.json", lambda text: "[]", r"summary\.json: no scene"),
         ("summary.json", lambda text: '{"scene": {}}', r"\[time\]: missing table"),
-        *((name, None, rf"{name}: ") for name in ("trajectory.csv", "events.csv", "summary.json")),
+        *((name, None, rf"{name}: No such file or directory") for name in ("trajectory.csv", "events.csv")),
+        ("summary.json", None, r"summary\.json: missing; .* is not a run directory"),
     ],
 )
 def test_damage_is_named_by_file(tmp_path, name, damage, message):

@@ -11,6 +11,7 @@ import typer
 from rich.text import Text
 
 from ..scene import load_scene, shipped_scenes
+from ..scene.messages import nearest
 from ..scene.reference import MODELS
 from ..studies.tables import table
 from .common import BAD_INPUT, JsonOption, bad_input_reported, console_for, fail, print_json
@@ -79,11 +80,10 @@ def keys(
         wanted = re.sub(r"\.\d+", "", what)  # loads.0.frequency is a key of loads
         found = [key for key in found if wanted in (key.table, f"{key.table}.{key.name}".lstrip("."))]
         if not found:
-            table = wanted.partition(".")[0]
-            kind, there = (
-                ("key", [key.name for key in reference.listed(table)]) if table in MODELS else ("table", MODELS)
-            )
-            fail(BAD_INPUT, f"{what}: unknown {kind}; allowed: {', '.join(filter(None, there))}")
+            table, _, name = wanted.partition(".")
+            there = [key.name for key in reference.listed(table)] if table in MODELS else [*filter(None, MODELS)]
+            kind, hint = ("key", nearest(name, there)) if table in MODELS else ("table", nearest(table, there))
+            fail(BAD_INPUT, f"{what}: unknown {kind}; {hint}allowed: {', '.join(there)}")
     if as_json:
         print_json([key._asdict() for key in found])
     console = console_for(silent=as_json)

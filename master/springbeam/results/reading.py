@@ -56,8 +56,10 @@ def load_summary(directory: str | Path) -> dict[str, Any]:
         summary = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ResultsUnreadable(f"{path}: missing; {directory} is not a run directory") from None
-    except (OSError, ValueError) as error:
-        raise ResultsUnreadable(f"{path}: {error}") from error
+    except OSError as error:
+        raise ResultsUnreadable(f"{path}: {error.strerror}") from error
+    except ValueError as error:
+        raise ResultsUnreadable(f"{path}: not JSON: {error}") from error
     if not isinstance(summary, dict) or not isinstance(summary.get("scene"), dict):
         raise ResultsUnreadable(f"{path}: no scene in it")
     return summary
@@ -94,7 +96,7 @@ def _complete_lines(path: Path, columns: tuple[str, ...] | None = None) -> tuple
         everything = lines()
         header = next(everything, None)
     except OSError as error:
-        raise ResultsUnreadable(f"{path}: {error}") from error
+        raise ResultsUnreadable(f"{path}: {error.strerror}") from error
     if header is None:
         raise ResultsUnreadable(f"{path}: empty")
     found = tuple(header.rstrip("\n").split(","))
@@ -115,7 +117,8 @@ def _read_table(path: Path, columns: tuple[str, ...] | None = None) -> dict[str,
         try:
             table = np.loadtxt(chain([first], lines), dtype=kinds, delimiter=",", comments=None, ndmin=1)
         except ValueError as error:
-            raise ResultsUnreadable(f"{path}: after the header: {error}") from None
+            why, _, _ = str(error).partition(";")  # what follows is for who calls numpy
+            raise ResultsUnreadable(f"{path}: after the header: {why}") from None
     found = {name: np.ascontiguousarray(table[name]) for name in header}
     for name, values in found.items():
         if name == "phase":
