@@ -144,6 +144,20 @@ def test_averaged_mass_gains_two_orders_on_a_bar(degree: int) -> None:
         assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.25)
 
 
+@pytest.mark.parametrize(("metre", "second"), [(1e-9, 1.0), (1.0, 1e-9), (1e3, 1.0)])
+def test_units_do_not_matter(metre: float, second: float) -> None:
+    """Rotations are then far larger than displacements: the sparse modes of a beam of micrometres were lost."""
+
+    def slender(metre: float, second: float) -> Beam:
+        scales = {"length": metre, "area": 1e-2 * metre**2, "second_moment_of_area": 1e-5 * metre**4}
+        stiffness = 1.0 / (metre * second**2)
+        return beam(1e4 * stiffness, 4e3 * stiffness, **scales, density=100.0 / metre**3, mesh="none", n_modes=19)
+
+    assert modal_beam(slender(metre, second)).omega * second == pytest.approx(
+        modal_beam(slender(1.0, 1.0)).omega, rel=1e-12
+    )
+
+
 def test_sparse_and_dense_modes_span_the_same_space() -> None:
     """Above the dense size the lowest modes come from shift-and-invert; the frequencies must not tell."""
     few = beam(3.6e10, 3.6e10, n_elements=201, n_modes=6)

@@ -257,7 +257,14 @@ def singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _lowest_modes(discrete: SemiDiscreteBeam, count: int) -> np.ndarray:
     if discrete.size <= _DENSE_SIZE or 2 * count > discrete.size:
         return _rayleigh_ritz(discrete, np.eye(discrete.size))[1][:, :count]
-    return np.asarray(spla.eigsh(discrete.K, k=count, M=discrete.M, sigma=0.0, v0=np.ones(discrete.size))[1])
+    # Without units of length and time: rotations as displacements, and no wanted eigenvalue of K⁻¹M far below 1.
+    lengths = np.ones(discrete.size)
+    lengths[0::2] /= discrete.length
+    D = sp.diags(lengths).tocsc()
+    K, M = D @ discrete.K @ D, D @ discrete.M @ D
+    fastest = K.diagonal().max() / M.diagonal().min()  # rad²/s²
+    modes = spla.eigsh(K / fastest, k=count, M=M, sigma=0.0, v0=np.ones(discrete.size))[1]
+    return np.asarray(D @ modes)
 
 
 def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
