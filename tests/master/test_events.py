@@ -9,11 +9,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from springbeam.bodies.protocol import Motion
-from springbeam.contact.events import (
-    EventFunctions,
-    clearance,
-    locate,
-)
+from springbeam.contact.events import EventFunctions, clearance, locate
 from springbeam.contact.laws import Transmission
 from springbeam.contact.phases import Joint, Phase, common_velocity
 from springbeam.results.paths import Path, Sample
@@ -24,44 +20,15 @@ SIZE = 0.02
 CUBICS = [(1.0, -3.0, 0.5, 0.2), (0.2, -2.0, 3.0, -0.7), (0.3, 1.0, -4.0, 1.5), (0.1, -1.0, 1.0, 1.0), (1.0, 2.0)]
 
 
-def ends(coefficients) -> tuple[Polynomial, Sample, Sample]:
-    p = Polynomial(coefficients)(Polynomial((0.0, 1.0 / SIZE)))
-    return p, *((float(p(t)), float(p.deriv()(t))) for t in (0.0, SIZE))
-
-
 @pytest.mark.parametrize("coefficients", CUBICS)
 def test_a_cubic_lies_in_its_hull(coefficients):
-    p, start, end = ends(coefficients)
+    p = Polynomial(coefficients)(Polynomial((0.0, 1.0 / SIZE)))
+    start, end = ((float(p(t)), float(p.deriv()(t))) for t in (0.0, SIZE))
     values = p(np.linspace(0.0, SIZE, 2001))
     lowest, highest = clearance(start, end, SIZE)
     assert lowest <= values.min() + 1e-15
     assert highest >= values.max() - 1e-15
     assert highest - lowest <= max(abs(start[1]), abs(end[1])) * SIZE + abs(end[0] - start[0])
-
-
-@pytest.mark.parametrize("x", [1e-6, 0.25, 0.5, 0.999])
-@pytest.mark.parametrize("bend", [0.0, 2.0, -0.5])
-def test_a_path_falls_through_zero_at_its_root(x, bend):
-    """(x* − x)(1 + bend x²) falls through zero once in (0, 1); 40 bisections find it to 1e-12."""
-    p = Polynomial((x, -1.0)) * Polynomial((1.0, 0.0, bend))
-    _, start, end = ends(p.coef)
-    assert Path.through(start, end, SIZE).falls_through_zero() == pytest.approx(x, abs=1e-12)
-
-
-def test_crossing_of_a_start_on_zero_that_rises_first():
-    """x (1 − 2x) starts on zero, rises, and is through at 1/2: zero at the start is not the event."""
-    _, start, end = ends((0.0, 1.0, -2.0))
-    assert Path.through(start, end, SIZE).falls_through_zero() == pytest.approx(0.5, abs=1e-12)
-
-
-def test_a_path_that_dips_falls_and_rises_through_zero():
-    """(x − 0.3)(x − 0.8) is lowest at 0.55."""
-    _, start, end = ends((0.24, -1.1, 1.0))
-    path = Path.through(start, end, SIZE)
-    bottom = path.lowest_inside()
-    assert bottom == pytest.approx(0.55, abs=1e-11)
-    assert path.falls_through_zero(bottom) == pytest.approx(0.3, abs=1e-12)
-    assert path.rises_through_zero(bottom) == pytest.approx(0.8, abs=1e-12)
 
 
 class Counted:

@@ -14,7 +14,6 @@ from springbeam.bodies.protocol import Motion
 from springbeam.coupling.energy import created_mismatch
 from springbeam.coupling.hermite import gap_inside
 from springbeam.coupling.tie import Tie
-from springbeam.run.local_error import _beside_cubic
 from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 
 LENGTH = 3.0
@@ -114,15 +113,6 @@ def of_polynomial(coefficients: tuple[float, ...], size: float) -> tuple[Motion,
         Motion(w(0.0), v(0.0), 0.0, 0.0),
         Motion(w(size), v(size), first(size), second(size)),
     )
-
-
-def test_a_cubic_is_not_beside_itself():
-    assert _beside_cubic(*of_polynomial((0.3, -1.0, 2.0, 7.0), 0.1), 0.1) < 1e-16
-
-
-def test_a_quartic_is_beside_the_cubic_through_its_ends():
-    """τ⁴ lies τ²(H − τ)² above it: H⁴/30 in the mean, and H⁴/30 as twice the moment ∫(1 − x) x²(1 − x)² dx = 1/60."""
-    assert _beside_cubic(*of_polynomial((0.0, 0.0, 0.0, 0.0, 1.0), 0.1), 0.1) == pytest.approx(1e-4 / 30.0, rel=1e-9)
 
 
 @pytest.mark.parametrize("degree", [1, 2])

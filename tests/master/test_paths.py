@@ -1,4 +1,4 @@
-"""The path of a position inside a step: quintics exactly, minima, order of the error, distance from the cubic."""
+"""The path of a position inside a step: quintics exactly, minima, zeros, the order of its error and of the cubic's."""
 
 from __future__ import annotations
 
@@ -66,3 +66,31 @@ def test_orders_of_path_and_cubic():
         errors.append([max(abs(f.at(x) - y) for x, y in zip(s, exact, strict=True)) for f in (path, cubic)])
         assert path.beside_cubic == pytest.approx(errors[-1][1], rel=0.05)
     assert np.log2(np.divide(*errors)) == pytest.approx([6.0, 4.0], abs=0.1)
+
+
+def test_a_quartic_is_beside_the_cubic_through_its_ends_and_a_cubic_is_not():
+    """s⁴ lies s²(1 − s)² above it: 1/30 in the mean, and 1/30 as twice the moment ∫(1 − s) s²(1 − s)² ds = 1/60."""
+    assert through(Polynomial((0.0, 0.0, 0.0, 0.0, 1.0))).moments_beside_cubic == pytest.approx(1.0 / 30.0, rel=1e-12)
+    assert through(Polynomial((0.3, -1.0, 2.0, 7.0))).moments_beside_cubic < 1e-15
+
+
+@pytest.mark.parametrize("x", [1e-6, 0.25, 0.5, 0.999])
+@pytest.mark.parametrize("bend", [0.0, 2.0, -0.5])
+def test_it_falls_through_zero_at_its_root(x, bend):
+    """(x* − s)(1 + bend s²) falls through zero once in (0, 1); 40 bisections find it to 1e-12."""
+    path = through(Polynomial((x, -1.0)) * Polynomial((1.0, 0.0, bend)))
+    assert path.falls_through_zero() == pytest.approx(x, abs=1e-12)
+
+
+def test_a_start_on_zero_that_rises_first_is_no_fall():
+    """s (1 − 2s) starts on zero, rises, and is through at 1/2."""
+    assert through(Polynomial((0.0, 1.0, -2.0))).falls_through_zero() == pytest.approx(0.5, abs=1e-12)
+
+
+def test_a_dip_falls_and_rises_through_zero():
+    """(s − 0.3)(s − 0.8) is lowest at 0.55."""
+    path = through(Polynomial((0.24, -1.1, 1.0)))
+    bottom = path.lowest_inside()
+    assert bottom == pytest.approx(0.55, abs=1e-11)
+    assert path.falls_through_zero(bottom) == pytest.approx(0.3, abs=1e-12)
+    assert path.rises_through_zero(bottom) == pytest.approx(0.8, abs=1e-12)
