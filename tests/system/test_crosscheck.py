@@ -11,6 +11,7 @@ from rich.console import Console
 
 from springbeam import load_scene, with_changes
 from springbeam.monolithic import event_driven
+from springbeam.scene import SceneError
 from springbeam.studies.crosscheck import crosscheck
 from springbeam.studies.crosscheck.comparison import Crosscheck
 from springbeam.studies.crosscheck.orders import Orders
@@ -66,6 +67,14 @@ def test_any_elements_and_loads_pass(t_end, degree, loads, beam):
 def test_a_looser_tolerance_of_the_spring_is_part_of_the_bound():
     """IDA then errs by 2e-8, whatever the macro step; bounds of 1e-12 a step called that wrong."""
     assert crosscheck(with_changes(load_scene("duffing"), spring={"relative_tolerance": 1e-4})).passed
+
+
+def test_what_cannot_be_compared_has_not_passed():
+    """Tip and top touch at one velocity: the least change of it decides whether they are joined at once."""
+    beam, spring = {"n_elements": 3, "fidelity": "quasi_static"}, {"initial_velocity": -1.0}
+    grazing = with_changes(SOFT, beam=beam, spring=spring, time={"t_end": 0.05}, coupling={"macro_step": 1e-3})
+    with pytest.raises(SceneError, match="nothing could be compared"):
+        crosscheck(grazing)
 
 
 WRONG = {

@@ -113,6 +113,12 @@ def test_every_axis_is_swept_that_the_law_has(law, there, absent):
     assert absent not in families
 
 
+def test_of_scipy_a_beam_without_inertia_has_the_method_that_its_reference_has():
+    """The others ended the study in a traceback."""
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 3, "fidelity": "quasi_static"})
+    assert {c.method for c in configurations(scene)} == {"co-simulation", "DOP853"}
+
+
 def test_command(tmp_path):
     arguments = ["tradeoff", "duffing", "--until", "0.5", "--repeats", "2", "--json", "--out", str(tmp_path / "out")]
     table = json.loads(printed(*arguments))

@@ -107,7 +107,8 @@ def crosscheck(scene: Scene) -> Report:
     Raises
     ------
     SceneError
-        If the reference is not defined for the scene (law `transmission` with ``contact.impact = "rest"``).
+        If the reference is not defined for the scene (law `transmission` with ``contact.impact = "rest"``), or
+        nothing can be compared.
     RunStopped, ReferenceFailure
         If either stops early.
     """
@@ -199,6 +200,11 @@ def _compare(scene: Scene, coarse: Trajectory, fine: Trajectory, own_horizon: fl
     report = Report(scene, reference, coarse, min(own_horizon, stable), 1.0)
     for name in quantities(scene):
         _compare_quantity(report, name, runs)
+    if not report.rows:
+        raise SceneError(
+            f"nothing could be compared: another change of contact comes first, from t = {report.horizon:.9g} s on, if "
+            "the initial velocity changes a little; begin with another velocity, or at a distance"
+        )
     _compare_events(report, changes[0], changes[1], changes[2])
     return report
 

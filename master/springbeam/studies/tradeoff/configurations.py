@@ -134,6 +134,8 @@ def _models(scene: Scene) -> Iterator[Configuration]:
 
 def _rivals(scene: Scene) -> Iterator[Configuration]:
     for method, tolerances in SCIPY_TOLERANCES.items():
+        if scene.massless and method != "DOP853":  # the reference knows no other one there
+            continue
         for rtol in tolerances:
             yield Configuration(method, f"rtol {rtol:.0e}", scene, method, rtol)
     joined_for_good = scene.contact.law in ("tie", "link")  # Algorithm 1 lets go
