@@ -260,7 +260,7 @@ def bodies(scene: Scene) -> tuple[BeamBody | None, DuffingBody | None]:
     elif scene.beam is not None:
         target = scene.tip_target
         kinematic = scene.beam.approach == "undeformed" and target is not None
-        beam = beam_body(scene.beam, target[1] / scene.beam.length if kinematic else None)
+        beam = beam_body(scene.beam, target.value / scene.beam.length if kinematic else None)
         patterns = Loads(scene, modal_beam(scene.beam)).patterns
         beam.patterns = [row for load, row in zip(scene.loads, patterns, strict=True) if load.on != "spring"]
     if (p := scene.spring) is not None:

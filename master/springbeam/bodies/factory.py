@@ -66,8 +66,8 @@ def _body(scene: Scene, spec: Beam | Spring | Partner, start_time: float, found:
     rate = spec.initial_velocity_slope
     if spec.fidelity == "dynamic":
         return FmuBeam(spec, start_time, spec.initial_deflection_slope + start_time * rate, scene.loads)
-    assert scene.initial_tip is not None
-    tip, velocity = scene.initial_tip + start_time * rate * spec.length, rate * spec.length
+    assert scene.tip_at_start is not None
+    tip, velocity = scene.tip_at_start.value + start_time * rate * spec.length, rate * spec.length
     beam = QuasiStaticBeam(spec, scene.coupling.degree, tip, velocity)
     if spec.approach == "elastic" or scene.contact.law == "compliance":
         beam.release()

@@ -231,7 +231,7 @@ def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     if scene.beam is not None and s.beam is not None:
         slope, rate = scene.beam.initial_deflection_slope, scene.beam.initial_velocity_slope
         if scene.tip_target is not None and scene.beam.approach == "undeformed":
-            obstacle = scene.tip_target[1]
+            obstacle = scene.tip_target.value
             gap = slope * scene.beam.length - obstacle
             if gap > 0.0:
                 time = -gap / (rate * scene.beam.length)

@@ -66,11 +66,11 @@ def _beam_quantities(beam: Beam) -> tuple[float, ...]:
 
 
 def _bodies(scene: Scene, at: At) -> Iterator[str]:
-    upper, lower, stop, top = scene.upper, scene.lower, scene.stop, scene.initial_top
+    upper, lower, stop, top = scene.upper, scene.lower, scene.stop, scene.top_at_start
     if upper is None and lower is None:
         yield "no body: a scene needs [beam], [spring] or both"
-    if stop is not None and top is not None and stop.position >= top:
-        yield f"{at('stop.position')}: the foundation must lie below {at(scene.top_key)}"
+    if stop is not None and top is not None and stop.position >= top.value:
+        yield f"{at('stop.position')}: the foundation must lie below {at(top.key)}"
     if isinstance(upper, RigidWall) and (lower is None or isinstance(lower, RigidWall)):
         yield f"{at('beam.element')}: nothing moves in this scene; give it a body in [spring]"
     elif isinstance(lower, RigidWall) and upper is None:
@@ -139,24 +139,21 @@ def _spring_holds(scene: Scene, at: At) -> Iterator[str]:
 
 
 def _tip_arrives(scene: Scene, at: At) -> Iterator[str]:
-    target, clearance, t_c = scene.tip_target, scene.initial_clearance, scene.contact_time
-    if target is None or clearance is None:
+    tip, target, clearance, t_c = scene.tip_at_start, scene.tip_target, scene.initial_clearance, scene.contact_time
+    if tip is None or target is None or clearance is None:
         return
     if clearance < 0.0:
-        yield (
-            f"{at(scene.tip_key)}: the tip starts {-clearance:.6g} m below {at(target[0])}; it must start there or "
-            "above"
-        )
+        yield f"{at(tip.key)}: the tip starts {-clearance:.6g} m below {at(target.key)}; it must start there or above"
     elif t_c is not None and t_c > scene.time.t_end:
         when = f"not before t = {t_c:.6g} s, after {at('time.t_end')}" if math.isfinite(t_c) else "never"
         yield (
-            f"{at('beam.initial_velocity_slope')}: the undeformed tip reaches {at(target[0])} {when}; "
+            f"{at('beam.initial_velocity_slope')}: the undeformed tip reaches {at(target.key)} {when}; "
             'use a (more) negative initial_velocity_slope, or approach = "elastic"'
         )
 
 
 def _ends_can_be_joined(scene: Scene, at: At) -> Iterator[str]:
-    contact, tip, top = scene.contact, scene.initial_tip, scene.initial_top
+    contact, tip, top = scene.contact, scene.tip_at_start, scene.top_at_start
     if contact.damping > 0.0 and contact.law not in ("compliance", "link"):
         yield f'{at("contact.damping")}: law = "{contact.law}" has none; use 0.0, "compliance" or "link"'
     if not contact.lasting:
@@ -168,9 +165,11 @@ def _ends_can_be_joined(scene: Scene, at: At) -> Iterator[str]:
         yield f"{at('contact.stiffness')}: {at('contact.law')} needs a stiffness or a damping greater than 0"
     if contact.law == "tie" and contact.impact != "inelastic":
         yield f'{at("contact.impact")}: law = "tie" gives both ends one velocity; use "inelastic"'
-    if contact.law == "tie" and tip is not None and top is not None and not math.isclose(tip, top, rel_tol=1e-12):
+    if contact.law != "tie" or tip is None or top is None:
+        return
+    if not math.isclose(tip.value, top.value, rel_tol=1e-12):
         yield (
-            f'{at(scene.tip_key)}: the tip starts at {tip:.6g} m, but law = "tie" holds it at {at(scene.top_key)}; '
+            f'{at(tip.key)}: the tip starts at {tip.value:.6g} m, but law = "tie" holds it at {at(top.key)}; '
             'let them start at one height, or use "link"'
         )
 

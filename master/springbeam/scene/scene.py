@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
@@ -16,6 +16,13 @@ from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time, key
 #: Remainders of the macro grid, as fractions of H: shorter than the first is rounding; shorter than the second, a step
 #: would drown in rounding.
 _SAME, _SHORTEST = 1e-9, 1e-6
+
+
+class Height(NamedTuple):
+    """A height [m], and ``"table.key"`` of the key that gives it."""
+
+    key: str
+    value: float
 
 
 class Scene(Table):
@@ -115,54 +122,46 @@ class Scene(Table):
         return None
 
     @property
-    def tip_target(self) -> tuple[str, float] | None:
-        """What the upper end meets first, as ``("table.key", height [m])``: the lower body, else the stop.
+    def tip_at_start(self) -> Height | None:
+        """Where the upper end is at the start; ``None`` where only an FMU knows.
+
+        That is s₀ L, or the static deflection of a beam let go without inertia and damping.
+        """
+        body = self.upper
+        if body is None or body.START is None:
+            return None
+        height: float = getattr(body, body.START)
+        if isinstance(body, Beam):
+            static = self.massless and body.approach == "elastic" and body.alpha_b == 0.0
+            height = tip_load_deflection(body) if static else height * body.length
+        return Height(f"beam.{body.START}", height)
+
+    @property
+    def top_at_start(self) -> Height | None:
+        """Where the lower end is at the start, of our spring Ψ; ``None`` where only an FMU knows."""
+        if self.lower is None or self.lower.START is None:
+            return None
+        return Height(f"spring.{self.lower.START}", getattr(self.lower, self.lower.START))
+
+    @property
+    def tip_target(self) -> Height | None:
+        """What the upper end meets first: the lower body, else the stop.
 
         ``None`` where there is nothing to meet, where only an FMU knows, or where the law joins the ends at once.
         """
         if self.upper is None or self.contact.lasting:
             return None
         if self.lower is not None:
-            top = self.initial_top
-            return None if top is None else (self.top_key, top)
-        return None if self.stop is None else ("stop.position", self.stop.position)
-
-    @property
-    def tip_key(self) -> str:
-        """The key that says where the upper end is at the start."""
-        return f"beam.{self.upper.START if self.upper else None}"
-
-    @property
-    def top_key(self) -> str:
-        """The key that says where the lower end is at the start."""
-        return f"spring.{self.lower.START if self.lower else None}"
-
-    @property
-    def initial_top(self) -> float | None:
-        """Where the lower end is at the start [m]; of our spring Ψ."""
-        return getattr(self.lower, self.lower.START) if self.lower and self.lower.START else None
-
-    @property
-    def initial_tip(self) -> float | None:
-        """u_tip at the start [m]: s₀ L, or the static deflection of a beam let go without inertia and damping."""
-        beam = self.upper
-        if beam is None or beam.START is None:
-            return None
-        start: float = getattr(beam, beam.START)
-        if not isinstance(beam, Beam):
-            return start
-        if self.massless and beam.approach == "elastic" and beam.alpha_b == 0.0:
-            return tip_load_deflection(beam)
-        return start * beam.length
+            return self.top_at_start
+        return None if self.stop is None else Height("stop.position", self.stop.position)
 
     @property
     def initial_clearance(self) -> float | None:
         """Height [m] of the upper end above `tip_target` at the start, 0 where only rounding separates them."""
-        tip = self.initial_tip
-        if tip is None or self.tip_target is None:
+        tip, target = self.tip_at_start, self.tip_target
+        if tip is None or target is None:
             return None
-        target = self.tip_target[1]
-        return 0.0 if math.isclose(tip, target, rel_tol=1e-12) else tip - target
+        return 0.0 if math.isclose(tip.value, target.value, rel_tol=1e-12) else tip.value - target.value
 
     @property
     def duration(self) -> float:
