@@ -29,6 +29,15 @@ FEW = run((0.2, "stop_impact"), (0.25, "stop_impact"), (0.26, "seated"), (0.5, "
 MANY = run(*((0.2 + 0.06 * (1 - 0.5**k), "stop_impact") for k in range(9)), (0.26, "seated"), (0.502, "unseated"))
 
 
+def slight(share):
+    """A stroke, and later one of so much less impulse."""
+    events = [Event(time, "stop_impact", impulse_foundation=j) for time, j in ((0.2, 1.0), (0.6, share))]
+    return Trajectory(SCENE, HARD.columns, events)
+
+
+HARD = run((0.2, "stop_impact"))
+
+
 @pytest.mark.parametrize(
     ("first", "second", "window", "expected", "number"),
     [
@@ -44,6 +53,9 @@ MANY = run(*((0.2 + 0.06 * (1 - 0.5**k), "stop_impact") for k in range(9)), (0.2
         (CONTACT, run((0.1, "impact"), (0.4, "release"), phase="touch"), 0.01, 0.6, 1),
         (FEW, MANY, 0.06, 0.002, 2),
         (run((0.2, "stop_impact")), run((0.2, "stop_impact"), (0.6, "stop_impact")), 0.01, 0.4, 2),
+        # A stroke of 0.1 % of the impulse is no evidence, one of 1 % is.
+        *((a, b, 0.01, 0.0, 1) for a, b in ((HARD, slight(1e-3)), (slight(1e-3), HARD))),
+        (HARD, slight(1e-2), 0.01, 0.4, 2),
     ],
 )
 def test_how_far_two_runs_are_apart(first, second, window, expected, number):

@@ -15,6 +15,9 @@ import numpy as np
 
 from .trajectory import Event, Trajectory
 
+#: Share of the impulse of a run below which a contact or a stroke is none to speak of.
+SLIGHT = 2e-3
+
 #: From when to when something is touched [s]; an impact that lets go at once has no length.
 Interval = tuple[float, float]
 
@@ -48,18 +51,19 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
     """Return how far the times of two runs are apart [s], and how many of ``second`` that is about.
 
     Each beginning and end of a contact is compared with the nearest one of the other run, or with the end of the run,
-    if it is the later. Contacts closer than ``window`` [s] to each other are one, those between tip and spring that
-    are shorter than that are left out.
+    if it is the later. Contacts closer than ``window`` [s] to each other are one. Those shorter than that are left out:
+    between tip and spring all, on the foundation those that pass on hardly any impulse, as of a top that only just
+    reaches it.
     """
     end = float(second.time[-1])
     worst, number = 0.0, 0
-    for ours, theirs, least in (
-        (_contacts(first, end), _contacts(second, end), window),
-        (foundation_contacts(first.events, end), foundation_contacts(second.events, end), 0.0),
+    runs = first, second
+    for all_of, lasting in (
+        ([_contacts(run, end) for run in runs], [_lasting(_contacts(run, end), window, window) for run in runs]),
+        ([foundation_contacts(run.events, end) for run in runs], [_felt(run, end, window) for run in runs]),
     ):
-        lasting = _lasting(theirs, window, least)
-        worst = max(worst, _furthest(_lasting(ours, window, least), theirs, end), _furthest(lasting, ours, end))
-        number += sum(t < end for interval in lasting for t in set(interval))
+        worst = max(worst, _furthest(lasting[0], all_of[1], end), _furthest(lasting[1], all_of[0], end))
+        number += sum(t < end for interval in lasting[1] for t in set(interval))
     return worst, number
 
 
@@ -122,6 +126,18 @@ def _lasting(intervals: list[Interval], window: float, least: float) -> list[Int
         else:
             merged.append((begin, end))
     return [(begin, end) for begin, end in merged if end - begin >= least]
+
+
+def _felt(run: Trajectory, end: float, window: float) -> list[Interval]:
+    """Return contacts with the foundation that last longer than ``window`` [s] or pass on `SLIGHT` of its impulses."""
+    strokes = _lasting(foundation_contacts(run.events, end), window, 0.0)
+    times = [event.time for event in run.events]
+    passed = np.cumsum([0.0, *(abs(event.impulse_foundation) for event in run.events)])
+
+    def impulse(since: float, until: float) -> float:
+        return float(passed[np.searchsorted(times, until, "right")] - passed[np.searchsorted(times, since, "left")])
+
+    return [(s, u) for s, u in strokes if u - s > window or impulse(s, u) >= SLIGHT * passed[-1]]
 
 
 def _furthest(ours: list[Interval], theirs: list[Interval], end: float) -> float:

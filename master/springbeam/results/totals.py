@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..scene import Scene
-from .contact_times import foundation_contacts, tip_contacts
+from .contact_times import SLIGHT, foundation_contacts, tip_contacts
 from .paths import Path
 from .steps import impulse, load_on_spring
 from .trajectory import Event
@@ -51,8 +51,6 @@ LOSS_NAMES = {
 _BESIDE = ("contact_force_window", "deepest_tip_time")
 #: Gauss–Legendre nodes and weights on [0, 1].
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(3)[0] + 1) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
-#: Share of the impulse of a run below which a contact is none to speak of.
-_SLIGHT = 2e-3
 
 
 def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -118,7 +116,7 @@ def shortest_contact(steps: np.ndarray | None, events: Iterable[Event], below: f
     before, after = _cumulative(steps, events)
     first, last = (np.searchsorted(steps["time"], times) for times in np.transpose(short))
     passed = np.abs(before[last] - after[first])
-    return min((u - s for (s, u), j in zip(short, passed, strict=True) if j > _SLIGHT * abs(after[-1])), default=inf)
+    return min((u - s for (s, u), j in zip(short, passed, strict=True) if j > SLIGHT * abs(after[-1])), default=inf)
 
 
 def _contact(
