@@ -1,8 +1,9 @@
-"""The command, in this process, and one that is interrupted: what tests of several folders call."""
+"""The command in this process, one that is interrupted, and what it has written: for tests of several folders."""
 
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import typer
 from typer import testing
@@ -36,6 +37,11 @@ def refused(*arguments: object) -> str:
     assert (result.exit_code, result.stdout) == (2, ""), result.output
     assert "Traceback" not in result.stderr
     return result.stderr
+
+
+def written(directory: Path) -> dict[str, bytes]:
+    """Return the files to which a run appends: those of one that goes on are, to the last byte, those of the whole."""
+    return {path.name: path.read_bytes() for path in directory.iterdir() if path.suffix in (".csv", ".bin")}
 
 
 class Interrupt:

@@ -14,6 +14,7 @@ from itertools import cycle
 
 import numpy as np
 import pytest
+from commands import written
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from runs import PAIR, SCENES
@@ -378,10 +379,6 @@ def test_a_directory_is_made_with_its_parents_and_only_an_empty_one_discarded(tm
 # -- going on -----------------------------------------------------------------------------------------------------
 
 
-def result_files(path):
-    return {file.name: file.read_bytes() for file in path.glob("*.csv")}
-
-
 @pytest.mark.parametrize("scene", [PAIR, SCENES["spring"]])
 def test_a_restored_recorder_writes_the_same_files(tmp_path, scene):
     event = Event(0.05, "impact", y=0.1)
@@ -407,7 +404,7 @@ def test_a_restored_recorder_writes_the_same_files(tmp_path, scene):
     record(resumed, rows=7, event=event)
     assert resumed.save()["files"] == {path.name: (f.size, f.crc) for path, f in whole._files.items()}
     resumed.finish({"status": "done"})
-    assert result_files(tmp_path / "killed") == result_files(tmp_path / "whole")
+    assert written(tmp_path / "killed") == written(tmp_path / "whole")
 
 
 @pytest.mark.parametrize("name", ["trajectory.csv", "events.csv", "shapes.csv"])

@@ -6,7 +6,6 @@ import base64
 import dataclasses
 import json
 import shlex
-import sys
 from html.parser import HTMLParser
 
 import numpy as np
@@ -22,12 +21,8 @@ from springbeam.pictures.report.described import described
 from springbeam.results.directory import REPORT
 from springbeam.results.trajectory import Event
 from springbeam.scene import load_scene, scene_from_dict, shipped_scenes, with_changes
+from springbeam.scene.reading import tomllib
 from springbeam.scene.statics import SHAPE_POINTS
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
 
 VOID = {"meta", "input", "br", "link", "img", "hr"}
 LOADS = {"src", "href", "srcset", "poster", "data", "action", "formaction", "background"}

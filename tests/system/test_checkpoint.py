@@ -18,7 +18,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from commands import Interrupt, printed, refused
+from commands import Interrupt, printed, refused, written
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -62,10 +62,6 @@ def interrupted(tmp_path: Path, left: Path) -> Path:
 
 def files(directory: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in directory.iterdir()}
-
-
-def results(directory: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in directory.glob("*.csv")}
 
 
 @pytest.fixture(scope="module")
@@ -281,7 +277,7 @@ def test_an_interrupted_run_goes_on(interrupted, whole):
     before = Checkpoint.read(interrupted / "run.checkpoint").wall_time
     trajectory = springbeam.resume(interrupted)
     assert trajectory.summary["wall_time"] > before > 0.0
-    assert results(interrupted) == results(whole)
+    assert written(interrupted) == written(whole)
     assert trajectory.summary["status"] == "done"
     assert np.array_equal(trajectory.e_total, springbeam.simulate(SCENE).e_total)
     assert not (interrupted / "run.checkpoint").exists()
@@ -295,7 +291,7 @@ def test_a_run_that_stopped_stops_again_at_the_same_place(tmp_path):
     def ended(run) -> tuple[object, ...]:
         with pytest.raises(springbeam.RunStopped, match="has changed the energy by") as stopped:
             run()
-        return stopped.value.time, results(tmp_path), load_trajectory(tmp_path).summary["status"]
+        return stopped.value.time, written(tmp_path), load_trajectory(tmp_path).summary["status"]
 
     def begin() -> None:
         with FileRecorder(scene, RunDirectory.create(tmp_path)) as recorder:
@@ -342,7 +338,7 @@ def test_a_signal_ends_the_command_with_3_and_it_goes_on(tmp_path, long, number)
     assert "Traceback" not in errors
     assert load_trajectory(tmp_path / "run").summary["status"] == "interrupted"
     printed("resume", tmp_path / "run", "--no-plots", "-q")
-    assert results(tmp_path / "run") == results(long)
+    assert written(tmp_path / "run") == written(long)
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of another process")
@@ -366,7 +362,7 @@ def test_a_run_without_room_ends_with_3_and_goes_on_where_there_is(tmp_path, lon
     assert len(cut) == limit
     assert (long / "trajectory.csv").read_bytes().startswith(cut)
     printed("resume", tmp_path / "run", "--no-plots", "-q")
-    assert results(tmp_path / "run") == results(long)
+    assert written(tmp_path / "run") == written(long)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="no locks")

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tomli_w
-from commands import command
+from commands import command, written
 from faulty import NAMES, Fault, Script, installed
 
 from springbeam.results.reading import load_trajectory
@@ -35,7 +35,6 @@ LAWS: dict[str, tuple[dict[str, dict[str, Any]], tuple[str, ...]]] = {
 }
 #: What halving one step changes at the end [m]: its error at H against that at H/2, of order 2 and 6 and none.
 HALVED = {"energy": 1e-5, "hermite": 1e-10, "compliance": 1e-5, "jacobi": 1e-4}
-FILES = ("trajectory.csv", "events.csv", "shapes.csv")
 Run = Callable[..., tuple[int, Path, Script]]
 
 
@@ -66,7 +65,7 @@ def whole(run: Run, law: str) -> dict[str, bytes]:
         script.check()
         trajectory = load_trajectory(directory)
         assert {where for where in LAWS[law][1] if where not in ("location", "paper")} <= set(trajectory.phase)
-        _WHOLE[law] = {name: (directory / name).read_bytes() for name in FILES}
+        _WHOLE[law] = written(directory)
     return _WHOLE[law]
 
 
@@ -77,8 +76,7 @@ def check_stopped(code: int, directory: Path, expected: dict[str, bytes], cause:
     assert summary["status"] == "stopped"
     assert cause in summary["cause"]
     assert summary["residual"] is None or np.isfinite(summary["residual"])
-    for name in FILES:
-        content = (directory / name).read_bytes()
+    for name, content in written(directory).items():
         assert expected[name].startswith(content), name
     trajectory = load_trajectory(directory)
     assert trajectory.summary["time"] >= (trajectory.time[-1] if len(trajectory) else 0.0)
@@ -208,4 +206,4 @@ def test_after_fmi2_fatal_the_next_run_is_as_ever(run: Run) -> None:
     code, directory, script = run("energy", name="next")
     assert code == 0
     script.check()
-    assert {name: (directory / name).read_bytes() for name in FILES} == expected
+    assert written(directory) == expected

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import printed
-from test_faults import FILES, PATH, SCENE
+from commands import printed, written
+from test_faults import PATH, SCENE
 
 from springbeam.results.reading import load_trajectory
 
@@ -57,10 +57,6 @@ def interrupted(number: signal.Signals, fmu: str, function: str, where: str, ski
     return errors
 
 
-def contents(directory: Path) -> dict[str, bytes]:
-    return {name: (directory / name).read_bytes() for name in FILES}
-
-
 def check_interrupted(directory: Path, whole: dict[str, bytes], said: str, named: str) -> None:
     """One line names the call and the time; the rows are the first ones of the run that did not hang."""
     trajectory = load_trajectory(directory)
@@ -79,7 +75,7 @@ def check_interrupted(directory: Path, whole: dict[str, bytes], said: str, named
         f"what was computed is in {directory}; "
     )
     assert said.count("\n") == 1
-    for name, content in contents(directory).items():
+    for name, content in written(directory).items():
         assert whole[name].startswith(content)
     assert 10 < len(trajectory) < whole["trajectory.csv"].count(b"\n") - 1
 
@@ -94,14 +90,14 @@ def test_a_call_that_never_returns_can_be_interrupted(
 ) -> None:
     directory = tmp_path / "run"
     printed("run", PATH, "--out", tmp_path / "whole", "--no-plots", "-q")
-    whole = contents(tmp_path / "whole")
+    whole = written(tmp_path / "whole")
     run = ("run", PATH, "--out", directory, "--checkpoint", 0.02)
     said = interrupted(number, fmu, "fmi2DoStep", where, 3, *run)
     check_interrupted(directory, whole, said, f"fmi2DoStep of {fmu}.fmu")
     said = interrupted(number, fmu, "fmi2GetReal", "row", 50, "resume", directory)
     check_interrupted(directory, whole, said, f"fmi2GetReal of {fmu}.fmu")
     printed("resume", directory, "--no-plots", "-q")
-    assert contents(directory) == whole
+    assert written(directory) == whole
 
 
 def test_a_call_that_never_returns_before_the_first_row_leaves_nothing(tmp_path: Path) -> None:

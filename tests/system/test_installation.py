@@ -14,10 +14,7 @@ import pytest
 from commands import command, printed
 from packaging.requirements import Requirement
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
+from springbeam.scene.reading import tomllib
 
 ROOT = Path(__file__).parents[2]
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from commands import written
 
 from springbeam.results.reading import load_trajectory
 
@@ -29,7 +30,6 @@ pytestmark = [
 
 SEED = int(os.environ.get("SPRINGBEAM_SEED", "20240607"))
 KILLS = int(os.environ.get("SPRINGBEAM_KILLS", "20"))
-FILES = ("trajectory.csv", "events.csv", "shapes.csv", "steps.bin")
 #: Beside wall times, all that may differ.
 TIMES = ("setup_time", "wall_time")
 
@@ -108,10 +108,6 @@ def size_of(file: Path) -> int:
     return file.stat().st_size if file.exists() else 0
 
 
-def contents(directory: Path) -> dict[str, bytes]:
-    return {name: (directory / name).read_bytes() for name in FILES if (directory / name).exists()}
-
-
 def summary(directory: Path) -> dict[str, Any]:
     loaded = json.loads((directory / "summary.json").read_text())
     return {key: value for key, value in loaded.items() if key not in TIMES}
@@ -123,7 +119,7 @@ def check_killed(directory: Path, whole: dict[str, bytes]) -> None:
         return  # killed before its first row
     trajectory = load_trajectory(directory)
     assert trajectory.summary["status"] in ("running", "done")  # the latter while the process ends
-    for name, content in contents(directory).items():
+    for name, content in written(directory).items():
         assert whole[name].startswith(content)
     assert len(trajectory) == len((directory / "trajectory.csv").read_bytes().splitlines()) - 1
 
@@ -138,7 +134,7 @@ def test_a_run_killed_at_random_moments_goes_on_to_the_same_bytes(nursery: Nurse
         reference = tmp_path / law
         if not reference.exists():
             assert nursery.run("run", *COMMANDS[law], "--out", reference, "-q", "--no-plots") == 0, nursery.said()
-        whole = contents(reference)
+        whole = written(reference)
         directory = tmp_path / f"killed-{attempts}"
         rows, checkpoint = directory / "trajectory.csv", directory / "run.checkpoint"
         interval = rng.choice([0.01, 0.05])
@@ -166,7 +162,7 @@ def test_a_run_killed_at_random_moments_goes_on_to_the_same_bytes(nursery: Nurse
             nursery.said()
             code = nursery.run(*command)
         assert code == 0, nursery.said()
-        assert contents(directory) == whole
+        assert written(directory) == whole
         assert summary(directory) == summary(reference)
         assert sorted(path.name for path in directory.iterdir()) == sorted([*whole, "summary.json"])
     assert resumed >= KILLS // 4, f"only {resumed} of {kills} runs had taken a checkpoint"
