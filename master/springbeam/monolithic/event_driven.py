@@ -149,7 +149,7 @@ class _Run:
                 if every_event:
                     self._record()
                 if len(state.events) > _MOST_EVENTS or self._chatters():
-                    raise ReferenceFailure(f"{len(state.events)} events by t = {end!r} s: they do not end")
+                    raise ReferenceFailure(f"{len(state.events)} events by t = {end:.9g} s: they do not end")
                 self._begin_phase()
             elif end == self._kink:
                 self._begin_piece()

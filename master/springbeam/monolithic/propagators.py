@@ -70,7 +70,7 @@ class RungeKuttaPropagator:
         message = solver.step()
         if solver.status == "failed":
             raise ReferenceFailure(f"{self.method.name} failed in phase {self.phase.name}: {message}")
-        self.elapsed = solver.t
+        self.elapsed = float(solver.t)
         size = solver.t - begin
         nodes = np.linspace(0.0, size, count)
         # DOP853's takes evaluations of its own.
