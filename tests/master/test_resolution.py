@@ -16,6 +16,7 @@ from springbeam.scene.resolution import (
     CONTACT_STEPS,
     CONTACT_TURN,
     MISMATCH,
+    STABLE,
     WAVE_LAG,
     fastest_frequency,
     impact_frequency,
@@ -215,6 +216,16 @@ def test_the_force_that_acted_is_in_its_column(law):
     impulse = float(np.sum(run.contact_force[1:] * np.diff(run.time)))
     assert impulse == pytest.approx(run.z[0] - run.z[-1], rel=1e-8)
     assert abs(impulse) > 0.01
+
+
+@pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
+@pytest.mark.parametrize("below", [{"mass": 1.0}, {"element": "point_mass", "mass": 1.0}], ids=["ours", "another"])
+def test_hermite_is_judged_whatever_body_the_tip_meets(below, share, resolved):
+    """By ω_max H = 3; the peak force of so short a window is doubted for both."""
+    coupling = {"scheme": "hermite", "degree": 2, "macro_step": share * STABLE / fastest_frequency(PAIR.beam)}
+    scene = with_changes(PAIR, stop=None, spring=below, contact={"force_window": 1e-4}, coupling=coupling)
+    assert ("may be unstable" in (not_resolved(scene, 0.0, 1.0) or "")) != resolved
+    assert "depends on the mesh" in peak_force_doubt(scene)
 
 
 def test_a_peak_force_that_depends_on_the_mesh_is_told():

@@ -120,10 +120,16 @@ def _contact_lost(scene: Scene, omega: float, H: float, steps: float) -> str | N
     )
 
 
+def _struck(scene: Scene) -> Beam | None:
+    """Return our beam if it has inertia and something, whatever body, is there for its tip to meet."""
+    meets = scene.lower is not None or scene.stop is not None
+    return scene.beam if meets and not scene.massless else None
+
+
 def _unstable(scene: Scene, H: float) -> str | None:
     """Return in words why steps of H [s] are too long for `hermite`, as far as is known; ``None`` if they are not."""
-    beam, meets = scene.beam, scene.spring is not None or scene.stop is not None
-    if scene.coupling.scheme != "hermite" or beam is None or beam.fidelity == "quasi_static" or not meets:
+    beam = _struck(scene)
+    if beam is None or scene.coupling.scheme != "hermite":
         return None
     fastest = fastest_frequency(beam)
     if fastest * H <= STABLE:
@@ -140,8 +146,8 @@ def _waves_lag(scene: Scene, H: float) -> str | None:
 
     It leaves no mismatch of velocities that would tell.
     """
-    beam, meets = scene.beam, scene.spring is not None or scene.stop is not None
-    if beam is None or beam.integrator == "modal" or scene.massless or not meets or not scene.contact.rigid:
+    beam = _struck(scene)
+    if beam is None or beam.integrator == "modal" or not scene.contact.rigid:
         return None
     lag = scene.duration / H * (impact_frequency(beam) * H) ** 3 / 12.0
     if lag <= WAVE_LAG:
@@ -179,9 +185,8 @@ def peak_force_doubt(scene: Scene) -> str | None:
     At a rigid impact the force at an instant grows with the mesh. Its mean over a window settles where the window is
     longer than `SETTLED` periods of the fastest wave kept (``docs/contact.md`` has the numbers).
     """
-    beam = scene.beam
-    meets = scene.spring is not None or scene.stop is not None
-    if beam is None or not meets or beam.fidelity == "quasi_static" or not scene.contact.rigid:
+    beam = _struck(scene)
+    if beam is None or not scene.contact.rigid:
         return None
     window, fastest = force_window(scene), min(shear_frequency(beam), fastest_frequency(beam))
     if window * fastest >= SETTLED * 2.0 * pi:
