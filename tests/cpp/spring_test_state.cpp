@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <initializer_list>
 #include <limits>
 #include <string>
@@ -21,22 +20,15 @@ using spring::Spring;
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-/// What the call says when it refuses.
-std::string refusal(const std::function<void()>& call) {
+/// What is said of parameters that are refused.
+std::string refusal(const Parameters& p) {
   try {
-    call();
+    Spring s(p);
   } catch (const std::invalid_argument& error) {
     return error.what();
   }
   return "nothing was refused";
-}
-
-std::string refusal(const std::function<void(Parameters&)>& change) {
-  Parameters p;
-  change(p);
-  return refusal(std::function<void()>([&p] { Spring s(p); }));
 }
 
 void expect(const std::string& message, std::initializer_list<const char*> parts) {
@@ -83,28 +75,21 @@ std::string failure(Spring& spring, double size, const Inputs& inputs = {}) {
 }  // namespace
 
 TEST(SpringParameters, RefusalsNameParameterValueAndWhatIsAllowed) {
-  expect(refusal([](Parameters& p) {
-           p.stop_enabled = true;
-           p.stop_position = 0.1;
-         }),
-         {"displacement = 0", "stop_position = 0.1"});
+  Parameters p;
+  p.stop_enabled = true;
+  p.stop_position = 0.1;
+  expect(refusal(p), {"displacement = 0", "stop_position = 0.1"});
   // No potential well: every motion would escape.
-  for (const double k1 : {0.0, -1.0})
-    expect(refusal([k1](Parameters& p) {
-             p.linear_stiffness = k1;
-             p.cubic_stiffness = -0.2;
-           }),
-           {"cubic_stiffness = -0.2", "linear_stiffness > 0"});
-}
-
-TEST(SpringParameters, StartBeyondTheHilltopIsRefused) {
-  Parameters p = softening();
+  p = softening();
+  for (const double k1 : {0.0, -1.0}) {
+    p.linear_stiffness = k1;
+    expect(refusal(p), {"cubic_stiffness = -0.2", "linear_stiffness > 0"});
+  }
+  p = softening();
   p.displacement = 3.872;  // the hilltop is at 3.87298
   EXPECT_NO_THROW(Spring{p});
   p.displacement = -3.874;
-  const std::string message = refusal(std::function<void()>([&p] { Spring s(p); }));
-  EXPECT_NE(message.find("displacement = -3.874"), std::string::npos) << message;
-  EXPECT_NE(message.find("3.87298"), std::string::npos) << message;
+  expect(refusal(p), {"displacement = -3.874", "3.87298"});
 }
 
 // The coupling repeats steps and compares with ==.
@@ -144,18 +129,12 @@ TEST(SpringState, RepeatedStepsAreBitIdentical) {
   }
 }
 
-TEST(SpringState, AStateOfAnotherLengthIsRefused) {
+TEST(SpringState, AStateOfAnotherLengthOrWithAnImpossibleNumberIsRefused) {
   Spring s(softening());
   const auto before = saved(s);
   EXPECT_THROW(s.restore({1.0, 2.0}), std::invalid_argument);
-  EXPECT_EQ(saved(s), before);
-}
-
-TEST(SpringState, AStateWithAnImpossibleNumberIsRefused) {
-  Spring s(softening());
-  const auto before = saved(s);
   auto forged = before;
-  forged[0] = std::numeric_limits<double>::infinity();
+  forged[0] = infinity;
   EXPECT_THROW(s.restore(forged), std::invalid_argument);
   for (const double steps : {-1.0, 1e20}) {
     forged = before;
@@ -241,9 +220,7 @@ TEST(SpringEscape, BeyondTheHilltopIsReported) {
         escaped = true;
         EXPECT_NEAR(t + escape.reached, T, 1e-10);  // 100 steps of 1e-12 relative
         EXPECT_EQ(saved(s), before);
-        const std::string message = escape.what();
-        EXPECT_NE(message.find(sign > 0 ? "y = 3.87298" : "y = -3.87298"), std::string::npos) << message;
-        EXPECT_NE(message.find("hilltop"), std::string::npos) << message;
+        expect(escape.what(), {sign > 0 ? "y = 3.87298" : "y = -3.87298", "hilltop"});
       }
     }
     EXPECT_TRUE(escaped);
