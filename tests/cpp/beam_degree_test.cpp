@@ -159,67 +159,6 @@ TEST(BeamDegree, FormsAreTheIntegralsOfTheirDefinition) {
   }
 }
 
-TEST(BeamDegree, OneIsThePapersElementBitByBit) {
-  // (57)–(59) node by node, as they have been evaluated since before other degrees existed.
-  for (const int n : {1, 2, 17}) {
-    for (const bool reduced : {false, true}) {
-      Parameters p = general_beam(n);
-      p.reduced_integration = reduced;
-      const Timoshenko mesh(p);
-      const Eigen::VectorXd q = noise(2 * n);
-      const double h = p.length / n, r = std::sqrt(p.second_moment_of_area / p.area), m = h / 6.0;
-      const double s = p.shear_modulus * p.shear_coefficient / p.density;
-      double b = p.young_modulus / p.density;
-      if (!reduced) b += s * (h / r) * (h / r) / 12.0;
-      const double half = 0.5 / r, lever = 0.5 * h / r, bend = b / h;
-      const auto at = [&](int i, int field) { return i > 0 ? q[2 * (i - 1) + field] : 0.0; };
-      const auto moment = [&](int e) { return bend * (at(e, 0) - at(e - 1, 0)); };
-      const auto shear = [&](int e) { return s * ((at(e, 1) - at(e - 1, 1)) / h - half * (at(e - 1, 0) + at(e, 0))); };
-      const Eigen::VectorXd Mq = mesh.mass_times(q), Kq = mesh.stiffness_times(q);
-      for (int i = 1; i <= n; ++i) {
-        for (int f = 0; f < 2; ++f) {
-          const double node =
-              i < n ? m * (at(i - 1, f) + 4.0 * at(i, f) + at(i + 1, f)) : m * (at(i - 1, f) + 2.0 * at(i, f));
-          EXPECT_EQ(Mq[2 * (i - 1) + f], node);
-        }
-        const double theta =
-            i < n ? (moment(i) - moment(i + 1)) - lever * (shear(i) + shear(i + 1)) : moment(i) - lever * shear(i);
-        EXPECT_EQ(Kq[2 * (i - 1)], theta);
-        EXPECT_EQ(Kq[2 * (i - 1) + 1], i < n ? shear(i) - shear(i + 1) : shear(i));
-      }
-      double M = 0.0, bending = 0.0, shearing = 0.0;
-      for (int e = 1; e <= n; ++e) {
-        const double t0 = at(e - 1, 0), t1 = at(e, 0), u0 = at(e - 1, 1), u1 = at(e, 1);
-        M += (t0 * t0 + t1 * t1 + (t0 + t1) * (t0 + t1)) + (u0 * u0 + u1 * u1 + (u0 + u1) * (u0 + u1));
-        const double kappa = (t1 - t0) / h, gamma = (u1 - u0) / h - half * (t0 + t1);
-        bending += kappa * kappa;
-        shearing += gamma * gamma;
-      }
-      EXPECT_EQ(mesh.mass_norm2(q), M * h / 6.0);
-      EXPECT_EQ(mesh.stiffness_norm2(q), h * (b * bending + s * shearing));
-      // K⁻¹: forces from the tip, displacements from the clamp.
-      Eigen::VectorXd y(2 * n);
-      double M1 = 0.0, S1 = 0.0, t0 = 0.0, u0 = 0.0;
-      for (int i = 2 * n - 2; i >= 0; i -= 2) {
-        const double S = S1 + q[i + 1];
-        M1 += q[i] + lever * (S1 + S);
-        S1 = S;
-        y[i] = M1;
-        y[i + 1] = S1;
-      }
-      for (int i = 0; i < 2 * n; i += 2) {
-        const double t1 = t0 + h / b * y[i];
-        u0 += h / s * y[i + 1] + lever * (t0 + t1);
-        t0 = t1;
-        y[i] = t0;
-        y[i + 1] = u0;
-      }
-      const Eigen::VectorXd x = mesh.flexibility_times(q);
-      for (Eigen::Index i = 0; i < 2 * n; ++i) EXPECT_EQ(x[i], y[i]);
-    }
-  }
-}
-
 double bending(const Parameters& p) { return p.young_modulus * p.second_moment_of_area; }
 double shearing(const Parameters& p) { return p.shear_modulus * p.shear_coefficient * p.area; }
 
