@@ -181,6 +181,15 @@ def test_a_spring_that_only_just_reaches_the_stop_again_and_again_has_an_accurac
     assert run.summary["accuracy"]["pilot_steps"] + run.do_steps <= 10_000
 
 
+def test_a_tip_that_the_stop_holds_from_the_start_has_an_accuracy():
+    """It moves by rounding alone, of which no two runs agree, while the beam behind it swings under its load."""
+    beam = {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 8, "distributed_load": -1.0}
+    scene = {"time": {"t_end": 1.0}, "beam": beam, "stop": {"position": 0.0, "restitution": 0.5}, "accuracy": 1e-3}
+    run = simulate(scene_from_dict(scene))
+    assert np.abs(run.u_tip).max() <= 1e-15
+    assert run.summary["accuracy"]["pilot_steps"] + run.do_steps <= 2000
+
+
 @pytest.mark.parametrize("law", ["transmission", "compliance"])
 def test_a_run_may_be_shorter_than_the_default_macro_step(law, tmp_path):
     """4 ms, which nothing uses here, was held against it."""

@@ -36,6 +36,8 @@ from .stability.predict import contact_frequency
 _MOST, _MOST_STOPPED = 50_000, 6
 #: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
+#: Share of the deflection that the beam's energy could cause at which a tip is at rest.
+_AT_REST = 1e-9
 #: Runs that differ by more are both unresolved, whatever their order [of the motion].
 _UNRESOLVED = 0.02
 #: The coupling's and IDA's relative tolerance over the accuracy, and the least of them; IDA's absolute one [m].
@@ -168,9 +170,12 @@ class _Search:
             found = f"a run that may do takes some {steps:.1g}"
         else:
             found = f"runs still differ by {estimate.apart:.1e}"
+        beam, easier = self._scene.beam, ""
+        if beam is not None and beam.fidelity == "dynamic":
+            easier = ", take a coarser mesh" if beam.integrator == "modal" else ', take [beam] integrator = "modal"'
         raise SceneError(
-            f"accuracy = {self._accuracy:g}: not reached with {_MOST} steps, {found}; ask for less, shorten [time] "
-            "t_end, or take a coarser mesh"
+            f"accuracy = {self._accuracy:g}: not reached with {_MOST} steps, {found}; ask for less{easier}, or shorten "
+            "[time] t_end"
         )
 
     def _told(self, run: Trajectory, estimate: _Estimate) -> Trajectory:
@@ -292,7 +297,11 @@ class _Search:
         for name in ("u_tip", "y"):
             if name not in fine.run.columns:
                 continue
-            scale = float(np.abs(fine.run[name] - fine.run[name][0]).max()) or 1.0
+            scale = float(np.abs(fine.run[name] - fine.run[name][0]).max())
+            if name == "u_tip" and self._scene.beam is not None:  # a tip held by the stop moves by rounding alone
+                energy = float(np.abs(values["e_beam"]).max())
+                scale = max(scale, _AT_REST * math.sqrt(2.0 * energy * tip_compliance(self._scene.beam)))
+            scale = scale or 1.0
             difference = np.abs(others[name][common] - values[name][index[common]])
             worst = max(worst, float(difference.max(initial=0.0)) / scale)
         return worst
