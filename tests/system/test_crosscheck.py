@@ -171,3 +171,21 @@ def test_a_change_of_contact_that_the_run_lacks_is_shown_as_none():
     console.print(*found.shown)
     assert not found.passed
     assert ["opens", "none", "0.5000000000", "0.0e+00", "FAILED"] in map(str.split, console.export_text().splitlines())
+
+
+def test_algorithm_1_begins_in_contact_where_an_elastic_approach_begins_at_the_spring():
+    """Its reference let the beam move freely for a step first."""
+    beam = {"young_modulus": 1e3, "shear_modulus": 1e3, "n_elements": 4, "approach": "elastic"}
+    beam |= {"initial_velocity_slope": -0.1}
+    spring = {"mass": 100.0, "linear_stiffness": 7e3, "cubic_stiffness": 0.0}
+    paper = {"contact": {"law": "paper", "stiffness": 500.0}, "coupling": {"macro_step": 1e-3}, "time": {"t_end": 5e-3}}
+    report = crosscheck(with_changes(SOFT, beam=beam, spring=spring, **paper))
+    assert report.reference.phase[0] == "tied"
+    assert report.passed, report.rows
+
+
+def test_a_reference_that_fails_is_one_error(tmp_path):
+    changes = ["contact.law=paper", "beam.n_elements=4", "coupling.macro_step=1e-3", "time.t_end=0.05"]
+    result = command("crosscheck", "soft", *(f"--set={change}" for change in changes), "--out", tmp_path / "out")
+    assert result.exit_code == 3
+    assert result.stderr.startswith("error: Newton's method for the predicted position does not converge at t = 0.0")

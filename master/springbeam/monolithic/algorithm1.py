@@ -31,6 +31,7 @@ import scipy.sparse.linalg as spla
 from ..results.trajectory import Event, Trajectory
 from ..scene import Scene
 from .algorithm1_ledger import PairState, StepLedger
+from .hybrid_system import ReferenceFailure
 from .semi_discrete import SemiDiscreteBeam, assemble
 
 StartVelocity = Literal["rest", "tip", "average"]
@@ -39,7 +40,7 @@ YTemp = Literal["equation", "guess", "both"]
 _MAX_ITERATIONS = 50
 
 
-class AlgorithmFailure(RuntimeError):
+class AlgorithmFailure(ReferenceFailure):
     """Newton's method did not converge, or the solution overflows; ``trajectory`` holds what came before."""
 
     trajectory: Trajectory | None = None
@@ -168,7 +169,7 @@ class _Algorithm:
         self.time, self._began = 0.0, clock.perf_counter()
         self._events: list[Event] = []
         state = PairState(*self._initial_beam(), self.spring.equilibrium, self.spring.initial_velocity)
-        touched = self.beam.approach == "undeformed"
+        touched = self.beam.approach == "undeformed" or state.q[-1] <= self.spring.equilibrium
         if touched:  # nothing to integrate before t_c
             state = self._first_contact(state)
         self.ledger.record(self.time, state, "tied" if touched else "free")

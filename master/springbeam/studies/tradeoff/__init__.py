@@ -217,7 +217,7 @@ def _run(configuration: Configuration, reach: float) -> tuple[Trajectory | str, 
             return run, float(run.summary["wall_time"]), perf_counter() - began - float(run.summary["wall_time"])
         run = simulate(scene, limited)
         return run, float(run.summary["wall_time"]), float(run.summary["setup_time"])
-    except (RunStopped, algorithm1.AlgorithmFailure, event_driven.ReferenceFailure) as stopped:
+    except (RunStopped, event_driven.ReferenceFailure) as stopped:
         return str(stopped), perf_counter() - began, 0.0
 
 
