@@ -96,12 +96,10 @@ def test_what_damping_takes_is_booked(law, degree, size):
 class Affine(Body):
     """Ends a step at ``free`` + ``response``·C [m]."""
 
+    CHECKPOINTED = ("w",)
+
     def __init__(self, free: float, response: float, size: float):
         self.free, self.response, self.mass, self.w = free, response, 0.5 * size**2 / abs(response), 0.0
-
-    def mark(self): ...
-
-    def rewind(self): ...
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
         self.w = self.free + self.response * contact[0]
