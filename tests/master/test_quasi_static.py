@@ -198,6 +198,10 @@ LIFE = {
         "spring": {"initial_velocity": 0.0, "external_force": -1.0},
         "beam": {"distributed_load": 0.0},
     },
+    "from rest at Ψ, a load that lifts the tip alone": {
+        "spring": {"initial_velocity": 0.0, "external_force": 0.1},
+        "beam": {"distributed_load": 3.0, "alpha_b": 0.2},
+    },
     "hardening, pressed": {
         "spring": {"external_force": -3.0, "cubic_stiffness": 4.0},
         "stop": {"position": -0.2, "restitution": 0.3},

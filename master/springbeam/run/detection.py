@@ -79,12 +79,14 @@ class Detector:
         return max(1e-12 * max(abs(tip.velocity), abs(low.velocity)), _VELOCITY_ROUNDING * self._fastest())
 
     def at_start(self, state: State, start: Ends) -> str | None:
-        """The event that is due before any step: its function is 0 and falling."""
+        """The event that is due before any step: its function is 0 and falling, or a force that can only push pulls."""
         phase = state.phase
         for (kind, _), (value, rate) in zip(
             self._functions.of(phase), self._functions.samples(phase, start), strict=True
         ):
             if rate < 0.0 and value <= self.tolerance(start) and rate < -self._rest(start):
+                return kind
+            if kind == "separation" and value < -self.simultaneity_tolerance(start):
                 return kind
         return None
 
