@@ -286,9 +286,10 @@ class _Search:
         dense output of ``fine`` is as smooth as the motion.
         """
         times, wanted = fine.run.time, coarse.run.time
-        index = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-        index -= np.abs(times[index - 1] - wanted) < np.abs(times[index] - wanted)
+        index = np.clip(np.searchsorted(times, wanted, "right") - 1, 0, len(times) - 2)
+        index += np.abs(times[index + 1] - wanted) < np.abs(times[index] - wanted)
         common = np.abs(times[index] - wanted) <= 1e-9 * self._span
+        common &= np.append(np.diff(wanted) > 0.0, True)  # of rows at one time the last: a massless tip may have jumped
         values, others = fine.run.columns, coarse.run.columns
         if self._softly:
             values, index = fine.run.at(np.clip(wanted, times[0], times[-1])).columns, np.arange(len(wanted))
