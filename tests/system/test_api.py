@@ -238,6 +238,10 @@ def test_what_a_body_cannot_do_is_said():
         simulate(scene, lower=Silent(DuffingBody()))
     with pytest.raises(TypeError, match=r"in place of the spring is a float, not a springbeam\.Body"):
         simulate(scene, lower=1.0)
+    impossible = DuffingBody()
+    impossible.mass = -1.0
+    with pytest.raises(SceneError, match=r"in place of the spring: mass = -1\.0; give its end a mass of 0 or more"):
+        simulate(scene, lower=impossible)
     with pytest.raises(SceneError, match=r"\[spring\]: missing"):
         simulate(with_changes(scene, spring=None), lower=DuffingBody())
     for change, message in (

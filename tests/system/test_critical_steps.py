@@ -73,8 +73,8 @@ def test_a_coupling_that_is_not_as_predicted_is_told():
         Comparison("compliance", "jacobi", 0, 1e4, 1e-4, 1e-4, 1.5, 1.0),
         Comparison("compliance", "energy", 0, 1e4, None, None, 1.0, 1.5),
     ):
-        assert study.found({"0": asdict(good)}).passed
-        assert not study.found({"0": asdict(good), "1": asdict(other)}).passed
+        assert study.findings({"0": asdict(good)}).passed
+        assert not study.findings({"0": asdict(good), "1": asdict(other)}).passed
 
 
 def test_command(tmp_path, monkeypatch):

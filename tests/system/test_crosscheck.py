@@ -166,7 +166,7 @@ def test_a_change_of_contact_that_the_run_lacks_is_shown_as_none():
     missing = {"kind": "opens", "time": None, "reference": 0.5, "bound": 0.0, "passed": False}
     record = {"quantities": [quantity], "events": [missing], "notes": [], "scene": {}, "motion": {"time": [0.0, 1.0]}}
     study = Crosscheck(scene=SOFT)
-    found = study.found({"comparison": {**record, "passed": False, "horizon": 1.0, "growth": 1.0}})
+    found = study.findings({"comparison": {**record, "passed": False, "horizon": 1.0, "growth": 1.0}})
     console = Console(record=True, width=80)
     console.print(*found.shown)
     assert not found.passed

@@ -46,7 +46,7 @@ def test_only_cases_without_a_record_are_computed(tmp_path):
     assert len(lines) == 4
     (tmp_path / FILE).write_bytes(b"".join(lines[:2]) + lines[2][:-9])  # killed while it wrote
     with Records(study, tmp_path) as records:
-        assert list(records.found) == ["0"]
+        assert list(records.by_name) == ["0"]
         assert record_all(study, records, report=seen.append) == whole
     assert len(seen) == 2
     assert (tmp_path / FILE).read_bytes() == b"".join(lines)
@@ -80,7 +80,7 @@ def test_a_killed_worker_loses_its_own_case_alone_and_only_if_it_dies_again(tmp_
     with Records(study, tmp_path / "s") as records:
         found = record_all(study, records, workers=2)
     assert [record["status"] for record in found.values()] == ["done", "lost" if always else "done", "done", "done"]
-    assert len(records.found) == (3 if always else 4)
+    assert len(records.by_name) == (3 if always else 4)
 
 
 def test_an_interrupted_study_says_how_it_goes_on_and_does(tmp_path, monkeypatch):

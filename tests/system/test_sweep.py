@@ -103,7 +103,7 @@ def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
 def test_rows_are_what_single_runs_give_and_failures_are_rows(tmp_path):
     plan = planned("spring.mass=0.5,1,-1", "spring.linear_stiffness=1:100:3:log")
     records = record_all(plan)
-    assert plan.found(records).document["runs"] == {"done": 6, "stopped": 0, "refused": 3, "lost": 0}
+    assert plan.findings(records).document["runs"] == {"done": 6, "stopped": 0, "refused": 3, "lost": 0}
     plan.write(records, tmp_path, pictures=True)
     assert (tmp_path / "sweep.png").stat().st_size > 10_000
     rows = sweep.rows(tmp_path)

@@ -106,7 +106,7 @@ def carry_out(
             with watched(cut_short):
                 computed = _computed(study, records, console, workers, scheduler, quiet=quiet or as_json)
             files = study.write(computed, directory, pictures=not no_plots)
-        found = study.found(computed)
+        found = study.findings(computed)
     if as_json:
         print_json({"directory": directory, "files": files, **found.document})
     elif quiet:
@@ -141,9 +141,9 @@ def _going_on(records: Records, total: int) -> Iterator[Callable[[str], str]]:
     directory = records.path.parent
 
     def cut_short(cause: str) -> str:
-        if not records.found:
+        if not records.by_name:
             return cause
-        there = f"{len(records.found)} of {total} records are in {directory}"
+        there = f"{len(records.by_name)} of {total} records are in {directory}"
         return f"{cause}; {there}; springbeam resume {directory} goes on"
 
     try:
@@ -151,7 +151,7 @@ def _going_on(records: Records, total: int) -> Iterator[Callable[[str], str]]:
     except ConnectionError as error:
         fail(BAD_INPUT, str(error))
     except (KeyboardInterrupt, RunStopped, ReferenceFailure, OSError) as error:
-        if isinstance(error, OSError) and not records.found:
+        if isinstance(error, OSError) and not records.by_name:
             raise
         fail(STOPPED, cut_short(cause_of(error, directory)))
 
@@ -162,7 +162,7 @@ def _computed(
     """Return all records, and show meanwhile how far it is."""
     from ..studies.study import dask_cluster, record_all
 
-    total, there = len(study.cases()), len(records.found)
+    total, there = len(study.cases()), len(records.by_name)
     if there == total:
         return record_all(study, records)
     console.print(Text(study.cost()))
@@ -177,7 +177,7 @@ def _computed(
         nonlocal failed, said
         failed += study.failed(record)
         bar.update(task, advance=1, failed=failed)
-        spent, done = monotonic() - began, len(records.found) - there
+        spent, done = monotonic() - began, len(records.by_name) - there
         rest = spent / max(done, 1) * (total - there - done)
         if bar.disable and not said and min(spent, rest) > _LONG:
             said = True

@@ -225,9 +225,13 @@ def _without_own(scene: Scene, **own: Body | None) -> Scene:
     if not given:
         return scene
     for place in given:
-        name = {"upper": "beam", "lower": "spring"}[place]
-        if not isinstance(own[place], Body):
-            raise TypeError(f"the body in place of the {name} is a {type(own[place]).__name__}, not a springbeam.Body")
+        name, body = {"upper": "beam", "lower": "spring"}[place], own[place]
+        if not isinstance(body, Body):
+            raise TypeError(f"the body in place of the {name} is a {type(body).__name__}, not a springbeam.Body")
+        if not body.mass >= 0.0:
+            raise SceneError(
+                f"the body in place of the {name}: mass = {body.mass}; give its end a mass of 0 or more [kg]"
+            )
         if getattr(scene, place) is None:
             raise SceneError(f"[{name}]: missing; a body of your own takes the place of one that the scene has")
     asked = {

@@ -21,7 +21,7 @@ from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, with_changes
 from ..scene.tables import STEP_KEY, TOLERANCE_KEYS
 from .accuracy import simulate
-from .study import Found, Record, Study
+from .study import Findings, Record, Study
 from .sweep.metrics import METRICS, heading
 from .tables import number, table, write_csv
 
@@ -162,7 +162,7 @@ class Converge(Study):
         given = next(iter(records.values()))["values"]
         return [name for name, value in given.items() if self.metric or value is not None]
 
-    def found(self, records: Mapping[str, Record]) -> Found:
+    def findings(self, records: Mapping[str, Record]) -> Findings:
         """Judge how the quantities settle."""
         quantities, by_steps = self.quantities(records), list(records.values())[-1]
         document: dict[str, Any] = {"finer_steps": by_steps}
@@ -181,7 +181,7 @@ class Converge(Study):
         shown.append(
             "by steps: what half the macro step, or a tenth of accuracy or tolerances, changes on the finest mesh"
         )
-        return Found(document, shown)
+        return Findings(document, shown)
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
         """Write a row per run, and draw how far each quantity is from its limit."""

@@ -7,7 +7,7 @@
   it is, with which version and which FMUs. Nothing is written before the FMUs are found, and nothing stays where no
   case was done.
 * A case whose record is there is not computed again. A study with all records is shown at once.
-* Tables, pictures and files are made from the records alone (`Study.found`, `Study.write`).
+* Tables, pictures and files are made from the records alone (`Study.findings`, `Study.write`).
 
 `record_all` computes, `Records` is the file, `cli/study.py` the frame that all commands share.
 """
@@ -57,7 +57,7 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 
 
 @dataclass(frozen=True)
-class Found:
+class Findings:
     """What the records of a study say."""
 
     document: dict[str, Any]  #: for programs (``--json``)
@@ -91,7 +91,7 @@ class Study(BaseModel, ABC):
         """
 
     @abstractmethod
-    def found(self, records: Mapping[str, Record]) -> Found:
+    def findings(self, records: Mapping[str, Record]) -> Findings:
         """Judge the records, which come in the order of the cases."""
 
     @abstractmethod
@@ -137,14 +137,14 @@ class Records:
 
     def __init__(self, study: Study, directory: Path, *, replace: bool = False) -> None:
         self._settings, self.path = study.settings(), directory / FILE
-        self.found: dict[str, Record] = {}
+        self.by_name: dict[str, Record] = {}
         self._whole = 0  #: bytes of complete lines
         self._replaced = study.files  #: patterns of what the first record removes
         if replace:
             with suppress(ResultsUnreadable, KeyError):
                 self._replaced += _class_of(_read(self.path)[0]["study"]).files
             return
-        settings, self.found, self._whole = _read(self.path)
+        settings, self.by_name, self._whole = _read(self.path)
         if self._whole and settings != self._settings:
             raise ResultsExist(f"{directory}: holds another study, or one of another springbeam or FMU ({FILE})")
         if not self._whole and directory.is_dir() and any(file != self.path for file in directory.iterdir()):
@@ -173,7 +173,7 @@ class Records:
                     stale.unlink()
                 self._write(self._settings)
         self._write({"case": name, "record": record})
-        self.found[name] = record
+        self.by_name[name] = record
 
     def _write(self, line: dict[str, Any]) -> None:
         left = to_json(line) + b"\n"
@@ -249,7 +249,7 @@ def record_all(
         If an FMU cannot be loaded.
     """
     cases = study.cases()
-    known = {} if records is None else records.found
+    known = {} if records is None else records.by_name
     todo = {name: case for name, case in cases.items() if name not in known}
     lost: dict[str, Record] = {}
     with closing(_computed(study, todo, workers, cluster)) as computed:

@@ -13,7 +13,7 @@ from ...pictures.drawing import POSITIONS, present
 from ...results.trajectory import Event, Trajectory, columns_of
 from ...scene import Scene, with_changes
 from ..reference import refuse_without_reference
-from ..study import Found, Record, Study
+from ..study import Findings, Record, Study
 from ..tables import table, write_csv
 from . import crosscheck
 
@@ -63,7 +63,7 @@ class Crosscheck(Study):
             "reference": {name: report.reference[name] for name in ("time", *positions)},
         }
 
-    def found(self, records: Mapping[str, Record]) -> Found:
+    def findings(self, records: Mapping[str, Record]) -> Findings:
         """Show what was compared: quantities, and changes of contact."""
         record, units = records[_CASE], columns_of(self.scene)
         quantities = [
@@ -87,7 +87,7 @@ class Crosscheck(Study):
         passed = record["passed"]
         shown.append(Text("passed" if passed else "FAILED", style="bold green" if passed else "bold red"))
         told = {name: record[name] for name in ("passed", "horizon", "growth", "events", "notes", "scene")}
-        return Found({**told, "quantities": _told(record)}, shown, passed)
+        return Findings({**told, "quantities": _told(record)}, shown, passed)
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
         """Write a row per quantity, and draw both motions and their errors."""

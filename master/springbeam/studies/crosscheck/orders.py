@@ -14,7 +14,7 @@ from ...monolithic import event_driven
 from ...results.contact_times import contact_changes
 from ...run.runner import simulate
 from ...scene import Scene, SceneError, with_changes
-from ..study import Found, Record, Study
+from ..study import Findings, Record, Study
 from ..tables import table, write_csv
 from .sampling import SHORT, away_from, quantities, sample
 
@@ -96,7 +96,7 @@ class Orders(Study):
                 found.append(OrderRow(phase, begin, end, name, tuple(errors.tolist()), tuple(observed.tolist())))
         return found
 
-    def found(self, records: Mapping[str, Record]) -> Found:
+    def findings(self, records: Mapping[str, Record]) -> Findings:
         """Show the errors and the orders."""
         rows, steps = self.rows(records), list(records)[1:]
         cells = [
@@ -109,7 +109,7 @@ class Orders(Study):
         ]
         names = ("phase", "from [s]", "quantity", *steps, "orders")
         shown = table(names, cells, "largest errors", words=("from [s]", "quantity"))
-        return Found({"orders": [asdict(row) for row in rows]}, [shown])
+        return Findings({"orders": [asdict(row) for row in rows]}, [shown])
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
         """Write a row per stretch and quantity."""

@@ -22,7 +22,7 @@ from ...coupling.protocol import Window
 from ...monolithic.semi_discrete import modal_beam
 from ...scene import Scene, load_scene, with_changes
 from ..schemes import RIGID, SOFT
-from ..study import Found, Record, Study
+from ..study import Findings, Record, Study
 from ..tables import table, write_csv
 from .linear import spectral_radius
 from .predict import THRESHOLD, critical_step, linear_pair
@@ -173,14 +173,14 @@ class Critical(Study):
         law, stiffness, scheme, degree = case
         return asdict(comparison(linear_scene(law, stiffness, scheme, degree, 4 if self.quick else 10)))
 
-    def found(self, records: Mapping[str, Record]) -> Found:
+    def findings(self, records: Mapping[str, Record]) -> Findings:
         """Judge whether predicted and measured agree."""
         couplings = [Comparison(**record) for record in records.values()]
         agree = all(c.agrees for c in couplings)
         names = ("coupling", "λ [N/m]", "predicted [s]", "measured [s]", "differ by", f"at {LARGE_STEP:g} s")
         shown = table(names, [c.cells() for c in couplings], "critical macro steps")
         listed = [{**asdict(c), "stable": c.stable} for c in couplings]
-        return Found({"agree": agree, "couplings": listed}, [shown], agree)
+        return Findings({"agree": agree, "couplings": listed}, [shown], agree)
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
         """Write a row per coupling."""

@@ -18,7 +18,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...scene import SceneError
-from ..study import Found, Record, Study
+from ..study import Findings, Record, Study
 from ..tables import table, write_csv
 from .cells import COUPLINGS, sampled_cells, scene_dict, slice_cells
 from .outcome import CLASSES, Outcome, run_cell
@@ -66,13 +66,13 @@ class Grid(Study):
         """Tell whether a cell is garbage."""
         return bool(record["kind"] == "garbage")
 
-    def found(self, records: Mapping[str, Record]) -> Found:
+    def findings(self, records: Mapping[str, Record]) -> Findings:
         """Count classes and reasons; passed if no cell is garbage."""
         bad = {name: record["reason"] for name, record in records.items() if self.failed(record)}
         classes = Counter(record["kind"] for record in records.values())
         garbage = [Text(f"garbage   garbage-{name}.toml: {reason}") for name, reason in bad.items()]
         shown = [self._classes(records), _reasons(records), *garbage]
-        return Found({"cells": len(records), "classes": classes, "garbage": bad}, shown, not bad)
+        return Findings({"cells": len(records), "classes": classes, "garbage": bad}, shown, not bad)
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
         """Write a row per cell, the scenes of garbage, and the pictures."""

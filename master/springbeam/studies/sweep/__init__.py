@@ -15,7 +15,7 @@ from rich.text import Text
 from ...run.outcome import RunStopped
 from ...scene import Scene, SceneError, key_kind
 from ..accuracy import simulate
-from ..study import Found, Record, Study
+from ..study import Findings, Record, Study
 from . import picture, stroboscopic
 from .design import Axis, Sampling, compatible, design, parse_axis, varied
 from .metrics import METRICS, PRINCIPAL
@@ -87,13 +87,13 @@ class Sweep(Study):
         """Tell whether a row is no run that is done."""
         return bool(record["status"] != "done")
 
-    def found(self, records: Mapping[str, Record]) -> Found:
+    def findings(self, records: Mapping[str, Record]) -> Findings:
         """Count the rows by status, and name the first error."""
         counts = Counter(record["status"] for record in records.values())
         lines = [f"runs      {', '.join(f'{counts[status]} {status}' for status in STATUSES if counts[status])}"]
         if first := next((record["error"] for record in records.values() if record["error"]), None):
             lines.append(f"error     {first}, the first of them")
-        return Found({"runs": {status: counts[status] for status in STATUSES}}, [Text(line) for line in lines])
+        return Findings({"runs": {status: counts[status] for status in STATUSES}}, [Text(line) for line in lines])
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
         """Write ``sweep.parquet`` with a row per run, and draw what one or two keys change."""

@@ -24,7 +24,7 @@ from ...run.runner import simulate
 from ...scene import Scene, SceneError, with_changes
 from ...scene.resolution import mesh_frequency
 from ..reference import comparable_until, refuse_without_reference
-from ..study import Found, Record, Study
+from ..study import Findings, Record, Study
 from ..tables import write_csv
 from .configurations import ALGORITHM_1, SCIPY_TOLERANCES, Configuration, configurations, finer
 from .points import Errors, Point, Points, errors
@@ -163,12 +163,12 @@ class Tradeoff(Study):
             notes.append(f"not run, {turns}: {', '.join(hopeless)}")
         return notes
 
-    def found(self, records: Mapping[str, Record]) -> Found:
+    def findings(self, records: Mapping[str, Record]) -> Findings:
         """Name the cheapest configurations, and those that nothing beats."""
         found, notes, until = self.judged(records), self.notes(records), self.scene.time.t_end
         title = f"{self.scene.title}: up to t = {until:.6g} s, {len(found.points)} configurations"
         shown = [Text(title), *found.tables(), *(Text(f"note      {note}") for note in notes)]
-        return Found({"until": until, **found.document(), "notes": [*self.remarks, *notes]}, shown)
+        return Findings({"until": until, **found.document(), "notes": [*self.remarks, *notes]}, shown)
 
     def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
         """Write a row per point, and draw the work–precision diagrams."""
