@@ -142,7 +142,7 @@ def profile(effort: Effort) -> Iterator[Row]:
         "of it, the beam set back and stepped": lambda: stepped(beam),
         "of it, the spring set back and stepped": lambda: stepped(spring),
         "is an event due at the start": lambda: detector.at_start(state, start),
-        "does one come inside": lambda: detector.first(state, step),
+        "does one come inside": lambda: detector.first_event(state, step),
         "a row: energies, ledger, recorder": lambda: simulation._rows.write(state, step),
         "of it, energies of both bodies": lambda: pair.energies(end),
         "of it, the ledger": lambda: simulation._balance.ledger.book(*energies),
