@@ -56,6 +56,8 @@ _EXPECTED = 3.5
 _TURN, _ALONE = 26.0, 2.0
 #: Displacement error over energy residual of `hermite`, in runs with changes of contact after the first.
 _AMPLIFIED = 10.0
+#: doStep calls per macro step of a run that pays for its events rather than its steps: more steps cost hardly more.
+_CALLS_PER_STEP = 8.0
 
 # Soft laws, by `energy` 2.
 #: What the first macro step turns the contact by [rad], over accuracy^(1/4), and the order that is relied on
@@ -231,7 +233,9 @@ class _Search:
         return self._grown(fine, math.pow(margin * max(estimate.expected, estimate.event), 1.0 / _EXPECTED))
 
     def _grown(self, last: _Pilot, growth: float) -> float:
-        return _rung(last.steps * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH))
+        return _rung(
+            max(last.steps * min(max(growth, _LEAST_GROWTH), _MOST_GROWTH), last.run.do_steps / _CALLS_PER_STEP)
+        )
 
     # -- runs ---------------------------------------------------------------------------------------------------------
 
