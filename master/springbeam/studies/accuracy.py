@@ -36,9 +36,9 @@ from .stability.predict import contact_frequency
 _MOST, _MOST_STOPPED = 50_000, 6
 #: An estimate of the error is to be so many times smaller than the accuracy.
 _SAFETY = 1.5
-#: Share of the deflection that the beam's energy could cause at which a tip is at rest.
+#: A tip that moves by a smaller share of the deflection that the energy of the beam could cause is at rest.
 _AT_REST = 1e-9
-#: Runs that differ by more are both unresolved, whatever their order [of the motion].
+#: Runs that differ by more, relative to the motion, are both unresolved, whatever their order.
 _UNRESOLVED = 0.02
 #: The coupling's and IDA's relative tolerance over the accuracy, and the least of them; IDA's absolute one [m].
 _SHARE, _TIGHTEST, _ABSOLUTE = 1e-3, 1e-12, 1e-30
