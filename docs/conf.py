@@ -14,7 +14,7 @@ PAGES = {
     "How to": "tutorial contact accuracy report loads sweeps scripting own_fmu tools faq",
     "Reference": "scene commands files api fmu_variables",
     "Theory and measurements": "model coupling stability measured performance paper",
-    "Development": "architecture contributing",
+    "Development": "architecture contributing notebook",
 }
 
 
