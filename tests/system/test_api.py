@@ -14,6 +14,7 @@ from commands import printed
 
 import springbeam
 from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam.bodies.protocol import NO_FORCE, Energies, Motion
 from springbeam.monolithic import event_driven
 from springbeam.results.totals import LOSS_NAMES, TOTALS
 from springbeam.studies.sweep.metrics import METRICS
@@ -253,6 +254,94 @@ def test_what_a_body_cannot_do_is_said():
             simulate(with_changes(scene, **change), lower=DuffingBody())
     with pytest.raises(SceneError, match="a body of your own can be run once"):
         simulate(scene.model_copy(update={"accuracy": 1e-3}), lower=DuffingBody())
+
+
+class Mass(springbeam.Body):
+    """A free mass under constant forces that takes no impulses; ``fails`` is called with the time of each step."""
+
+    CHECKPOINTED = ("x", "v", "means")
+
+    def __init__(self, x=0.0, v=0.0, fails=None):
+        self.mass, self.x, self.v, self.means, self.calls, self.fails = 1.0, x, v, (0.0, 0.0), 0, fails
+
+    def motion(self):
+        return Motion(self.x, self.v, *self.means)
+
+    def energies(self):
+        return Energies(0.5 * self.v**2, 0.0, 0.0, 0.0)
+
+    def advance(self, time, size, contact, foundation=NO_FORCE):
+        self.calls += 1
+        if self.fails is not None:
+            self.fails(time)
+        a = foundation[0] - contact[0]
+        x, v = self.x, self.v
+        self.means = (
+            x * size + v * size**2 / 2 + a * size**3 / 6,
+            x * size**2 / 2 + v * size**3 / 6 + a * size**4 / 24,
+        )
+        self.x, self.v = x + v * size + a * size**2 / 2, v + a * size
+        return self.motion()
+
+
+class StruckMass(Mass):
+    def apply_impulse(self, impulse):
+        self.v += impulse / self.mass
+
+
+APART = with_changes(
+    SOFT, stop=None, time={"t_end": 0.1}, coupling={"degree": 0}, beam={"approach": "elastic", "n_elements": 4}
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "body", "says"),
+    [
+        ({"contact": {"law": "tie"}}, StruckMass(x=-0.1), 'law = "tie": the upper end starts at 0 m .* -0.1 m; let'),
+        ({"contact": {"law": "tie"}}, Mass(v=-2.0), r"start with -1 and -2 m/s .* body in \[spring\] does not take"),
+        ({}, StruckMass(x=0.1), r"\[beam\]: the upper end starts at 0 m and the lower one at 0.1 m; it must start"),
+        ({"contact": {"law": "compliance"}}, StruckMass(x=0.1), "the lower one at 0.1 m; it must start there or above"),
+        ({}, Mass(), r'law = "transmission": the body in \[spring\] cannot do that, it has no impulse, .* apply_imp'),
+        ({"stop": {"position": -0.1}}, StruckMass(x=-0.2), r"position = -0.1: .* \[spring\] starts below .* -0.2 m"),
+        (
+            {"beam": {"initial_deflection_slope": 0.05, "approach": "undeformed"}},
+            StruckMass(v=1.0),
+            r'approach = "undeformed": the body in \[spring\] starts with 1 m/s, but nothing moves until .* t = 0.05 s',
+        ),
+    ],
+)
+def test_a_start_that_cannot_be_is_refused_whoever_made_the_body(change, body, says):
+    with pytest.raises(SceneError, match=says):
+        simulate(with_changes(APART, **change), lower=body)
+    assert body.calls == 0
+
+
+def test_a_tie_needs_no_impulse_between_ends_of_one_velocity():
+    scene = with_changes(APART, contact={"law": "tie"})
+    run = simulate(scene, lower=Mass(v=-1.0))
+    assert np.abs(run.u_tip - run.y).max() < 1e-9
+    assert max(abs(event.impulse_contact) for event in run.events) < 1e-15  # N·s: rounding
+
+
+@pytest.mark.parametrize(
+    ("error", "cause"),
+    [(OverflowError("too fast"), "OverflowError: too fast"), (ValueError(), "ValueError")],
+)
+def test_an_error_in_a_body_of_ones_own_is_reported_at_once(error, cause):
+    """Without 20 halvings of the step: it is called once more after the last step that is made."""
+    steps = []
+
+    def fails(time):
+        steps.append(time)
+        if time >= 0.03:
+            raise error
+
+    with pytest.raises(springbeam.RunStopped) as stopped:
+        simulate(with_changes(APART, contact={"law": "compliance"}), lower=StruckMass(fails=fails))
+    assert stopped.value.cause == cause
+    assert stopped.value.time == pytest.approx(0.03, abs=APART.coupling.macro_step)
+    assert sum(time >= 0.03 for time in steps) == 1
+    assert stopped.value.run.time[-1] == stopped.value.time
 
 
 def test_references_have_no_steps_and_can_be_saved(tmp_path):

@@ -41,7 +41,8 @@ class Need(NamedTuple):
 _STATE = "its state cannot be saved (canGetAndSetFMUstate = false)"
 _SIZES = "its steps have one size (canHandleVariableCommunicationStepSize = false)"
 _SLOPES = "its input takes no derivatives (canInterpolateInputs = false; FMI 3.0 has none)"
-_VELOCITY, _IMPULSE, _INTEGRALS = "it has no velocity", "it has no impulse", "it has not integral and integral_2"
+_VELOCITY, _INTEGRALS = "it has no velocity", "it has not integral and integral_2"
+_IMPULSE = "it has no impulse, or of a body of your own no apply_impulse"
 
 
 #: A share of a step that is rounding.
@@ -94,9 +95,9 @@ def needs(scene: Scene, body: Abilities) -> Iterator[Need]:
 
 
 def refusals(scene: Scene, abilities: Mapping[str, Abilities]) -> list[str]:
-    """Return why ``scene`` cannot be run with foreign FMUs of these ``abilities``, by table, each with a remedy."""
+    """Return why ``scene`` cannot be run with bodies of these ``abilities``, by table, each with a remedy."""
     return [
-        f"{need.asked}: the FMU in [{table}] cannot do that, {need.lacks}; {need.instead}"
+        f"{need.asked}: the body in [{table}] cannot do that, {need.lacks}; {need.instead}"
         for table, body in abilities.items()
         for need in needs(scene, body)
         if not need.has

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from contextlib import ExitStack
-from math import isclose
 from pathlib import Path
 
-from ..scene import Beam, Scene, SceneError, Spring
+from ..scene import Beam, Scene, Spring
 from ..scene.partners import ForeignFmu, Partner
 from ..scene.tables import ORDINARY_SCHEMES
-from .abilities import refusals
 from .archive import fmu_directory
 from .elements import ELEMENTS
 from .fmu_bodies import FmuBeam, FmuSpring
@@ -18,9 +16,6 @@ from .foreign import Findings
 from .isolated import IsolatedBody, examined
 from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
-
-#: Velocities closer than this share are one where an end takes no impulse: told, and measured from displacements.
-_SAME_SPEED, _SAME_SPEED_MEASURED = 1e-13, 1e-6
 
 
 def load_bodies(scene: Scene, start_time: float) -> tuple[Body | None, Body | None]:
@@ -30,15 +25,11 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[Body | None, Body | No
     ------
     FmuError
         If an FMU cannot be found or loaded, or a foreign one does not do what it or the scene says.
-    SceneError
-        If the scene asks for what a foreign FMU cannot do.
     """
     found = findings(scene)
     faults = [fault for finding in found.values() for fault in finding.faults]
     if faults:
         raise FmuError("\n".join(faults))
-    if lines := refusals(scene, {table: finding.abilities for table, finding in found.items()}):
-        raise SceneError("\n".join(lines))
     bodies: list[Body | None] = []
     with ExitStack() as made:
         for table, spec in (("beam", scene.upper), ("spring", scene.lower)):
@@ -47,8 +38,6 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[Body | None, Body | No
                 made.callback(body.close)
             bodies.append(body)
         upper, lower = bodies
-        if found and upper is not None and lower is not None:
-            _refuse_start(scene, upper, lower)
         made.pop_all()
     return upper, lower
 
@@ -78,42 +67,6 @@ def findings(scene: Scene) -> dict[str, Findings]:
     """Examine the foreign FMUs of ``scene`` (`springbeam.bodies.probe`), by table. Raises FmuError."""
     H = scene.coupling.macro_step or 1e-3 * scene.time.t_end
     return {table: examined(spec, table == "beam", 0.0, H) for table, spec in scene.foreign.items()}
-
-
-def _refuse_start(scene: Scene, upper: Body, lower: Body) -> None:
-    """Raise SceneError if the ends cannot start where only the FMUs know that they do."""
-    u, y = upper.motion().displacement, lower.motion().displacement
-    apart = not isclose(u, y, rel_tol=1e-12)
-    starts = f"the upper end starts at {u:.9g} m and the lower one at {y:.9g} m"
-    if scene.contact.law == "tie" and apart:
-        raise SceneError(f'[contact] law = "tie": {starts}; let them start at one height, or use "link"')
-    if scene.contact.law == "tie":
-        _refuse_speeds(upper, lower)
-    if scene.contact.lasting or not apart:
-        return
-    if u < y:
-        raise SceneError(f"[beam]: {starts}; it must start there or above")
-    if scene.beam is not None and scene.beam.approach == "undeformed":
-        raise SceneError(
-            f'[beam] approach = "undeformed": {starts}, and where the FMU below is when they meet is not known '
-            'beforehand; use approach = "elastic", or let them start at one height'
-        )
-
-
-def _refuse_speeds(upper: Body, lower: Body) -> None:
-    """Raise SceneError if ends that are to be tied start with two velocities, and one takes no impulse."""
-    v, z = upper.motion().velocity, lower.motion().velocity
-    for table, body, other in (("beam", upper, lower), ("spring", lower, upper)):
-        if not isinstance(body, IsolatedBody) or body.abilities.impulse:
-            continue
-        same = _SAME_SPEED if body.abilities.velocity else _SAME_SPEED_MEASURED
-        if abs(v - z) > same * max(abs(v), abs(z)):
-            raise SceneError(
-                f'[contact] law = "tie": the ends start with {v:.6g} and {z:.6g} m/s and are joined by an impulse, '
-                f"which the FMU in [{table}] has no input for; name its impulse, let both start with one velocity, or "
-                'use "link"'
-            )
-        body.start_as_fast_as(other.motion().velocity)
 
 
 def fingerprints(scene: Scene) -> dict[str, str]:

@@ -24,12 +24,10 @@ from .abilities import Abilities
 from .end_loaded import EndLoaded
 from .fmu import Fmu
 from .fmu_bodies import FmuBody
-from .protocol import NO_FORCE, BodyFailed, Energies, FmuError, Force, Motion
+from .protocol import NO_FORCE, ROUNDED_IMPULSE, BodyFailed, Energies, FmuError, Force, Motion
 
 #: Corrections of a holding force; the velocity that it may leave, and the displacement, over those without it.
 _MAX_CORRECTIONS, _AT_REST, _STAYS = 20, 1e-12, 1e-6
-#: An impulse that changes the velocity by less than this share is rounding.
-_NO_IMPULSE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -167,7 +165,7 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def apply_impulse(self, impulse: float) -> None:
         if not self._IMPULSE:
-            if abs(impulse) <= _NO_IMPULSE * self.mass * abs(self._current.velocity):
+            if abs(impulse) <= ROUNDED_IMPULSE * self.mass * abs(self._current.velocity):
                 return
             raise BodyFailed(f"{self.fmu.path}: cannot take an impulse of {impulse:.6g} N·s, it has no input for one")
         before = self._current.velocity

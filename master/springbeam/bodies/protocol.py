@@ -13,6 +13,8 @@ from .checkpointed import Checkpointed
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
+#: An impulse that changes the velocity by less than this share is rounding.
+ROUNDED_IMPULSE = 1e-12
 #: No force over the whole step.
 NO_FORCE: Force = (0.0, 0.0, 0.0)
 
@@ -103,8 +105,13 @@ class Body(Checkpointed):
         return self.energies()
 
     def apply_impulse(self, impulse: float) -> None:
-        """Change the velocity of the end at once by an upward impulse [N·s]."""
-        raise NotImplementedError
+        """Change the velocity of the end at once by an upward impulse [N·s].
+
+        A body that leaves it out is refused where a scene needs impulses (`springbeam.bodies.gate`); one that changes
+        nothing but by rounding is none.
+        """
+        if abs(impulse) > ROUNDED_IMPULSE * self.mass * abs(self.motion().velocity):
+            raise BodyFailed(f"{type(self).__name__} has no apply_impulse, and meets an impulse of {impulse:.6g} N·s")
 
     def holding_force(self, displacement: float, velocity: float) -> float:
         """Return the upward force [N] that keeps the end at ``displacement`` [m] and ``velocity`` [m/s].

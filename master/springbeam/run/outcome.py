@@ -4,11 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import isfinite
+from traceback import walk_tb
 
 #: ``progress(time, phase, macro_steps)``, called once per accepted step.
 Progress = Callable[[float, str, int], None]
 #: Cause of a run that ends because a number has become too large.
 OVERFLOW = "a force, an energy or a position is larger than a double holds"
+
+
+def raised_here(error: BaseException) -> bool:
+    """Return whether code of this package has raised ``error``, and not a body of the caller's that it has called."""
+    module = ""
+    for frame, _ in walk_tb(error.__traceback__):
+        module = frame.f_globals.get("__name__", "")
+    return module.partition(".")[0] == __name__.partition(".")[0]
 
 
 class RunStopped(RuntimeError):

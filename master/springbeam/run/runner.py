@@ -119,7 +119,7 @@ def run(
             status = {"status": "stopped", "cause": f"{type(error).__name__}: {error}"}
             raise
         except Exception as error:
-            cause = f"{type(error).__name__}: {error}"
+            cause = "".join(traceback.format_exception_only(error)).strip()
             status = {"status": "stopped", "cause": cause, "residual": None, "traceback": traceback.format_exc()}
             raise RunStopped(cause, simulation.time) from error
         except BaseException as error:

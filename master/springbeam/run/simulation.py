@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..bodies.checkpointed import Checkpointed
+from ..bodies.gate import admit
 from ..bodies.protocol import NO_FORCE, Body, BodyFailed, StepRefused
 from ..contact.phases import Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
@@ -25,7 +26,7 @@ from .detection import Detector
 from .ledger import Balance
 from .local_error import LocalError
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
-from .outcome import OVERFLOW, Progress, RunStopped
+from .outcome import OVERFLOW, Progress, RunStopped, raised_here
 from .rows import NOT_SHOWN, Rows
 from .stepping import Pair
 
@@ -50,6 +51,8 @@ class Simulation(Checkpointed):
         Receives rows, events and shapes.
     progress
         Called once per accepted step.
+
+    Raises SceneError if the scene cannot be run with these bodies.
     """
 
     CHECKPOINTED = (
@@ -79,6 +82,7 @@ class Simulation(Checkpointed):
     ) -> None:
         scene, self._choice = with_scheme_chosen(scene)
         self._scene, self._recorder, self._progress = scene, recorder, progress
+        admit(scene, start_time, beam, spring)
         self._pair = Pair(scene, beam, spring)
         self._state = self._pair.initial_state(start_time)
         self._steps: MacroGrid | AdaptiveSteps
@@ -113,6 +117,8 @@ class Simulation(Checkpointed):
         except (BodyFailed, NonFiniteValue) as failed:
             raise RunStopped(str(failed), self.time) from failed
         except OverflowError as error:
+            if not raised_here(error):
+                raise
             raise RunStopped(OVERFLOW, self.time) from error
 
     @property
@@ -170,6 +176,8 @@ class Simulation(Checkpointed):
                 pair.rewind()
                 size = self._steps.size
             except (StepRefused, OverflowError) as refused:
+                if isinstance(refused, OverflowError) and not raised_here(refused):
+                    raise  # a body of the caller's has failed: it would do so at any size
                 if pair.repeatable:
                     pair.rewind()
                 cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
