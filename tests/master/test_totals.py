@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from springbeam.results.extremes import Extremes
 from springbeam.results.steps import STEP
 from springbeam.results.totals import shortest_contact, totals
 from springbeam.results.trajectory import Event
@@ -71,6 +72,36 @@ def test_the_peak_is_that_of_a_sum_over_a_grid_of_windows():
     assert means.max() == pytest.approx(whole, rel=1e-2)
 
 
+@pytest.mark.parametrize("window", [1e-3, 0.2, 0.5, 0.97])
+@pytest.mark.parametrize("ends", [[0.0, 1.0], [0.0, 0.4, 1.0], [0.0, 0.31, 0.33, 0.6, 1.0]])
+def test_a_window_need_not_begin_or_end_at_a_row(ends, window):
+    """C = 12 t (1 − t) again: the best window has ½ as its middle, wherever the steps end."""
+    steps = steps_with(lambda t: (12.0 * t * (1.0 - t), 12.0 - 24.0 * t, -24.0), ends)
+    assert found(steps, window=window)["contact_force_max"] == pytest.approx(3.0 - window**2, rel=1e-12)
+
+
+@pytest.mark.parametrize("window", [3e-3, 0.1])
+def test_no_window_has_a_larger_mean(window):
+    """Of forces that jump from step to step, windows shorter and longer than these."""
+    rng = np.random.default_rng(4)
+    ends = np.cumsum(np.append(0.0, rng.uniform(5e-3, 2e-2, 60)))
+    pieces = [np.polynomial.Polynomial([c, dc, 0.5 * ddc]) for c, dc, ddc in rng.normal(size=(60, 3)) * [1, 1e2, 1e4]]
+    table = dict(zip(ends.tolist(), pieces, strict=False))
+    steps = steps_with(lambda t: tuple(table[t].deriv(k)(0.0) if k else table[t](0.0) for k in range(3)), ends)
+    most = found(steps, window=window)["contact_force_max"]
+    total = np.cumsum([0.0, *(piece.integ()(size) for piece, size in zip(pieces, np.diff(ends), strict=True))])
+
+    def until(t):
+        row = np.searchsorted(ends, t, side="right").clip(max=60) - 1
+        return np.array([total[i] + pieces[i].integ()(x) for i, x in zip(row, t - ends[row], strict=True)])
+
+    begins = np.concatenate([np.linspace(0.0, ends[-1] - window, 20001), ends, ends - window])
+    begins = begins[(begins >= 0.0) & (begins <= ends[-1] - window)]
+    means = (until(begins + window) - until(begins)) / window
+    assert means.max() <= most * (1.0 + 1e-12)
+    assert means.max() == pytest.approx(most, rel=1e-4)
+
+
 def test_durations_and_rebound():
     steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11))
     events = (
@@ -116,24 +147,53 @@ def test_a_tip_that_strikes_the_stop_itself():
     assert numbers["rebound_velocity"] == 0.7
 
 
-@pytest.mark.parametrize("struck", [False, True])
-def test_the_deepest_place_is_between_the_rows_unless_something_is_struck_there(struck):
-    """u = −1 + (t − 0.46)² by steps of 0.1 s, of which the polynomial of a step keeps everything."""
-    ends = np.linspace(0.0, 1.0, 11)
-    primitive = np.polynomial.Polynomial([-1.0 + 0.46**2, -0.92, 1.0])
+@pytest.mark.parametrize("ends", [np.linspace(0.0, 1.0, 11), [0.0, 1.0], [0.0, 0.45, 1.0]])
+def test_the_deepest_place_is_between_the_rows(ends):
+    """u = −1 + (t − 0.46)², of which the polynomial of a step keeps everything."""
+    numbers = found(moving(ends, np.polynomial.Polynomial([-1.0 + 0.46**2, -0.92, 1.0])))
+    assert numbers["deepest_tip"] == pytest.approx(-1.0, abs=1e-13)
+    assert numbers["deepest_tip_time"] == pytest.approx(0.46, abs=1e-6)  # where u is flat to 1e-12 m
+
+
+def test_the_deepest_place_may_follow_an_event():
+    """At 0.5 the tip is thrown down from −1: it goes on as −1 − (t − ½) + 2 (t − ½)², lowest at 0.75."""
+    before, after = np.polynomial.Polynomial([-2.0, 2.0]), np.polynomial.Polynomial([0.0, -3.0, 2.0])
+    steps = np.append(moving([0.0, 0.5], before), moving([0.5, 1.0], after)[1:])
+    numbers = found(steps, Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))
+    assert numbers["deepest_tip"] == -2.0
+    numbers = found(moving([0.5, 1.0], after), Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))
+    assert numbers["deepest_tip"] == pytest.approx(-1.125, abs=1e-13)
+    assert numbers["deepest_tip_time"] == pytest.approx(0.75, abs=1e-6)
+
+
+def moving(ends, path):
+    """Steps between ``ends`` of a tip on ``path``, a polynomial."""
 
     def integrals(a, b):
-        once = primitive.integ(lbnd=a)
+        once = path.integ(lbnd=a)
         return once(b), once.integ(lbnd=a)(b)
 
-    steps = steps_with(lambda t: (0.0, 0.0, 0.0), ends, primitive, primitive.deriv(), integrals)
-    events = [Event(float(ends[k]), "impact") for k in (4, 5)] if struck else []
-    numbers = found(steps, *events)
-    if struck:
-        assert (numbers["deepest_tip"], numbers["deepest_tip_time"]) == (pytest.approx(-1.0 + 0.04**2), 0.5)
-    else:
-        assert numbers["deepest_tip"] == pytest.approx(-1.0, abs=1e-14)
-        assert numbers["deepest_tip_time"] == pytest.approx(0.46, abs=1e-7)
+    return steps_with(lambda t: (0.0, 0.0, 0.0), ends, path, path.deriv(), integrals)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_extremes_are_those_of_a_fine_grid(seed):
+    """Of 40 quintics with coefficients of any size, and of those that are constant or straight."""
+    random = np.random.default_rng(seed)
+    powers = random.normal(size=(6, 40)) * 10.0 ** random.uniform(-3.0, 1.0, (6, 40))
+    powers[1:, :5] = powers[2:, 5:10] = 0.0
+    start, size = np.arange(40.0), np.full(40, 0.5)
+    share = np.linspace(0.0, 1.0, 4001)
+    grid = np.polynomial.polynomial.polyval(share, powers)
+    rows = Extremes.of_rows(start, powers[0])
+    low, low_time, high, high_time = rows.beside(powers, start, size)
+    scale = np.abs(grid).max()
+    assert grid.min() - 1e-5 * scale <= low <= grid.min() + 1e-14 * scale
+    assert grid.max() - 1e-14 * scale <= high <= grid.max() + 1e-5 * scale
+    for value, time in ((low, low_time), (high, high_time)):
+        step = int(time)
+        there = np.polynomial.polynomial.polyval((time - step) / 0.5, powers[:, step])
+        assert there == pytest.approx(value, abs=1e-13 * scale)
 
 
 def test_the_window_is_a_fiftieth_of_the_slowest_period():

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
+from springbeam.studies.sweep.metrics import METRICS
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
@@ -107,6 +110,33 @@ def test_soft_contact_opens_where_the_ends_part():
     opened = next(event.time for event in run.events if event.kind == "separation")
     around = run.at([opened - 1e-5, opened + 1e-5])
     assert around.phase.tolist() == ["touch", "free"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"contact": {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}}, {"spring": None, "stop": None}],
+    ids=["transmission", "compliance", "beam alone"],
+)
+def test_extremes_are_those_of_the_curve(changes):
+    """Metrics and the summary beside 200 points a step: no point is beyond, and one is near."""
+    run = simulate(with_changes(SOFT, time={"t_end": 0.7}, coupling={"macro_step": 5e-3}, **changes))
+    # Between events: what `at` returns there, and just before them.
+    points = [np.linspace(a, b, 201)[:-1] for a, b in pairwise(np.unique(run.time))]
+    fine = run.at(np.append(np.concatenate(points), run.time[-1]))
+    pairs = [("u_tip_min", "u_tip", np.min), ("u_tip_max", "u_tip", np.max), ("y_min", "y", np.min)]
+    pairs += [("y_max", "y", np.max), ("gap_max", "gap", np.max), ("z_max", "z", lambda z: np.abs(z).max())]
+    seen = 0
+    for name, column, of in pairs:
+        value = METRICS[name](run)
+        if column not in run.columns:
+            assert value is None
+            continue
+        grid, scale = of(fine[column]), np.abs(fine[column]).max()
+        beyond = value - grid if of is not np.min else grid - value
+        assert -1e-12 * scale <= beyond <= 1e-3 * scale, name
+        seen += abs(value - of(run[column])) > 1e-6 * scale
+    assert run.summary["deepest_tip"] == METRICS["u_tip_min"](run)
+    assert seen  # rows alone would not do
 
 
 def test_times_that_are_not_known_are_refused(tmp_path):

@@ -18,10 +18,13 @@ between rows are no more accurate than the rows.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 
+from .extremes import Extremes
 from .paths import Path
 from .steps import contact_force, load_on_spring
 from .trajectory import Trajectory
@@ -58,6 +61,73 @@ def at(run: Trajectory, times: Any) -> Trajectory:
     return Trajectory(run.scene, columns, list(run.events), run.shapes, dict(run.summary))
 
 
+def extremes(run: Trajectory, name: str) -> Extremes:
+    """Return the lowest and the highest value of a column of the motion on the curve that `at` follows.
+
+    ``name`` is ``u_tip``, ``v_tip``, ``y``, ``z`` or ``gap``. A run that left no steps has its rows only.
+    """
+    values, times = run.columns[name], run.columns["time"]
+    found = Extremes.of_rows(times, values)
+    if run.steps is None:
+        return found
+    after = np.flatnonzero(run.steps["size"] > 0.0)
+    steps, before = run.steps[after], after - 1
+    start = {key: column[before] for key, column in run.columns.items()}
+    powers = motion(steps, start, _held_together(run, before))
+    if name in powers:
+        curve = powers[name]
+    else:  # a gap above the stop
+        assert run.scene.stop is not None
+        curve = powers["u_tip"].copy()
+        curve[0] -= run.scene.stop.position
+    return found.beside(curve, start["time"], steps["size"])
+
+
+def motion(steps: np.ndarray, start: Mapping[str, np.ndarray], joined: np.ndarray) -> dict[str, np.ndarray]:
+    """Return displacements, velocities and gap over each of ``steps`` as polynomials of s = τ/H.
+
+    Parameters
+    ----------
+    steps
+        Of sizes above 0 and of dtype `springbeam.results.steps.STEP`, shape (n,).
+    start
+        Columns ``u_tip``, ``v_tip``, ``y``, ``z`` at the start of each step, after what happens there, as far as the
+        scene has them: [m] and [m/s], shape (n,).
+    joined
+        Whether a rigid law holds the ends together over the step, shape (n,).
+
+    Returns
+    -------
+    dict
+        The coefficients of 1, s … s⁵ of ``u_tip``, ``v_tip``, ``y``, ``z`` and, of a pair, ``gap``, shape (6, n).
+    """
+    found: dict[str, np.ndarray] = {}
+    size: Any = steps["size"]
+    for position, velocity in (("u_tip", "v_tip"), ("y", "z")):
+        if position in start:
+            begin: Any = (start[position], start[velocity])
+            end: Any = (steps[position], steps[velocity])
+            means: Any = (steps[f"{position}_integral"] / size, steps[f"{position}_integral_2"] / size**2)
+            path: Any = Path.through(begin, end, size, means)
+            powers = np.array(path.powers)
+            found[position] = powers
+            found[velocity] = np.vstack([np.arange(1.0, 6.0)[:, None] * powers[1:] / size, np.zeros_like(size)])
+    if "u_tip" in found and "y" in found:
+        for of_tip, of_low in (("u_tip", "y"), ("v_tip", "z")):
+            together = found[of_low].copy()
+            apart = start[of_tip] - start[of_low]
+            together[:2] += apart, steps[of_tip] - steps[of_low] - apart
+            found[of_tip] = np.where(joined, together, found[of_tip])
+        found["gap"] = found["u_tip"] - found["y"]
+    return found
+
+
+def _held_together(run: Trajectory, row: np.ndarray) -> np.ndarray:
+    """Return whether a rigid law holds the ends together from each ``row`` on."""
+    phase = run.columns["phase"][row]
+    return np.asarray(run.scene.contact.rigid & ((phase == "tied") | (phase == "touch")))
+
+
 class _Between:
     """Columns at times strictly between a row and the one after it; ``row`` is the row before each time."""
 
@@ -66,24 +136,18 @@ class _Between:
         start, end = run.columns["time"][row], run.columns["time"][row + 1]
         self._share = (times - start) / (end - start)
         self._tau = self._share * self._steps["size"]
-        self._seated = run.columns["phase"][row] == "seated"
 
     def columns(self) -> dict[str, np.ndarray]:
         run, steps = self._run, self._steps
         contact = run.scene.contact
         found: dict[str, np.ndarray] = {}
-        for position, velocity in (("u_tip", "v_tip"), ("y", "z")):
-            if position in run.columns:
-                found[position], found[velocity] = self._path(position, velocity)
-        at = self._run.columns["time"][self._row] + self._tau
+        start = {name: values[self._row] for name, values in run.columns.items()}
+        curves = motion(steps, start, _held_together(run, self._row))
+        curves.pop("gap", None)
+        found |= {name: polyval(self._share, powers, tensor=False) for name, powers in curves.items()}
+        at = run.columns["time"][self._row] + self._tau
         found |= {f"load_{i}": load.value(at) for i, load in enumerate(run.scene.loads)}
-        pair = "u_tip" in found and "y" in found
-        phase = run.columns["phase"][self._row]
-        if pair and contact.rigid:
-            joined = (phase == "tied") | (phase == "touch")
-            for of_tip, of_low, apart in (("u_tip", "y", "gap"), ("v_tip", "z", "velocity_mismatch")):
-                together = found[of_low] + self._linear(apart, steps[of_tip] - steps[of_low])
-                found[of_tip] = np.where(joined, together, found[of_tip])
+        pair, phase = "u_tip" in found and "y" in found, start["phase"]
         found |= {name: self._linear(name, run.columns[name][self._row + 1]) for name in _LINEAR if name in run.columns}
         found |= self._mechanical()
         if "contact_force_smoothed" in run.columns:
@@ -103,7 +167,7 @@ class _Between:
         if pair:
             found["gap"] = found["u_tip"] - found["y"]
             if not (contact.rigid or contact.lasting):
-                phase = np.where(self._seated, phase, np.where(found["gap"] < 0.0, "touch", "free"))
+                phase = np.where(phase == "seated", phase, np.where(found["gap"] < 0.0, "touch", "free"))
                 found["phase"] = phase
             found["velocity_mismatch"] = np.where(phase == "free", 0.0, found["v_tip"] - found["z"])
         elif "gap" in run.columns:
@@ -114,15 +178,6 @@ class _Between:
         found["e_total"] = sum((found[name] for name in energies), np.zeros_like(force))
         found["energy_residual"] = found["e_total"] - (run.columns["e_total"][0] - run.columns["energy_residual"][0])
         return found
-
-    def _path(self, position: str, velocity: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return displacement [m] and velocity [m/s] of an end."""
-        steps, size = self._steps, self._steps["size"]
-        start: Any = (self._run.columns[position][self._row], self._run.columns[velocity][self._row])
-        end: Any = (steps[position], steps[velocity])
-        means: Any = (steps[f"{position}_integral"] / size, steps[f"{position}_integral_2"] / size**2)
-        path: Any = Path.through(start, end, size, means)
-        return path.at(self._share), path.slope(self._share) / size
 
     def _linear(self, name: str, end: np.ndarray) -> np.ndarray:
         """Return what goes from the row's value to ``end``, which is reached before the event of the next row."""

@@ -14,8 +14,9 @@ import numpy as np
 
 from ..scene import Scene
 from .contact_times import SLIGHT, foundation_contacts, tip_contacts
-from .paths import Path
-from .steps import impulse, load_on_spring
+from .dense import motion
+from .extremes import Extremes
+from .steps import contact_force, impulse, load_on_spring
 from .trajectory import Event
 
 
@@ -90,7 +91,8 @@ def totals(
     if scene.coupled or (beam and stop):
         found |= _contact(scene, steps, events, window, free_at_end)
     if beam:
-        found["deepest_tip"], found["deepest_tip_time"] = _deepest(steps, {event.time for event in events})
+        contacts = tip_contacts(events, inf, free_at_end=free_at_end)
+        found["deepest_tip"], found["deepest_tip_time"] = _deepest(scene, steps, events, contacts)
     if stop:
         found["stop_strokes"] = sum(event.kind in ("stop_impact", "seated") for event in events)
         found["foundation_impulse"] = _of_foundation(scene, steps) + sum(event.impulse_foundation for event in events)
@@ -161,14 +163,45 @@ def _cumulative(steps: np.ndarray, events: list[Event]) -> tuple[np.ndarray, np.
 
 
 def _largest_mean(steps: np.ndarray, before: np.ndarray, after: np.ndarray, window: float) -> float:
-    """Return the largest mean of C [N] over windows of ``window`` [s] that begin or end at a row.
+    """Return the largest mean of C [N] over windows of ``window`` [s], wherever they begin.
 
     An impulse at the edge of a window belongs to it if that makes the mean larger.
     """
     time = steps["time"]
     ending = np.maximum(before, after) - _impulse_until(steps, time, after, time - window)
     beginning = _impulse_until(steps, time, after, time + window) - np.minimum(before, after)
-    return max(0.0, float(ending.max()), float(beginning.max())) / window
+    # Inside steps the mean is largest where C is the same at both edges of the window.
+    edges = np.union1d(time, time - window)
+    since = edges[:-1] + _equal_at_both_edges(steps, edges, window)
+    inside = _impulse_until(steps, time, after, since + window) - _impulse_until(steps, time, after, since)
+    return max(0.0, *(float(found.max(initial=0.0)) for found in (ending, beginning, inside))) / window
+
+
+def _equal_at_both_edges(steps: np.ndarray, edges: np.ndarray, window: float) -> np.ndarray:
+    """Return how long after each of ``edges`` C becomes smaller ``window`` later than now; all [s].
+
+    It is 0, as well, where that does not happen up to the next edge: shapes (n,), and (n - 1,) of what is returned.
+    Between edges no window begins or ends at a row, so that both forces are of degree 2.
+    """
+    length = np.diff(edges)
+    middle = edges[:-1] + 0.5 * length
+    c, b, a = (late - early for late, early in zip(_force(steps, middle + window), _force(steps, middle), strict=True))
+    # The root of a τ² + b τ + c at which it falls is 2 c / (√(b² - 4 a c) - b), also where a is 0.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = 2.0 * c / (np.sqrt(b**2 - 4.0 * a * c) - b)
+    return np.where(np.abs(root) < 0.5 * length, root + 0.5 * length, 0.0)
+
+
+def _force(steps: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return C, Ċ and C̈/2 at ``times`` [s], none of them a row's: 0 before the first row and after the last."""
+    time = steps["time"]
+    end = np.searchsorted(time, times)
+    known = (end > 0) & (end < len(time))
+    end = np.where(known, end, 0)
+    tau = times - (time[end] - steps["size"][end])
+    rate, curvature = steps["contact_force_rate"][end], steps["contact_force_rate_2"][end]
+    force = contact_force(steps[end], tau)
+    return known * force, known * (rate + tau * curvature), known * 0.5 * curvature
 
 
 def _impulse_until(steps: np.ndarray, time: np.ndarray, after: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -193,19 +226,24 @@ def _of_foundation(scene: Scene, steps: np.ndarray) -> float:
     return float(seated.sum())
 
 
-def _deepest(steps: np.ndarray, struck: set[float]) -> tuple[float, float]:
-    """Return the tip's lowest place [m] and its time [s], also between the rows; not past an event's kink."""
-    time, u = steps["time"], steps["u_tip"]
-    row = int(np.argmin(u))
-    found, at = float(u[row]), float(time[row])
-    for end in (row, row + 1):
-        if not 0 < end < len(steps) or steps["size"][end] == 0.0 or float(time[end - 1]) in struck:
-            continue
-        names = ["u_tip", "v_tip", "u_tip_integral", "u_tip_integral_2"]
-        (u0, v0, _, _), (u1, v1, once, twice) = (steps[names][i].item() for i in (end - 1, end))
-        size = float(steps["size"][end])
-        path = Path.through((u0, v0), (u1, v1), size, (once / size, twice / size**2))
-        bottom = path.lowest_inside()
-        if bottom is not None and path.at(bottom) < found:
-            found, at = path.at(bottom), float(time[end - 1]) + bottom * size
-    return found, at
+def _deepest(
+    scene: Scene, steps: np.ndarray, events: list[Event], contacts: list[tuple[float, float]]
+) -> tuple[float, float]:
+    """Return the tip's lowest place [m] and its time [s], also between the rows; ``contacts`` are with a spring."""
+    time = steps["time"]
+    start = {name: steps[name].copy() for name in ("u_tip", "v_tip", *(("y", "z") if scene.lower is not None else ()))}
+    for event in events:  # what happens at a row changes the velocities with which the next step begins
+        row = np.searchsorted(time, event.time, side="right") - 1
+        if time[row] == event.time:
+            start["v_tip"][row] = event.v_tip
+            if "z" in start:
+                start["z"][row] = event.z
+    after = np.flatnonzero(steps["size"] > 0.0)
+    start = {name: values[after - 1] for name, values in start.items()}
+    joined = np.zeros(len(after), dtype=bool)
+    if scene.contact.rigid:
+        for since, until in contacts:
+            joined |= (time[after - 1] >= since) & (time[after] <= until)
+    curve = motion(steps[after], start, joined)["u_tip"]
+    found = Extremes.of_rows(time, steps["u_tip"]).beside(curve, time[after - 1], steps["size"][after])
+    return found.lowest, found.lowest_time

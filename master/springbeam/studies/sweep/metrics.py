@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 
 import numpy as np
 
+from ...results.dense import extremes
+from ...results.extremes import Extremes
 from ...results.totals import LOSS_NAMES, TOTALS
 from ...results.trajectory import EVENT_KINDS, Trajectory
 
@@ -28,6 +30,10 @@ def _of(column: str, pick: Callable[[np.ndarray], float]) -> Callable[[Trajector
     return lambda run: float(pick(run[column])) if column in run.columns else None
 
 
+def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajectory], float | None]:
+    return lambda run: pick(extremes(run, column)) if column in run.columns else None
+
+
 def _first(kind: str) -> Callable[[Trajectory], float | None]:
     return lambda run: next((event.time for event in run.events if event.kind == kind), None)
 
@@ -43,14 +49,14 @@ def _total(name: str) -> Callable[[Trajectory], float | None]:
 _last: Callable[[np.ndarray], float] = itemgetter(-1)
 
 METRICS: dict[str, Metric] = {
-    "u_tip_min": Metric("m", "lowest row of the tip", _of("u_tip", np.min)),
-    "u_tip_max": Metric("m", "highest row of the tip", _of("u_tip", np.max)),
+    "u_tip_min": Metric("m", "lowest place of the tip", _extreme("u_tip", attrgetter("lowest"))),
+    "u_tip_max": Metric("m", "highest place of the tip", _extreme("u_tip", attrgetter("highest"))),
     "u_tip_end": Metric("m", "the tip at the end", _of("u_tip", _last)),
-    "y_min": Metric("m", "lowest row of the spring's top", _of("y", np.min)),
-    "y_max": Metric("m", "highest row of the spring's top", _of("y", np.max)),
+    "y_min": Metric("m", "lowest place of the spring's top", _extreme("y", attrgetter("lowest"))),
+    "y_max": Metric("m", "highest place of the spring's top", _extreme("y", attrgetter("highest"))),
     "y_end": Metric("m", "the spring's top at the end", _of("y", _last)),
-    "z_max": Metric("m/s", "largest speed of the spring's top", _of("z", lambda z: np.max(np.abs(z)))),
-    "gap_max": Metric("m", "largest gap", _of("gap", np.max)),
+    "z_max": Metric("m/s", "largest speed of the spring's top", _extreme("z", lambda z: max(z.highest, -z.lowest))),
+    "gap_max": Metric("m", "largest gap", _extreme("gap", attrgetter("highest"))),
     **{name: Metric(unit, words, _total(name)) for name, (words, unit) in TOTALS.items()},
     **{name: Metric("J", f"energy lost by {words}", _total(name)) for name, words in LOSS_NAMES.items()},
     "dissipated": Metric("J", "energy lost to damping", _of("e_dissipated", _last)),
