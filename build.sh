@@ -7,6 +7,7 @@ usage() {
   cat <<'TEXT'
 ./build.sh run [SCENE] [OPTION]…   set up, build, and simulate a scene (default: soft)
 ./build.sh test [PYTEST OPTION]…   set up, build, and run all tests (C++, then Python)
+./build.sh kernels [OPTION]…        run the numeric tests as on other processors: with the linear algebra of three of them
 ./build.sh fmus                    set up and build fmus/beam.fmu, spring.fmu and spring_beam.ssp
 ./build.sh win64                   also cross-compile for 64-bit Windows; the FMUs then carry both
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
@@ -157,6 +158,27 @@ case $command in
     say "Python tests"
     $python -m pytest -n auto --dist worksteal -m "not slow" "$@" || failed="${failed:+$failed and }Python tests"
     [ -z "$failed" ] || die "failed: $failed"
+    ;;
+  kernels)
+    build
+    # What numpy uses of this processor beyond what it needs.
+    features=$($python -c 'from numpy._core._multiarray_umath import __cpu_dispatch__ as extra, __cpu_features__ as has
+print(*(name for name in extra if has[name]))')
+    failed=
+    numeric_tests() { # KERNEL [PYTEST OPTION]…
+      local kernel=$1
+      shift
+      say "numeric tests with OpenBLAS for $kernel"
+      OPENBLAS_CORETYPE=$kernel $python -m pytest -n auto --dist worksteal -m "not slow" \
+        tests/contract tests/master tests/system "$@" || failed="$failed $kernel"
+    }
+    grep -qw avx512bw /proc/cpuinfo && numeric_tests SkylakeX "$@" || say "this processor has no AVX-512: no SkylakeX"
+    grep -qw avx2 /proc/cpuinfo && numeric_tests Haswell "$@" || say "this processor has no AVX2: no Haswell"
+    # The oldest: also libm (names of glibc before 2.33, and since) and numpy without AVX2 and FMA.
+    export GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX2_Usable,-FMA_Usable,-FMA4_Usable,-AVX2,-FMA,-FMA4
+    export NPY_DISABLE_CPU_FEATURES=$features
+    numeric_tests Prescott "$@"
+    [ -z "$failed" ] || die "failed with:$failed"
     ;;
   win64)
     build fmus

@@ -15,6 +15,8 @@ from springbeam.cli import app
 testing._get_command = cache(typer.main.get_command)
 COMMAND = testing._get_command(app)
 
+#: What takes longer hangs, however busy the machine [s].
+HANGS = 3600.0
 #: What a terminal or a CI service may have set.
 PLAIN = {"COLUMNS": "80", "TERMINAL_WIDTH": None, "FORCE_COLOR": None, "PY_COLORS": None, "GITHUB_ACTIONS": None}
 

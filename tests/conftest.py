@@ -12,6 +12,7 @@ from typing import Any
 # more threads of OpenBLAS only wait for each other, and spin meanwhile.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import hypothesis
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -23,6 +24,10 @@ ROOT = Path(__file__).resolve().parents[1]
 
 # The folders of the helper modules: commands.py here, the others beside the tests that use them.
 sys.path[:0] = [str(ROOT / "tests" / folder) for folder in (".", "master", "system")]
+
+# Every run of the tests draws the same examples, however busy the machine, whatever an earlier run has found.
+hypothesis.settings.register_profile("springbeam", derandomize=True, database=None, deadline=None)
+hypothesis.settings.load_profile("springbeam")
 
 # A shell ignores it in what it runs in the background, and so would the programs that tests start and interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -11,6 +11,7 @@ from typing import Any
 
 import fmpy
 import pytest
+from commands import HANGS
 
 HERE = Path(__file__).resolve().parent
 HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -18,7 +19,7 @@ ZIG = HERE.parents[1] / "build" / "win64" / "zig-cc"
 
 
 def run(*command: str | Path, **options: Any) -> str:
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=300, **options)
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=HANGS, **options)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

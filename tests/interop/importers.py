@@ -12,6 +12,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from commands import HANGS
 
 HERE = Path(__file__).resolve().parent
 SIZE, END = 1e-3, 0.4
@@ -55,7 +56,7 @@ def run(*command: str | Path, cwd: Path | None = None, env: dict[str, str] | Non
         env={**os.environ, **(env or {})},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=HANGS,
     )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     return done.stdout

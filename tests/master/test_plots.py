@@ -7,7 +7,7 @@ import dataclasses
 import matplotlib
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 from matplotlib.image import imread
@@ -246,7 +246,6 @@ def test_residual_is_relative_to_the_largest_energy():
 # -- thinning -----------------------------------------------------------------------------------------------------
 
 
-@settings(deadline=None)
 @given(
     values=npst.arrays(float, st.integers(1, 3000), elements=st.floats(-1e6, 1e6)),
     columns=st.integers(2, 60),

@@ -181,7 +181,7 @@ def test_what_a_file_cannot_hold_is_refused(make, bad):
 finite = st.floats(allow_nan=False, allow_infinity=False)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(values=st.lists(st.tuples(finite, finite), min_size=1, max_size=40))
 def test_numbers_survive_a_file_bit_for_bit(tmp_path_factory, values):
     path = tmp_path_factory.mktemp("run")

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scenes import scene_from_dict
 
@@ -236,7 +236,6 @@ def outcome(data):
         return str(refusal)
 
 
-@settings(deadline=None)
 @given(
     key=st.sampled_from(list(load_scene("soft").beam.model_dump())),
     value=st.one_of(st.booleans(), st.integers(), st.floats(), st.text(max_size=5)),

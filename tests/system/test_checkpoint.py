@@ -18,7 +18,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from commands import Interrupt, printed, refused, written
+from commands import HANGS, Interrupt, printed, refused, written
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -320,7 +320,7 @@ def started(directory: Path) -> subprocess.Popen[str]:
     """The command, once it has taken a checkpoint."""
     program = [sys.executable, "-m", "springbeam", *LONG, "--out", str(directory), "--checkpoint", "0.05"]
     run = subprocess.Popen(program, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + HANGS
     while not (directory / "run.checkpoint").exists():
         assert time.monotonic() < deadline
         time.sleep(0.01)
@@ -332,7 +332,7 @@ def started(directory: Path) -> subprocess.Popen[str]:
 def test_a_signal_ends_the_command_with_3_and_it_goes_on(tmp_path, long, number):
     run = started(tmp_path / "run")
     run.send_signal(number)
-    _, errors = run.communicate(timeout=60)
+    _, errors = run.communicate(timeout=HANGS)
     assert run.returncode == 3
     assert "interrupted (reached t = " in errors
     assert "Traceback" not in errors
@@ -349,7 +349,7 @@ def test_a_run_without_room_ends_with_3_and_goes_on_where_there_is(tmp_path, lon
     run = started(tmp_path / "run")
     limit = (tmp_path / "run" / "trajectory.csv").stat().st_size + 50_000
     resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (limit, limit))
-    _, errors = run.communicate(timeout=120)
+    _, errors = run.communicate(timeout=HANGS)
     assert run.returncode == 3
     assert "the run stopped early: " in errors
     assert "File too large" in errors

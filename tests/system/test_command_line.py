@@ -12,7 +12,7 @@ from importlib import util
 from pathlib import Path
 
 import pytest
-from commands import COMMAND, Interrupt, command, printed, refused
+from commands import COMMAND, HANGS, Interrupt, command, printed, refused
 from typer.testing import CliRunner
 
 from springbeam.bodies.archive import fmu_directory
@@ -233,7 +233,7 @@ for line in ("--help", "scenes", "run sotf", "rnu"):
         print("code", end.code)
 """
     environment = {key: value for key, value in os.environ.items() if key not in FORCING}
-    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, env=environment, text=True, timeout=60)
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, env=environment, text=True, timeout=HANGS)
     assert re.findall(r"^code (\d)", ran.stdout, re.M) == ["0", "0", "2", "2"]
     assert "\x1b" not in ran.stdout + ran.stderr
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from commands import COMMAND, command
+from commands import COMMAND, HANGS, command
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -140,7 +140,7 @@ def test_commands_of_the_documentation_run(desk, page, unpainted, monkeypatch):
             if reason_not_to_run(line):
                 continue
             if ">" in line:  # what a shell does; all others are run in this process, which has imported everything
-                ran = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=100)
+                ran = subprocess.run(["bash", "-c", line], capture_output=True, text=True, timeout=HANGS)
                 code, said = ran.returncode, ran.stderr
             else:
                 program, *arguments = shlex.split(line, comments=True)

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import printed, written
+from commands import HANGS, printed, written
 from test_faults import PATH, SCENE
 
 from springbeam.results.reading import load_trajectory
@@ -48,7 +48,7 @@ def interrupted(number: signal.Signals, fmu: str, function: str, where: str, ski
         with pytest.raises(subprocess.TimeoutExpired):  # it does hang
             process.wait(0.2)
         process.send_signal(number)
-        output, errors = process.communicate(timeout=20)
+        output, errors = process.communicate(timeout=HANGS)
     finally:
         process.kill()
     assert process.returncode == 3

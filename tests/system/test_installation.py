@@ -11,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from commands import command, printed
+from commands import HANGS, command, printed
 from packaging.requirements import Requirement
 
 from springbeam.scene.reading import tomllib
@@ -57,7 +57,7 @@ print(springbeam.__file__, len(springbeam.simulate(springbeam.load_scene("duffin
 """
     run = subprocess.run(
         [sys.executable, "-c", script], env={"PYTHONPATH": str(tmp_path / "site"), "PATH": ""}, cwd=tmp_path,
-        capture_output=True, text=True, check=True, timeout=100,
+        capture_output=True, text=True, check=True, timeout=HANGS,
     )  # fmt: skip
     assert run.stdout.split() == [str(tmp_path / "site/springbeam/__init__.py"), "2001"]
 
@@ -97,5 +97,5 @@ except SystemExit as end:
     print(end.code, sockets)
 """
     command = [sys.executable, "-c", script, str(tmp_path / "out")]
-    run = subprocess.run(command, capture_output=True, text=True, check=True, timeout=100)
+    run = subprocess.run(command, capture_output=True, text=True, check=True, timeout=HANGS)
     assert run.stdout.splitlines()[-1] == "0 []", run.stdout

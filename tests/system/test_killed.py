@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import written
+from commands import HANGS, written
 
 from springbeam.results.reading import load_trajectory
 
@@ -94,7 +94,7 @@ class Nursery:
         return text
 
     def close(self) -> None:
-        self._process.communicate(timeout=60)
+        self._process.communicate(timeout=HANGS)
 
 
 @pytest.fixture(scope="module")

@@ -36,13 +36,8 @@ def randomized(test: Callable[[], None]) -> Callable[[], None]:
     chosen = os.environ.get("SPRINGBEAM_SEED")
     if chosen is not None:
         test = seed(int(chosen))(test)
-    return settings(
-        max_examples=EXAMPLES,
-        derandomize=chosen is None,
-        database=None,
-        deadline=None,
-        suppress_health_check=list(HealthCheck),
-    )(test)
+    every = list(HealthCheck)
+    return settings(max_examples=EXAMPLES, derandomize=chosen is None, suppress_health_check=every)(test)
 
 
 def decades(low: float, high: float) -> st.SearchStrategy[float]:
