@@ -32,6 +32,7 @@ def test_each_frame_is_a_recorded_one():
         for line, part, factor in shown._moving:
             assert np.array_equal(line.get_ydata(), factor * motion.heights(part, frame))
         assert np.array_equal(motion.heights("beam", frame), run.shapes[1][frame])
+        assert motion.at(run.time[frame]) == frame
         assert shown._cursor.get_xdata() == [run.time[frame]] * 2
         assert shown._words.get_text().split() == ["t", "=", f"{run.time[frame]:.4f}", "s", str(run.phase[frame])]
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from commands import command, printed, refused
+from matplotlib.figure import Figure
 from rich.console import Console
 
 import springbeam.run.runner
@@ -78,6 +79,18 @@ def test_a_run_leaves_results_and_pictures_and_says_where(here, unpainted):
     assert event.split() == ["impact", "0.10000000", "0.5", "-1", "0.25", "0.125"]
     summary = json.loads((here / "results" / "soft" / "summary.json").read_text(encoding="utf-8"))
     assert {key: summary[key] for key in SUMMARY} == SUMMARY
+
+
+def test_a_picture_that_cannot_be_written_ends_with_3_and_loses_nothing(here, monkeypatch):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Figure, "savefig", full)
+    result = command("run", "soft")
+    assert result.exit_code == 3
+    assert "no pictures: " in result.stderr
+    assert "No space left on device; what was computed is in results/soft" in " ".join(result.stderr.split())
+    assert len(load_trajectory(here / "results" / "soft")) == 31
 
 
 def test_results_are_named_after_the_file_and_a_second_run_does_not_touch_the_first(here):

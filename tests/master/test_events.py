@@ -9,7 +9,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from springbeam.bodies.protocol import Motion
-from springbeam.contact.events import EventFunctions, clearance, locate
+from springbeam.contact.events import EventFunctions, Height, clearance, gap, locate
 from springbeam.contact.laws import Transmission
 from springbeam.contact.phases import Joint, Phase, common_velocity
 from springbeam.results.paths import Path, Sample
@@ -95,6 +95,25 @@ def test_locate_gives_up_where_time_itself_is_rounded():
     h = located(f, 3.0, 0.0, 1e6)
     assert abs(h - math.acos(0.3)) <= 4.0 * np.finfo(float).eps * 1e6
     assert len(f.sizes) - 2 <= 35  # 3/(4 ulp of 1e6) = 2^31.6
+
+
+@pytest.mark.parametrize(
+    "function", [gap, Height(0, 0.3, 0.0), Height(1, 0.3, 1.0, -1.0)], ids=["gap", "above", "below"]
+)
+def test_means_of_event_functions_are_their_integrals(function):
+    """∫ f dτ/H and ∫∫ f dτ dτ/H² of ends that move as polynomials, f by itself along the step."""
+    motions = Polynomial((0.5, -2.0, 30.0, 7.0)), Polynomial((0.1, 1.0, -20.0))
+
+    def value(tau):
+        return function(tuple(Motion(w(tau), w.deriv()(tau), 0.0, 0.0) for w in motions))[0]
+
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    tau = 0.5 * SIZE * (nodes + 1.0)
+    f = np.array([value(t) for t in tau])
+    # ∫∫ f = ∫ (H − τ) f dτ
+    expected = 0.5 * weights @ f, 0.5 * weights @ ((1.0 - tau / SIZE) * f)
+    ends = tuple(Motion(w(SIZE), 0.0, w.integ()(SIZE), w.integ(2)(SIZE)) for w in motions)
+    assert function.means(ends, SIZE) == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize(("v", "z", "rate"), [(-0.4, 0.1, -0.3), (-0.1, 0.4, -0.0), (0.4, -0.1, 0.3)])

@@ -18,6 +18,8 @@ from springbeam.results.totals import totals
 from springbeam.run.loads import Loads, Signal
 from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid
 from springbeam.scene import Load, Scene, SceneError, load_scene, with_changes
+from springbeam.scene.linearised import contact_energy
+from springbeam.scene.statics import tip_compliance, tip_force_shape
 
 RECORD = np.column_stack([np.linspace(0.0, 0.05, 26), 3.0 * np.sin(200.0 * np.linspace(0.0, 0.05, 26))])
 #: One of each signal, on all places.
@@ -68,6 +70,16 @@ def test_the_projection_is_that_of_the_signal(name, start, size):
         tau = 0.5 * size * (NODES + 1.0)
         mine = 0.5 * size * WEIGHTS @ (np.array([force.value(f, x) for x in tau]) * (tau / size) ** power)
         assert mine == pytest.approx(exact, abs=2e-14 * size * abs(load.amplitude) * 3.0)
+
+
+@pytest.mark.parametrize("at", [0.25, 0.6, 1.0])
+def test_a_point_force_counts_by_how_far_it_moves_the_tip_of_a_slender_beam(at):
+    """At x it moves the tip as far as a force at the tip moves x; begun at once it does 2 F²/k there."""
+    beam = {"shear_modulus": 1e12, "initial_velocity_slope": 0.0, "approach": "elastic"}
+    load = {"on": "beam", "at": at, "amplitude": 10.0}
+    scene = with_changes(load_scene("soft"), beam=beam).model_copy(update={"loads": (Load(**load),)})
+    moved, compliance = 10.0 * float(tip_force_shape(scene.beam, np.array([at]))[0]), tip_compliance(scene.beam)
+    assert contact_energy(scene) == pytest.approx(2.0 * moved**2 / compliance, rel=1e-6)
 
 
 def test_a_load_that_is_over_is_zero_without_being_looked_at(monkeypatch):
@@ -175,6 +187,24 @@ def test_a_base_that_falls_faster_than_the_spring_lifts_it_off_the_foundation():
     seated = (run.phase == "seated") & (exact.phase == "seated")
     assert run.foundation_force[seated] == pytest.approx(exact.foundation_force[seated], abs=0.1)
     assert run.summary["max_energy_residual"] < 1e-11
+
+
+@pytest.mark.parametrize(("degree", "bound"), [(0, 5e-5), (1, 1e-6)])
+def test_a_tied_pair_leaves_the_foundation_by_the_loads_until_then(degree, bound):
+    """A harmonic base lifts it; N changes by 2 N in a macro step. A load that jumps right after has no part in it."""
+    base = {"on": "base", "signal": "harmonic", "frequency": 6.0, "amplitude": -8.0}
+    beam = {"n_elements": 4, "young_modulus": 400.0, "shear_modulus": 400.0, "initial_velocity_slope": -0.5}
+    scene = scene_from_dict({
+        "time": {"t_end": 0.18},
+        "beam": {**beam, "alpha_b": 0.01},
+        "spring": {"linear_stiffness": 3.0, "external_force": -5.0},
+        "stop": {"position": -0.01, "restitution": 0.0},
+        "coupling": {"macro_step": 1e-3, "degree": degree},
+        "loads": [base, {"on": "spring", "signal": "step", "start": 0.1762, "amplitude": 5.0}],
+    })  # fmt: skip
+    found, exact = simulate(scene).events[:3], event_driven.simulate(scene).events[:3]
+    assert [event.kind for event in found] == ["impact", "seated", "unseated"]
+    assert [event.time for event in found] == pytest.approx([event.time for event in exact], abs=bound)
 
 
 @pytest.mark.parametrize("law", [("compliance", 1.0), ("compliance", 1.5), ("link", 1.0)])

@@ -45,6 +45,18 @@ def test_the_step_after_an_impact_is_short_and_the_next_one_back_on_the_grid():
     assert grid.next(1.99) == (2.0, 2.0 - 1.99)
 
 
+@pytest.mark.parametrize("end", [2.0, 1.97, 1.91, 1.03, 1.0 + 1.0 / 3.0])
+def test_the_grid_ends_where_the_run_does(end):
+    grid, times = MacroGrid(1.0, end, 0.1), [1.0]
+    while times[-1] < end:
+        target, size = grid.next(times[-1])
+        assert size == pytest.approx(target - times[-1], abs=1e-12)
+        times.append(target)
+        grid.reached(target)
+    assert times[-1] == end
+    assert times[:-1] == pytest.approx(1.0 + 0.1 * np.arange(len(times) - 1), abs=1e-12)
+
+
 def test_sizes_are_few_and_change_by_bounded_factors():
     """A quarter of an octave apart; at most doubled, at least an eighth, a fourth of the run at most."""
     steps, sizes = AdaptiveSteps(1.0, 1.0 + LENGTH), []

@@ -214,6 +214,7 @@ def test_bouncing_mass_comes_to_rest_at_the_zeno_time() -> None:
     for j, event in enumerate(bounces[:6]):
         assert event.time == pytest.approx(fall * (1.0 + 2.0 * (e - e ** (j + 1)) / (1.0 - e)), abs=1e-12)
         assert event.z == pytest.approx(e ** (j + 1) * g * fall, abs=1e-12)
+    assert len(bounces) == 19  # the next one would rise by e⁴⁰ < 1e-12 of the height, and is the last
     seated = result.events[-1]
     assert seated.kind == "seated"
     # The flights left out last 2v/(g(1 − e)), and rise v²/2g ≤ seat_height.

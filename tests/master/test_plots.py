@@ -102,6 +102,8 @@ def test_shapes_start_at_first_contact():
     assert t_c <= first < t_c + 0.6 / 399
     assert len(curves.get_segments()) == plots._SHAPES_EARLY
     assert len(velocities.get_segments()) == plots._SHAPES_EARLY - 1
+    times = curves.get_array()
+    assert np.allclose(velocities.get_array(), 0.5 * (times[1:] + times[:-1]), rtol=1e-12)
 
 
 def test_mean_velocity_of_shapes():
@@ -172,6 +174,17 @@ def test_panels_are_painted_with_all_that_they_say():
     assert [line.get_label() for line in energies.lines if line.get_label()[0] != "_"] == ["total"]
 
 
+def test_what_is_compared_is_drawn_in_the_unit_of_its_axis(tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(comparison.Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
+    run = a_trajectory()
+    comparison.draw({"one": run}, tmp_path / "compared.png")
+    units = {"u_tip": "[mm]", "v_tip": "[mm/s]", "contact_force": "[mN]"}
+    for ax, (column, unit) in zip(figures[0].axes, units.items(), strict=False):
+        assert ax.get_ylabel().endswith(unit)
+        assert np.abs(ax.lines[0].get_ydata()).max() == pytest.approx(1e3 * np.abs(run[column]).max(), rel=1e-12)
+
+
 def test_runs_in_which_nothing_moves_are_compared(tmp_path):
     still = a_trajectory(SCENES["spring"], y=np.zeros(400), z=np.zeros(400))
     comparison.draw({"one": still, "other": still}, tmp_path / "compared.png")
@@ -240,7 +253,10 @@ def test_energies_are_stacked_to_the_total_unless_one_is_negative_and_those_too_
 def test_residual_is_relative_to_the_largest_energy():
     trajectory = a_trajectory(e_beam=np.full(400, 3.0), energy_residual=np.full(400, -6e-12))
     stored = np.abs(trajectory.e_beam) + np.abs(trajectory.e_spring) + np.abs(trajectory.e_contact)
-    assert np.allclose(panel("residual", trajectory).curves[0].values, 6e-12 / stored.max(), rtol=1e-12)
+    for total in (0.0, 50.0):
+        trajectory.columns["e_total"] = np.full(400, total)
+        largest = max(stored.max(), total)
+        assert np.allclose(panel("residual", trajectory).curves[0].values, 6e-12 / largest, rtol=1e-12, atol=0.0)
 
 
 # -- thinning -----------------------------------------------------------------------------------------------------

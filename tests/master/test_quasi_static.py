@@ -48,6 +48,15 @@ def test_statics_are_those_of_a_mesh_that_holds_them() -> None:
     assert statics.tip_inertia(BEAM) == pytest.approx(shape @ d.M @ shape, rel=1e-12)
 
 
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_locking_is_the_stiffness_of_the_mesh_over_that_of_the_beam(degree: int) -> None:
+    mesh = {"element_degree": degree, "n_elements": 2, "shear_modulus": 4e3, "fidelity": "dynamic"}
+    beam = BEAM.model_copy(update=mesh)
+    d = assemble(beam)
+    ratio = statics.tip_compliance(beam) / spsolve(d.K, d.tip_vector)[d.tip]
+    assert statics.locking(beam) == pytest.approx(ratio, rel=1e-11)
+
+
 def test_a_slender_beam_moves_33_of_140_of_its_mass() -> None:
     slender = Beam.with_ones(second_moment_of_area=1e-8, young_modulus=1e8, shear_modulus=1e8)
     assert statics.tip_inertia(slender) == pytest.approx(33.0 / 140.0, rel=1e-6)

@@ -75,6 +75,13 @@ def test_the_limits_of_the_mismatch_and_of_the_shortest_contact(share, resolved)
     assert (not_resolved(PAIR, 0.0, 3.0, shortest_contact=lasted) is None) is resolved
 
 
+def test_a_contact_shorter_than_a_macro_step_is_said():
+    told = not_resolved(PAIR, 0.0, 3.0, shortest_contact=0.9 * PAIR.coupling.H)
+    assert told is not None
+    assert "a contact lasts 0.9 macro steps only" in told
+    assert not_resolved(PAIR, 0.0, 3.0, shortest_contact=3.0 * PAIR.coupling.H) is None
+
+
 def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
     coarse = with_changes(PAIR, coupling={"macro_step": 0.2})
     assert "slowest oscillation of the beam" in not_resolved(coarse, 0.0, 1.0)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bodies import simulate, stopping
+from bodies import DuffingBody, Upper, simulate, stopping
 from references import dips, kinds
 from scenes import scene_from_dict
 
@@ -94,6 +94,48 @@ def test_a_soft_contact_that_begins_at_the_start_is_an_impact_whatever_rounding_
     assert run.gap[0] == pytest.approx(roundings * np.spacing(0.1), abs=1e-30)
     assert (run.events[0].kind, run.phase[0]) == ("impact", "free")
     assert run.events[0].time == pytest.approx(0.0, abs=1e-14)
+
+
+def thrown_together(upper, lower, **tables):
+    """The run of two masses on a linear contact, instead of beam and spring."""
+    tables["contact"] = {"law": "compliance", "exponent": 1.0, **tables["contact"]}
+    return simulate(with_changes(load_scene("soft"), stop=None, **tables), lambda *_: (upper, lower))
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_masses_that_meet_and_part_swap_their_velocities(degree):
+    """Two of 1 kg on a contact of 2.2 ms in steps of 4 ms: energy and momentum leave nothing else."""
+    ends = Upper(1.0, 0.0, 0.0, y=0.0085, z=-1.0), DuffingBody(1.0, 0.0, 0.0)
+    coupling = {"degree": degree, "macro_step": 4e-3}
+    run = thrown_together(*ends, time={"t_end": 0.02}, contact={"stiffness": 1e6}, coupling=coupling)
+    assert kinds(run) == ["impact", "separation"]
+    assert (run.v_tip[-1], run.z[-1]) == pytest.approx((0.0, -1.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(("degree", "share"), [(0, 0.4), (1, 5e-3), (2, 5e-3)])
+def test_a_mass_that_swings_through_a_contact_within_a_step_touches_it(degree, share):
+    """u = 0.01 cos 100 t dips 0.1 mm below a mass at rest, from 30.0 to 32.8 ms, in a step from 29.7 to 33 ms: as soft
+    as the contact is, its impulse is ∫ λ p dt of that motion, but for 0.3 %."""
+    half = np.arccos(0.99) / 100.0
+    impulse = 1e3 * 0.02 * (np.sin(100.0 * half) / 100.0 - 0.99 * half)
+    ends = Upper(1.0, 1e4, 0.0, y=0.01), DuffingBody(1.0, 0.0, 0.0, y=-0.0099)
+    coupling = {"degree": degree, "macro_step": 3.3e-3}
+    run = thrown_together(*ends, time={"t_end": 0.04}, contact={"stiffness": 1e3}, coupling=coupling)
+    assert kinds(run) == ["impact", "separation"]
+    assert run.z[-1] == pytest.approx(-impulse, rel=share)
+
+
+@pytest.mark.parametrize("degree", [0, 2])
+def test_a_damped_contact_that_opens_fast_pushes_only(degree):
+    """χ ṗ falls below −1 before it opens: the force is then 0, not a pull; beside the reference."""
+    law = {"law": "compliance", "stiffness": 1e4, "exponent": 1.5, "damping": 20.0}
+    coupling = {"scheme": "energy", "degree": degree, "macro_step": 2.5e-4}
+    scene = soft(4, contact=law, stop=None, beam={"initial_velocity_slope": -2.0}, coupling=coupling)
+    run, exact = simulate(scene), reference(scene)
+    touches = run.gap < 0.0
+    assert (20.0 * run.velocity_mismatch[touches]).max() > 1.0
+    assert run.contact_force.min() >= (0.0 if degree == 0 else -1e-3)
+    assert max(error(run, exact, name) for name in ("u_tip", "y")) < 1e-3
 
 
 SOFT_LAW = {"law": "compliance", "exponent": 1.5}

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from bodies import DuffingBody, ModalBody, couple, orders, solve, unit_beam
+from bodies import DuffingBody, ModalBody, Upper, couple, orders, solve, unit_beam
 
 from springbeam.bodies import force
 from springbeam.bodies.protocol import NO_FORCE
@@ -175,3 +175,26 @@ def test_a_body_that_is_not_finite_does_not_converge():
     with pytest.raises(NotConverged) as caught:
         solve(Tie("energy", 0, 1e-12), 1e-3, unit_beam(4), spring)
     assert not caught.value.residual < float("inf")
+
+
+class Grainy(DuffingBody):
+    """Tells its displacement in multiples of ``grain`` [m]."""
+
+    grain = 1.0
+
+    def motion(self):
+        exact = super().motion()
+        return exact._replace(displacement=self.grain * round(exact.displacement / self.grain))
+
+
+@pytest.mark.parametrize(("grain", "found"), [(1e-13, True), (1e-11, False)])
+def test_a_body_may_be_rounded_by_a_thousand_tolerances_and_no_more(grain, found):
+    """The tolerance is 1e-12 of the distance in a step, 0.5 m/s · 1 ms."""
+    upper, lower = Upper(1.0, 100.0, 0.0, z=0.5), Grainy(1.0, 50.0, 0.0, z=0.5)
+    lower.grain = grain
+    if found:
+        rows = couple(Tie("energy", 0, 1e-12), 1e-3, 20, upper, lower)
+        assert max(abs(row.upper.displacement - row.lower.displacement) for row in rows) <= grain
+    else:
+        with pytest.raises(NotConverged):
+            couple(Tie("energy", 0, 1e-12), 1e-3, 20, upper, lower)

@@ -8,7 +8,7 @@ import pytest
 from springbeam.results.extremes import Extremes
 from springbeam.results.steps import STEP
 from springbeam.results.totals import shortest_contact, totals
-from springbeam.results.trajectory import Event
+from springbeam.results.trajectory import EVENT_KINDS, Event
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.resolution import force_window, slowest_frequency
 from springbeam.scene.statics import tip_inertia
@@ -44,6 +44,19 @@ def test_impulse_and_peak_of_a_polynomial_force():
     assert numbers["contact_force_max"] == pytest.approx(3.0 - 0.2**2, rel=1e-13)  # a window ends on 0.6, a row
     # Longer than the run: all of it, spread over the window.
     assert found(steps, window=4.0)["contact_force_max"] == pytest.approx(0.5, rel=1e-14)
+
+
+def test_a_peak_may_be_where_the_run_begins():
+    """C = 1 − t and no row at 0.2 s: over a window of 0.2 s the mean from the start on is 0.9 N."""
+    steps = steps_with(lambda t: (1.0 - t, -1.0, 0.0), np.linspace(0.0, 1.0, 8))
+    assert found(steps, window=0.2)["contact_force_max"] == pytest.approx(0.9, rel=1e-13)
+
+
+def test_what_events_take_is_of_the_stop_or_of_the_ends_that_meet():
+    """1, 2, 4 … 64 J by the events of each kind: strokes on the stop and seating take 2 + 32 J, the others 93."""
+    events = [Event(0.1 * k, kind, energy_loss=2.0**k) for k, kind in enumerate(EVENT_KINDS)]
+    numbers = found(steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11)), *events)
+    assert (numbers["loss_stop"], numbers["loss_impact"]) == (34.0, 93.0)
 
 
 def test_an_impulse_counts_in_the_impulse_and_in_every_window_that_holds_it():

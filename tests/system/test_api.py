@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, beam_body
 from commands import printed
+from runs import a_trajectory
 
 import springbeam
 from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.bodies.protocol import NO_FORCE, Energies, Motion
 from springbeam.monolithic import event_driven
 from springbeam.results.totals import LOSS_NAMES, TOTALS
+from springbeam.scene.statics import SHAPE_POINTS
 from springbeam.studies.sweep.metrics import METRICS
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
@@ -137,6 +139,8 @@ def test_to_pandas_and_xarray(run):
     assert dataset["u_tip"].attrs == {"units": "m"}
     assert np.array_equal(dataset["deflection"].sel(x=1.0).values, run.shapes[1][:, -1])
     assert np.array_equal(dataset["phase"].values, run.phase)
+    longer = a_trajectory(with_changes(run.scene, beam={"length": 2.0}))
+    assert np.array_equal(longer.to_xarray()["x"].values, 2.0 * SHAPE_POINTS)
 
 
 def test_without_the_extra_the_error_names_it(run, monkeypatch):

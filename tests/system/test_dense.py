@@ -99,6 +99,21 @@ def test_rows_are_themselves_and_between_them_every_column_holds(changes):
             assert before.e_impact_loss[0] == pytest.approx(run.at(event.time).e_impact_loss[0] - event.energy_loss)
             jump = run.at(event.time).e_total[0] - before.e_total[0]
             assert abs(jump) < 1e-8 * scale
+            if (spring := run.scene.spring) is not None:  # each body has what it brings to the event
+                y, z = before.y[0], before.z[0]
+                stored = 0.5 * (
+                    spring.mass * z**2 + spring.linear_stiffness * y**2 + 0.5 * spring.cubic_stiffness * y**4
+                )
+                assert before.e_spring[0] == pytest.approx(stored, abs=1e-5 * scale)
+
+
+def test_the_smoothed_force_goes_on_to_the_end_of_its_phase():
+    """It belongs to the start of its row's step; the row at a change of phase has that of the next one."""
+    run = simulate(SOFT)
+    changes = np.flatnonzero((run.phase[1:] != run.phase[:-1]) & (np.diff(run.time) > 0.0))
+    assert len(changes) > 0
+    before = run.at(run.time[changes + 1] - 1e-6 * np.diff(run.time)[changes])
+    assert before.contact_force_smoothed == pytest.approx(run.contact_force_smoothed[changes], rel=1e-12)
 
 
 def test_soft_contact_opens_where_the_ends_part():

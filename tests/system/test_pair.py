@@ -47,6 +47,24 @@ def test_energy_is_conserved_at_any_macro_step(name, factor):
     assert trajectory.summary["max_energy_residual"] <= bound
 
 
+def test_what_numerical_damping_takes_is_no_error():
+    """ρ∞ = 0 takes a tenth of the energy of `soft`, which no column books: said, but no reason to stop."""
+    beam = {"integrator": "generalized_alpha", "rho_inf": 0.0, "n_elements": 10}
+    trajectory = simulate(with_changes(load_scene("soft"), beam=beam, coupling={"macro_step": 1e-3}))
+    assert trajectory.time[-1] == trajectory.scene.time.t_end
+    assert 0.1 < trajectory.summary["max_energy_residual"] < 0.5
+    assert any("beam.rho_inf = 0" in warning for warning in trajectory.summary["warnings"])
+
+
+def test_the_papers_law_injects_all_of_the_energy_residual():
+    """Also under a constant load on the spring, whose work, 2e-4 J, is none of it."""
+    changes = {"beam": {"n_elements": 20, "n_modes": 0}, "time": {"t_end": 0.7}, "spring": {"external_force": 0.5}}
+    found = simulate(with_changes(load_scene("paper-fig2"), contact={"law": "paper"}, **changes))
+    injected = found.summary["injected_into_beam"] + found.summary["injected_into_spring"]
+    assert abs(injected) > 100.0
+    assert found.energy_residual[-1] == pytest.approx(injected, rel=1e-9)
+
+
 def test_hermite_says_when_the_macro_step_is_too_large():
     """ω_max H = 7 is beyond its stability: the energy changes, and the run says so; at 17 with a light top it stops."""
     hermite = {"scheme": "hermite", "degree": 2}

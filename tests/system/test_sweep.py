@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from commands import command
+from runs import a_trajectory
 
 from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
@@ -12,6 +13,7 @@ from springbeam.studies import sweep
 from springbeam.studies.study import Records, dask_cluster, record_all
 from springbeam.studies.sweep import picture
 from springbeam.studies.sweep.design import Axis, design, parse_axis, varied
+from springbeam.studies.sweep.metrics import METRICS as METRICS_THERE_ARE
 
 METRICS = ("y_min", "first_stop_impact", "energy_residual")
 
@@ -97,6 +99,10 @@ def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
     assert sorted(v[2] for v in values) == [1] * 10 + [2] * 10 + [4] * 10
     assert design(axes, 30, 7, "latin_hypercube") == values
     assert design(axes, 30, 8, "latin_hypercube") != values
+
+
+def test_the_largest_speed_may_be_downward():
+    assert METRICS_THERE_ARE["z_max"](a_trajectory(z=np.linspace(-2.0, 1.0, 400))) == 2.0
 
 
 @pytest.mark.filterwarnings("error:The input coordinates to pcolormesh")  # of values that do not ascend

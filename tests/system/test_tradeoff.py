@@ -16,7 +16,7 @@ from springbeam.studies import tradeoff
 from springbeam.studies.study import record_all
 from springbeam.studies.tradeoff import Tradeoff
 from springbeam.studies.tradeoff.configurations import configurations
-from springbeam.studies.tradeoff.points import errors
+from springbeam.studies.tradeoff.points import Errors, Point, Points, errors
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +64,17 @@ def test_choices_are_the_cheapest_that_keep_the_error(found):
             assert choice.ours.solve == min(p.solve for p in good)
     assert found.cheapest()[1].ours is not None
     assert found.cheapest()[1].scipy is not None
+
+
+def test_points_judged_on_a_finer_mesh_are_on_no_front_and_chosen_for_no_error():
+    def point(solve, error, refined):
+        against = Errors(error, None, None, None, 0.0, None, None)
+        return Point("family", "setting", "co-simulation", refined, 0, None, against, "", solve, 0.0, 0.0)
+
+    rough, better, finer = point(1.0, 1e-3, False), point(2.0, 1e-5, False), point(0.5, 1e-9, True)
+    found = Points([better, finer, rough])
+    assert found.front() == [rough, better]
+    assert [choice.ours for choice in found.cheapest()] == [rough, better, None, None]
 
 
 def test_modes_converge_to_the_mesh_and_not_beyond(found):
