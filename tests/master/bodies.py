@@ -99,7 +99,7 @@ class ModalBody(Double, BeamBody):
             small = h / 2**doublings
             E, W = expm(A * small), np.zeros((r, 7, 7))
             nodes, weights = np.polynomial.legendre.leggauss(12)
-            for x, w in zip(nodes, weights, strict=True):
+            for x, w in zip(nodes, weights, strict=True) if self.alpha else ():
                 rate = expm(A * (0.5 * (x + 1.0) * small))[:, 1, :]
                 W += 0.5 * w * small * rate[:, :, None] * rate[:, None, :]
             W *= self.alpha * self.omega[:, None, None] ** 2
