@@ -58,7 +58,8 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
-        return version("springbeam")
+        globals()[name] = found = version("springbeam")
+        return found
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

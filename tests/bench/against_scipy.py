@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from measure import compare
+from measure import compare, timed
 from rows import Effort, Row, ratio_row
 
 from springbeam import load_scene, simulate, with_changes
@@ -76,6 +76,11 @@ def accuracy(effort: Effort) -> Iterator[Row]:
                 f"the cheapest of scipy's: {method}, rtol {rtol:.0e}",
                 faster=True,
             )
+            call = partial(simulate, chosen.scene)
+            theirs_call = partial(_scipy, soft, method, rtol, scale, np.array([UNTIL]))
+            whole = compare(lambda f=call: timed(f), lambda f=theirs_call: timed(f), effort.rounds)  # type: ignore[misc]
+            besides = "whole calls in a warm process: of scipy's, assembly and modes are a part"
+            yield ratio_row("the same, whole calls", whole, 1.0, besides, faster=True)
             if effort.quick:
                 return
         methods = list(dict.fromkeys(m for seconds, _, m, _ in theirs if seconds <= _HOPELESS * best))

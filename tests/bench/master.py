@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from ctypes import c_size_t
-from time import thread_time
+from time import process_time, thread_time
 from typing import Any
 
 import printed
@@ -84,7 +84,22 @@ def tied_phase(scene: Scene) -> tuple[float, int]:
     return clock[-1] - clock[0], len(clock) - 1
 
 
+def whole_call(effort: Effort) -> Row:
+    """What a call of `simulate` takes beside its solution, in a process that has run the scene before."""
+    scene = with_changes(load_scene("soft"), time={"t_end": 0.0712}, coupling={"macro_step": 0.0712 / 6})
+    simulate(scene)
+    calls, solutions = [], []
+    for _ in range(5 * effort.rounds):
+        began = process_time()
+        run = simulate(scene)
+        calls.append(process_time() - began)
+        solutions.append(float(run.summary["wall_time"]))
+    times = Times(calls, solutions)
+    return ratio_row("`soft` to 0.0712 s in 6 macro steps: a whole call", times, 4.0, "its solution, `wall_time`")
+
+
 def master(effort: Effort) -> Iterator[Row]:
+    yield whole_call(effort)
     empty = nothing()
     for H, scheme, degree in ((2.5e-4, "energy", 0), (1e-3, "energy", 0), (1e-3, "energy", 2), (1e-3, "hermite", 2)):
         coupling = {"macro_step": H, "scheme": scheme, "degree": degree}

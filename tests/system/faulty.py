@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from springbeam.bodies import functions
+from springbeam.bodies.fmu_bodies import release
 from springbeam.run import detection, simulation
 from springbeam.run.paper_law import PaperLaw
 from springbeam.run.rows import Rows
@@ -78,6 +79,7 @@ class Script:
 
     def check(self) -> None:
         """Every instance is used as FMI allows, and freed once; but for one that returned fmi2Fatal, never touched."""
+        release()
         for fmu in ("beam", "spring"):
             allowed: set[str] | None = None
             alive = False
@@ -160,6 +162,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
     the bodies go back to the mark, "row" while a row is written, "event" while one acts; in Algorithm 1 "paper".
     """
     script = Script(faults)
+    release()  # what is kept would not be loaded
     monkeypatch.setattr(functions, "cdll", SimpleNamespace(LoadLibrary=partial(Library, script)))
 
     def watch(owner: Any, name: str, where: Callable[..., str]) -> None:

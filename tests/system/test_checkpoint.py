@@ -176,7 +176,7 @@ def test_a_run_without_checkpoints_says_how_to_take_them(interrupted):
 
 
 def test_another_version_is_refused(interrupted, monkeypatch):
-    monkeypatch.setattr(runner, "version", lambda name: "9.9")
+    monkeypatch.setattr(runner, "__version__", "9.9")
     with pytest.raises(CheckpointRefused, match=r"written by springbeam 0\.1\.0, this is 9\.9"):
         springbeam.resume(interrupted)
 

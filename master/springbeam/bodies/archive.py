@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 #: Largest size of all members of an archive together, and largest number of them.
 MOST_BYTES, MOST_MEMBERS = 1 << 28, 10_000
 _ENCRYPTED = 0x1
+_PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def fmu_directory() -> Path:
@@ -18,9 +19,8 @@ def fmu_directory() -> Path:
     chosen = os.environ.get("SPRINGBEAM_FMUS")
     if chosen:
         return Path(chosen)
-    package = Path(__file__).resolve().parents[1]
-    installed = package / "fmus"
-    return installed if installed.is_dir() else package.parents[1] / "fmus"
+    installed = _PACKAGE / "fmus"
+    return installed if installed.is_dir() else _PACKAGE.parents[1] / "fmus"
 
 
 class UnsafeArchive(ValueError):

@@ -49,12 +49,12 @@ def _body(scene: Scene, spec: Beam | Spring | Partner, start_time: float, found:
         by_substeps = coupling.degree > found.abilities.integrals and coupling.scheme not in ORDINARY_SCHEMES
         return IsolatedBody(spec, spec is scene.upper, start_time, found, by_substeps)
     if isinstance(spec, Spring):
-        return FmuSpring(spec, start_time)
+        return FmuSpring.of(spec, start_time)
     if not isinstance(spec, Beam):
         return ELEMENTS[spec.element](**spec.model_dump(exclude={"element"}))
     rate = spec.initial_velocity_slope
     if spec.fidelity == "dynamic":
-        return FmuBeam(spec, start_time, spec.initial_deflection_slope + start_time * rate, scene.loads)
+        return FmuBeam.of(spec, start_time, spec.initial_deflection_slope + start_time * rate, scene.loads)
     assert scene.tip_at_start is not None
     tip, velocity = scene.tip_at_start.value + start_time * rate * spec.length, rate * spec.length
     beam = QuasiStaticBeam(spec, scene.coupling.degree, tip, velocity)

@@ -93,7 +93,9 @@ class Fmu(Checkpointed):
         self._closed = False
         self.prepared, self.real = functions.prepared, functions.REAL
         self._state = c_void_p()
+        self._start = c_void_p()  #: as initialised, if it is kept
         self._worst = 0  #: status of the calls that have failed for good
+        self._refused = False  #: whether a step was not made
         #: Whether anything happened since the state was marked.
         self.moved = False
         #: doStep calls, and how often the state was set back.
@@ -185,6 +187,11 @@ class Fmu(Checkpointed):
         """Whether no call has failed for good."""
         return not self._closed and self._worst <= WARNING
 
+    @property
+    def faultless(self) -> bool:
+        """Whether every call so far did what it was asked for."""
+        return self.usable and not self._refused
+
     def accessor(self, verb: str, names: Sequence[str], values: Any) -> Call:
         """Return what gets or sets (``verb``) variables that are real numbers by ``values``, an array of C."""
         return self._functions.accessor(verb, self.real, self.references(names, self.real), values)
@@ -226,6 +233,16 @@ class Fmu(Checkpointed):
         self.moved = False
         self.rewinds += 1
 
+    def keep_start(self) -> None:
+        """Remember the present state as the one `return_to_start` sets."""
+        self._must("cannot save the state", "GetFMUState", byref(self._start))
+
+    def return_to_start(self) -> None:
+        """Set the state of `keep_start`, as a new instance has it."""
+        self._must("cannot restore the state", "SetFMUState", self._start)
+        self.moved, self.steps, self.rewinds = False, 0, 0
+        self._messages.clear()
+
     def step(self, time: float, size: float) -> None:
         """Make a step (fmi2DoStep) with the inputs that have been set. Raises StepRefused."""
         self.steps += 1
@@ -235,6 +252,7 @@ class Fmu(Checkpointed):
             return
         if status not in (DISCARD, ERROR):
             raise self.failed(status, f"cannot step at t = {time:.9g} s")
+        self._refused = True
         cause = self._cause(f"{self._functions.spelt('DoStep')} returned {_STATUS[status]}")
         reached = ""
         if status == DISCARD:
@@ -278,8 +296,9 @@ class Fmu(Checkpointed):
         if self._closed:
             return
         self._closed = True
-        if self._state and self._worst < FATAL:
-            self._worst = self.prepared("FreeFMUState", byref(self._state))()
+        for state in (self._state, self._start):
+            if state and self._worst < FATAL:
+                self._worst = self.prepared("FreeFMUState", byref(state))()
         if self._worst == FATAL:
             _unpacked.cache_clear()  # the next instance takes a copy of the library of its own
         else:

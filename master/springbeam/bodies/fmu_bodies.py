@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import atexit
+from collections.abc import Callable, Hashable, Sequence
 from ctypes import byref, c_double, sizeof
 from math import isfinite
+from pathlib import Path
 from typing import Any, ClassVar, NoReturn
 
 import numpy as np
+from typing_extensions import Self
 
 from ..scene import Beam, Load, Spring
 from ..scene.statics import SHAPE_POINTS
@@ -170,9 +173,70 @@ class FmuBody(Body):
         self.fmu.close()
 
 
-class FmuBeam(FmuBody, BeamBody):
+#: Most bodies that are kept: those of two scenes.
+_MOST_KEPT = 4
+#: Closed bodies that a later run may take, by what they were made of; the last one was closed last.
+_kept: dict[Hashable, OwnBody] = {}
+
+
+class OwnBody(FmuBody):
+    """A body of an FMU of this project. It is kept when it is closed: to make it takes longer than a short run.
+
+    What is kept is the instance, with what follows from its parameters, and its state after initialisation.
+    """
+
+    NAME: ClassVar[str]  #: of the FMU
+    _key: Hashable = None  #: what the body was made of, if it is to be kept
+    _as_made: dict[str, Any]  #: the attributes then
+
+    @classmethod
+    def of(cls, *arguments: Any) -> Self:
+        """Return a body made of ``arguments``, new or kept; both step to the same bits. Raises FmuError."""
+        path = _path(cls.NAME)
+        key = (cls, path, path.stat().st_mtime_ns if path.is_file() else None, arguments)
+        body = _kept.pop(key, None)
+        if not isinstance(body, cls):
+            body = cls(*arguments)
+            body._key, body._as_made = key, dict(vars(body))
+            body._guarded(body.fmu.keep_start)
+        else:
+            body._guarded(body.fmu.return_to_start)
+            as_made = body._as_made
+            vars(body).clear()
+            vars(body).update(as_made, _key=key, _as_made=as_made)
+        return body
+
+    def _guarded(self, call: Callable[[], None]) -> None:
+        try:
+            call()
+        except FmuError:
+            self.fmu.close()
+            raise
+
+    def close(self) -> None:
+        if self._key is None or not self.fmu.faultless:
+            self.fmu.close()
+            return
+        _kept[self._key] = self
+        while len(_kept) > _MOST_KEPT:
+            _kept.pop(next(iter(_kept))).fmu.close()
+
+
+@atexit.register
+def release() -> None:
+    """Free the bodies that are kept."""
+    while _kept:
+        _kept.popitem()[1].fmu.close()
+
+
+def _path(name: str) -> Path:
+    return fmu_directory() / f"{name}.fmu"
+
+
+class FmuBeam(OwnBody, BeamBody):
     """``beam.fmu`` as a body."""
 
+    NAME = "beam"
     _MOTION = (
         "tip_displacement",
         "tip_velocity",
@@ -194,7 +258,7 @@ class FmuBeam(FmuBody, BeamBody):
         parameters["mass_matrix"] = _MASS_MATRICES[beam.mass_matrix]
         parameters["initial_deflection_slope"] = deflection_slope
         parameters |= {f"point_force_position[{k}]": at for k, at in enumerate(self._points, 1)}
-        super().__init__(Fmu("beam", fmu_directory() / "beam.fmu", parameters, start_time))
+        super().__init__(Fmu(self.NAME, _path(self.NAME), parameters, start_time))
 
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)
@@ -227,9 +291,10 @@ class FmuBeam(FmuBody, BeamBody):
         return np.array(np.frombuffer(self._shape.values))
 
 
-class FmuSpring(FmuBody, EndLoaded):
+class FmuSpring(OwnBody, EndLoaded):
     """``spring.fmu`` as a body; contact law and foundation are the master's."""
 
+    NAME = "spring"
     CHECKPOINTED = (*FmuBody.CHECKPOINTED, "_dissipated_before")
 
     _MOTION = ("displacement", "velocity", "displacement_integral", "displacement_integral_2")
@@ -243,7 +308,7 @@ class FmuSpring(FmuBody, EndLoaded):
         parameters["displacement"] = spring.equilibrium
         parameters["velocity"] = spring.initial_velocity
         self._dissipated_before = 0.0  #: before the last `restart` [J]
-        super().__init__(Fmu("spring", fmu_directory() / "spring.fmu", parameters, start_time))
+        super().__init__(Fmu(self.NAME, _path(self.NAME), parameters, start_time))
 
     def _mass(self) -> float:
         return self._spring.mass

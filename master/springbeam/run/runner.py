@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import traceback
 from contextlib import suppress
-from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from .. import __version__
 from ..bodies.checkpointed import Checkpointed
 from ..bodies.factory import findings, fingerprints, load_bodies
 from ..bodies.fmu_bodies import FmuBeam, FmuBody, FmuSpring
@@ -87,7 +87,7 @@ def run(
         if not isinstance(recorder, FileRecorder):
             raise TypeError("checkpoints belong to results in a directory")
         _refuse_checkpoints(scene)
-        checkpoints = Checkpoints(recorder, seconds, version("springbeam"), fingerprints(scene), before)
+        checkpoints = Checkpoints(recorder, seconds, __version__, fingerprints(scene), before)
 
         def after_step(time: float, phase: str, macro_steps: int) -> None:
             if progress is not None:
@@ -129,7 +129,7 @@ def run(
             ended = perf_counter()
             summary = {
                 **status,
-                "version": version("springbeam"),
+                "version": __version__,
                 **simulation.summary(),
                 **_totals(simulation, scene, recorder),
                 **_calls(beam=beam, spring=spring),
@@ -175,10 +175,8 @@ def last_checkpoint(directory: str | Path) -> Checkpoint:
     if not results.checkpoint.exists():
         raise CheckpointRefused(f"{results.path}: no checkpoint; springbeam run --checkpoint SECONDS takes them")
     start = Checkpoint.read(results.checkpoint)
-    if start.version != version("springbeam"):
-        raise CheckpointRefused(
-            f"{results.checkpoint}: written by springbeam {start.version}, this is {version('springbeam')}"
-        )
+    if start.version != __version__:
+        raise CheckpointRefused(f"{results.checkpoint}: written by springbeam {start.version}, this is {__version__}")
     if start.scene != scene_from_dict(summary["scene"], source=f"{results.summary}: scene"):
         raise CheckpointRefused(f"{results.summary}: its scene is not the one that was run")
     found = fingerprints(start.scene)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -61,6 +61,7 @@ def initial_kinetic_energy(beam: Beam) -> float:
     return beam.density * beam.area * beam.length**3 * beam.initial_velocity_slope**2 / 6.0
 
 
+@lru_cache(maxsize=64)
 def lowest_frequency(beam: Beam) -> float:
     """Return the lowest frequency, clamped and free [rad/s], by Ritz's method.
 
@@ -124,6 +125,7 @@ def _work(beam: Beam, start: float, virtual: Callable[[np.ndarray], tuple[np.nda
     return total
 
 
+@lru_cache(maxsize=64)
 def tip_reach(beam: Beam) -> float:
     """Estimate how far the tip goes from a straight beam [m].
 

@@ -1,0 +1,114 @@
+"""Bodies of FMUs that are kept from one run to the next: they step as new ones do, are few, and are freed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springbeam import RunStopped, load_scene, simulate, with_changes
+from springbeam.bodies import fmu, fmu_bodies
+from springbeam.bodies.fmu_bodies import FmuSpring, release
+from springbeam.scene import Scene
+
+SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3}, time={"t_end": 0.25})
+PULSE = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.05, "amplitude": 3.0}
+SCENES = {
+    "transmission": SOFT,
+    "degree 2": with_changes(SOFT, coupling={"degree": 2}),
+    "generalized-alpha": with_changes(SOFT, beam={"integrator": "generalized_alpha"}),
+    "compliance": with_changes(SOFT, contact={"law": "compliance"}),
+    "loads": with_changes(SOFT, loads=[PULSE, {"on": "beam", "at": 0.5}, {"on": "spring", "amplitude": -2.0}]),
+    "spring alone": with_changes(load_scene("duffing"), time={"t_end": 1.0}),
+    "bouncing": with_changes(load_scene("beam-on-stop"), time={"t_end": 0.1}),
+    "Algorithm 1": with_changes(
+        load_scene("paper-fig2"), contact={"law": "paper", "impact": "rest"}, beam={"n_elements": 40}
+    ),
+}
+
+
+@pytest.fixture(autouse=True)
+def none_kept() -> None:
+    release()
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[str | None]:
+    """The names of the instances that are made from now on."""
+    names: list[str | None] = []
+    make = fmu.Fmu.__init__
+
+    def noted(self: fmu.Fmu, name: str | None, *rest: Any) -> None:
+        names.append(name)
+        make(self, name, *rest)
+
+    monkeypatch.setattr(fmu.Fmu, "__init__", noted)
+    return names
+
+
+def numbers(scene: Scene) -> dict[str, Any]:
+    """Return all that a run leaves and that is no time of the clock."""
+    run = simulate(scene)
+    assert run.steps is not None or scene.contact.law == "paper"
+    counts = {name: value for name, value in run.summary.items() if name not in ("wall_time", "setup_time")}
+    shapes = [np.asarray(part).tobytes() for part in run.shapes or ()]
+    return {**{name: np.asarray(column).tobytes() for name, column in run.columns.items()}, "": shapes, **counts}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_kept_body_steps_to_the_bits_of_a_new_one(name: str, made: list[str | None]) -> None:
+    first = numbers(SCENES[name])
+    new = len(made)
+    assert numbers(SCENES[name]) == first
+    assert (new, len(made)) == (len(SCENES[name].fmus), new)
+
+
+def test_what_one_run_hands_to_a_body_is_gone_in_the_next(made: list[str | None]) -> None:
+    """The loads on a spring are no part of what it is made of."""
+    without = numbers(SOFT)
+    loaded = numbers(with_changes(SOFT, loads=[{"on": "spring", "amplitude": -2.0}]))
+    assert loaded["y"] != without["y"]
+    assert numbers(SOFT) == without
+    assert made.count("spring") == 1
+
+
+def test_other_start_values_take_another_instance(made: list[str | None]) -> None:
+    assert numbers(SOFT) != numbers(with_changes(SOFT, spring={"damping": 0.1}))
+    assert made == ["beam", "spring", "spring"]
+
+
+def test_few_are_kept_and_the_oldest_is_freed(monkeypatch: pytest.MonkeyPatch) -> None:
+    closed = []
+    close = fmu.Fmu.close
+    monkeypatch.setattr(fmu.Fmu, "close", lambda self: (closed.append(self), close(self)))
+    springs = [with_changes(load_scene("duffing"), spring={"mass": m}, time={"t_end": 0.1}) for m in range(1, 7)]
+    for scene in springs:
+        simulate(scene)
+    assert len(closed) == len(springs) - fmu_bodies._MOST_KEPT
+    release()
+    assert len(closed) == len(springs)
+    assert not any(one.usable for one in closed)
+
+
+def test_two_bodies_at_once_are_two_instances(made: list[str | None]) -> None:
+    spring = load_scene("duffing").spring
+    one, other = FmuSpring.of(spring, 0.0), FmuSpring.of(spring, 0.0)
+    one.advance(0.0, 0.1, (1.0, 0.0, 0.0))
+    assert other.motion().velocity == 0.0
+    one.close()
+    other.close()
+    assert FmuSpring.of(spring, 0.0).motion() == other.motion()
+    assert len(made) == 2
+
+
+def test_a_body_whose_calls_fail_is_not_kept(made: list[str | None], monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(self: fmu.Fmu) -> None:
+        raise self.failed(3, "cannot save the state")
+
+    with monkeypatch.context() as during:
+        during.setattr(fmu.Fmu, "mark", failing)
+        with pytest.raises(RunStopped, match=r"beam\.fmu: cannot save the state"):
+            simulate(SOFT)
+    simulate(SOFT)
+    assert made == ["beam", "spring", "beam"]  # the spring had not been called
