@@ -7,12 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bodies import simulate
+from bodies import DuffingBody, beam_body, simulate
 
 from springbeam.contact import laws
 from springbeam.monolithic import event_driven
 from springbeam.monolithic import laws as references
-from springbeam.scene import load_scene, with_changes
+from springbeam.pictures.panels import forces
+from springbeam.pictures.report.described import described
+from springbeam.run import runner
+from springbeam.scene import Scene, SceneError, load_scene, with_changes
+from springbeam.scene import laws as facts
+from springbeam.scene.linearised import contact_energy
+from springbeam.scene.resolution import WINDOW
+from springbeam.scene.statics import tip_inertia
+from springbeam.studies.stability.predict import predict
 
 PAGE = Path(__file__).parents[2] / "docs" / "contributing.md"
 BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.M | re.S)
@@ -20,11 +28,28 @@ BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), 
 
 @pytest.fixture
 def stiffening(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The law of the page, in place of `compliance`: a scene names no other."""
-    for block, module in zip(BLOCKS, (laws, references), strict=True):
-        monkeypatch.setattr(module, "LAWS", dict(module.LAWS))
-        exec(block, {**vars(module)})
-        monkeypatch.setitem(module.LAWS, "compliance", module.LAWS["stiffening"])
+    """The law of the page, under its own name."""
+    for block, module in zip(BLOCKS, (laws, facts, references), strict=True):
+        for name in module.LAWS.keys() - {"stiffening"}:  # restored, with the new name taken out, after the test
+            monkeypatch.setitem(module.LAWS, name, module.LAWS[name])
+        monkeypatch.setitem(module.LAWS, "stiffening", None)
+        exec(block, vars(module).copy())
+
+
+def bumper() -> Scene:
+    """A tip on the bumper, on a beam of 6 elements."""
+    return with_changes(
+        load_scene("soft"),
+        time={"t_end": 0.1},
+        beam={"n_elements": 6},
+        stop=None,
+        contact={"law": "stiffening", "stiffness": K},
+        coupling={"degree": 2, "macro_step": 2.5e-4},
+    )
+
+
+#: k [N/m]; h = k/1e-4 m².
+K = 300.0
 
 
 def test_it_is_short() -> None:
@@ -34,14 +59,7 @@ def test_it_is_short() -> None:
 @pytest.mark.usefixtures("stiffening")
 def test_master_and_reference_agree_and_keep_the_energy() -> None:
     """Degree 2 on a beam of 6 elements: the reference's tolerance is 1e-11; p is past the knee √(k/h) = 1 cm."""
-    scene = with_changes(
-        load_scene("soft"),
-        time={"t_end": 0.1},
-        beam={"n_elements": 6},
-        stop=None,
-        contact={"law": "compliance", "stiffness": 300.0},
-        coupling={"degree": 2, "macro_step": 2.5e-4},
-    )
+    scene = bumper()
     run, exact = simulate(scene), event_driven.simulate(scene)
     assert (run.y - run.u_tip).max() > 0.01
     assert [e.kind for e in run.events] == [e.kind for e in exact.events]
@@ -50,3 +68,39 @@ def test_master_and_reference_agree_and_keep_the_energy() -> None:
     for column in ("u_tip", "y"):
         assert np.abs(run[column][mine] - exact[column][theirs]).max() < 1e-9
     assert run.summary["max_energy_residual"] < 1e-12
+
+
+@pytest.mark.usefixtures("stiffening")
+def test_the_window_of_its_peak_force_and_its_frequency_are_its_own() -> None:
+    """The energy at first contact goes into ½ k p² + ¼ h p⁴; there F′ = k + 3 h p²."""
+    scene = bumper()
+    h = K / 1e-4
+    p2 = (np.sqrt(K * K + 4.0 * h * contact_energy(scene)) - K) / h  # p²
+    slope = K + 3.0 * h * p2
+    assert laws.stiffest(scene) == pytest.approx(slope, rel=1e-12)
+    masses = 1.0 / tip_inertia(scene.beam) + 1.0 / scene.spring.mass
+    window = WINDOW * 2.0 * np.pi / np.sqrt(slope * masses)
+    run = runner.simulate(scene, upper=beam_body(scene.beam, 0.0), lower=DuffingBody())
+    assert run.summary["contact_force_window"] == pytest.approx(window, rel=1e-12)
+    # The law's peak, not a mean over a fiftieth of the beam's period.
+    assert run.summary["contact_force_max"] == pytest.approx(np.max(run.contact_force), rel=0.02)
+    found = predict(scene)
+    assert found.contact_frequency == pytest.approx(
+        np.sqrt(slope * (1.0 / found.tip_mass + 1.0 / scene.spring.mass)), rel=1e-12
+    )
+
+
+@pytest.mark.usefixtures("stiffening")
+def test_pictures_report_and_messages_call_it_what_it_is() -> None:
+    run = simulate(bumper())
+    legends = {curve.name: curve.look.words for curve in forces(run).curves}
+    assert legends["compliance_force"] == "of the bumper k p₊ + h p₊³"
+    assert dict(described(run.scene))["contact"] == "stiffening: a bumper that stiffens, stiffness 300"
+    with pytest.raises(
+        SceneError, match=r'damping = 1.0: law = "stiffening" has none; use 0.0, "compliance" or "link"'
+    ):
+        with_changes(bumper(), contact={"damping": 1.0})
+    with pytest.raises(
+        SceneError, match=r'needs a rigid law; with \[contact\] law = "stiffening" use scheme = "energy"'
+    ):
+        with_changes(bumper(), coupling={"scheme": "hermite"})

@@ -72,7 +72,7 @@ def needs(scene: Scene, body: Abilities) -> Iterator[Need]:
         changing = {degree: coupling.degree > 0, f"[contact] damping = {contact.damping}": contact.damping > 0.0}
         for asked in (asked for asked, is_so in changing.items() if is_so):
             yield Need(asked, body.velocity, _VELOCITY, 'leave it out, or use scheme = "energy"')
-    struck = {f'[contact] law = "{contact.law}"': scene.joins and contact.law == "transmission"}
+    struck = {f'[contact] law = "{contact.law}"': scene.joins and contact.facts.strikes}
     struck |= {"[stop]": scene.stop is not None}
     for asked in (asked for asked, is_so in struck.items() if is_so):
         instead = "leave it out" if asked == "[stop]" else 'use "compliance", "link" or "tie"'

@@ -58,7 +58,7 @@ def _body(scene: Scene, spec: Beam | Spring | Partner, start_time: float, found:
     assert scene.tip_at_start is not None
     tip, velocity = scene.tip_at_start.value + start_time * rate * spec.length, rate * spec.length
     beam = QuasiStaticBeam(spec, scene.coupling.degree, tip, velocity)
-    if spec.approach == "elastic" or scene.contact.law == "compliance":
+    if spec.approach == "elastic" or scene.contact.soft:
         beam.release()
     return beam
 

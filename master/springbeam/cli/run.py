@@ -133,8 +133,8 @@ def _check_interval(interval: float, scene: Scene, checkpoint: float | None) -> 
         cause = "must be a time above 0 s, as in --output-interval 1e-3"
     elif checkpoint is not None:
         cause = "--checkpoint goes on from rows at every step; leave one of the two out"
-    elif scene.contact.law == "paper":
-        cause = 'contact.law = "paper" has no data between its steps; leave one of the two out'
+    elif scene.contact.algorithm:
+        cause = f'contact.law = "{scene.contact.law}" has no data between its steps; leave one of the two out'
     elif scene.time.t_end / interval > _MOST_ROWS:
         cause = f"more than {_MOST_ROWS:,} rows up to time.t_end = {scene.time.t_end:g} s; take a longer one"
     if cause is not None:

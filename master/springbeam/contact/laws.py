@@ -6,8 +6,9 @@ has no force of its own: it holds the ends together, and C is whatever that take
 
     C = F(p) + D(p, ṗ),     F = Φ′,     D ṗ ≥ 0,
 
-so that Φ is what it stores and ∫ D ṗ dt what it dissipates. To add a law, write its class here, name it in `LAWS`,
-and write it again, independently, in `springbeam.monolithic.laws` (``docs/contributing.md``).
+so that Φ is what it stores and ∫ D ṗ dt what it dissipates. To add a law, write its class here, name it in `LAWS`, say
+what it is in `springbeam.scene.laws`, and write it again, independently, in `springbeam.monolithic.laws`
+(``docs/contributing.md``).
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal, Protocol
 
-from ..scene import Contact
+from ..scene import Contact, Scene
+from ..scene.linearised import contact_energy
 
 
 class RigidLaw:
@@ -156,3 +158,36 @@ LAWS: dict[str, Callable[[Contact], Law]] = {
 def law_of(contact: Contact) -> Law:
     """Return the law that ``contact`` names."""
     return LAWS[contact.law](contact)
+
+
+def stiffest(scene: Scene) -> float:
+    """Return F′ of the scene's law [N/m] where it has taken all the energy at first contact; 0 of a law that is rigid.
+
+    A law that is not one-sided is linear: how deep it goes does not matter.
+    """
+    law = law_of(scene.contact) if scene.coupled else Transmission()
+    if not law.soft:
+        return 0.0
+    return law.slope(depth(law, contact_energy(scene)) if law.one_sided else 0.0)
+
+
+def depth(law: SoftLaw, energy: float) -> float:
+    """Return the penetration [m] at which a one-sided ``law`` stores ``energy`` [J], to rounding."""
+    if energy <= 0.0:
+        return 0.0
+
+    def stores_less(p: float) -> bool:
+        try:
+            return law.potential(p) < energy
+        except OverflowError:
+            return False
+
+    high = 1.0
+    while stores_less(high):
+        high *= 2.0
+    while not stores_less(0.5 * high) and high > 0.0:
+        high *= 0.5
+    low = 0.5 * high
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if stores_less(middle) else (low, middle)
+    return high

@@ -51,12 +51,6 @@ PHASE_LOOKS = {
     "touch": Look("#FFF1B8", "touch (y ≥ Ψ)"),
     "seated": Look("#CFE8DD", "seated (at φ)"),
 }
-#: What phases are called where the law means another thing by them.
-_PHASE_WORDS_OF_LAWS = {
-    "compliance": {"touch": "in contact (u < y)"},
-    "tie": {"tied": "tied (u = y)"},
-    "link": {"tied": "joined by the link"},
-}
 EVENT_LOOKS = {
     "impact": Look(VERMILLION, "impact tip–spring", marker=Marker("▼", "v", "triangle-down")),
     "stop_impact": Look(BLACK, "impact on foundation", marker=Marker("▲", "^", "triangle-up")),
@@ -79,7 +73,7 @@ VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)", Line(1.5)), "z": Look(VERMILLIO
 FORCES = {
     "contact_force": Look(SKY, "contact C, as applied", Line(0.7)),
     "contact_force_smoothed": Look(BLUE, "contact C, smoothed", Line(1.2)),
-    "compliance_force": Look(GREEN, "part λ(Ψ − u)₊ᵖ", Line(1.0, dashed=True)),  # of other laws: `panels.forces`
+    "compliance_force": Look(GREEN, "of the law", Line(1.0, dashed=True)),  # in the words of the law: `panels.forces`
     "foundation_force": Look(BLACK, "foundation N", Line(0.9)),
 }
 ENERGIES = {
@@ -222,7 +216,10 @@ def shaded_phases(trajectory: Trajectory) -> list[tuple[Look, list[tuple[float, 
         return []
     scene = trajectory.scene
     words = {name: look.words for name, look in PHASE_LOOKS.items()}
-    words |= _PHASE_WORDS_OF_LAWS.get(scene.contact.law, {})
+    if scene.contact.soft:
+        words |= {"touch": "in contact (u < y)", "tied": f"joined by the {scene.contact.law}"}
+    elif scene.contact.lasting:
+        words["tied"] = "tied (u = y)"
     if scene.spring is None:
         words = {name: text.replace("y", "φ") for name, text in words.items()}
     return [(Look(PHASE_LOOKS[phase].colour, words[phase]), found) for phase, found in spans.items()]

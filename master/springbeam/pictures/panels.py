@@ -109,13 +109,8 @@ def velocities(trajectory: Trajectory, names: Iterable[str]) -> Panel:
 def forces(trajectory: Trajectory) -> Panel:
     """Return the forces that are not zero throughout, in the words of the run's law."""
     contact = trajectory.scene.contact
-    words = {
-        "compliance": "of the law λ(y − u)₊ᵖ" + " (1 + χ ṗ)" * (contact.damping > 0.0),
-        "link": "of the link λ(y − u)" + " + c(z − v)" * (contact.damping > 0.0),
-    }
-    looks = dict(FORCES)
-    if contact.law in words:
-        looks["compliance_force"] = FORCES["compliance_force"]._replace(words=words[contact.law])
+    words = contact.facts.force + contact.facts.damper * (contact.damping > 0.0)
+    looks = FORCES | {"compliance_force": FORCES["compliance_force"]._replace(words=words)}
     seen, remarks = _seen(trajectory, looks, "N")
     return _lines(trajectory, "forces", "Forces", seen, "force", "N", remarks, height=2.0)
 

@@ -25,7 +25,7 @@ _TOLERANCES = EXACT / 1e-12
 def bounds(scene: Scene) -> tuple[float, float]:
     """Relative energy residuals above which a run warns, and above which it stops."""
     coupling, beam = scene.coupling, scene.beam
-    changes = coupling.scheme == "hermite" or coupling.scheme in ORDINARY_SCHEMES or scene.contact.law == "paper"
+    changes = coupling.scheme == "hermite" or coupling.scheme in ORDINARY_SCHEMES or scene.contact.algorithm
     if changes or (beam is not None and beam.damped_numerically):
         return APPROXIMATE, 0.1
     tolerance = max(coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)

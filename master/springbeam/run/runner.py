@@ -14,6 +14,7 @@ from ..bodies.factory import findings, fingerprints, load_bodies
 from ..bodies.fmu_bodies import FmuBeam, FmuBody, FmuSpring
 from ..bodies.isolated import IsolatedBody
 from ..bodies.protocol import Body, FmuError
+from ..contact.laws import stiffest
 from ..results.directory import RunDirectory
 from ..results.file_recorder import FileRecorder
 from ..results.reading import load_summary, load_trajectory
@@ -96,7 +97,7 @@ def run(
 
     of_scene = _without_own(scene, upper=upper, lower=lower)
     start_time = 0.0 if upper is not None else scene.contact_time or 0.0
-    paper = scene.contact.law == "paper"
+    paper = scene.contact.algorithm
     beam, spring = load_bodies(_as_in_paper(scene) if paper else of_scene, start_time)
     try:
         simulation: Simulation | PaperLaw
@@ -233,7 +234,7 @@ def _without_own(scene: Scene, **own: Body | None) -> Scene:
         if getattr(scene, place) is None:
             raise SceneError(f"[{name}]: missing; a body of your own takes the place of one that the scene has")
     asked = {
-        'contact.law = "paper"': scene.contact.law == "paper",
+        f'contact.law = "{scene.contact.law}"': scene.contact.algorithm,
         'coupling.scheme = "auto"': scene.coupling.scheme == "auto",
         'beam.fidelity = "quasi_static"': scene.massless,
     }
@@ -251,7 +252,8 @@ def _totals(simulation: Simulation | PaperLaw, scene: Scene, recorder: Recorder)
     steps = recorder.steps()
     if steps is None or isinstance(simulation, PaperLaw):
         return {}
-    return totals(scene, steps, recorder.events(), force_window(scene), free_at_end=simulation.free_at_end)
+    window = force_window(scene, stiffest(scene) if scene.contact.facts.opens else 0.0)
+    return totals(scene, steps, recorder.events(), window, free_at_end=simulation.free_at_end)
 
 
 def _calls(**bodies: Body | None) -> dict[str, int]:

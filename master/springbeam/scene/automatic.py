@@ -24,8 +24,8 @@ class Choice(NamedTuple):
 def choice(scene: Scene) -> Choice:
     """Return the scheme and degree that fit ``scene``, whatever it asks for."""
     beam, coupling = scene.beam, scene.coupling
-    if scene.contact.law == "paper":
-        return Choice("energy", 0, 'contact.law = "paper"')
+    if scene.contact.algorithm:
+        return Choice("energy", 0, f'contact.law = "{scene.contact.law}"')
     if scene.partners:
         return Choice("energy", _highest_degree(scene), "a body that is not our own")
     if beam is None:

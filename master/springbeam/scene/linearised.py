@@ -50,18 +50,6 @@ def _load_energy(scene: Scene) -> float:
     return energy
 
 
-def contact_depth(scene: Scene) -> float:
-    """Return the penetration [m] at which normal compliance has taken all the energy at first contact."""
-    p = scene.contact.exponent + 1.0
-    return float((p * contact_energy(scene) / scene.contact.stiffness) ** (1.0 / p))
-
-
-def contact_stiffness(scene: Scene) -> float:
-    """Return F′ of normal compliance [N/m] at `contact_depth`."""
-    contact = scene.contact
-    return float(contact.exponent * contact.stiffness * contact_depth(scene) ** (contact.exponent - 1.0))
-
-
 def spring_stiffness(scene: Scene) -> float:
     """Return k1 + 3 k2 y² of the spring at its stiffest [N/m].
 

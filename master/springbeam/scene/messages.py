@@ -89,9 +89,9 @@ def _missing(model: type[Table], key: str, given: Any) -> str:
     return f"{key}: missing; give the {field.description} [{extra(field, 'unit')}]{also}: {allowed(field)}"
 
 
-def extra(field: FieldInfo, name: str) -> str:
-    """Return what `springbeam.scene.tables.key` noted of a key: its "unit", or what holds "otherwise"."""
-    return str(field.json_schema_extra[name]) if isinstance(field.json_schema_extra, dict) else ""
+def extra(field: FieldInfo, name: str) -> Any:
+    """Return what `springbeam.scene.tables.key` noted of a key: its "unit", "otherwise" or "enum"; "" if nothing."""
+    return field.json_schema_extra.get(name, "") if isinstance(field.json_schema_extra, dict) else ""
 
 
 def _explain_top(kind: str, value: Any, name: str) -> str:
@@ -135,6 +135,8 @@ def allowed(field: FieldInfo) -> str:
         return "a list of 1 to 4 finite numbers"
     if get_origin(field.annotation) is dict:
         return "a table, as { k = 3.0e4 }"
+    if names := extra(field, "enum"):
+        return " or ".join(toml_of(name) for name in names)
     for part in _alternatives(field.annotation):
         if get_origin(part) is Literal:
             return " or ".join(toml_of(choice) for choice in get_args(part))

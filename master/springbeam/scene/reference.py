@@ -49,7 +49,7 @@ def heading(table: str) -> str:
 
 def unit_of(table: str, key: str) -> str:
     """Return the unit of a key of a table, or of a load by its number ("loads.0"); "–" if it has none."""
-    return extra(MODELS[table.partition(".")[0]].model_fields[key], "unit")
+    return str(extra(MODELS[table.partition(".")[0]].model_fields[key], "unit"))
 
 
 def about(table: str) -> str:
@@ -59,7 +59,7 @@ def about(table: str) -> str:
 
 def _default(model: type[Table], name: str, field: FieldInfo) -> str:
     if otherwise := extra(field, "otherwise"):
-        return otherwise
+        return str(otherwise)
     for ways in model.WAYS:
         if any(name in group for group in ways.groups) and model.model_fields[ways.groups[0][0]].is_required():
             return f"needed: the {ways.thing} one way"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import inf, pi, sqrt
 
-from .linearised import contact_stiffness, spring_frequency, spring_stiffness
+from .linearised import spring_frequency, spring_stiffness
 from .scene import Scene
 from .statics import bending_stiffness, locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from .tables import Beam
@@ -159,17 +159,17 @@ def _waves_lag(scene: Scene, H: float) -> str | None:
     )
 
 
-def force_window(scene: Scene) -> float:
+def force_window(scene: Scene, stiffness: float = 0.0) -> float:
     """Return over which time the contact force is averaged before its peak is taken [s].
 
-    It is ``contact.force_window``, or `WINDOW` of a period: that of a compliant contact, whose peak is the law's; else
-    the slowest of the beam alone; that of spring and beam together where the beam has no inertia; the run where nothing
-    oscillates.
+    It is ``contact.force_window``, or `WINDOW` of a period: that of a contact by a soft law that opens, whose peak is
+    the law's; else the slowest of the beam alone; that of spring and beam together where the beam has no inertia; the
+    run where nothing oscillates. ``stiffness`` is that of such a law where it is deepest [N/m], 0 of any other.
     """
     beam, spring = scene.beam, scene.spring
     if scene.contact.force_window is not None:
         return scene.contact.force_window
-    if scene.contact.law == "compliance" and beam is not None and (stiffness := contact_stiffness(scene)) > 0.0:
+    if stiffness > 0.0 and beam is not None:
         masses = [tip_inertia(beam), *([] if spring is None else [spring.mass])]
         return WINDOW * 2.0 * pi / sqrt(stiffness * sum(1.0 / mass for mass in masses))
     if beam is not None and beam.fidelity == "dynamic":

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterator
 from functools import partial
 
+from .laws import laws_that
 from .linearised import largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS
 from .messages import toml_of
@@ -85,11 +86,11 @@ def _partners_fit(scene: Scene, at: At) -> Iterator[str]:
     for table, body in scene.partners.items():
         foreign = isinstance(body, ForeignFmu)
         name = at(f"{table}.fmu" if foreign else f"{table}.element")
-        if contact.law == "paper":
+        if contact.algorithm:
             yield f"{name}: {at('contact.law')} is Algorithm 1, which needs our own bodies; take another law"
         if scene.coupling.feedback != "two_way":
             yield f'{name}: {at("coupling.feedback")} bounds what it neglects for our own bodies only; use "two_way"'
-        if scene.massless and contact.law == "transmission":
+        if scene.massless and contact.facts.strikes:
             yield (
                 f"{name}: {at('contact.law')} needs our own spring below {at('beam.fidelity')}; "
                 'use law = "tie", or fidelity = "dynamic"'
@@ -154,22 +155,23 @@ def _tip_arrives(scene: Scene, at: At) -> Iterator[str]:
 
 def _ends_can_be_joined(scene: Scene, at: At) -> Iterator[str]:
     contact, tip, top = scene.contact, scene.tip_at_start, scene.top_at_start
-    if contact.damping > 0.0 and contact.law not in ("compliance", "link"):
-        yield f'{at("contact.damping")}: law = "{contact.law}" has none; use 0.0, "compliance" or "link"'
+    if contact.damping > 0.0 and "damping" not in contact.facts.takes:
+        others = laws_that(lambda law: "damping" in law.takes)
+        yield f'{at("contact.damping")}: law = "{contact.law}" has none; use 0.0, {others}'
     if not contact.lasting:
         return
     for table in ("beam", "spring"):
         if scene.under(table) is None and not scene.elastic_stop:
             yield f"{at('contact.law')}: joins a [beam] and a [spring]; this scene has no [{table}]"
-    if contact.law == "link" and contact.stiffness == contact.damping == 0.0:
+    if contact.soft and contact.stiffness == contact.damping == 0.0:
         yield f"{at('contact.stiffness')}: {at('contact.law')} needs a stiffness or a damping greater than 0"
-    if contact.law == "tie" and contact.impact != "inelastic":
-        yield f'{at("contact.impact")}: law = "tie" gives both ends one velocity; use "inelastic"'
-    if contact.law != "tie" or tip is None or top is None:
+    if contact.rigid and contact.impact != "inelastic":
+        yield f'{at("contact.impact")}: law = "{contact.law}" gives both ends one velocity; use "inelastic"'
+    if contact.soft or tip is None or top is None:
         return
     if not math.isclose(tip.value, top.value, rel_tol=1e-12):
         yield (
-            f'{at(tip.key)}: the tip starts at {tip.value:.6g} m, but law = "tie" holds it at {at(top.key)}; '
+            f'{at(tip.key)}: the tip starts at {tip.value:.6g} m, but law = "{contact.law}" holds it at {at(top.key)}; '
             'let them start at one height, or use "link"'
         )
 
@@ -177,7 +179,7 @@ def _ends_can_be_joined(scene: Scene, at: At) -> Iterator[str]:
 def _law_applies(scene: Scene, at: At) -> Iterator[str]:
     beam, contact, scheme = scene.beam, scene.contact, scene.coupling.scheme
     law = at("contact.law")
-    if contact.law == "paper":
+    if contact.algorithm:
         for table in ("beam", "spring", "stop"):
             if scene.under(table) is None:
                 yield f"{law}: Algorithm 1 needs a [{table}]"
@@ -185,9 +187,9 @@ def _law_applies(scene: Scene, at: At) -> Iterator[str]:
             yield f"{at('beam.mesh')}: {law} integrates the beam by (62), which needs a mesh"
         if beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf != 1.0:
             yield f"{at('beam.rho_inf')}: {law} is the midpoint rule, rho_inf = 1"
-    if contact.law == "compliance" and contact.stiffness == 0.0:
+    if contact.facts.opens and contact.stiffness == 0.0:
         yield (
-            f'{at("contact.stiffness")}: with law = "compliance" nothing would hold the bodies apart; it must be '
+            f'{at("contact.stiffness")}: with law = "{contact.law}" nothing would hold the bodies apart; it must be '
             "greater than 0"
         )
     if scene.elastic_stop and scene.stop is not None and scene.stop.restitution != 1.0:
@@ -195,16 +197,16 @@ def _law_applies(scene: Scene, at: At) -> Iterator[str]:
             f"{at('stop.restitution')}: {law} makes the stop elastic; leave restitution out, and give its loss by "
             "[contact] damping"
         )
-    if scheme in ORDINARY_SCHEMES and contact.law not in ("compliance", "link"):
+    if scheme in ORDINARY_SCHEMES and not contact.soft:
         yield (
-            f'{at("coupling.scheme")}: needs [contact] law = "compliance" or "link"; '
+            f"{at('coupling.scheme')}: needs [contact] law = {laws_that(lambda law: law.soft)}; "
             f'use scheme = "energy" or "hermite" with law = "{contact.law}"'
         )
-    if scheme == "hermite" and contact.law in ("compliance", "link"):
+    if scheme == "hermite" and contact.soft:
         yield (
             f'{at("coupling.scheme")}: needs a rigid law; with {law} use scheme = "energy", "gauss_seidel" or "jacobi"'
         )
-    if scheme == "hermite" and contact.impact == "rest" and contact.rigid and scene.joins:
+    if scheme == "hermite" and contact.impact == "rest" and contact.facts.strikes and scene.joins:
         yield (
             f"{at('coupling.scheme')}: gives both ends one velocity, but {at('contact.impact')} leaves two; "
             'use scheme = "energy" or impact = "inelastic"'
@@ -218,16 +220,13 @@ def _inertia_needed(scene: Scene, at: At) -> Iterator[str]:
     name, law = at("beam.fidelity"), at("contact.law")
     if scene.lower is None:
         yield f'{name}: a beam without inertia needs a [spring]; use fidelity = "dynamic"'
-    remedies = {
-        "compliance": 'law = "transmission", fidelity = "dynamic", or neglect the force on the beam: [coupling] '
-        'feedback = "beam_drives"',
-        "link": 'law = "tie" or fidelity = "dynamic"',
-    }
-    if contact.law in remedies and scene.coupling.feedback != "beam_drives":
-        yield f"{name}: the tip between the beam and {law} would have no inertia; use {remedies[contact.law]}"
-    if contact.law == "paper":
+    if contact.soft and scene.coupling.feedback != "beam_drives":
+        remedy = 'law = "transmission", fidelity = "dynamic", or neglect the force on the beam: [coupling] '
+        remedy = 'law = "tie" or fidelity = "dynamic"' if contact.lasting else f'{remedy}feedback = "beam_drives"'
+        yield f"{name}: the tip between the beam and {law} would have no inertia; use {remedy}"
+    if contact.algorithm:
         yield f'{name}: {law} integrates the beam by (62); use fidelity = "dynamic"'
-    if contact.law == "transmission" and contact.impact == "tip":
+    if contact.facts.strikes and contact.impact == "tip":
         yield (
             f"{name}: {at('contact.impact')} gives the spring the velocity of the tip, which without inertia has none "
             'of its own; use impact = "inelastic"'
@@ -258,8 +257,9 @@ def _feedback_negligible(scene: Scene, at: At) -> Iterator[str]:
         yield f'{name}: there is one body only; use "two_way"'
     if beam is None or spring is None:
         return
-    if contact.law != "compliance" or coupling.scheme not in ("energy", "auto"):
-        yield f'{name}: needs [contact] law = "compliance" and [coupling] scheme = "energy"; use "two_way" otherwise'
+    if not contact.facts.opens or coupling.scheme not in ("energy", "auto"):
+        laws = laws_that(lambda law: law.opens)
+        yield f'{name}: needs [contact] law = {laws} and [coupling] scheme = "energy"; use "two_way" otherwise'
     if contact.damping > 0.0:
         yield f'{name}: its error is unknown for a damped contact; use [contact] damping = 0.0 or "two_way"'
     if coupling.feedback == "spring_drives" and (spring.cubic_stiffness != 0.0 or spring.linear_stiffness <= 0.0):
@@ -270,7 +270,7 @@ def _feedback_negligible(scene: Scene, at: At) -> Iterator[str]:
         return
     # A contact of depth p has V = 2 λ p, whatever p.
     share = 4.0 * contact.stiffness / (scene.driver_stiffness or math.inf)
-    if contact.exponent == 1.0 and share > coupling.feedback_tolerance:
+    if contact.exponent == 1.0 and "exponent" in contact.facts.takes and share > coupling.feedback_tolerance:
         yield (
             f"{name}: neglects up to 4·stiffness/(stiffness of the driving end) = {share:.2g} of the penetration; "
             f'allowed is feedback_tolerance = {coupling.feedback_tolerance:g}. Use "two_way", or allow more'
@@ -283,7 +283,7 @@ def _coupling_resolves(scene: Scene, at: At) -> Iterator[str]:
         return  # it picks scheme, degree and steps that go together
     if H is None:
         tolerance = next(at(f"coupling.{key}") for key in TOLERANCE_KEYS if getattr(coupling, key) is not None)
-        if scene.contact.law == "paper":
+        if scene.contact.algorithm:
             yield f"{tolerance}: {at('contact.law')} is Algorithm 1, which has one macro_step"
         if coupling.scheme in ORDINARY_SCHEMES:
             yield f'{tolerance}: scheme = "{coupling.scheme}" never repeats a step; give macro_step instead'
@@ -323,7 +323,7 @@ def _loads_act(scene: Scene, at: At) -> Iterator[str]:
                 f'{on}: {at("beam.fidelity")} takes no loads that vary; use fidelity = "dynamic", or distributed_load '
                 "for a constant"
             )
-        if scene.contact.law == "paper":
+        if scene.contact.algorithm:
             yield f"{on}: {at('contact.law')} is Algorithm 1, which knows constant loads only; take another law"
 
 

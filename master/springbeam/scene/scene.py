@@ -105,7 +105,7 @@ class Scene(Table):
     def elastic_stop(self) -> bool:
         """Whether the contact law acts between the tip and the stop: there is no spring, and the law is soft."""
         alone = self.upper is not None and self.lower is None and self.stop is not None
-        return alone and self.contact.law in ("compliance", "link")
+        return alone and self.contact.soft
 
     @property
     def coupled(self) -> bool:

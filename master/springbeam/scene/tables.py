@@ -16,10 +16,13 @@ from pydantic import (
     ModelWrapValidatorHandler,
     PrivateAttr,
     SerializerFunctionWrapHandler,
+    field_validator,
     model_serializer,
     model_validator,
 )
 from typing_extensions import Self
+
+from .laws import LAWS, LawFacts, choices
 
 #: Up to this many unknowns all modes may be kept; the full eigenproblem grows with the cube.
 ALL_MODES_UP_TO = 1000
@@ -35,13 +38,24 @@ class SceneError(ValueError):
     """A scene that cannot be run; the message names the file, the table, the key and what would be allowed."""
 
 
-def key(unit: str, meaning: str, default: Any = ..., *, otherwise: str = "", **bounds: float) -> Any:
+def key(
+    unit: str,
+    meaning: str,
+    default: Any = ...,
+    *,
+    otherwise: str = "",
+    one_of: tuple[str, ...] = (),
+    **bounds: float,
+) -> Any:
     """Declare a key of a table: its unit ("–" for none), one line of meaning, its default (none: it must be given).
 
-    ``otherwise`` says in words what holds where the key is left out and ``default`` does not tell; ``bounds`` are
-    pydantic's gt, ge, le, lt.
+    ``otherwise`` says in words what holds where the key is left out and ``default`` does not tell; ``one_of`` are the
+    texts that it may be, where its type does not say; ``bounds`` are pydantic's gt, ge, le, lt.
     """
-    return Field(default, description=meaning, json_schema_extra={"unit": unit, "otherwise": otherwise}, **bounds)  # type: ignore[call-overload]
+    extra: dict[str, Any] = {"unit": unit, "otherwise": otherwise}
+    if one_of:
+        extra["enum"] = list(one_of)
+    return Field(default, description=meaning, json_schema_extra=extra, **bounds)  # type: ignore[call-overload]
 
 
 class Ways(NamedTuple):
@@ -280,9 +294,7 @@ class Stop(Table):
 class Contact(Table):
     """What force C belongs to the penetration p = y − u_tip (``docs/model.md``, "Interface laws")."""
 
-    law: Literal["transmission", "compliance", "tie", "link", "paper"] = key(
-        "–", "the interface law (docs/contact.md says which)", "transmission"
-    )
+    law: str = key("–", "the interface law (docs/contact.md says which)", "transmission", one_of=tuple(LAWS))
     impact: Literal["inelastic", "rest", "tip"] = key(
         "–", "what a rigid meeting does: both ends get their common velocity; the spring's becomes 0, or the tip's",
         "inelastic",
@@ -301,23 +313,44 @@ class Contact(Table):
         otherwise="a fiftieth of the period of a compliant contact, else of the beam's slowest",
     )  # fmt: skip
 
+    @field_validator("law")
+    @classmethod
+    def _law_exists(cls, law: str) -> str:
+        if law not in LAWS:
+            raise ValueError(f'law = "{law}": must be {choices(LAWS)}')
+        return law
+
     @model_validator(mode="after")
     def _law_is_complete(self) -> Contact:
-        needed = {"compliance": ("stiffness", "exponent"), "paper": ("stiffness", "exponent"), "link": ("stiffness",)}
-        missing = [name for name in needed.get(self.law, ()) if name not in self.model_fields_set]
+        missing = [name for name in self.facts.needs if name not in self.model_fields_set]
         if missing:
             raise ValueError("\n".join(f'{name}: missing; law = "{self.law}" needs it' for name in missing))
         return self
 
     @property
+    def facts(self) -> LawFacts:
+        """What the law is."""
+        return LAWS[self.law]
+
+    @property
     def rigid(self) -> bool:
         """Whether ends that have met share one position."""
-        return self.law in ("transmission", "tie")
+        return self.facts.kind == "rigid"
+
+    @property
+    def soft(self) -> bool:
+        """Whether C is a function of the penetration and its rate."""
+        return self.facts.soft
+
+    @property
+    def algorithm(self) -> bool:
+        """Whether the law is an algorithm of its own, defined by its macro step."""
+        return self.facts.kind == "algorithm"
 
     @property
     def lasting(self) -> bool:
         """Whether the law joins the ends from the start and for good, for either sign of C."""
-        return self.law in ("tie", "link")
+        return self.facts.lasting
 
 
 #: Keys that set the length of macro steps: the one, or the others.

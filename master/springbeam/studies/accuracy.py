@@ -112,8 +112,10 @@ def pick(scene: Scene) -> Trajectory:
     """
     if scene.accuracy is None:
         raise SceneError("accuracy: the scene asks for none")
-    if scene.contact.law == "paper":
-        raise SceneError('accuracy: [contact] law = "paper" is defined by its macro step; take another law')
+    if scene.contact.algorithm:
+        raise SceneError(
+            f'accuracy: [contact] law = "{scene.contact.law}" is defined by its macro step; take another law'
+        )
     return _Search(scene, scene.accuracy).run()
 
 

@@ -20,10 +20,12 @@ def refuse_without_reference(scene: Scene) -> None:
             f"[{table}] {'fmu' if table in scene.foreign else 'element'}: no reference knows this body, a "
             f"{type(body).__name__}; springbeam run --accuracy compares runs of smaller and smaller steps instead"
         )
-    if scene.contact.law == "transmission" and scene.contact.impact == "rest" and scene.beam and scene.spring:
+    if scene.contact.facts.strikes and scene.contact.impact == "rest" and scene.beam and scene.spring:
         raise SceneError("contact.impact = 'rest': no reference has it; use 'inelastic' or 'tip'")
-    if scene.contact.law == "compliance" and scene.massless:
-        raise SceneError("beam.fidelity = 'quasi_static': no reference has it with law 'compliance'; use 'dynamic'")
+    if scene.contact.soft and scene.massless:
+        raise SceneError(
+            f"beam.fidelity = 'quasi_static': no reference has it with law '{scene.contact.law}'; use 'dynamic'"
+        )
 
 
 def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:

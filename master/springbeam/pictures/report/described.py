@@ -8,11 +8,6 @@ from ...scene import Scene
 from ...scene.partners import kind_of
 from ...scene.statics import bending_stiffness, shear_stiffness
 
-_LAWS = {
-    "transmission": "the tip and the spring move together while they touch",
-    "tie": "tied for good",
-}
-
 
 def described(scene: Scene) -> Iterator[tuple[str, str]]:
     """Return what each part of the scene is, in the order of the drawing from above."""
@@ -33,9 +28,9 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
     for table, partner in scene.partners.items():
         yield table, f"another body in its place: {kind_of(partner).replace('_', ' ')}"
     if scene.coupled:
-        soft = f"λ = {contact.stiffness:.4g}, exponent {contact.exponent:.4g}"
-        words = {"link": f"stiffness {contact.stiffness:.4g} N/m", "compliance": soft, "paper": soft}
-        yield "contact", f"{contact.law}: {(_LAWS | words)[contact.law]}"
+        values = {key: getattr(contact, key) for key in contact.facts.takes if key != "impact"}
+        numbers = [f"{key} {value:.4g}" for key, value in values.items() if key != "damping" or value > 0.0]
+        yield "contact", f"{contact.law}: {', '.join([contact.facts.words, *numbers])}"
     if stop is not None:
         rebound = "elastic" if scene.elastic_stop else f"restitution {stop.restitution:.4g}"
         yield "foundation", f"at φ = {stop.position:.4g} m, {rebound}"

@@ -112,7 +112,7 @@ def crosscheck(scene: Scene) -> Report:
     RunStopped, ReferenceFailure
         If either stops early.
     """
-    if scene.contact.law == "paper":
+    if scene.contact.algorithm:
         return _crosscheck_paper(scene)
     refuse_without_reference(scene)
     asked, note, failure = scene, "", None

@@ -33,7 +33,7 @@ class Crosscheck(Study):
     def cases(self) -> dict[str, Scene]:
         """Return the scene to compare. Raises SceneError if there is no reference."""
         scene = self.scene
-        if scene.contact.law != "paper":
+        if not scene.contact.algorithm:
             refuse_without_reference(scene)
         if self.quick:
             start = scene.contact_time or 0.0
@@ -42,7 +42,7 @@ class Crosscheck(Study):
 
     def cost(self) -> str:
         """Say what is run."""
-        if self.scene.contact.law == "paper":
+        if self.scene.contact.algorithm:
             return "a run, and Algorithm 1 twice"
         return "2 runs and 2 references, more where the motion is not resolved"
 

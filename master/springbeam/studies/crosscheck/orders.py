@@ -48,7 +48,7 @@ class Orders(Study):
 
     def cases(self) -> dict[str, int | None]:
         """Return the halvings, ``None`` for the reference. Raises SceneError if the law does not converge."""
-        if self.scene.contact.law == "paper":
+        if self.scene.contact.algorithm:
             raise SceneError("contact.law = 'paper': Algorithm 1 does not converge; --orders needs another law")
         halvings = range(_HALVINGS + 1 - self.quick)
         return {"reference": None, **{f"H/{2**k}" if k else "H": k for k in halvings}}

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ...scene import Beam
+from ...scene.laws import LAWS
 from ..schemes import RIGID, SOFT
 
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
@@ -178,14 +179,14 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
     restitution = {"given": cell["restitution"], "plastic": 0.0, "elastic": 1.0}[cell["elasticity"]]
     # generalized_alpha goes with degree 0 only, and with ρ∞ = 1 in the paper.
     integrator = cell["integrator"] if degree == 0 else "modal"
-    if law == "paper" and integrator == "damped":
+    if LAWS[law].kind == "algorithm" and integrator == "damped":
         integrator = "midpoint"
     elastic = cell["approach"] == "elastic"
     clearance = cell["clearance"]
     if elastic:
         clearance = min(clearance, 0.1 * speed * steps * H)  # else most would never meet
     impact = cell["impact"]
-    if law in ("tie", "link"):  # joined from the start, a tie by the inelastic impact
+    if LAWS[law].lasting:  # joined from the start, a tie by the inelastic impact
         clearance, impact = 0.0, "inelastic"
     # What takes the beam's kinetic energy v²/6.
     reach = abs(psi) + speed / np.sqrt(3.0 * k1)
@@ -196,7 +197,7 @@ def scene_dict(cell: dict[str, Any]) -> dict[str, Any]:
             "impact": impact,
             "stiffness": cell["contact_stiffness"],
             "exponent": cell["exponent"],
-            "damping": cell["contact_damping"] if law in ("compliance", "link") else 0.0,
+            "damping": cell["contact_damping"] if "damping" in LAWS[law].takes else 0.0,
         },
         "coupling": {"scheme": scheme, "degree": degree, "macro_step": H},
         "time": {"t_end": steps * H + (0.0 if elastic or cell["bodies"] == "spring" else clearance / speed)},

@@ -44,7 +44,7 @@ def growth(scene: Scene) -> float:
     H, soft = scene.coupling.H, not scene.contact.rigid
     spring = {"cubic_stiffness": 0.0, "equilibrium": 0.0, "external_force": 0.0, "initial_velocity": 0.0}
     at_rest = {"distributed_load": 0.0, "initial_deflection_slope": 0.0, "initial_velocity_slope": 0.0}
-    law = {"law": "link", "damping": 0.0} if scene.contact.law == "compliance" else {}
+    law = {"law": "link", "damping": 0.0} if scene.contact.facts.opens else {}
     linear = with_changes(scene, stop=None, spring=spring, beam={**at_rest, "approach": "elastic"}, contact=law)
     coupling, guess = coupling_of(linear, law_of(linear.contact)), NO_FORCE
     beam, top = load_bodies(linear, 0.0)

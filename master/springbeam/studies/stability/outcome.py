@@ -117,8 +117,8 @@ def judged(run: Trajectory, cause: str = "") -> Outcome:
 
 
 def _only_damped_numerically(scene: Scene) -> bool:
-    beam, scheme, law = scene.beam, scene.coupling.scheme, scene.contact.law
-    return beam is not None and beam.damped_numerically and scheme == "energy" and law != "paper"
+    beam, scheme = scene.beam, scene.coupling.scheme
+    return beam is not None and beam.damped_numerically and scheme == "energy" and not scene.contact.algorithm
 
 
 def _energy_scale(run: Trajectory) -> np.ndarray:
@@ -164,6 +164,6 @@ def _overlap(run: Trajectory) -> float:
         joined = np.isin(run.phase, ("tied", "touch"))
         overlap = float(np.max(np.where(joined, np.abs(run.gap), np.where(run.phase == "free", -run.gap, 0.0))))
     elastic = scene.spring is None and not scene.contact.rigid  # a stop with a soft law
-    if scene.stop is not None and scene.contact.law != "paper" and not elastic:
+    if scene.stop is not None and not scene.contact.algorithm and not elastic:
         overlap = max(overlap, float(np.max(scene.stop.position - (run.y if scene.spring is not None else run.u_tip))))
     return max(overlap, 0.0) / motion if motion > 0.0 else 0.0

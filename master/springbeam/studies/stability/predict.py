@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.laws import Transmission, law_of
+from ...contact.laws import Transmission, depth, law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene, suspicions
 from ...scene.automatic import Choice, choice
-from ...scene.linearised import contact_depth, spring_frequency, spring_stiffness
+from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from ...scene.resolution import STABLE
 from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
 from ..schemes import RIGID, SOFT
@@ -97,7 +97,7 @@ def predict(scene: Scene) -> Prediction:
             notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
         if beam.integrator == "generalized_alpha":
             notes.append("predicted for exact modes; generalized_alpha with rho_inf = 1 adds no energy of its own")
-    of_the_paper = scene.contact.law == "paper"
+    of_the_paper = scene.contact.algorithm
     pair = None if modal is None or of_the_paper else linear_pair(scene, modal)
     schemes: tuple[SchemePrediction, ...] = ()
     if of_the_paper:
@@ -200,8 +200,8 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
     law = law_of(scene.contact) if scene.coupled else Transmission()
     if not law.soft:
         return LinearPair(beam, low)
-    depth = contact_depth(scene) if law.one_sided else 0.0
-    return LinearPair(beam, low, law.slope(depth), law.resistance(depth, 0.0)[2] if law.damped else 0.0)
+    depth_reached = depth(law, contact_energy(scene)) if law.one_sided else 0.0
+    return LinearPair(beam, low, law.slope(depth_reached), law.resistance(depth_reached, 0.0)[2] if law.damped else 0.0)
 
 
 def contact_frequency(scene: Scene) -> float:

@@ -73,7 +73,7 @@ class Tradeoff(Study):
         SceneError
             If no reference is defined for the scene.
         """
-        if scene.contact.law == "paper":
+        if scene.contact.algorithm:
             raise SceneError("[contact] law = \"paper\": Algorithm 1 has no exact solution to compare with; "
                              'law = "transmission" or "compliance" has')  # fmt: skip
         refuse_without_reference(scene)

@@ -138,7 +138,7 @@ def _rivals(scene: Scene) -> Iterator[Configuration]:
             continue
         for rtol in tolerances:
             yield Configuration(method, f"rtol {rtol:.0e}", scene, method, rtol)
-    joined_for_good = scene.contact.law in ("tie", "link")  # Algorithm 1 lets go
+    joined_for_good = scene.contact.lasting  # Algorithm 1 lets go
     if scene.beam is not None and scene.spring is not None and scene.stop is not None and not joined_for_good:
         for H in _sizes(scene):
             paper = {"contact": {"law": "paper"}, "coupling": {"scheme": "energy", "degree": 0, "macro_step": H}}
