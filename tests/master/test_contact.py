@@ -132,3 +132,18 @@ def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, 
         assert tip_mass * v_after + mass * z_after == pytest.approx(tip_mass * v + mass * z, rel=1e-14)
     else:
         assert (v_after, z_after) == (v, z)
+
+
+@pytest.mark.parametrize(("v", "left"), [(0.19, 0.0), (-3.0, 0.0), (0.21, 0.21)])
+@pytest.mark.parametrize("mass", [None, 1.0])
+def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(mass, v, left):
+    """It rests on the stop, or on a seated spring top, which stays; the impulse is the foundation's."""
+    tip_mass, held = 0.01, Phase(Joint.TIED if mass is None else Joint.TOUCH, seated=True)
+    transitions = Transitions(load_scene("soft"), Transmission(), tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
+    ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, 0.0, 0.0, 0.0)
+    kind, phase, impact = transitions.after("separation", held, ends, 0.0, ends, -1.0, 1e-17)
+    assert (kind, phase) == ("separation", Phase(Joint.FREE, seated=mass is not None))
+    assert impact.on_spring == 0.0
+    assert impact.of_foundation == impact.on_beam
+    assert v + impact.on_beam / tip_mass == pytest.approx(left, abs=1e-15)
+    assert impact.energy_loss == pytest.approx(0.5 * tip_mass * (v**2 - left**2), rel=1e-12)

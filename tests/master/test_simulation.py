@@ -211,6 +211,29 @@ def test_a_top_that_rests_where_its_spring_is_unloaded_stays_there(size):
     assert trajectory.events[0].time == pytest.approx(np.pi / 2, rel=1e-11)
 
 
+@pytest.mark.parametrize(("scheme", "degree"), [("energy", 0), ("energy", 2)])
+def test_a_top_that_leaves_its_foundation_for_less_than_a_step_is_seen(scheme, degree):
+    """Without stiffness, under F₀ − s(t − t₁) from where it is seated: it leaves at once, is back 3 F₀/s later, and the
+    foundation gives it 3/2 F₀²/s. At the end of the step, 0.22 s later, it would be below."""
+    force, slope, since, speed = 0.05, 1.0, 1.03, 1.0
+    load = force + slope * since
+    scene = scene_from_dict({
+        "time": {"t_end": 2.0},
+        "spring": {
+            "linear_stiffness": 0.0, "equilibrium": speed * since - load * since**2 / 2 + slope * since**3 / 6,
+            "initial_velocity": -speed, "external_force": load,
+        },
+        "loads": [{"on": "spring", "signal": "ramp", "amplitude": -2.0 * slope, "duration": 2.0}],
+        "stop": {"position": 0.0, "restitution": 0.0},
+        "coupling": {"scheme": scheme, "degree": degree, "macro_step": 0.25},
+    })  # fmt: skip
+    events = simulate(scene).events
+    assert [event.kind for event in events] == ["seated", "unseated", "seated"]
+    back = since + 3.0 * force / slope
+    assert [event.time for event in events] == pytest.approx([since, since, back], abs=1e-9)
+    assert events[2].impulse_foundation == pytest.approx(1.5 * force**2 / slope, rel=1e-6)
+
+
 # -- steps that fail ------------------------------------------------------------------------------------------------
 
 

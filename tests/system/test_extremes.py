@@ -11,6 +11,7 @@ from scenes import scene_from_dict
 
 from springbeam import RunStopped, simulate
 from springbeam.monolithic import event_driven
+from springbeam.results.contact_times import impulse_difference
 from springbeam.results.trajectory import Trajectory
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.reading import tomllib
@@ -23,7 +24,13 @@ SCENES["massless and damped"] = {
     "coupling": {**MASSLESS["coupling"], "degree": 2},
 }
 #: How near u_tip and y are to the reference, relative to their range.
-BESIDE_THE_REFERENCE = {"past the hilltop": 1e-11, "grazing": 5e-3}
+BESIDE_THE_REFERENCE = {
+    "past the hilltop": 1e-11,
+    "grazing": 5e-3,
+    "struck twice in a step": 1e-10,  # 4e-2 if only the end of the step is looked at
+    "let go of the stop": 2e-3,  # 4e-2 with the velocity that the scheme has left it
+    "off for less than a step": 2e-6,
+}
 
 
 def overlap(run: Trajectory) -> float:
@@ -127,10 +134,18 @@ def test_a_tip_is_held_at_zero(scheme, degree, size, slope, load):
 def test_the_motion_is_that_of_the_reference(name, bound):
     scene = scene_from_dict(SCENES[name])
     run = simulate(scene)
-    rows = np.arange(0, len(run), 20)
+    rows = np.arange(0, len(run), 7)
     reference = event_driven.simulate(scene, sample_times=run.time[rows])
-    for column in ("u_tip", "y"):
+    for column in {"u_tip", "y"} & set(run.columns):
         assert np.abs(run[column][rows] - reference[column]).max() <= bound * np.ptp(reference[column]), column
+
+
+def test_a_seated_tip_that_is_off_its_stop_for_less_than_a_step_is_seen():
+    """What the stop gives is then that of the reference, with one rest more: 1.6e-3 less without it."""
+    scene = scene_from_dict(SCENES["off for less than a step"])
+    run, exact = simulate(scene), event_driven.simulate(scene)
+    assert [event.kind for event in run.events] == [event.kind for event in exact.events]
+    assert impulse_difference(run, exact) < 1e-6
 
 
 @pytest.mark.parametrize(

@@ -232,11 +232,13 @@ class Transitions(Checkpointed):
     def _part(self, opened: Phase, tip: Motion, low: Motion) -> Impact:
         """Ends that a tie lets go have one velocity; where a scheme has let theirs differ, they take that first.
 
-        Unless they part by so much that it is no error but a vibration that the macro step does not follow.
+        Unless they part by so much that it is no error but a vibration that the macro step does not follow. A lower end
+        that the foundation holds stays at rest.
         """
         parting = tip.velocity - low.velocity
-        if self._mass is None or self._tip_mass is None or opened.seated or parting == 0.0:
+        if self._tip_mass is None or parting == 0.0 or parting > VIBRATION * self._fastest():
             return Impact()
-        if parting > VIBRATION * self._fastest():
-            return Impact()
+        if self._mass is None or opened.seated:
+            on_beam, loss = rebound(tip.velocity, self._tip_mass, restitution=0.0)
+            return Impact(on_beam, of_foundation=on_beam, energy_loss=loss)
         return meeting("inelastic", tip.velocity, low.velocity, self._tip_mass, self._mass)

@@ -147,21 +147,20 @@ class Detector:
     def _bracket(
         self, state: State, function: EventFunction, step: Step, floor: float, start: Sample, end: Sample
     ) -> Step | None:
-        """Return ``step`` if ``function`` ends below ``floor``, a shorter one if it dips below it inside, or None."""
-        if end[0] < floor:
-            return step
+        """Return ``step`` if ``function`` ends below ``floor``, a shorter one if it dips below it before, or None."""
+        whole_step = step if end[0] < floor else None
         if abs(start[1]) <= self._rest(step.start):
             # Ends that have just parted may close a little first, by the error of the time at which they were let go.
-            return None
+            return whole_step
         path = Path.through(start, end, step.size, function.means(step.end, step.size))
         unsure = _UNSURE * path.beside_cubic
-        if clearance(start, end, step.size)[0] - path.beside_cubic >= floor + unsure:
+        if whole_step is None and clearance(start, end, step.size)[0] - path.beside_cubic >= floor + unsure:
             return None
         before, whole = 0.0, step.size
         for _ in range(_MAX_DIP_TRIALS):
             inside = path.lowest_inside()
             if inside is None or path.at(inside) >= floor + unsure:
-                return None
+                break
             dip = self._pair.attempt(state, before + inside * path.size, step.start)
             bottom = function(dip.end)
             if bottom[0] < floor:
@@ -173,7 +172,7 @@ class Detector:
                 end, whole = bottom, dip.size
             shrunk = (whole - before) / step.size
             path, unsure = Path.through(start, end, whole - before), unsure * shrunk**4
-        return None
+        return whole_step
 
     def _located(self, state: State, function: EventFunction, bracket: Step, guess: float) -> Step:
         """Return the step that ends where ``function`` is 0, near ``guess`` [s]. Raises StepRefused if none does."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ..bodies import force
 from ..bodies.protocol import Force
-from ..contact.events import gap
+from ..contact.events import EventFunction, Height, gap
 from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Step
 from .stepping import Pair, State
@@ -112,20 +112,22 @@ class Separation:
         return self._pair.attempt(state, zero, step.start), push.event
 
     def _opens(self, state: State, step: Step, event: str) -> bool:
-        """Do the ends part if they are let go for the step? ("unseated": does the lower end leave the foundation?)"""
-        phase = state.phase
+        """Do the ends part if they are let go for the step, or early in it, to meet again before its end?
+
+        ("unseated": does the lower end leave the foundation?)
+        """
+        phase, pair = state.phase, self._pair
         if event == "unseated":
-            assert self._pair.stop is not None
-            low = self._pair.attempt(state, step.size, step.start, Phase(phase.joint)).end[1]
-            return low.displacement > self._pair.stop
-        let_go = Phase(Joint.FREE, phase.seated and self._pair.spring is not None)
-        if gap(self._pair.attempt(state, step.size, step.start, let_go).end)[0] > 0.0:
+            assert pair.stop is not None
+            height: EventFunction = Height(1, pair.stop, share=0.0)
+            let_go = Phase(phase.joint)
+        else:
+            height, let_go = gap, Phase(Joint.FREE, phase.seated and pair.spring is not None)
+        if height(pair.attempt(state, step.size, step.start, let_go).end)[0] > 0.0:
             return True
-        if phase.seated:  # a tip let go keeps its own velocity, and may be back on the foundation at once
-            return False
-        drift = abs(gap(step.start)[1])  # what the scheme leaves open of the ends' velocities, no parting
+        drift = abs(height(step.start)[1])  # what the scheme leaves open of the ends' velocities, no parting
         early = _EARLY * step.size
-        return gap(self._pair.attempt(state, early, step.start, let_go).end)[0] > drift * early
+        return height(pair.attempt(state, early, step.start, let_go).end)[0] > drift * early
 
 
 def _zero_of_means(points: list[tuple[float, float]], start: float) -> float | None:
