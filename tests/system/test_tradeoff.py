@@ -15,7 +15,7 @@ from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.studies import tradeoff
 from springbeam.studies.study import record_all
 from springbeam.studies.tradeoff import Tradeoff
-from springbeam.studies.tradeoff.configurations import configurations
+from springbeam.studies.tradeoff.configurations import ALGORITHM_1, configurations
 from springbeam.studies.tradeoff.points import Errors, Point, Points, errors
 
 
@@ -48,33 +48,31 @@ def test_more_steps_cost_more_calls(found):
         assert all(p.rollbacks > 0 for p in by_family(found, family))
 
 
-def test_no_point_beats_the_front(found):
-    front = found.front()
-    assert len(front) >= 3
-    for point in found.points:
-        if not point.refined and point.displacement < 0.1:
-            assert any(f.solve <= point.solve and f.displacement <= point.displacement for f in front)
+def test_front_and_choices_are_of_points_on_the_same_model():
+    """A point judged on a finer mesh is on no front; one that nothing is quicker and better than is; 0.1 is no result.
+    A choice is the cheapest that keeps the error, of this package and of scipy."""
 
-
-def test_choices_are_the_cheapest_that_keep_the_error(found):
-    for choice in found.cheapest():
-        good = [p for p in found.points if p.displacement <= choice.target and not p.refined and not p.monolithic]
-        assert (choice.ours is None) == (not good)
-        if choice.ours is not None:
-            assert choice.ours.solve == min(p.solve for p in good)
-    assert found.cheapest()[1].ours is not None
-    assert found.cheapest()[1].scipy is not None
-
-
-def test_points_judged_on_a_finer_mesh_are_on_no_front_and_chosen_for_no_error():
-    def point(solve, error, refined):
+    def point(solve, error, method="co-simulation", refined=False):
         against = Errors(error, None, None, None, 0.0, None, None)
-        return Point("family", "setting", "co-simulation", refined, 0, None, against, "", solve, 0.0, 0.0)
+        return Point("family", "setting", method, refined, 0, None, against, "", solve, 0.0, 0.0)
 
-    rough, better, finer = point(1.0, 1e-3, False), point(2.0, 1e-5, False), point(0.5, 1e-9, True)
-    found = Points([better, finer, rough])
-    assert found.front() == [rough, better]
+    rough, better, finer = point(1.0, 1e-3), point(2.0, 1e-5), point(0.5, 1e-9, refined=True)
+    slower, wrong, scipy, paper = (
+        point(3.0, 1e-4),
+        point(0.1, 0.2),
+        point(1.5, 1e-7, "Radau"),
+        point(0.2, 5e-3, ALGORITHM_1),
+    )
+    found = Points([better, slower, finer, rough, wrong, scipy, paper])
+    assert found.front() == [paper, rough, scipy]
     assert [choice.ours for choice in found.cheapest()] == [rough, better, None, None]
+    assert [choice.scipy for choice in found.cheapest()] == [scipy, scipy, scipy, None]
+    assert [choice.ratio for choice in found.cheapest()] == [1.5, 0.75, None, None]
+
+
+def test_a_tradeoff_has_a_front_and_choices(found):
+    assert len(found.front()) >= 3
+    assert None not in (found.cheapest()[1].ours, found.cheapest()[1].scipy)
 
 
 def test_modes_converge_to_the_mesh_and_not_beyond(found):
