@@ -20,7 +20,7 @@ from springbeam.contact.phases import (
     rebound,
     spring_force,
 )
-from springbeam.scene import Spring, load_scene
+from springbeam.scene import Spring, load_scene, with_changes
 
 MASSES = [(0.25, 1.0), (1.0, 0.01), (3.0, 100.0)]
 VELOCITIES = [(-1.0, 0.0), (-0.2, 0.7), (0.1, 0.3)]
@@ -147,3 +147,22 @@ def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(
     assert impact.of_foundation == impact.on_beam
     assert v + impact.on_beam / tip_mass == pytest.approx(left, abs=1e-15)
     assert impact.energy_loss == pytest.approx(0.5 * tip_mass * (v**2 - left**2), rel=1e-12)
+
+
+def struck_at(z, restitution, fastest=1.0):
+    """The kind, the phase and the impact as a top strikes the foundation at ``z``, after an impact at ``fastest``."""
+    scene = with_changes(load_scene("soft"), stop={"restitution": restitution})
+    transitions = Transitions(scene, Transmission(), 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
+    for speed in (-fastest, z):
+        end = Motion(scene.stop.position, speed, 0.0, 0.0)
+        found = transitions.after("stop_impact", Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
+    return found
+
+
+@pytest.mark.parametrize(("z", "restitution", "kind"), [
+    (-1e-3, 0.9, "stop_impact"), (-1e-12, 0.9, "seated"), (-1e-12, 1.0, "stop_impact"), (0.0, 1.0, "seated"),
+])  # fmt: skip
+def test_bounces_die_out_unless_nothing_is_lost(z, restitution, kind):
+    found, phase, impact = struck_at(z, restitution)
+    assert (found, phase.seated) == (kind, kind == "seated")
+    assert impact.of_foundation == pytest.approx(-z * (1.0 + (0.0 if kind == "seated" else restitution)), rel=1e-14)

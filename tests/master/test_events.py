@@ -9,11 +9,11 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from springbeam.bodies.protocol import Motion
-from springbeam.contact.events import EventFunctions, Height, clearance, gap, locate
+from springbeam.contact.events import EventFunctions, Height, Holding, clearance, gap, locate
 from springbeam.contact.laws import Transmission
 from springbeam.contact.phases import Joint, Phase, common_velocity
 from springbeam.results.paths import Path, Sample
-from springbeam.scene import load_scene
+from springbeam.scene import Beam, Spring, load_scene
 
 SIZE = 0.02
 #: Coefficients in x = τ/H, ascending.
@@ -114,6 +114,13 @@ def test_means_of_event_functions_are_their_integrals(function):
     expected = 0.5 * weights @ f, 0.5 * weights @ ((1.0 - tau / SIZE) * f)
     ends = tuple(Motion(w(SIZE), 0.0, w.integ()(SIZE), w.integ(2)(SIZE)) for w in motions)
     assert function.means(ends, SIZE) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_force_that_holds_a_massless_tip_falls_as_the_spring_moves():
+    """1/k = 4/3 m/N, α_b = 0.1 s, 2 kg, c = 0.5 N·s/m, k1 = 3 N/m: C/k = 0.2 − 0.1 m, and ż = −0.175/2 m/s²."""
+    holding = Holding(Beam.with_ones(alpha_b=0.1), Spring.with_ones(mass=2.0, damping=0.5, linear_stiffness=3.0))
+    ends = Motion(0.2, -1.0, 0.0, 0.0), Motion(0.2, -1.0, 0.0, 0.0)
+    assert holding(ends) == pytest.approx((0.1, -1.0 - 0.1 * 0.0875), rel=1e-14)
 
 
 @pytest.mark.parametrize(("v", "z", "rate"), [(-0.4, 0.1, -0.3), (-0.1, 0.4, -0.0), (0.4, -0.1, 0.3)])

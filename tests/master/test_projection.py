@@ -61,13 +61,14 @@ def test_the_work_is_what_the_law_stores(degree, q, shape):
 @pytest.mark.parametrize("q", [1.0, 1.5, 3.0])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_it_is_the_projection_of_the_force(degree, q, shape):
-    """Against adaptive quadrature; 16 graded points of a power beside its zero leave 1e-7 of the largest force."""
+    """Also the coefficient that is left out, against adaptive quadrature; 16 graded points of a power beside its zero
+    leave 1e-7 of the largest force."""
     law = Compliance(1e4, q)
     projection = Projection(law, degree)
     start, x = numbers(shape, degree)
     c = series(projection, start, x)
     largest = law.force(float(np.abs(legendre.legval(np.linspace(-1, 1, 50), c)).max()))
-    for k, value in enumerate(projection.force(start, SIZE, x)):
+    for k, value in enumerate([*projection.force(start, SIZE, x), projection.next_coefficient(start, x)]):
         unit = [0.0] * k + [1.0]
         exact = (k + 0.5) * integral(lambda s, e=unit: law.force(legendre.legval(s, c)) * legendre.legval(s, e), c)
         assert value == pytest.approx(exact, abs=1e-7 * largest)

@@ -324,6 +324,16 @@ def test_a_diagnostic_column_that_overflows_does_not_stop_a_run(stiffness, expon
     assert not any("compliance_force" in warning for warning in plain.summary["warnings"])
 
 
+def test_the_smoothed_force_begins_anew_with_each_contact():
+    """At degree 0 it is the mean of two neighbouring steps' forces; a first step has no neighbour."""
+    run = simulate(soft(coupling={"scheme": "energy", "degree": 0}))
+    first = np.searchsorted(run.time, [event.time for event in run.events if event.kind == "impact"], side="right")
+    assert len(first) >= 2
+    assert np.array_equal(run.contact_force_smoothed[first], run.contact_force[first])
+    mean = 0.5 * (run.contact_force[1:9] + run.contact_force[2:10])
+    assert run.contact_force_smoothed[2:10] == pytest.approx(mean, rel=1e-12)
+
+
 # -- the ledger -----------------------------------------------------------------------------------------------------
 
 

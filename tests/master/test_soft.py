@@ -9,7 +9,8 @@ from scipy.linalg import expm
 
 from springbeam.bodies.protocol import NO_FORCE, Body, Motion
 from springbeam.contact.laws import Compliance, Link
-from springbeam.coupling.protocol import NotConverged
+from springbeam.coupling.exchange import Exchange
+from springbeam.coupling.protocol import NotConverged, Scales, Step
 from springbeam.coupling.soft import SoftSolver
 
 DEGREES = [0, 1, 2]
@@ -134,3 +135,29 @@ def test_a_step_made_at_degree_0_books_what_damping_takes_at_degree_0(law, monke
     assert coupling.reduced >= 12
     assert coupling.dissipated > 1e-4
     assert max(abs(row.energy - rows[0].energy) for row in rows) < 1e-12 * rows[0].energy
+
+
+@pytest.mark.parametrize("degree", DEGREES)
+def test_the_error_of_a_step_is_the_same_in_any_unit_of_mass(degree):
+    """Three orders of magnitude more of λ and of both masses move the ends as before."""
+    ends = [
+        (Motion(u, 0.0, u, 0.5 * u), Motion(u + p, 0.0, u + 0.4 * p, 0.1 * p)) for u, p in ((0.0, 1e-3), (0.1, 3e-3))
+    ]
+    step = Step(0.0, 0.01, NO_FORCE, NO_FORCE, *ends)
+    (light,), (heavy,) = (
+        SoftSolver(Compliance(factor, 1.5), degree, 1e-12).local_errors(step, Scales(1.0, 0.5, factor, factor))
+        for factor in (1.0, 1e3)
+    )
+    assert light == pytest.approx(heavy, rel=1e-12)
+    assert light[0] > 0.0
+
+
+@pytest.mark.parametrize(("sequential", "degree", "pressed"), [
+    (False, 0, 2.0), (False, 1, 2.0 + 1.0), (True, 0, 2.0 + 1.0 - 0.002), (True, 1, 2.0 + 1.0 - 0.004 / 3.0),
+])  # fmt: skip
+def test_exchanged_forces_are_of_the_ends_as_they_were_exchanged(sequential, degree, pressed):
+    """p = 2 mm grows by 0.5 m/s over 4 ms, λ = 1 kN/m: the mean force on the lower mass is λ p at the start, 2 N,
+    half-way of its continuation, or with the tip where the force on it, 2 or 2 + 500 t N, has brought it."""
+    upper, lower = Upper(8.0, 0.0, 0.0, y=0.0, z=-0.25), DuffingBody(8.0, 0.0, 0.0, y=2e-3, z=0.25)
+    solve(Exchange(Compliance(1e3, 1.0), sequential, degree), 4e-3, upper, lower)
+    assert 8.0 * (0.25 - lower.z) / 4e-3 == pytest.approx(pressed, abs=1e-9)
