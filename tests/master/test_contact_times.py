@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import scene_from_dict
 
-from springbeam.results.contact_times import contact_changes
+from springbeam.results.contact_times import contact_changes, tip_contacts
 from springbeam.results.contact_times import contact_time_difference as difference
 from springbeam.results.trajectory import Event, Trajectory
 
@@ -18,6 +18,23 @@ SCENE = scene_from_dict(
 def run(*events, phase="free"):
     columns = {"time": np.array([0.0, 1.0]), "phase": np.array([phase, phase])}
     return Trajectory(SCENE, columns, [Event(time, kind) for time, kind in events])
+
+
+@pytest.mark.parametrize(
+    ("kinds", "free_at_end", "found"),
+    [
+        ("impact release separation", True, [(0.1, 0.3)]),  # above Ψ they still touch
+        ("impact release retie", False, [(0.1, 1.0)]),
+        ("impact release impact", False, [(0.1, 0.2), (0.3, 1.0)]),
+        ("impact release", True, [(0.1, 0.2)]),
+        ("impact release", False, [(0.1, 1.0)]),
+        ("impact stop_impact separation", True, [(0.1, 0.3)]),
+    ],
+)
+def test_contacts_of_the_tip_begin_with_an_impact_and_end_where_the_ends_part(kinds, free_at_end, found):
+    events = [Event(0.1 * (k + 1), kind) for k, kind in enumerate(kinds.split())]
+    contacts = tip_contacts(events, 1.0, free_at_end=free_at_end)
+    assert np.array(contacts) == pytest.approx(np.array(found), rel=1e-12)
 
 
 CONTACT = run((0.1, "impact"), (0.4, "separation"))

@@ -51,6 +51,18 @@ def test_both_answers_are_among_them():
     assert {through(Polynomial(c)).lowest_inside() is None for c in QUINTICS} == {True, False}
 
 
+@pytest.mark.parametrize(("even", "odd"), [(1.0, 0.0), (0.0, -1.0), (0.7, 0.4)])
+def test_path_and_cubic_are_apart_by_no_more_than_they_say(even, odd):
+    """s²(1 − s)² [even + odd (2s − 1)] beside a cubic; one part alone is met."""
+    s, one = Polynomial((0.0, 1.0)), Polynomial((1.0,))
+    beside = s**2 * (one - s) ** 2 * (even * one + odd * (2.0 * s - one))
+    apart = np.abs(beside(np.linspace(0.0, 1.0, 2001))).max()
+    told = through(Polynomial((0.3, -1.0, 2.0, 0.5)) + beside).beside_cubic
+    assert told >= apart * (1.0 - 1e-6)
+    if even * odd == 0.0:
+        assert told == pytest.approx(apart, rel=1e-4)
+
+
 def test_orders_of_path_and_cubic():
     """cos(ωτ) over one step: H⁶/46080 and H⁴/384 of the derivative in the middle; the distance tells the cubic's."""
     errors = []
