@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from springbeam.results.extremes import Extremes
 from springbeam.contact.laws import stiffest
+from springbeam.results.extremes import Extremes
 from springbeam.results.steps import STEP
 from springbeam.results.totals import shortest_contact, totals
 from springbeam.results.trajectory import EVENT_KINDS, Event
