@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bodies import simulate
 from commands import command, printed, refused
 from matplotlib.figure import Figure
 from rich.console import Console
@@ -20,12 +21,14 @@ from rich.console import Console
 import springbeam.run.runner
 from springbeam import cli
 from springbeam.cli import common
+from springbeam.cli.compare import results_of
 from springbeam.results.directory import PICTURES
 from springbeam.results.reading import load_trajectory
 from springbeam.results.recording import NonFiniteValue
+from springbeam.results.totals import totals
 from springbeam.results.trajectory import Event
 from springbeam.run.outcome import RunStopped
-from springbeam.scene import shipped_scenes
+from springbeam.scene import load_scene, shipped_scenes, with_changes
 
 SUMMARY = {"status": "done", "macro_steps": 31, "wall_time": 0.25, "max_energy_residual": 3e-14, "warnings": []}
 
@@ -255,3 +258,30 @@ def test_a_run_that_stopped_names_what_goes_on_with_it(here, monkeypatch):
     assert result.stderr.endswith(
         "what was computed is in results/soft; springbeam resume results/soft goes on from the last checkpoint\n"
     )
+
+
+def test_peaks_are_compared_over_one_window():
+    """The same motion, its force averaged over 1 ms and 4 ms."""
+    soft = load_scene("soft")
+    runs = []
+    for window in (1e-3, 4e-3):
+        run = simulate(
+            with_changes(
+                soft,
+                beam={"n_elements": 4},
+                stop=None,
+                time={"t_end": 0.05},
+                contact={"force_window": window},
+                coupling={"macro_step": 1e-3},
+            )
+        )
+        peak = totals(run.scene, run.steps, run.events, window, free_at_end=True)["contact_force_max"]
+        run.summary |= {"contact_force_max": peak, "contact_force_window": window}
+        runs.append(run)
+    own = [run.summary["contact_force_max"] for run in runs]
+    assert own[0] > 1.1 * own[1]
+    found = results_of(runs)
+    assert found["contact_force_window [s]"] == [4e-3, 4e-3]
+    assert found["contact_force_max [N]"] == [pytest.approx(own[1], rel=1e-14)] * 2
+    runs[0].steps = None
+    assert results_of(runs)["contact_force_max [N]"] == [None, own[1]]

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
+from matplotlib.axes import Axes
 from matplotlib.image import imread
 from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
 
@@ -333,3 +334,24 @@ def test_alternation(values, expected):
 def test_readable_units(largest, unit, expected):
     factor, name = readable_unit([np.array([0.0, -largest]), np.array([])], unit)
     assert (factor, name) == (pytest.approx(expected[0], rel=1e-15), expected[1])
+
+
+def test_a_peak_between_the_means_is_told_beside_the_curve():
+    run = a_trajectory(contact_force=np.where(np.arange(400) == 200, 14.1, 1.0))
+    run.summary |= {"contact_force_max": 9.98, "contact_force_window": 9.9e-3}
+    said = "highest instant 14.1\u00a0N; largest mean over 9.9\u00a0ms, which the run tells, 9.98\u00a0N"
+    assert said in panel("forces", run).remarks
+    run.summary["contact_force_max"] = 14.0
+    assert not any("largest mean" in remark for remark in panel("forces", run).remarks)
+
+
+def test_runs_over_each_other_show_what_strikes_them(tmp_path, monkeypatch):
+    """One run is seated, the other struck twice: it has stems, not only a force of zero."""
+    drawn = []
+    monkeypatch.setattr(Axes, "vlines", lambda ax, time, low, high, **_: drawn.append((ax.get_ylabel(), high)))
+    strokes = [Event(t, "stop_impact", 0, 0, 0, 0, 0.0, 0.6, 0.0) for t in (0.1, 0.3)]
+    zero = np.zeros(400)
+    comparison.draw(
+        {"seated": a_trajectory(), "struck": a_trajectory(events=strokes, foundation_force=zero)}, tmp_path / "a.png"
+    )
+    assert [high.tolist() for _, high in drawn] == [[0.6, 0.6]]

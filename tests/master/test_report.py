@@ -377,3 +377,8 @@ def test_the_command_writes_the_page_and_overwrites_none_unasked(tmp_path):
     assert printed("report", directory, "--force") == f"{directory / REPORT}\n"
     assert "positions" in Page((directory / REPORT).read_text(encoding="utf-8")).ids
     assert (directory / REPORT).read_bytes() == (directory.parent / "other.html").read_bytes()
+
+
+def test_the_scheme_that_ran_is_described_where_auto_picked_it():
+    scene = with_changes(PAIR, contact={"law": "compliance"}, coupling={"scheme": "auto"})
+    assert dict(described(scene))["steps"].startswith("energy of degree 2, picked by auto, macro step ")

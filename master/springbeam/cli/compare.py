@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..results.reading import load_trajectory
-from ..results.totals import LOSS_NAMES, TOTALS
+from ..results.totals import LOSS_NAMES, TOTALS, totals
 from ..results.trajectory import Trajectory
 from ..scene import Scene
 from .common import (
@@ -24,6 +24,9 @@ from .common import (
     print_json,
     results_directory,
 )
+
+#: Windows closer than this share are one.
+_SAME_WINDOW = 1e-9
 
 
 def compare(
@@ -73,12 +76,34 @@ def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:
 def results_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
     """Return the numbers of `springbeam.results.totals` that any of the runs has, with their units, by run."""
     units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
+    summaries = _over_one_window(runs)
     found = {}
     for name, unit in units.items():
-        values = [run.summary.get(name) for run in runs]
+        values = [summary.get(name) for summary in summaries]
         if any(values):
             found[f"{name} [{unit}]" if unit else name] = values
     return {**found, "warnings": [len(run.summary.get("warnings", ())) for run in runs]}
+
+
+def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:
+    """Return the runs' summaries with their peak forces over one window, the longest of theirs.
+
+    A mean over another window is another quantity. A run without steps, which has no force between its rows, has no
+    peak beside those of other windows.
+    """
+    windows = [run.summary.get("contact_force_window") for run in runs]
+    known = [window for window in windows if window is not None]
+    common = max(known, default=0.0)
+    summaries = []
+    for run, window in zip(runs, windows, strict=True):
+        summary = dict(run.summary)
+        if window is not None and abs(window - common) > _SAME_WINDOW * common:
+            peak = None
+            if run.steps is not None:
+                peak = totals(run.scene, run.steps, run.events, common, free_at_end=True)["contact_force_max"]
+            summary |= {"contact_force_max": peak, "contact_force_window": None if peak is None else common}
+        summaries.append(summary)
+    return summaries
 
 
 def _table(title: str, names: list[str], rows: dict[str, list[Any]]) -> Table:

@@ -95,10 +95,8 @@ def _totals_in_words(summary: Mapping[str, Any]) -> list[str]:
     lines = []
     if "contact_impulse" in summary:
         found = {name: f"{summary[name]:.4g} {unit}" for name, (_, unit) in TOTALS.items() if name in summary}
-        parts = [
-            f"impulse {found['contact_impulse']}",
-            f"peak force {found['contact_force_max']} (mean over {found['contact_force_window']}; docs/contact.md)",
-        ]
+        over = f"largest mean over {found['contact_force_window']}; pictures show instants, see docs/contact.md"
+        parts = [f"impulse {found['contact_impulse']}", f"peak force {found['contact_force_max']} ({over})"]
         lines.append(f"contact   {', '.join(parts)}")
         parts = []
         if summary.get("contact_duration_total"):

@@ -36,6 +36,8 @@ from .drawing import (
 
 #: Forces and energies below this part of the largest one are not seen beside it.
 _INVISIBLE = 5e-3
+#: A curve that is so much higher than the peak force that the run tells shows another number.
+_ANOTHER_PEAK = 0.01
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,21 @@ def forces(trajectory: Trajectory) -> Panel:
     words = contact.facts.force + contact.facts.damper * (contact.damping > 0.0)
     looks = FORCES | {"compliance_force": FORCES["compliance_force"]._replace(words=words)}
     seen, remarks = _seen(trajectory, looks, "N")
+    remarks += _peak_in_words(trajectory)
     return _lines(trajectory, "forces", "Forces", seen, "force", "N", remarks, height=2.0)
+
+
+def _peak_in_words(trajectory: Trajectory) -> list[str]:
+    """Return how the peak force that the run tells is related to the curve, where that rises higher."""
+    summary = trajectory.summary
+    if "contact_force_max" not in summary or "contact_force" not in trajectory.columns:
+        return []
+    told, drawn = float(summary["contact_force_max"]), float(np.max(trajectory["contact_force"]))
+    if drawn <= (1.0 + _ANOTHER_PEAK) * told:
+        return []
+    window = readable_unit([np.array([float(summary["contact_force_window"])])], "s")
+    over = f"{window.factor * float(summary['contact_force_window']):.3g}\u00a0{window.name}"
+    return [f"highest instant {drawn:.4g}\u00a0N; largest mean over {over}, which the run tells, {told:.4g}\u00a0N"]
 
 
 def impulses(trajectory: Trajectory) -> Panel:

@@ -87,6 +87,13 @@ class Load(Table):
         return {"beam": "N" if self.at is not None else "N/m", "base": "m/s²"}.get(self.on, "N")
 
     @property
+    def begins(self) -> float:
+        """Time [s] before which the load is 0; −∞ of a constant."""
+        if self.signal == "constant":
+            return -inf
+        return self.start + (float(self.record.x[0]) if self.signal == "table" else 0.0)
+
+    @property
     def end(self) -> float:
         """Time [s] from which on the load is 0; ∞ if there is none."""
         if self.signal == "table":

@@ -41,6 +41,14 @@ def key_kind(table: str, key: str) -> type:
     return next((kind for kind in (int, bool, float) if kind in kinds), str)
 
 
+def at(scene: Scene, place: str) -> str:
+    """Return ``[table] key = value`` for ``"table.key"`` of ``scene``."""
+    table, _, key = place.rpartition(".")
+    number = table.removeprefix("loads.")
+    content = scene.loads[int(number)] if number.isdigit() else scene.under(table)
+    return f"[{table}] {key} = {toml_of(getattr(content, key))}"
+
+
 def _alternatives(annotation: Any) -> tuple[Any, ...]:
     """Return the types that an annotation allows, None last."""
     return get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)

@@ -12,12 +12,12 @@ from functools import partial
 from .laws import laws_that
 from .linearised import largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS
-from .messages import toml_of
-from .partners import ForeignFmu, RigidWall
+from .messages import at
+from .partners import ForeignFmu, PointMass, RigidWall
 from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
 from .suspicions import suspicions
-from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam
+from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring
 
 #: More are a mistyped macro step: two weeks at a microsecond a step.
 MOST_MACRO_STEPS = 1e12
@@ -29,7 +29,7 @@ At = Callable[[str], str]
 def impossible(scene: Scene) -> list[str]:
     """Return why ``scene`` cannot be run, as lines ``[table] key = value: reason and remedy``; empty if it can."""
     try:
-        found = [line for check in _CHECKS for line in check(scene, partial(_at, scene))]
+        found = [line for check in _CHECKS for line in check(scene, partial(at, scene))]
         if not found:
             beam = scene.beam
             if beam is not None and not 0.0 < min(quantities := _beam_quantities(beam)) <= max(quantities) < math.inf:
@@ -40,14 +40,6 @@ def impossible(scene: Scene) -> list[str]:
     return found
 
 
-def _at(scene: Scene, place: str) -> str:
-    """Return ``[table] key = value`` for ``"table.key"``."""
-    table, _, key = place.rpartition(".")
-    number = table.removeprefix("loads.")
-    content = scene.loads[int(number)] if number.isdigit() else scene.under(table)
-    return f"[{table}] {key} = {toml_of(getattr(content, key))}"
-
-
 def _extreme(scene: Scene) -> str:
     """Return the value furthest from 1, with its place."""
     sizes = {
@@ -55,7 +47,7 @@ def _extreme(scene: Scene) -> str:
         for place, value in scene.flat().items()
         if "." in place and isinstance(value, (int, float)) and value != 0.0
     }
-    return _at(scene, max(sizes, key=lambda place: sizes[place]))
+    return at(scene, max(sizes, key=lambda place: sizes[place]))
 
 
 def _beam_quantities(beam: Beam) -> tuple[float, ...]:
@@ -78,6 +70,11 @@ def _bodies(scene: Scene, at: At) -> Iterator[str]:
         yield f"{at('spring.element')}: nothing moves in this scene; give it a body in [beam]"
     elif isinstance(lower, RigidWall) and stop is not None:
         yield f"{at('spring.element')}: leave [stop] out"
+    elif isinstance(lower, RigidWall) and scene.contact.facts.strikes and scene.contact.impact == "tip":
+        yield (
+            f"{at('contact.impact')}: gives the lower body the velocity of the tip, and {at('spring.element')} cannot "
+            'move; use impact = "inelastic"'
+        )
 
 
 def _partners_fit(scene: Scene, at: At) -> Iterator[str]:
@@ -151,6 +148,27 @@ def _tip_arrives(scene: Scene, at: At) -> Iterator[str]:
             f"{at('beam.initial_velocity_slope')}: the undeformed tip reaches {at(target.key)} {when}; "
             'use a (more) negative initial_velocity_slope, or approach = "elastic"'
         )
+
+
+def _nothing_moves_before(scene: Scene, at: At) -> Iterator[str]:
+    """Yield what would move while an undeformed tip approaches, for nothing is integrated until it arrives."""
+    t_c, lower = scene.contact_time, scene.lower
+    if t_c is None or not 0.0 < t_c < math.inf:
+        return
+    approach, remedy = at("beam.approach"), 'or use approach = "elastic"'
+    for key in ("initial_velocity", "velocity"):
+        if isinstance(lower, Spring | PointMass) and getattr(lower, key, 0.0) != 0.0:
+            yield (
+                f"{at(f'spring.{key}')}: {approach} holds everything until the tip arrives at t = {t_c:.6g} s; start "
+                f"at rest, {remedy}"
+            )
+    for number, load in enumerate(scene.loads):
+        acts = load.on != "spring" or lower is not None
+        if acts and load.peak > 0.0 and load.begins < t_c:
+            yield (
+                f"{at(f'loads.{number}.signal')}: acts before the tip arrives at t = {t_c:.6g} s, and {approach} holds "
+                f"everything until then; give a start from there on, {remedy}"
+            )
 
 
 def _ends_can_be_joined(scene: Scene, at: At) -> Iterator[str]:
@@ -332,6 +350,7 @@ _CHECKS = (
     _partners_fit,
     _spring_holds,
     _tip_arrives,
+    _nothing_moves_before,
     _ends_can_be_joined,
     _law_applies,
     _inertia_needed,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from .effects import without_effect
 from .linearised import beam_energy, spring_energy, well_depth
 from .scene import Scene
 from .statics import initial_kinetic_energy, locking, tip_compliance, tip_inertia
@@ -30,7 +31,9 @@ def suspicions(scene: Scene) -> list[str]:
         for number, load in enumerate(scene.loads)
         if load.is_finer_than(H)
     ]
+    found += without_effect(scene)
     found += implausible(scene)
+    found += held_apart(scene)
     beam, spring = scene.beam, scene.spring
     if spring is not None and spring.cubic_stiffness < 0.0:
         arriving = 0.0 if scene.massless else beam_energy(scene)
@@ -59,6 +62,20 @@ def suspicions(scene: Scene) -> list[str]:
                 f"{initial_kinetic_energy(beam):.3g} J; the result lacks its impact and the vibration that follows"
             )
     return found
+
+
+def held_apart(scene: Scene) -> Iterator[str]:
+    """Yield that the spring is held until an undeformed tip arrives, where it would move by itself."""
+    spring, t_c = scene.spring, scene.contact_time
+    if spring is None or not t_c or t_c > scene.time.t_end:
+        return
+    psi = spring.equilibrium
+    pull = spring.linear_stiffness * psi + spring.cubic_stiffness * psi**3
+    if not math.isclose(pull, spring.external_force, rel_tol=1e-9):
+        yield (
+            f"[spring] equilibrium = {psi:g}: {spring.external_force - pull:.3g} N act on it there, and the "
+            f'top is held until the tip arrives at t = {t_c:.3g} s; [beam] approach = "elastic" lets it move'
+        )
 
 
 def implausible(scene: Scene) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ...scene import Scene
+from ...scene.automatic import with_scheme_chosen
 from ...scene.partners import kind_of
 from ...scene.statics import bending_stiffness, shear_stiffness
 
@@ -39,5 +40,6 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
         yield f"load_{i}", what + (f", {load.frequency:.4g} Hz" if load.frequency else "")
     H = scene.coupling.macro_step
     length = "macro steps that follow from tolerances" if H is None else f"macro step {H:.4g} s"
-    scheme = f"{scene.coupling.scheme} of degree {scene.coupling.degree}"
+    ran, picked = with_scheme_chosen(scene)
+    scheme = f"{ran.coupling.scheme} of degree {ran.coupling.degree}" + ("" if picked is None else ", picked by auto")
     yield "steps", f"{scheme}, {length}, to {scene.time.t_end:.4g} s"

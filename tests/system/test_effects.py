@@ -1,0 +1,125 @@
+"""Keys without effect: told where, and only where, a run is the same to the last bit without them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from springbeam import SceneError, load_scene, simulate, with_changes
+from springbeam.results.trajectory import Trajectory
+from springbeam.scene import Scene, suspicions
+from springbeam.scene.effects import effects
+
+pytestmark = pytest.mark.usefixtures("fmu_folder")
+
+#: The tip meets the spring at once, and the spring strikes the stop after some ms.
+SOFT = with_changes(
+    load_scene("soft"),
+    time={"t_end": 0.03},
+    beam={"n_elements": 4},
+    spring={"initial_velocity": -0.3},
+    stop={"position": -1e-3, "restitution": 0.5},
+    coupling={"macro_step": 1e-3},
+)
+LAW = {"stiffness": 1e3, "exponent": 1.5}
+SCENES = {
+    "transmission": SOFT,
+    "compliance": with_changes(SOFT, contact={"law": "compliance", **LAW}),
+    "link": with_changes(SOFT, contact={"law": "link", "stiffness": 1e3, "exponent": 3.0}),
+    "tie": with_changes(SOFT, contact={"law": "tie", "stiffness": 1e4, "exponent": 3.0}),
+    "exchange": with_changes(SOFT, contact={"law": "compliance", **LAW}, coupling={"scheme": "jacobi"}),
+    "generalized-α": with_changes(SOFT, beam={"integrator": "generalized_alpha"}),
+    "without inertia": with_changes(SOFT, beam={"fidelity": "quasi_static", "n_elements": 50}),
+    "a hat load without inertia": with_changes(
+        SOFT, beam={"fidelity": "quasi_static", "n_elements": 50, "tip_load_coefficient": -1.0}
+    ),
+    "beam and stop": with_changes(SOFT, spring=None, beam={"distributed_load": -50.0}),
+    "beam and soft stop": with_changes(
+        SOFT, spring=None, stop={"restitution": 1.0}, contact={"law": "compliance", **LAW}, coupling={"degree": 2}
+    ),
+    "beam": with_changes(SOFT, spring=None, stop=None),
+    "spring": with_changes(SOFT, beam=None),
+    "paper": with_changes(
+        load_scene("paper-fig2"), time={"t_end": 0.6}, beam={"n_elements": 4, "n_modes": 0}, contact={"law": "paper"}
+    ),
+}
+VALUES: dict[str, Any] = {
+    "beam.n_elements": 3,
+    "beam.element_degree": 2,
+    "beam.reduced_integration": True,
+    "beam.mass_matrix": "averaged",
+    "beam.integrator": "generalized_alpha",
+    "beam.n_modes": 3,
+    "beam.rho_inf": 0.5,
+    "stop.restitution": 0.25,
+    "contact.impact": "tip",
+    "contact.stiffness": 2e3,
+    "contact.exponent": 1.25,
+    "contact.force_window": 3e-3,
+    "coupling.degree": 1,
+    "coupling.tolerance": 1e-3,
+    "coupling.feedback_tolerance": 1e-2,
+}
+_RUNS: dict[str, Trajectory] = {}
+
+
+def same(a: Trajectory, b: Trajectory) -> bool:
+    """Return whether two runs are the same to the last bit, but for what the clock says."""
+    numbers = [
+        {
+            name: value
+            for name, value in run.summary.items()
+            if name not in ("wall_time", "setup_time", "scene", "warnings") and not isinstance(value, dict)
+        }
+        for run in (a, b)
+    ]
+    return (
+        numbers[0] == numbers[1]
+        and a.columns.keys() == b.columns.keys()
+        and all(np.array_equal(a[name], b[name]) for name in a.columns)
+    )
+
+
+def made(name: str, scene: Scene) -> Trajectory:
+    return _RUNS.setdefault(name, simulate(scene))
+
+
+@pytest.mark.parametrize("place", VALUES)
+@pytest.mark.parametrize("name", SCENES)
+def test_a_key_is_told_where_it_changes_nothing(name: str, place: str) -> None:
+    table, key = place.split(".")
+    if SCENES[name].under(table) is None or (table == "coupling" and name in ("beam", "spring")):
+        return  # an accuracy gives a scheme to one body as well: nothing is said of it
+    if (name, place) == ("beam and soft stop", "coupling.tolerance"):
+        return  # the response of a linear beam to a wall is known after one step: its force is found to rounding
+    if getattr(SCENES[name].under(table), key) == VALUES[place]:
+        return
+    try:
+        scene = with_changes(SCENES[name], **{table: {key: VALUES[place]}})
+    except SceneError:
+        return
+    told = [line for line in suspicions(scene) if line.startswith(f"[{table}] {key} = ") and "plays no part" in line]
+    assert same(made(name, SCENES[name]), simulate(scene)) == bool(told), (told, suspicions(scene))
+
+
+def test_every_row_of_the_table_is_looked_at() -> None:
+    """But the mesh without elements, the law itself and the scheme, which other keys come with."""
+    listed = {place for effect in effects() for place in effect.keys}
+    assert listed - VALUES.keys() == {"beam.mesh", "contact.law", "coupling.scheme"}
+
+
+def test_a_load_that_begins_after_the_run_is_told() -> None:
+    late = with_changes(SOFT, loads=[{"on": "tip", "signal": "step", "start": 0.03}])
+    assert suspicions(late) == ["[loads.0] start = 0.03: plays no part here; the run ends at 0.03 s"]
+    assert np.array_equal(simulate(late).y, simulate(SOFT).y)
+
+
+def test_a_law_between_no_two_bodies_is_told() -> None:
+    scene = with_changes(SCENES["spring"], contact={"law": "compliance", **LAW})
+    assert [line.partition(":")[0] for line in suspicions(scene)] == [
+        '[contact] law = "compliance"',
+        "[contact] stiffness = 1000.0",
+        "[contact] exponent = 1.5",
+    ]
