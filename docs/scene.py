@@ -16,8 +16,8 @@ Made by `python docs/scene.py` from the declarations that `springbeam keys` list
 A scene is a TOML file of tables. All values are SI, up is positive. A missing `[beam]`, `[spring]` or `[stop]` is a
 scene without it. Invalid keys and values are rejected; the error names the key and the allowed values. A
 key that plays no part in the scene (`rho_inf` with the modal integrator, `stiffness` of a tie) is named in a warning.
-`springbeam new NAME` writes a commented scene to start from. The symbols are those of [model.md](model.md), the schemes those of
-[coupling.md](coupling.md).
+`springbeam new NAME` writes a commented scene to start from. The symbols are those of [model.md](model.md), the
+schemes those of [coupling.md](coupling.md).
 
 **Editors** complete and check keys by the JSON Schema [scene.schema.json](scene.schema.json), which
 `springbeam keys --schema` prints: with Taplo or Even Better TOML, the first line of a scene beside it is

@@ -122,14 +122,20 @@ def test_a_run_is_that_of_the_scheme_it_takes_and_says_so():
     found = simulate(auto(**short, coupling={"macro_step": 1e-3}))
     named = simulate(with_changes(PAIR, **short, coupling={"scheme": "hermite", "degree": 2, "macro_step": 1e-3}))
     np.testing.assert_array_equal(found.u_tip, named.u_tip)
-    assert found.summary["coupling"] == {"scheme": "hermite", "degree": 2, "because": "ω_max H = 1.73 <= 3"}
+    assert found.summary["coupling"] == {
+        "scheme": "hermite",
+        "degree": 2,
+        "because": "the whole mesh's ω_max H = 1.73 <= 3",
+    }
     assert found.scene.coupling.scheme == "auto"
     assert "coupling" not in named.summary
 
 
 def test_the_command_says_what_it_took(tmp_path):
     arguments = ["run", "soft", "--set", "time.t_end=0.02", "--set", "coupling.scheme=auto", "--no-plots"]
-    assert "coupling  hermite 2: ω_max H = 0.433 <= 3" in printed(*arguments, "--out", tmp_path / "out")
+    assert "coupling  hermite 2: the whole mesh's ω_max H = 0.433 <= 3" in printed(
+        *arguments, "--out", tmp_path / "out"
+    )
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["coupling"]["scheme"] == "hermite"
 
 

@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from bodies import DuffingBody, ModalBody, solve, unit_beam
+from commands import printed
 from scipy.linalg import expm
 
 from springbeam.contact.laws import Link
@@ -172,10 +173,21 @@ def test_soft_is_predicted():
     assert p.omega_1 == pytest.approx(12.7396492, rel=3e-4)
     assert p.displacement_gain == pytest.approx(2.0 / (10.0 * 2.5e-4))
     assert p.spring_frequency == pytest.approx(3.0**0.5)
-    assert p.resolved_modes == p.modes == 40
+    assert (p.resolved_modes, p.modes, p.static_shapes) == (40, 40, 0)
     assert [(s.scheme, s.degree) for s in p.schemes] == TIES
     assert all(s.spectral_radius == pytest.approx(1.0, abs=1e-11) for s in p.schemes)
     assert p.auto[:2] == ("hermite", 2)
+
+
+def test_modes_are_those_that_the_scene_keeps():
+    """Of 12 modes asked for, 15 shapes are kept: 3 are static, faster than any mode, and no modes."""
+    p = predict(load_scene("steel-bumper"))
+    assert p.modes == load_scene("steel-bumper").beam.n_modes == 12
+    assert p.static_shapes == 3
+    assert 0 < p.resolved_modes < 12
+    assert "of 12 modes resolved (ωH ≤ 1), beside 3 static shapes" in " ".join(
+        printed("predict", "steel-bumper").split()
+    )
 
 
 def test_advice_beyond_the_bound_of_hermite_and_beyond_the_lowest_mode():

@@ -75,7 +75,8 @@ def _lines(p: Prediction) -> list[tuple[str, str]]:
     lines = [*_estimated(p), ("H", f"{p.macro_step:g} s")]
     if p.omega_1 is not None and p.omega_max is not None:
         lines.append(("beam", f"ω₁H = {p.omega_1 * p.macro_step:.3g}, ω_max H = {p.omega_max * p.macro_step:.3g}; "
-                              f"{p.resolved_modes} of {p.modes} modes resolved (ωH ≤ 1)"))  # fmt: skip
+                              f"{p.resolved_modes} of {p.modes} modes resolved (ωH ≤ 1)"
+                              + (f", beside {p.static_shapes} static shapes" if p.static_shapes else "")))  # fmt: skip
         lines.append(("", f"tip mass {p.tip_mass:.3g} kg, impedance Z = {p.impedance:.3g} N·s/m"))
     if p.spring_frequency is not None:
         lines.append(("spring", f"ωH = {p.spring_frequency * p.macro_step:.3g} at its stiffest"))

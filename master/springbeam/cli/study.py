@@ -50,7 +50,7 @@ SchedulerOption = Annotated[
 QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]
 #: Options of all studies.
 _SHARED = ("out", "force", "no_plots", "quiet", "as_json")
-#: Where no bar is shown, a study that takes longer, and so much more, says once how long the rest takes [s].
+#: Where no bar is shown, a study that takes longer, and so much more, says how long the rest takes [s].
 _LONG = 10.0
 
 
@@ -156,6 +156,29 @@ def _going_on(records: Records, total: int) -> Iterator[Callable[[str], str]]:
         fail(STOPPED, cut_short(cause_of(error, directory)))
 
 
+class Rest:
+    """How long the rest of a study takes, told from time to time.
+
+    Told first when each of its ``processes`` has made two records since ``began`` [s], and again each time that the
+    number of records has doubled; not where what is done, or the rest, takes less than `_LONG`.
+    """
+
+    def __init__(self, began: float, processes: int) -> None:
+        self._began = self._first = began
+        self._told_at = 2 * max(processes, 1)
+
+    def after(self, now: float, done: int, left: int) -> float | None:
+        """Return how long the ``left`` records take [s] if it is to be told ``now`` [s], after ``done`` records."""
+        if done <= 1:
+            self._first = now  # what comes before it, as the start of processes, is not done again
+            return None
+        seconds = (now - self._first) / (done - 1) * left
+        if done < self._told_at or min(now - self._began, seconds) <= _LONG:
+            return None
+        self._told_at = 2 * done
+        return seconds
+
+
 def _computed(
     study: Study, records: Records, console: Console, workers: int | None, scheduler: str | None, *, quiet: bool
 ) -> dict[str, Record]:
@@ -171,18 +194,17 @@ def _computed(
     state, left = TextColumn("{task.fields[failed]} failed"), TimeRemainingColumn()
     bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), state, left, quiet=quiet)
     task = bar.add_task("", total=total, completed=there, failed=0)
-    began, failed, said = monotonic(), 0, False
+    processes = (workers or os.cpu_count() or 1) if study.parallel else 0
+    rest, failed = Rest(monotonic(), processes), 0
 
     def report(record: Record) -> None:
-        nonlocal failed, said
+        nonlocal failed
         failed += study.failed(record)
         bar.update(task, advance=1, failed=failed)
-        spent, done = monotonic() - began, len(records.by_name) - there
-        rest = spent / max(done, 1) * (total - there - done)
-        if bar.disable and not said and min(spent, rest) > _LONG:
-            said = True
-            console.print(f"some {rest:.0f} s more")
+        done = len(records.by_name)
+        seconds = rest.after(monotonic(), done - there, total - done)
+        if bar.disable and seconds is not None:
+            console.print(f"{done} of {total} records; some {seconds:.0f} s more if the others are like them")
 
-    processes = (workers or os.cpu_count() or 1) if study.parallel else 0
     with records, dask_cluster(scheduler) if scheduler else nullcontext() as cluster, bar:
         return record_all(study, records, processes, cluster, report)

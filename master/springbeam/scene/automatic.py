@@ -42,11 +42,12 @@ def choice(scene: Scene) -> Choice:
         return Choice("hermite", 2, "the steps follow from tolerances")
     H = coupling.macro_step
     fastest = max(mesh_frequency(beam), 0.0 if scene.spring is None else spring_frequency(scene))
+    bound = f"the whole mesh's ω_max H = {fastest * H:.3g}"
     if fastest * H <= STABLE:
-        return Choice("hermite", 2, f"ω_max H = {fastest * H:.3g} <= {STABLE:g}")
+        return Choice("hermite", 2, f"{bound} <= {STABLE:g}")
     slowest = slowest_frequency(beam)
     if slowest * H <= TURN:
-        return Choice("energy", 2, f"ω_max H = {fastest * H:.3g} > {STABLE:g}")
+        return Choice("energy", 2, f"{bound} > {STABLE:g}")
     return Choice("energy", 0, f"ω₁H = {slowest * H:.3g} > {TURN:g}")
 
 

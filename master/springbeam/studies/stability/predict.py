@@ -75,6 +75,7 @@ class Prediction:
     displacement_gain: float | None
     resolved_modes: int | None  #: of the beam's, with ωH ≤ `RESOLVED`
     modes: int | None
+    static_shapes: int | None  #: kept beside them where not all modes are; they are the fastest
     schemes: tuple[SchemePrediction, ...]
     auto: Choice | None  #: the scheme that fits, which ``scheme = "auto"`` takes, where there is something to couple
     notes: tuple[str, ...]
@@ -87,12 +88,13 @@ def predict(scene: Scene) -> Prediction:
     notes += [f"[{table}] is not our own body: its frequencies are not known beforehand" for table in scene.partners]
     if scene.accuracy is not None:
         notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")
-    modal = None
+    modal = kept = None
     if scene.massless:
         notes.append("a quasi-static beam has no inertia and no step of its own: nothing to predict")
     elif scene.beam is not None:
         beam, truncated = _reduced(scene.beam)
         modal = modal_beam(beam)
+        kept = min(beam.modes_kept, len(modal.omega))
         if truncated:
             notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
         if beam.integrator == "generalized_alpha":
@@ -125,7 +127,7 @@ def predict(scene: Scene) -> Prediction:
     ]
     Z = None if scene.beam is None else math.sqrt(shear_stiffness(scene.beam) * scene.beam.density * scene.beam.area)
     mass = None if scene.spring is None else scene.spring.mass
-    resolved = None if modal is None else int(np.sum(modal.omega * H <= RESOLVED))
+    resolved = None if modal is None else int(np.sum(modal.omega[:kept] * H <= RESOLVED))
     if modal is not None and resolved == 0:
         notes.append(
             f"the motion is not resolved: the beam's lowest mode turns {modal.omega[0] * H:.3g} rad in a macro step; "
@@ -144,7 +146,8 @@ def predict(scene: Scene) -> Prediction:
         impedance=Z,
         displacement_gain=None if mass is None or Z is None or (pair and pair.soft) else 2.0 * mass / (Z * H),
         resolved_modes=resolved,
-        modes=None if modal is None else len(modal.omega),
+        modes=kept,
+        static_shapes=None if modal is None or kept is None else len(modal.omega) - kept,
         schemes=schemes,
         auto=choice(scene) if schemes else None,
         notes=tuple(notes),
