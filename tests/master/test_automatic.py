@@ -143,5 +143,5 @@ def test_the_command_says_what_it_took(tmp_path):
 def test_hermite_beyond_its_limit_is_told(share, told):
     H = share * STABLE / mesh_frequency(PAIR.beam)
     scene = with_changes(PAIR, coupling={"scheme": "hermite", "degree": 2, "macro_step": H})
-    said = not_resolved(scene, 0.0, 1.0)
+    said = not_resolved(scene, 0.0)
     assert (said is not None and 'scheme = "hermite"' in said) == told

@@ -102,6 +102,18 @@ def totals(
     return {name: value if name == "stop_strokes" else float(value) for name, value in found.items()}
 
 
+def pace(steps: np.ndarray | None) -> float:
+    """Return the largest speed of an end over its largest distance from its start [1/s], of the end with more of it."""
+    found = 0.0
+    if steps is None or len(steps) == 0:
+        return found
+    for place, velocity in (("u_tip", "v_tip"), ("y", "z")):
+        way = float(np.abs(steps[place] - steps[place][0]).max())
+        if way > 0.0:
+            found = max(found, float(np.abs(steps[velocity]).max()) / way)
+    return found
+
+
 def shortest_contact(steps: np.ndarray | None, events: Iterable[Event], below: float, *, free_at_end: bool) -> float:
     """Return how long the shortest contact or rest on the foundation that has ended lasts [s]; ∞ if not ``below`` [s].
 

@@ -255,7 +255,7 @@ class PaperLaw(Checkpointed):
     def summary(self) -> dict[str, Any]:
         """Return what `springbeam.run.simulation.Simulation` does, with what the algorithm injected [J]."""
         warnings = ["contact.law = 'paper' overwrites the tip's position, which changes the energy by energy_residual"]
-        unresolved = not_resolved(self.scene, 0.0, 0.0)
+        unresolved = not_resolved(self.scene, 0.0)
         if unresolved is not None:
             warnings.append(unresolved)
         return {

@@ -9,7 +9,7 @@ from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, BeamBody
 from ..contact.events import gap
 from ..contact.laws import Compliance
-from ..contact.phases import Joint, common_velocity
+from ..contact.phases import Joint
 from ..coupling.protocol import Step
 from ..results.paths import Path
 from ..results.recording import Recorder
@@ -36,7 +36,7 @@ class Rows(Checkpointed):
 
     CHECKPOINTED = (
         *("_shapes_left", "_next_shape", "largest_mismatch", "largest_speed", "_relative_speed", "_deepest"),
-        *("contact_steps", "not_shown", "mismatch_at_stop", "_last_strike"),
+        *("contact_steps", "not_shown", "_mismatch_energy", "_last_strike"),
     )
 
     def __init__(self, scene: Scene, pair: Pair, balance: Balance, recorder: Recorder, start_time: float) -> None:
@@ -51,7 +51,7 @@ class Rows(Checkpointed):
         known = (*COLUMNS, *(f"load_{i}" for i in range(len(scene.loads))))
         self._present = itemgetter(*(known.index(name) for name in recorder.columns))
         self.largest_mismatch = 0.0  #: |v_tip − z| while tied [m/s]
-        self.mismatch_at_stop = 0.0  #: the same over the speed with which the joined ends strike the foundation
+        self._mismatch_energy = 0.0  #: of the same where the joined ends part or strike the foundation [J]
         self._last_strike = -inf  #: [s]
         self._relative_speed = 0.0  #: |v_tip − z| of ends that a soft law couples [m/s]
         self._deepest = 0.0  #: penetration of ends that a soft law couples [m]
@@ -96,20 +96,26 @@ class Rows(Checkpointed):
             if early or time >= self._next_shape:
                 self._shape(pair.beam, time, early)
 
-    def note_stop_impact(self, state: State, macro_step: float) -> None:
-        """Note how far the velocities of joined ends differ as they strike the foundation.
+    def note_mismatch(self, state: State, kind: str, macro_step: float) -> None:
+        """Note how far the velocities of joined ends differ as they part, or strike the foundation.
 
-        Impacts less than ``macro_step`` [s] after another one, or at the start of a phase, are left out: they may be as
-        slow as one likes.
+        Strikes less than ``macro_step`` [s] after another one are left out, and what happens at the start of a phase:
+        they may be as slow as one likes.
         """
-        pair, first = self._pair, state.time - self._last_strike > macro_step and state.steps_in_phase > 0
-        self._last_strike = state.time
-        if not first or pair.law.soft or not pair.joinable or state.phase.joint is Joint.FREE:
-            return
-        v, z = (end.velocity for end in pair.ends())
-        speed = abs(common_velocity(v, z, pair.upper.mass, pair.lower.mass))
-        if speed > 0.0:
-            self.mismatch_at_stop = max(self.mismatch_at_stop, abs(v - z) / speed)
+        first = state.steps_in_phase > 0
+        if kind == "stop_impact":
+            first &= state.time - self._last_strike > macro_step
+            self._last_strike = state.time
+        if first and not self._pair.law.soft and state.phase.joint is not Joint.FREE:
+            v, z = (end.velocity for end in self._pair.ends())
+            energy = 0.5 * self._pair.reduced_mass(state.phase) * (v - z) ** 2
+            self._mismatch_energy = max(self._mismatch_energy, energy)
+
+    @property
+    def mismatch_at_events(self) -> float:
+        """Return the largest mismatch noted, as √ of its energy over the largest energy so far."""
+        scale = self._balance.ledger.scale
+        return sqrt(self._mismatch_energy / scale) if scale > 0.0 else 0.0
 
     def note_penetration(self, step: Step) -> None:
         """Note how deep the ends of a soft law have sunk into each other on ``step``, also inside it.

@@ -16,7 +16,7 @@ from ..bodies.protocol import NO_FORCE, Body, BodyFailed, StepRefused
 from ..contact.phases import Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
 from ..results.recording import NonFiniteValue, Recorder
-from ..results.totals import shortest_contact
+from ..results.totals import pace, shortest_contact
 from ..results.trajectory import Event
 from ..scene import Scene
 from ..scene.automatic import with_scheme_chosen
@@ -226,8 +226,8 @@ class Simulation(Checkpointed):
             self._last_opening = state.time
         if kind == "impact":
             state.reclosed = state.time - self._last_opening <= SIMULTANEOUS * self._steps.size
-        if kind == "stop_impact":
-            self._rows.note_stop_impact(state, self._steps.size)
+        if kind in ("separation", "release", "stop_impact"):
+            self._rows.note_mismatch(state, kind, self._steps.size)
         ends = pair.ends()
         meets = kind in ("impact", "separation")  # at Ψ, where it means something else
         tolerance = self._detector.simultaneity_tolerance(ends) if meets else self._detector.tolerance(ends)
@@ -294,9 +294,7 @@ class Simulation(Checkpointed):
             )
         unresolved = not_resolved(
             self._scene,
-            rows.largest_mismatch,
-            rows.largest_speed,
-            mismatch_at_stop=rows.mismatch_at_stop,
+            rows.mismatch_at_events,
             shortest_contact=shortest_contact(
                 self._recorder.steps(),
                 self._recorder.events(),
@@ -305,6 +303,8 @@ class Simulation(Checkpointed):
             ),
             contact_frequency=rows.contact_frequency,
             contact_steps=rows.contact_steps,
+            pace=pace(self._recorder.steps()),
+            strokes=any(event.kind in ("stop_impact", "seated") for event in self._recorder.events()),
         )
         doubt = unresolved or peak_force_doubt(self._scene)
         if doubt is not None:
