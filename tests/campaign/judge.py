@@ -30,8 +30,8 @@ WAYS: dict[str, dict[str, Any]] = {
 }
 #: What a run at a fixed step may be wrong by.
 FIXED = 1e-2
-#: Rows of a run that are judged, about; seconds that a reference may take.
-ROWS, TIME_LIMIT = 25, 30.0
+#: Rows of a run that are judged, about, and times of a run with an accuracy; seconds that a reference may take.
+ROWS, POINTS, TIME_LIMIT = 25, 200, 30.0
 #: Relative changes of a stiffness that show the conditioning, and how many times larger the motion's may be.
 PERTURBATIONS, WELL_CONDITIONED = (1e-5, 1e-3, -1e-3), 30.0
 
@@ -95,15 +95,19 @@ def judge(seed: int, number: int, ways: list[str]) -> list[Verdict]:
     ]
     if not done:
         return found
-    times = {way: run.time[:: len(run) // ROWS + 1] for way, run in done.items()}
+    times = np.unique(np.concatenate([_times(way, run) for way, run in done.items()]))
     try:
-        reference = event_driven.simulate(
-            scene, sample_times=np.unique(np.concatenate(list(times.values()))), time_limit=TIME_LIMIT
-        )
+        reference = event_driven.simulate(scene, sample_times=times, time_limit=TIME_LIMIT)
         condition = _condition(scene, float(reference.time[-1] - reference.time[0]))
     except (event_driven.ReferenceFailure, RunStopped, ValueError) as failed:
         return [*found, *(Verdict(seed, number, way, "no reference", why=str(failed)) for way in done)]
     return [*found, *(_verdict(seed, number, way, run, reference, condition) for way, run in done.items())]
+
+
+def _times(way: str, run: Trajectory) -> np.ndarray:
+    """Return when ``run`` is judged: with an accuracy between its rows too, since that is about the curve."""
+    rows = run.time[:: len(run) // ROWS + 1]
+    return np.append(rows, np.linspace(run.time[0], run.time[-1], POINTS)) if "accuracy" in WAYS[way] else rows
 
 
 def _run(scene: Scene, way: str) -> Trajectory | Exception:
@@ -124,7 +128,11 @@ def _failure(failed: Exception) -> tuple[str, float, bool, float, float, float, 
 def _verdict(seed: int, number: int, way: str, run: Trajectory, reference: Trajectory, condition: float) -> Verdict:
     span = float(run.time[-1] - run.time[0])
     picked = run.summary.get("accuracy")
-    found = errors(run, reference, span / run.summary["macro_steps"])
+    promised = WAYS[way].get("accuracy")
+    if promised is None:
+        found = errors(run, reference, span / run.summary["macro_steps"])
+    else:  # at all times; contacts are told apart as far as their times are promised
+        found = errors(run.at(np.unique(_times(way, run))), reference, promised * span / 2.0)
     wrong = (found.u_tip_max, found.y_max, (found.event_time or 0.0) / span, found.impulse)
     said = set(run.summary["warnings"]) - {*suspicions(run.scene), peak_force_doubt(run.scene)}
     return Verdict(

@@ -48,11 +48,8 @@ def report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}{beside}")
     if "accuracy" in summary:
         found = summary["accuracy"]
-        console.print(
-            f"accuracy  {picked_in_words(found)}\n"
-            f"          errors {found['estimated_displacement_error']:.1e} (displacement), "
-            f"{found['estimated_event_error']:.1e} (times and impulses of {found['events_compared']} events)"
-        )
+        errors = ", ".join(f"{value:.1e} ({name})" for name, value in found["estimated_errors"].items())
+        console.print(f"accuracy  {picked_in_words(found)}\n          errors at most {errors}")
         if "estimated_mesh_error" in found:
             picked = found["picked"]
             mesh = f"{picked['n_elements']} elements" if "n_elements" in picked else f"{picked['n_modes']} exact modes"

@@ -5,7 +5,8 @@ Steps end on events and on changes of phase, so that no polynomial reaches acros
 * ``y``, ``z`` and, of ends that move apart, ``u_tip``, ``v_tip`` follow the path of order 6 through both ends of the
   step with its two moments (`springbeam.results.paths`), velocities its slope (order 5);
 * ends that a rigid law joins move together: ``u_tip`` takes the path of y, whose own is smoother, ``v_tip`` its slope,
-  each with what the rows say of the gap and of the mismatch, linear between them;
+  each with what the rows say of the gap and of the mismatch, linear between them; a tip that the foundation holds stays
+  where its rows are;
 * ``contact_force``, ``foundation_force`` are the polynomials applied; ``gap``, ``velocity_mismatch``, ``tie_reaction``,
   ``e_total`` and ``energy_residual`` follow from the other columns as in a row;
 * ``load_0`` and its like are the signals;
@@ -94,7 +95,7 @@ def motion(steps: np.ndarray, start: Mapping[str, np.ndarray], joined: np.ndarra
         Columns ``u_tip``, ``v_tip``, ``y``, ``z`` at the start of each step, after what happens there, as far as the
         scene has them: [m] and [m/s], shape (n,).
     joined
-        Whether a rigid law holds the ends together over the step, shape (n,).
+        Whether a rigid law holds the ends, or a tip and the foundation, together over the step, shape (n,).
 
     Returns
     -------
@@ -119,13 +120,19 @@ def motion(steps: np.ndarray, start: Mapping[str, np.ndarray], joined: np.ndarra
             together[:2] += apart, steps[of_tip] - steps[of_low] - apart
             found[of_tip] = np.where(joined, together, found[of_tip])
         found["gap"] = found["u_tip"] - found["y"]
+    elif "u_tip" in found:
+        for name in ("u_tip", "v_tip"):  # the foundation holds it where its rows say
+            straight = np.zeros_like(found[name])
+            straight[:2] = start[name], steps[name] - start[name]
+            found[name] = np.where(joined, straight, found[name])
     return found
 
 
 def _held_together(run: Trajectory, row: np.ndarray) -> np.ndarray:
     """Return whether a rigid law holds the ends together from each ``row`` on."""
     phase = run.columns["phase"][row]
-    return np.asarray(run.scene.contact.rigid & ((phase == "tied") | (phase == "touch")))
+    held = ("tied", "touch") if "y" in run.columns else ("tied", "touch", "seated")
+    return run.scene.contact.rigid & np.isin(phase, held)
 
 
 class _Between:

@@ -91,7 +91,7 @@ def totals(
     if scene.coupled or (beam and stop):
         found |= _contact(scene, steps, events, window, free_at_end)
     if beam:
-        contacts = tip_contacts(events, inf, free_at_end=free_at_end)
+        contacts = tip_contacts(events, inf, free_at_end=free_at_end) if spring else foundation_contacts(events, inf)
         found["deepest_tip"], found["deepest_tip_time"] = _deepest(scene, steps, events, contacts)
     if stop:
         found["stop_strokes"] = sum(event.kind in ("stop_impact", "seated") for event in events)
@@ -241,7 +241,7 @@ def _of_foundation(scene: Scene, steps: np.ndarray) -> float:
 def _deepest(
     scene: Scene, steps: np.ndarray, events: list[Event], contacts: list[tuple[float, float]]
 ) -> tuple[float, float]:
-    """Return the tip's lowest place [m] and its time [s], also between the rows; ``contacts`` are with a spring."""
+    """Return the tip's lowest place [m] and its time [s], also between the rows; ``contacts`` are its own."""
     time = steps["time"]
     start = {name: steps[name].copy() for name in ("u_tip", "v_tip", *(("y", "z") if scene.lower is not None else ()))}
     for event in events:  # what happens at a row changes the velocities with which the next step begins

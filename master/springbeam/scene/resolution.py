@@ -75,7 +75,7 @@ def not_resolved(
     """
     H = scene.coupling.macro_step
     if H is not None:  # steps that follow from tolerances are judged by their error
-        for name, omega, else_ in _slowest(scene):
+        for name, omega, else_ in slow_oscillations(scene):
             if omega * H > TURN:
                 return (
                     f"not resolved: the slowest oscillation of the {name} turns {omega * H:.3g} rad in a macro step. "
@@ -83,7 +83,7 @@ def not_resolved(
                     f"{_rounded_down(TURN / omega)} resolves it{else_}"
                 )
         if scene.massless and scene.contact.rigid:  # the ends are one oscillator, in its steps as in a soft contact's
-            contact_frequency, contact_steps = _joined_frequency(scene), scene.duration / H
+            contact_frequency, contact_steps = joined_frequency(scene), scene.duration / H
         lost = _contact_lost(scene, contact_frequency, H, contact_steps, pace / LATE[strokes])
         if lost := lost or _unstable(scene, H) or _waves_lag(scene, H):
             return lost
@@ -134,7 +134,7 @@ def _unstable(scene: Scene, H: float) -> str | None:
     beam = _struck(scene)
     if beam is None or scene.coupling.scheme != "hermite":
         return None
-    fastest = fastest_frequency(beam)
+    fastest = lasting_frequency(beam)  # damped waves are stable in far longer steps
     if fastest * H <= STABLE:
         return None
     return (
@@ -177,7 +177,7 @@ def force_window(scene: Scene, stiffness: float = 0.0) -> float:
         return WINDOW * 2.0 * pi / sqrt(stiffness * sum(1.0 / mass for mass in masses))
     if beam is not None and beam.fidelity == "dynamic":
         return WINDOW * 2.0 * pi / slowest_frequency(beam)
-    if (together := _joined_frequency(scene)) > 0.0:
+    if (together := joined_frequency(scene)) > 0.0:
         return WINDOW * 2.0 * pi / together
     return WINDOW * scene.time.t_end
 
@@ -201,7 +201,7 @@ def peak_force_doubt(scene: Scene) -> str | None:
     )
 
 
-def _slowest(scene: Scene) -> list[tuple[str, float, str]]:
+def slow_oscillations(scene: Scene) -> list[tuple[str, float, str]]:
     """Return (name, frequency [rad/s], what else would help) of each body and load that oscillates."""
     found = []
     beam, spring = scene.beam, scene.spring
@@ -247,7 +247,7 @@ def slowest_frequency(beam: Beam) -> float:
     return lowest_frequency(beam) * sqrt(locking(beam))
 
 
-def _joined_frequency(scene: Scene) -> float:
+def joined_frequency(scene: Scene) -> float:
     """Return the frequency of the spring and a beam without inertia together [rad/s]; 0 if none holds the mass."""
     beam, spring = scene.beam, scene.spring
     if beam is None or spring is None:
@@ -257,8 +257,13 @@ def _joined_frequency(scene: Scene) -> float:
 
 def impact_frequency(beam: Beam) -> float:
     """Return the highest frequency of the waves that an impact sets off and that do not die out at once [rad/s]."""
-    waves = min(shear_frequency(beam), fastest_frequency(beam))
-    return waves if beam.alpha_b == 0.0 else min(waves, DIES_OUT / beam.alpha_b)
+    return min(shear_frequency(beam), lasting_frequency(beam))
+
+
+def lasting_frequency(beam: Beam) -> float:
+    """Return the highest frequency kept, of waves that do not die out at once [rad/s]."""
+    fastest = fastest_frequency(beam)
+    return fastest if beam.alpha_b == 0.0 else min(fastest, DIES_OUT / beam.alpha_b)
 
 
 def fastest_frequency(beam: Beam) -> float:

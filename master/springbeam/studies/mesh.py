@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from ..results.contact_times import contact_time_difference
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, with_changes
 from ..scene.tables import ALL_MODES_UP_TO
-from .accuracy import pick
+from .accuracy import differences, pick
 from .converge import RATIO
 
 #: Shares of the accuracy that the mesh may use, and the coupling and the time integration.
 _SHARE = 0.5
-#: Times at which two meshes are compared, and the part of the run that is too short for a contact to be told.
-_TIMES, _SHORT = 1000, 1e-3
+#: Contacts shorter than this share of the run are not compared.
+_SHORT = 1e-3
 #: Order in the size of the elements that is relied on at least, and at most.
 _LOWEST, _HIGHEST = 1.0, 2.0
 
@@ -50,7 +47,8 @@ def pick_mesh(scene: Scene) -> Trajectory:
             mesh["n_elements"] = factor * beam.n_elements
         fine = pick(with_changes(scene, accuracy=_SHARE * asked, beam=mesh))
         if coarse is not None:
-            difference = _difference(coarse, fine)
+            apart = differences(coarse, fine, _SHORT)
+            difference = max(apart["motion"], apart["times"])
             order = math.log(before / difference, RATIO) if 0.0 < difference < before < math.inf else _LOWEST
             error = difference / (RATIO ** min(max(order, _LOWEST), _HIGHEST) - 1.0)
             if error <= _SHARE * asked:
@@ -65,17 +63,3 @@ def pick_mesh(scene: Scene) -> Trajectory:
         f"accuracy = {asked:g} with the mesh: not reached, {reached}; ask for less, shorten [time] t_end, or take "
         "elements of a higher degree where the motion is smooth (springbeam converge shows what settles)"
     )
-
-
-def _difference(coarse: Trajectory, fine: Trajectory) -> float:
-    """Return the largest difference of tip or spring top over its largest change, or of times of contact over the time
-    that is run."""
-    begin, end = float(fine.time[0]), float(fine.time[-1])
-    times = np.linspace(begin, end, _TIMES)
-    ours, theirs = coarse.at(times), fine.at(times)
-    worst = contact_time_difference(coarse, fine, _SHORT * (end - begin))[0] / (end - begin)
-    for name in ("u_tip", "y"):
-        if name in fine.columns:
-            scale = float(np.abs(theirs[name] - theirs[name][0]).max()) or 1.0
-            worst = max(worst, float(np.abs(ours[name] - theirs[name]).max()) / scale)
-    return worst
