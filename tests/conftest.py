@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import springbeam
+from springbeam.bodies.fmu_bodies import release
 from springbeam.monolithic import event_driven
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -41,6 +43,14 @@ def fmu_folder() -> Path:
     if missing:
         pytest.fail(f"{', '.join(missing)} not in {folder}: run ./build.sh fmus")
     return folder
+
+
+@pytest.fixture
+def none_kept() -> Iterator[None]:
+    """No body of an FMU is kept from an earlier test, nor for a later one."""
+    release()
+    yield
+    release()
 
 
 @pytest.fixture

@@ -28,9 +28,7 @@ SCENES = {
 }
 
 
-@pytest.fixture(autouse=True)
-def none_kept() -> None:
-    release()
+pytestmark = pytest.mark.usefixtures("none_kept")
 
 
 @pytest.fixture

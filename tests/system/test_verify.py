@@ -27,12 +27,8 @@ from springbeam.studies.verify.impact import _airy_overshoot
 
 
 def test_every_exact_solution_is_met_in_a_table_of_80_columns():
-    """The averaged mass keeps the force between the fronts to 1 % with 50 elements, the consistent one rings by 17 %.
-
-    By prototypes of others it is 24 % and 1.1 % with 25.
-    """
     console = Console(record=True, width=80)
-    found = report(verify.SECTIONS, console)
+    report(verify.SECTIONS, console)
     shown = console.export_text()
     assert " 0 failed" in shown
     assert "FAIL" not in shown
@@ -41,11 +37,6 @@ def test_every_exact_solution_is_met_in_a_table_of_80_columns():
     assert all(name in shown for name in ("quantity", "exact", "computed", "error", "bound"))
     assert max(len(line) for line in shown.splitlines()) <= 80
     assert "…" not in shown.replace("… one step late", "").replace("… Gauss–Seidel", "")  # nothing cut off
-    assert "not representable" in shown  # why a row is not judged
-    assert "not judged" in shown
-    errors = {check.quantity.partition(" ")[0]: check.error for check in found[verify.ringing.title]}
-    assert 0.1 < errors["consistent"] < 0.3
-    assert 0.0 < errors["averaged"] < 0.01
 
 
 # -- a wrong parameter fails ----------------------------------------------------------------------------------------
@@ -71,6 +62,16 @@ def force_off(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(
         FmuBeam, "advance", lambda self, t, size, c, *rest: right(self, t, size, (1.01 * c[0], *c[1:]), *rest)
     )
+
+
+def consistent(patch: pytest.MonkeyPatch) -> None:
+    """Every mesh has the consistent mass: its sixth frequency is 0.5 % higher."""
+    right = FmuBeam.__init__
+
+    def wrong(self, beam, *rest):
+        right(self, beam.model_copy(update={"mass_matrix": "consistent"}), *rest)
+
+    patch.setattr(FmuBeam, "__init__", wrong)
 
 
 def gap_left_open(patch: pytest.MonkeyPatch) -> None:
@@ -104,6 +105,8 @@ def base_as_force(patch: pytest.MonkeyPatch) -> None:
         (verify.frequencies, changed(FmuBeam, "density", 1.01)),
         (verify.frequencies, changed(FmuBeam, "second_moment_of_area", 0.99)),
         (verify.mesh_convergence, changed(FmuBeam, "density", 1.01)),
+        (verify.bar_frequencies, changed(FmuBeam, "shear_modulus", 1.01)),
+        (verify.bar_frequencies, consistent),
         (verify.beam_energy, force_off),
         (verify.duffing, changed(FmuSpring, "mass", 1.01)),
         (verify.duffing, changed(FmuSpring, "cubic_stiffness", 1.01)),
@@ -126,12 +129,12 @@ def base_as_force(patch: pytest.MonkeyPatch) -> None:
     ],
     ids=lambda given: getattr(given, "solution", given).__name__,
 )
-def test_a_mistake_of_one_percent_fails(section, mistake, monkeypatch: pytest.MonkeyPatch):
+def test_a_mistake_of_one_percent_fails(section, mistake, monkeypatch: pytest.MonkeyPatch, none_kept: None):
     mistake(monkeypatch)
-    assert any(check.passed is False for check in section())
+    assert any(not check.passed for check in section())
 
 
-def test_json_is_the_checks_and_a_failed_one_is_exit_code_1(monkeypatch: pytest.MonkeyPatch):
+def test_json_is_the_checks_and_a_failed_one_is_exit_code_1(monkeypatch: pytest.MonkeyPatch, none_kept: None):
     monkeypatch.setattr(verify, "SECTIONS", (verify.mesh_convergence, verify.escape))
     document = json.loads(printed("verify", "--json"))
     assert document["passed"] is True
@@ -170,10 +173,9 @@ def test_a_case_that_cannot_be_computed_fails_alone_and_with_its_cause():
         (Check("", 1.0, 0.7, 0.2, ""), False),
         (Check("", 1.0, float("nan"), 0.2, ""), False),
         (Check("", 1.0, None, 0.2, ""), False),
-        (Check("", 1.0, 5.0, None, ""), None),
     ],
 )
-def test_a_check_passes_within_its_bound_only(check: Check, passed: bool | None):
+def test_a_check_passes_within_its_bound_only(check: Check, passed: bool):
     assert check.passed is passed
 
 

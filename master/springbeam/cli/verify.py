@@ -28,7 +28,7 @@ def verify(as_json: JsonOption = False) -> None:
 
     with bad_input_reported():
         found = report(SECTIONS, console_for(silent=as_json))
-    passed = all(check.passed is not False for checks in found.values() for check in checks)
+    passed = all(check.passed for checks in found.values() for check in checks)
     if as_json:
         described = [
             {"title": title, "checks": [{**asdict(c), "error": c.error, "passed": c.passed} for c in checks]}
@@ -54,8 +54,8 @@ def report(sections: Iterable[Section], console: Console) -> dict[str, list[Chec
         console.print(notes)
         console.print()
     verdicts = [check.passed for checks in found.values() for check in checks]
-    counts = f"{verdicts.count(True)} passed, {verdicts.count(False)} failed, {verdicts.count(None)} reported without"
-    console.print(f"{counts} judgement; {perf_counter() - began:.0f} s")
+    counts = f"{verdicts.count(True)} passed, {verdicts.count(False)} failed"
+    console.print(f"{counts}; {perf_counter() - began:.0f} s")
     return found
 
 
@@ -67,7 +67,7 @@ def _table(checks: list[Check], marks: dict[str, str]) -> Table:
         table.add_column(heading, justify="right", no_wrap=True, min_width=width)
     table.add_column("", no_wrap=True)
     for check in checks:
-        verdict = {True: Text("pass"), False: Text("FAIL", style="bold red"), None: Text("–")}[check.passed]
+        verdict = Text("pass") if check.passed else Text("FAIL", style="bold red")
         table.add_row(
             Text(check.quantity),
             *(number(value, ".6g", "–") for value in (check.exact, check.computed)),

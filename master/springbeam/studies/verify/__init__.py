@@ -8,17 +8,26 @@ A new exact solution is a function in one of the modules beside this one, made a
 
 from __future__ import annotations
 
-from .beam import all_lost, beam_energy, frequencies, mesh_convergence, static_deflection, stiff_frequency
+from .beam import (
+    all_lost,
+    bar_frequencies,
+    beam_energy,
+    frequencies,
+    mesh_convergence,
+    static_deflection,
+    stiff_frequency,
+)
 from .coupling import added_mass, energy_scheme, two_masses
-from .impact import bar_impact, bouncing_bar, ringing
+from .impact import bar_impact
 from .laws import compliant_impact, damped_link, hunt_crossley, linked_masses, tied_masses
 from .loads import moving_base, pulse, resonance, slow_ramp
 from .spring import duffing, escape
 
 #: In the order of the table. Each raises FmuError if an FMU cannot be found, loaded or initialised.
 SECTIONS = (
-    *(static_deflection, frequencies, stiff_frequency, mesh_convergence, beam_energy, all_lost, duffing, escape),
-    *(bar_impact, ringing, bouncing_bar, two_masses, added_mass, energy_scheme),
+    *(static_deflection, frequencies, stiff_frequency, mesh_convergence, bar_frequencies, beam_energy, all_lost),
+    *(duffing, escape),
+    *(bar_impact, two_masses, added_mass, energy_scheme),
     *(resonance, pulse, slow_ramp, moving_base),
     *(compliant_impact, hunt_crossley, linked_masses, damped_link, tied_masses),
 )

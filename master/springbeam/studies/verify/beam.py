@@ -5,11 +5,11 @@ The beam has ρA = ρI = L = 1, EI = KAG = κ, unless a function says otherwise;
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from functools import lru_cache
 from itertools import pairwise, product
-from math import log, sqrt
+from math import cos, log, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -91,6 +91,34 @@ def mesh_convergence() -> Iterator[Check]:
     # log2 of (1 + 4d)/(1 + d), |d| ≤ (kh)²
     order = float(np.log2(errors[40] / errors[80]))
     yield Check("order from n = 40 to 80", 2.0, order, 3.0 * next_order / log(2), reason)
+
+
+#: How a bar of c = 1 is discretised, and the ω h of its wave that turns by kh over h.
+_BARS: dict[str, tuple[dict[str, Any], Callable[[float], float]]] = {
+    "consistent mass": ({"n_elements": 50}, lambda kh: sqrt(6.0 * (1.0 - cos(kh)) / (2.0 + cos(kh)))),
+    "averaged mass": (
+        {"n_elements": 50, "mass_matrix": "averaged"},
+        lambda kh: sqrt(12.0 * (1.0 - cos(kh)) / (5.0 + cos(kh))),
+    ),
+    "exact modes": ({"mesh": "none"}, lambda kh: kh),
+}
+
+
+@section("Beam: frequencies of a bar on 50 linear elements, and on exact modes", *((name,) for name in _BARS))
+def bar_frequencies(name: str) -> Iterator[Check]:
+    """A clamped–free bar (θ kept at rest by a huge ρI), k = (j − ½)π, whose waves the mesh disperses.
+
+    Consistent mass: ω h/c = √(6(1 − cos kh)/(2 + cos kh)), too fast by (kh)²/24 of it; averaged mass:
+    √(12(1 − cos kh)/(5 + cos kh)), too slow by (kh)⁴/480.
+    """
+    n, rigid, stiff = 50, 1e14, 1e3
+    beam, dispersed = _BARS[name]
+    bar = Beam.with_ones(n_modes=6, second_moment_of_area=rigid, young_modulus=stiff, **beam)
+    measured = _measured_frequencies(bar, 0.1, 300)
+    for j in (1, 3, 6):
+        w = n * dispersed((j - 0.5) * pi / n)
+        reason = "rounding: ε N² in an eigenproblem of N = 2n unknowns"
+        yield Check(f"{name}: ω{j} [rad/s]", w, _nearest(measured, w), (2 * n) ** 2 * EPS * w, reason)
 
 
 @section("Beam: energy of a step under a constant force", *product(("modal", "generalized_alpha"), (0.0, 1e-4)))

@@ -27,15 +27,15 @@ class Check:
     exact, computed
         The two values; ``computed`` is ``None`` where the FMUs gave none.
     bound
-        Largest \\|computed − exact\\| that passes; ``None`` if the number is reported, not judged.
+        Largest \\|computed − exact\\| that passes.
     reason
-        Where the bound comes from, or why there is none.
+        Where the bound comes from.
     """
 
     quantity: str
     exact: float | None
     computed: float | None
-    bound: float | None
+    bound: float
     reason: str
 
     @property
@@ -44,10 +44,8 @@ class Check:
         return None if self.exact is None or self.computed is None else self.computed - self.exact
 
     @property
-    def passed(self) -> bool | None:
-        """Whether the error is within the bound; ``None`` if the check is not judged. NaN does not pass."""
-        if self.bound is None:
-            return None
+    def passed(self) -> bool:
+        """Whether the error is within the bound; NaN is not."""
         return self.error is not None and abs(self.error) <= self.bound
 
 
