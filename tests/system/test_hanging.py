@@ -39,7 +39,7 @@ def interrupted(number: signal.Signals, fmu: str, function: str, where: str, ski
     """What the command says when it is sent a signal while the FMU hangs."""
     process = subprocess.Popen(
         [sys.executable, "-c", HANGING, fmu, function, where, str(skip), *map(str, arguments), "--no-plots", "-q"],
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])},
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:
@@ -93,8 +93,8 @@ def test_a_call_that_never_returns_can_be_interrupted(
     whole = written(tmp_path / "whole")
     run = ("run", PATH, "--out", directory, "--checkpoint", 0.02)
     said = interrupted(number, fmu, "fmi2DoStep", where, 3, *run)
-    check_interrupted(directory, whole, said, f"fmi2DoStep of {fmu}.fmu")
-    said = interrupted(number, fmu, "fmi2GetReal", "row", 50, "resume", directory)
+    check_interrupted(directory, whole, said, f"setting inputs or fmi2DoStep of {fmu}.fmu")
+    said = interrupted(number, fmu, "fmi2GetReal", "tied", 50, "resume", directory)
     check_interrupted(directory, whole, said, f"fmi2GetReal of {fmu}.fmu")
     printed("resume", directory, "--no-plots", "-q")
     assert written(directory) == whole

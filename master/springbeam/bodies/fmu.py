@@ -12,7 +12,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from struct import Struct
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 from fmpy.model_description import ModelDescription, read_model_description
 
@@ -85,6 +85,9 @@ class Fmu(Checkpointed):
 
     CHECKPOINTED = ("steps", "rewinds")
 
+    clock: Any  #: an array of C: time and size [s] of the step that `do_step` makes
+    do_step: Call
+
     def __init__(self, name: str | None, path: Path, parameters: Mapping[str, Value], start_time: float) -> None:
         self.path, self._own = path, name is not None
         self._name = path.stem if name is None else name
@@ -100,8 +103,8 @@ class Fmu(Checkpointed):
         self.moved = False
         #: doStep calls, and how often the state was set back.
         self.steps = self.rewinds = 0
-        self._time, self._size, self._start_time = c_double(), c_double(), c_double()
-        self._do_step = functions.stepping(self._time, self._size)
+        self._start_time = c_double()
+        self.stepping((c_double * 2)())
         if self.says.canGetAndSetFMUstate:
             self._get_state = self.prepared("GetFMUState", byref(self._state))
             self._set_state = self.prepared("SetFMUState", self._state)
@@ -236,20 +239,25 @@ class Fmu(Checkpointed):
     def keep_start(self) -> None:
         """Remember the present state as the one `return_to_start` sets."""
         self._must("cannot save the state", "GetFMUState", byref(self._start))
+        self._at_start = self.clock, self.do_step
 
     def return_to_start(self) -> None:
         """Set the state of `keep_start`, as a new instance has it."""
         self._must("cannot restore the state", "SetFMUState", self._start)
         self.moved, self.steps, self.rewinds = False, 0, 0
+        self.clock, self.do_step = self._at_start
         self._messages.clear()
 
-    def step(self, time: float, size: float) -> None:
-        """Make a step (fmi2DoStep) with the inputs that have been set. Raises StepRefused."""
-        self.steps += 1
-        self._time.value, self._size.value = time, size
-        status = self._do_step()
-        if status <= WARNING:
-            return
+    def stepping(self, clock: Any) -> None:
+        """Let `do_step` make steps as the first two numbers of ``clock`` say."""
+        self.clock, self.do_step = (
+            clock,
+            self._functions.stepping(*(c_double.from_buffer(clock, 8 * i) for i in (0, 1))),
+        )
+
+    def refuse(self, status: int) -> NoReturn:
+        """Raise StepRefused, or BodyFailed, for a step (fmi2DoStep) that has returned ``status``."""
+        time = self.clock[0]
         if status not in (DISCARD, ERROR):
             raise self.failed(status, f"cannot step at t = {time:.9g} s")
         self._refused = True
@@ -317,10 +325,10 @@ class Fmu(Checkpointed):
 _CALLED_BY = {
     "_load": "fmi2Instantiate",
     "initialise": "initialisation",
-    "step": "fmi2DoStep",
+    "_step": "setting inputs or fmi2DoStep",
     "get": "fmi2GetReal",
+    "_tell": "fmi2GetReal",
     "set": "fmi2SetReal",
-    "_advance": "fmi2SetReal or fmi2SetRealInputDerivatives",
     "mark": "fmi2GetFMUstate",
     "rewind": "fmi2SetFMUstate",
     "close": "fmi2FreeInstance",
@@ -338,7 +346,7 @@ def call_under_way(frame: FrameType | None) -> str:
         fmu = owner._fmu if isinstance(owner, Reals) else getattr(owner, "fmu", owner)
         if isinstance(fmu, Fmu):
             function = _CALLED_BY.get(frame.f_code.co_name, frame.f_code.co_name)
-            time = getattr(fmu, "_time", None)  # none while it is being loaded
-            return f"{function} of {fmu.path.name}" + ("" if time is None else f" at t = {time.value:.9g} s")
+            clock = getattr(fmu, "clock", None)  # none while it is being loaded
+            return f"{function} of {fmu.path.name}" + ("" if clock is None else f" at t = {clock[0]:.9g} s")
         frame = frame.f_back
     return "the program" if innermost is None else f"{innermost.f_code.co_filename}, line {innermost.f_lineno},"

@@ -5,8 +5,10 @@ from __future__ import annotations
 import atexit
 from collections.abc import Callable, Hashable, Sequence
 from ctypes import byref, c_double, sizeof
+from functools import partial
 from math import isfinite
 from pathlib import Path
+from struct import Struct
 from typing import Any, ClassVar, NoReturn
 
 import numpy as np
@@ -32,7 +34,7 @@ _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__
 class FmuBody(Body):
     """What both bodies do alike; a subclass names its variables."""
 
-    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("fmu", "_pending", "_current")
+    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("fmu", "_pending", "_current", "_told")
 
     _MOTION: tuple[str, ...]
     _ENERGIES: tuple[str, ...]
@@ -42,10 +44,10 @@ class FmuBody(Body):
     _bears_loads = False  #: whether the last of the energies is the work of the loads
     #: Highest derivative of a force that is handed over.
     _SLOPES: int = 2
-    #: Whether the derivatives of one step may act in the next one if they are not set again.
-    _KEEPS_SLOPES: bool = False
     _current: Motion
-    _marked_motion: Motion
+    _told: tuple[float, ...]
+    #: Whether the FMU tells its whole motion.
+    _tells_all = True
 
     def __init__(self, fmu: Fmu) -> None:
         self.fmu = fmu
@@ -56,10 +58,10 @@ class FmuBody(Body):
             raise
 
     def _prepare(self, fmu: Fmu) -> None:
-        self._motion, self._energies = Reals(fmu, *self._MOTION), Reals(fmu, *self._ENERGIES)
+        self._prepare_outputs()
         self._impulse = Reals(fmu, *self._IMPULSE)
         self._prepare_inputs(())
-        self._pending = self._marked_pending = 0.0
+        self._pending = 0.0
         self.mass = self._mass()
         if not isfinite(self.mass):
             raise FmuError(f"{fmu.path}: the mass of its end is {self.mass}")
@@ -68,15 +70,24 @@ class FmuBody(Body):
     def _prepare_inputs(self, loads: Sequence[str]) -> None:
         """Prepare the calls that set the forces and ``loads``, inputs of the FMU, and their derivatives."""
         fmu, names = self.fmu, (*self._FORCES, *loads)
-        n = self._number = len(names)
+        n = len(names)
         Reals(fmu, *names)  # a wrong reference is found before the run
-        self._inputs: Any = (c_double * (3 * n))()  # the forces and loads, then the two derivatives of each
-        self._set_forces = fmu.accessor("Set", names, self._inputs)
+        values: Any = (c_double * (2 + 3 * n))()  # time and size, forces and loads, then the two derivatives of each
+        fmu.stepping(values)
+        self._set_forces = fmu.accessor("Set", names, byref(values, 2 * sizeof(c_double)))
         if self._SLOPES > 0:
-            slopes = byref(self._inputs, n * sizeof(c_double))
-            self._set_slopes = fmu.input_derivatives(names, self._SLOPES, slopes)
+            self._set_slopes = fmu.input_derivatives(names, self._SLOPES, byref(values, (2 + n) * sizeof(c_double)))
+        self._write = partial(Struct(f"{len(values)}d").pack_into, values, 0)
         #: The loads of a step, and two derivatives of each.
         self._loads: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,) * len(loads), (0.0,) * (2 * len(loads)))
+
+    def _prepare_outputs(self) -> None:
+        """Prepare the one call that reads motion and energies."""
+        self._outputs = (*self._MOTION, *self._ENERGIES)
+        Reals(self.fmu, *self._outputs)  # a wrong reference is found before the run
+        values: Any = (c_double * len(self._outputs))()
+        self._get = self.fmu.accessor("Get", self._outputs, values)
+        self._unpack = partial(Struct(f"{len(values)}d").unpack, values)
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
         #: By input of the FMU: what is added to it by a unit of which load.
@@ -85,7 +96,9 @@ class FmuBody(Body):
             for name, share in self._inputs_of(load):
                 self._shares.setdefault(name, []).append((number, share))
         self._prepare_inputs(tuple(self._shares))
-        self._energies, self._bears_loads = Reals(self.fmu, *self._ENERGIES[:3], "load_work"), True
+        self._ENERGIES, self._bears_loads = (*self._ENERGIES[:3], "load_work"), True
+        self._prepare_outputs()
+        self._tell()
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         """Return the inputs of the FMU that ``load`` acts by, and how much of it each takes."""
@@ -115,12 +128,12 @@ class FmuBody(Body):
 
     def mark(self) -> None:
         self.fmu.mark()
-        self._marked_pending, self._marked_motion = self._pending, self._current
+        self._marked_values = self._pending, self._current, self._told
 
     def rewind(self) -> None:
         if self.fmu.moved:
             self.fmu.rewind()
-            self._pending, self._current = self._marked_pending, self._marked_motion
+            self._pending, self._current, self._told = self._marked_values
 
     def motion(self) -> Motion:
         return self._current
@@ -131,39 +144,48 @@ class FmuBody(Body):
         self._impulse.set((self._pending,))
         self._current = self._current._replace(velocity=self._current.velocity + impulse / self.mass)
 
-    def _advance(self, time: float, size: float, inputs: Sequence[float]) -> Motion:
-        """Step under ``inputs`` at the start of the step: forces and loads, then the two derivatives of each."""
-        fmu, n = self.fmu, self._number
-        if not isfinite(sum(inputs)):
-            raise StepRefused(f"{fmu.path.name}: the force it should step under is not finite: {list(inputs[:n])}")
-        self._inputs[:] = inputs
+    def _step(self, sloped: bool) -> Motion:
+        """Step as has been written, under forces that vary if they are ``sloped``; return the motion."""
+        fmu = self.fmu
         fmu.moved = True
+        fmu.steps += 1
         if (status := self._set_forces()) > WARNING:
             raise fmu.failed(status, f"cannot set {', '.join(self._FORCES)} and loads")
-        if (any(inputs[n:]) or self._KEEPS_SLOPES) and (status := self._set_slopes()) > WARNING:
+        if sloped and (status := self._set_slopes()) > WARNING:
             raise fmu.failed(status, "cannot set input derivatives")
-        fmu.step(time, size)
+        if (status := fmu.do_step()) > WARNING:
+            fmu.refuse(status)
         self._pending = 0.0
-        self._current = motion = self._read_motion()
-        return motion
+        return self._tell()
 
     def _begin(self) -> None:
         """Read the motion that the FMU was initialised to."""
         try:
-            self._current = self._marked_motion = self._read_motion()
+            self._tell()
         except StepRefused as refused:
             raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
+        self._marked_values = self._pending, self._current, self._told
 
-    def _read_motion(self) -> Motion:
-        motion = _motion_of(Motion, self._motion.get())
-        return motion if isfinite(sum(motion)) else self._refused(motion)
+    def _refuse(self, *forces: Force) -> NoReturn:
+        raise StepRefused(f"{self.fmu.path.name}: the force it should step under is not finite: {forces}")
 
-    def _refused(self, motion: Motion) -> NoReturn:
-        raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
+    def _made_up(self, told: tuple[float, ...]) -> Motion:
+        """Return the motion where the FMU does not tell all of it."""
+        raise NotImplementedError
+
+    def _tell(self) -> Motion:
+        """Read the motion, and the energies that belong to it."""
+        if (status := self._get()) > WARNING:
+            raise self.fmu.failed(status, f"cannot read {', '.join(self._outputs)}")
+        self._told = told = self._unpack()
+        self._current = motion = _motion_of(Motion, told[:4]) if self._tells_all else self._made_up(told)
+        if not isfinite(sum(motion)):
+            raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
+        return motion
 
     def _stored(self) -> tuple[float, ...]:
         """Return the energies [J]; the kinetic one has the impulse that is still pending."""
-        energies = self._energies.get()
+        energies = self._told[len(self._MOTION) :]
         if self._pending != 0.0:
             before = self._current.velocity - self._pending / self.mass
             return (energies[0] + 0.5 * self._pending * (before + self._current.velocity), *energies[1:])
@@ -268,8 +290,11 @@ class FmuBeam(OwnBody, BeamBody):
         return Reals(self.fmu, "tip_mass").get()[0]
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        values, slopes = self._loads
-        return self._advance(time, size, (contact[0], *values, contact[1], contact[2], *slopes))
+        (c, dc, ddc), (values, slopes) = contact, self._loads
+        if not isfinite(c + dc + ddc):
+            self._refuse(contact)
+        self._write(time, size, c, *values, dc, ddc, *slopes)
+        return self._step(dc != 0.0 or ddc != 0.0 or any(slopes))
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         if load.on == "tip":
@@ -320,7 +345,10 @@ class FmuSpring(OwnBody, EndLoaded):
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
-        return self._advance(time, size, (c, n, *values, dc, ddc, dn, ddn, *slopes))
+        if not isfinite(c + dc + ddc + n + dn + ddn):
+            self._refuse(contact, foundation)
+        self._write(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes)
+        return self._step(dc != 0.0 or ddc != 0.0 or dn != 0.0 or ddn != 0.0 or any(slopes))
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         return [("base_acceleration" if load.on == "base" else "external_force", 1.0)]

@@ -73,10 +73,10 @@ class ForeignBody(FmuBody, EndLoaded):
         names, energies = spec.named(spec.MOTION), spec.named(spec.ENERGIES)
         self._MOTION = tuple(name for name in names if name is not None)
         self._at = [None if name is None else self._MOTION.index(name) for name in names]
+        self._tells_all = None not in self._at
         self._ENERGIES = tuple(name for name in energies if name is not None) if found.abilities.energies else ()
         self._IMPULSE = () if spec.impulse is None else (spec.impulse,)
         self._FORCES, self._SLOPES = (spec.force,), found.abilities.slopes
-        self._KEEPS_SLOPES = self._SLOPES > 0
         self._upward = 1.0 if upper else -1.0
         #: Work of all forces and impulses on the end so far, but not of loads [J].
         self.received = 0.0
@@ -148,7 +148,10 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def _part(self, time: float, size: float, inputs: Force) -> Motion:
         struck, self._size = self._pending != 0.0, size
-        end = self._advance(time, size, inputs)
+        if not isfinite(sum(inputs)):
+            self._refuse(inputs)
+        self._write(time, size, *inputs)
+        end = self._step(self._SLOPES > 0)  # the derivatives of one step may act in the next if they are not set again
         if struck:
             self._impulse.set((0.0,))  # should the FMU not take it as used up
         return end
@@ -172,21 +175,17 @@ class ForeignBody(FmuBody, EndLoaded):
         super().apply_impulse(impulse)
         self.received += 0.5 * impulse * (before + self._current.velocity)
 
-    def _read_motion(self) -> Motion:
-        if None not in self._at:
-            return super()._read_motion()
-        told, size = self._motion.get(), self._size
+    def _made_up(self, told: tuple[float, ...]) -> Motion:
+        size = self._size
         w, v, once, twice = (None if at is None else told[at] for at in self._at)
         assert w is not None
         if size == 0.0:
-            motion = Motion(w, self._found.velocity if v is None else v, once or 0.0, twice or 0.0)
-        else:
-            w0, v0 = self._current[:2]
-            if v is None:
-                v0 = v = (w - w0) / size
-            first, second = moments(w0, v0, w, v, size)
-            motion = Motion(w, v, first if once is None else once, second if twice is None else twice)
-        return motion if isfinite(sum(motion)) else self._refused(motion)
+            return Motion(w, self._found.velocity if v is None else v, once or 0.0, twice or 0.0)
+        w0, v0 = self._current[:2]
+        if v is None:
+            v0 = v = (w - w0) / size
+        first, second = moments(w0, v0, w, v, size)
+        return Motion(w, v, first if once is None else once, second if twice is None else twice)
 
     def energies(self) -> Energies:
         if not self.abilities.energies:

@@ -65,3 +65,11 @@ def broyden(descent: Matrix, step: Vector, residual: Vector) -> Matrix:
         return descent
     row = [sum(map(mul, step, column)) / denominator for column in zip(*descent, strict=True)]
     return [[x + y * z for x, z in zip(line, row, strict=True)] for line, y in zip(descent, d, strict=True)]
+
+
+def secant(B: Matrix, step: Vector, missed: Vector) -> Matrix:
+    """Return B + m sᵀ/(sᵀs): Broyden's update of a Jacobian whose prediction over the step s has missed m."""
+    square = sum(map(mul, step, step))
+    if square == 0.0:
+        return B
+    return [[x + m * s / square for x, s in zip(row, step, strict=True)] for row, m in zip(B, missed, strict=True)]

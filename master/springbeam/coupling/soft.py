@@ -22,7 +22,7 @@ from . import energy
 from .projection import Projection
 from .protocol import Booking, ErrorEstimate, NotConverged, Scales, Step, Window
 from .small import Matrix, Vector, inverse, times
-from .solver import StepSolver
+from .solver import Aim, StepSolver
 
 _MAX_NEWTON, _MAX_DAMPING = 60, 8
 #: A correction smaller than this share of the penetration's numbers changes nothing.
@@ -97,7 +97,7 @@ class SoftSolver(StepSolver):
         tip, low = window.ends
         return not any(self._projection.force(low.displacement - tip.displacement, window.size, list(map(neg, gap))))
 
-    def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> tuple[Vector, Vector]:
+    def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> Aim:
         tip, low = window.ends
         size, x = window.size, list(map(neg, gap))
         step = (low.displacement - tip.displacement, size, x, a, descent)
@@ -111,8 +111,8 @@ class SoftSolver(StepSolver):
             pass
         if found is None:
             raise NotConverged(max(map(abs, x)), _MAX_NEWTON)
-        x, a = found
-        return list(map(neg, x)), a
+        x, better = found
+        return list(map(neg, x)), list(map(sub, better, a)), better
 
     def _newton(
         self, start: float, size: float, x: Vector, a: Vector, descent: Matrix, flexibility: Matrix | None = None

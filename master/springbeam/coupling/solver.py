@@ -1,10 +1,12 @@
-"""Find the contact force of a step: Newton's method on conditions of the gap, with responses that are remembered.
+"""Find the contact force of a step: predict, correct, verify, with responses of the bodies that are remembered.
 
-Unknowns are the Legendre coefficients a of C; residuals are conditions on the gap over the step, in metres, beside what
-the law wants them to be (`StepSolver.aim`: nothing at all, where the ends are tied). The beam is linear: its conditions
-are affine in a with a matrix B that depends on H alone, which is measured once per H and remembered. The spring's
-matrix S starts as that of a free mass, is measured when a size comes again, and follows by Broyden's rank-one updates,
-so a step usually costs two beam steps and two spring steps.
+Unknowns are the Legendre coefficients a of C; the conditions on the gap over the step, in metres, should be what the
+law wants them to be (`StepSolver.aim`: zero, where the ends are tied). Both bodies advance under the force that the
+last step tells. Corrections follow from responses: B of the upper body's conditions to a is measured once for each size
+of step and remembered, for the beam is linear. S of the lower body's starts as that of a free mass, and Broyden's
+rank-one updates make it follow. Under a corrected force the lower body advances and the end of the upper one is
+predicted by B. Once the conditions hold so, the upper body advances to verify it, so a step usually costs two steps of
+each body. An upper body that is not linear is found out there, and B follows as S does.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ import numpy as np
 from ..bodies import force
 from ..bodies.protocol import Body, Force, Motion
 from .protocol import Conditions, Coupling, NotConverged, Window
-from .small import Matrix, Vector, broyden, inverse, times, transposed
+from .small import Matrix, Vector, broyden, inverse, secant, times, transposed
 
 _MAX_ITERATIONS = 20
 #: Rounding of a sum of modes, relative to the largest it has been.
@@ -33,12 +35,13 @@ _STAGNATES = 0.3
 SIZES_REMEMBERED = 64
 
 
-#: How corrections follow from residuals against one kind of lower body: D = −(B − S)⁻¹ [N/m], and whether S was
-#: measured; if not, it is that of a free mass, followed by Broyden's updates.
-Descent = tuple[Matrix, bool]
-#: What is remembered of a size of step: B of the upper body's conditions to a [m/N], and descents by the kind of the
-#: lower body.
-Response = tuple[Matrix, dict[str, Descent]]
+#: Where a correction leads: the conditions there [m], ``None`` if zero; the correction of the coefficients [N], and the
+#: coefficients there [N].
+Aim = tuple[Vector | None, Vector, Vector]
+#: What is remembered of a size of step: B [m/N]; D = −(B − S)⁻¹ [N/m], unless the lower body was a wall; and whether S
+#: was measured. If not, it is that of a free mass, followed by Broyden's updates.
+Response = tuple[Matrix, Matrix | None, bool]
+_UNKNOWN: tuple[None, None, bool] = (None, None, False)
 
 
 class StepSolver(Coupling):
@@ -72,8 +75,8 @@ class StepSolver(Coupling):
         """Return whether nothing acts between the bodies under ``a``, nor should; parameters as of `aim`."""
         return False
 
-    def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> tuple[Vector, Vector] | None:
-        """Return what the conditions should be, and the coefficients that would make them so; ``None``: zero.
+    def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> Aim:
+        """Return where force and conditions are to go.
 
         Parameters
         ----------
@@ -84,7 +87,8 @@ class StepSolver(Coupling):
         window
             The step.
         """
-        return None
+        step = times(descent, gap)
+        return None, step, list(map(add, a, step))
 
     def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
         """Advance both bodies from their marks over ``window`` so that the conditions hold; return the force.
@@ -92,9 +96,9 @@ class StepSolver(Coupling):
         ``guess`` is the contact force as far as known. Raises NotConverged (with the residual [m]) or StepRefused.
         """
         time, size, (start, _) = window
-        conditions = self._conditions
-        a = force.legendre(guess, size, self.degree)
-        acting = force.derivatives(a, size)
+        conditions, derivatives = self._conditions, force.derivatives
+        a = known = force.legendre(guess, size, self.degree)  # known: where the upper body has been
+        acting = derivatives(a, size)
         upper.rewind()
         upper_end = upper.advance(time, size, acting)
         r_upper: Sequence[float] = conditions(upper_end, size)
@@ -104,88 +108,91 @@ class StepSolver(Coupling):
         gap = list(map(sub, r_upper, r_lower))
         if self.no_contact(gap, a, window):
             return acting
-        tried: Vector | None = a  # at the upper body in earnest; elsewhere its end is predicted
-        known = self._sizes.get(size)
-        if known is None:
-            tried = None
+        B, descent, measured = remembered = self._sizes.get(size, _UNKNOWN)
+        predicted = B is None  # whether the upper body is elsewhere than at its end under ``a``
+        if B is None:
             length = max(self._expected, abs(upper_end.displacement), size * abs(upper_end.velocity))
-            known = (self._measure(upper, time, size, a, r_upper, length), {})
-        self._remember(size, known)
-        (B, descents), kind = known, type(lower).__name__
-        remembered = descents.get(kind)
-        descent, measured = remembered or (_descent(B, self._free_response(lower, size)), False)
-        aim = self.aim(gap, a, descent, window)
-        residual = gap if aim is None else list(map(sub, gap, aim[0]))
+            B = self._measure(upper, time, size, a, r_upper, length)
+        if descent is None or lower.mass == inf:
+            descent = _descent(B, self._free_response(lower, size))
+        goal, step, better = self.aim(gap, a, descent, window)
+        residual = gap if goal is None else list(map(sub, gap, goal))
         norm = max(map(abs, residual))
         # Rounding at least. What is asked is known once the motion is; that under the guess may be far from it.
         enough = tolerance = _ROUNDING * max(self._reach, abs(start.displacement))
-        noisy = False  # the iteration has met the bodies' own rounding
-        fresh = False  # S was measured for this step
+        left = inf  # when the upper body advanced last, of the residual [m]
+        noise = 0.0  # of the bodies' own rounding, once the iteration has met it [m]
+        # S is measured once, when a size comes again: it then saves a step of the lower body in most.
+        due = not measured and remembered[1] is not None and lower.mass < inf
+        fresh = False  # whether S was measured in this step
         for iteration in range(_MAX_ITERATIONS):
             if not norm < inf:
                 raise NotConverged(norm, iteration)
             previous = norm
             if norm <= enough:
-                if tried is a:
+                if not predicted:
                     break
                 upper.rewind()
-                upper_end, tried = upper.advance(time, size, acting), a
-                r_upper = conditions(upper_end, size)  # in place of the affine prediction
+                upper_end = upper.advance(time, size, acting)
+                r_upper, predicted = conditions(upper_end, size), False
             else:
                 self.iterations += 1
-                if aim is None:
-                    step = times(descent, residual)
-                    a = list(map(add, a, step))
-                else:
-                    step, a = list(map(sub, aim[1], a)), aim[1]
-                acting = force.derivatives(a, size)
-                r_upper = list(map(add, r_upper, times(B, step)))
+                a = better
+                acting = derivatives(a, size)
+                r_upper, predicted = list(map(add, r_upper, times(B, step))), True
                 lower.rewind()
                 lower_end = lower.advance(time, size, acting)
                 r_lower = conditions(lower_end, size)
                 tolerance = self._absolute_tolerance(start, lower_end, size, times(B, a))
-                enough = self._noise(tolerance) if noisy else tolerance
-            gap = list(map(sub, r_upper, r_lower))
-            residual = gap if aim is None else list(map(sub, gap, aim[0]))
+                enough = tolerance if tolerance > noise else noise
+            before, gap = gap, list(map(sub, r_upper, r_lower))
+            residual = gap if goal is None else list(map(sub, gap, goal))
             norm = max(map(abs, residual))
             if not norm > enough:
                 continue
-            if tried is not a:  # below, the difference is rounding and would spoil what is known
+            if predicted:
+                stagnates = norm > _STAGNATES * previous
                 descent = broyden(descent, step, residual)
-            stagnates = norm > _STAGNATES * previous
-            # S is measured once, when a size comes again: it then saves a step of the lower body in most.
-            if (stagnates and not fresh) or not (remembered is None or measured):
+            else:
+                stagnates, left = norm > _STAGNATES * left, norm
+                if norm > self._noise(tolerance):
+                    # The upper body is not linear: what it missed of the prediction corrects both responses.
+                    taken, missed = list(map(sub, a, known)), list(map(sub, gap, before))
+                    B, descent = secant(B, taken, missed), broyden(descent, taken, missed)
+                known = a
+            if due or (stagnates and predicted and not fresh):
                 length = 1e-4 * max(abs(lower_end.displacement), size * abs(lower_end.velocity))
                 S = self._measure(lower, time, size, a, r_lower, length)
                 lower.rewind()
                 lower.advance(time, size, acting)
-                descent, measured, fresh = _descent(B, S), True, True
+                descent, measured, fresh, due = _descent(B, S), True, True, False
             elif stagnates and norm <= self._noise(tolerance):
-                noisy, enough = True, self._noise(tolerance)
-            if aim is not None:
-                aim = self.aim(gap, a, descent, window)
-                assert aim is not None
-                residual = list(map(sub, gap, aim[0]))
-                norm = max(map(abs, residual))
+                noise = enough = self._noise(tolerance)
+            goal, step, better = self.aim(gap, a, descent, window)
+            residual = gap if goal is None else list(map(sub, gap, goal))
+            norm = max(map(abs, residual))
         else:
             raise NotConverged(norm, _MAX_ITERATIONS)
-        self._last_size = size
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
-        self._reach = max(self._reach, abs(upper_end.displacement), abs(lower_end.displacement))
-        descents[kind] = (descent, measured)
+        u, y = upper_end[0], lower_end[0]
+        self._reach = max(self._reach, u, -u, y, -y)
+        if lower.mass == inf:
+            descent, measured = remembered[1:]
+        if B is not remembered[0] or descent is not remembered[1]:
+            self._sizes[size] = (B, descent, measured)
+        if size != self._last_size:
+            self._used_last(size)
         return acting
 
     def _noise(self, tolerance: float) -> float:
         """Return up to which residual [m] an iteration that stagnates may have met the bodies' own rounding."""
         return max(_NOISE * tolerance, _ROUNDING * self._expected)
 
-    def _remember(self, size: float, known: Response) -> None:
-        """Keep ``known`` as what was used last, and forget the size that was used least recently."""
-        if size != self._last_size:
-            self._sizes.pop(size, None)
-            self._sizes[size] = known
-            if len(self._sizes) > SIZES_REMEMBERED:
-                del self._sizes[next(iter(self._sizes))]
+    def _used_last(self, size: float) -> None:
+        """Forget the size that was used least recently, if there are too many."""
+        self._sizes[size], self._last_size = self._sizes.pop(size), size
+        if len(self._sizes) > SIZES_REMEMBERED:
+            del self._sizes[next(iter(self._sizes))]
 
     def _free_response(self, lower: Body, size: float) -> Matrix:
         if lower.mass == inf:
@@ -214,9 +221,9 @@ class StepSolver(Coupling):
     def _absolute_tolerance(self, start: Motion, end: Motion, size: float, by_force: Vector) -> float:
         """Return the tolerance [m]; ``start`` is the upper body's motion, ``end`` the lower one's."""
         (u, v, _, _), (y, z, _, _) = start, end
-        change = max(size * max(abs(v), abs(z)), abs(y - u))
+        change = max(size * max(v, -v, z, -z), abs(y - u))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
-        rounding = _ROUNDING * max(self._reach, abs(u), abs(y), *map(abs, by_force))
+        rounding = _ROUNDING * max(self._reach, u, -u, y, -y, *map(abs, by_force))
         return max(self._tolerance * change, rounding)
 
 
