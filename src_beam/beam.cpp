@@ -119,6 +119,18 @@ double Beam::load_potential() const {
   return -work;
 }
 
+double Beam::load_potential_rate() const {
+  double power = 0.0;
+  for (const Loads::Shape i : {Loads::distributed, Loads::hat}) power += now_.loads[i] * load_power_per_unit(i);
+  return -power;
+}
+
+double Beam::load_power() const {
+  double power = 0.0;
+  for (std::size_t i = 0; i < Loads::count; ++i) power += now_.loads[i] * load_power_per_unit(i);
+  return power;
+}
+
 bool Beam::outputs_finite() const {
   Shape u{}, theta{};
   deflection(u);
@@ -162,14 +174,17 @@ Beam::Forecast Beam::forecast_per_load(double size, std::size_t shape) {
   return forecast(size);
 }
 
-std::array<double, 2> Beam::tip_response(double size) {
+std::array<double, 3> Beam::tip_response(double size) {
   Trial trial(*this);
   trial.clear();
-  std::array<double, 2> response{};
+  std::array<double, 3> response{};
   step(size, {1.0, 0.0, 0.0}, {});
   response[0] = tip_displacement();
   step(size, {}, {});
   response[1] = tip_displacement();
+  trial.clear();
+  apply_tip_impulse(1.0);
+  response[2] = forecast(size).velocity;
   return response;
 }
 

@@ -124,6 +124,7 @@ class Beam {
   /// to the end of the last step. The motion does not depend on it.
   void observe(double tip_force, const Loads& loads);
   const Loads::Values& loads() const { return now_.loads; }  ///< acting now
+  double tip_force() const { return now_.tip_force; }        ///< likewise
 
   virtual double tip_displacement() const = 0;                            ///< u(L) [m]
   virtual double tip_velocity() const = 0;                                ///< u_t(L) [m/s]
@@ -137,14 +138,22 @@ class Beam {
   double load_work() const { return book(), now_.load_work; }             ///< of all loads since the start [J]
   double load_potential() const;  ///< −qᵀF [J] of the uniform and the hat load, as if they were constant
   virtual double load_work_per_unit(std::size_t shape) const = 0;  ///< qᵀF of a unit of a load, as ∫ u dx [m²]
-  virtual double tip_mass() const = 0;                             ///< 1/(eᵀ M⁻¹ e) [kg]
-  virtual void deflection(Shape& u) const = 0;                     ///< [m]
-  virtual void rotation(Shape& theta) const = 0;                   ///< [rad]
+  // Their rates, under what acts now.
+  virtual double tip_rotation_rate() const = 0;                     ///< [rad/s]
+  virtual double kinetic_power() const = 0;                         ///< [W]
+  virtual double strain_power() const = 0;                          ///< [W]
+  virtual double dissipated_power() const = 0;                      ///< [W]
+  virtual double load_power_per_unit(std::size_t shape) const = 0;  ///< q̇ᵀF of a unit of a load, as ∫ u_t dx [m²/s]
+  double load_power() const;                                        ///< of all loads [W]
+  double load_potential_rate() const;                               ///< [W]
+  virtual double tip_mass() const = 0;                              ///< 1/(eᵀ M⁻¹ e) [kg]
+  virtual void deflection(Shape& u) const = 0;                      ///< [m]
+  virtual void rotation(Shape& theta) const = 0;                    ///< [rad]
 
   /// How the tip goes on over two steps of `size` [s] without a tip force.
   struct Forecast {
     double velocity;      ///< w = [u(t + 2·size) − u(t)]/(2·size) [m/s]
-    double acceleration;  ///< its rate, [u_t(t + 2·size) − u_t(t)]/(2·size) [m/s²]
+    double acceleration;  ///< its rate without a tip force, [u_t(t + 2·size) − u_t(t)]/(2·size) [m/s²]
   };
   /// Under the load that load_potential() refers to, by two trial steps, which leave no trace.
   /// @throws as step()
@@ -155,8 +164,9 @@ class Beam {
   /// What 1 N held over a step of `size` [s] adds to u(L) at that step's end, and at the end of another step without a
   /// force [m/N]. As the beam is linear, forces C₁, C₂ over the next two steps lead to
   ///     u(t + 2·size) = u(t) + 2·size·w + C₁ r[1] + C₂ r[0].
+  /// r[2]: what a tip impulse of 1 N·s adds to w [1/kg].
   /// @throws as forecast()
-  std::array<double, 2> tip_response(double size);
+  std::array<double, 3> tip_response(double size);
 
   /// The whole dynamic state as a flat vector of fixed length (for one parameter set).
   void save(std::vector<double>& state) const;

@@ -167,13 +167,13 @@ class GeneralizedAlphaBeam final : public Beam {
 
   double tip_displacement() const override { return q_[mesh_.tip_index()]; }
   double tip_velocity() const override { return v_[mesh_.tip_index()]; }
-  double tip_acceleration() const override {
-    VectorXd force = -mu_ * mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
-    force += load_of(now_.loads);
-    force[mesh_.tip_index()] += now_.tip_force;
-    return tip_response_.dot(force);
-  }
+  double tip_acceleration() const override { return tip_response_.dot(inertia()); }
   double tip_rotation() const override { return q_[mesh_.tip_rotation_index()] / mesh_.radius_of_gyration(); }
+  double tip_rotation_rate() const override { return v_[mesh_.tip_rotation_index()] / mesh_.radius_of_gyration(); }
+  double kinetic_power() const override { return v_.dot(inertia()); }
+  double strain_power() const override { return mu_ * v_.dot(mesh_.stiffness_times(q_)); }
+  double dissipated_power() const override { return mu_ * alpha_ * mesh_.stiffness_norm2(v_); }
+  double load_power_per_unit(std::size_t i) const override { return shape(i).dot(v_); }
   double kinetic_energy() const override { return 0.5 * mu_ * mesh_.mass_norm2(v_); }
   double strain_energy() const override { return 0.5 * mu_ * mesh_.stiffness_norm2(q_); }
   double load_work_per_unit(std::size_t i) const override { return shape(i).dot(q_); }
@@ -225,6 +225,13 @@ class GeneralizedAlphaBeam final : public Beam {
       numbers += x->size();
     }
     if (!midpoint_) std::memcpy(&last_, numbers, sizeof last_);
+  }
+
+  /// ρA M q̈ under what acts now: all forces that the stiffness and the damping leave.
+  VectorXd inertia() const {
+    VectorXd force = load_of(now_.loads) - mu_ * mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
+    force[mesh_.tip_index()] += now_.tip_force;
+    return force;
   }
 
   /// Makes q_ and v_ from q0_ and v0_; returns the loss.

@@ -63,11 +63,12 @@ class ModalBeam final : public Beam {
 
   double tip_displacement() const override { return displacement_; }
   double tip_velocity() const override { return velocity_; }
-  double tip_acceleration() const override {
-    ArrayXd force = now_.tip_force * tip_;
-    for (std::size_t i = 0; i < Loads::count; ++i) force += now_.loads[i] * modes_.loads[i].array();
-    return (tip_ * (force - omega2_ * eta_ - damping_ * v_)).sum();
-  }
+  double tip_acceleration() const override { return (tip_ * acceleration()).sum(); }
+  double tip_rotation_rate() const override { return modes_.tip_rotation.dot(v_.matrix()); }
+  double kinetic_power() const override { return (v_ * acceleration()).sum(); }
+  double strain_power() const override { return (omega2_ * eta_ * v_).sum(); }
+  double dissipated_power() const override { return (damping_ * v_.square()).sum(); }
+  double load_power_per_unit(std::size_t i) const override { return modes_.loads[i].dot(v_.matrix()); }
   double tip_rotation() const override { return modes_.tip_rotation.dot(eta_.matrix()); }
   double kinetic_energy() const override { return 0.5 * v_.square().sum(); }
   double strain_energy() const override { return 0.5 * (modes_.omega.array() * eta_).square().sum(); }
@@ -187,6 +188,13 @@ class ModalBeam final : public Beam {
       const std::array<double, 10> entries = oscillator_dissipation(modes_.omega[i], damping_[i], h);
       for (std::size_t j = 0; j < entries.size(); ++j) Q[j][i] = entries[j];
     }
+  }
+
+  /// η̈ of each mode under what acts now.
+  ArrayXd acceleration() const {
+    ArrayXd force = now_.tip_force * tip_;
+    for (std::size_t i = 0; i < Loads::count; ++i) force += now_.loads[i] * modes_.loads[i].array();
+    return force - omega2_ * eta_ - damping_ * v_;
   }
 
   /// Due only when it is asked for or its work space is needed again: a step that is tried and taken back, as event

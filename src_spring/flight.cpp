@@ -28,24 +28,14 @@ constexpr std::size_t least_order = 4;  ///< of R, where the motion is resolved 
 
 enum Unknown { q, p, A, B, e, unknowns };
 
-// Something in contact with the top may hold it past the hilltop, but hardly so many times as far from 0: there the
-// spring pushes as hard as 1e12 linear springs would pull.
-constexpr double runaway = 1e6;
-
 std::vector<Crossing> crossings(const Parameters& parameters) {
-  std::vector<Crossing> all;
-  if (std::isfinite(parameters.hilltop())) all = {Crossing::falling};
-  if (parameters.stop_enabled) all.insert(all.end(), {Crossing::falling, Crossing::rising});
-  return all;
+  return parameters.stop_enabled ? std::vector<Crossing>{Crossing::falling, Crossing::rising} : std::vector<Crossing>{};
 }
 
 }  // namespace
 
 Flight::Flight(const Motion& motion, const Parameters& parameters)
-    : Segment(motion, parameters, unknowns, crossings(parameters)),
-      peak_(parameters.hilltop()),
-      hilltop_(std::isfinite(peak_) ? own_ : -1),
-      stop_(parameters.stop_enabled ? std::max(hilltop_ + 1, own_) : -1) {}
+    : Segment(motion, parameters, unknowns, crossings(parameters)), stop_(parameters.stop_enabled ? own_ : -1) {}
 
 void Flight::prepare() {
   const Start& start = start_;
@@ -81,8 +71,6 @@ void Flight::prepare() {
   const bool resolved = H * rate <= resolved_limit;
   const bool smooth = !touching_ || contact.polynomial() || start.depth > 2.0 * depth_travel;
   const std::size_t most = smooth ? max_order : contact.analytic() ? least_order : 2;
-  held_ = touching_ || start.loads.held;
-  height_ = held_ ? runaway * peak_ : peak_;
 
   // Tolerances: of y and z by what they and their change over the step (or over 1/rate) are, then scaled.
   const double span = std::min(H, 1.0 / std::max(rate, std::numeric_limits<double>::min()));
@@ -161,41 +149,25 @@ Flight::Event Flight::run(const Start& start) {
   prepare();
   Event event = Event::none;
   while (event == Event::none && solver_.advance() == IdaSolver::Outcome::event) {
-    if (hilltop_ >= 0 && solver_.occurred(hilltop_)) {
-      finish();
-      if (escapes()) return Event::hilltop;
-    }
     if (stop_ >= 0 && solver_.fell(stop_))
       event = Event::stop;
     else if (contact_ >= 0 && solver_.fell(contact_))
       event = Event::contact;
   }
   finish();
-  if (event == Event::none && below_height(reached_.y) < 0.0 && escapes()) event = Event::hilltop;
   if (event == Event::none && parameters_.stop_enabled &&
       start.gap + (reached_.y - start.y) < -solver_.absolute_tolerance()[q])
     throw IdaError("the top passed the stop unnoticed");
   return event;
 }
 
-/// A stop at the lower hilltop or above keeps the top from the lower one.
-double Flight::below_height(double y) const {
-  return height_ - (parameters_.stop_enabled && parameters_.stop_position >= -peak_ ? y : std::abs(y));
-}
-
-/// Past the hilltop the spring pushes outwards: a top that moves outwards comes back only if something else pulls.
-bool Flight::escapes() const {
-  const auto& [y, z, integral, integral_2, dissipated, impulse] = reached_;
-  const double outwards = y < 0.0 ? -1.0 : 1.0;
-  const double force = value(loads_.force, solver_.s());
-  return held_ || (outwards * z > 0.0 && motion_.push_outwards(y, outwards, force) >= 0.0);
-}
+double Flight::displacement() const { return start_.y + (R_.rise(solver_.s()) + solver_.value()[q]); }
 
 void Flight::finish() {
   const double H = start_.size, s = solver_.s();
   const double* Y = solver_.value();
   auto& [y, z, integral, integral_2, dissipated, impulse] = reached_;
-  y = start_.y + (R_.rise(s) + Y[q]);
+  y = displacement();
   z = (R_.order() > 0 ? start_.z : 0.0) + (R_.rate_rise(s) + Y[p]) / H;
   integral = H * (R_.integral(s) + Y[A]);
   integral_2 = H * H * (R_.integral_2(s) + Y[B]);
@@ -239,7 +211,6 @@ void Flight::jacobian(double s, double c, const double* Y, const double*, double
 
 void Flight::events(double s, const double* Y, double* g) const noexcept {
   const double rise = R_.rise(s) + Y[q], slope = R_.rate(s) + Y[p];
-  if (hilltop_ >= 0) g[hilltop_] = below_height(start_.y + rise);
   if (stop_ >= 0) {
     g[stop_] = stop_watch_.distance(start_.gap + rise, s);
     g[stop_ + 1] = stop_watch_.rate(slope, s);

@@ -7,8 +7,7 @@
 // cancellation (motion.hpp). q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H² B. All unknowns are under error
 // control, see tolerances in flight.cpp.
 //
-// Events: [hilltop] |y| is past the hilltop and nothing brings it back, neither a contact nor the loads; [stop] y − φ
-// falls to 0; [contact] see segment.hpp.
+// Events: [stop] y − φ falls to 0; [contact] see segment.hpp.
 #pragma once
 
 #include "segment.hpp"
@@ -20,6 +19,7 @@ class Flight final : public Segment {
   Flight(const Motion& motion, const Parameters& parameters);
 
   Event run(const Start& start) override;
+  double displacement() const override;
 
   bool residual(double s, const double* Y, const double* Yp, double* F) const noexcept override;
   void jacobian(double s, double c, const double* Y, const double* Yp, double* J) const noexcept override;
@@ -27,18 +27,13 @@ class Flight final : public Segment {
 
  private:
   void prepare();
-  double below_height(double y) const;  ///< how far |y| is below `height_` [m]
-  bool escapes() const;                 ///< once past `height_`
   void finish();
 
-  const double peak_;         ///< |y| of the hilltop; infinity: none
-  const int hilltop_, stop_;  ///< event functions, as contact_
+  const int stop_;  ///< event function, as contact_
   Taylor R_;
   Motion::Remainder remainder_;
   Series contact_taylor_{}, dissipation_taylor_{};  ///< contact force and its loss d_R, as far as R accounts for them
   int contact_order_ = -1;                          ///< of these
-  bool held_ = false;
-  double height_ = 0.0;  ///< |y| from where it may escape
   Watch stop_watch_;
 };
 

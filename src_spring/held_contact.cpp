@@ -20,65 +20,99 @@ HeldContact::HeldContact(const Compliance& law, double mass, double size, const 
   }
 }
 
-void HeldContact::begin(const TipMessage& seen, double y, const Top& top) {
-  TipMessage& first = now_.first;
-  const bool nothing = seen.displacement == 0.0 && seen.velocity == 0.0;
-  const bool held_back = nothing && (first.displacement != 0.0 || first.velocity != 0.0);
-  if (!held_back) first = seen;
-  now_.tip = first.displacement;
+void HeldContact::begin(const TipMessage& seen, bool initial, double y, const Top& top) {
+  if (initial) now_.given = seen;
+  const auto nothing = [](const TipMessage& m) { return m.displacement == 0.0 && m.velocity == 0.0; };
+  untold_ = nothing(seen) && !nothing(now_.given);
+  now_.first = untold_ ? now_.given : seen;
+  now_.tip = now_.first.displacement;
   now_.depth = y - now_.tip;
-  const double free = now_.tip + size_ * first.velocity;
-  if (held_back) {
-    send(0.0, free);
-  } else {
-    choose(y, free, top);
-  }
+  now_.said_next = free_of_first();
+  send(untold_ ? 0.0 : solve(now_.depth, free_of_first(), top), free_of_first());
 }
 
 void HeldContact::advance(const TipMessage& seen, double y, const Top& top) {
+  if (started()) compare(seen);
   const TipMessage& from = started() ? seen : now_.first;
-  if (now_.steps == 2.0) compare(seen);  // before, the first step's mean velocity was a guess
-  now_.steps = std::min(now_.steps + 1.0, 2.0);
+  now_.steps = std::min(now_.steps + 1.0, 3.0);
   now_.tip = now_.next;
+  now_.said = now_.said_next;
   const double depth = y - now_.tip;
   if (law_.damped())
     now_.dissipated += now_.force * (depth - now_.depth) - (law_.energy(depth) - law_.energy(now_.depth));
   now_.depth = depth;
-  choose(y, from.displacement + 2.0 * size_ * from.velocity + now_.force * response_[1], top);
+  now_.said_next = from.displacement + 2.0 * size_ * from.velocity;
+  now_.before = now_.last;
+  now_.last = now_.force;
+  const double free = now_.said_next + now_.last * response_[1];
+  send(solve(depth, free, top), free);
 }
 
 void HeldContact::compare(const TipMessage& seen) {
-  constexpr double noticeable = 0.05;  // of the way in a step
-  reach_ = std::max({reach_, size_ * std::abs(seen.velocity), response_[0] * now_.force});
-  const double off = std::abs(seen.displacement - now_.tip);
-  if (off <= noticeable * reach_) return;
-  ++missed_;
-  farthest_ = std::max(farthest_, off);
+  constexpr double rounding = 1e-6, noticeable = 0.05, whole = 0.75;  // of the way in a step
+  const auto& [r1, r2] = response_;
+  reach_ = std::max({reach_, size_ * std::abs(seen.velocity), r1 * now_.force});
+  const auto off = [&seen](double tip) { return std::abs(seen.displacement - tip); };
+  const double miss = off(now_.tip);
+  if (now_.steps < 2.0) untold_ = untold_ || miss > whole * reach_;
+  if (now_.steps < 3.0 || miss <= rounding * reach_) return;  // the first step's mean velocity was a guess
+  if (off(now_.said + r2 * now_.last + r1 * now_.force) < 0.01 * miss) {
+    ++missed_[late];
+  } else if (off(now_.said + r1 * now_.before + r2 * now_.last) < 0.01 * miss) {
+    ++missed_[swapped];
+  } else if (miss > noticeable * reach_) {
+    ++missed_[elsewhere];
+  }
+  farthest_ = std::max(farthest_, miss);
 }
 
-void HeldContact::choose(double y, double free, const Top& top) {
-  const double start = y - now_.tip, yielding = response_[0] + yielding_;
-  double low = 0.0, high = std::numeric_limits<double>::infinity();
-  double force = std::isfinite(now_.force) ? now_.force : 0.0;
-  // The top answers almost like a free mass, then two or three trials do; an impact on the foundation takes more.
-  for (int trial = 0; trial < 60; ++trial) {
+/// C with C = mean(start, end(C)), end(C) = top(C) − free − r₁C: Newton's method between brackets, with the top's
+/// slope from the last two trials, at first that of a free mass. Without a contact one trial does, in one two or three;
+/// where the top strikes the foundation the brackets close.
+double HeldContact::solve(double start, double free, const Top& top) const {
+  constexpr double epsilon = std::numeric_limits<double>::epsilon(), infinite = std::numeric_limits<double>::infinity();
+  double low = 0.0, high = infinite, yielding = response_[0] + yielding_;
+  double force = std::isfinite(now_.force) ? now_.force : 0.0, last = force, last_reached = 0.0,
+         last_missing = infinite;
+  for (int trial = 0; trial < 120; ++trial) {
     const double reached = top(force);
-    if (!std::isfinite(reached)) break;
-    const double at_rest = reached + yielding_ * force - free;
-    const double wanted = held(start, at_rest - yielding * force);
-    if (!std::isfinite(wanted)) {
-      force = wanted;
-      break;
+    double next = 0.0;
+    if (std::isfinite(reached)) {
+      const double end = reached - free - response_[0] * force;
+      const Mean wanted = mean(start, end);
+      if (!std::isfinite(wanted.force)) return infinite;
+      const double missing = wanted.force - force;
+      const double depths = std::abs(reached) + std::abs(free) + response_[0] * force;
+      // What no longer falls is rounding, or the error of the top's step where that is many periods long.
+      const double accuracy = std::abs(missing) < 0.5 * last_missing ? 4.0 * epsilon : 1e-10;
+      if (std::abs(missing) <= 1e-13 * force + wanted.by_end * accuracy * depths) return force;
+      last_missing = std::abs(missing);
+      (missing > 0.0 ? low : high) = force;
+      if (force != last) yielding = std::max(response_[0], response_[0] - (reached - last_reached) / (force - last));
+      last = force;
+      last_reached = reached;
+      next = force + missing / (1.0 + wanted.by_end * yielding);
+    } else if (force > low) {
+      high = force;  // pressed so hard, the top runs away
+    } else {
+      return infinite;
     }
-    if (std::abs(wanted - force) <= 1e-13 * force) break;
-    (wanted > force ? low : high) = force;
-    double next = root(start, at_rest, yielding);
-    if (!(low < next && next < high) && std::isfinite(high)) next = low + (high - low) / 2;
-    if (next == force) break;
+    if (high < infinite && (!(low <= next && next < high) || trial > 20)) next = low + (high - low) / 2;
+    const bool closed = high < infinite && high - low <= 4.0 * epsilon * high;
+    if (closed || next == force) return std::isfinite(reached) ? force : infinite;
     force = next;
-    if (!std::isfinite(force)) break;
   }
-  send(force, free);
+  return infinite;
+}
+
+HeldContact::Sensitivity HeldContact::sensitivity(double y, const Top& top) const {
+  const double start = now_.depth, C = now_.force;
+  if (!(C > 0.0) || untold_) return {0.0, 0.0, 0.0};
+  const double change = 1e-5 * (C + (std::abs(y) + 1e-6) / yielding_);
+  const double gives = (top(C - change) - top(C + change)) / (2.0 * change);  // what an upward force adds to y
+  const Mean mean = this->mean(start, top(C) - free_of_first() - response_[0] * C);
+  const double stiff = 1.0 + mean.by_end * (gives + response_[0]);
+  return {-mean.by_start / stiff, -mean.by_end / stiff, mean.by_end * gives / stiff};
 }
 
 void HeldContact::send(double force, double free) {
@@ -86,24 +120,21 @@ void HeldContact::send(double force, double free) {
   now_.force = std::isfinite(now_.next) ? force : std::numeric_limits<double>::infinity();
 }
 
-/// C with C = held(start, free − yielding·C). The mean falls with C: there is one, between 0 and what no yielding
-/// gives.
-double HeldContact::root(double start, double free, double yielding) const {
-  double low = 0.0, high = held(start, free);
-  while (high - low > 4.0 * std::numeric_limits<double>::epsilon() * high) {
-    const double middle = low + (high - low) / 2;
-    if (middle <= low || middle >= high) break;  // neighbouring denormal numbers, or not finite
-    (held(start, free - yielding * middle) > middle ? low : high) = middle;
-  }
-  return high;
-}
-
-double HeldContact::held(double start, double end) const {
-  const double factor = law_.damping_factor((end - start) / size_);
+HeldContact::Mean HeldContact::mean(double start, double end) const {
+  const double way = end - start, factor = law_.damping_factor(way / size_);
+  double force = 0.0, by_start = 0.0, by_end = 0.0;
   // Where the difference quotient is rounding, the middle is as good.
-  if (std::abs(end - start) <= 1e-6 * (std::abs(end) + std::abs(start)))
-    return factor * law_.elastic((start + end) / 2);
-  return factor * ((law_.energy(end) - law_.energy(start)) / (end - start));
+  if (std::abs(way) <= 1e-6 * (std::abs(end) + std::abs(start))) {
+    const double middle = (start + end) / 2;
+    force = law_.elastic(middle);
+    if (middle > 0.0) by_start = by_end = law_.slopes(middle, 0.0).force_by_depth / 2;
+  } else {
+    force = (law_.energy(end) - law_.energy(start)) / way;
+    by_start = (force - law_.elastic(start)) / way;
+    by_end = (law_.elastic(end) - force) / way;
+  }
+  const double damping = factor > 0.0 && way != 0.0 ? (factor - 1.0) / way * force : 0.0;  // C χ/H
+  return {factor * force, factor * by_start - damping, factor * by_end + damping};
 }
 
 void HeldContact::restore(const State& state) {

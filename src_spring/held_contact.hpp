@@ -9,6 +9,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <functional>
 
 #include "compliance.hpp"
@@ -27,56 +28,78 @@ class HeldContact {
   /// @throws std::invalid_argument if r₁ is 0
   HeldContact(const Compliance& law, double mass, double size, const std::array<double, 2>& response);
 
-  /// Where the top would be [m] after a step of H under a force [N] held over it; NaN if that is not known or would
-  /// take too long: then the last force asked for stays.
+  /// Where the top would be [m] after a step of H under a force [N] held over it; NaN if it cannot make that step.
   using Top = std::function<double(double)>;
 
   /// Before the first step, whenever `seen` changes: choose its force, the top being at y. w then stands for the first
-  /// step's mean velocity, too. Zeros after other values are no message: the tool has nothing to pass on yet, and as
-  /// it does not pass the force on either, that is 0 over the first step.
-  void begin(const TipMessage& seen, double y, const Top& top);
+  /// step's mean velocity, too. `initial`: `seen` are start values, not yet a message. Zeros where the start values
+  /// are others are no message either: the tool has nothing to pass on yet, and as it does not pass the force on, that
+  /// is 0 over the first step.
+  void begin(const TipMessage& seen, bool initial, double y, const Top& top);
 
   /// A step was made under force(), at whose start the tip was `seen`, and the top is at y: choose the next force.
   void advance(const TipMessage& seen, double y, const Top& top);
 
-  /// C over the next step [N]; not finite if it, or where the tip goes, leaves the range of floating-point numbers.
+  /// C over the next step [N]; not finite if none was found, or where the tip goes leaves the range of numbers.
   double force() const { return now_.force; }
-  double energy(double y) const { return law_.energy(y - now_.tip); }  ///< Φ [J]
-  double dissipated() const { return now_.dissipated; }                ///< by the contact since the start [J]
-  double tip() const { return now_.tip; }                              ///< u_tip now [m], as foreseen
-  double size() const { return size_; }                                ///< H [s]
-  bool started() const { return now_.steps > 0.0; }                    ///< a step was made
+  /// How the force of the first step follows what begin() was given, its sum with `free` = u + H w taken apart.
+  struct Sensitivity {
+    double by_start, by_free;  ///< ∂C/∂u at the start, ∂C/∂free [N/m]
+    double by_load;            ///< ∂C by an upward force on the top [–]
+  };
+  Sensitivity sensitivity(double y, const Top& top) const;
+  double elastic(double y) const { return law_.elastic(y - now_.tip); }  ///< Φ' [N]
+  double energy(double y) const { return law_.energy(y - now_.tip); }    ///< Φ [J]
+  double dissipated() const { return now_.dissipated; }                  ///< by the contact since the start [J]
+  double tip() const { return now_.tip; }                                ///< u_tip now [m], as foreseen
+  double size() const { return size_; }                                  ///< H [s]
+  bool started() const { return now_.steps > 0.0; }                      ///< a step was made
 
-  /// Steps so far that the tip began elsewhere than foreseen, and by how much at most [m]. With the connections right
-  /// that is rounding, but in the two steps that a sudden load on the beam takes to be known. No part of the state.
-  int missed() const { return missed_; }
-  double farthest() const { return farthest_; }
+  /// What a tip that does not come where it was foreseen tells. With the connections right it comes there to rounding,
+  /// but where a load on the beam changes.
+  enum Miss : std::size_t {
+    elsewhere,  ///< by a good part of a step's way
+    late,       ///< where it would be under the forces of the next steps: values pass one after the other
+    swapped,    ///< where it would be with r₁ for r₂
+    kinds
+  };
+  int missed(Miss kind) const { return missed_[kind]; }  ///< steps so far; no part of the state
+  double farthest() const { return farthest_; }          ///< the longest miss [m]
+  /// Whether nothing was passed on before the first step: it found the tip a whole step's way from where it was said.
+  bool untold() const { return untold_; }
 
   /// Everything that a step changes; doubles only, see flat.hpp.
   struct State {
-    double tip = 0.0, next = 0.0;  ///< u_tip now and after the coming step [m]
-    double force = 0.0;            ///< over that step [N]
-    double depth = 0.0;            ///< y − u_tip now [m]
-    double dissipated = 0.0;       ///< [J]
-    TipMessage first;              ///< seen before the first step
-    double steps = 0.0;            ///< made, 2 for more
+    double tip = 0.0, next = 0.0;        ///< u_tip now and after the coming step [m]
+    double force = 0.0;                  ///< over that step [N]
+    double depth = 0.0;                  ///< y − u_tip now [m]
+    double dissipated = 0.0;             ///< [J]
+    TipMessage given, first;             ///< start values; what was seen before the first step
+    double steps = 0.0;                  ///< made, 3 for more
+    double said = 0.0, said_next = 0.0;  ///< the tip now and after the coming step as said, without forces [m]
+    double last = 0.0, before = 0.0;     ///< forces over the last two steps [N]
   };
   const State& state() const { return now_; }
   /// @throws std::invalid_argument (state unchanged) if a number that force() does not decide is not finite
   void restore(const State& state);
 
  private:
+  /// Mean of the law's force over a step, and its slopes.
+  struct Mean {
+    double force, by_start, by_end;  ///< [N], [N/m]
+  };
+  Mean mean(double start, double end) const;
   void compare(const TipMessage& seen);
-  void choose(double y, double free, const Top& top);
-  void send(double force, double free);  ///< the force over the next step; where the tip goes without one
-  double root(double start, double free, double yielding) const;
-  double held(double start, double end) const;
+  double solve(double start, double free, const Top& top) const;
+  void send(double force, double free);  ///< the force over the next step; where the tip goes without it
+  double free_of_first() const { return now_.tip + size_ * now_.first.velocity; }
 
   Compliance law_;
   double yielding_, size_;
   std::array<double, 2> response_;
   State now_;
-  int missed_ = 0;
+  std::array<int, kinds> missed_{};
+  bool untold_ = false;
   double farthest_ = 0.0;
   double reach_ = 0.0;  ///< longest way of the tip in a step so far [m]
 };

@@ -106,6 +106,7 @@ IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings)
   check(IDASetLinearSolver(ida, linear_solver_.get(), J_.get()), "IDASetLinearSolver");
   check(IDASetJacFn(ida, jacobian), "IDASetJacFn");
   check(IDASetMaxOrd(ida, max_order), "IDASetMaxOrd");
+  check(IDASetMinStep(ida, 1e-20), "IDASetMinStep");  // a motion without end would end in ever smaller steps
   check(IDASetMaxErrTestFails(ida, max_error_failures), "IDASetMaxErrTestFails");
   check(IDASetNonlinConvCoef(ida, newton_share), "IDASetNonlinConvCoef");
   if (crossings.empty()) return;

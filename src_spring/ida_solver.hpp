@@ -34,7 +34,7 @@ class IdaError : public std::runtime_error {
 /// The steps allowed did not suffice.
 class TooMuchWork : public IdaError {
  public:
-  TooMuchWork() : IdaError("too many internal steps") {}
+  TooMuchWork() : IdaError("it spans too much of the motion") {}
 };
 
 /// Which sign changes of an event function count.

@@ -14,9 +14,7 @@ Loads Loads::from(const Parameters& parameters, const Inputs& inputs) {
   Loads loads{load_of(parameters, inputs), inputs.tip_displacement};
   for (std::size_t i = 0; i < 3; ++i) {
     const double N = parameters.stop_enabled ? 0.0 : inputs.foundation_force[i];
-    const double contact = N - inputs.contact_force[i];
-    loads.held = loads.held || contact != 0.0;
-    loads.force[i] += contact;
+    loads.force[i] += N - inputs.contact_force[i];
   }
   return loads;
 }

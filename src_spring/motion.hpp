@@ -14,13 +14,12 @@ namespace spring {
 
 /// What acts from outside over a segment, τ from its start.
 struct Loads {
-  Polynomial force;   ///< F [N]
-  Polynomial tip;     ///< u_tip [m]
-  bool held = false;  ///< something is in contact with the top, and may hold it
+  Polynomial force;  ///< F [N]
+  Polynomial tip;    ///< u_tip [m]
 
   static Loads from(const Parameters& parameters, const Inputs& inputs);
-  Loads from_time(double t) const { return {shifted(force, t), shifted(tip, t), held}; }
-  Loads scaled(double size) const { return {common::scaled(force, size), common::scaled(tip, size), held}; }
+  Loads from_time(double t) const { return {shifted(force, t), shifted(tip, t)}; }
+  Loads scaled(double size) const { return {common::scaled(force, size), common::scaled(tip, size)}; }
 };
 
 /// A motion near a segment's start: Taylor coefficients in s = τ/H of y, of y², of the depth y − u_tip and of the
@@ -78,10 +77,6 @@ class Motion {
   /// Force that would hold the top at y, at rest, with its first two derivatives: −F + k1 y + k2 y³ + C. [N, N/s, N/s²]
   Polynomial holding_force(double y, const Loads& loads, bool touching, double depth) const;
 
-  /// What F and the spring, where it pushes that way, add to a motion of the top at y in direction `sense`. [N]
-  double push_outwards(double y, double sense, double force) const {
-    return sense * force + std::max(0.0, -sense * (k1_ + k2_ * y * y) * y);
-  }
   double potential_energy(double y) const;
   const Compliance& compliance() const { return compliance_; }
   double mass() const { return mass_; }

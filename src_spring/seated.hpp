@@ -20,6 +20,7 @@ class Seated final : public Segment {
 
   /// @pre holds(), y = φ, z = 0
   Event run(const Start& start) override;
+  double displacement() const override { return parameters_.stop_position; }
 
   bool residual(double s, const double* Y, const double* Yp, double* F) const noexcept override;
   void jacobian(double s, double c, const double* Y, const double* Yp, double* J) const noexcept override;

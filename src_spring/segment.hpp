@@ -27,7 +27,7 @@ struct Start {
 
 class Segment : public ImplicitSystem {
  public:
-  enum class Event { none, hilltop, stop, release, contact };
+  enum class Event { none, stop, release, contact };
 
   /// @throws IdaError; s reached is solver().s()
   virtual Event run(const Start& start) = 0;
@@ -37,6 +37,7 @@ class Segment : public ImplicitSystem {
     double y, z, integral, integral_2, dissipated, impulse;
   };
   const Reached& reached() const { return reached_; }
+  virtual double displacement() const = 0;                      ///< y, also where run() failed
   double elapsed() const { return solver_.s() * start_.size; }  ///< τ
   const IdaSolver& solver() const { return solver_; }
 

@@ -18,6 +18,7 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// refused, so that no call lasts longer than a second or two. To start a segment costs as much as some steps.
 constexpr long most_work = 1'000'000, work_of_start = 20;
 constexpr long most_stalled = 100;  ///< events without progress
+constexpr double smallest_step = 1e-100;
 
 }  // namespace
 
@@ -98,11 +99,6 @@ class Spring::Step {
     state_.z = z;
     held_ += impulse;
     t_ += segment.elapsed();
-    if (event == Segment::Event::hilltop)
-      throw Escape("spring: y = " + number(state_.y) +
-                       " m has run away, past the hilltop |y| = " + number(parameters_.hilltop()) +
-                       " m of the softening spring, reached " + number(t_) + " s after the step's start",
-                   t_);
     // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
     if (parameters_.stop_enabled)
       state_.y =
@@ -120,17 +116,17 @@ class Spring::Step {
       state_.steps += static_cast<double>(steps);
       work_ += steps + work_of_start;
       return event;
-    } catch (const TooMuchWork&) {
-      const double reached = t_ + segment.solver().s() * start.size;
-      throw StepFailure("spring: a step of " + number(size_) + " s spans too much of the motion: " +
-                            std::to_string(most_work - work_of_start * segments_) + " internal steps with " +
-                            std::to_string(segments_) + " contact events reach " + number(reached) +
-                            " s after its start; use a smaller step size",
-                        reached);
     } catch (const IdaError& error) {
       const double reached = t_ + segment.solver().s() * start.size;
-      throw StepFailure(std::string("spring: ") + error.what() + ", " + number(reached) + " s after the step's start",
-                        reached);
+      const long steps = most_work - start.most_steps - work_of_start * segments_ + segment.solver().steps();
+      std::string why = "spring: a step of " + number(size_) + " s fails after " + number(reached) + " s, " +
+                        std::to_string(steps) + " internal steps and " + std::to_string(segments_) +
+                        " contact events: " + error.what();
+      const double y = std::abs(segment.displacement());
+      if (y > parameters_.hilltop())
+        why += "; the top has run away, past its hilltop |y| = " + number(parameters_.hilltop()) +
+               " m, where a softening spring pushes outwards";
+      throw StepFailure(why + "; use a smaller step size", reached);
     }
   }
 
@@ -154,10 +150,14 @@ Spring::Spring(const Parameters& p)
 }
 
 void Spring::step(double size, const Inputs& inputs) {
+  if (size < smallest_step)
+    throw StepFailure("spring: a step of " + number(size) + " s is too small, its square underflows; use a step size " +
+                          "of at least " + number(smallest_step) + " s",
+                      0.0);
   const Loads loads = Loads::from(parameters_, inputs);
   const State before = state_;
   state_ = Step(*this, size, loads).run();
-  see(loads, size);
+  see(loads, size, true);
   // Impacts turn the velocity around, y goes on: the step's integrals know the work through all of its events.
   state_.load_work += work(load_of(parameters_, inputs), size, state_.y - before.y, state_.integral - before.y * size,
                            state_.integral_2 - before.y * size * size / 2);
@@ -177,13 +177,17 @@ bool Spring::finite() const {
 }
 
 /// What acts at `t` is what accelerations and reactions refer to.
-void Spring::see(const Loads& loads, double t) {
+void Spring::see(const Loads& loads, double t, bool extrapolated) {
   state_.force = value(loads.force, t);
   state_.tip = value(loads.tip, t);
   state_.tip_rate = rate(loads.tip, t);
+  state_.tip_curvature = loads.tip[2];
+  state_.extrapolated = extrapolated ? 1.0 : 0.0;
 }
 
-void Spring::observe(const Inputs& inputs) { see(Loads::from(parameters_, inputs), 0.0); }
+void Spring::observe(const Inputs& inputs, bool extrapolated) {
+  see(Loads::from(parameters_, inputs), 0.0, extrapolated);
+}
 
 void Spring::apply_impulse(double impulse) {
   state_.z += impulse / parameters_.mass;
@@ -202,6 +206,9 @@ Compliance::Slopes Spring::reaction_slopes() const {
 }
 double Spring::kinetic_energy() const { return parameters_.mass / 2 * state_.z * state_.z; }
 double Spring::potential_energy() const { return motion_.potential_energy(state_.y); }
+double Spring::spring_force() const {
+  return (parameters_.linear_stiffness + parameters_.cubic_stiffness * state_.y * state_.y) * state_.y;
+}
 double Spring::contact_energy() const { return motion_.compliance().energy(depth()); }
 
 void Spring::save(std::vector<double>& state) const {

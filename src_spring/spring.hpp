@@ -25,11 +25,6 @@ class StepFailure : public std::runtime_error {
   StepFailure(const std::string& what, double reached) : std::runtime_error(what), reached(reached) {}
   double reached;  ///< [s] after the step's start
 };
-/// A softening spring (k1 > 0 > k2) beyond the hilltop |y| = √(k1/|k2|) of its potential.
-class Escape : public StepFailure {
- public:
-  using StepFailure::StepFailure;
-};
 
 /// One spring. Every step starts IDA afresh, so a step repeated from the same saved state is bit-identical.
 class Spring {
@@ -40,12 +35,12 @@ class Spring {
   Spring& operator=(const Spring&) = delete;
 
   /// Advance by `size` [s] > 0, finite. The work is bounded: a step that spans too much of the motion is refused.
-  /// @throws StepFailure, Escape (state unchanged)
+  /// @throws StepFailure (state unchanged)
   void step(double size, const Inputs& inputs);
 
   /// Take `inputs` as acting at the present instant, for acceleration(), reaction() and contact_energy() before the
-  /// first step or after an input has jumped. The motion does not depend on it.
-  void observe(const Inputs& inputs);
+  /// first step or after an input has jumped. The motion does not depend on it. `extrapolated`: see there.
+  void observe(const Inputs& inputs, bool extrapolated = false);
 
   /// Instantaneous upward impulse J [N·s]: z += J/m.
   void apply_impulse(double impulse);
@@ -63,13 +58,16 @@ class Spring {
   long ida_steps() const { return static_cast<long>(state_.steps); }  ///< internal IDA steps since the start
   double kinetic_energy() const;                                      ///< ½ m z² [J]
   double potential_energy() const;                                    ///< ½ k1 y² + ¼ k2 y⁴ [J]
+  double spring_force() const;                                        ///< k1 y + k2 y³ [N]
   // Under the inputs at the end of the last step, or as observed since:
   double acceleration() const;                 ///< ż [m/s²]
   double reaction() const;                     ///< C of the law inside [N]; 0 for external
   Compliance::Slopes reaction_slopes() const;  ///< of it
   double elastic_reaction() const { return motion_.compliance().elastic(depth()); }  ///< λ_nc (y − u_tip)₊^p [N]
   double contact_energy() const;  ///< λ_nc (y − u_tip)₊^{p+1}/(p+1) of the law inside [J]
-  Polynomial tip() const { return {state_.tip, state_.tip_rate, 0.0}; }  ///< u_tip [m] and its rate; no curvature
+  Polynomial tip() const { return {state_.tip, state_.tip_rate, state_.tip_curvature}; }  ///< u_tip [m], its rates
+  /// Whether the tip is where the last step left it, and none has been observed since.
+  bool extrapolated() const { return state_.extrapolated != 0.0; }
 
   /// The whole dynamic state as a flat vector of fixed length.
   void save(std::vector<double>& state) const;
@@ -83,12 +81,14 @@ class Spring {
     double integral = 0.0, integral_2 = 0.0;
     double dissipated = 0.0, impact_loss = 0.0, load_work = 0.0;
     double stop_force = 0.0, stop_impulse = 0.0;
-    double seated = 0.0;                            ///< 1 on the foundation
-    double force = 0.0, tip = 0.0, tip_rate = 0.0;  ///< F, u_tip and its rate where the step ended
-    double steps = 0.0;                             ///< IDA's, since the start
+    double seated = 0.0;                                    ///< 1 on the foundation
+    double force = 0.0;                                     ///< F where the step ended, or as observed
+    double tip = 0.0, tip_rate = 0.0, tip_curvature = 0.0;  ///< u_tip there
+    double extrapolated = 0.0;                              ///< 1: by a step, not observed
+    double steps = 0.0;                                     ///< IDA's, since the start
   };
   class Step;
-  void see(const Loads& loads, double t);
+  void see(const Loads& loads, double t, bool extrapolated);
   double depth() const { return parameters_.compliant() ? state_.y - state_.tip : -1.0; }
   bool finite() const;
 

@@ -18,7 +18,7 @@ const char* name(Type type) { return type_names[static_cast<int>(type)]; }
 
 double finite(const Variable& v, double value) {
   if (!std::isfinite(value)) {
-    throw Discarded("'" + v.name + "' = " + number(value) + " is not finite: the inputs are too large");
+    throw std::invalid_argument("'" + v.name + "' = " + number(value) + " is not finite: the inputs are too large");
   }
   return value;
 }
@@ -106,7 +106,7 @@ void Instance::ensure_built() {
   }
   progress.built = true;
   push_inputs();
-  model_->observe();
+  observe();
 }
 
 void Instance::push_inputs() {
@@ -116,7 +116,7 @@ void Instance::push_inputs() {
 void Instance::show(const Variable& v, std::size_t input) {
   if (!progress.built) return;
   v.set(*model_, values_[input]);
-  model_->observe();
+  observe();
 }
 
 Polynomial& Instance::use(std::size_t input) {
@@ -160,14 +160,18 @@ void Instance::set(unsigned reference, Type type, double value) {
   require_allowed(v, value);
   const std::size_t place = place_[reference];
   if (is_setting(v)) {
-    auto changed = std::make_shared<std::vector<double>>(*settings_);
-    (*changed)[place] = value;
-    settings_ = std::move(changed);
-    progress.built = false;
+    change_setting(place, value);
     return;
   }
   use(place)[0] = value;
   show(v, place);
+}
+
+void Instance::change_setting(std::size_t place, double value) {
+  auto changed = std::make_shared<std::vector<double>>(*settings_);
+  (*changed)[place] = value;
+  settings_ = std::move(changed);
+  progress.built = false;
 }
 
 void Instance::set_derivative(unsigned reference, int order, double value) {
@@ -189,7 +193,8 @@ double Instance::output_derivative(unsigned reference, int order) {
   const Variable& v = variable(reference, Type::real, "get a derivative of");
   if (order < 1) throw std::invalid_argument("derivative order " + std::to_string(order) + ": they begin with 1");
   if (order > max_output_derivative_order || !v.derivative) {
-    throw Discarded("derivative of order " + std::to_string(order) + " of '" + v.name + "' is not available");
+    throw std::invalid_argument("derivative of order " + std::to_string(order) + " of '" + v.name +
+                                "' is not available: outputs have that of order 1");
   }
   ensure_built();
   return finite(v, v.derivative(*model_));
@@ -199,19 +204,50 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
   const Variable& of = variable(unknown, Type::real, "differentiate");
   const Variable& by = variable(known, Type::real, "differentiate by");
   if (of.causality != Causality::output) throw std::invalid_argument("'" + of.name + "' is not an output");
-  if (is_setting(by) && progress.phase == initialization) {
-    throw Discarded("derivatives by parameters and start values, such as '" + by.name + "', are not available");
-  }
-  if (!by.continuous_input()) throw std::invalid_argument("'" + by.name + "' is not a continuous input");
+  const bool starting = progress.phase == initialization;
+  if (!by.continuous_input() && !(is_setting(by) && starting))
+    throw std::invalid_argument("'" + by.name + "' is not a continuous input");
   ensure_built();
   for (const Dependency& d : of.dependencies) {
     if (d.input != by.name) continue;
     const double partial = d.partial(*model_);
-    if (!std::isfinite(partial))
-      throw Discarded("the derivative of '" + of.name + "' by '" + by.name + "' is not known");
-    return partial;
+    return std::isnan(partial) ? difference(of, known) : finite(of, partial);
   }
-  return 0.0;
+  const auto& at_start = of.initial_dependencies;
+  const bool follows = starting && std::find(at_start.begin(), at_start.end(), by.name) != at_start.end();
+  return follows ? difference(of, known) : 0.0;
+}
+
+/// At the start a parameter may act in any way, and its derivative is asked for once: two models more cost little.
+double Instance::difference(const Variable& of, unsigned known) {
+  const Variable& by = table_.variables[known];
+  const std::size_t place = place_[known];
+  const double x = is_setting(by) ? (*settings_)[place] : values_[place][0];
+  const double change = 1e-6 * (x != 0.0 ? std::abs(x) : by.nominal);
+  const auto put = [&](double value) {
+    if (is_setting(by)) {
+      change_setting(place, value);
+      ensure_built();
+    } else {
+      use(place)[0] = value;
+      show(by, place);
+    }
+  };
+  // One side may be out of bounds, its own or those that other parameters set.
+  const auto beside = [&](double to, double& result) {
+    try {
+      require_allowed(by, to);
+      put(to);
+      result = of.get(*model_);
+      return to;
+    } catch (const std::invalid_argument&) {
+      return x;
+    }
+  };
+  double above = of.get(*model_), below = above;
+  const double high = beside(x + change, above), low = beside(x - change, below);
+  put(x);
+  return finite(of, (above - below) / (high - low));
 }
 
 void Instance::step(double time, double size) {
@@ -231,9 +267,20 @@ void Instance::step(double time, double size) {
                                 " goes past the stop time " + number(progress.stop_time));
   }
   ensure_built();
-  push_inputs();
-  model_->step(size);
-  for (const std::size_t i : used_) values_[i] = {inputs_[i]->consumed ? 0.0 : values_[i][0], unset, unset};
+  try {
+    model_->step(size);
+  } catch (const Discarded&) {
+    ++model_->refused;
+    throw;
+  }
+  for (const std::size_t i : used_) {
+    Polynomial& value = values_[i];
+    const bool held = std::isnan(value[1]) && std::isnan(value[2]) && !inputs_[i]->consumed;
+    if (held) continue;
+    value = {inputs_[i]->consumed ? 0.0 : value[0], unset, unset};
+    inputs_[i]->set(*model_, value);
+  }
+  model_->settle();
   progress.time = time + size;
 }
 

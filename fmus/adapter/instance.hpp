@@ -22,17 +22,17 @@ class Instance {
   void exit_initialization();
   void reset();
 
-  /// @throws Discarded if an output has no finite value under the inputs that were set since the last step
+  // What the importer asks for wrongly throws std::invalid_argument, also an output that the inputs which were set
+  // since the last step drive out of the range of numbers.
+
   double get(unsigned reference, Type type);
   void set(unsigned reference, Type type, double value);
   void set_derivative(unsigned reference, int order, double value);
-  /// @throws Discarded if it is not known
   double output_derivative(unsigned reference, int order);
-  /// ∂unknown/∂known, of an output by a continuous input, at the present instant.
-  /// @throws Discarded if it is not known
+  /// ∂unknown/∂known at the present instant, of an output by a continuous input or, before the start, by a parameter.
   double partial_derivative(unsigned unknown, unsigned known);
 
-  /// @throws Discarded, std::invalid_argument
+  /// @throws Discarded
   void step(double time, double size);
   /// What the model has to say after a step; empty if nothing.
   std::string take_warning() { return std::exchange(model_->warning, {}); }
@@ -48,7 +48,10 @@ class Instance {
  private:
   const Variable& variable(unsigned reference, Type type, const char* what) const;
   void ensure_built();
+  void observe() { model_->observe((progress.phase & (instantiated | initialization)) != 0); }
   void push_inputs();
+  void change_setting(std::size_t place, double value);
+  double difference(const Variable& of, unsigned known);  ///< the derivative by differences
   Polynomial& use(std::size_t input);
   void show(const Variable& v, std::size_t input);  ///< to the model, if there is one
 

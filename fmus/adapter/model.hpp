@@ -31,12 +31,16 @@ class Model {
   /// @throws std::exception naming the parameter
   virtual void build(double tolerance) = 0;
 
-  /// Called after build() and whenever an input was set: outputs that follow inputs without a step are due.
-  virtual void observe() {}
+  /// Called after build() and whenever an input was set: outputs that follow inputs without a step are due. `initial`:
+  /// inputs are still start values.
+  virtual void observe(bool initial) = 0;
 
   /// Called by fmi2DoStep, the inputs having been set.
   /// @throws Discarded
   virtual void step(double size) = 0;
+
+  /// Called after step() and after inputs have lost their derivatives and impulses.
+  virtual void settle() {}
 
   /// Called for every saved state; the vector is flat and holds everything that build() does not make.
   virtual void save(std::vector<double>& state) const = 0;
@@ -47,6 +51,7 @@ class Model {
 
   /// Set by step() where the user should be told something that is no error; cleared by whoever tells it.
   std::string warning;
+  int refused = 0;  ///< steps, counted by whoever asks for them; no part of the state
 };
 
 }  // namespace fmi

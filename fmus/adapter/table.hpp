@@ -54,6 +54,7 @@ struct Variable {
   Variable& range(double low, double high) { return min = low, max = high, *this; }
   Variable& at_least(double low) { return min = low, *this; }
   Variable& positive() { return min = std::numeric_limits<double>::min(), *this; }
+  Variable& whole() { return type = Type::integer, *this; }
   Variable& typical(double value) { return nominal = value, *this; }
   Variable& from(std::vector<std::string> names) { return initial_dependencies = std::move(names), *this; }
 };
@@ -131,26 +132,26 @@ class TableBuilder {
     return v;
   }
 
+  /// A result at the communication points, with its time derivative under the inputs that are set.
+  template <class Get, class Derivative>
+  Variable& output(const std::string& name, const std::string& unit, const std::string& description, Get get,
+                   Derivative derivative) {
+    Variable& v = local(name, unit, description, get);
+    v.causality = Causality::output;
+    v.derivative = [derivative](const Model& m) { return static_cast<double>(derivative(static_cast<const M&>(m))); };
+    return v;
+  }
+  /// One that changes with the steps only.
   template <class Get>
   Variable& output(const std::string& name, const std::string& unit, const std::string& description, Get get) {
-    Variable& v = add(name, unit, description, Causality::output);
-    v.get = [get](const Model& m) { return static_cast<double>(get(static_cast<const M&>(m))); };
-    return v;
+    return output(name, unit, description, get, [](const M&) { return 0.0; });
   }
 
   /// What can be read as an output, but is none: tools record and plot every output.
   template <class Get>
   Variable& local(const std::string& name, const std::string& unit, const std::string& description, Get get) {
-    Variable& v = output(name, unit, description, get);
-    v.causality = Causality::local;
-    return v;
-  }
-
-  template <class Get, class Derivative>
-  Variable& output(const std::string& name, const std::string& unit, const std::string& description, Get get,
-                   Derivative derivative) {
-    Variable& v = output(name, unit, description, get);
-    v.derivative = [derivative](const Model& m) { return derivative(static_cast<const M&>(m)); };
+    Variable& v = add(name, unit, description, Causality::local);
+    v.get = [get](const Model& m) { return static_cast<double>(get(static_cast<const M&>(m))); };
     return v;
   }
 

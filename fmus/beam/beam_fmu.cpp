@@ -29,7 +29,7 @@ struct BeamModel final : fmi::Model {
   std::unique_ptr<Beam> beam;
   /// With communication_step > 0, otherwise 0. A forecast that leaves the range of numbers is not finite.
   Beam::Forecast forecast{};
-  std::array<double, 2> tip_response{};
+  std::array<double, 3> tip_response{};
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
@@ -47,7 +47,7 @@ struct BeamModel final : fmi::Model {
     look_ahead();
   }
 
-  void observe() override {
+  void observe(bool) override {
     const Loads::Values before = forecasts() ? beam->loads() : Loads::Values{};
     beam->observe(tip_force[0], loads);
     if (forecasts() && beam->loads() != before) look_ahead();
@@ -78,6 +78,14 @@ struct BeamModel final : fmi::Model {
   // At point `i` of the shape.
   double deflection(std::size_t i) const { return at(i, deflection_, &Beam::deflection); }
   double rotation(std::size_t i) const { return at(i, rotation_, &Beam::rotation); }
+  /// As the tip goes on under the tip force and the loads that are set.
+  double forecast_rate() const {
+    double rate = forecast.acceleration + tip_response[2] * beam->tip_force();
+    loads.for_each([&](std::size_t i, const fmi::Polynomial& f) {
+      if (f[1] != 0.0) rate += f[1] * forecast_by(i);
+    });
+    return rate;
+  }
   double forecast_by(std::size_t load) const {
     return forecasts() ? beam->forecast_per_load(parameters.communication_step, load).velocity : 0.0;
   }
@@ -244,20 +252,22 @@ fmi::Table fmi::make_table() {
   free_motion.insert(free_motion.end(), load_names.begin(), load_names.end());
   add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
       .from({"initial_velocity_slope", "length"});
-  add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation))
+  add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation),
+             of(&Beam::tip_rotation_rate))
       .from(with_kept({"initial_deflection_slope"}));
   add.output("tip_displacement_integral", "m.s", "integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral), of(&Beam::tip_displacement));
   add.output("tip_displacement_integral_2", "m.s2", "double integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral_2), of(&Beam::tip_displacement_integral));
-  add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy))
+  add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy), of(&Beam::kinetic_power))
       .from(with_kept({"density", "initial_velocity_slope", "mass_matrix", "element_degree"}));
-  add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy))
+  add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy), of(&Beam::strain_power))
       .from(with_kept({"initial_deflection_slope"}));
-  add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy));
+  add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy),
+             of(&Beam::dissipated_power));
   add.output("load_potential", "J",
              "potential of the loads distributed_load and tip_load_coefficient, as if they were constant",
-             of(&Beam::load_potential))
+             of(&Beam::load_potential), of(&Beam::load_potential_rate))
       .from(with_kept({"initial_deflection_slope", "tip_load_coefficient", "distributed_load"}));
   add.depends("distributed_load", [](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); });
   add.output(
@@ -267,15 +277,17 @@ fmi::Table fmi::make_table() {
       "acts suddenly from then on: the start is no state of rest under it. kinetic_energy + strain_energy + "
       "dissipated_energy - load_work changes by the work of tip_force and tip_impulse alone, for "
       "generalized_alpha if rho_inf = 1",
-      of(&Beam::load_work));
+      of(&Beam::load_work), of(&Beam::load_power));
+  add.output("warnings", "", "steps so far that were discarded; restored states do not take it back",
+             [](const BeamModel& m) { return m.refused; })
+      .whole();
   add.output("tip_mass", "kg", "mass that a tip impulse meets: 1/(e'M^-1 e) of the discrete beam", of(&Beam::tip_mass))
       .from(basis);
   add.output(
          "tip_velocity_forecast", "m/s",
          "mean velocity of the tip over the next two steps of communication_step were there no tip_force; 0 if that is "
          "0",
-         [](const BeamModel& m) { return m.forecast.velocity; },
-         [](const BeamModel& m) { return m.forecast.acceleration; })
+         [](const BeamModel& m) { return m.forecast.velocity; }, [](const BeamModel& m) { return m.forecast_rate(); })
       .from(free_motion);
   for (std::size_t i = 0; i < load_names.size(); ++i) {
     add.depends(load_names[i], [i](const BeamModel& m) { return m.forecast_by(i); });

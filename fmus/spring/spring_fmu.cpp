@@ -18,12 +18,13 @@
 
 namespace {
 
+using spring::HeldContact;
 using spring::Parameters;
 using spring::Spring;
 
 /// The spring's parameters, where its top rests, and what exchange between steps adds to them.
 struct FmuParameters : Parameters {
-  double equilibrium = 0.0;  ///< Ψ [m]; in (6) the spring's force is 0 at y = 0 all the same
+  double equilibrium = 0.0;  ///< Ψ [m]: for the partner; in (6) the spring's force is 0 at y = 0
   double communication_step = 0.0, tip_response = 0.0, tip_response_2 = 0.0;
 };
 
@@ -32,15 +33,13 @@ struct SpringModel final : fmi::Model {
   spring::Inputs inputs;  ///< but for the tip
   fmi::Polynomial tip_velocity{}, forecast{};
   fmi::Polynomial tip_displacement{0.0, fmi::unset, fmi::unset};  ///< as set
-  std::optional<fmi::Polynomial> reached;  ///< what it was extrapolated to, until it is set or used again
+  bool tip_is_set = false, tip_velocity_is_set = false;           ///< since the last observe()
   double impulse = 0.0;
-  std::optional<Spring> spring;
-  std::optional<spring::HeldContact> held;
+  mutable std::optional<Spring> spring;  ///< which trial steps leave as it was
+  std::optional<HeldContact> held;
 
   void build(double tolerance) override {
     Parameters p = parameters;
-    // A start of 0 is what tools send that set every start value: it does not count as chosen.
-    if (p.displacement == 0.0) p.displacement = parameters.equilibrium;
     if (tolerance > 0.0) p.relative_tolerance = std::min(p.relative_tolerance, tolerance);
     held.reset();
     if (p.compliant() && parameters.communication_step > 0.0) {
@@ -54,63 +53,77 @@ struct SpringModel final : fmi::Model {
     }
   }
 
-  void observe() override {
-    if (held) {
-      if (!held->started()) held->begin(message(), spring->displacement(), trial());
-      show_force();
-    } else {
-      spring->observe(acting());
-    }
+  void observe(bool initial) override {
+    if (held && !held->started()) held->begin(message(), initial, spring->displacement(), trial());
+    look();
   }
 
   void step(double size) override {
-    reached.reset();
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
     const bool goes_on = held && size > rounding * held->size();
     if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
       throw fmi::Discarded("a step of " + common::number(size) + " s, but communication_step = " +
                            common::number(held->size()) + " s: steps must have that size, or the parameter be 0");
     }
+    if (!has_force()) throw fmi::Discarded(no_force());
     std::vector<double> before;
     if (impulse != 0.0 || held) save(before);
-    const auto discard = [&](const std::string& why) {
-      if (!before.empty()) restore(before);
-      throw fmi::Discarded(why);
-    };
-    const auto has_force = [this] {
-      return !held || (std::isfinite(held->force()) && std::isfinite(contact_energy()));
-    };
-    if (!has_force()) discard(no_force);
-    const spring::Inputs present = acting();
+    spring::Inputs present = inputs;
+    if (parameters.compliant()) present.contact_force = {held ? held->force() : 0.0, 0.0, 0.0};
+    present.tip_displacement = tip();
     try {
       if (impulse != 0.0) spring->apply_impulse(impulse);
       spring->step(size, present);
+      if (goes_on) held->advance(message(), spring->displacement(), trial());
+      if (!has_force()) throw spring::StepFailure(no_force(), 0.0);
     } catch (const spring::StepFailure& e) {
-      discard(e.what());
-    } catch (const std::domain_error& e) {
-      discard(e.what());
+      if (!before.empty()) restore(before);
+      throw fmi::Discarded(e.what());
     }
-    keep_tip();
-    if (goes_on) held->advance(message(), spring->displacement(), trial());
-    if (!has_force()) discard(no_force);
-    if (held) show_force();
+    if (held) look();
     check_wiring();
   }
 
+  void settle() override { tip_is_set = tip_velocity_is_set = false; }
+
   double reaction() const { return held ? held->force() : spring->reaction(); }
   double contact_energy() const { return held ? held->energy(spring->displacement()) : spring->contact_energy(); }
+  double dissipated_energy() const { return spring->dissipated_energy() + (held ? held->dissipated() : 0.0); }
+
+  // Rates of outputs, under the inputs that are set.
+  double approach() const { return spring->velocity() - (held ? tip_velocity[0] : spring->tip()[1]); }  ///< δ̇
   double reaction_rate() const {
     const auto slopes = spring->reaction_slopes();
-    return slopes.force_by_depth * (spring->velocity() - spring->tip()[1]) +
-           slopes.force_by_rate * (spring->acceleration() - tip()[2]);
+    return slopes.force_by_depth * approach() + slopes.force_by_rate * (spring->acceleration() - spring->tip()[2]);
   }
-  // Of what the held force follows before its first step only the value is known, later it follows nothing.
-  double reaction_by_tip_displacement() const { return by_tip(-spring->reaction_slopes().force_by_depth); }
+  double dissipated_power() const {
+    const double by_contact = held ? 0.0 : (spring->reaction() - spring->elastic_reaction()) * approach();
+    return parameters.damping * spring->velocity() * spring->velocity() + by_contact;
+  }
+  double kinetic_power() const { return parameters.mass * spring->velocity() * spring->acceleration(); }
+  double load() const { return inputs.external_force[0] - parameters.mass * inputs.base_acceleration[0]; }
+  double contact_power() const { return elastic_reaction() * approach(); }
+  double elastic_reaction() const { return held ? held->elastic(spring->displacement()) : spring->elastic_reaction(); }
+
+  // The held force follows inputs before its first step only.
+  double reaction_by_tip_displacement() const {
+    return held ? sensitivity().by_start + sensitivity().by_free : -spring->reaction_slopes().force_by_depth;
+  }
   double reaction_by_tip_velocity() const {
-    return by_tip(is_set((reached ? *reached : tip_displacement)[1]) ? 0.0 : -spring->reaction_slopes().force_by_rate);
+    const bool read = spring->extrapolated() || !is_set(tip_displacement[1]);
+    return read ? -spring->reaction_slopes().force_by_rate : 0.0;
   }
-  double contact_energy_by_tip_displacement() const { return by_tip(-spring->elastic_reaction()); }
-  double dissipated_energy() const { return spring->dissipated_energy() + (held ? held->dissipated() : 0.0); }
+  double reaction_by_forecast() const { return held ? held->size() * sensitivity().by_free : 0.0; }
+  double reaction_by_load() const { return held ? sensitivity().by_load : 0.0; }
+  double contact_energy_by_tip_displacement() const { return held && held->started() ? 0.0 : -elastic_reaction(); }
+
+  int warnings() const {
+    int count = refused + ignored;
+    if (!held) return count;
+    for (const auto& [kind, most] : misses)
+      if (held->missed(kind) >= most) count += held->missed(kind);
+    return count + (held->untold() ? 1 : 0);
+  }
 
   void save(std::vector<double>& state) const override {
     spring->save(state);
@@ -120,101 +133,129 @@ struct SpringModel final : fmi::Model {
   }
 
   void restore(const std::vector<double>& state) override {
-    using Held = spring::HeldContact::State;
+    using Held = HeldContact::State;
     const std::size_t own = held ? spring::Flat<Held>{}.size() : 0;
     if (state.size() < own) throw std::invalid_argument("spring: a saved state is too short");
     const auto mine = state.end() - static_cast<std::ptrdiff_t>(own);
-    std::optional<spring::HeldContact> restored = held;
+    std::optional<HeldContact> restored = held;
     if (restored) restored->restore(spring::from_flat<Held>(&*mine));
     spring->restore({state.begin(), mine});
     held = restored;
-    keep_tip();
+    settle();  // what was seen of the inputs is part of the state
   }
 
  private:
-  static constexpr long most_trial_work = 100'000;  ///< of IDA's steps for one force
-  static constexpr double rounding = 1e-6;          ///< of communication_step
-  static constexpr int most_missed = 10;            ///< steps; a sudden load takes 2, a harmonic one from rest up to 8
-  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-  static constexpr const char* no_force =
-      "spring: the contact force leaves the range of floating-point numbers; the tip is too far or too fast";
+  static constexpr long most_trial_work = 1'000'000;  ///< of IDA's steps for one force, as for one step
+  static constexpr double rounding = 1e-6;            ///< of communication_step
+  struct Misses {
+    HeldContact::Miss kind;
+    int most;  ///< steps: a sudden load takes 2, a harmonic one from rest up to 8
+  };
+  static constexpr std::array<Misses, HeldContact::kinds> misses{
+      {{HeldContact::elsewhere, 10}, {HeldContact::late, 3}, {HeldContact::swapped, 3}}};
 
-  bool warned_ = false;
-
-  double by_tip(double partial) const { return !held ? partial : held->started() ? 0.0 : unknown; }
+  int ignored = 0;  ///< steps in which a tip was passed on and not used
+  unsigned told_ = 0;
+  mutable std::string trial_failure_;
 
   static bool is_set(double derivative) { return !std::isnan(derivative); }
 
   /// The tip from now on: tip_velocity is its rate where tip_displacement has no derivative.
   fmi::Polynomial tip() const {
-    fmi::Polynomial tip = reached ? *reached : tip_displacement;
+    fmi::Polynomial tip = tip_displacement;
     const double curvature = is_set(tip[1]) ? 0.0 : tip_velocity[1];
     if (!is_set(tip[1])) tip[1] = tip_velocity[0];
     if (!is_set(tip[2])) tip[2] = curvature;
     return tip;
   }
 
-  void keep_tip() {
-    if (held) return;
-    const fmi::Polynomial tip = spring->tip();
-    reached = {tip[0], tip[1] == tip_velocity[0] ? fmi::unset : tip[1], fmi::unset};
+  /// To what outputs refer to. A tip that was not set since the last step is where that one left it.
+  void look() {
+    spring::Inputs present = inputs;
+    if (parameters.compliant()) present.contact_force = {held && has_force() ? held->force() : 0.0, 0.0, 0.0};
+    const bool extrapolated = spring->extrapolated() && !tip_is_set;
+    present.tip_displacement = extrapolated ? spring->tip() : tip();
+    if (extrapolated && tip_velocity_is_set)
+      present.tip_displacement = {spring->tip()[0], tip_velocity[0], tip_velocity[1]};
+    settle();
+    spring->observe(present, extrapolated);
   }
 
-  /// A pair that is wired wrongly gains energy without a sign: say so, once.
+  bool has_force() const { return !held || (std::isfinite(held->force()) && std::isfinite(contact_energy())); }
+  std::string no_force() const {
+    return "spring: no contact force was found that holds over the step: the tip is too far or too fast, or the step "
+           "too long" +
+           (trial_failure_.empty() ? "" : " (a trial step says: " + trial_failure_ + ")");
+  }
+
+  /// A pair that is wired wrongly gains or loses energy, or has no contact, without a sign: say so, once.
   void check_wiring() {
-    if (warned_) return;
-    if (held && held->missed() >= most_missed) {
-      warning = "the tip was not where it was foreseen in " + std::to_string(held->missed()) + " steps, by up to " +
-                common::number(held->farthest()) +
-                " m, so the contact gains or loses energy. Connect tip_displacement and tip_velocity_forecast of the "
-                "beam to the inputs of these names and reaction to its tip_force; set communication_step in both to "
-                "the step size, tip_response and tip_response_2 to the beam's; pass values on between the steps only, "
-                "for both FMUs alike (Jacobi). Loads on the beam that change much within a step show here, too";
-    } else if (!held && forecast[0] != 0.0 && parameters.compliant()) {
-      warning =
-          "tip_velocity_forecast arrives but is not used, as communication_step = 0: a contact that the steps do not "
-          "resolve gains energy. Set communication_step, tip_response and tip_response_2 to those of the beam, or "
-          "communication_step of the beam to 0";
+    const auto tell = [this](unsigned kind, const std::string& what) {
+      if ((told_ >> kind & 1U) == 0) warning = what;
+      told_ |= 1U << kind;
+    };
+    if (held && held->untold())
+      tell(5,
+           "nothing was passed on before the first step (or a blow hit the beam): the tip made it without a contact "
+           "force, which adds energy. Exchange values before the first step, too");
+    static constexpr const char* remedies[] = {
+        "Connect tip_displacement and tip_velocity_forecast of the beam to the inputs of these names and reaction to "
+        "its tip_force; set communication_step in both to the step size, tip_response and tip_response_2 to the "
+        "beam's. Loads on the beam that change much within a step show here, too",
+        "It was where one step more or less takes it: pass values on between the steps only, for both FMUs alike "
+        "(Jacobi), or delay what passes within a step by one step",
+        "tip_response and tip_response_2 are swapped"};
+    for (const auto& [kind, most] : misses) {
+      if (held && held->missed(kind) >= most)
+        tell(static_cast<unsigned>(kind),
+             "the tip was not where it was foreseen in " + std::to_string(held->missed(kind)) + " steps, by up to " +
+                 common::number(held->farthest()) + " m, so the contact gains or loses energy. " + remedies[kind]);
     }
-    warned_ = !warning.empty();
+    if (held) return;
+    const bool law = parameters.compliant(), ahead = parameters.communication_step > 0.0 || forecast[0] != 0.0;
+    if (!law && (ahead || tip_displacement[0] != 0.0 || tip_velocity[0] != 0.0)) {
+      ++ignored;
+      tell(6,
+           "the beam's tip arrives or communication_step is set, but contact_law = 1: there is no contact. Set "
+           "contact_law = 2, or connect only contact_force");
+    } else if (law && ahead) {
+      ++ignored;
+      tell(7,
+           "tip_velocity_forecast arrives but is not used, as communication_step = 0: a contact that the steps do not "
+           "resolve gains energy. Set communication_step, tip_response and tip_response_2 to those of the beam, or "
+           "communication_step of the beam to 0");
+    }
   }
 
   spring::TipMessage message() const { return {tip_displacement[0], forecast[0]}; }
-
-  /// What acts from now on, but for what the contact law does not read.
-  spring::Inputs acting() const {
-    spring::Inputs present = inputs;
-    if (parameters.compliant()) present.contact_force = {held ? held->force() : 0.0, 0.0, 0.0};
-    present.tip_displacement = tip();
-    return present;
+  HeldContact::Sensitivity sensitivity() const {
+    return held->started() ? HeldContact::Sensitivity{} : held->sensitivity(spring->displacement(), trial());
   }
 
   /// Where the top would be after the next step, other inputs staying as they are; the spring is left as it was.
-  spring::HeldContact::Top trial() {
+  HeldContact::Top trial() const {
     std::vector<double> start;
     spring->save(start);
-    spring::Inputs next = acting();
+    spring::Inputs next = inputs;
     for (auto* input : {&next.foundation_force, &next.external_force, &next.base_acceleration})
       (*input)[1] = (*input)[2] = 0.0;
+    trial_failure_.clear();
     return [this, start, next, work = 0L](double force) mutable {
+      constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
       if (work > most_trial_work) return unknown;
-      next.contact_force[0] = force;
+      next.contact_force = {force, 0.0, 0.0};
       const long before = spring->ida_steps();
+      double reached = unknown;
       try {
         spring->step(held->size(), next);
-      } catch (const spring::StepFailure&) {
-        return unknown;  // the step itself will tell
+        reached = spring->displacement();
+      } catch (const spring::StepFailure& e) {
+        trial_failure_ = e.what();
       }
       work += spring->ida_steps() - before;
-      const double reached = spring->displacement();
       spring->restore(start);
       return reached;
     };
-  }
-
-  /// To the acceleration. Without a finite force `reaction` has no value, and the next step is refused.
-  void show_force() {
-    if (std::isfinite(held->force())) spring->observe(acting());
   }
 };
 
@@ -248,10 +289,10 @@ fmi::Table fmi::make_table() {
   parameter("damping", "N.s/m", &Parameters::damping, "viscous damping alpha_s").at_least(0);
   parameter("linear_stiffness", "N/m", &Parameters::linear_stiffness, "linear stiffness k1");
   parameter("cubic_stiffness", "N/m3", &Parameters::cubic_stiffness, "cubic stiffness k2; < 0 softens");
-  parameter(
-      "equilibrium", "m", &FmuParameters::equilibrium,
-      "position Psi where the top rests: it starts there, unless displacement has a start value other than 0. The "
-      "spring's force is 0 at y = 0 all the same");
+  parameter("equilibrium", "m", &FmuParameters::equilibrium,
+            "position Psi of the top when nothing touches it, for whoever reads the parameters: the motion begins at "
+            "the start "
+            "value of displacement and the spring's force is 0 at y = 0");
   parameter("contact_law", "", &Parameters::contact_law, "1 = external, 2 = normal compliance inside")
       .range(1, 2)
       .choice = "ContactLaw";
@@ -307,12 +348,15 @@ fmi::Table fmi::make_table() {
       .set = [](fmi::Model& m, const fmi::Polynomial& value) {
     auto& model = static_cast<SpringModel&>(m);
     model.tip_displacement = value;  // with what is unset
-    model.reached.reset();
+    model.tip_is_set = true;
   };
   add.input("tip_velocity", "m/s",
             "velocity of the beam's tip, read by contact_law = 2 where no derivative of tip_displacement is set; its "
             "derivative of order 1 is the tip's acceleration, that of order 2 is not used",
-            &SpringModel::tip_velocity);
+            [](SpringModel& m, const fmi::Polynomial& value) {
+              m.tip_velocity = value;
+              m.tip_velocity_is_set = true;
+            });
   add.input("tip_velocity_forecast", "m/s",
             "for communication_step > 0: tip_velocity_forecast of the beam; its derivatives are not used",
             &SpringModel::forecast);
@@ -333,29 +377,44 @@ fmi::Table fmi::make_table() {
              // with communication_step > 0, of which the first is foreseen:
              "communication_step", "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping",
              "linear_stiffness", "cubic_stiffness", "external_force", "base_acceleration", "foundation_force",
-             "stop_enabled", "stop_position", "restitution", "equilibrium"});
-  add.depends("tip_displacement", [](const SpringModel& m) { return m.reaction_by_tip_displacement(); });
-  add.depends("tip_velocity", [](const SpringModel& m) { return m.reaction_by_tip_velocity(); });
+             "stop_enabled", "stop_position", "restitution"});
+  using M = const SpringModel&;
+  add.depends("tip_displacement", [](M m) { return m.reaction_by_tip_displacement(); });
+  add.depends("tip_velocity", [](M m) { return m.reaction_by_tip_velocity(); });
+  add.depends("tip_velocity_forecast", [](M m) { return m.reaction_by_forecast(); });
+  add.depends("external_force", [](M m) { return m.reaction_by_load(); });
+  add.depends("base_acceleration", [](M m) { return -m.parameters.mass * m.reaction_by_load(); });
+  add.depends("foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : m.reaction_by_load(); });
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
-  add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy)).from({"mass", "velocity"});
-  add.output("potential_energy", "J", "potential energy of the spring", of(&Spring::potential_energy))
-      .from({"linear_stiffness", "cubic_stiffness", "displacement", "equilibrium"});
-  add.output("contact_energy", "J", "energy stored in the contact law inside",
-             [](const SpringModel& m) { return m.contact_energy(); })
-      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "equilibrium",
-             "tip_displacement"});
-  add.depends("tip_displacement", [](const SpringModel& m) { return m.contact_energy_by_tip_displacement(); });
-  add.output("dissipated_energy", "J", "work of the damping force and of the contact's damping since the start",
-             [](const SpringModel& m) { return m.dissipated_energy(); });
+  add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy),
+             [](M m) { return m.kinetic_power(); })
+      .from({"mass", "velocity"});
+  add.output("potential_energy", "J", "potential energy of the spring", of(&Spring::potential_energy),
+             [](M m) { return m.spring->spring_force() * m.spring->velocity(); })
+      .from({"linear_stiffness", "cubic_stiffness", "displacement"});
+  add.output(
+         "contact_energy", "J", "energy stored in the contact law inside", [](M m) { return m.contact_energy(); },
+         [](M m) { return m.contact_power(); })
+      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "displacement", "tip_displacement"});
+  add.depends("tip_displacement", [](M m) { return m.contact_energy_by_tip_displacement(); });
+  add.output(
+      "dissipated_energy", "J", "work of the damping force and of the contact's damping since the start",
+      [](M m) { return m.dissipated_energy(); }, [](M m) { return m.dissipated_power(); });
   add.output("load_work", "J",
              "work of external_force and base_acceleration since the start, where it is 0, impacts and rest on the "
              "foundation inside included",
-             of(&Spring::load_work));
+             of(&Spring::load_work), [](M m) { return m.load() * m.spring->velocity(); });
   add.output("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
              of(&Spring::impact_loss));
-  add.output("internal_steps", "", "steps that IDA took since the start",
-             [](const SpringModel& m) { return static_cast<double>(m.spring->ida_steps()); });
+  add.output(
+         "warnings", "",
+         "steps so far in which something was missed or refused: the wiring is wrong, or a step was discarded. Many "
+         "tools hide the messages that say what; restored states do not take it back",
+         [](M m) { return m.warnings(); })
+      .whole();
+  add.local("internal_steps", "", "steps that IDA took since the start",
+            [](const SpringModel& m) { return static_cast<double>(m.spring->ida_steps()); });
   return t;
 }
 

@@ -55,7 +55,7 @@ class Fmu:
         self.library = ct.CDLL(str(self.binary))
         self.library.fmi2Instantiate.restype = ct.c_void_p
         self.variables = {v.name: v for v in self.description.modelVariables}
-        self.outputs = self.named("output")
+        self.outputs = [name for name in self.named("output") if self.variables[name].type == "Real"]
         self.instances: list[Instance] = []
         self.parameters = MOVING[self.name]
         self.force, self.impulse, self.displacement, self.velocity = ENDS[self.name]
@@ -160,7 +160,13 @@ class Instance:
         assert self.call("fmi2GetReal", self.fmu.references(*names), len(names), values) == OK, self.message
         return values[0] if len(names) == 1 else list(values)
 
+    def integer(self, name: str) -> int:
+        value = (ct.c_int * 1)()
+        assert self.call("fmi2GetInteger", self.fmu.references(name), 1, value) == OK, self.message
+        return int(value[0])
+
     def outputs(self) -> list[float]:
+        """The Real ones."""
         return list(self.get(*self.fmu.outputs))
 
     def derive(self, name: str, order: int, value: float) -> int:
@@ -172,6 +178,13 @@ class Instance:
         reference = self.fmu.references(name)
         value = (ct.c_double * 1)(math.nan)
         return self.call("fmi2GetRealOutputDerivatives", reference, 1, (ct.c_int * 1)(order), value), value[0]
+
+    def partials(self, outputs: list[str], name: str) -> tuple[int, list[float]]:
+        """Return the status, and the derivatives of the outputs by an input or, before the start, by a parameter."""
+        values = (ct.c_double * len(outputs))(*[math.nan] * len(outputs))
+        unknown, known, one = self.fmu.references(*outputs), self.fmu.references(name), (ct.c_double * 1)(1.0)
+        arguments = (unknown, ct.c_size_t(len(outputs)), known, ct.c_size_t(1), one, values)
+        return self.call("fmi2GetDirectionalDerivative", *arguments), list(values)
 
     def try_step(self, time: float, size: float) -> int:
         return self.call("fmi2DoStep", ct.c_double(time), ct.c_double(size), 0)

@@ -187,7 +187,7 @@ def test_outputs_fit_a_plot_of_all_of_them(case: Any) -> None:
     """FMPy draws a row for every output, of which 17 fit; the shape's 42 values are there to be asked for."""
     result = simulate_fmu(str(case.path))
     names = result.dtype.names[1:]
-    assert list(names) == case.outputs
+    assert sorted(names) == sorted(case.named("output"))
     assert len(create_plotly_figure(result, names=names).data) == len(names)
     assert case.name == "spring" or np.ptp(result["tip_displacement"]) > 0.1  # a first try shows a motion
     if case.name == "beam":

@@ -143,11 +143,16 @@ def test_beam_that_looks_ahead_says_where_its_free_tip_goes(beam: Any) -> None:
     # What goes by the state alone is the same.
     others = [n for n in beam.outputs if n not in ("tip_velocity_forecast", "tip_response", "tip_response_2")]
     assert k.get(*others) == plain.get(*others)
-    (u, w), (_, rate), v = (
-        k.get("tip_displacement", "tip_velocity_forecast"),
-        k.derivative("tip_velocity_forecast"),
-        plain.get("tip_velocity"),
-    )
+    u, w = k.get("tip_displacement", "tip_velocity_forecast")
+    (_, rate), v = k.derivative("tip_velocity_forecast"), plain.get("tip_velocity")
+    # Its rate is that of the motion under the force that acts, though it foresees none.
+    token, h = k.state(), 1e-8
+    k.step(20 * size, h)
+    assert (k.get("tip_velocity_forecast") - w) / h == pytest.approx(rate, rel=1e-5)
+    k.restore(token)
+    k.set("tip_force", 0.0)
+    free = k.derivative("tip_velocity_forecast")[1]
+    assert abs(free - rate) > 10.0
     # An input that changes the motion ahead changes what is said of it at once.
     k.set("distributed_load", -3.0)
     assert k.get("tip_velocity_forecast") < w - 1e-3
@@ -158,7 +163,7 @@ def test_beam_that_looks_ahead_says_where_its_free_tip_goes(beam: Any) -> None:
         for i in (20, 21):
             one.step(i * size, size)
     assert k.get("tip_displacement") == pytest.approx(u + 2 * size * w, abs=1e-15)
-    assert plain.get("tip_velocity") == pytest.approx(v + 2 * size * rate, abs=1e-13)
+    assert plain.get("tip_velocity") == pytest.approx(v + 2 * size * free, abs=1e-13)
 
 
 def test_a_last_step_of_rounding_is_made_under_the_held_force(beam: Any, spring: Any) -> None:
@@ -178,11 +183,23 @@ def test_a_last_step_of_rounding_is_made_under_the_held_force(beam: Any, spring:
     pair.spring.step(pair.time, size * (1 + 1e-9))  # as a tool's times may have it
 
 
-def gauss_seidel(pair: Pair, first: str) -> None:
-    for i in range(100):
-        for k in (pair.beam, pair.spring) if first == "beam" else (pair.spring, pair.beam):
-            k.step(i * pair.size, pair.size)
-            pair.exchange()
+def gauss_seidel(pair: Pair, first: str, steps: int = 100, delayed: bool = False) -> list[float]:
+    """Step one after the other, passing on after each; ``delayed``: what the second gets is of a step before."""
+    beam, spring = pair.beam, pair.spring
+    signals = {
+        "beam": [(beam, n, spring, n) for n in pair.connected],
+        "spring": [(spring, "reaction", beam, "tip_force")],
+    }
+    second = "spring" if first == "beam" else "beam"
+    y = []
+    for i in range(steps):
+        before = {name: k.get(name) for k, name, _, _ in signals[first]}
+        for name in (first, second):
+            (beam if name == "beam" else spring).step(i * pair.size, pair.size)
+            for k, output, other, port in signals[name]:
+                other.set(port, before[output] if delayed and name == first else k.get(output))
+        y.append(spring.get("displacement"))
+    return y
 
 
 def warnings(pair: Pair) -> list[str]:
@@ -207,9 +224,60 @@ def test_a_wrong_connection_is_told_once_with_the_remedy(beam: Any, spring: Any,
         responses = {}
     pair.start(communication_step=size, **responses)
     pair.run(0.1)
-    (warning,) = warnings(pair)
+    warning = warnings(pair)[-1]
+    assert len(warnings(pair)) == (2 if wrong == "spring only" else 1)  # then no forecast arrives at the start, too
     assert "the tip was not where it was foreseen" in warning
     assert "Connect tip_displacement and tip_velocity_forecast" in warning
+    assert pair.spring.integer("warnings") >= 10
+
+
+def test_a_right_pair_counts_no_warnings(beam: Any, spring: Any) -> None:
+    pair = Pair(beam, spring, 1e-3).start()
+    pair.run(0.1)
+    assert [k.integer("warnings") for k in (pair.beam, pair.spring)] == [0, 0]
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-4])
+def test_responses_that_are_swapped_are_told(beam: Any, spring: Any, size: float) -> None:
+    ahead = beam.running(**BEAM, communication_step=size)
+    r1, r2 = ahead.get("tip_response", "tip_response_2")
+    pair = Pair(beam, spring, size).start(tip_response=r2, tip_response_2=r1)
+    pair.run(0.05)
+    (warning,) = warnings(pair)
+    assert "tip_response and tip_response_2 are swapped" in warning
+
+
+@pytest.mark.parametrize("ahead", [True, False])
+def test_a_tip_that_arrives_where_there_is_no_law_is_told(beam: Any, spring: Any, ahead: bool) -> None:
+    pair = Pair(beam, spring, 1e-3, look_ahead=ahead).start(contact_law=1)
+    pair.run(0.02)
+    (warning,) = warnings(pair)
+    assert "contact_law = 1: there is no contact" in warning
+    assert pair.spring.integer("warnings") == 20
+
+
+def test_nothing_passed_on_before_the_first_step_is_told(beam: Any, spring: Any) -> None:
+    for known in (True, False):  # start values of the spring's inputs
+        pair = Pair(beam, spring, 1e-3)
+        pair.start() if known else pair.start(tip_velocity_forecast=0.0)
+        for k, names in ((pair.spring, BY_NAME), (pair.beam, ["tip_force"])):
+            for name in names:
+                k.set(name, 0.0)
+        pair.run(0.02)
+        (warning,) = warnings(pair)
+        assert "nothing was passed on before the first step" in warning
+        assert pair.spring.integer("warnings") == 1
+
+
+def test_the_first_force_does_not_depend_on_what_was_seen_before(spring: Any) -> None:
+    forces = []
+    for seen in ([0.0], [0.02, 0.0]):
+        k = spring.running(contact_law=2, communication_step=1e-3, tip_response=1e-6, displacement=0.01)
+        for u in seen:
+            k.set("tip_displacement", u)
+        forces.append(k.get("reaction"))
+    assert forces[0] == pytest.approx(1e-2, rel=1e-3)  # λ δ³, λ = 1e4
+    assert forces[0] == pytest.approx(forces[1], rel=1e-12)
 
 
 def test_responses_of_another_step_are_told(beam: Any, spring: Any) -> None:
@@ -220,12 +288,22 @@ def test_responses_of_another_step_are_told(beam: Any, spring: Any) -> None:
     assert "tip_response and tip_response_2 to the beam's" in warning
 
 
+@pytest.mark.parametrize("size", [1e-3, 1e-4])
 @pytest.mark.parametrize("first", ["beam", "spring"])
-def test_a_tool_that_passes_values_on_one_after_the_other_is_told(beam: Any, spring: Any, first: str) -> None:
-    pair = Pair(beam, spring, 1e-3).start()
+def test_a_tool_that_passes_values_on_one_after_the_other_is_told(
+    beam: Any, spring: Any, first: str, size: float
+) -> None:
+    pair = Pair(beam, spring, size).start()
     gauss_seidel(pair, first)
     (warning,) = warnings(pair)
     assert "for both FMUs alike (Jacobi)" in warning
+
+
+@pytest.mark.parametrize("first", ["beam", "spring"])
+def test_a_delay_of_one_step_mends_what_passes_within_a_step(beam: Any, spring: Any, first: str) -> None:
+    pair, right = (Pair(beam, spring, 1e-3).start() for _ in range(2))
+    assert gauss_seidel(pair, first, delayed=True) == list(right.run(0.1)[1])
+    assert pair.spring.integer("warnings") == 0
 
 
 def test_a_beam_that_looks_ahead_alone_is_told(beam: Any, spring: Any) -> None:
@@ -257,6 +335,35 @@ def test_reaction_follows_the_tip_without_a_step(spring: Any) -> None:
     assert k.get("contact_energy") == pytest.approx(1e6 * 4e-4**2.5 / 2.5, rel=1e-14)
     k.set("tip_displacement", 1e-4)
     assert k.get("reaction") == 0.0
+
+
+def test_where_the_tip_was_left_belongs_to_the_state(spring: Any) -> None:
+    """After a step the tip is where its derivative took it: also restored, and after a step that was refused."""
+    k = spring.running(contact_law=2, displacement=0.0, tip_displacement=-1e-3, **LAW)
+    assert k.derive("tip_displacement", 1, -0.5) == k.derive("tip_displacement", 2, 30.0) == 0
+    k.set("tip_velocity", 0.2)
+    k.step(0.0, 1e-3)
+
+    def seen() -> list[float]:
+        return [k.get("reaction"), k.derivative("reaction")[1], k.get("contact_energy"), k.derivative("velocity")[1]]
+
+    there, token = seen(), k.state()
+    y, velocity = k.get("displacement", "velocity")
+    depth, rate = y + 1e-3 + 0.5e-3 - 15e-6, velocity + 0.5 - 0.03
+    assert there[0] == pytest.approx(1e6 * depth**1.5, rel=1e-12)
+    assert there[1] == pytest.approx(1.5e6 * depth**0.5 * rate, rel=1e-12)
+    k.set("tip_displacement", -3e-3)
+    assert k.get("reaction") > 2.0 * there[0]
+    k.restore(token)
+    assert seen() == there
+    k.set("tip_velocity", 0.3)  # of the tip where it is
+    assert [seen()[0], k.derivative("reaction")[1]] == [there[0], pytest.approx(1.5e6 * depth**0.5 * (velocity - 0.3))]
+    k.restore(token)
+    k.set("contact_force", 1.0)  # something else
+    assert seen() == there
+    k.set("impulse", 1e300)
+    assert k.try_step(1e-3, 1e-3) == 2
+    assert seen() == there
 
 
 def hunt_crossley(chi: float, speed: float, end: float) -> np.ndarray:
@@ -347,5 +454,5 @@ def test_ssp_in_fmpy(fmu_folder: Path, reference: np.ndarray, capfd: pytest.Capt
     )
     # FMPy passes nothing on before its first step, which the tip makes without a force (energy + 7.5 %).
     assert len(result) == 400
-    assert "foreseen" not in "".join(capfd.readouterr())
+    assert "nothing was passed on before the first step" in "".join(capfd.readouterr())
     assert np.abs(result["spring.displacement"] - reference).max() < 2e-4

@@ -48,11 +48,11 @@ REFUSALS: list[tuple[str, dict[str, float], dict[str, float], float, float, str]
     ("beam", {}, {"tip_impulse": 1e308}, 0.1, 0.1, "not finite"),
     ("beam", {"integrator": 2}, {"tip_force": 1e308}, 0.1, 0.1, "not finite"),
     ("beam", {"communication_step": 1e-3}, {"tip_force": 1e308}, 1e-3, 1e-3, "not finite"),
-    ("spring", {"linear_stiffness": 3.0, "cubic_stiffness": -0.2}, {"impulse": 100.0}, 0.1, 1e-3, "hilltop"),
+    ("spring", {"linear_stiffness": 3.0, "cubic_stiffness": -0.2}, {"impulse": 100.0}, 1.0, 1e-3, "past its hilltop"),
     ("spring", {"linear_stiffness": 1e6}, {"contact_force": 1.0}, 1e6, 1e-3, "too much of the motion"),
     ("spring", {"linear_stiffness": 3.0}, {"contact_force": 1e308}, 0.1, 0.1, "range of floating-point numbers"),
     ("spring", AHEAD, {"tip_displacement": 1e-3}, 2e-3, 1e-3, "a step of 0.002 s, but communication_step = 0.001 s"),
-    ("spring", AHEAD, {"tip_velocity_forecast": -1e308}, 1e-3, 1e-3, "contact force leaves the range"),
+    ("spring", AHEAD, {"tip_velocity_forecast": -1e308}, 1e-3, 1e-3, "no contact force was found"),
 ]
 
 
@@ -65,12 +65,14 @@ def test_after_any_refusal_a_master_goes_on(
     for slave in (k, twin):
         slave.step(0.0, 1e-3)
     before = k.outputs()
+    told = k.integer("warnings")
     token = k.state()
     start = {i: k.get(i) for i in inputs}
     for i, value in inputs.items():
         k.set(i, value)
     assert k.try_step(1e-3, size) == DISCARD
     assert why in k.message
+    assert k.integer("warnings") == told + 1  # in the results, where messages are hidden
     # Nothing was done: the last time that holds is the start of the step.
     reached, status = ct.c_double(), ct.c_int()
     assert k.call("fmi2GetRealStatus", 2, ct.byref(reached)) == OK
@@ -88,11 +90,11 @@ def test_after_any_refusal_a_master_goes_on(
     assert k.outputs() == twin.outputs()
 
 
-def test_a_held_contact_of_finite_force_but_infinite_energy_is_discarded(spring: Any) -> None:
+def test_a_held_contact_of_infinite_energy_is_discarded(spring: Any) -> None:
     k = spring.running(**{**AHEAD, "communication_step": 1e3})
     k.set("tip_displacement", -1e100)  # λ δ³ = 1e304 N, λ δ⁴/4 overflows
     assert k.try_step(0.0, 1e-6) == DISCARD
-    assert "range of floating-point numbers" in k.message
+    assert "no contact force was found" in k.message
 
 
 @pytest.mark.parametrize("tolerance", [0.1, 1e-4, 0.0, -1.0, math.nan, 1e-3])

@@ -12,7 +12,6 @@
 
 using namespace spring_test;
 using spring::ContactLaw;
-using spring::Escape;
 using spring::Inputs;
 using spring::Parameters;
 using spring::Spring;
@@ -195,15 +194,20 @@ TEST(SpringEscape, JustBelowTheHilltopRuns) {
   EXPECT_LT(s.velocity(), 0.0);
 }
 
-// With 10 % more energy than the hilltop's the top gets there at T = ∫dy/√(2(E − V)); then the state stays, and what is
-// said names y, the hilltop and the time.
-TEST(SpringEscape, BeyondTheHilltopIsReported) {
+// With 10 % more energy than the hilltop's the top gets away: it reaches infinity at T = ∫dy/√(2(E − V)). Steps up to
+// there are made; then the state stays, and what is said names the hilltop and the time.
+TEST(SpringEscape, BeyondTheHilltopItRunsAway) {
   const double E = 1.1 * hilltop_energy;
-  const auto integrand = [E](double y) { return 1.0 / std::sqrt(2.0 * (E - 1.5 * y * y + 0.05 * y * y * y * y)); };
+  // y = tan x: the integrand is smooth and ends at a finite value.
+  const auto integrand = [E](double x) {
+    const double s = std::sin(x), c = std::cos(x);
+    return 1.0 / std::sqrt(2.0 * (E * c * c * c * c - 1.5 * s * s * c * c + 0.05 * s * s * s * s));
+  };
   double T = 0.0;
-  constexpr int n = 4000;  // Simpson: error ~ 1e-13 on this smooth integrand
+  constexpr int n = 20000;  // Simpson: error below 1e-12
+  const double end = std::acos(0.0);
   for (int i = 0; i <= n; ++i)
-    T += integrand(hilltop * i / n) * (i == 0 || i == n ? 1.0 : i % 2 != 0 ? 4.0 : 2.0) * hilltop / n / 3.0;
+    T += integrand(end * i / n) * (i == 0 || i == n ? 1.0 : i % 2 != 0 ? 4.0 : 2.0) * end / n / 3.0;
 
   for (const double sign : {1.0, -1.0}) {
     Parameters p = softening();
@@ -216,15 +220,37 @@ TEST(SpringEscape, BeyondTheHilltopIsReported) {
       try {
         s.step(0.02, Inputs{});
         t += 0.02;
-      } catch (const Escape& escape) {
+      } catch (const spring::StepFailure& failure) {
         escaped = true;
-        EXPECT_NEAR(t + escape.reached, T, 1e-10);  // 100 steps of 1e-12 relative
+        EXPECT_NEAR(t + failure.reached, T, 1e-9);
         EXPECT_EQ(saved(s), before);
-        expect(escape.what(), {sign > 0 ? "y = 3.87298" : "y = -3.87298", "hilltop"});
+        expect(failure.what(), {"run away, past its hilltop |y| = 3.87298", "a step of 0.02 s fails after"});
       }
     }
     EXPECT_TRUE(escaped);
+    EXPECT_GT(std::abs(s.displacement()), hilltop);
   }
+}
+
+// E = ½ z² + V(y) + y (the load is −1 N) is constant also past the hilltop, from where the load brings the top back.
+TEST(SpringEscape, ALoadBringsItBack) {
+  Parameters p;
+  p.linear_stiffness = 1.0;
+  p.cubic_stiffness = -1.0;
+  p.displacement = 0.99;
+  p.velocity = 0.1;
+  Spring s(p);
+  s.step(0.2, {});
+  Inputs inputs;
+  inputs.external_force[0] = -1.0;
+  const double before = energy(s) + s.displacement();
+  double highest = 0.0;
+  while (s.velocity() > -1.0) {
+    s.step(0.01, inputs);
+    highest = std::max(highest, s.displacement());
+    EXPECT_NEAR(energy(s) + s.displacement(), before, 1e-12);
+  }
+  EXPECT_NEAR(highest, 1.015, 1e-3);
 }
 
 // A force that pushes it over, within one long step; a hardening spring takes the same force.
@@ -232,11 +258,11 @@ TEST(SpringEscape, AForceCanPushItOver) {
   Inputs inputs;
   inputs.external_force[0] = 20.0;
   Spring s(softening());
-  EXPECT_THROW(s.step(1.0, inputs), Escape);
+  EXPECT_THROW(s.step(2.0, inputs), spring::StepFailure);
   Parameters p = softening();
   p.cubic_stiffness = 0.2;
   Spring hardening(p);
-  EXPECT_NO_THROW(hardening.step(1.0, inputs));
+  EXPECT_NO_THROW(hardening.step(2.0, inputs));
 }
 
 // Whatever pulls harder than the spring pushes brings it back from there: E = ½mz² + V(y) + C y is constant.
@@ -285,7 +311,7 @@ TEST(SpringEscape, AStopAtTheHilltopHoldsTheTop) {
   p.displacement = 0.0;
   p.velocity = 1.1 * std::sqrt(2.0 * hilltop_energy);
   Spring upward(p);
-  EXPECT_THROW(upward.step(4.0, Inputs{}), Escape);
+  EXPECT_THROW(upward.step(8.0, Inputs{}), spring::StepFailure);
 }
 
 // ω = 1e6 rad/s over 1000 s is 1.6e8 periods, hours of internal steps; over 0.1 ms it is 16.
@@ -295,7 +321,7 @@ TEST(SpringStep, WorkIsBounded) {
   p.displacement = 1e-3;
   Spring s(p);
   expect(failure(s, 1e3),
-         {"1000 s spans too much", "1000000 internal steps with 0 contact events", "smaller step size"});
+         {"1000 s fails", "spans too much", "1000000 internal steps and 0 contact events", "smaller step size"});
   s.step(1e-4, {});
   EXPECT_NEAR(s.displacement(), 1e-3 * std::cos(100.0), 1e-12);
   // Also where events, not the motion, are what is many: a bounce lasts 4 us.
@@ -307,7 +333,13 @@ TEST(SpringStep, WorkIsBounded) {
   Inputs pressed;
   pressed.external_force[0] = -5e6;
   Spring b(bouncing);
-  expect(failure(b, 1.0, pressed), {"1 s spans too much", "internal steps with ", "smaller step size"});
+  expect(failure(b, 1.0, pressed), {"1 s fails", "spans too much", "internal steps and ", "smaller step size"});
+}
+
+TEST(SpringStep, TooSmallAStepSaysSo) {
+  Spring s(softening());
+  s.step(1e-99, {});
+  expect(failure(s, 1e-300), {"a step of 1e-300 s is too small", "at least 1e-100 s"});
 }
 
 // Finite numbers whose results are not: the motion, its energy, the force of the law inside.

@@ -125,7 +125,7 @@ def test_a_spring_that_runs_away_is_the_cause_not_the_step_that_follows_it():
     tables = {"time": {"t_end": 2.0}, "contact": {"law": "tie"}, "coupling": {"relative_tolerance": 1e-3}}
     beam = {"young_modulus": 3.0, "shear_modulus": 3.0, "n_elements": 10, "initial_velocity_slope": -1.0}
     spring = {"linear_stiffness": 3.0, "cubic_stiffness": -4000.0}
-    with pytest.raises(RunStopped, match="has run away, past the hilltop"):
+    with pytest.raises(RunStopped, match="has run away, past its hilltop"):
         simulate(scene_from_dict({**tables, "beam": beam, "spring": spring}))
 
 

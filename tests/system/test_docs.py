@@ -103,7 +103,7 @@ def test_a_program_of_the_documentation_runs(page, number, capsys, monkeypatch):
     monkeypatch.chdir(ROOT)
     path = ROOT / page if page == "README.md" else DOCS / page
     exec(compile(blocks(path, "python")[number], f"{page}[{number}]", "exec"), {"__name__": "__main__"})
-    assert re.search(PROGRAMS[page, number], capsys.readouterr().out)
+    assert re.search(PROGRAMS[page, number], capsys.readouterr().out, re.M)
 
 
 def test_the_notebook_runs(capsys, monkeypatch):
