@@ -19,6 +19,7 @@ constexpr double epsilon = std::numeric_limits<double>::epsilon();
 constexpr long most_work = 1'000'000, work_of_start = 20;
 constexpr long most_stalled = 100;  ///< events without progress
 constexpr double smallest_step = 1e-100;
+constexpr double far = 1e6;  ///< as many hilltops away, nothing brings a top back
 
 }  // namespace
 
@@ -99,6 +100,7 @@ class Spring::Step {
     state_.z = z;
     held_ += impulse;
     t_ += segment.elapsed();
+    throw_if_run_away(y / far, t_);
     // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
     if (parameters_.stop_enabled)
       state_.y =
@@ -119,15 +121,21 @@ class Spring::Step {
     } catch (const IdaError& error) {
       const double reached = t_ + segment.solver().s() * start.size;
       const long steps = most_work - start.most_steps - work_of_start * segments_ + segment.solver().steps();
-      std::string why = "spring: a step of " + number(size_) + " s fails after " + number(reached) + " s, " +
-                        std::to_string(steps) + " internal steps and " + std::to_string(segments_) +
-                        " contact events: " + error.what();
-      const double y = std::abs(segment.displacement());
-      if (y > parameters_.hilltop())
-        why += "; the top has run away, past its hilltop |y| = " + number(parameters_.hilltop()) +
-               " m, where a softening spring pushes outwards";
+      const std::string why = "spring: a step of " + number(size_) + " s fails after " + number(reached) + " s, " +
+                              std::to_string(steps) + " internal steps and " + std::to_string(segments_) +
+                              " contact events: " + error.what();
+      throw_if_run_away(segment.displacement(), reached);
       throw StepFailure(why + "; use a smaller step size", reached);
     }
+  }
+
+  /// Past the hilltop, a motion that nothing brings back reaches infinity in finite time, where the solver fails.
+  void throw_if_run_away(double y, double reached) const {
+    if (std::abs(y) > parameters_.hilltop())
+      throw StepFailure("spring: the top has run away, past its hilltop |y| = " + number(parameters_.hilltop()) +
+                            " m, where a softening spring pushes outwards: a step of " + number(size_) +
+                            " s fails after " + number(reached) + " s",
+                        reached);
   }
 
   Spring& spring_;
