@@ -12,13 +12,14 @@ for the second body of ``gauss_seidel`` towards the force at the step's end with
 
 from __future__ import annotations
 
-from ..bodies.protocol import Body, Ends, Force
+from ..bodies.protocol import Body, Force
 from ..contact.laws import SoftLaw
-from .protocol import Booking, Coupling, Window
+from .projection import Booked
+from .protocol import Window
 
 
-class Exchange(Coupling):
-    """Coupling by one exchange per step.
+class Exchange(Booked):
+    """Coupling by one exchange per step; what the law dissipates is that of the path of the ends.
 
     Parameters
     ----------
@@ -33,7 +34,8 @@ class Exchange(Coupling):
     energy_exact = False
 
     def __init__(self, law: SoftLaw, sequential: bool, degree: int) -> None:
-        self.law, self._sequential, self.degree = law, sequential, degree
+        super().__init__(law, degree)
+        self._sequential = sequential
 
     def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
         """Return the force on the upper body; ``guess`` plays no part. Raises StepRefused."""
@@ -50,7 +52,3 @@ class Exchange(Coupling):
         lower.rewind()
         lower.advance(time, size, on_lower)
         return force
-
-    def booking(self, ends: Ends) -> Booking:
-        tip, low = ends
-        return Booking(self.law.potential(low.displacement - tip.displacement))

@@ -20,8 +20,9 @@ from ..bodies import force
 from ..bodies.elements import Prescribed
 from ..bodies.protocol import Body, Ends, Force
 from ..contact.laws import SoftLaw
+from .projection import penetration
 from .protocol import Booking, Neglected, Step, Window
-from .soft import SoftSolver, penetration
+from .soft import SoftSolver
 
 
 class OneWay(SoftSolver):

@@ -17,11 +17,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from math import isfinite
+from operator import sub
+from typing import ClassVar
 
 import numpy as np
 
 from ..bodies.force import sign_changes
+from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
+from . import energy
+from .protocol import Booking, Coupling, Step
 from .small import Matrix, Vector, transposed
 
 #: p̃ by its coefficients in powers of s, up to degree 3.
@@ -227,3 +232,33 @@ def _zeros_inside(path: _Path) -> list[float]:
             change -= s
         found.append(s)
     return found
+
+
+def penetration(step: Step, degree: int) -> tuple[float, Vector]:
+    """Return the penetration at the start of ``step`` [m], and its numbers over the step as `Projection` takes them."""
+    tip, low = step.start
+    conditions = energy.CONDITIONS[degree]
+    x = list(map(sub, conditions(step.end[1], step.size), conditions(step.end[0], step.size)))
+    return low.displacement - tip.displacement, x
+
+
+class Booked(Coupling):
+    """Books what a soft law stores and dissipates; parameters as of `Projection`."""
+
+    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("dissipated",)
+
+    def __init__(self, law: SoftLaw, degree: int) -> None:
+        self.law, self.degree, self._projection = law, degree, Projection(law, degree)
+        self.dissipated = 0.0  #: by the law since the start [J]
+
+    def accept(self, step: Step) -> None:
+        self._book(step, self._projection)
+
+    def _book(self, step: Step, projection: Projection) -> None:
+        if self.law.damped:
+            start, x = penetration(step, projection.degree)
+            self.dissipated += projection.dissipated(start, step.size, x)
+
+    def booking(self, ends: Ends) -> Booking:
+        tip, low = ends
+        return Booking(self.law.potential(low.displacement - tip.displacement), self.dissipated)

@@ -16,11 +16,11 @@ from operator import add, neg, sub
 
 import numpy as np
 
-from ..bodies.protocol import Body, Ends, Force
+from ..bodies.protocol import Body, Force
 from ..contact.laws import SoftLaw
 from . import energy
-from .projection import Projection
-from .protocol import Booking, ErrorEstimate, NotConverged, Scales, Step, Window
+from .projection import Booked, penetration
+from .protocol import ErrorEstimate, NotConverged, Scales, Step, Window
 from .small import Matrix, Vector, inverse, times
 from .solver import Aim, StepSolver
 
@@ -35,7 +35,7 @@ _ROUNDING = 1e-12
 _STIFFER = 16.0
 
 
-class SoftSolver(StepSolver):
+class SoftSolver(Booked, StepSolver):
     """Coupling by a soft law; a step that does not converge at its degree is made at degree 0, which conserves as well.
 
     Parameters
@@ -48,16 +48,18 @@ class SoftSolver(StepSolver):
         Tolerance as of `StepSolver`.
     """
 
-    CHECKPOINTED = (*StepSolver.CHECKPOINTED, "_last_crossing", "_simpler", "_simplified", "reduced", "dissipated")
+    CHECKPOINTED = (
+        *(*StepSolver.CHECKPOINTED, *Booked.CHECKPOINTED),
+        *("_last_crossing", "_simpler", "_simplified", "reduced"),
+    )
 
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
-        super().__init__(energy.CONDITIONS[degree], degree, tolerance)
-        self.law, self._projection = law, Projection(law, degree)
+        StepSolver.__init__(self, energy.CONDITIONS[degree], degree, tolerance)
+        Booked.__init__(self, law, degree)
         #: Size of the last step [s], and (E + A′)⁻¹ [m/N] where its crossing was found.
         self._last_crossing: tuple[float, Matrix] = (0.0, [])
         self._simpler = SoftSolver(law, 0, tolerance) if degree > 0 else None
         self._simplified, self.reduced = False, 0  #: the last step tried, and the steps made
-        self.dissipated = 0.0  #: by the law since the start [J]
 
     def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
         self._simplified = False
@@ -74,14 +76,8 @@ class SoftSolver(StepSolver):
 
     def accept(self, step: Step) -> None:
         self.reduced += self._simplified
-        if self.law.damped:
-            made = self._simpler if self._simplified and self._simpler is not None else self
-            start, x = penetration(step, made.degree)
-            self.dissipated += made._projection.dissipated(start, step.size, x)
-
-    def booking(self, ends: Ends) -> Booking:
-        tip, low = ends
-        return Booking(self.law.potential(low.displacement - tip.displacement), self.dissipated)
+        made = self._simpler if self._simplified and self._simpler is not None else self
+        self._book(step, made._projection)
 
     def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
         """Estimate from the part of the law's force that the polynomial leaves out: it changes velocities."""
@@ -184,11 +180,3 @@ class SoftSolver(StepSolver):
                 return found
             x, a = found[0], [softness * c for c in found[1]]
             softness = min(1.0, _STIFFER * softness)
-
-
-def penetration(step: Step, degree: int) -> tuple[float, Vector]:
-    """Return the penetration at the start of ``step`` [m], and its numbers over the step as `Projection` takes them."""
-    tip, low = step.start
-    conditions = energy.CONDITIONS[degree]
-    x = list(map(sub, conditions(step.end[1], step.size), conditions(step.end[0], step.size)))
-    return low.displacement - tip.displacement, x

@@ -11,6 +11,7 @@ each body. An upper body that is not linear is found out there, and B follows as
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from math import inf
 from operator import add, sub
@@ -22,6 +23,8 @@ from ..bodies import force
 from ..bodies.protocol import Body, Force, Motion
 from .protocol import Conditions, Coupling, NotConverged, Window
 from .small import Matrix, Vector, broyden, inverse, secant, times, transposed
+
+_log = logging.getLogger(__name__)
 
 _MAX_ITERATIONS = 20
 #: Rounding of a sum of modes, relative to the largest it has been.
@@ -173,6 +176,9 @@ class StepSolver(Coupling):
             norm = max(map(abs, residual))
         else:
             raise NotConverged(norm, _MAX_ITERATIONS)
+        if _log.isEnabledFor(logging.DEBUG):
+            said = "t = %.9g s, H = %.3g s: contact force found in %d iterations, residual %.2g m, %.2g m allowed"
+            _log.debug(said, time, size, iteration, norm, enough)
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
         u, y = upper_end[0], lower_end[0]
         self._reach = max(self._reach, u, -u, y, -y)

@@ -35,13 +35,18 @@ class Signal:
     def __init__(self, load: Load, macro_step: float | None) -> None:
         self._load = load
         self._end = load.end
+        #: When the load jumps or bends and a step ends [s].
         self.kinks = load.kinks(macro_step)
+        #: Lines of a table [s], which is a polynomial between them.
+        self._lines = load.start + load.record.x if load.signal == "table" else None
 
     def over(self, time: float, size: float) -> Force:
         """Return the projection onto a step of ``size`` [s] from ``time`` [s] on."""
         same = _SAME * size
         if time + same >= self._end:
             return NO_FORCE
+        if self._lines is not None:
+            return force.derivatives(self._of_table(self._lines, time, size), size)
         cuts = [time, *(kink for kink in self.kinks if time + same < kink < time + size - same), time + size]
         if len(cuts) == 2:
             return force.derivatives(self._legendre(time, size), size)
@@ -56,8 +61,6 @@ class Signal:
         """Return the three Legendre coefficients over a piece without a jump inside."""
         load, middle = self._load, start + 0.5 * size
         elapsed = middle - load.start
-        if load.signal == "table":
-            return self._of_table(start, size)
         if load.signal == "ramp":
             assert load.duration is not None
             if 0.0 < elapsed < load.duration:
@@ -71,11 +74,10 @@ class Signal:
             return _wave(load.amplitude, pi / load.duration, elapsed, 0.0, size)
         return (float(load.value(middle)), 0.0, 0.0)
 
-    def _of_table(self, start: float, size: float) -> Sequence[float]:
-        """By pieces, each a polynomial of degree 3 at most."""
-        points = self._load.start + self._load.record.x
-        first, last = np.searchsorted(points, (start, start + size), side="right")
-        edges = np.concatenate([[start], points[first:last], [start + size]])
+    def _of_table(self, lines: np.ndarray, start: float, size: float) -> Sequence[float]:
+        """Return the coefficients by the pieces between ``lines`` [s], each a polynomial of degree 3 at most."""
+        first, last = np.searchsorted(lines, (start, start + size), side="right")
+        edges = np.concatenate([[start], lines[first:last], [start + size]])
         half = 0.5 * np.diff(edges)[:, None]
         t = edges[:-1, None] + half * (_NODES + 1.0)
         weights = half * _WEIGHTS * self._load.value(t)
