@@ -7,11 +7,11 @@ from contextlib import closing
 from math import nan, pi, sqrt
 
 from scipy.optimize import brentq
-from scipy.special import ellipk
 
 from ...bodies.fmu_bodies import FmuSpring
 from ...bodies.protocol import NO_FORCE, FmuError, StepRefused
 from ...scene import Spring
+from ..exact import Duffing
 from .check import Check, section
 
 IDA = "IDA: BDF of order ≤ 5 takes some ε^(−1/6) internal steps a radian, each of error ε: ωT·ε^(5/6)"
@@ -21,13 +21,8 @@ _SPRINGS = ((3.0, -0.2, 0.5), (3.0, -0.2, 1.0), (150.0, 67.0, 0.5), (150.0, 67.0
 
 @section("Spring: Duffing (k1, k2, A), from rest", *_SPRINGS)
 def duffing(k1: float, k2: float, amplitude: float) -> Iterator[Check]:
-    """Undamped Duffing spring, m = 1, from rest at A.
-
-    Hardening: y = A cn(ωt|μ), ω² = k1 + k2A², μ = k2A²/2ω². Softening: y = A sn(ωt + K|μ), ω² = k1 + k2A²/2,
-    μ = −k2A²/2ω². Period 4K(μ)/ω.
-    """
-    w2 = k1 + k2 * amplitude**2 * (1.0 if k2 > 0.0 else 0.5)
-    period = 4.0 * float(ellipk(abs(k2) * amplitude**2 / (2.0 * w2))) / sqrt(w2)
+    """Undamped Duffing spring, m = 1, from rest at A: its period, and where it is after one (`exact.Duffing`)."""
+    period = Duffing(k1, k2, amplitude).period
     spring = Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=amplitude)
     name = f"({k1:g}, {k2:g}, {amplitude:g})"
     relative = ida_error(2.0 * pi)
