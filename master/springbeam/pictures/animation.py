@@ -20,7 +20,7 @@ from ..results.trajectory import Trajectory
 from .drawing import BLACK, GREY, LEVELS, STONE, VERMILLION, level_side, mark, time_unit
 from .frames import Frames, Part, Sketch, frames_of, sketches
 from .panels import positions
-from .timeline import STYLE, line_style, paint
+from .timeline import STYLE, line_style, paint, shade
 
 SUFFIXES = (".gif", ".mp4")
 _SIZE, _DPI = (8.0, 5.0), 100
@@ -104,7 +104,8 @@ class _Picture:
         for ax, sketch in zip(axes, shown, strict=True):
             self._sketch(ax, sketch)
         self._clock = time_unit(trajectory)
-        paint(below, trajectory, positions(trajectory))
+        shade(below, trajectory)
+        paint(below, positions(trajectory), self._clock)
         self._cursor = below.axvline(0.0, color=BLACK, lw=1.0, ls=":")
         self.figure.suptitle(trajectory.scene.title, fontsize=10.0, x=0.01, ha="left")
         self._words = self.figure.text(0.99, 0.985, "", fontsize=9.0, ha="right", va="top", family="monospace")

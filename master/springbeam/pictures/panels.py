@@ -18,12 +18,17 @@ from .drawing import (
     BLUE,
     ENERGIES,
     FORCES,
+    GREEN,
     IMPULSES,
+    ORANGE,
     POSITIONS,
+    PURPLE,
+    SKY,
     VELOCITIES,
     VERMILLION,
     Line,
     Look,
+    Marker,
     Unit,
     alternates,
     decimated,
@@ -38,6 +43,18 @@ from .drawing import (
 _INVISIBLE = 5e-3
 #: A curve that is so much higher than the peak force that the run tells shows another number.
 _ANOTHER_PEAK = 0.01
+_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
+#: Quantity, unit, and columns or fields of events of the panels in which runs are compared.
+_COMPARED = (
+    ("position", "m", ("u_tip", "y")),
+    ("velocity", "m/s", ("v_tip", "z")),
+    ("contact force", "N", ("contact_force",)),
+    ("foundation force", "N", ("foundation_force",)),
+    ("impulse, tip", "N·s", ("impulse_contact",)),
+    ("impulse, foundation", "N·s", ("impulse_foundation",)),
+)
+#: How the first column of such a panel is drawn, and the second.
+_COMPARED_LINES = (Line(1.4), Line(0.8, dashed=True))
 
 
 @dataclass(frozen=True)
@@ -59,12 +76,19 @@ class Panel:
     name: str
     heading: str
     quantity: str
-    unit: Unit
+    si: str  #: its unit
     curves: list[Curve]
     height: float = 1.6  #: [inch]
     levels: dict[str, float] = field(default_factory=dict)  #: heights [m] of Ψ and φ
     logarithmic: tuple[float, float] | None = None  #: limits of a logarithmic axis; stems begin at the lower one
     remarks: list[str] = field(default_factory=list)
+
+    @property
+    def unit(self) -> Unit:
+        """The unit of the axis, with a prefix unless it is logarithmic."""
+        if self.logarithmic is not None:
+            return Unit(1.0, self.si)
+        return readable_unit([curve.values for curve in self.curves], self.si)
 
     @property
     def axis(self) -> str:
@@ -133,21 +157,22 @@ def _peak_in_words(trajectory: Trajectory) -> list[str]:
 
 def impulses(trajectory: Trajectory) -> Panel:
     """Return the impulses of the events, on a logarithmic axis where a linear one would not show them all."""
-    panel = Panel("impulses", "Impulses", "impulse", Unit(1.0, "N·s"), [], 1.2)
-    for name, look in IMPULSES.items():
-        points = [(e.time, getattr(e, name)) for e in trajectory.events if getattr(e, name)]
-        time, values = np.reshape(points, (-1, 2)).T
-        rows = decimated(time, values)
-        if points:
-            panel.curves.append(Curve(name, look, time[rows], values[rows]))
+    curves = [curve for name, look in IMPULSES.items() for curve in _stems(trajectory, name, look)]
+    panel = Panel("impulses", "Impulses", "impulse", "N·s", curves, 1.2)
     sizes = [curve.values for curve in panel.curves]
     least, most = min(map(np.min, sizes), default=0.0), max(map(np.max, sizes), default=0.0)
     if 0.0 < 30.0 * least < most:
         # Impulses of rounding size would stretch the axis over the ones that matter.
         panel.logarithmic = 0.3 * max(least, 1e-8 * most), 3.0 * most
-    else:
-        panel.unit = readable_unit(sizes, "N·s")
     return panel
+
+
+def _stems(trajectory: Trajectory, name: str, look: Look) -> list[Curve]:
+    """Return the impulses of one kind, none if there were none."""
+    points = [(e.time, getattr(e, name)) for e in trajectory.events if getattr(e, name)]
+    time, values = np.reshape(points, (-1, 2)).T
+    rows = decimated(time, values)
+    return [Curve(name, look, time[rows], values[rows])] if points else []
 
 
 def gap(trajectory: Trajectory) -> Panel:
@@ -180,12 +205,34 @@ def residual(trajectory: Trajectory) -> Panel:
     look = Look(VERMILLION, "over the largest energy", Line(0.8))
     curve = Curve("energy_residual", look, trajectory["time"][rows], relative[rows])
     heading = "Energy residual: what the sum of all energies has changed by since the start"
-    panel = Panel("residual", heading, "energy residual", Unit(1.0, "–"), [curve], 1.4)
+    panel = Panel("residual", heading, "energy residual", "–", [curve], 1.4)
     if len(rows):
         panel.logarithmic = 0.3 * max(float(np.min(curve.values)), 1e-18), 3.0 * float(np.max(curve.values))
     else:
         panel.remarks.append("zero throughout")
     return panel
+
+
+def compared(runs: Mapping[str, Trajectory]) -> list[Panel]:
+    """Return panels with the curves of several runs, a colour each; only those of positions may be all zero.
+
+    What strikes leaves impulses and no force: they have panels of their own.
+    """
+    found = []
+    for quantity, unit, columns in _COMPARED:
+        panel = Panel(quantity, quantity, quantity, unit, [])
+        for number, (name, run) in enumerate(runs.items()):
+            colour, size = _COLOURS[number % len(_COLOURS)], max(7.0 - 1.5 * number, 2.5)
+            for column, line in zip(columns, _COMPARED_LINES, strict=False):
+                words = f"{name}: {(POSITIONS | VELOCITIES)[column].words}" if len(columns) > 1 else name
+                if column in IMPULSES:
+                    stems = Look(colour, words, marker=Marker("○", "o", "circle-open", size))
+                    panel.curves += _stems(run, column, stems)
+                else:
+                    panel.curves += _lines(run, "", "", {column: Look(colour, words, line)}, quantity, unit).curves
+        if unit == "m" or any(curve.values.any() for curve in panel.curves):
+            found.append(panel)
+    return found
 
 
 def _energy_scale(trajectory: Trajectory) -> float:
@@ -211,9 +258,8 @@ def _lines(
         values = trajectory[column]
         rows = decimated(time, values)
         curves.append(Curve(column, looks[column], time[rows], values[rows], alternates(values)))
-    readable = readable_unit([trajectory[curve.name] for curve in curves], unit)
     said = [f"{curve.look.words} {ALTERNATES}" for curve in curves if curve.alternates]
-    return Panel(name, heading, quantity, readable, curves, remarks=[*said, *remarks], **more)
+    return Panel(name, heading, quantity, unit, curves, remarks=[*said, *remarks], **more)
 
 
 def _seen(trajectory: Trajectory, looks: Mapping[str, Look], unit: str) -> tuple[dict[str, Look], list[str]]:

@@ -21,6 +21,7 @@ from .drawing import (
     MANY_EVENTS,
     VERMILLION,
     Look,
+    Unit,
     event_marks,
     level_side,
     mark,
@@ -63,7 +64,8 @@ def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Fig
     figure = figure_for(trajectory, title, 1.0 + sum(heights))
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0].tolist()
     for ax, panel in zip(axes, panels, strict=True):
-        paint(ax, trajectory, panel)
+        shade(ax, trajectory)
+        paint(ax, panel, time_unit(trajectory))
         ax.label_outer()
     phases = [look for look, _ in shaded_phases(trajectory)]
     shades = [Patch(facecolor=look.colour, edgecolor=GREY, linewidth=0.5, label=look.words) for look in phases]
@@ -96,13 +98,18 @@ def _mark_events(axes: list[Axes], trajectory: Trajectory) -> list[Line2D]:
     return handles
 
 
-def paint(ax: Axes, trajectory: Trajectory, panel: Panel) -> None:
-    """Draw ``panel`` over the time of the run, whose phases are shaded."""
-    clock, factor = time_unit(trajectory), panel.unit.factor
+def shade(ax: Axes, trajectory: Trajectory) -> None:
+    """Give the axes the time of the run, and its phases as shades."""
+    factor = time_unit(trajectory).factor
     for look, spans in shaded_phases(trajectory):
-        intervals = [(clock.factor * start, clock.factor * (end - start)) for start, end in spans]
+        intervals = [(factor * start, factor * (end - start)) for start, end in spans]
         ax.broken_barh(intervals, (0.0, 1.0), transform=ax.get_xaxis_transform(), color=look.colour, lw=0.0, zorder=0)
-    ax.set_xlim(*(clock.factor * trajectory["time"][[0, -1]]))
+    ax.set_xlim(*(factor * trajectory["time"][[0, -1]]))
+
+
+def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
+    """Draw ``panel`` over time in the unit ``clock``."""
+    factor = panel.unit.factor
     ax.set_xlabel(f"time t [{clock.name}]")
     stack = [curve for curve in panel.curves if curve.stacked]
     if stack:

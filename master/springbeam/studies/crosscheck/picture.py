@@ -10,7 +10,7 @@ import matplotlib
 import numpy as np
 
 from ...pictures import drawing
-from ...pictures.drawing import BLACK, POSITIONS, Line, Look, Unit
+from ...pictures.drawing import BLACK, POSITIONS, Line, Look
 from ...pictures.panels import Curve, Panel
 from ...pictures.timeline import DPI, STYLE, timeline
 from ...results.trajectory import Trajectory
@@ -38,8 +38,7 @@ def _positions(run: Trajectory, reference: Mapping[str, np.ndarray]) -> Panel:
         theirs = Look(BLACK, f"{name}, reference", Line(0.7))
         curves.append(Curve(name, ours, run["time"], run[name]))
         curves.append(Curve(name, theirs, reference["time"], reference[name]))
-    unit = drawing.readable_unit([run[name] for name in names], "m")
-    return Panel("positions", "Positions", "position", unit, curves, 2.2)
+    return Panel("positions", "Positions", "position", "m", curves, 2.2)
 
 
 def _errors(record: Mapping[str, Any]) -> Panel:
@@ -53,5 +52,5 @@ def _errors(record: Mapping[str, Any]) -> Panel:
         lowest.append(np.min(errors, where=errors > 0.0, initial=bounds.max()))
         highest.append(max(errors.max(), bounds.max()))
     limits = max(min(lowest, default=1e-16), 1e-18), 10.0 * max(highest, default=1.0)
-    quantity, unit = "error (lines), bound (dashed)\n", Unit(1.0, "unit of the quantity")
-    return Panel("errors", "Errors", quantity, unit, curves, 3.0, logarithmic=limits)
+    quantity = "error (lines), bound (dashed)\n"
+    return Panel("errors", "Errors", quantity, "unit of the quantity", curves, 3.0, logarithmic=limits)
