@@ -25,6 +25,7 @@ import numpy as np
 from ..bodies.force import sign_changes
 from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
+from ..results.paths import last
 from . import energy
 from .protocol import Booking, Coupling, Step
 from .small import Matrix, Vector, transposed
@@ -39,8 +40,6 @@ _EPS = 2.0**-52
 _STEADY, _OFF_ZERO = 0.9, 0.3
 #: Relative change of p over a step up to which the quotient ΔΦ/Δp would lose more than two digits.
 _SMALL_CHANGE = 0.01
-#: How well zeros of p̃ are found, and steps to them at most.
-_ZERO, _MAX_STEPS_TO_ZERO = 1e-12, 40
 
 
 def _gauss(points: int) -> list[tuple[float, float]]:
@@ -218,20 +217,14 @@ def _zeros_inside(path: _Path) -> list[float]:
     rate = (b1 - 2.0 * b2 + 3.0 * b3, 2.0 * b2 - 6.0 * b3, 6.0 * b3)  # dp̃/ds and its derivatives at s = −1
     turns = [tau - 1.0 for tau in sign_changes(rate, 2.0)]
     for low, high in pairwise([-1.0, *turns, 1.0]):
-        at_low = _at(path, low)[0]
-        if at_low * _at(path, high)[0] >= 0.0:
-            continue
-        s, change = 0.5 * (low + high), 1.0
-        for _ in range(_MAX_STEPS_TO_ZERO):
-            if abs(change) <= _ZERO:
-                break
-            value, slope = _at(path, s)
-            low, high = (s, high) if value * at_low > 0.0 else (low, s)
-            newton = s - value / slope if slope != 0.0 else low
-            change, s = s, newton if low < newton < high else 0.5 * (low + high)
-            change -= s
-        found.append(s)
+        if _at(path, low)[0] * _at(path, high)[0] < 0.0:
+            found.append(_zero(path, low, high))
     return found
+
+
+def _zero(path: _Path, low: float, high: float) -> float:
+    negative = _at(path, low)[0] < 0.0
+    return last(lambda s: (_at(path, s)[0] < 0.0) is negative, low, high)[1]
 
 
 def penetration(step: Step, degree: int) -> tuple[float, Vector]:

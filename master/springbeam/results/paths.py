@@ -7,6 +7,7 @@ the step is resolved.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,8 +18,19 @@ Means = tuple[float, float]
 
 #: Largest values in (0, 1) of s²(1 − s)² and of s²(1 − s)²(2s − 1).
 _EVEN, _ODD = 1.0 / 16.0, 0.0178885438
-#: Points at which a minimum is looked for, and bisections to it.
+#: Points at which a minimum is looked for, and bisections to a place.
 _POINTS, _BISECTIONS = 16, 40
+
+
+def last(holds: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
+    """Return by bisection between which two numbers ``holds``, true at ``low`` and false at ``high``, ends to be so.
+
+    They are apart by 2^−40 of the bracket.
+    """
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low, high
 
 
 class Path(NamedTuple):
@@ -67,19 +79,12 @@ class Path(NamedTuple):
 
         A path that starts on zero and rises falls later; one that only falls, at once.
         """
-        low, high = 0.0, until
-        for _ in range(_BISECTIONS):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.at(middle) >= 0.0 else (low, middle)
+        low, high = last(lambda s: self.at(s) >= 0.0, 0.0, until)
         return high if low > 0.0 else 0.0
 
     def rises_through_zero(self, since: float) -> float:
         """Return s in [since, 1] where f, below zero at ``since``, not at the end, rises through it, by bisection."""
-        low, high = since, 1.0
-        for _ in range(_BISECTIONS):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if self.at(middle) < 0.0 else (low, middle)
-        return high
+        return last(lambda s: self.at(s) < 0.0, since, 1.0)[1]
 
     def lowest_inside(self) -> float | None:
         """Return s in (0, 1) of the lowest minimum, ``None`` if there is none inside."""
@@ -88,10 +93,7 @@ class Path(NamedTuple):
         for i, (before, after) in enumerate(pairwise(slopes)):
             if not before < 0.0 <= after:
                 continue
-            low, high = i / _POINTS, (i + 1) / _POINTS
-            for _ in range(_BISECTIONS):
-                middle = 0.5 * (low + high)
-                low, high = (middle, high) if self.slope(middle) < 0.0 else (low, middle)
+            high = last(lambda s: self.slope(s) < 0.0, i / _POINTS, (i + 1) / _POINTS)[1]
             if best is None or self.at(high) < self.at(best):
                 best = high
         return best if best is None or 0.0 < best < 1.0 else None
