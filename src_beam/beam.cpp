@@ -38,18 +38,8 @@ void validate(const Parameters& p) {
 
   if (p.n_elements > max_elements / p.element_degree) {
     reject("n_elements", p.n_elements,
-           "0 (no mesh) or between 1 and " + std::to_string(max_elements / p.element_degree) + " (" +
-               std::to_string(max_elements) + " over element_degree)");
-  }
-  if (p.n_elements == 0) {
-    const std::string without = "without a mesh (n_elements = 0)";
-    if (p.n_modes == 0)
-      reject("n_modes", p.n_modes, "between 1 and " + std::to_string(max_exact_modes) + " " + without);
-    if (p.integrator != Integrator::modal) reject("integrator", static_cast<int>(p.integrator), "1 (modal) " + without);
-    if (p.mass_matrix != MassMatrix::consistent || p.reduced_integration)
-      reject(p.reduced_integration ? "reduced_integration" : "mass_matrix",
-             p.reduced_integration ? 1 : static_cast<int>(p.mass_matrix), "left at its default " + without);
-    return;
+           "between 1 and " + std::to_string(max_elements / p.element_degree) + " (" + std::to_string(max_elements) +
+               " over element_degree)");
   }
   if (p.integrator != Integrator::modal) return;
   const int unknowns = 2 * p.n_elements * p.element_degree;

@@ -24,8 +24,6 @@ inline constexpr int max_elements = 1000000;
 /// Most unknowns of a dense eigenproblem: of the mesh (two per element and degree) where all modes are wanted, of the
 /// reduced basis where some are.
 inline constexpr int max_dense_unknowns = 1000;
-/// Most modes without a mesh, 3 µs each; bounds memory, not the mathematics.
-inline constexpr int max_exact_modes = 10000;
 
 /// All in SI units; defaults are the unit beam of the paper's section 3.
 struct Parameters {
@@ -37,7 +35,7 @@ struct Parameters {
   double shear_coefficient = 1.0;      ///< K [–]
   double length = 1.0;                 ///< L [m]
   double alpha_b = 0.0;                ///< Kelvin–Voigt retardation time [s]
-  int n_elements = 50;                 ///< uniform elements; 0 = no mesh: the exact modes, see exact_modes.hpp
+  int n_elements = 50;                 ///< uniform elements
   int element_degree = 1;              ///< polynomial degree of u and θ in an element, 1 … 12; 1 = P1
   int n_modes = 0;                     ///< lowest modes kept by `modal`; 0 = all of the mesh's
   bool reduced_integration = false;    ///< p-point Gauss rule for the shear; false = exact (59)

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "exact_modes.hpp"
 #include "modal_oscillator.hpp"
 #include "modes.hpp"
 #include "step_cache.hpp"
@@ -267,9 +266,7 @@ class ModalBeam final : public Beam {
 }  // namespace
 
 std::unique_ptr<Beam> make_modal_beam(const Parameters& parameters) {
-  return std::make_unique<ModalBeam>(parameters, parameters.n_elements == 0
-                                                     ? exact_modes(parameters)
-                                                     : compute_modes(Timoshenko(parameters), parameters));
+  return std::make_unique<ModalBeam>(parameters, compute_modes(Timoshenko(parameters), parameters));
 }
 
 }  // namespace beam

@@ -33,11 +33,6 @@ struct BeamModel final : fmi::Model {
 
   // The modes are exact and the midpoint rule has no error control: a tolerance has nothing to act on.
   void build(double) override {
-    if (parameters.n_elements == 0 && parameters.tip_load_coefficient != 0.0) {
-      throw std::invalid_argument(
-          "beam: tip_load_coefficient is the load of the last element's hat function; it must be 0 without a mesh, "
-          "n_elements = 0");
-    }
     beam = beam::make_beam(parameters);
     loads.set(Loads::hat, {parameters.tip_load_coefficient, 0.0, 0.0});
     forecast = {};
@@ -160,14 +155,12 @@ fmi::Table fmi::make_table() {
   parameter("length", "m", &Parameters::length, "length L").positive();
   parameter("alpha_b", "s", &Parameters::alpha_b, "Kelvin-Voigt retardation time: damping = alpha_b * stiffness")
       .at_least(0);
-  parameter("n_elements", "", &Parameters::n_elements,
-            "uniform elements; 0 = no mesh: the exact modes of the continuous beam, n_modes of them")
-      .range(0, beam::max_elements);
+  parameter("n_elements", "", &Parameters::n_elements, "uniform elements").range(1, beam::max_elements);
   parameter("element_degree", "", &Parameters::element_degree,
             "polynomial degree of deflection and rotation in an element; 1 = linear elements")
       .range(1, beam::max_element_degree);
   parameter("n_modes", "", &Parameters::n_modes, "lowest modes kept by the modal integrator; 0 = all of the mesh's")
-      .range(0, beam::max_exact_modes);
+      .range(0, beam::max_dense_unknowns);
   parameter(
       "reduced_integration", "", &Parameters::reduced_integration,
       "as many Gauss points for the shear term as element_degree; false = exact integration, which locks for slender "
@@ -234,12 +227,6 @@ fmi::Table fmi::make_table() {
                                        "shear_modulus",  "length",  "shear_coefficient",     "n_elements",
                                        "element_degree", "n_modes", "reduced_integration",   "integrator",
                                        "mass_matrix"};
-  // What of a start the modes without a mesh hold: not all, unlike those of a mesh.
-  const auto with_kept = [](std::vector<std::string> names) {
-    names.insert(names.end(), {"n_elements", "n_modes", "length", "area", "second_moment_of_area", "young_modulus",
-                               "shear_modulus", "shear_coefficient"});
-    return names;
-  };
   add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),
              of(&Beam::tip_velocity))
       .from(start_u);
@@ -253,22 +240,21 @@ fmi::Table fmi::make_table() {
   add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
       .from({"initial_velocity_slope", "length"});
   add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation),
-             of(&Beam::tip_rotation_rate))
-      .from(with_kept({"initial_deflection_slope"}));
+             of(&Beam::tip_rotation_rate));
   add.output("tip_displacement_integral", "m.s", "integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral), of(&Beam::tip_displacement));
   add.output("tip_displacement_integral_2", "m.s2", "double integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral_2), of(&Beam::tip_displacement_integral));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy), of(&Beam::kinetic_power))
-      .from(with_kept({"density", "initial_velocity_slope", "mass_matrix", "element_degree"}));
+      .from({"density", "area", "length", "initial_velocity_slope", "mass_matrix", "element_degree", "n_elements"});
   add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy), of(&Beam::strain_power))
-      .from(with_kept({"initial_deflection_slope"}));
+      .from({"initial_deflection_slope", "area", "length", "shear_coefficient", "shear_modulus"});
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy),
              of(&Beam::dissipated_power));
   add.output("load_potential", "J",
              "potential of the loads distributed_load and tip_load_coefficient, as if they were constant",
              of(&Beam::load_potential), of(&Beam::load_potential_rate))
-      .from(with_kept({"initial_deflection_slope", "tip_load_coefficient", "distributed_load"}));
+      .from({"initial_deflection_slope", "tip_load_coefficient", "distributed_load", "length", "n_elements"});
   add.depends("distributed_load", [](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); });
   add.output(
       "load_work", "J",

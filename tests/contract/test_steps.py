@@ -51,7 +51,7 @@ REFUSALS: list[tuple[str, dict[str, float], dict[str, float], float, float, str]
     ("spring", {"linear_stiffness": 3.0, "cubic_stiffness": -0.2}, {"impulse": 100.0}, 1.0, 1e-3, "past its hilltop"),
     ("spring", {"linear_stiffness": 1e6}, {"contact_force": 1.0}, 1e6, 1e-3, "too much of the motion"),
     ("spring", {"linear_stiffness": 3.0}, {"contact_force": 1e308}, 0.1, 0.1, "range of floating-point numbers"),
-    ("spring", AHEAD, {"tip_displacement": 1e-3}, 2e-3, 1e-3, "a step of 0.002 s, but communication_step = 0.001 s"),
+    ("spring", AHEAD, {"tip_displacement": -1e-3}, 2e-3, 1e-3, "a step of 0.002 s, but communication_step = 0.001 s"),
     ("spring", AHEAD, {"tip_velocity_forecast": -1e308}, 1e-3, 1e-3, "no contact force was found"),
 ]
 

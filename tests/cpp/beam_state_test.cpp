@@ -141,10 +141,6 @@ TEST(BeamState, ParametersThatDoNotGoTogetherAreRefused) {
     std::vector<std::string> named;
   };
   const std::vector<Refused> all = {
-      {[](Parameters& p) { p.n_elements = 0; }, {"n_modes", "= 0 ", "between 1 and 10000", "without a mesh"}},
-      {[](Parameters& p) { p.n_elements = 0, p.n_modes = 8, p.mass_matrix = MassMatrix::averaged; }, {"mass_matrix"}},
-      {[](Parameters& p) { p.n_elements = 0, p.n_modes = 8, p.integrator = Integrator::generalized_alpha; },
-       {"integrator", "without a mesh"}},
       {[](Parameters& p) { p.n_elements = 2000000; }, {"n_elements"}},
       {[](Parameters& p) { p.element_degree = 8, p.n_elements = 125001; }, {"n_elements", "125000", "element_degree"}},
       {[](Parameters& p) { p.element_degree = 2, p.n_modes = 201; }, {"n_modes", "200", "50 elements of degree 2"}},

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "beam.hpp"
-#include "exact_modes.hpp"
 #include "modes.hpp"
 
 namespace beam::testing {
@@ -36,9 +35,7 @@ inline Parameters general_beam(int n_elements, int element_degree = 1) {
   return p;
 }
 
-inline Modes modes_of(const Parameters& p) {
-  return p.n_elements == 0 ? exact_modes(p) : compute_modes(Timoshenko(p), p);
-}
+inline Modes modes_of(const Parameters& p) { return compute_modes(Timoshenko(p), p); }
 
 /// Of the modal beam, ascending [rad/s].
 inline std::vector<double> frequencies(const Parameters& p) {
@@ -64,8 +61,7 @@ inline Parameters with_integrator(Parameters p, Integrator integrator, double rh
   return p;
 }
 
-/// Both integrators, degrees 1 and 5, with and without damping and truncation, and without a mesh, in motion under a
-/// load.
+/// Both integrators, degrees 1 and 5, with and without damping and truncation, in motion under a load.
 inline std::vector<Parameters> variants() {
   std::vector<Parameters> all;
   for (Parameters p : {general_beam(25), general_beam(3, 5)}) {
@@ -84,9 +80,6 @@ inline std::vector<Parameters> variants() {
       all.push_back(with_integrator(p, Integrator::generalized_alpha));
       p.mass_matrix = MassMatrix::consistent;
     }
-    p.n_elements = 0;
-    p.n_modes = 10;
-    all.push_back(p);
   }
   return all;
 }

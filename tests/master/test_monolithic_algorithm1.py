@@ -192,7 +192,6 @@ def test_unknown_readings_are_refused(choice: dict[str, str], message: str) -> N
     [
         {"loads": [{"on": "tip", "amplitude": 1.0}]},
         {"beam": {"fidelity": "quasi_static"}},
-        {"beam": {"mesh": "none", "n_modes": 4}},
     ],
 )
 def test_what_the_paper_does_not_have_is_refused(changes: dict[str, Any]) -> None:

@@ -61,7 +61,6 @@ GOOD = {
     "contact at t_end": changed(beam={"initial_deflection_slope": 0.6}),
     "500 elements, all modes": changed(beam={"n_elements": 500}),
     "1000 elements, 64 modes": changed(beam={"n_elements": 1000, "n_modes": 64}),
-    "no mesh": changed(beam={"mesh": "none", "n_modes": 10_000}),
     "1000 elements, midpoint": changed(beam={"n_elements": 1000, "integrator": "generalized_alpha"}),
     # Algorithm 1 brings its own integrator, so that a shipped scene need not be rewritten for it.
     "paper on a modal scene": changed(contact={"law": "paper"}),

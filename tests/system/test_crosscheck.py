@@ -46,10 +46,8 @@ LOADS = [
         (0.1, 0, [], {"n_elements": 6, "element_degree": 2, "reduced_integration": True, "tip_load_coefficient": -6.0}),
         (0.1, 0, [], {"n_elements": 12, "mass_matrix": "averaged"}),
         (0.1, 0, [], {"n_elements": 4, "element_degree": 3, "n_modes": 6, "mass_matrix": "averaged", "alpha_b": 1e-3}),
-        (0.1, 0, [], {"mesh": "none", "n_modes": 12, "distributed_load": -2.0, "alpha_b": 1e-3}),
         (0.1, 0, [], {"n_elements": 30, "element_degree": 10, "n_modes": 8, "distributed_load": -2.0, "alpha_b": 1e-3}),
         (0.2, 0, LOADS, {}),
-        (0.2, 2, LOADS, {"mesh": "none", "n_modes": 8}),
         (0.2, 2, LOADS, {"n_elements": 6, "element_degree": 3, "n_modes": 8, "mass_matrix": "averaged"}),
     ],
 )

@@ -105,9 +105,9 @@ def test_a_key_is_told_where_it_changes_nothing(name: str, place: str) -> None:
 
 
 def test_every_row_of_the_table_is_looked_at() -> None:
-    """But the mesh without elements, the law itself and the scheme, which other keys come with."""
+    """But the law itself and the scheme, which other keys come with."""
     listed = {place for effect in effects() for place in effect.keys}
-    assert listed - VALUES.keys() == {"beam.mesh", "contact.law", "coupling.scheme"}
+    assert listed - VALUES.keys() == {"contact.law", "coupling.scheme"}
 
 
 def test_a_load_that_begins_after_the_run_is_told() -> None:

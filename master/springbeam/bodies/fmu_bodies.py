@@ -274,8 +274,6 @@ class FmuBeam(OwnBody, BeamBody):
         self._points = sorted({load.at for load in loads if load.at is not None})
         self._constants = {"distributed_load": beam.distributed_load}
         parameters: dict[str, float | int | bool] = {name: value for name, value in beam if name not in beam.GIVEN_ONLY}
-        if beam.mesh == "none":
-            parameters["n_elements"] = 0
         parameters["integrator"] = _INTEGRATORS[beam.integrator]
         parameters["mass_matrix"] = _MASS_MATRICES[beam.mass_matrix]
         parameters["initial_deflection_slope"] = deflection_slope

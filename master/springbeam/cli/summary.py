@@ -51,8 +51,7 @@ def report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         errors = ", ".join(f"{value:.1e} ({name})" for name, value in found["estimated_errors"].items())
         console.print(f"accuracy  {picked_in_words(found)}\n          errors at most {errors}")
         if "estimated_mesh_error" in found:
-            picked = found["picked"]
-            mesh = f"{picked['n_elements']} elements" if "n_elements" in picked else f"{picked['n_modes']} exact modes"
+            mesh = f"{found['picked']['n_elements']} elements"
             console.print(f"mesh      {mesh}: error {found['estimated_mesh_error']:.1e} beside the continuous beam")
     for warning in summary.get("warnings", ()):
         console.print(Text(f"warning   {warning}"))

@@ -86,8 +86,8 @@ def simulate(
     """
     if scene.beam is None or scene.spring is None:
         raise ValueError("Algorithm 1 needs [beam] and [spring]")
-    if scene.loads or scene.massless or scene.beam.mesh == "none":
-        raise ValueError("Algorithm 1 knows no [[loads]] and needs a dynamic [beam] with a mesh")
+    if scene.loads or scene.massless:
+        raise ValueError("Algorithm 1 knows no [[loads]] and needs a dynamic [beam]")
     if start_velocity is None:
         start_velocity = "tip" if scene.contact.impact == "tip" else "rest"
     for name, value, kind in (("start_velocity", start_velocity, StartVelocity), ("y_temp", y_temp, YTemp)):

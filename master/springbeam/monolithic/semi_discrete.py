@@ -11,7 +11,7 @@ singular values of B, since eigenvalues of K carry an absolute error ε·ω_max�
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
@@ -111,13 +111,11 @@ def _gauss(points: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def assemble(beam: Beam) -> SemiDiscreteBeam:
-    """Assemble the beam of a scene; one without a mesh on elements too fine to tell.
+    """Assemble the beam of a scene.
 
     With ``reduced_integration`` the shear takes p Gauss points instead of p + 1.
     """
     n, p = beam.n_elements, beam.element_degree
-    if beam.mesh == "none":
-        n, p = beam.n_modes + 3, 12  # half a wave or less in an element: frequencies to rounding
     h = beam.length / n
     bending = beam.young_modulus * beam.second_moment_of_area
     shear = beam.shear_coefficient * beam.area * beam.shear_modulus
@@ -188,17 +186,10 @@ class ModalBeam:
     sampler: np.ndarray
     basis: np.ndarray
     alpha: float
-    static: np.ndarray | None = None  #: (N,) K⁻¹e, where modal forces make up for the modes left out (model.md)
 
     def force(self, load: np.ndarray) -> np.ndarray:
         """Return the modal forces, (r,), of a load vector (N,), other than the tip force's, b."""
-        modal = np.asarray(self.basis.T @ load)
-        return modal if self.static is None else self.completed(modal, float(self.static @ load))
-
-    def completed(self, modal: np.ndarray, deflection: float) -> np.ndarray:
-        """Return modal forces with what they lack for the static ``deflection`` of the tip [m]."""
-        compliance, raised = self.tip / self.omega**2, self.tip * (self.omega / self.omega[-1]) ** 4
-        return np.asarray(modal + (deflection - modal @ compliance) / (raised @ compliance) * raised)
+        return np.asarray(self.basis.T @ load)
 
     @property
     def inverse_tip_mass(self) -> float:
@@ -213,8 +204,6 @@ def modal_beam(beam: Beam) -> ModalBeam:
     u = x, θ = 0, whatever the loads and starts are; Rayleigh–Ritz in it.
     """
     discrete = assemble(beam)
-    if beam.mesh == "none":
-        return _without_mesh(discrete, beam)
     space = _augmented_space(discrete, beam) if 0 < beam.n_modes < discrete.size else np.eye(discrete.size)
     omega, basis = _rayleigh_ritz(discrete, space)
     load = beam.distributed_load * discrete.uniform_load + beam.tip_load_coefficient * discrete.hat_load
@@ -227,25 +216,6 @@ def modal_beam(beam: Beam) -> ModalBeam:
         basis=basis,
         alpha=beam.alpha_b,
     )
-
-
-def _without_mesh(discrete: SemiDiscreteBeam, beam: Beam) -> ModalBeam:
-    """Return the lowest modes with the compliance of the others spread over them, weights (ω/ω_n)⁴."""
-    basis = _lowest_modes(discrete, beam.n_modes)
-    omega = np.linalg.norm(discrete.B @ basis, axis=0)
-    L, x, static = beam.length, discrete.slope_shape[1::2], np.zeros(discrete.size)
-    bending = beam.young_modulus * beam.second_moment_of_area
-    static[0::2] = x * (L - 0.5 * x) / bending
-    static[1::2] = x**2 * (0.5 * L - x / 6.0) / bending
-    static[1::2] += x / (beam.shear_coefficient * beam.area * beam.shear_modulus)
-    sampler, tip = discrete.deflection_sampler() @ basis, basis[discrete.tip]
-    weight, modal = (omega / omega[-1]) ** 4, tip**2 / omega**2
-    tip = tip * np.sqrt(1.0 + max(static[discrete.tip] - modal.sum(), 0.0) / (weight @ modal) * weight)
-    sampler[-1] = tip
-    found = ModalBeam(omega, tip, np.zeros(0), np.zeros(0), sampler, basis, beam.alpha_b, static)
-    start = found.completed(omega**2 * (basis.T @ (discrete.M @ discrete.slope_shape)), L)
-    load = beam.distributed_load * found.force(discrete.uniform_load)
-    return replace(found, load=load, slope_shape=start / omega**2)
 
 
 def singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

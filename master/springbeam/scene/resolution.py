@@ -284,12 +284,7 @@ def _nth_frequency(beam: Beam, high: float) -> float:
 
 
 def mesh_frequency(beam: Beam) -> float:
-    """Return an estimate of the highest frequency of the mesh [rad/s], without one of the ``n_modes``-th wave."""
-    if beam.mesh == "none":
-        high = lowest_frequency(beam)
-        while modes_below(beam, high) <= beam.n_modes:
-            high *= 2.0
-        return _nth_frequency(beam, high)
+    """Return an estimate of the highest frequency of the mesh [rad/s]."""
     bending, shear = bending_stiffness(beam), shear_stiffness(beam)
     inertia, mass = beam.density * beam.second_moment_of_area, beam.density * beam.area
     return sqrt(_gradient(beam) * max(bending / inertia, shear / mass) + shear / inertia)
@@ -297,8 +292,6 @@ def mesh_frequency(beam: Beam) -> float:
 
 def shear_frequency(beam: Beam) -> float:
     """Return an estimate of the highest frequency of shear waves on the mesh [rad/s], which an impact sets off."""
-    if beam.mesh == "none":
-        return mesh_frequency(beam)
     return sqrt(_gradient(beam) * shear_stiffness(beam) / (beam.density * beam.area))
 
 

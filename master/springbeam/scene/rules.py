@@ -201,8 +201,6 @@ def _law_applies(scene: Scene, at: At) -> Iterator[str]:
         for table in ("beam", "spring", "stop"):
             if scene.under(table) is None:
                 yield f"{law}: Algorithm 1 needs a [{table}]"
-        if beam is not None and beam.mesh == "none":
-            yield f"{at('beam.mesh')}: {law} integrates the beam by (62), which needs a mesh"
         if beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf != 1.0:
             yield f"{at('beam.rho_inf')}: {law} is the midpoint rule, rho_inf = 1"
     if contact.facts.opens and contact.stiffness == 0.0:

@@ -137,7 +137,7 @@ def tip_reach(beam: Beam) -> float:
 
 def locking(beam: Beam) -> float:
     """Return the static tip stiffness of a fully integrated mesh over that of the beam (model.md, "Locking")."""
-    if beam.fidelity == "quasi_static" or beam.mesh == "none" or beam.reduced_integration or beam.element_degree > 2:
+    if beam.fidelity == "quasi_static" or beam.reduced_integration or beam.element_degree > 2:
         return 1.0
     bending, shear, h = bending_stiffness(beam), shear_stiffness(beam), beam.length / beam.n_elements
     if beam.element_degree == 1:

@@ -27,7 +27,7 @@ from .laws import LAWS, LawFacts, choices
 #: Up to this many unknowns all modes may be kept; the full eigenproblem grows with the cube.
 ALL_MODES_UP_TO = 1000
 #: Most modes of a mesh with more, and of the continuous beam.
-MOST_MODES, MOST_EXACT_MODES = 1000, 10_000
+MOST_MODES = 1000
 #: Most modes times unknowns: 40 bytes each while the modes are found, so 1 GB.
 MOST_MODE_VALUES = 25_000_000
 #: Most elements times their degree.
@@ -149,9 +149,6 @@ class Beam(Table):
         "–", "shear coefficient K", gt=0.0, otherwise="5/6 with width and height, 9/10 with diameter; needed with area"
     )
     alpha_b: float = key("s", "Kelvin–Voigt retardation time α_b", 0.0, ge=0.0)
-    mesh: Literal["none"] | None = key(
-        "–", "none: the n_modes lowest modes of the continuous beam", None, otherwise="elements of equal length"
-    )
     n_elements: int = key("–", "number of elements", 50, ge=1, le=MOST_ELEMENTS)
     element_degree: int = key("–", "degree of u and θ in an element; 1 is the paper's", 1, ge=1, le=12)
     n_modes: int = key("–", "number of lowest modes kept; 0 keeps all", 0, ge=0)
@@ -180,7 +177,6 @@ class Beam(Table):
     WAYS = (
         Ways("section", (("area", "second_moment_of_area"), ("width", "height"), ("diameter",))),
         Ways("shear stiffness", (("shear_modulus",), ("poisson_ratio",))),
-        Ways("mesh", (("n_elements", "element_degree", "reduced_integration", "mass_matrix"), ("mesh",))),
         Ways("velocity at the start", (("initial_velocity_slope",), ("approach_speed",))),
     )
     START = "initial_deflection_slope"
@@ -190,7 +186,7 @@ class Beam(Table):
     )
     #: Keys that are not the FMU's.
     GIVEN_ONLY: ClassVar[frozenset[str]] = frozenset(
-        ("width", "height", "diameter", "poisson_ratio", "approach_speed", "approach", "fidelity", "mesh")
+        ("width", "height", "diameter", "poisson_ratio", "approach_speed", "approach", "fidelity")
     )
 
     @classmethod
@@ -204,8 +200,6 @@ class Beam(Table):
             return 1.0
 
         follows: dict[str, Any] = {}
-        if data.get("mesh") == "none":
-            follows |= {"n_elements": 1, "element_degree": 1, "reduced_integration": False, "mass_matrix": "consistent"}
         b, h, d = number("width"), number("height"), number("diameter")
         if b is not None and h is not None:
             follows |= {"area": b * h, "second_moment_of_area": b * h * h * h / 12.0, "shear_coefficient": 5.0 / 6.0}
@@ -228,8 +222,8 @@ class Beam(Table):
 
     @property
     def unknowns(self) -> int:
-        """Unknowns of the mesh; without a mesh its modes."""
-        return self.n_modes if self.mesh == "none" else 2 * self.n_elements * self.element_degree
+        """Unknowns of the mesh."""
+        return 2 * self.n_elements * self.element_degree
 
     @property
     def modes_kept(self) -> int:
@@ -238,13 +232,6 @@ class Beam(Table):
 
     @model_validator(mode="after")
     def _modes_exist(self) -> Beam:
-        if self.mesh == "none":
-            if self.integrator == "modal" and not 1 <= self.n_modes <= MOST_EXACT_MODES:
-                raise ValueError(f'n_modes = {self.n_modes}: with mesh = "none" give 1 … {MOST_EXACT_MODES}, say 100')
-            for name, value in (("integrator", "modal"), ("tip_load_coefficient", 0.0)):
-                if (given := getattr(self, name)) != value:
-                    raise ValueError(f'{name} = {given}: needs a mesh, and mesh = "none"; leave one of them out')
-            return self
         unknowns, degree = self.unknowns, self.element_degree
         mesh = f"n_elements = {self.n_elements}" + (f" of element_degree = {degree}" if degree > 1 else "")
         if self.n_elements * degree > MOST_ELEMENTS:

@@ -42,7 +42,7 @@ _ROUNDING = 1e-12
 class Mesh:
     """What a run differs in."""
 
-    n_elements: int  #: 0: exact modes without a mesh
+    n_elements: int
     n_modes: int  #: kept; 0: all
     finer_steps: bool = False  #: what the time steps change
 
@@ -120,8 +120,6 @@ class Converge(Study):
             raise SceneError(f"{unknown[0]}: no such metric; there are {', '.join(METRICS)}")
         levels = 3 if self.quick else self.levels
         more = [RATIO**k for k in range(levels)]
-        if beam.mesh == "none":
-            return {"modes": [Mesh(0, beam.n_modes * k) for k in more]}
         found = {"elements": [Mesh(beam.n_elements * k, beam.n_modes) for k in more]}
         if beam.integrator == "modal" and beam.modes_kept >= more[-1]:
             fewer = [Mesh(beam.n_elements, beam.modes_kept // k) for k in more[:0:-1]]
@@ -137,8 +135,8 @@ class Converge(Study):
 
     def record(self, case: Mesh) -> Record:
         """Run one mesh. ``unknowns`` are the modes that take part; a value is ``None`` where it did not happen."""
-        mesh = {"n_elements": case.n_elements} if case.n_elements else {}
-        scene = with_changes(self.scene, beam={**mesh, "n_modes": case.n_modes})
+        mesh = {"n_elements": case.n_elements, "n_modes": case.n_modes}
+        scene = with_changes(self.scene, beam=mesh)
         if case.finer_steps:
             scene = _with_finer_steps(scene)
         assert scene.beam is not None
@@ -148,7 +146,7 @@ class Converge(Study):
             values = {name: METRICS[name](made) for name in quantities}
         except (RunStopped, SceneError) as stopped:  # a SceneError if the accuracy cannot be reached
             values, cause = dict.fromkeys(quantities), str(stopped)
-        mesh |= {"n_elements": case.n_elements, "n_modes": case.n_modes, "unknowns": scene.beam.modes_kept}
+        mesh["unknowns"] = scene.beam.modes_kept
         return {**mesh, "values": values, "seconds": perf_counter() - began, "cause": cause}
 
     def refinements(self, records: Mapping[str, Record]) -> list[Refinement]:

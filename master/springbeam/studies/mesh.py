@@ -40,11 +40,8 @@ def pick_mesh(scene: Scene) -> Trajectory:
     coarse: Trajectory | None = None
     before = error = math.inf
     factor = 1
-    exact = beam.mesh == "none"
     while beam.unknowns * factor <= ALL_MODES_UP_TO:
-        mesh = {"n_modes": factor * beam.n_modes}
-        if not exact:
-            mesh["n_elements"] = factor * beam.n_elements
+        mesh = {"n_modes": factor * beam.n_modes, "n_elements": factor * beam.n_elements}
         fine = pick(with_changes(scene, accuracy=_SHARE * asked, beam=mesh))
         if coarse is not None:
             apart = differences(coarse, fine, _SHORT)
@@ -57,8 +54,7 @@ def pick_mesh(scene: Scene) -> Trajectory:
                 return fine
             before = difference
         coarse, factor = fine, RATIO * factor
-    kind, count = ("modes", beam.n_modes) if exact else ("elements", beam.n_elements)
-    reached = f"{factor // RATIO * count} {kind} still leave some {error:.1e}"
+    reached = f"{factor // RATIO * beam.n_elements} elements still leave some {error:.1e}"
     raise SceneError(
         f"accuracy = {asked:g} with the mesh: not reached, {reached}; ask for less, shorten [time] t_end, or take "
         "elements of a higher degree where the motion is smooth (springbeam converge shows what settles)"

@@ -15,9 +15,7 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
     beam, spring, stop, contact = scene.beam, scene.spring, scene.stop, scene.contact
     if beam is not None:
         mesh = "no inertia" if beam.fidelity == "quasi_static" else f"{beam.n_elements} elements"
-        if beam.fidelity == "dynamic" and beam.mesh == "none":
-            mesh = f"{beam.n_modes} exact modes"
-        elif beam.fidelity == "dynamic" and beam.n_modes:
+        if beam.fidelity == "dynamic" and beam.n_modes:
             mesh += f", {beam.n_modes} modes"
         mass = beam.density * beam.area * beam.length
         stiffness = f"EI = {bending_stiffness(beam):.4g} N·m², KAG = {shear_stiffness(beam):.4g} N"

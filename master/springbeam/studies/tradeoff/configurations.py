@@ -104,7 +104,7 @@ def _adaptive(scene: Scene) -> Iterator[Configuration]:
 def finer(scene: Scene) -> Scene | None:
     """Return the scene with elements of higher degree, which stand for the continuum; ``None`` if that is too large."""
     beam = scene.beam
-    if beam is None or beam.integrator != "modal" or beam.mesh == "none":
+    if beam is None or beam.integrator != "modal":
         return None
     degree = min(_HIGHEST_DEGREE, ALL_MODES_UP_TO // (2 * beam.n_elements))
     if degree < 2 * beam.element_degree:
