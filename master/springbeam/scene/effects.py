@@ -47,7 +47,7 @@ def _integrator(scene: Scene) -> str | None:
 
 def effects() -> tuple[Effect, ...]:
     """Return where the keys count that do not always."""
-    mesh = ("element_degree", "reduced_integration", "mass_matrix", "mesh")
+    mesh = ("element_degree", "reduced_integration", "mass_matrix")
     return (
         Effect(tuple(f"beam.{key}" for key in mesh), _dynamic, 'it counts with fidelity = "dynamic"'),
         Effect(
