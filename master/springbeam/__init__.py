@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .bodies.protocol import Body, Energies, Motion
     from .results.trajectory import Event, Trajectory
     from .run.outcome import RunStopped
-    from .run.runner import resume
+    from .run.runner import Simulation, resume
     from .scene import Scene, SceneError, load_scene, with_changes
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "RunStopped",
     "Scene",
     "SceneError",
+    "Simulation",
     "SpringDamper",
     "Trajectory",
     "__version__",
@@ -44,7 +45,7 @@ _HOME = {
         "bodies.protocol": ("Body", "Energies", "Motion"),
         "results.trajectory": ("Event", "Trajectory"),
         "run.outcome": ("RunStopped",),
-        "run.runner": ("resume",),
+        "run.runner": ("Simulation", "resume"),
         "scene": ("Scene", "SceneError", "load_scene", "with_changes"),
     }.items()
     for name in names

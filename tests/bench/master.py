@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from ctypes import c_size_t
 from time import process_time, thread_time
 from typing import Any
@@ -22,7 +21,7 @@ from springbeam.bodies.functions import Functions
 from springbeam.monolithic import algorithm1
 from springbeam.results.recording import MemoryRecorder
 from springbeam.results.trajectory import Trajectory
-from springbeam.run.simulation import Simulation
+from springbeam.run.master import Master
 from springbeam.scene import Scene
 
 #: The calls of a macro step; those before the first one are set-up.
@@ -120,10 +119,6 @@ def master(effort: Effort) -> Iterator[Row]:
             return
 
 
-class _Enough(Exception):
-    pass
-
-
 def profile(effort: Effort) -> Iterator[Row]:
     """Parts of a macro step, each repeated by itself in the middle of the first tied phase of `soft`."""
     scene = load_scene("soft")
@@ -131,21 +126,20 @@ def profile(effort: Effort) -> Iterator[Row]:
     assert isinstance(beam, FmuBeam)
     assert spring is not None
 
-    def progress(time: float, phase: str, macro_steps: int) -> None:
-        if macro_steps == 20:
-            raise _Enough
-
-    recorder = MemoryRecorder(scene)
-    simulation = Simulation(scene, 0.0, beam, spring, recorder, progress)
-    with suppress(_Enough):
-        simulation._run()
-    state, pair, detector = simulation._state, simulation._pair, simulation._detector
+    master = Master(scene, 0.0, beam, spring, MemoryRecorder(scene))
+    for _ in range(20):
+        master.step()
+    state, pair, detector = master.state, master._pair, master._detector
     start, H = pair.ends(), scene.coupling.H
     pair.mark()
     step = pair.attempt(state, H, start)
     end = pair.ends()
-    energies = pair.energies(end)
-    simulation._rows._next_shape, simulation._rows._shapes_left = float("inf"), 0
+    master._next_shape, master._shapes_left = float("inf"), 0
+
+    def recorded(number: int) -> None:
+        for _ in range(number):
+            master._record(step, end)
+        master.hand_over()
 
     def stepped(body: FmuBeam | FmuSpring) -> None:
         body.rewind()
@@ -158,10 +152,10 @@ def profile(effort: Effort) -> Iterator[Row]:
         "of it, the spring set back and stepped": lambda: stepped(spring),
         "is an event due at the start": lambda: detector.at_start(state, start),
         "does one come inside": lambda: detector.first_event(state, step),
-        "a row: energies, ledger, recorder": lambda: simulation._rows.write(state, step),
+        "its record": lambda: master._record(step, end),
         "of it, energies of both bodies": lambda: pair.energies(end),
-        "of it, the ledger": lambda: simulation._balance.ledger.book(*energies),
-        "a shape (400 a run)": lambda: recorder.shape(1.0, beam.shape()),
+        "256 records checked and kept, and made": lambda: recorded(256),
+        "a shape (400 a run)": lambda: master._shape(beam, early=False),
     }
     calls = 10 if effort.quick else 2000
     pair.rewind()  # which is where bodies are marked

@@ -25,8 +25,8 @@ from springbeam.monolithic.loads import Loads
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.recording import MemoryRecorder
 from springbeam.results.trajectory import Trajectory
+from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped
-from springbeam.run.simulation import Simulation
 from springbeam.scene import Beam, Scene
 
 
@@ -281,13 +281,14 @@ def stopping(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> tuple[Tr
     """The run of `simulate`, and what stopped it."""
     beam, spring = wrap(*bodies(scene))
     recorder = MemoryRecorder(scene)
-    simulation = Simulation(scene, (scene.contact_time or 0.0), beam, spring, recorder)
+    master = Master(scene, (scene.contact_time or 0.0), beam, spring, recorder)
     stopped = None
     try:
-        simulation.run()
+        while not master.done:
+            master.step()
     except RunStopped as error:
         stopped = error
-    recorder.finish(simulation.summary())
+    recorder.finish(master.summary())
     trajectory = recorder.trajectory()
     trajectory.summary["work"] = {
         name: body.steps for name, body in (("beam", beam), ("spring", spring)) if hasattr(body, "steps")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from springbeam.results.steps import STEP, STEP_COLUMNS
 from springbeam.results.trajectory import EVENT_KINDS, Event, Trajectory, columns_of
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
@@ -49,6 +50,24 @@ def a_trajectory(scene=PAIR, n=400, events=(), **columns):
     shapes = None if scene.beam is None else (t, np.outer(np.sin(9.0 * t), SHAPE_POINTS**2))
     ordered = {name: made[name] for name in columns_of(scene)}
     return Trajectory(scene, ordered, list(events), shapes, {})
+
+
+def block(n=300, scene=PAIR, t_end=3.0, begin=0):
+    """Records of ``n`` steps up to ``t_end``, in every phase, with an event every tenth step, and shapes.
+
+    A run may have several, of which ``begin`` steps came before.
+    """
+    rng = np.random.default_rng(n + begin)
+    steps = np.zeros(n, STEP)
+    for name in STEP_COLUMNS:
+        steps[name] = rng.normal(size=n)
+    number = np.arange(begin, begin + n)
+    steps["time"], steps["size"] = t_end * number / max(begin + n - 1, 1), np.where(number % 7, t_end / n, 0.0)
+    steps["phase"], steps["events"], steps["energy_at_start"] = number % 6, (number + 9) // 10, 0.25
+    happen = number[number % 10 == 1]
+    events = [Event(float(steps["time"][i - begin]), "impact", 0.5, -1.0, None, 0.1 * i) for i in happen]
+    shapes = np.column_stack([steps["time"], rng.normal(size=(n, 21))]) if scene.beam is not None else np.empty((0, 22))
+    return steps, events, shapes
 
 
 EVERY_EVENT = [Event(0.05 * (i + 1), kind, 0, 0, 0, 0, 0.1, 0.2, 0.3) for i, kind in enumerate(EVENT_KINDS)]

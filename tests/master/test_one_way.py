@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,13 @@ import pytest
 from bodies import simulate, stopping, unit_beam
 
 from springbeam.bodies.elements import RigidWall
-from springbeam.bodies.protocol import NO_FORCE, Motion
+from springbeam.bodies.protocol import NO_FORCE, Force, Motion
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.one_way import OneWay
 from springbeam.coupling.projection import Projection
 from springbeam.coupling.protocol import Step, Window
+from springbeam.results.steps import STEP
+from springbeam.run.neglect import Past, neglected
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import Beam, Scene, SceneError, load_scene, statics, with_changes
 
@@ -102,34 +105,50 @@ def test_both_ends_known_leave_nothing_to_solve() -> None:
     beam, start = unit_beam(6), 1e-3
     beam.mark()
     law = Compliance(*LAW)
-    one_way = OneWay(law, 0, 1e-12, upper_drives=True, driver_stiffness=1e6)
+    one_way = OneWay(law, 0, 1e-12, upper_drives=True)
     ends = (beam.motion()._replace(displacement=-start), RigidWall(0.0).motion())
     force = one_way.solve(beam, RigidWall(0.0), Window(0.0, 0.01, ends), (5.0, 0.0, 0.0))
     assert force == (Projection(law, 0).force(start, 0.01, [-beam.motion().displacement])[0], 0.0, 0.0)
     assert beam.steps == 1
 
 
-def test_the_accounts_are_those_of_the_docstring() -> None:
-    one_way = OneWay(Compliance(*LAW), 0, 1e-12, upper_drives=True, driver_stiffness=50.0)
-    assert one_way.neglected() == (0.0, 0.0)
+def test_the_work_on_the_end_that_does_not_feel_the_force_is_booked() -> None:
+    one_way = OneWay(Compliance(*LAW), 0, 1e-12, upper_drives=True)
     tip = 0.0
     for force, moved, depth in ((2.0, -0.1, 0.02), (5.0, 0.2, 0.05), (1.0, 0.3, 0.01), (0.0, 0.0, -0.2)):
         before, tip = tip, tip + moved
         ends = [(Motion(u, 0.0, 0.0, 0.0), Motion(u + depth, 0.0, 0.0, 0.0)) for u in (before, tip)]
         one_way.accept(Step(0.0, 1.0, (force, 0.0, 0.0), NO_FORCE, *ends))
-    left_out = one_way.neglected()
-    assert left_out.motion == pytest.approx(2.0 * (2.0 + 3.0 + 4.0 + 1.0) / 50.0)
-    assert left_out.share == pytest.approx(left_out.motion / 0.05)
     assert one_way.booking(ends[1]).unfelt == pytest.approx(2.0 * -0.1 + 5.0 * 0.2 + 1.0 * 0.3)
 
 
-@pytest.mark.parametrize("degree", [0, 1, 2])
-def test_the_bound_counts_the_turns_of_a_polynomial_force(degree: int) -> None:
+def steps_under(forces: Iterable[Force], depths: Iterable[float]) -> np.ndarray:
+    """Steps of 1 s under these forces, at whose ends the tip has sunk so deep [m]."""
+    table = np.array(list(forces))
+    steps = np.zeros(len(table), STEP)
+    steps["size"], steps["y"] = 1.0, list(depths)
+    for name, values in zip(("", "_rate", "_rate_2"), table.T, strict=True):
+        steps[f"contact_force{name}"] = values
+    return steps
+
+
+def test_what_is_neglected_is_twice_the_variation_of_the_force_over_the_stiffness() -> None:
+    """In one look or in several."""
+    steps = steps_under([(c, 0.0, 0.0) for c in (2.0, 5.0, 1.0, 0.0)], [0.02, 0.05, 0.01, -0.2])
+    bound = neglected(steps, 50.0, Past())
+    assert bound.motion == pytest.approx(2.0 * np.cumsum([2.0, 3.0, 4.0, 1.0]) / 50.0)
+    assert bound.share == pytest.approx(bound.motion / [0.02, 0.05, 0.05, 0.05])
+    past = Past()
+    for part in (steps[:1], steps[1:3], steps[3:]):
+        motion, _, past = neglected(part, 50.0, past)
+    assert motion[-1] == bound.motion[-1]
+    assert past == bound.past
+
+
+def test_the_bound_counts_the_turns_of_a_polynomial_force() -> None:
     """∫|Ċ| of 1 − 6τ + 6τ² over [0, 1]: from 1 down to −1/2 and up again, 3; the jump to its start, 1."""
-    one_way = OneWay(Compliance(*LAW), degree, 1e-12, upper_drives=True, driver_stiffness=2.0)
-    ends = (Motion(0.0, 0.0, 0.0, 0.0), Motion(0.0, 0.0, 0.0, 0.0))
-    one_way.accept(Step(0.0, 1.0, [(1.0, 0.0, 0.0), (1.0, -6.0, 0.0), (1.0, -6.0, 12.0)][degree], NO_FORCE, ends, ends))
-    assert one_way.neglected().motion == pytest.approx([1.0, 7.0, 4.0][degree])
+    for force, expected in (((1.0, 0.0, 0.0), 1.0), ((1.0, -6.0, 0.0), 7.0), ((1.0, -6.0, 12.0), 4.0)):
+        assert neglected(steps_under([force], [0.0]), 2.0, Past()).motion[0] == pytest.approx(expected)
 
 
 def test_a_run_stops_when_the_bound_passes_the_tolerance() -> None:

@@ -12,11 +12,11 @@ from bodies import DuffingBody, Upper, simulate, stopping
 from references import dips, kinds
 from scenes import scene_from_dict
 
-from springbeam.bodies.protocol import NO_FORCE, Energies, StepRefused
-from springbeam.coupling.protocol import Booking
+from springbeam.bodies.protocol import NO_FORCE, StepRefused
 from springbeam.monolithic import event_driven
+from springbeam.results.steps import STEP
 from springbeam.results.trajectory import Event, Trajectory
-from springbeam.run.ledger import Ledger, bounds
+from springbeam.run.ledger import bounds, errors
 from springbeam.scene import Scene, load_scene, with_changes
 from springbeam.scene.reading import tomllib
 
@@ -381,12 +381,20 @@ def test_the_ledger_closes(degree, size):
 
 def test_a_residual_is_relative_to_the_largest_energy_so_far_that_of_the_contact_included():
     """1 J at first; a load then does 99 J of work, which the contact stores but for 1 mJ; and all comes back."""
-    ledger, nothing = Ledger(), Energies(0.0, 0.0, 0.0, 0.0)
-    for beam, stored in ((1.0, 0.0), (0.0, 99.999), (1.0, 0.0)):
-        energies = Energies(beam, 0.0, 0.0, -99.0 if stored else 0.0)
-        ledger.book(energies, nothing, Booking(stored))
-    assert ledger.relative == pytest.approx(1e-3 / 99.999, rel=1e-9)
-    assert ledger.gain == 0.0
+    steps = np.zeros(3, STEP)
+    steps["beam_kinetic"], steps["law_stored"], steps["beam_load"] = (
+        [1.0, 0.0, 1.0],
+        [0.0, 99.999, 0.0],
+        [0.0, -99.0, 0],
+    )
+    steps["energy_at_start"] = 1.0
+    scene = soft()
+    whole = errors(scene, steps, steps[:1], 0.0, of_interface=False)
+    assert whole.share == pytest.approx([0.0, -1e-3 / 99.999, 0.0], rel=1e-9)
+    assert whole.scale.tolist() == [1.0, 99.999, 99.999]
+    # Looked at one by one they are judged alike.
+    part = errors(scene, steps[2:], steps[:1], 99.999, of_interface=False)
+    assert (part.share, part.scale) == (whole.share[2:], whole.scale[2:])
 
 
 @pytest.mark.parametrize(("tolerance", "warns"), [(1e-13, 1e-8), (1e-12, 1e-8), (1e-9, 1e-5), (1e-3, 1e-3)])

@@ -29,6 +29,8 @@ def steps_with(force, ends, tip=lambda t: -t, rate=lambda t: -1.0, once=None):
             steps[name][k] = value
         if once is not None:
             steps["u_tip_integral"][k], steps["u_tip_integral_2"][k] = once(start, ends[k])
+    for name in ("u_tip", "v_tip"):
+        steps[f"{name}_after"] = steps[name]
     return steps
 
 
@@ -173,6 +175,7 @@ def test_the_deepest_place_may_follow_an_event():
     """At 0.5 the tip is thrown down from −1: it goes on as −1 − (t − ½) + 2 (t − ½)², lowest at 0.75."""
     before, after = np.polynomial.Polynomial([-2.0, 2.0]), np.polynomial.Polynomial([0.0, -3.0, 2.0])
     steps = np.append(moving([0.0, 0.5], before), moving([0.5, 1.0], after)[1:])
+    steps["v_tip_after"][1] = -1.0
     numbers = found(steps, Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))
     assert numbers["deepest_tip"] == -2.0
     numbers = found(moving([0.5, 1.0], after), Event(0.5, "separation", y=-2.0, z=0.0, u_tip=-1.0, v_tip=-1.0))

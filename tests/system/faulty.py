@@ -17,9 +17,9 @@ import pytest
 
 from springbeam.bodies import functions
 from springbeam.bodies.fmu_bodies import release
-from springbeam.run import detection, simulation
+from springbeam.run import detection
+from springbeam.run.master import Master
 from springbeam.run.paper_law import PaperLaw
-from springbeam.run.rows import Rows
 from springbeam.run.stepping import Pair
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
@@ -180,9 +180,9 @@ def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
     watch(Pair, "attempt", phase)
     for owner, name, where in (
         (Pair, "rewind", "rollback"),
-        (Rows, "write", "row"),
+        (Master, "_record", "row"),
         (detection, "locate", "location"),
-        (simulation.Simulation, "_act", "event"),
+        (Master, "_act", "event"),
         (PaperLaw, "_step", "paper"),
     ):
         watch(owner, name, lambda *_, where=where: where)

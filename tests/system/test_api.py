@@ -118,14 +118,56 @@ def test_rows_at_an_interval_are_those_of_at(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     printed("run", "soft", "--set=time.t_end=0.1", "--out=rows", "--no-plots", "--output-interval=3e-3")
     printed("run", "soft", "--set=time.t_end=0.1", "--out=all", "--no-plots")
-    rows, every = springbeam.load("rows"), springbeam.load("all")
-    assert np.array_equal(rows.time, 3e-3 * np.arange(34))
-    expected = every.at(rows.time)
+    every = springbeam.load("all")
+    expected = every.at(3e-3 * np.arange(34))
+    rows = np.genfromtxt("rows/trajectory.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    assert list(rows.dtype.names) == list(every.columns)
     for name in every.columns:
         assert np.array_equal(rows[name], expected[name]), name
-    assert rows.events == every.events
-    with pytest.raises(ValueError, match="output interval"):
-        rows.at(0.01)
+    # The run itself is there as well.
+    assert np.array_equal(springbeam.load("rows").time, every.time)
+
+
+def test_a_run_is_made_step_by_step(fmu_folder):
+    """To the same bits as at once; on the way it is a trajectory as any other."""
+    scene = with_changes(load_scene("soft"), time={"t_end": 0.1}, beam={"n_elements": 8})
+    whole = springbeam.simulate(scene)
+    with springbeam.Simulation(scene) as sim:
+        assert len(sim.run) == 0
+        steps = 0
+        while sim.step():
+            steps += 1
+            if steps == 40:
+                halfway = sim.run
+                assert halfway.summary["status"] == "running"
+                assert halfway.time[-1] == sim.state.time
+                assert halfway.phase[-1] == sim.state.phase.name
+                assert np.array_equal(halfway.at(0.00512).y, whole.at(0.00512).y)
+        assert sim.done
+        assert len(whole) == steps + 2  # the start, and the last step
+        assert sim.run.steps.tobytes() == whole.steps.tobytes()
+        assert sim.run.summary["status"] == "done"
+        assert not sim.step()
+    assert halfway.steps.tobytes() == whole.steps[:41].tobytes()
+
+
+def test_a_run_that_stops_brings_what_it_has_computed(fmu_folder):
+    scene = with_changes(
+        load_scene("soft"),
+        beam={"n_elements": 10},
+        contact={"law": "compliance", "exponent": 1.5},
+        coupling={"scheme": "gauss_seidel", "macro_step": 1e-3},
+    )
+    with pytest.raises(springbeam.RunStopped, match="has changed the energy") as stopped:
+        springbeam.simulate(scene)
+    run = stopped.value.run
+    assert run.time[-1] == stopped.value.time > 0.1
+    assert run.summary["status"] == "stopped"
+    # The step at which too much has changed is the last one, whoever looked at it later.
+    scale = np.maximum.accumulate(np.abs(run.e_beam) + np.abs(run.e_spring) + run.e_contact)
+    share = np.abs(run.energy_residual) / scale
+    assert share[-1] > 0.1 >= share[:-1].max()
+    assert all(event.time <= run.time[-1] for event in run.events)
 
 
 def test_to_pandas_and_xarray(run):

@@ -151,7 +151,7 @@ DAMAGE = {
     "": [
         *(partial(checksummed, b"", content) for content in (b"[]", b"[" * 100_000, b"nonsense")),
         partial(checksummed, b'"version"', b'"vision"'),
-        partial(checksummed, b'"_macro_steps"', b'"_micro_steps"'),
+        partial(checksummed, b'"macro_steps"', b'"micro_steps"'),
         partial(checksummed, b'"$Joint"', b'"$Phase"'),
         partial(checksummed, b'"$bytes": "', b'"$bytes": "!'),
         partial(checksummed, b'"$bytes": "c3By', b'"$bytes": "AAAA'),
@@ -257,12 +257,11 @@ def test_rows_reach_the_disk_before_the_checkpoint_that_counts_them(tmp_path, mo
     recorder = FileRecorder(SCENE, RunDirectory.create(tmp_path / "run"))
     with recorder, pytest.raises(KeyboardInterrupt):
         runner.run(SCENE, recorder, Interrupt(2), seconds=0.0)
-    at = calls.index(("fsync", "trajectory.csv"))
-    assert calls[at : at + 7] == [
-        ("fsync", "trajectory.csv"),
+    at = calls.index(("fsync", "shapes.csv"))
+    assert calls[at : at + 6] == [
+        ("fsync", "shapes.csv"),
         ("fsync", "events.csv"),
         ("fsync", "steps.bin"),
-        ("fsync", "shapes.csv"),
         ("fsync", "run.checkpoint.part"),
         ("replace", "run.checkpoint.part"),
         ("fsync", "run"),
@@ -347,7 +346,7 @@ def test_a_run_without_room_ends_with_3_and_goes_on_where_there_is(tmp_path, lon
     import resource
 
     run = started(tmp_path / "run")
-    limit = (tmp_path / "run" / "trajectory.csv").stat().st_size + 50_000
+    limit = (tmp_path / "run" / "steps.bin").stat().st_size + 50_000
     resource.prlimit(run.pid, resource.RLIMIT_FSIZE, (limit, limit))
     _, errors = run.communicate(timeout=HANGS)
     assert run.returncode == 3
@@ -358,9 +357,9 @@ def test_a_run_without_room_ends_with_3_and_goes_on_where_there_is(tmp_path, lon
     trajectory = load_trajectory(tmp_path / "run")
     assert trajectory.summary["status"] == "stopped"
     assert "File too large" in trajectory.summary["cause"]
-    cut = (tmp_path / "run" / "trajectory.csv").read_bytes()
+    cut = (tmp_path / "run" / "steps.bin").read_bytes()
     assert len(cut) == limit
-    assert (long / "trajectory.csv").read_bytes().startswith(cut)
+    assert (long / "steps.bin").read_bytes().startswith(cut)
     printed("resume", tmp_path / "run", "--no-plots", "-q")
     assert written(tmp_path / "run") == written(long)
 

@@ -32,6 +32,7 @@ PROGRAMS = {
     ("scripting.md", 1): r"largest difference of y: \d\.\de-1[0-4] m\nenergy residual: \d\.\de-1[0-9]",
     ("scripting.md", 2): r"^[1-9]\d* strokes?, energy residual \d\.\de-1[0-9]",
     ("api.md", 0): r"contact_impulse    0\.9873\ncontact_force_max  9\.97\d?\ncontact_duration   0\.1444\n.*\n\[-0\.00",
+    ("api.md", 1): r"^0\.1 tied \[-0\.00874",
     (
         "tools.md",
         0,

@@ -21,7 +21,7 @@ from hypothesis import HealthCheck, event, given, seed, settings
 from hypothesis import strategies as st
 
 from springbeam.results.reading import load_trajectory
-from springbeam.run.rows import Rows
+from springbeam.run.master import Master
 from springbeam.scene import Scene, SceneError, load_scene
 from springbeam.studies.stability.cells import PARAMETERS, scene_dict
 
@@ -121,12 +121,12 @@ def interrupting(write: Callable[..., None]) -> Callable[..., None]:
     """Ctrl-C for a run of many rows: adaptive steps may be small, and bouncing without end."""
     rows = 0
 
-    def written(self: Rows, state: Any, step: Any) -> None:
+    def written(self: Master, step: Any, ends: Any) -> None:
         nonlocal rows
         rows += 1
         if rows > MOST_ROWS:
             raise KeyboardInterrupt
-        write(self, state, step)
+        write(self, step, ends)
 
     return written
 
@@ -142,7 +142,7 @@ def check(text: str) -> None:
         except SceneError:
             pass
         with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
-            patch.setattr(Rows, "write", interrupting(Rows.write))
+            patch.setattr(Master, "_record", interrupting(Master._record))
             warnings.simplefilter("error")  # numpy's, of overflow
             result = command("run", path, "--out", out, "--no-plots", "-q")
         event(f"exit code {result.exit_code}")

@@ -16,7 +16,7 @@ from commands import command
 from springbeam import load_scene, simulate, with_changes
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.ledger import APPROXIMATE, EXACT, bounds
-from springbeam.run.simulation import Simulation
+from springbeam.run.master import Master
 from springbeam.scene import Contact, Coupling, SceneError
 from springbeam.studies.stability import grid
 from springbeam.studies.stability.cells import COUPLINGS, PARAMETERS, SLICES, sampled_cells, scene_dict, slice_cells
@@ -133,7 +133,7 @@ def test_what_cannot_be_run_is_refused_and_a_crash_is_garbage(monkeypatch):
     def crash(*_: object) -> None:
         raise ZeroDivisionError("nothing there")
 
-    monkeypatch.setattr(Simulation, "_advance", crash)
+    monkeypatch.setattr(Master, "_advance", crash)
     outcome = run_cell(slice_cells(2)[0])
     assert (outcome.kind, outcome.reason) == ("garbage", "crashed: ZeroDivisionError: nothing there")
 

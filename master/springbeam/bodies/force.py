@@ -44,13 +44,6 @@ def work_on(force: Force, start: Motion, end: Motion, size: float) -> float:
     return value(force, size) * (end.displacement - w0) - force[1] * once - force[2] * (size * once - twice)
 
 
-def variation(force: Force, size: float) -> float:
-    """Return ∫ |Ċ| dτ [N] over a step."""
-    turn = -force[1] / force[2] if force[2] != 0.0 else 0.0
-    values = [force[0], value(force, turn) if 0.0 < turn < size else force[0], value(force, size)]
-    return abs(values[1] - values[0]) + abs(values[2] - values[1])
-
-
 def sign_changes(force: Force, size: float) -> list[float]:
     """Return where C passes through zero inside the step, ascending."""
     c, b, a = force[0], force[1], 0.5 * force[2]

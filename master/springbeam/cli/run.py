@@ -15,9 +15,8 @@ from rich.text import Text
 
 from ..bodies.protocol import FmuError
 from ..results.directory import RunDirectory
-from ..results.file_recorder import FileRecorder, leave_rows_at_multiples
+from ..results.file_recorder import FileRecorder
 from ..results.reading import load_summary, load_trajectory
-from ..results.recording import NonFiniteValue, replay
 from ..results.trajectory import Trajectory
 from ..run.checkpoint import Checkpoint
 from ..scene import Scene, load_scene
@@ -171,11 +170,10 @@ def carry_out(
 ) -> None:
     """Run ``scene`` into ``directory``, from ``start`` if given, and report; see `springbeam.run.runner.run`.
 
-    A run that is already ``made`` is only written. With an ``interval`` [s] the rows at its multiples take the place of
-    those of the steps, when all else is done.
+    A run that is already ``made`` is only written; ``interval`` as of `FileRecorder`.
     """
     console = console_for(silent=quiet or as_json)
-    recorder = FileRecorder(scene, directory)
+    recorder = FileRecorder(scene, directory, interval)
     try:
         with bad_input_reported():
             error = _run_into(recorder, seconds, start, made, quiet=quiet)
@@ -183,11 +181,7 @@ def carry_out(
         if not recorder.begun:
             directory.discard()
     report(console, directory, scene)
-    left = (
-        None if no_plots else _draw(console, directory),
-        None if interval is None else _thin_out(directory, interval),
-    )
-    for trouble in filter(None, left):
+    if not no_plots and (trouble := _draw(console, directory)) is not None:
         error = error or f"{trouble}; what was computed is in {directory.path}"
     if as_json:
         print_json({"directory": directory.path, **load_summary(directory.path)})
@@ -209,15 +203,6 @@ def _draw(console: Console, directory: RunDirectory) -> str | None:
         return f"no pictures: {cause_of(error, directory.path)}"
     if pictures:
         console.print(Text(f"pictures  {directory.path / '*.png'} ({len(pictures)})"), soft_wrap=True)
-    return None
-
-
-def _thin_out(directory: RunDirectory, interval: float) -> str | None:
-    """Leave the rows at multiples of ``interval`` [s]; return why they could not be written, or ``None``."""
-    try:
-        leave_rows_at_multiples(directory, interval)
-    except OSError as error:
-        return f"rows of every step: {cause_of(error, directory.path)}"
     return None
 
 
@@ -262,12 +247,12 @@ def _run_into(
     with recorder, _ProgressBar(t_end, quiet=quiet) as progress, watched(last_words):
         try:
             if made is not None:
-                replay(made, recorder)
+                recorder.write(made)
             else:
                 run_scene(recorder.scene, recorder, progress, seconds=seconds, start=start)
             return None
-        except (RunStopped, NonFiniteValue, OSError, FmuError, KeyboardInterrupt) as error:
-            if not recorder.begun and not isinstance(error, RunStopped | NonFiniteValue):
+        except (RunStopped, OSError, FmuError, KeyboardInterrupt) as error:
+            if not recorder.begun and not isinstance(error, RunStopped):
                 raise
             cause = cause_of(error, recorder.directory.path)
             if isinstance(error, KeyboardInterrupt):

@@ -42,6 +42,11 @@ class Phase:
         """Name in the column ``phase``."""
         return "seated" if self.seated else self.joint.value
 
+    @cached_property
+    def number(self) -> float:
+        """Number in a record (`springbeam.results.steps.PHASE_NAMES`)."""
+        return float(list(Joint).index(self.joint) + 3 * self.seated)
+
 
 @dataclass(frozen=True)
 class Impact:

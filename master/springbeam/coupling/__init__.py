@@ -32,7 +32,4 @@ def coupling_of(scene: Scene, law: Law) -> Coupling:
         return Exchange(law, asked.scheme == "gauss_seidel", asked.degree)
     if asked.feedback == "two_way":
         return SoftSolver(law, asked.degree, asked.tolerance)
-    stiffness = scene.driver_stiffness
-    assert stiffness is not None
-    drives = asked.feedback == "beam_drives"
-    return OneWay(law, asked.degree, asked.tolerance, upper_drives=drives, driver_stiffness=stiffness)
+    return OneWay(law, asked.degree, asked.tolerance, upper_drives=asked.feedback == "beam_drives")

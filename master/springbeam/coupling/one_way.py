@@ -21,12 +21,12 @@ from ..bodies.elements import Prescribed
 from ..bodies.protocol import Body, Ends, Force
 from ..contact.laws import SoftLaw
 from .projection import penetration
-from .protocol import Booking, Neglected, Step, Window
+from .protocol import Booking, Step, Window
 from .soft import SoftSolver
 
 
 class OneWay(SoftSolver):
-    """Coupling that one end does not feel, and what has been neglected.
+    """Coupling that one end does not feel; `springbeam.run.neglect` bounds what is left out.
 
     Parameters
     ----------
@@ -34,18 +34,13 @@ class OneWay(SoftSolver):
         As of `SoftSolver`.
     upper_drives
         Whether the upper body drives the lower one, or the lower the upper.
-    driver_stiffness
-        k: static force per displacement of the driving end [N/m].
     """
 
-    CHECKPOINTED = (*SoftSolver.CHECKPOINTED, "_variation", "_force", "_deepest", "_work")
+    CHECKPOINTED = (*SoftSolver.CHECKPOINTED, "_work")
 
-    def __init__(
-        self, law: SoftLaw, degree: int, tolerance: float, *, upper_drives: bool, driver_stiffness: float
-    ) -> None:
+    def __init__(self, law: SoftLaw, degree: int, tolerance: float, *, upper_drives: bool) -> None:
         super().__init__(law, degree, tolerance)
-        self._upper_drives, self._stiffness = upper_drives, driver_stiffness
-        self._variation = self._force = self._deepest = 0.0
+        self._upper_drives = upper_drives
         self._work = 0.0  #: of the contact force on the driving end, which does not feel it [J]
 
     def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
@@ -62,18 +57,9 @@ class OneWay(SoftSolver):
 
     def accept(self, step: Step) -> None:
         super().accept(step)
-        contact, size = step.contact, step.size
-        self._variation += abs(contact[0] - self._force) + force.variation(contact, size)
-        self._force = force.value(contact, size)
-        tip, low = step.end
-        self._deepest = max(self._deepest, low.displacement - tip.displacement)
         driver = 0 if self._upper_drives else 1
-        work = force.work_on(contact, step.start[driver], step.end[driver], size)
+        work = force.work_on(step.contact, step.start[driver], step.end[driver], step.size)
         self._work += work if self._upper_drives else -work
 
     def booking(self, ends: Ends) -> Booking:
         return super().booking(ends)._replace(unfelt=self._work)
-
-    def neglected(self) -> Neglected:
-        motion = 2.0 * self._variation / self._stiffness
-        return Neglected(motion, motion / self._deepest if self._deepest > 0.0 else 0.0)

@@ -44,13 +44,6 @@ class Booking(NamedTuple):
 NOTHING_BOOKED = Booking()
 
 
-class Neglected(NamedTuple):
-    """Motion of a driving end that one-way coupling leaves out, at most."""
-
-    motion: float  #: [m]
-    share: float  #: of the largest penetration so far
-
-
 class Scales(NamedTuple):
     """What the errors of a step are relative to."""
 
@@ -98,10 +91,6 @@ class Coupling(Checkpointed):
         ``reduced_mass`` is that of both ends [kg].
         """
         return step.contact
-
-    def neglected(self) -> Neglected | None:
-        """Return what of the motion is left out by now, ``None`` if nothing is."""
-        return None
 
 
 class Uncoupled(Coupling):

@@ -1,17 +1,19 @@
-"""A run directory: its files, the lock on it, and the errors of one that cannot be read.
+"""A run directory: its files, the claim on it, and the errors of one that cannot be read.
 
-It holds ``trajectory.csv`` (a row per accepted step), ``events.csv``, ``shapes.csv`` (the beam's deflection at
-`SHAPE_POINTS`), ``steps.bin`` (what lies between rows), ``summary.json`` and pictures. ``file_recorder`` writes it,
-``reading`` reads it.
+It holds ``steps.bin`` (the records of the run), ``events.csv``, ``shapes.csv`` (the beam's deflection at
+`SHAPE_POINTS`), ``trajectory.csv`` (a row per accepted step), ``summary.json`` and pictures. ``file_recorder`` writes
+it, ``reading`` reads it.
 """
 
 from __future__ import annotations
 
+import os
 import tempfile
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from typing import BinaryIO
+from weakref import finalize
 
 try:
     import fcntl
@@ -26,6 +28,8 @@ PICTURES = (
     "d_velocities_and_forces.png",
     "e_gap_and_energy.png",
 )
+#: What `springbeam export --format parquet` leaves there.
+PARQUET = ("trajectory.parquet", "events.parquet", "shapes.parquet")
 #: What `springbeam report` and `springbeam animate` may leave there.
 REPORT = "report.html"
 ANIMATIONS = ("animation.gif", "animation.mp4")
@@ -48,28 +52,52 @@ class RunDirectory:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self.trajectory = self.path / "trajectory.csv"
+        self.steps = self.path / "steps.bin"
         self.events = self.path / "events.csv"
         self.shapes = self.path / "shapes.csv"
-        self.steps = self.path / "steps.bin"  #: what `springbeam.results.steps` says of each step, as doubles
+        self.trajectory = self.path / "trajectory.csv"
         self.summary = self.path / "summary.json"
         #: It exists until the run is done (`springbeam.run.checkpoint`).
         self.checkpoint = self.path / "run.checkpoint"
+        self._claim: finalize[..., RunDirectory] | None = None
 
     def results(self) -> list[Path]:
         """Return the result files that exist, and the files made from them."""
         files = (self.summary, self.trajectory, self.events, self.shapes, self.steps, self.checkpoint)
-        made = (self.path / name for name in (*PICTURES, REPORT, *ANIMATIONS))
+        made = (self.path / name for name in (*PARQUET, *PICTURES, REPORT, *ANIMATIONS))
         return [file for file in (*files, *made) if file.exists()]
 
+    def sizes(self) -> dict[str, int]:
+        """Return the sizes of the files that hold the run [bytes], of those that exist."""
+        files = (self.steps, self.events, self.shapes, self.trajectory)
+        return {file.name: file.stat().st_size for file in files if file.exists()}
+
+    def claim(self) -> None:
+        """Keep other processes out until `release`, or until this one ends. Raises ResultsInUse if another is in."""
+        if self._claim is None and fcntl is not None:
+            folder = os.open(self.path, os.O_RDONLY)
+            self._claim = finalize(self, os.close, folder)
+            try:
+                lock(folder, self.path)
+            except ResultsInUse:
+                self.release()
+                raise
+
+    def release(self) -> None:
+        """Let other processes in."""
+        if self._claim is not None:
+            self._claim()
+            self._claim = None
+
     def discard(self) -> None:
-        """Remove the directory if nothing is in it."""
+        """Let other processes in, and remove the directory if nothing is in it."""
+        self.release()
         with suppress(OSError):
             self.path.rmdir()
 
     @classmethod
     def create(cls, path: str | Path, *, replace: bool = False) -> RunDirectory:
-        """Return the directory ``path``, made if need be; its files stay until a `FileRecorder` begins to write there.
+        """Claim the directory ``path``, made if need be; its files stay until a `FileRecorder` begins to write there.
 
         Parameters
         ----------
@@ -89,12 +117,11 @@ class RunDirectory:
         """
         directory = cls(path)
         directory.path.mkdir(parents=True, exist_ok=True)
+        directory.claim()
         results = directory.results()
         if results and not replace:
+            directory.release()
             raise ResultsExist(f"{directory.path} already holds results ({results[0].name})")
-        if directory.trajectory.exists():
-            with directory.trajectory.open("rb") as file:
-                lock(file)
         try:
             tempfile.TemporaryFile(dir=directory.path).close()
         except OSError as error:
@@ -104,7 +131,7 @@ class RunDirectory:
 
     @classmethod
     def create_numbered(cls, path: str | Path) -> RunDirectory:
-        """Make a new directory: ``path``, or ``path-2``, ``path-3``, … when that exists.
+        """Make and claim a new directory: ``path``, or ``path-2``, ``path-3``, … when that exists.
 
         Runs started at the same time get different directories.
         """
@@ -116,17 +143,19 @@ class RunDirectory:
                 candidate.mkdir()
             except FileExistsError:
                 continue
-            return cls(candidate)
+            directory = cls(candidate)
+            directory.claim()
+            return directory
         raise AssertionError("unreachable")
 
 
-def lock(file: BinaryIO) -> None:
-    """Hold ``file`` until it is closed or the process ends. Raises ResultsInUse if another process does."""
+def lock(file: BinaryIO | int, path: Path) -> None:
+    """Hold the open ``file`` of this ``path`` until it is closed. Raises ResultsInUse if another process does."""
     if fcntl is None:
         return
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise ResultsInUse(f"{file.name}: another process is writing to it") from None
+        raise ResultsInUse(f"{path}: another process is writing to it") from None
     except OSError:  # a file system without locks
         return

@@ -1,7 +1,7 @@
-"""Results streamed into the files of a run directory.
+"""A run streamed into the files of a directory.
 
-Numbers are written as the shortest text that reads back to the same double, so a file holds exactly what was computed.
-No file ever holds NaN or inf.
+Records are appended to ``steps.bin`` as the run goes, some hundred at a time, after their events and shapes: a run that
+is killed loses no more than that. Rows, ``trajectory.csv``, are made from the records at the end.
 """
 
 from __future__ import annotations
@@ -17,16 +17,15 @@ import numpy as np
 from pydantic_core import to_json
 
 from ..scene import Scene
-from .directory import ResultsUnreadable, RunDirectory, lock
-from .reading import load_events, load_trajectory
-from .recording import Recorder, replay, with_scene
-from .steps import STEP, steps_of
+from .columns import blocks
+from .directory import ResultsUnreadable, RunDirectory
+from .reading import load_events, read_run
+from .recording import Recorder, with_scene
+from .steps import STEP
 from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
 
 #: Bytes kept free for the last summary; longer ones are written if the disk has room.
 _SUMMARY_ROOM = 16384
-#: Bytes of steps that are written together.
-_STEPS_TOGETHER = 8192
 #: Times closer than this share are one.
 _SAME = 1e-12
 
@@ -34,31 +33,29 @@ _SAME = 1e-12
 class FileRecorder(Recorder):
     """Streams into a `RunDirectory` and keeps nothing, so that memory does not grow with the run.
 
-    A row is in its file when `row` returns, its step some rows later, and ``summary.json`` says from the start which
-    scene it belongs to: the results of a run that was killed can be loaded. Results of an earlier run stay until this
-    one has something to record; then they are removed.
+    ``summary.json`` says from the start which scene the records belong to: the results of a run that was killed can be
+    loaded. Results of an earlier run stay until this one has something to record; then they are removed.
 
     Parameters
     ----------
+    scene
+        As of `Recorder`.
     directory
-        Where the results go (`RunDirectory.create`); the others are those of `Recorder`.
+        Where the results go (`RunDirectory.create`).
+    interval
+        Make the rows at its multiples [s], by `Trajectory.at`, instead of one per step.
     """
 
-    def __init__(self, scene: Scene, directory: RunDirectory, columns: Sequence[str] | None = None) -> None:
-        super().__init__(scene, columns)
+    def __init__(self, scene: Scene, directory: RunDirectory, interval: float | None = None) -> None:
+        super().__init__(scene)
         self.directory = directory
         self.finished = False
-        #: Time of the last row [s]; ``None`` before the first.
-        self.time: float | None = None
-        #: The columns of each file; one that is no table has none.
-        self._columns: dict[Path, Sequence[str]] = {
-            directory.trajectory: self.columns,
-            directory.events: EVENT_COLUMNS,
-            directory.steps: (),
-        }
+        self._interval = interval
+        #: The first line of each file that grows, in the order in which they do.
+        self._headers = {directory.events: _line(EVENT_COLUMNS), directory.steps: b""}
         if scene.beam is not None:
-            self._columns[directory.shapes] = SHAPE_COLUMNS
-        self._files: dict[Path, _Lines] = {}
+            self._headers = {directory.shapes: _line(SHAPE_COLUMNS), **self._headers}
+        self._files: dict[Path, _Appended] = {}
 
     def __enter__(self) -> FileRecorder:
         return self
@@ -73,61 +70,76 @@ class FileRecorder(Recorder):
         """Whether the directory holds results of this run."""
         return bool(self._files)
 
-    def _keep_row(self, numbers: list[float], phase: str) -> None:
-        fields: list[float | str] = [*numbers]
-        fields.insert(self._phase_at, phase)
-        self._file(self.directory.trajectory).write(_line(fields))
-        self.time = numbers[0]
-        if len(self._steps) >= _STEPS_TOGETHER:
-            self._write_steps()
+    @property
+    def time(self) -> float | None:
+        """Time of the last record [s]; ``None`` before the first."""
+        steps = self.steps()
+        return float(steps["time"][-1]) if len(steps) else None
 
-    def _write_steps(self) -> None:
-        waiting, self._steps = self._steps, bytearray()
-        if waiting:
-            steps_of(waiting)
-            self._file(self.directory.steps).write(waiting)
+    def keep(self, steps: np.ndarray, events: Sequence[Event], shapes: np.ndarray) -> None:
+        self._begin()
+        if self.directory.shapes in self._files:
+            self._files[self.directory.shapes].write(_lines(shapes.tolist()))
+        self._files[self.directory.events].write(_lines(_fields(event) for event in events))
+        self._files[self.directory.steps].write(steps.tobytes())
 
-    def steps(self) -> np.ndarray | None:
-        self._write_steps()
+    def steps(self) -> np.ndarray:
         path = self.directory.steps
         whole = path.stat().st_size // STEP.itemsize if self.begun else 0
-        return np.memmap(path, STEP, mode="r", shape=whole) if whole else None
+        return np.memmap(path, STEP, mode="r", shape=whole) if whole else np.empty(0, STEP)
 
     def events(self) -> Iterable[Event]:
         return load_events(self.directory.path) if self.begun else iter(())
 
-    def _keep_event(self, event: Event) -> None:
-        values = [getattr(event, name) for name in EVENT_COLUMNS]
-        fields = ["" if v is None else v if isinstance(v, str) else float(v) for v in values]
-        self._file(self.directory.events).write(_line(fields))
-
-    def _keep_shape(self, numbers: list[float]) -> None:
-        self._file(self.directory.shapes).write(_line(numbers))
-
-    def finish(self, summary: Mapping[str, Any]) -> None:
+    def trajectory(self) -> Trajectory:
         self._begin()
-        self._write_steps()
-        self.close()
-        self._write_summary(summary)
-        if summary.get("status") == "done":
-            self.directory.checkpoint.unlink(missing_ok=True)
+        return read_run(self.directory)
+
+    def write(self, run: Trajectory) -> None:
+        """Write a finished run, also one by a reference, which has columns only."""
+        recorded = run.steps is not None
+        shapes = np.column_stack(run.shapes) if run.shapes is not None else np.empty((0, len(SHAPE_COLUMNS)))
+        self.keep(np.empty(0, STEP) if run.steps is None else run.steps, run.events, shapes)
+        self.finish(
+            {name: run.summary[name] for name in run.summary.keys() - {"scene", "files"}}, None if recorded else run
+        )
+
+    def finish(self, summary: Mapping[str, Any], run: Trajectory | None = None) -> None:
+        """See `Recorder.finish`; a ``run`` that left no records has its own rows. Raises OSError."""
+        self._begin()
+        self._close_files()
         self.finished = True
+        try:
+            write_rows(self.directory, self._rows() if run is None else [run.columns])
+        finally:  # also where the disk has no room for them
+            self._write_summary({**summary, "files": self.directory.sizes()})
+            if summary.get("status") == "done":
+                self.directory.checkpoint.unlink(missing_ok=True)
+
+    def _rows(self) -> Iterable[Mapping[str, np.ndarray]]:
+        if self._interval is None or self.time is None:
+            return blocks(self.scene, self.steps())
+        return [at_multiples(self.trajectory(), self._interval)]
 
     def close(self) -> None:
+        """Close the files, and let other processes use the directory."""
+        self._close_files()
+        self.directory.release()
+
+    def _close_files(self) -> None:
         with ExitStack() as files:  # each is closed, also when another cannot be (a full disk)
-            for lines in self._files.values():
-                files.callback(lines.file.close)
+            for appended in self._files.values():
+                files.callback(appended.file.close)
 
     def save(self) -> dict[str, Any]:
         """Write what was recorded to the disk, and return what `restore` needs."""
         self._begin()
-        self._write_steps()
-        for lines in self._files.values():
-            os.fsync(lines.file.fileno())
-        return {"time": self.time, "files": {path.name: (f.size, f.crc) for path, f in self._files.items()}}
+        for appended in self._files.values():
+            os.fsync(appended.file.fileno())
+        return {path.name: (appended.size, appended.crc) for path, appended in self._files.items()}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Go on from what `save` of a recorder in the same directory returned; later rows are removed.
+        """Go on from what `save` of a recorder in the same directory returned; what came later is removed.
 
         Raises
         ------
@@ -136,46 +148,40 @@ class FileRecorder(Recorder):
         ResultsInUse
             If another process is writing them.
         """
+        self.directory.claim()
         with ExitStack() as opened:
-            files: dict[Path, _Lines] = {}
-            for path in self._columns:
-                files[path] = _Lines(path, *saved["files"][path.name])
+            files: dict[Path, _Appended] = {}
+            for path in self._headers:
+                files[path] = _Appended(path, *saved[path.name])
                 opened.callback(files[path].file.close)
-            lock(files[self.directory.trajectory].file)
-            for lines in files.values():
-                lines.check()
+            for appended in files.values():
+                appended.check()
             opened.pop_all()
         self._files = files
-        for lines in files.values():
-            lines.file.truncate(lines.size)
-        self.time = saved["time"]
+        for appended in files.values():
+            appended.file.truncate(appended.size)
+        self.directory.trajectory.unlink(missing_ok=True)
         self._write_summary({"status": "running"})
         self._reserve_summary()
-
-    def _file(self, path: Path) -> _Lines:
-        self._begin()
-        return self._files[path]
 
     def _begin(self) -> None:
         """Write the files with their headers, which then replace earlier results."""
         if self._files:
             return
-        headers = {path: ",".join(names).encode() + b"\n" if names else b"" for path, names in self._columns.items()}
         try:
-            for path, header in headers.items():
+            for path, header in self._headers.items():
                 _part(path).write_bytes(header)
             self._reserve_summary()
         except OSError:
-            for path in (*headers, self.directory.summary):
+            for path in (*self._headers, self.directory.summary):
                 with suppress(OSError):
                     _part(path).unlink()
             raise
         for file in self.directory.results():
             file.unlink()
-        for path, header in headers.items():
+        for path, header in self._headers.items():
             os.replace(_part(path), path)
-            self._files[path] = _Lines(path, len(header), crc32(header))
-        lock(self._files[self.directory.trajectory].file)
+            self._files[path] = _Appended(path, len(header), crc32(header))
         # Last: where there is a summary, there is a run that can be loaded.
         self._write_summary({"status": "running"})
         self._reserve_summary()
@@ -185,44 +191,46 @@ class FileRecorder(Recorder):
         _part(self.directory.summary).write_bytes(b" " * _SUMMARY_ROOM)
 
     def _write_summary(self, summary: Mapping[str, Any]) -> None:
-        text, part = as_json(with_scene(summary, self.scene)), _part(self.directory.summary)
-        # A reader, or a run killed at this moment, finds the old summary or the new one, never half of it.
-        with part.open("r+b" if part.exists() else "wb") as file:
-            file.write(text + b"\n")
-            file.truncate()
-        os.replace(part, self.directory.summary)
+        write_summary(self.directory, with_scene(summary, self.scene))
+
+
+def write_summary(directory: RunDirectory, summary: Mapping[str, Any]) -> None:
+    """Replace ``summary.json``: a reader, or a run killed at this moment, finds the old or the new one, never half."""
+    part = _part(directory.summary)
+    with part.open("r+b" if part.exists() else "wb") as file:
+        file.write(as_json(summary) + b"\n")
+        file.truncate()
+    os.replace(part, directory.summary)
 
 
 def save(run: Trajectory, directory: str | Path, *, replace: bool) -> Path:
     """Write the files of a finished run; see `Trajectory.save`."""
     target = RunDirectory.create(directory, replace=replace)
-    with FileRecorder(run.scene, target, tuple(run.columns)) as recorder:
-        replay(run, recorder)
+    with FileRecorder(run.scene, target) as recorder:
+        recorder.write(run)
     return target.path
 
 
-def leave_rows_at_multiples(directory: RunDirectory, interval: float) -> None:
-    """Replace the rows of a finished run by those at the multiples of ``interval`` [s] from its first to its last row.
-
-    Events and shapes stay; nothing is left that tells what lies between the rows. Raises OSError; the directory is then
-    as before.
-    """
-    run = load_trajectory(directory.path)
-    if run.steps is None:  # it stopped before its first row
-        return
-    first, last = (run.time[i] / interval for i in (0, -1))
-    times = interval * np.arange(np.ceil(first * (1.0 - _SAME)), np.floor(last * (1.0 + _SAME)) + 1.0)
-    rows = run.at(np.clip(times, run.time[0], run.time[-1]))
-    table = ",".join(run.columns).encode() + b"\n"
-    table += b"".join(map(_line, zip(*(values.tolist() for values in rows.columns.values()), strict=True)))
+def write_rows(directory: RunDirectory, rows: Iterable[Mapping[str, np.ndarray]]) -> None:
+    """Replace ``trajectory.csv`` by columns, block after block. Raises OSError; the file is then as before."""
     part = _part(directory.trajectory)
     try:
-        part.write_bytes(table)
+        with part.open("wb") as file:
+            for number, columns in enumerate(rows):
+                if number == 0:
+                    file.write(_line(list(columns)))
+                file.write(_lines(zip(*(values.tolist() for values in columns.values()), strict=True)))
+        os.replace(part, directory.trajectory)
     except OSError:
         part.unlink(missing_ok=True)
         raise
-    directory.steps.unlink()
-    os.replace(part, directory.trajectory)
+
+
+def at_multiples(run: Trajectory, interval: float) -> dict[str, np.ndarray]:
+    """Return the columns of ``run`` at the multiples of ``interval`` [s] from its first to its last row."""
+    first, last = (run.time[i] / interval for i in (0, -1))
+    times = interval * np.arange(np.ceil(first * (1.0 - _SAME)), np.floor(last * (1.0 + _SAME)) + 1.0)
+    return run.at(np.clip(times, run.time[0], run.time[-1])).columns
 
 
 def _part(path: Path) -> Path:
@@ -230,18 +238,18 @@ def _part(path: Path) -> Path:
     return path.with_name(f"{path.name}.part")
 
 
-class _Lines:
-    """A result file that grows line by line; each is handed to the system at once, so a killed run loses none."""
+class _Appended:
+    """A result file that grows; what is written is handed to the system at once, so that a killed run has it."""
 
     def __init__(self, path: Path, size: int, crc: int) -> None:
         if not path.is_file():
             raise ResultsUnreadable(f"{path}: missing")
         self.path = path
-        self.size, self.crc = size, crc  #: of the lines written [bytes], and their CRC-32
+        self.size, self.crc = size, crc  #: of what was written [bytes], and its CRC-32
         self.file = path.open("ab", buffering=0)
 
     def check(self) -> None:
-        """Raise ResultsUnreadable if the file does not begin with the lines written."""
+        """Raise ResultsUnreadable if the file does not begin with what was written."""
         found, left = 0, self.size
         with self.path.open("rb") as file:
             while left > 0 and (chunk := file.read(min(left, 1 << 20))):
@@ -251,17 +259,27 @@ class _Lines:
         if found != self.crc:
             raise ResultsUnreadable(f"{self.path}: changed since it was written")
 
-    def write(self, line: bytes | bytearray) -> None:
-        written = self.file.write(line)
-        while written < len(line):  # a disk that is almost full takes a part, and then refuses
-            written += self.file.write(line[written:])
-        self.size += len(line)
-        self.crc = crc32(line, self.crc)
+    def write(self, content: bytes) -> None:
+        written = 0
+        while written < len(content):  # a disk that is almost full takes a part, and then refuses
+            written += self.file.write(content[written:])
+        self.size += len(content)
+        self.crc = crc32(content, self.crc)
+
+
+def _fields(event: Event) -> list[Any]:
+    values = [getattr(event, name) for name in EVENT_COLUMNS]
+    return ["" if v is None else v if isinstance(v, str) else float(v) for v in values]
 
 
 def _line(fields: Sequence[Any]) -> bytes:
-    """Return numbers and plain words as a line of CSV; JSON writes numbers alike, seven times faster than repr."""
-    return to_json(fields)[1:-1].replace(b'"', b"") + b"\n"
+    return _lines([fields])
+
+
+def _lines(rows: Iterable[Sequence[Any]]) -> bytes:
+    """Return numbers and plain words as lines of CSV; JSON writes numbers as the shortest text that reads back."""
+    text = to_json(list(rows))[2:-2].replace(b"],[", b"\n").replace(b'"', b"")
+    return text + b"\n" if text else b""
 
 
 def as_json(document: Any) -> bytes:

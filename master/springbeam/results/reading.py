@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from itertools import chain
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -12,41 +13,58 @@ import numpy as np
 
 from ..scene import scene_from_dict
 from .directory import ResultsUnreadable, RunDirectory
+from .recording import trajectory_of
 from .steps import steps_of
 from .trajectory import EVENT_COLUMNS, EVENT_KINDS, PHASES, SHAPE_COLUMNS, Event, Trajectory
 
 
 def load_trajectory(directory: str | Path) -> Trajectory:
-    """Read a run directory, also of a run that was stopped or killed: an incomplete last line is left out.
+    """Read a run directory, also of a run that was stopped or killed: of that, the steps that it has written.
 
     Raises
     ------
     ResultsUnreadable
-        If a file is missing or is not what a run writes.
+        If a file is missing, is not what a run writes, or not what this one has written.
     """
     run = RunDirectory(directory)
+    refuse_cut(run, load_summary(run.path))
+    return read_run(run)
+
+
+def refuse_cut(run: RunDirectory, summary: dict[str, Any]) -> None:
+    """Raise ResultsUnreadable if a file is not as long as ``summary``, that of a run that has ended, says."""
+    found = run.sizes()
+    for name, size in summary.get("files", {}).items():
+        if found.get(name) != size:
+            remedy = f"; springbeam export {run.path} writes it again" if name == run.trajectory.name else ""
+            there = f"{found[name]} bytes" if name in found else "missing"
+            raise ResultsUnreadable(f"{run.path / name}: {there}, {size} bytes were written{remedy}")
+
+
+def read_run(run: RunDirectory) -> Trajectory:
+    """Return what the files hold, whole or not. Raises ResultsUnreadable."""
     summary = load_summary(run.path)
-    columns = _read_table(run.trajectory)
+    summary.pop("files", None)  # of the directory, not of the run
+    scene = scene_from_dict(summary["scene"], source=f"{run.summary}: scene")
+    try:
+        steps = steps_of(run.steps.read_bytes()) if run.steps.exists() else steps_of(b"")
+    except (OSError, ValueError) as error:
+        raise ResultsUnreadable(f"{run.steps}: {error}") from error
+    events = list(load_events(run.path))
     shapes = None
     if run.shapes.exists():
         table = _read_table(run.shapes, SHAPE_COLUMNS)
-        shapes = (table["time"], np.column_stack([table[name] for name in SHAPE_COLUMNS[1:]]))
-    scene = scene_from_dict(summary["scene"], source=f"{run.summary}: scene")
-    return Trajectory(scene, columns, list(load_events(run.path)), shapes, summary, _read_steps(run, columns["time"]))
-
-
-def _read_steps(run: RunDirectory, times: np.ndarray) -> np.ndarray | None:
-    """Return the steps, of a killed run maybe fewer than its rows; ``None`` for a run that leaves none."""
-    try:
-        steps = steps_of(run.steps.read_bytes()) if run.steps.exists() else None
-    except (OSError, ValueError) as error:
-        raise ResultsUnreadable(f"{run.steps}: {error}") from error
-    if steps is None:
-        return None
-    steps = steps[: len(times)]
-    if not np.array_equal(steps["time"], times[: len(steps)]):
-        raise ResultsUnreadable(f"{run.steps}: not the steps of {run.trajectory.name}")
-    return steps
+        shapes = np.column_stack([table[name] for name in SHAPE_COLUMNS])
+    if len(steps) == 0 and run.trajectory.exists():  # it left no records: a reference
+        pictured = None if shapes is None else (shapes[:, 0].copy(), shapes[:, 1:].copy())
+        return Trajectory(scene, _read_table(run.trajectory), events, pictured, summary)
+    # A run that was killed may have written what belongs to records that it has not.
+    last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-inf, 0)
+    if known > len(events):
+        raise ResultsUnreadable(f"{run.events}: {len(events)} events, {known} belong to {run.steps.name}")
+    if shapes is not None:
+        shapes = shapes[shapes[:, 0] <= last]
+    return trajectory_of(scene, steps, events[:known], shapes, summary)
 
 
 def load_summary(directory: str | Path) -> dict[str, Any]:

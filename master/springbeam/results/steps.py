@@ -1,8 +1,7 @@
-"""The data of a step that its row lacks: the ends before the event that ends it, and the contact force.
+"""The record of a step: all that a run leaves of it, from which columns, totals and dense output follow.
 
-A row holds the state after its event. Between two rows the motion follows from the start of the step (the row before),
-its end and its two moments, the force from the step's polynomial: `springbeam.results.dense` and
-`springbeam.results.totals` are made from these.
+A run is a sequence of these records, of fixed size, one per accepted step. Between two rows the motion follows from the
+state after the event of the row before, the end of the step and its two moments, the force from the step's polynomial.
 """
 
 from __future__ import annotations
@@ -12,67 +11,74 @@ from typing import Any
 
 import numpy as np
 
-from ..scene import Scene
-
-#: Numbers of a step in the order of the file ``steps.bin``: its end [s] and size [s] (0 for a row that ends no step),
-#: the ends' displacements [m], velocities [m/s], integrals [m·s] and [m·s²] over it; C, Ċ, C̈ and N at its start.
+#: Numbers of a record in the order of the file ``steps.bin``.
 STEP_COLUMNS = (
-    "time",
-    "size",
-    "u_tip",
-    "v_tip",
-    "u_tip_integral",
-    "u_tip_integral_2",
-    "y",
-    "z",
-    "y_integral",
-    "y_integral_2",
-    "contact_force",
-    "contact_force_rate",
-    "contact_force_rate_2",
-    "foundation_force",
+    # The step's end [s] and size [s], 0 for a row that ends no step.
+    *("time", "size"),
+    # The ends before the event of the row: displacements [m], velocities [m/s], integrals [m·s] and [m·s²] over it.
+    *("u_tip", "v_tip", "u_tip_integral", "u_tip_integral_2", "y", "z", "y_integral", "y_integral_2"),
+    # Contact force and foundation force with two derivatives at its start; where it has no size, at the row.
+    *("contact_force", "contact_force_rate", "contact_force_rate_2"),
+    *("foundation_force", "foundation_force_rate", "foundation_force_rate_2"),
+    # The row: the ends after its event, the phase (`PHASE_NAMES`), and the number of events up to here.
+    *("u_tip_after", "v_tip_after", "y_after", "z_after", "phase", "events"),
+    # Mean of the contact force's two limits at the start of the step, and the force of a soft law at the row [N].
+    *("smoothed", "law_force"),
+    # Energies of the bodies after the event [J], as of `springbeam.bodies.protocol.Energies`.
+    *("beam_kinetic", "beam_potential", "beam_dissipated", "beam_load"),
+    *("spring_kinetic", "spring_potential", "spring_dissipated", "spring_load"),
+    # In the contact law: stored, dissipated since the start, and the work on an end that does not feel it [J].
+    *("law_stored", "law_dissipated", "unfelt"),
+    # Taken by events since the start, and the work that foreign bodies have received [J].
+    *("impact_loss", "beam_received", "spring_received"),
+    # All energies when the run began, before an impact at its start [J].
+    "energy_at_start",
 )
 #: Little-endian doubles, on every machine.
 STEP = np.dtype([(name, "<f8") for name in STEP_COLUMNS])
-#: Bytes of a step from its numbers.
+#: Bytes of a record from its numbers.
 packed = Struct(f"<{len(STEP_COLUMNS)}d").pack
+#: The column ``phase`` by the number in a record: how the ends are joined, and 3 more while the lower end is seated.
+PHASE_NAMES = np.array(["free", "tied", "touch", "seated", "seated", "seated"])
+#: Numbers of phases in which nothing joins the ends.
+_APART = (0.0, 3.0)
 
 
-def steps_of(content: bytes | bytearray) -> np.ndarray | None:
-    """Return the steps in ``content``, an incomplete last one left out; ``None`` if there is none.
-
-    Raises ValueError for a number that is not finite.
-    """
-    whole = len(content) // STEP.itemsize
-    if not whole:
-        return None
-    steps: np.ndarray = np.frombuffer(content, STEP, whole).copy()
-    numbers = steps.view("<f8").reshape(whole, -1)
-    if not np.isfinite(numbers).all():
-        row, column = (int(index) for index in np.argwhere(~np.isfinite(numbers))[0])
-        raise ValueError(
-            f"{STEP_COLUMNS[column]} = {numbers[row, column]} in the step to t = {numbers[row, 0]!s} s: not finite"
-        )
+def steps_of(content: bytes | bytearray) -> np.ndarray:
+    """Return the records in ``content``, an incomplete last one left out. Raises ValueError for one not finite."""
+    steps: np.ndarray = np.frombuffer(content, STEP, len(content) // STEP.itemsize).copy()
+    if (found := first_not_finite(steps)) is not None:
+        row, column = found
+        raise ValueError(f"{column} = {steps[column][row]} in the step to t = {steps['time'][row]!s} s: not finite")
+    if (
+        not np.isin(steps["phase"], range(len(PHASE_NAMES))).all()
+        or (np.diff(steps["events"], prepend=0.0) < 0.0).any()
+    ):
+        raise ValueError("not records of steps")
     return steps
 
 
-def impulse(steps: np.ndarray, tau: np.ndarray, of: Any = slice(None)) -> np.ndarray:
+def first_not_finite(steps: np.ndarray) -> tuple[int, str] | None:
+    """Return the first record with a number that is not finite, and which; ``None`` if there is none."""
+    finite = np.isfinite(steps.view("<f8").reshape(len(steps), len(STEP_COLUMNS)))
+    if finite.all():
+        return None
+    row, column = np.argwhere(~finite)[0]
+    return int(row), STEP_COLUMNS[column]
+
+
+def joined(steps: np.ndarray) -> np.ndarray:
+    """Return whether the ends are joined from each row on."""
+    return ~np.isin(steps["phase"], _APART)
+
+
+def impulse(steps: np.ndarray, tau: np.ndarray, of: Any = slice(None), name: str = "contact_force") -> np.ndarray:
     """Return ∫ C dτ [N·s] from the start of each step, of those that ``of`` picks, up to ``tau`` [s]."""
     # By columns: picking whole steps would move ten times as much.
-    c, dc, ddc = (steps[name][of] for name in ("contact_force", "contact_force_rate", "contact_force_rate_2"))
+    c, dc, ddc = (steps[f"{name}{order}"][of] for order in ("", "_rate", "_rate_2"))
     return np.asarray(tau * (c + tau * (dc / 2.0 + tau * ddc / 6.0)))
 
 
-def load_on_spring(scene: Scene, times: np.ndarray) -> np.ndarray:
-    """Return what the loads of ``scene`` amount to on its lower end [N] at ``times`` [s]."""
-    mass = getattr(scene.lower, "mass", None) or 0.0
-    shares = {"spring": 1.0, "base": -mass}
-    parts = [shares[load.on] * load.value(times) for load in scene.loads if load.on in shares]
-    return sum(parts, np.zeros_like(times))
-
-
-def contact_force(steps: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """Return C [N] of each step ``tau`` [s] after its start."""
-    return np.asarray(
-        steps["contact_force"] + tau * (steps["contact_force_rate"] + 0.5 * tau * steps["contact_force_rate_2"])
-    )
+def force(steps: np.ndarray, tau: np.ndarray, name: str = "contact_force") -> np.ndarray:
+    """Return C [N] of each step ``tau`` [s] after its start, or the force N of the foundation."""
+    return np.asarray(steps[name] + tau * (steps[f"{name}_rate"] + 0.5 * tau * steps[f"{name}_rate_2"]))

@@ -14,9 +14,8 @@ import numpy as np
 
 from ..scene import Scene
 from .contact_times import SLIGHT, foundation_contacts, tip_contacts
-from .dense import motion
-from .extremes import Extremes
-from .steps import contact_force, impulse, load_on_spring
+from .dense import extremes
+from .steps import impulse
 from .trajectory import Event
 
 
@@ -50,8 +49,6 @@ LOSS_NAMES = {
 }
 #: Numbers of `TOTALS` that say something only beside others.
 _BESIDE = ("contact_force_window", "deepest_tip_time")
-#: Gauss–Legendre nodes and weights on [0, 1].
-_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(3)[0] + 1) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
 
 
 def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -91,36 +88,35 @@ def totals(
     if scene.coupled or (beam and stop):
         found |= _contact(scene, steps, events, window, free_at_end)
     if beam:
-        contacts = tip_contacts(events, inf, free_at_end=free_at_end) if spring else foundation_contacts(events, inf)
-        found["deepest_tip"], found["deepest_tip_time"] = _deepest(scene, steps, events, contacts)
+        found["deepest_tip"], found["deepest_tip_time"] = extremes(scene, steps, "u_tip")[:2]
     if stop:
         found["stop_strokes"] = sum(event.kind in ("stop_impact", "seated") for event in events)
-        found["foundation_impulse"] = _of_foundation(scene, steps) + sum(event.impulse_foundation for event in events)
+        held = impulse(steps, steps["size"], name="foundation_force").sum()
+        found["foundation_impulse"] = held + sum(event.impulse_foundation for event in events)
         found["loss_stop"] = sum(event.energy_loss for event in events if event.kind in ("stop_impact", "seated"))
     if beam and spring:
         found["loss_impact"] = sum(e.energy_loss for e in events if e.kind not in ("stop_impact", "seated"))
     return {name: value if name == "stop_strokes" else float(value) for name, value in found.items()}
 
 
-def pace(steps: np.ndarray | None) -> float:
+def pace(steps: np.ndarray) -> float:
     """Return the largest speed of an end over its largest distance from its start [1/s], of the end with more of it."""
     found = 0.0
-    if steps is None or len(steps) == 0:
-        return found
     for place, velocity in (("u_tip", "v_tip"), ("y", "z")):
-        way = float(np.abs(steps[place] - steps[place][0]).max())
+        way = float(np.abs(steps[place] - steps[place][:1]).max(initial=0.0))
         if way > 0.0:
-            found = max(found, float(np.abs(steps[velocity]).max()) / way)
+            speeds = np.where(steps["size"] > 0.0, steps[velocity], steps[f"{velocity}_after"])
+            found = max(found, float(np.abs(speeds).max()) / way)
     return found
 
 
-def shortest_contact(steps: np.ndarray | None, events: Iterable[Event], below: float, *, free_at_end: bool) -> float:
+def shortest_contact(steps: np.ndarray, events: Iterable[Event], below: float, *, free_at_end: bool) -> float:
     """Return how long the shortest contact or rest on the foundation that has ended lasts [s]; ∞ if not ``below`` [s].
 
     Those that pass on hardly any impulse are left out, and one whose end has no row, of a run that was interrupted
     there. Other parameters as of `totals`.
     """
-    if steps is None or len(steps) == 0:
+    if len(steps) == 0:
         return inf
     events = [event for event in events if event.time <= steps["time"][-1]]
     intervals = [*tip_contacts(events, inf, free_at_end=free_at_end), *foundation_contacts(events, inf)]
@@ -212,8 +208,8 @@ def _force(steps: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray
     end = np.where(known, end, 0)
     tau = times - (time[end] - steps["size"][end])
     rate, curvature = steps["contact_force_rate"][end], steps["contact_force_rate_2"][end]
-    force = contact_force(steps[end], tau)
-    return known * force, known * (rate + tau * curvature), known * 0.5 * curvature
+    value = steps["contact_force"][end] + tau * (rate + 0.5 * tau * curvature)
+    return known * value, known * (rate + tau * curvature), known * 0.5 * curvature
 
 
 def _impulse_until(steps: np.ndarray, time: np.ndarray, after: np.ndarray, times: np.ndarray) -> np.ndarray:
@@ -223,39 +219,3 @@ def _impulse_until(steps: np.ndarray, time: np.ndarray, after: np.ndarray, times
     tau = np.clip(times - time[row], 0.0, steps["size"][into])
     found = after[row] + np.where(into > row, impulse(steps, tau, into), 0.0)
     return np.where(row < 0, 0.0, found)
-
-
-def _of_foundation(scene: Scene, steps: np.ndarray) -> float:
-    """Return ∫ N dt [N·s]: N is C of the step less the load and a constant, 0 unless the lower end is seated."""
-    size, force = steps["size"], steps["foundation_force"]
-    seated = np.where(force != 0.0, impulse(steps, size) + (force - steps["contact_force"]) * size, 0.0)
-    if any(load.on in ("spring", "base") for load in scene.loads) and scene.lower is not None:
-        start = steps["time"] - size
-        # A macro step resolves its loads: three Gauss points are exact to degree 5.
-        for share, weight in zip(_NODES, _WEIGHTS, strict=True):
-            at_start, later = load_on_spring(scene, start), load_on_spring(scene, start + share * size)
-            seated -= np.where(force != 0.0, weight * size * (later - at_start), 0.0)
-    return float(seated.sum())
-
-
-def _deepest(
-    scene: Scene, steps: np.ndarray, events: list[Event], contacts: list[tuple[float, float]]
-) -> tuple[float, float]:
-    """Return the tip's lowest place [m] and its time [s], also between the rows; ``contacts`` are its own."""
-    time = steps["time"]
-    start = {name: steps[name].copy() for name in ("u_tip", "v_tip", *(("y", "z") if scene.lower is not None else ()))}
-    for event in events:  # what happens at a row changes the velocities with which the next step begins
-        row = np.searchsorted(time, event.time, side="right") - 1
-        if time[row] == event.time:
-            start["v_tip"][row] = event.v_tip
-            if "z" in start:
-                start["z"][row] = event.z
-    after = np.flatnonzero(steps["size"] > 0.0)
-    start = {name: values[after - 1] for name, values in start.items()}
-    joined = np.zeros(len(after), dtype=bool)
-    if scene.contact.rigid:
-        for since, until in contacts:
-            joined |= (time[after - 1] >= since) & (time[after] <= until)
-    curve = motion(steps[after], start, joined)["u_tip"]
-    found = Extremes.of_rows(time, steps["u_tip"]).beside(curve, time[after - 1], steps["size"][after])
-    return found.lowest, found.lowest_time

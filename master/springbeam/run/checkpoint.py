@@ -18,15 +18,18 @@ from enum import Enum
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Motion
 from ..contact.phases import Joint, Phase
 from ..results.file_recorder import FileRecorder
 from ..scene import Scene, scene_from_dict
+
+if TYPE_CHECKING:  # a command that only reads a checkpoint loads no FMU
+    from .master import Master
+    from .paper_law import PaperLaw
 
 _FORMAT = 1
 _TITLE = b"springbeam checkpoint"
@@ -114,11 +117,12 @@ class Checkpoints:
         self._began = perf_counter() - wall_time
         self._due = self._began + wall_time
 
-    def take_when_due(self, simulation: Checkpointed) -> None:
+    def take_when_due(self, simulation: Master | PaperLaw) -> None:
         """To be called between two steps. Raises OSError if the disk refuses; the last checkpoint stays then."""
         now = perf_counter()
         if now < self._due:
             return
+        simulation.hand_over()
         scene, results = self._recorder.scene, self._recorder.save()
         wall_time = now - self._began
         checkpoint = Checkpoint(scene, self._version, self._files, self._seconds, wall_time, results, simulation.save())

@@ -1,17 +1,16 @@
-"""The energy ledger of a run, what judges the run by it, and what is said where something has changed the energy."""
+"""What judges a run by its energy ledger, and what is said where something has changed the energy."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import inf, isfinite
-from typing import Any
+from math import inf
+from typing import Any, NamedTuple
 
-from ..bodies.checkpointed import Checkpointed
-from ..bodies.protocol import Body, Ends, Energies
-from ..coupling.protocol import Booking
+import numpy as np
+
+from ..bodies.protocol import Body
+from ..results.columns import ledger
 from ..scene import Scene
 from ..scene.tables import ORDINARY_SCHEMES
-from .outcome import RunStopped
 from .stepping import Pair
 
 #: Relative energy residual up to which a coupling that creates no energy is exact: rounding and solvers' tolerances.
@@ -32,118 +31,89 @@ def bounds(scene: Scene) -> tuple[float, float]:
     return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
 
 
-@dataclass
-class Ledger(Checkpointed):
-    """E_beam + E_spring + E_contact + dissipated + impact losses − work of external loads = constant."""
+class Errors(NamedTuple):
+    """By how much the energy is off at each of some records."""
 
-    impact_loss: float = 0.0  #: [J], by whoever applies an impact
-    initial: float | None = None  #: the total of the first row [J]
-    scale: float = 0.0  #: the largest energy so far [J]
-    largest_residual: float = 0.0  #: [J]
-    relative: float = 0.0  #: the largest residual over the scale at its time
-    gain: float = 0.0  #: the same of the residuals that are positive
-    dissipated: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: by the beam, the spring, the contact law [J]
-
-    def book(self, beam: Energies, spring: Energies, between: Booking) -> tuple[float, ...]:
-        """Return the energies of the next row [J], from ``e_beam`` to ``energy_residual`` as in a run's columns.
-
-        ``between`` is what the coupling adds.
-
-        One that is not finite changes nothing: it is no row of the results.
-        """
-        (kinetic, potential, dissipated, load), (kinetic_2, potential_2, dissipated_2, load_2) = beam, spring
-        e_beam, e_spring = kinetic + potential, kinetic_2 + potential_2
-        contact, law_dissipated, unfelt = between
-        lost_in = (dissipated, dissipated_2, law_dissipated)
-        dissipated, load = dissipated + dissipated_2 + law_dissipated, load + unfelt + load_2
-        lost = self.impact_loss
-        total = e_beam + e_spring + contact + dissipated + lost + load
-        if (initial := self.initial) is None:
-            self.initial = initial = total
-        residual = total - initial
-        if isfinite(residual):
-            self.dissipated = lost_in
-            self.scale = scale = max(self.scale, abs(initial), abs(e_beam) + abs(e_spring) + contact)
-            share = residual / scale if scale > 0.0 else 0.0
-            if abs(residual) > self.largest_residual:
-                self.largest_residual = abs(residual)
-            if abs(share) > self.relative:
-                self.relative = abs(share)
-            if share > self.gain:
-                self.gain = share
-        return e_beam, e_spring, contact, dissipated, lost, load, total, residual
+    residual: np.ndarray  #: [J]
+    share: np.ndarray  #: the same over the largest energy until then
+    scale: np.ndarray  #: the largest energy until then [J]
 
 
-class Balance(Checkpointed):
-    """The ledger of a run, and how much of the energy may change."""
+def errors(scene: Scene, steps: np.ndarray, first: np.ndarray, scale: float, *, of_interface: bool) -> Errors:
+    """Return the errors at ``steps``, before which the largest energy was ``scale`` [J]; others as of `ledger`.
 
-    CHECKPOINTED = ("ledger", "_judged")
+    ``first`` is the first record of the run, shape (1,): it has the energy that should be kept.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused by the record
+        found, initial = ledger(scene, steps, of_interface=of_interface), float(first["energy_at_start"][0])
+        if of_interface and scene.foreign:
+            initial = float(ledger(scene, first, of_interface=True)["e_total"][0])
+        size = np.abs(found["e_beam"]) + np.abs(found["e_spring"]) + found["e_contact"]
+        largest = np.maximum.accumulate(np.maximum(size, max(scale, abs(initial))))
+        residual = found["e_total"] - initial
+        share = np.divide(residual, largest, out=np.zeros_like(residual), where=largest > 0.0)
+    return Errors(residual, share, largest)
+
+
+class Balance:
+    """How much of a run's energy may change, and has."""
 
     def __init__(self, scene: Scene, pair: Pair) -> None:
         self._scene, self._pair = scene, pair
-        self.ledger = Ledger()
-        #: The ledger, or with foreign bodies, whose own accounts may be off, that of the work that they have received.
-        self._judged = Ledger() if scene.foreign else self.ledger
         self._numerically_damped = scene.beam is not None and scene.beam.damped_numerically
         self._warns, self._stops = bounds(scene)
         #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
         self._untold = any(type(body).energies is Body.energies and body.mass < inf for body in pair.bodies)
         if self._untold:
             self._warns = self._stops = inf
+        self._first, self._scale = np.empty(0), 0.0
 
-    def book(self, ends: Ends) -> tuple[float, ...]:
-        """Return the energies of the next row, as `Ledger.book` does, where the ends are."""
-        if self._judged is not self.ledger:
-            self._judged.book(*self._pair.exchanged(ends))
-        return self.ledger.book(*self._pair.energies(ends))
+    def first_wrong(self, steps: np.ndarray) -> tuple[int, float] | None:
+        """Return at which of the next records of the run, shape (n,), too much of the energy has changed.
 
-    def lose(self, energy: float) -> None:
-        """Book what an impact has taken [J]."""
-        self.ledger.impact_loss += energy
-        if self._judged is not self.ledger:
-            self._judged.impact_loss += energy
+        Beside its number, its share of the energy is returned; ``None`` if there is none.
+        """
+        if not self._first.size:
+            self._first = steps[:1].copy()
+        found = errors(self._scene, steps, self._first, self._scale, of_interface=True)
+        self._scale = float(found.scale[-1])
+        wrong = self._wrong(found) > self._stops
+        row = int(np.argmax(wrong))
+        return (row, float(abs(found.share[row]))) if wrong[row] else None
 
-    @property
-    def _error(self) -> float:
+    def _wrong(self, found: Errors) -> np.ndarray:
         """Return the share of the energy that has changed; what numerical damping takes is not an error."""
-        return self._judged.gain if self._numerically_damped else self._judged.relative
+        return found.share if self._numerically_damped else np.abs(found.share)
 
-    @property
-    def changed(self) -> bool:
-        """Whether so much of the energy has changed that the motion is in doubt."""
-        return self._error > self._warns
-
-    def refuse_change(self, time: float, macro_step: float) -> None:
-        """Raise RunStopped if more of the energy has changed by ``time`` [s] than can be right."""
-        if self._error > self._stops:
-            raise RunStopped(self._cause(macro_step), time)
-
-    def warnings(self, macro_step: float) -> list[str]:
-        """Return what a user should know of the energies."""
-        if self._untold:
-            return ["a body reports no energies, so the energy balance is not checked"]
-        if self._judged.relative > self._warns:
-            return [self._cause(macro_step)]
-        if self.ledger.relative > self._warns:
-            return [
-                f"the energies that the FMUs tell are off by {100.0 * self.ledger.relative:.2g} %, by their own "
-                f"solvers: the coupling has kept those of the interface to {self._judged.relative:.1e}"
-            ]
-        return []
-
-    def summary(self) -> dict[str, Any]:
-        """Return the residuals, and what the bodies and the contact law have dissipated [J], for ``summary.json``."""
-        beam, spring, contact = self.ledger.dissipated
-        return {
-            "max_energy_residual": self.ledger.relative,
-            "max_energy_residual_joule": self.ledger.largest_residual,
-            **({"max_interface_residual": self._judged.relative} if self._scene.foreign else {}),
-            **({"loss_beam": beam} if self._pair.beam is not None else {}),
-            **({"loss_spring": spring} if self._pair.spring is not None else {}),
-            **({"loss_contact": contact} if self._pair.law.soft else {}),
+    def report(self, steps: np.ndarray, macro_step: float) -> Report:
+        """Return what all records of the run, shape (n,), say of its energy."""
+        if not len(steps):
+            return Report({"max_energy_residual": 0.0, "max_energy_residual_joule": 0.0}, [], False)
+        own, judged = (errors(self._scene, steps, steps[:1], 0.0, of_interface=judged) for judged in (False, True))
+        of_own, of_judged = (float(np.abs(found.share).max()) for found in (own, judged))
+        last = steps[-1]
+        summary = {
+            "max_energy_residual": of_own,
+            "max_energy_residual_joule": float(np.abs(own.residual).max()),
+            **({"max_interface_residual": of_judged} if self._scene.foreign else {}),
+            **({"loss_beam": float(last["beam_dissipated"])} if self._pair.beam is not None else {}),
+            **({"loss_spring": float(last["spring_dissipated"])} if self._pair.spring is not None else {}),
+            **({"loss_contact": float(last["law_dissipated"])} if self._pair.law.soft else {}),
         }
+        warnings = []
+        if self._untold:
+            warnings.append("a body reports no energies, so the energy balance is not checked")
+        elif of_judged > self._warns:
+            warnings.append(self.cause(of_judged, macro_step))
+        elif of_own > self._warns:
+            warnings.append(
+                f"the energies that the FMUs tell are off by {100.0 * of_own:.2g} %, by their own "
+                f"solvers: the coupling has kept those of the interface to {of_judged:.1e}"
+            )
+        return Report(summary, warnings, bool(self._wrong(judged).max() > self._warns))
 
-    def _cause(self, macro_step: float) -> str:
+    def cause(self, share: float, macro_step: float) -> str:
+        """Return in words why a ``share`` of the energy has changed, and what would help."""
         coupling, beam = self._scene.coupling, self._scene.beam
         causes, remedies = [], []
         if not self._pair.joined.energy_exact:
@@ -157,5 +127,13 @@ class Balance(Checkpointed):
         if not causes:
             causes.append("rounding, or a solver's tolerance,")
             remedies.append("the results are not to be trusted; try another coupling.macro_step")
-        percent = 100.0 * self._judged.relative
+        percent = 100.0 * share
         return f"{' with '.join(causes)} has changed the energy by {percent:.2g} %: {'; '.join(remedies)}"
+
+
+class Report(NamedTuple):
+    """What the energy of a run amounts to."""
+
+    summary: dict[str, Any]  #: residuals, and what bodies and contact law have dissipated [J]
+    warnings: list[str]
+    changed: bool  #: whether so much has changed that the motion is in doubt

@@ -25,7 +25,7 @@ _CUBIC = 4
 class LocalError(Checkpointed):
     """Estimates relative to the tolerances of a scene, and the scales that these are relative to."""
 
-    CHECKPOINTED = ("_lowest", "_highest", "_fastest")
+    CHECKPOINTED = ("_lowest", "_highest", "_fastest", "_energy")
 
     def __init__(self, scene: Scene, pair: Pair) -> None:
         self._scene, self._pair = scene, pair
@@ -36,12 +36,15 @@ class LocalError(Checkpointed):
         self._lowest: list[float] = [end.displacement for end in ends]
         self._highest = self._lowest
         self._fastest = 0.0  #: [m/s]
+        self._energy = 0.0  #: the largest so far [J]
 
-    def estimate(self, state: State, step: Step, energy_scale: float) -> tuple[float, int]:
-        """The step's error, 1 is the tolerance, and the order in which it falls with the size of the step.
+    def note(self, energy: float) -> None:
+        """Note that all energies together have been as large as this [J]."""
+        if energy > self._energy:
+            self._energy = energy
 
-        ``energy_scale`` is the largest energy so far [J].
-        """
+    def estimate(self, state: State, step: Step) -> tuple[float, int]:
+        """The step's error, 1 is the tolerance, and the order in which it falls with the size of the step."""
         pair, size = self._pair, step.size
         lowest, highest, speed = self._extremes(step)
         ranges = [high - low for low, high in zip(lowest, highest, strict=True)]
@@ -51,7 +54,7 @@ class LocalError(Checkpointed):
             return 0.0, _CUBIC
         tolerance = self._relative + self._absolute / span
         coupling = pair.coupling(state.phase)
-        scales = Scales(span, speed, energy_scale, pair.reduced_mass(Phase()))
+        scales = Scales(span, speed, self._energy, pair.reduced_mass(Phase()))
         tied = not pair.law.soft and state.phase.joint is not Joint.FREE
         curve = self._curve(cubic, ranges, max(self._relative, _SEEN) if tied else self._relative)
         told = coupling.local_errors(step, scales)

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from math import isfinite
 from traceback import walk_tb
 
+from ..results.trajectory import Trajectory
+
 #: ``progress(time, phase, macro_steps)``, called once per accepted step.
 Progress = Callable[[float, str, int], None]
 #: Cause of a run that ends because a number has become too large.
@@ -23,8 +25,11 @@ def raised_here(error: BaseException) -> bool:
 class RunStopped(RuntimeError):
     """The run ended before t_end; everything up to ``time`` [s] has been recorded.
 
-    ``residual`` [m] is that of the conditions that could not be met, ``None`` where the cause is another.
+    ``residual`` [m] is that of the conditions that could not be met, ``None`` where the cause is another. ``run`` is
+    the trajectory so far, ``None`` where it went into files.
     """
+
+    run: Trajectory | None = None
 
     def __init__(self, cause: str, time: float, residual: float | None = None) -> None:
         if residual is not None and not isfinite(residual):

@@ -3,30 +3,198 @@
 from __future__ import annotations
 
 import traceback
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from .. import __version__
-from ..bodies.checkpointed import Checkpointed
 from ..bodies.factory import findings, fingerprints, load_bodies
 from ..bodies.fmu_bodies import FmuBeam, FmuBody, FmuSpring
 from ..bodies.isolated import IsolatedBody
 from ..bodies.protocol import Body, FmuError
-from ..contact.laws import stiffest
 from ..results.directory import RunDirectory
 from ..results.file_recorder import FileRecorder
 from ..results.reading import load_summary, load_trajectory
 from ..results.recording import MemoryRecorder, Recorder
-from ..results.totals import totals
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, scene_from_dict, suspicions, with_changes
-from ..scene.resolution import force_window
 from .checkpoint import Checkpoint, CheckpointRefused, Checkpoints
+from .master import Master
 from .outcome import Progress, RunStopped
 from .paper_law import PaperLaw
-from .simulation import Simulation
+from .stepping import State
+
+
+class Simulation:
+    """One run of a scene, a step at a time.
+
+    Parameters
+    ----------
+    scene
+        What is simulated; it asks for no accuracy.
+    recorder
+        Where the results go; default: kept in memory.
+    start
+        Go on from here, `last_checkpoint` of the directory of ``recorder``, instead of from the start.
+    upper, lower
+        Bodies that take the places of the beam and the spring, which the scene then describes as far as the master
+        asks; they are the caller's to close.
+
+    Raises
+    ------
+    SceneError
+        If the scene asks for what its bodies cannot do, or for an accuracy.
+    FmuError
+        If an FMU cannot be found or loaded.
+    ResultsUnreadable, ResultsInUse
+        If the results do not belong to ``start``, or another process is writing them.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        recorder: Recorder | None = None,
+        *,
+        start: Checkpoint | None = None,
+        upper: Body | None = None,
+        lower: Body | None = None,
+    ) -> None:
+        began = perf_counter()
+        _refuse_accuracy(scene, upper, lower)
+        self.scene, self.recorder = scene, recorder or MemoryRecorder(scene)
+        of_scene = _without_own(scene, upper=upper, lower=lower)
+        start_time = 0.0 if upper is not None else scene.contact_time or 0.0
+        paper = scene.contact.algorithm
+        self._bodies = beam, spring = load_bodies(_as_in_paper(scene) if paper else of_scene, start_time)
+        try:
+            self._master: Master | PaperLaw
+            if paper:
+                assert isinstance(beam, FmuBeam)
+                assert isinstance(spring, FmuSpring)
+                self._master = PaperLaw(scene, start_time, beam, spring, self.recorder)
+            else:
+                self._master = Master(scene, start_time, upper or beam, lower or spring, self.recorder)
+            if start is not None:
+                self._go_on(start)
+        except BaseException:
+            self.close()
+            raise
+        self._loaded = perf_counter()
+        self._setup_time, self._before = self._loaded - began, 0.0 if start is None else start.wall_time
+        self._summary: dict[str, Any] = {}  #: of the run when it has ended
+
+    def _go_on(self, start: Checkpoint) -> None:
+        recorder = self.recorder
+        if not isinstance(recorder, FileRecorder):
+            raise TypeError("a run goes on in the directory of its results")
+        try:
+            self._master.restore(start.simulation)
+        except ValueError as error:
+            path = recorder.directory.checkpoint
+            raise CheckpointRefused(f"{path}: written by another version: {error}") from error
+        recorder.restore(start.results)
+        self._master.catch_up()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the FMUs; what was computed stays."""
+        for body in self._bodies:
+            if body is not None:
+                body.close()
+
+    @property
+    def done(self) -> bool:
+        """Whether the run has reached t_end."""
+        return self._master.done
+
+    @property
+    def state(self) -> State:
+        """Where the run is: its time, phase and forces, and the size of its last step."""
+        return self._master.state
+
+    @property
+    def run(self) -> Trajectory:
+        """The trajectory so far; its summary has the ``status`` "running" until the run has ended."""
+        self._master.hand_over()
+        found = self.recorder.trajectory()
+        found.summary = found.summary if self._summary else self._summed_up({"status": "running"})
+        return found
+
+    def step(self) -> bool:
+        """Make one step, to the next macro point or event, and return whether there are more to come.
+
+        Raises RunStopped if the run ends early; what was computed is in its ``run``.
+        """
+        with self._ending():
+            self._master.step()
+        if self.done:
+            self._end({"status": "done"})
+        return not self.done
+
+    def finish(self, progress: Progress | None = None, checkpoints: Checkpoints | None = None) -> dict[str, Any]:
+        """Make all steps that are left and return the summary; ``progress`` is called after each. Raises RunStopped."""
+        master = self._master
+        with self._ending():
+            while not master.done:
+                master.step()
+                if progress is not None:
+                    progress(master.state.time, master.state.phase.name, master.macro_steps)
+                if checkpoints is not None:
+                    checkpoints.take_when_due(master)
+        return self._end({"status": "done"})
+
+    @contextmanager
+    def _ending(self) -> Iterator[None]:
+        """End the run with its summary if an error ends it, as RunStopped unless the disk or the user does."""
+        try:
+            yield
+        except RunStopped as stopped:
+            self._stopped(stopped, {})
+            raise
+        except OSError as error:
+            self._end({"status": "stopped", "cause": f"{type(error).__name__}: {error}"})
+            raise
+        except Exception as error:
+            cause = "".join(traceback.format_exception_only(error)).strip()
+            unforeseen = RunStopped(cause, self.state.time)
+            self._stopped(unforeseen, {"traceback": traceback.format_exc()})
+            raise unforeseen from error
+        except BaseException as error:
+            self._end({"status": "interrupted", "cause": type(error).__name__})
+            raise
+
+    def _stopped(self, stopped: RunStopped, more: dict[str, Any]) -> None:
+        self._end({"status": "stopped", "cause": stopped.cause, "residual": stopped.residual, **more})
+        if isinstance(self.recorder, MemoryRecorder):
+            stopped.run = self.recorder.trajectory()
+
+    def _end(self, status: dict[str, Any]) -> dict[str, Any]:
+        if not self._summary:
+            with suppress(RunStopped):  # the run ends for another reason
+                self._master.hand_over()
+            self._summary = self._summed_up(status)
+            self.recorder.finish(self._summary)
+        return self._summary
+
+    def _summed_up(self, status: dict[str, Any]) -> dict[str, Any]:
+        ended, summary = perf_counter(), self._master.summary()
+        beam, spring = self._bodies
+        return {
+            **status,
+            "version": __version__,
+            **summary,
+            **_calls(beam=beam, spring=spring),
+            "setup_time": self._setup_time,
+            "wall_time": self._before + ended - self._loaded,
+            "warnings": [*suspicions(self.scene), *summary["warnings"]],
+        }
 
 
 def run(
@@ -43,20 +211,13 @@ def run(
 
     Parameters
     ----------
-    scene
-        What is simulated.
-    recorder
-        Receives the results.
+    scene, recorder, start, upper, lower
+        As of `Simulation`, which raises the same errors.
     progress
-        Called once per accepted step.
+        Called after each step.
     seconds
         Take a checkpoint into the directory of ``recorder``, which is then a `FileRecorder`, after the first step and
         whenever so much time of the clock has passed [s].
-    start
-        Go on from here, `last_checkpoint` of the directory of ``recorder``, instead of from the start.
-    upper, lower
-        Bodies that take the places of the beam and the spring, which the scene then describes as far as the master
-        asks; they are the caller's to close.
 
     Raises
     ------
@@ -66,94 +227,16 @@ def run(
         ``traceback``.
     OSError
         If the results cannot be written.
-    FmuError
-        If an FMU cannot be found or loaded.
-    ResultsUnreadable, ResultsInUse
-        If the results do not belong to ``start``, or another process is writing them.
     """
-    if scene.accuracy is not None:
-        if (upper or lower) is not None:
-            raise SceneError(
-                f"accuracy = {scene.accuracy:g}: is kept by pilot runs, and a body of your own can be run once; give "
-                "coupling.scheme, degree and macro_step instead"
-            )
-        raise SceneError(
-            f"accuracy = {scene.accuracy:g}: the settings that keep it are not picked yet; run "
-            "springbeam.studies.accuracy.pick(scene).scene, or take accuracy out"
-        )
-    began = perf_counter()
-    before = 0.0 if start is None else start.wall_time
-    after_step = progress
+    checkpoints = None
     if seconds is not None:
         if not isinstance(recorder, FileRecorder):
             raise TypeError("checkpoints belong to results in a directory")
         _refuse_checkpoints(scene)
+        before = 0.0 if start is None else start.wall_time
         checkpoints = Checkpoints(recorder, seconds, __version__, fingerprints(scene), before)
-
-        def after_step(time: float, phase: str, macro_steps: int) -> None:
-            if progress is not None:
-                progress(time, phase, macro_steps)
-            checkpoints.take_when_due(simulation)
-
-    of_scene = _without_own(scene, upper=upper, lower=lower)
-    start_time = 0.0 if upper is not None else scene.contact_time or 0.0
-    paper = scene.contact.algorithm
-    beam, spring = load_bodies(_as_in_paper(scene) if paper else of_scene, start_time)
-    try:
-        simulation: Simulation | PaperLaw
-        if paper:
-            assert isinstance(beam, FmuBeam)
-            assert isinstance(spring, FmuSpring)
-            simulation = PaperLaw(scene, start_time, beam, spring, recorder, after_step)
-        else:
-            simulation = Simulation(scene, start_time, upper or beam, lower or spring, recorder, after_step)
-        if start is not None:
-            _go_on(simulation, recorder, start)
-        loaded = perf_counter()
-        status: dict[str, Any] = {"status": "done"}
-        try:
-            simulation.run()
-        except RunStopped as stopped:
-            status = {"status": "stopped", "cause": stopped.cause, "residual": stopped.residual}
-            raise
-        except OSError as error:
-            status = {"status": "stopped", "cause": f"{type(error).__name__}: {error}"}
-            raise
-        except Exception as error:
-            cause = "".join(traceback.format_exception_only(error)).strip()
-            status = {"status": "stopped", "cause": cause, "residual": None, "traceback": traceback.format_exc()}
-            raise RunStopped(cause, simulation.time) from error
-        except BaseException as error:
-            status = {"status": "interrupted", "cause": type(error).__name__}
-            raise
-        finally:
-            ended = perf_counter()
-            summary = {
-                **status,
-                "version": __version__,
-                **simulation.summary(),
-                **_totals(simulation, scene, recorder),
-                **_calls(beam=beam, spring=spring),
-                "setup_time": loaded - began,
-                "wall_time": before + ended - loaded,
-            }
-            summary["warnings"] = [*suspicions(scene), *summary["warnings"]]
-            recorder.finish(summary)
-        return summary
-    finally:
-        for body in (beam, spring):
-            if body is not None:
-                body.close()
-
-
-def _go_on(simulation: Checkpointed, recorder: Recorder, start: Checkpoint) -> None:
-    if not isinstance(recorder, FileRecorder):
-        raise TypeError("a run goes on in the directory of its results")
-    try:
-        simulation.restore(start.simulation)
-    except ValueError as error:
-        raise CheckpointRefused(f"{recorder.directory.checkpoint}: written by another version: {error}") from error
-    recorder.restore(start.results)
+    with Simulation(scene, recorder, start=start, upper=upper, lower=lower) as simulation:
+        return simulation.finish(progress, checkpoints)
 
 
 def last_checkpoint(directory: str | Path) -> Checkpoint:
@@ -203,9 +286,24 @@ def simulate(
     scene: Scene, progress: Progress | None = None, *, upper: Body | None = None, lower: Body | None = None
 ) -> Trajectory:
     """Co-simulate ``scene``, which asks for no accuracy, and return the trajectory; see `run`."""
-    recorder = MemoryRecorder(scene)
-    run(scene, recorder, progress, upper=upper, lower=lower)
-    return recorder.trajectory()
+    with Simulation(scene, upper=upper, lower=lower) as simulation:
+        simulation.finish(progress)
+        return simulation.run
+
+
+def _refuse_accuracy(scene: Scene, upper: Body | None, lower: Body | None) -> None:
+    """Raise SceneError if ``scene`` asks for an accuracy, which is kept by settings that are picked before."""
+    if scene.accuracy is None:
+        return
+    if (upper or lower) is not None:
+        raise SceneError(
+            f"accuracy = {scene.accuracy:g}: is kept by pilot runs, and a body of your own can be run once; give "
+            "coupling.scheme, degree and macro_step instead"
+        )
+    raise SceneError(
+        f"accuracy = {scene.accuracy:g}: the settings that keep it are not picked yet; run "
+        "springbeam.studies.accuracy.pick(scene).scene, or take accuracy out"
+    )
 
 
 def _refuse_checkpoints(scene: Scene) -> None:
@@ -250,14 +348,6 @@ def _as_in_paper(scene: Scene) -> Scene:
         beam={"integrator": "generalized_alpha", "rho_inf": 1.0, "n_modes": 0},
         coupling={"scheme": "energy", "degree": 0},
     )
-
-
-def _totals(simulation: Simulation | PaperLaw, scene: Scene, recorder: Recorder) -> dict[str, float | int]:
-    steps = recorder.steps()
-    if steps is None or isinstance(simulation, PaperLaw):
-        return {}
-    window = force_window(scene, stiffest(scene) if scene.contact.facts.opens else 0.0)
-    return totals(scene, steps, recorder.events(), window, free_at_end=simulation.free_at_end)
 
 
 def _calls(**bodies: Body | None) -> dict[str, int]:

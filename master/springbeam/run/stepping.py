@@ -34,6 +34,8 @@ class State(Checkpointed):
     #: (middle, C, N) of the last two steps of this phase.
     middles: list[tuple[float, float, float]] = field(default_factory=list)
     reclosed: bool = False  #: the contact had opened and closed at once: its next step does not open it again
+    lost: float = 0.0  #: by events so far [J]
+    fastest: float = 0.0  #: the largest speed of an end at a row so far [m/s]
 
     def accept(self, step: Step, time: float) -> None:
         """The step that ends at ``time`` is made."""
@@ -97,6 +99,8 @@ class Pair(Checkpointed):
         self.bodies: list[Body] = [body for body in (beam, spring) if body is not None]
         for body in self.bodies:
             body.take_place(upper=body is beam)
+        #: Whether the upper and the lower body are FMUs that others made; empty if none is.
+        self.foreign = tuple(table in scene.foreign for table in ("beam", "spring")) if scene.foreign else ()
         self.repeatable = all(body.abilities.state for body in self.bodies)
         #: Whether a step can be repeated with another size.
         self.divides = self.repeatable and all(body.abilities.any_size for body in self.bodies)
@@ -191,9 +195,10 @@ class Pair(Checkpointed):
         """Energies of the beam, of the spring and of what couples them [J], where the ends are."""
         return self.upper.energies(), self.lower.energies(), self.joined.booking(ends)
 
-    def exchanged(self, ends: Ends) -> tuple[Energies, Energies, Booking]:
-        """Return the energies by which the coupling is judged [J], where the ends are."""
-        return self.upper.exchanged(), self.lower.exchanged(), self.joined.booking(ends)
+    def received(self) -> tuple[float, float]:
+        """Return the work that the bodies have received if they are foreign FMUs [J], 0 of others."""
+        upper, lower = self.foreign
+        return (self.upper.exchanged().potential if upper else 0.0, self.lower.exchanged().potential if lower else 0.0)
 
     def end_force(self, state: State, step: Step) -> float:
         """C at the end of the step as well as the degree tells; exactly, where the tip has no mass [N]."""

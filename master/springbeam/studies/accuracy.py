@@ -15,7 +15,6 @@ import numpy as np
 
 from ..bodies.protocol import Body
 from ..results.contact_times import contact_time_difference, impulse_difference
-from ..results.recording import MemoryRecorder
 from ..results.trajectory import Trajectory
 from ..run import runner
 from ..run.outcome import Progress, RunStopped
@@ -88,18 +87,17 @@ def pick(scene: Scene) -> Trajectory:
     pilots: list[Trajectory] = []
     coarse, before, stopped = None, math.inf, 0
     while steps <= _MOST:
-        recorder = MemoryRecorder(_prepared(scene, scene.duration / steps))
+        prepared = _prepared(scene, scene.duration / steps)
         steps *= 2.0
         try:
-            runner.run(recorder.scene, recorder)
-        except RunStopped:
+            fine, stopped = runner.simulate(prepared), 0
+        except RunStopped as error:
             stopped += 1
-            if stopped == _MOST_STOPPED:
+            if stopped == _MOST_STOPPED or error.run is None:
                 raise
-            pilots.append(recorder.trajectory())
+            pilots.append(error.run)
             coarse = None
             continue
-        fine, stopped = recorder.trajectory(), 0
         if coarse is not None:
             apart = differences(coarse, fine, asked)
             worst = max(apart.values())

@@ -153,7 +153,7 @@ class Records:
     def __enter__(self) -> Records:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._file = self.path.open("ab", buffering=0)
-        lock(self._file)
+        lock(self._file, self.path)
         self._begun = False
         return self
 

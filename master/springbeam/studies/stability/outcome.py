@@ -122,7 +122,7 @@ def _only_damped_numerically(scene: Scene) -> bool:
 
 
 def _energy_scale(run: Trajectory) -> np.ndarray:
-    """Return the largest energy until each row [J], as in `ledger.Ledger`."""
+    """Return the largest energy until each row [J], as in `springbeam.run.ledger.errors`."""
     mechanical = sum(np.abs(run[name]) for name in ("e_beam", "e_spring", "e_contact") if name in run.columns)
     return np.maximum.accumulate(np.maximum(mechanical, abs(run.e_total[0])))
 

@@ -31,7 +31,14 @@ def _of(column: str, pick: Callable[[np.ndarray], float]) -> Callable[[Trajector
 
 
 def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajectory], float | None]:
-    return lambda run: pick(extremes(run, column)) if column in run.columns else None
+    def of(run: Trajectory) -> float | None:
+        if column not in run.columns:
+            return None
+        if run.steps is None:  # a reference, which has its rows only
+            return pick(Extremes.of_rows(run.time, run[column]))
+        return pick(extremes(run.scene, run.steps, column))
+
+    return of
 
 
 def _first(kind: str) -> Callable[[Trajectory], float | None]:

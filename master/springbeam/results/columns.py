@@ -1,0 +1,115 @@
+"""Columns and energies of a run: functions of its scene and its records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..scene import Scene
+from .steps import PHASE_NAMES, STEP_COLUMNS, force, joined
+from .trajectory import columns_of
+
+#: Largest value of a column that the motion does not depend on [N]; pictures multiply two of them.
+MOST_SHOWN = 1e150
+#: Records of which columns are made at once, so that those of a long run need no memory.
+_TOGETHER = 4096
+
+
+def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the columns that records of a run of ``scene`` amount to, those of `columns_of`.
+
+    Parameters
+    ----------
+    scene
+        As run.
+    steps
+        Any records of the run, of dtype `springbeam.results.steps.STEP`, shape (n,).
+    first
+        The first record of the run, shape (1,).
+    """
+    u, v, y, z = (steps[f"{name}_after"] for name in ("u_tip", "v_tip", "y", "z"))
+    apart, rigid, zeros = ~joined(steps), scene.contact.rigid, np.zeros(len(steps))
+    contact = np.where(apart & rigid, 0.0, force(steps, steps["size"]))
+    inside = steps["law_force"]
+    if scene.coupled and rigid and not scene.contact.lasting:
+        inside = np.minimum(normal_compliance(scene, u, first), MOST_SHOWN)
+    energies = ledger(scene, steps)
+    found = {
+        "time": steps["time"],
+        "u_tip": u,
+        "v_tip": v,
+        "y": y,
+        "z": z,
+        "contact_force": contact,
+        "contact_force_smoothed": np.where(apart, contact, steps["smoothed"]),
+        "compliance_force": inside,
+        "tie_reaction": contact - inside if rigid or scene.contact.algorithm else zeros,
+        "foundation_force": np.where(steps["phase"] < 3.0, 0.0, force(steps, steps["size"], "foundation_force")),
+        "gap": u - y,
+        "velocity_mismatch": np.where(apart, 0.0, v - z),
+        "phase": PHASE_NAMES[steps["phase"].astype(int)],
+        **energies,
+        "energy_residual": energies["e_total"] - steps["energy_at_start"],
+        **{f"load_{i}": load.value(steps["time"]) for i, load in enumerate(scene.loads)},
+    }
+    return {name: np.array(found[name]) for name in columns_of(scene)}
+
+
+def first_not_finite(scene: Scene, steps: np.ndarray, first: np.ndarray) -> tuple[int, str] | None:
+    """Return the first row that has a number that is not finite, and which; ``None`` if there is none.
+
+    Parameters as of `columns`.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        made = columns(scene, steps, first)
+    table = [(name, values) for name, values in made.items() if name != "phase"]
+    table += [(name, steps[name]) for name in STEP_COLUMNS]
+    finite = np.isfinite([values for _, values in table])
+    if finite.all():
+        return None
+    row = int(np.argmin(finite.all(axis=0)))
+    name, values = table[int(np.argmin(finite[:, row]))]
+    return row, f"{name} = {values[row]}"
+
+
+def blocks(scene: Scene, steps: np.ndarray) -> Iterator[dict[str, np.ndarray]]:
+    """Yield the columns of all records of a run, some thousand rows at a time."""
+    for begin in range(0, max(len(steps), 1), _TOGETHER):  # of no records as well, columns without rows
+        yield columns(scene, steps[begin : begin + _TOGETHER], steps[:1])
+
+
+def normal_compliance(scene: Scene, u: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """Return λ (Ψ − u)₊^p [N], the part of a rigid contact's force that the paper calls normal compliance."""
+    contact, psi = scene.contact, first["y_after"] if scene.spring is None else scene.spring.equilibrium
+    with np.errstate(over="ignore"):
+        return np.asarray(contact.stiffness * np.maximum(psi - u, 0.0) ** contact.exponent)
+
+
+def ledger(scene: Scene, steps: np.ndarray, *, of_interface: bool = False) -> dict[str, np.ndarray]:
+    """Return the columns from ``e_beam`` to ``e_total`` [J]: energies, what was lost, minus the work of the loads.
+
+    In the ledger ``of_interface`` the energy of a foreign FMU is the work that it has received: its own account may be
+    off.
+    """
+    parts = []
+    for name in ("beam", "spring"):
+        if of_interface and name in scene.foreign:
+            parts.append((steps[f"{name}_received"], np.zeros(len(steps)), np.zeros(len(steps))))
+        else:
+            kinetic, potential = steps[f"{name}_kinetic"], steps[f"{name}_potential"]
+            parts.append((kinetic + potential, steps[f"{name}_dissipated"], steps[f"{name}_load"]))
+    (e_beam, lost_beam, load_beam), (e_spring, lost_spring, load_spring) = parts
+    found = {
+        "e_beam": e_beam,
+        "e_spring": e_spring,
+        "e_contact": steps["law_stored"],
+        "e_dissipated": lost_beam + lost_spring + steps["law_dissipated"],
+        "e_impact_loss": steps["impact_loss"],
+        "e_load": load_beam + steps["unfelt"] + load_spring,
+    }
+    # From left to right: `sum` would begin with 0.
+    e_total = e_beam + e_spring
+    for name in ("e_contact", "e_dissipated", "e_impact_loss", "e_load"):
+        e_total = e_total + found[name]
+    return {**found, "e_total": e_total}

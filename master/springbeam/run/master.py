@@ -1,0 +1,378 @@
+"""The loop of a run: macro steps from event to event, each of which leaves one record.
+
+One step is *mark* (the bodies remember their state), *attempt* (advance under the phase's law; may be repeated with
+any size, each time from the mark; `springbeam.run.stepping`), *detect* (which event comes first inside the step?
+`springbeam.run.detection`) and *accept*. An event shortens the step to itself, acts (`springbeam.contact.phases`), and
+the run goes on from there. The records are checked some hundred at a time.
+"""
+
+from __future__ import annotations
+
+from itertools import islice
+from typing import Any
+
+import numpy as np
+
+from ..bodies.checkpointed import Checkpointed
+from ..bodies.gate import admit
+from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, StepRefused
+from ..contact.laws import stiffest
+from ..contact.phases import Joint, Phase, Transitions
+from ..coupling.protocol import NotConverged, Step
+from ..results.columns import ledger
+from ..results.recording import Recorder
+from ..results.steps import STEP, packed
+from ..results.steps import joined as are_joined
+from ..results.totals import pace, shortest_contact, totals
+from ..results.trajectory import Event
+from ..scene import Scene
+from ..scene.automatic import with_scheme_chosen
+from ..scene.resolution import CONTACT_STEPS, force_window, not_resolved, peak_force_doubt
+from .crowd import SIMULTANEOUS, Crowd
+from .detection import Detector
+from .ledger import Balance
+from .local_error import LocalError
+from .log import Log
+from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
+from .neglect import Past, neglected
+from .observed import NOT_SHOWN, observed
+from .outcome import OVERFLOW, RunStopped, raised_here
+from .stepping import Pair
+
+#: A load that jumps or bends within this fraction of H has done so.
+_SAME_TIME = 1e-9
+#: A step that is refused is halved this often before the run stops.
+_MAX_HALVINGS = 20
+#: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
+_SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
+
+
+class Master(Checkpointed):
+    """One run of a scene with given bodies, a step at a time.
+
+    Parameters
+    ----------
+    scene
+        What is simulated.
+    start_time
+        Where the run starts [s], `springbeam.scene.Scene.contact_time` or 0.
+    beam, spring
+        The bodies at the start time; ``None`` where the scene has none. A beam that is no `BeamBody` leaves no shapes.
+    recorder
+        Receives records, events and shapes.
+
+    Raises SceneError if the scene cannot be run with these bodies.
+    """
+
+    CHECKPOINTED = (
+        "_pair",
+        "state",
+        "_steps",
+        "_error",
+        "_transitions",
+        "_begun",
+        "_energy_at_start",
+        "_last_opening",
+        "_crowd",
+        "macro_steps",
+        "_halvings",
+        "_shapes_left",
+        "_next_shape",
+    )
+
+    def __init__(
+        self, scene: Scene, start_time: float, beam: Body | None, spring: Body | None, recorder: Recorder
+    ) -> None:
+        scene, self._choice = with_scheme_chosen(scene)
+        self._scene, self._recorder = scene, recorder
+        admit(scene, start_time, beam, spring)
+        self._pair = Pair(scene, beam, spring)
+        self.state = self._pair.initial_state(start_time)
+        self._steps: MacroGrid | AdaptiveSteps
+        if scene.coupling.adaptive:
+            self._steps = AdaptiveSteps(start_time, scene.time.t_end)
+        else:
+            self._steps = MacroGrid(start_time, scene.time.t_end, scene.coupling.H)
+        self._error = LocalError(scene, self._pair) if scene.coupling.adaptive else None
+        self._detector = Detector(scene, self._pair, self._steps, self._fastest)
+        self._transitions = Transitions(
+            scene,
+            self._pair.law,
+            None if beam is None else beam.mass,
+            None if spring is None else spring.mass,
+            self._fastest,
+            self._pair.equilibrium,
+        )
+        self._begun, self._energy_at_start = False, 0.0
+        self._last_opening = -float("inf")
+        self._crowd = Crowd(start_time)
+        self.macro_steps = self._halvings = 0
+        self._balance = Balance(scene, self._pair)
+        self._log = Log(scene, recorder, self._balance)
+        self._pictured = beam if isinstance(beam, BeamBody) else None
+        self._shapes_left, self._next_shape = _SHAPES_AFTER_CONTACT, start_time
+        length = scene.time.t_end - start_time or 1.0  # 0 where contact is at t_end: the one shape is that of the start
+        self._shape_every = length / _SHAPES_OVER_RUN
+
+    @property
+    def done(self) -> bool:
+        """Whether the run has reached t_end."""
+        return self._begun and self.state.time >= self._scene.time.t_end
+
+    def _fastest(self) -> float:
+        """The largest speed of an end so far [m/s]."""
+        return self.state.fastest
+
+    def step(self) -> None:
+        """Make the next step, up to an event if there is one. The first call begins the run.
+
+        Raises RunStopped; what was computed up to its time is with the recorder.
+        """
+        try:
+            if not self._begun:
+                self._begin()
+            if not self.done:
+                self._step()
+            if self._log.full or self.done:
+                self.hand_over()
+        except (BodyFailed, OverflowError, RunStopped) as failed:
+            if isinstance(failed, OverflowError) and not raised_here(failed):
+                raise
+            self.hand_over()  # where an earlier step was wrong, that is why it stops
+            if isinstance(failed, RunStopped):
+                raise
+            cause = OVERFLOW if isinstance(failed, OverflowError) else str(failed)
+            raise RunStopped(cause, self.state.time) from failed
+
+    def hand_over(self) -> None:
+        """Give the recorder the records that it does not have yet; see `Log.hand_over`."""
+        self._log.hand_over(self._steps.size)
+
+    def catch_up(self) -> None:
+        """Take note of the records that the recorder has of a run that was restored."""
+        self._log.catch_up()
+
+    def _step(self) -> None:
+        state, steps, loads = self.state, self._steps, self._pair.loads
+        target, size = steps.next(state.time, loads.next_kink(state.time + _SAME_TIME * steps.size))
+        step, event = self._advance(size)
+        whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
+        end = target if whole else state.time + step.size
+        self._crowd.count(end, step.size, steps.size)
+        if step.size > 0.0:
+            if self._error is not None:
+                self._error.accept(step)
+            self._pair.coupling(state.phase).accept(step)
+            state.accept(step, end)
+            self.macro_steps += 1
+            if self._pair.opens_softly:
+                self._note_soft_contact(step)
+        steps.reached(state.time)
+        if event is None:
+            self._record(step, step.end)
+        else:
+            self._act(event, step)
+            self._record(step, self._pair.ends())
+
+    def _advance(self, size: float) -> tuple[Step, str | None]:
+        """The next step and the event it ends on, the bodies left at its end."""
+        state, pair = self.state, self._pair
+        pair.mark()
+        start = pair.ends()
+        halvings, cause = 0, ""
+        while True:
+            try:
+                at_start = self._detector.at_start(state, start)
+                if at_start is not None:
+                    return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
+                step = pair.attempt(state, size, start)
+                if self._error is None or self._holds(step, self._error, cause):
+                    return self._detector.first_event(state, step)
+                pair.rewind()
+                size = self._steps.size
+            except (StepRefused, OverflowError) as refused:
+                if isinstance(refused, OverflowError) and not raised_here(refused):
+                    raise  # a body of the caller's has failed: it would do so at any size
+                if pair.repeatable:
+                    pair.rewind()
+                cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
+                if halvings == _MAX_HALVINGS or not pair.divides:
+                    residual = refused.residual if isinstance(refused, NotConverged) else None
+                    raise RunStopped(cause, state.time, residual) from refused
+                halvings += 1
+                self._halvings += 1
+                size *= 0.5
+
+    def _holds(self, step: Step, local_error: LocalError, refused: str) -> bool:
+        """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set.
+
+        ``refused`` says why longer ones were, or nothing: none that is too short for its tolerance hides that.
+        """
+        assert isinstance(self._steps, AdaptiveSteps)
+        error, order = local_error.estimate(self.state, step)
+        try:
+            return self._steps.judge(step.size, error, order)
+        except StepTooShort as too_short:
+            cause = refused or f"{too_short}, where it is {error:.3g} of it"
+            raise RunStopped(cause, step.time) from too_short
+
+    # -- events -----------------------------------------------------------------------------------------------------
+
+    def _begin(self) -> None:
+        """Record the start, after an event that is due there."""
+        state, pair = self.state, self._pair
+        start = pair.ends()
+        step = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
+        # The ledger starts with the bodies as they arrive, before an impact.
+        arriving = np.frombuffer(self._packed(step, start), STEP)
+        self._energy_at_start = float(ledger(self._scene, arriving)["e_total"][0])
+        if self._error is not None:
+            self._error.note(abs(self._energy_at_start))
+        if self._in_contact(start):
+            pair.mark()
+            self._act("impact" if pair.joinable else "stop_impact", step)
+        self._record(step, pair.ends())
+        self._begun = True
+
+    def _in_contact(self, start: Ends) -> bool:
+        """Is the tip on the spring top (or the stop), moving down or at rest?"""
+        pair = self._pair
+        if pair.beam is None or pair.law.soft or (pair.spring is None and pair.stop is None):
+            return False
+        tip, low = start
+        tolerance = self._detector.tolerance(start) + 1e-12 * abs(low.displacement)
+        parting = tip.velocity - low.velocity > 0.0 and not pair.law.lasting
+        return abs(tip.displacement - low.displacement) <= tolerance and not parting
+
+    def _act(self, kind: str, step: Step) -> None:
+        """The event at the end of ``step`` happens."""
+        state, pair = self.state, self._pair
+        if kind in ("separation", "release"):
+            self._last_opening = state.time
+        if kind == "impact":
+            state.reclosed = state.time - self._last_opening <= SIMULTANEOUS * self._steps.size
+        ends = pair.ends()
+        meets = kind in ("impact", "separation")  # at Ψ, where it means something else
+        tolerance = self._detector.simultaneity_tolerance(ends) if meets else self._detector.tolerance(ends)
+        kind, phase, impact = self._transitions.after(
+            kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
+        )
+        if kind in ("impact", "stop_impact") and pair.divides:
+            self._steps.shorten_after_impact()
+        pair.apply_impulses(impact.on_beam, impact.on_spring)
+        lost = impact.energy_loss + pair.follow_phase(phase)
+        state.lost += lost
+        state.enter(phase)
+        tip, low = pair.ends()
+        beam, spring = pair.beam is not None, pair.spring is not None
+        self._log.happened(
+            Event(
+                state.time,
+                kind,
+                low.displacement if spring else None,
+                low.velocity if spring else None,
+                tip.displacement if beam else None,
+                tip.velocity if beam else None,
+                impact.on_beam,
+                impact.of_foundation,
+                lost,
+            )
+        )
+
+    def _note_soft_contact(self, step: Step) -> None:
+        state = self.state
+        for joint, change in self._detector.soft_changes(state, step):
+            state.phase = Phase(joint, state.phase.seated)
+            self._log.happened(change)
+
+    # -- what is left of a step ---------------------------------------------------------------------------------------
+
+    def _record(self, step: Step, ends: Ends) -> None:
+        """Leave the record of ``step`` with the ``ends`` after its event, and now and then the beam's shape."""
+        state, (tip, low) = self.state, ends
+        speed = max(abs(tip.velocity), abs(low.velocity))
+        if speed > state.fastest:
+            state.fastest = speed
+        self._log.add(self._packed(step, ends))
+        if self._pictured is not None:
+            early = self._shapes_left > 0 and state.phase.joint is not Joint.FREE
+            if early or state.time >= self._next_shape:
+                self._shape(self._pictured, early)
+
+    def _packed(self, step: Step, ends: Ends) -> bytes:
+        state, pair = self.state, self._pair
+        _, size, contact, foundation, _, before = step
+        if size == 0.0:
+            contact, foundation = state.contact, state.foundation
+        (u, v, _, _), (y, z, _, _) = ends
+        of_upper, of_lower, booked = pair.energies(ends)
+        law_force, received = 0.0, (0.0, 0.0)
+        if pair.law.soft:
+            law_force = pair.law.force(y - u, z - v)
+        if pair.foreign:
+            received = pair.received()
+        if self._error is not None:
+            energies = abs(of_upper.kinetic + of_upper.potential) + abs(of_lower.kinetic + of_lower.potential)
+            self._error.note(energies + booked.stored)
+        return packed(
+            *(state.time, size, *before[0], *before[1], *contact, *foundation),
+            *(u, v, y, z, state.phase.number, self._log.events, state.smoothed, law_force),
+            *(*of_upper, *of_lower, *booked, state.lost, *received, self._energy_at_start),
+        )
+
+    def _shape(self, beam: BeamBody, early: bool) -> None:
+        time = self.state.time
+        self._shapes_left -= early
+        if time >= self._next_shape:
+            self._next_shape += self._shape_every * ((time - self._next_shape) // self._shape_every + 1.0)
+        self._log.show(time, beam.shape())
+
+    # -- what it amounts to -------------------------------------------------------------------------------------------
+
+    def summary(self) -> dict[str, Any]:
+        """Counts, residuals, warnings and results, as they go into ``summary.json``: of what the recorder has."""
+        scene, H, steps = self._scene, self._steps.size, self._recorder.steps()
+        known = int(steps["events"][-1]) if len(steps) else 0  # a full disk may have events without their records
+        events = list(islice(self._recorder.events(), known))
+        made, joined = int(np.count_nonzero(steps["size"])), self._pair.joined
+        balance, seen = self._balance.report(steps, H), observed(scene, self._pair, steps, events)
+        free_at_end = not are_joined(steps[-1:]).any()
+        warnings = balance.warnings
+        if joined.reduced:
+            warnings.append(
+                f"the contact force of {joined.reduced} of {made} macro steps was not found at coupling.degree = "
+                f"{joined.degree}; they were made at degree 0, which keeps the energy but has order 2. The "
+                "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
+            )
+        shortest = shortest_contact(steps, events, CONTACT_STEPS * H, free_at_end=free_at_end)
+        unresolved = not_resolved(
+            scene,
+            seen.mismatch_at_events,
+            shortest_contact=shortest,
+            contact_frequency=seen.contact_frequency,
+            contact_steps=seen.contact_steps,
+            pace=pace(steps),
+            strokes=any(event.kind in ("stop_impact", "seated") for event in events),
+        )
+        warnings += filter(None, [unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
+        neglect = {}
+        if scene.driver_stiffness is not None and len(steps):
+            bound = neglected(steps, scene.driver_stiffness, Past())
+            neglect = {"neglected_motion": float(bound.motion[-1]), "neglected_share": float(bound.share[-1])}
+        window = force_window(scene, stiffest(scene) if scene.contact.facts.opens else 0.0)
+        return {
+            **neglect,
+            **({} if self._choice is None else {"coupling": self._choice._asdict()}),
+            "time": float(steps["time"][-1]) if len(steps) else self.state.time,
+            "macro_steps": made,
+            "events": len(events),
+            "halved_steps": self._halvings,
+            **({"rejected_steps": self._steps.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
+            "iterations": joined.iterations,
+            **({"reduced_steps": joined.reduced} if joined.reduced else {}),
+            **balance.summary,
+            "max_velocity_mismatch": seen.mismatch,
+            "resolved": unresolved is None and not balance.changed,
+            "warnings": warnings,
+            **(totals(scene, steps, events, window, free_at_end=free_at_end) if len(steps) else {}),
+        }
