@@ -210,10 +210,10 @@ def report(label: str, scene: Scene, **choices: Any) -> None:
 def readings() -> None:
     for number in (2, 4):
         scene = load_scene(f"paper-fig{number}")
-        print(f"\nReadings, Figure {number} (start velocity, y_temp)")
-        for start in ("rest", "tip"):
+        print(f"\nReadings, Figure {number} (contact.impact, y_temp)")
+        for impact in ("rest", "tip"):
             for y_temp in ("equation", "guess", "both"):
-                report(f"{start}, {y_temp}", scene, start_velocity=start, y_temp=y_temp)
+                report(f"{impact}, {y_temp}", with_changes(scene, contact={"impact": impact}), y_temp=y_temp)
         print(f"Time step of Algorithm 1, Figure {number}")
         for h in (0.02, 0.008, 0.004, 0.002, 0.001):
             report(f"h_t = {h}", with_changes(scene, coupling={"macro_step": h}))

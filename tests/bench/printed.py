@@ -17,8 +17,7 @@ from springbeam.scene import Scene
 
 def simulate(scene: Scene) -> Trajectory:
     """Run Algorithm 1 as printed; arguments are the defaults of `springbeam.monolithic.algorithm1.simulate`."""
-    start_velocity: algorithm1.StartVelocity = "tip" if scene.contact.impact == "tip" else "rest"
-    return _AsPrinted(scene, start_velocity, "equation", 1e-12).run()
+    return _AsPrinted(scene, "equation", 1e-12).run()
 
 
 class _AsPrinted(algorithm1._Algorithm):

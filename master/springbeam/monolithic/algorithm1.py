@@ -2,9 +2,9 @@
 
 Line numbers in comments are those of the printed algorithm. Where it leaves something open the choice has a name:
 
-``start_velocity``
-    z at t_c: ``"rest"`` 0 (section 6), ``"tip"`` the tip's velocity (line 5), ``"average"`` eq. (11). In the
-    semi-discrete model the tip's velocity does not jump at t_c, so "average" and "tip" are one number.
+``contact.impact``
+    z at t_c: ``"tip"`` the tip's velocity (line 5), which in the semi-discrete model does not jump, so that it is also
+    the average of eq. (11); else 0 (section 6).
 ``y_temp`` (lines 16–17, "accommodate the transmission condition")
     ``"equation"``: (53) starts from the tip's position u instead of yˡ, and line 29 forms z from the true yˡ.
     ``"guess"``: u is where Newton's method starts; (53) keeps yˡ.
@@ -34,7 +34,6 @@ from .algorithm1_ledger import PairState, StepLedger
 from .hybrid_system import ReferenceFailure
 from .semi_discrete import SemiDiscreteBeam, assemble
 
-StartVelocity = Literal["rest", "tip", "average"]
 YTemp = Literal["equation", "guess", "both"]
 
 _MAX_ITERATIONS = 50
@@ -49,7 +48,6 @@ class AlgorithmFailure(ReferenceFailure):
 def simulate(
     scene: Scene,
     *,
-    start_velocity: StartVelocity | None = None,
     y_temp: YTemp = "equation",
     tolerance: float = 1e-12,
 ) -> Trajectory:
@@ -58,9 +56,6 @@ def simulate(
 
     Parameters
     ----------
-    start_velocity
-        See the module. Default: what ``contact.impact`` says, ``"tip"`` or ``"rest"``; the default of other laws,
-        ``"inelastic"``, is no choice of the paper's and is taken as its section 6, ``"rest"``.
     y_temp
         See the module.
     tolerance
@@ -88,20 +83,17 @@ def simulate(
         raise ValueError("Algorithm 1 needs [beam] and [spring]")
     if scene.loads or scene.massless:
         raise ValueError("Algorithm 1 knows no [[loads]] and needs a dynamic [beam]")
-    if start_velocity is None:
-        start_velocity = "tip" if scene.contact.impact == "tip" else "rest"
-    for name, value, kind in (("start_velocity", start_velocity, StartVelocity), ("y_temp", y_temp, YTemp)):
-        if value not in get_args(kind):
-            raise ValueError(f"{name} = {value!r}: one of {', '.join(get_args(kind))}")
-    return _Algorithm(scene, start_velocity, y_temp, tolerance).run()
+    if y_temp not in get_args(YTemp):
+        raise ValueError(f"y_temp = {y_temp!r}: one of {', '.join(get_args(YTemp))}")
+    return _Algorithm(scene, y_temp, tolerance).run()
 
 
 class _Algorithm:
-    def __init__(self, scene: Scene, start_velocity: StartVelocity, y_temp: YTemp, tolerance: float) -> None:
+    def __init__(self, scene: Scene, y_temp: YTemp, tolerance: float) -> None:
         assert scene.beam is not None
         assert scene.spring is not None
         self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
-        self.start_velocity, self.y_temp, self.tolerance = start_velocity, y_temp, tolerance
+        self.y_temp, self.tolerance = y_temp, tolerance
         self.discrete: SemiDiscreteBeam = assemble(scene.beam)
         d = self.discrete
         self.load = scene.beam.distributed_load * d.uniform_load + scene.beam.tip_load_coefficient * d.hat_load
@@ -208,7 +200,7 @@ class _Algorithm:
         return slope * shape, rate * shape
 
     def _first_contact(self, state: PairState) -> PairState:
-        state = state._replace(z=0.0 if self.start_velocity == "rest" else float(state.v[-1]))
+        state = state._replace(z=float(state.v[-1]) if self.scene.contact.impact == "tip" else 0.0)
         self._note("impact", state)
         return state
 
@@ -301,7 +293,6 @@ class _Algorithm:
         }
         summary = {
             "reference": "algorithm1",
-            "start_velocity": self.start_velocity,
             "y_temp": self.y_temp,
             "newton": newton,
         }
