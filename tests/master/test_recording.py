@@ -32,6 +32,7 @@ from springbeam.results.directory import (
     ResultsUnreadable,
     RunDirectory,
 )
+from springbeam.results.export import export
 from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.reading import load_events, load_summary, load_trajectory, read_run
 from springbeam.results.recording import MemoryRecorder
@@ -347,6 +348,48 @@ def test_a_run_that_is_done_and_lacks_a_part_does_not_pass_as_whole(tmp_path, na
 
 
 NOT_FINITE = np.full(len(STEP_COLUMNS), np.nan).tobytes()
+
+
+def test_rows_are_written_again_from_the_records(tmp_path):
+    filed(tmp_path / "run")
+    path = tmp_path / "run" / "trajectory.csv"
+    whole = path.read_bytes()
+    os.truncate(path, 1000)
+    assert export(tmp_path / "run", "csv") == [path]
+    assert path.read_bytes() == whole
+    path.unlink()
+    export(tmp_path / "run", "csv")
+    assert len(load_trajectory(tmp_path / "run")) == 300
+    # Other files cannot be made anew.
+    os.truncate(tmp_path / "run" / "events.csv", 100)
+    with pytest.raises(ResultsUnreadable, match=r"events\.csv: 100 bytes, \d+ bytes were written$"):
+        export(tmp_path / "run", "csv")
+
+
+def test_a_run_that_goes_on_is_exported_up_to_its_last_block(tmp_path):
+    recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path / "run"))
+    assert len(recorder.trajectory()) == 0
+    with pytest.raises(ResultsUnreadable, match=r"steps\.bin: no records"):
+        export(tmp_path / "run", "csv")
+    recorder.keep(*block(40))
+    export(tmp_path / "run", "csv")
+    assert len((tmp_path / "run" / "trajectory.csv").read_text().splitlines()) == 41
+    recorder.finish({"status": "done"})
+    assert len(load_trajectory(tmp_path / "run")) == 40
+
+
+@pytest.mark.parametrize("scene", [PAIR, SCENES["spring"]])
+def test_tables_are_exported_as_parquet(tmp_path, scene):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    run = filed(tmp_path / "run", block(30, scene), scene=scene)
+    files = export(tmp_path / "run", "parquet")
+    assert [file.name for file in files] == list(PARQUET[: 2 + (scene.beam is not None)])
+    there, tables = load_trajectory(run.directory.path), [parquet.read_table(file).to_pydict() for file in files]
+    assert tables[0] == {name: values.tolist() for name, values in there.columns.items()}
+    assert tables[1]["kind"] == ["impact"] * 3
+    assert tables[1]["v_tip"] == [event.v_tip for event in there.events]
+    if scene.beam is not None:
+        assert tables[2]["u_20"] == there.shapes[1][:, 20].tolist()
 
 
 def swapped(old, new):

@@ -37,6 +37,7 @@ TABLES = {
     "compare": "done done --out compared.png",
     "report": "done --out page.html",
     "animate": "done --seconds 0.2 --fps 10 --out moving.gif",
+    "export": "done",
     "predict": "soft --set beam.n_elements=10",
     "converge": "soft --levels 3 --set beam.n_elements=4 --set time.t_end=0.05 --out meshes",
     "tradeoff": "duffing --until 0.5 --quick --out traded",
@@ -126,7 +127,7 @@ def test_the_command_alone_shows_how_to_start():
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in TABLES if name not in ("new", "compare", "report", "animate", "resume")]
+    "name", [name for name in TABLES if name not in ("new", "compare", "report", "animate", "export", "resume")]
 )
 def test_json_is_one_document_and_all_of_stdout(arguments, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)

@@ -462,6 +462,29 @@ def test_events_are_those_of_the_element_and_a_run_goes_on_to_the_same_bits(fmu,
         assert np.array_equal(resumed[name], column), name
 
 
+def test_a_foreign_body_that_rests_on_the_stop_is_resumed_to_the_same_bits(fmu, tmp_path):
+    """The force that holds it there was found by trial steps when it came to rest; found again it has other digits."""
+    scene = pair(
+        fmu(),
+        time={"t_end": 1.0},
+        beam={"displacement": 0.01, "velocity": -1.0, "external_force": -30.0},
+        spring={"parameters": {"m": 0.5, "k": 400.0, "c": 2.0}},
+        stop={"position": -0.03, "restitution": 0.0},
+        contact={"law": "transmission", "damping": 0.0},
+        coupling={"macro_step": 0.01},
+    )
+
+    def interrupted(time: float, phase: str, steps: int) -> None:
+        if time > 0.6:
+            assert phase == "seated"
+            raise KeyboardInterrupt
+
+    directory = RunDirectory.create(tmp_path / "run")
+    with pytest.raises(KeyboardInterrupt), FileRecorder(scene, directory) as recorder:
+        runner.run(scene, recorder, interrupted, seconds=0.0)
+    assert resume(directory.path).steps.tobytes() == simulate(scene).steps.tobytes()
+
+
 def test_the_mass_is_measured_as_well_as_it_needs_to_be(fmu):
     for without in WITHOUT.values():
         found = findings(pair(fmu(), spring=dict.fromkeys(without)))["spring"]

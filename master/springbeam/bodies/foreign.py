@@ -63,7 +63,7 @@ class ForeignBody(FmuBody, EndLoaded):
         Whether moments are found by substeps.
     """
 
-    CHECKPOINTED = (*FmuBody.CHECKPOINTED, "received", "_load_work", "_size", "_time")
+    CHECKPOINTED = (*FmuBody.CHECKPOINTED, "received", "_load_work", "_size", "_time", "_held")
 
     #: Loads act on the end, and no input of the FMU is for them.
     expect_loads, set_loads = EndLoaded.expect_loads, EndLoaded.set_loads

@@ -75,7 +75,7 @@ def _common(
 _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Scenes": (scenes.scenes, scenes.keys, scenes.new),
     "Run": (run.run, resume.resume, studies.sweep),
-    "Look": (report.report, report.animate, compare.compare),
+    "Look": (report.report, report.animate, report.export, compare.compare),
     "Choose scheme and accuracy": (predict.predict, studies.tradeoff, studies.converge),
     "Check": (studies.crosscheck, verify.verify, studies.stability, doctor.doctor),
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn
@@ -41,6 +41,28 @@ def report(
 
         target.write_text(page(trajectory), encoding="utf-8")
     typer.echo(target)
+
+
+def export(
+    directory: RunArgument,
+    form: Annotated[
+        Literal["csv", "parquet"],
+        typer.Option("--format", help="csv: trajectory.csv anew. parquet: rows, events and shapes (needs pandas)."),
+    ] = "csv",
+) -> None:
+    """Write the tables of a run from its records (steps.bin), also of one that was killed or still runs.
+
+    Example: springbeam export results/soft --format parquet
+    """
+    from ..results.export import export as write
+
+    with bad_input_reported():
+        try:
+            files = write(results_directory(directory), form)
+        except ImportError as error:
+            fail(BAD_INPUT, f"--format {form}: {error}; pip install -e '.[data]' in the checkout of springbeam")
+    for file in files:
+        typer.echo(file)
 
 
 def animate(

@@ -31,11 +31,14 @@ def load_trajectory(directory: str | Path) -> Trajectory:
     return read_run(run)
 
 
-def refuse_cut(run: RunDirectory, summary: dict[str, Any]) -> None:
-    """Raise ResultsUnreadable if a file is not as long as ``summary``, that of a run that has ended, says."""
+def refuse_cut(run: RunDirectory, summary: dict[str, Any], *, rows: bool = True) -> None:
+    """Raise ResultsUnreadable if a file is not as long as ``summary``, that of a run that has ended, says.
+
+    ``rows`` says whether ``trajectory.csv`` counts, which the records can replace.
+    """
     found = run.sizes()
     for name, size in summary.get("files", {}).items():
-        if found.get(name) != size:
+        if found.get(name) != size and (rows or name != run.trajectory.name):
             remedy = f"; springbeam export {run.path} writes it again" if name == run.trajectory.name else ""
             there = f"{found[name]} bytes" if name in found else "missing"
             raise ResultsUnreadable(f"{run.path / name}: {there}, {size} bytes were written{remedy}")
