@@ -18,13 +18,15 @@ from springbeam.scene.resolution import peak_force_doubt
 from springbeam.scene.suspicions import suspicions
 from springbeam.studies.tradeoff.points import errors
 
-#: Ways to run a scene: an accuracy, or [coupling] at the scene's own macro step.
+#: Ways to run a scene: an accuracy, or [coupling] at the scene's own macro step, or that over ``finer``.
 WAYS: dict[str, dict[str, Any]] = {
     "--accuracy 1e-3": {"accuracy": 1e-3},
     "--accuracy 1e-4": {"accuracy": 1e-4},
     "energy 0": {"scheme": "energy", "degree": 0},
     "energy 1": {"scheme": "energy", "degree": 1},
     "energy 2": {"scheme": "energy", "degree": 2},
+    "energy 0, H/4": {"scheme": "energy", "degree": 0, "finer": 4.0},
+    "energy 2, H/4": {"scheme": "energy", "degree": 2, "finer": 4.0},
     "hermite 2": {"scheme": "hermite", "degree": 2},
     "auto": {"scheme": "auto"},
 }
@@ -115,7 +117,9 @@ def _run(scene: Scene, way: str) -> Trajectory | Exception:
     try:
         if "accuracy" in settings:
             return simulate(scene.model_copy(update=settings))
-        return simulate(with_changes(scene, coupling=settings))
+        coupling = {"macro_step": scene.coupling.H, **settings}
+        coupling["macro_step"] /= coupling.pop("finer", 1.0)
+        return simulate(with_changes(scene, coupling=coupling))
     except (SceneError, RunStopped) as failed:
         return failed
 
@@ -131,9 +135,11 @@ def _verdict(seed: int, number: int, way: str, run: Trajectory, reference: Traje
     promised = WAYS[way].get("accuracy")
     if promised is None:
         found = errors(run, reference, span / run.summary["macro_steps"])
+        late = found.event_time
     else:  # at all times; contacts are told apart as far as their times are promised
-        found = errors(run.at(np.unique(_times(way, run))), reference, promised * span / 2.0)
-    wrong = (found.u_tip_max, found.y_max, (found.event_time or 0.0) / span, found.impulse)
+        found = errors(run.at(np.unique(_times(way, run))), reference, span)
+        late, _ = contact_time_difference(run, reference, promised * span)
+    wrong = (found.u_tip_max, found.y_max, late / span, found.impulse)
     said = set(run.summary["warnings"]) - {*suspicions(run.scene), peak_force_doubt(run.scene)}
     return Verdict(
         seed, number, way, "done", condition, bool(said) or not run.summary["resolved"],

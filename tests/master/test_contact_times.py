@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes import scene_from_dict
 
 from springbeam.results.contact_times import contact_changes, tip_contacts
 from springbeam.results.contact_times import contact_time_difference as difference
+from springbeam.results.steps import STEP
 from springbeam.results.trajectory import Event, Trajectory
 
 SCENE = scene_from_dict(
@@ -77,6 +80,22 @@ HARD = run((0.2, "stop_impact"))
 )
 def test_how_far_two_runs_are_apart(first, second, window, expected, number):
     assert difference(first, second, window) == (pytest.approx(expected, abs=1e-15), number)
+
+
+@pytest.mark.parametrize(("force", "apart"), [(1e-3, 0.0), (1e-2, 0.3)])
+def test_a_short_contact_counts_by_its_impulse(force, apart):
+    """1 N for 0.3 s, then ``force`` for 0.1 s with steps of 0.1 s, beside a run without the second contact."""
+    steps = np.zeros(11, STEP)
+    steps["time"], steps["size"] = np.arange(11) / 10.0, [0.0, *[0.1] * 10]
+    steps["contact_force"][2:5] = 1.0
+    alone = replace(CONTACT, steps=steps.copy())
+    steps["contact_force"][8] = force
+    both = replace(SECOND, steps=steps)
+    for first, second in ((alone, both), (both, alone)):
+        assert difference(first, second, 0.2)[0] == pytest.approx(apart, abs=1e-15)
+    kicked = [replace(e, impulse_contact=0.1 * force if e.time == 0.7 else 0.0) for e in SECOND.events]
+    impact = replace(both, steps=alone.steps, events=kicked)
+    assert difference(alone, impact, 0.2)[0] == pytest.approx(apart, abs=1e-15)
 
 
 def test_changes_of_contact_are_named_in_their_order():

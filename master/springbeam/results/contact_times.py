@@ -1,7 +1,7 @@
 """When contact opens and closes and the foundation is struck, how hard, and how far two runs are apart in it.
 
-What lasts less than a window of a few macro steps is no evidence either way: whether a contact opens and closes again
-within a macro step is decided by rounding.
+What lasts less than a window and passes on hardly any impulse is no evidence either way: whether such a contact closes
+at all is decided by rounding.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .steps import impulse
 from .trajectory import Event, Trajectory
 
 #: Share of the impulse of a run below which a contact or a stroke is none to speak of.
@@ -51,19 +52,21 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
     """Return how far the times of two runs are apart [s], and how many of ``second`` that is about.
 
     Each beginning and end of a contact is compared with the nearest one of the other run, or with the end of the run,
-    if it is the later. Contacts closer than ``window`` [s] to each other are one. Those shorter than that are left out:
-    between tip and spring all, on the foundation those that pass on hardly any impulse, as of a top that only just
-    reaches it.
+    if it is the later. Contacts closer than ``window`` [s] to each other are one. Those shorter than that which pass on
+    less than `SLIGHT` of the impulse are left out; so are all short ones of tip and spring in a run without steps, as
+    of a reference, whose impulses are not known.
     """
     end = float(second.time[-1])
     worst, number = 0.0, 0
     runs = first, second
-    for all_of, lasting in (
-        ([_contacts(run, end) for run in runs], [_lasting(_contacts(run, end), window, window) for run in runs]),
-        ([foundation_contacts(run.events, end) for run in runs], [_felt(run, end, window) for run in runs]),
+    tip = [_contacts(run, end) for run in runs]
+    low = [foundation_contacts(run.events, end) for run in runs]
+    for all_of, felt in (
+        (tip, [_felt(found, _passed_to_tip(run), window) for found, run in zip(tip, runs, strict=True)]),
+        (low, [_felt(found, _passed_to_foundation(run), window) for found, run in zip(low, runs, strict=True)]),
     ):
-        worst = max(worst, _furthest(lasting[0], all_of[1], end), _furthest(lasting[1], all_of[0], end))
-        number += sum(t < end for interval in lasting[1] for t in set(interval))
+        worst = max(worst, _furthest(felt[0], all_of[1], end), _furthest(felt[1], all_of[0], end))
+        number += sum(t < end for interval in felt[1] for t in set(interval))
     return worst, number
 
 
@@ -128,16 +131,40 @@ def _lasting(intervals: list[Interval], window: float, least: float) -> list[Int
     return [(begin, end) for begin, end in merged if end - begin >= least]
 
 
-def _felt(run: Trajectory, end: float, window: float) -> list[Interval]:
-    """Return contacts with the foundation that last longer than ``window`` [s] or pass on `SLIGHT` of its impulses."""
-    strokes = _lasting(foundation_contacts(run.events, end), window, 0.0)
-    times = [event.time for event in run.events]
-    passed = np.cumsum([0.0, *(abs(event.impulse_foundation) for event in run.events)])
+def _felt(intervals: list[Interval], passed: tuple[np.ndarray, np.ndarray], window: float) -> list[Interval]:
+    """Join ``intervals`` closer than ``window`` [s]; return those that last longer or pass on `SLIGHT` of the impulses.
 
-    def impulse(since: float, until: float) -> float:
-        return float(passed[np.searchsorted(times, until, "right")] - passed[np.searchsorted(times, since, "left")])
+    ``passed`` is times [s], and the impulse [N·s] up to and with each, without signs; none if it is not known.
+    """
+    times, total = passed
+    total = np.append(0.0, total)
 
-    return [(s, u) for s, u in strokes if u - s > window or impulse(s, u) >= SLIGHT * passed[-1]]
+    def impulse_over(since: float, until: float) -> float:
+        return float(total[np.searchsorted(times, until, "right")] - total[np.searchsorted(times, since, "left")])
+
+    found = _lasting(intervals, window, 0.0)
+    return [(s, u) for s, u in found if u - s > window or (times.size and impulse_over(s, u) >= SLIGHT * total[-1])]
+
+
+def _passed_to_tip(run: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    if run.steps is None:
+        return np.empty(0), np.empty(0)
+    steps = run.steps
+    return steps["time"], np.cumsum(np.abs(impulse(steps, steps["size"])) + np.abs(kicks(steps["time"], run.events)))
+
+
+def _passed_to_foundation(run: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    passed = np.cumsum([abs(event.impulse_foundation) for event in run.events])
+    return np.array([event.time for event in run.events]), passed
+
+
+def kicks(times: np.ndarray, events: Iterable[Event]) -> np.ndarray:
+    """Return the events' impulses on the tip [N·s] at each of ``times`` [s], those of one time at its last row."""
+    found = np.zeros(len(times))
+    for event in events:
+        if event.impulse_contact != 0.0:
+            found[np.searchsorted(times, event.time, side="right") - 1] += event.impulse_contact
+    return found
 
 
 def _furthest(ours: list[Interval], theirs: list[Interval], end: float) -> float:

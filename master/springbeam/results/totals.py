@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..scene import Scene
-from .contact_times import SLIGHT, foundation_contacts, tip_contacts
+from .contact_times import SLIGHT, foundation_contacts, kicks, tip_contacts
 from .dense import extremes
 from .steps import impulse
 from .trajectory import Event
@@ -160,14 +160,9 @@ def _cumulative(steps: np.ndarray, events: list[Event]) -> tuple[np.ndarray, np.
 
     Impulses at one time, as of the rows of one event, all act at its last row.
     """
-    time = steps["time"]
-    kicks = np.zeros(len(steps))
-    for event in events:
-        if event.impulse_contact != 0.0:
-            kicks[np.searchsorted(time, event.time, side="right") - 1] += event.impulse_contact
-    over_steps = np.cumsum(impulse(steps, steps["size"]))
-    after = over_steps + np.cumsum(kicks)
-    return after - kicks, after
+    at_events = kicks(steps["time"], events)
+    after = np.cumsum(impulse(steps, steps["size"])) + np.cumsum(at_events)
+    return after - at_events, after
 
 
 def _largest_mean(steps: np.ndarray, before: np.ndarray, after: np.ndarray, window: float) -> float:

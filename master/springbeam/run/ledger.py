@@ -15,6 +15,8 @@ from .stepping import Pair
 
 #: Relative energy residual up to which a coupling that creates no energy is exact: rounding and solvers' tolerances.
 EXACT = 1e-8
+#: What a warning says where more of the energy has changed.
+CHANGED = "has changed the energy"
 #: Largest such residual where a scheme, an integrator or Algorithm 1 changes the energy itself.
 APPROXIMATE = 1e-3
 #: Energy-error allowance per unit of solver tolerance: 1e-12 gives `EXACT`.
@@ -128,7 +130,7 @@ class Balance:
             causes.append("rounding, or a solver's tolerance,")
             remedies.append("the results are not to be trusted; try another coupling.macro_step")
         percent = 100.0 * share
-        return f"{' with '.join(causes)} has changed the energy by {percent:.2g} %: {'; '.join(remedies)}"
+        return f"{' with '.join(causes)} {CHANGED} by {percent:.2g} %: {'; '.join(remedies)}"
 
 
 class Report(NamedTuple):

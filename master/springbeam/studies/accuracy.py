@@ -17,6 +17,7 @@ from ..bodies.protocol import Body
 from ..results.contact_times import contact_time_difference, impulse_difference
 from ..results.trajectory import Trajectory
 from ..run import runner
+from ..run.ledger import CHANGED
 from ..run.outcome import Progress, RunStopped
 from ..scene import Scene, SceneError, with_changes
 from ..scene.automatic import choice
@@ -85,7 +86,9 @@ def pick(scene: Scene) -> Trajectory:
         )
     asked, steps = scene.accuracy, _first(scene)
     pilots: list[Trajectory] = []
-    coarse, before, stopped = None, math.inf, 0
+    coarse: Trajectory | None = None
+    before: dict[str, float] = {}
+    stopped = 0
     while steps <= _MOST:
         prepared = _prepared(scene, scene.duration / steps)
         steps *= 2.0
@@ -96,19 +99,17 @@ def pick(scene: Scene) -> Trajectory:
             if stopped == _MOST_STOPPED or error.run is None:
                 raise
             pilots.append(error.run)
-            coarse = None
+            coarse, before = None, {}
             continue
         if coarse is not None:
             apart = differences(coarse, fine, asked)
-            worst = max(apart.values())
-            order = 1.0 if before == math.inf or worst == 0.0 else min(max(math.log2(before / worst), 1.0), 2.0)
-            errors = {name: value / (2.0**order - 1.0) for name, value in apart.items()}
+            errors = {name: value / (2.0 ** _order(before.get(name), value) - 1.0) for name, value in apart.items()}
             if _SAFETY * max(errors.values()) <= asked:
                 return _told(fine, asked, errors, pilots)
-            before = worst
+            before = apart
         pilots.append(fine)
         coarse = fine
-    reached = f"a run that may do takes {steps:.1g}" if before == math.inf else f"runs still differ by {before:.1e}"
+    reached = f"runs still differ by {max(before.values()):.1e}" if before else f"a run that may do takes {steps:.1g}"
     raise SceneError(
         f"accuracy = {asked:g}: not reached with {_MOST} steps, {reached}; ask for less, take a coarser mesh or fewer "
         "modes, or shorten [time] t_end"
@@ -140,6 +141,11 @@ def differences(coarse: Trajectory, fine: Trajectory, short: float) -> dict[str,
     return found
 
 
+def _order(before: float | None, now: float) -> float:
+    """Return the order that two successive differences show, 1 … 2; 1 where there is one only."""
+    return min(max(math.log2(before / now), 1.0), 2.0) if before and now else 1.0
+
+
 def _first(scene: Scene) -> float:
     """Return the number of macro steps of the first run: half as many as one needs that calls itself resolved."""
     rates = [omega / TURN for _, omega, _ in slow_oscillations(scene)]
@@ -166,7 +172,10 @@ def _prepared(scene: Scene, macro_step: float) -> Scene:
 
 
 def _told(run: Trajectory, asked: float, errors: dict[str, float], pilots: list[Trajectory]) -> Trajectory:
-    """Return ``run`` with what was picked and found in its summary."""
+    """Return ``run`` with what was picked and found in its summary.
+
+    What a scheme has changed of the energy is a doubt about the motion; runs that agree have settled it.
+    """
     coupling, spring = run.scene.coupling, run.scene.spring
     picked: dict[str, Any] = {"scheme": coupling.scheme, "degree": coupling.degree, "macro_step": coupling.H}
     if spring is not None:
@@ -179,4 +188,6 @@ def _told(run: Trajectory, asked: float, errors: dict[str, float], pilots: list[
         "pilot_steps": sum(pilot.do_steps for pilot in pilots),
         "pilot_time": sum(float(pilot.summary["wall_time"]) for pilot in pilots),
     }
-    return replace(run, summary={**run.summary, "accuracy": accuracy})
+    warnings = [warning for warning in run.summary["warnings"] if CHANGED not in warning]
+    resolved = not any(warning.startswith("not resolved") for warning in warnings)
+    return replace(run, summary={**run.summary, "accuracy": accuracy, "warnings": warnings, "resolved": resolved})
