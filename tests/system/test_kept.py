@@ -101,11 +101,11 @@ def test_two_bodies_at_once_are_two_instances(made: list[str | None]) -> None:
 
 
 def test_a_body_whose_calls_fail_is_not_kept(made: list[str | None], monkeypatch: pytest.MonkeyPatch) -> None:
-    def failing(self: fmu.Fmu) -> None:
-        raise self.failed(3, "cannot save the state")
+    def failing(self: fmu_bodies.FmuBody) -> None:
+        raise self.fmu.failed(3, "cannot save the state")
 
     with monkeypatch.context() as during:
-        during.setattr(fmu.Fmu, "mark", failing)
+        during.setattr(fmu_bodies.FmuBody, "mark", failing)
         with pytest.raises(RunStopped, match=r"beam\.fmu: cannot save the state"):
             simulate(SOFT)
     simulate(SOFT)

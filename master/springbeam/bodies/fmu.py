@@ -106,8 +106,8 @@ class Fmu(Checkpointed):
         self._start_time = c_double()
         self.stepping((c_double * 2)())
         if self.says.canGetAndSetFMUstate:
-            self._get_state = self.prepared("GetFMUState", byref(self._state))
-            self._set_state = self.prepared("SetFMUState", self._state)
+            self.get_state = self.prepared("GetFMUState", byref(self._state))
+            self.set_state = self.prepared("SetFMUState", self._state)
         try:
             self._initialising = functions.initialising(self._start_time, self._prepared_parameters(parameters))
             self.initialise(start_time)
@@ -224,17 +224,6 @@ class Fmu(Checkpointed):
         number = (c_int * n)(*list(range(1, orders + 1)) * len(names))
         references = self.references(each, self.real)
         return self.prepared("SetRealInputDerivatives", references, c_size_t(n), number, values)
-
-    def mark(self) -> None:
-        if (status := self._get_state()) > WARNING:
-            raise self.failed(status, "cannot save the state")
-        self.moved = False
-
-    def rewind(self) -> None:
-        if (status := self._set_state()) > WARNING:
-            raise self.failed(status, "cannot restore the state")
-        self.moved = False
-        self.rewinds += 1
 
     def keep_start(self) -> None:
         """Remember the present state as the one `return_to_start` sets."""

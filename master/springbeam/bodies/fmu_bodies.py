@@ -127,12 +127,19 @@ class FmuBody(Body):
         return self.fmu.rewinds
 
     def mark(self) -> None:
-        self.fmu.mark()
+        fmu = self.fmu
+        if (status := fmu.get_state()) > WARNING:
+            raise fmu.failed(status, "cannot save the state")
+        fmu.moved = False
         self._marked_values = self._pending, self._current, self._told
 
     def rewind(self) -> None:
-        if self.fmu.moved:
-            self.fmu.rewind()
+        fmu = self.fmu
+        if fmu.moved:
+            if (status := fmu.set_state()) > WARNING:
+                raise fmu.failed(status, "cannot restore the state")
+            fmu.moved = False
+            fmu.rewinds += 1
             self._pending, self._current, self._told = self._marked_values
 
     def motion(self) -> Motion:

@@ -144,7 +144,7 @@ class EventFunctions:
 def position_tolerance(ends: Ends, level: float, macro_step: float) -> float:
     """What positions can be told apart to [m]: rounding of the displacements, and of the foundation's ``level``."""
     (u, v, _, _), (y, z, _, _) = ends
-    return 8.0 * _EPS * max(abs(u), abs(y), abs(level)) + 1e-15 * max(abs(v), abs(z)) * macro_step
+    return 8.0 * _EPS * max(u, -u, y, -y, level, -level) + 1e-15 * max(v, -v, z, -z) * macro_step
 
 
 def clearance(start: Sample, end: Sample, size: float) -> tuple[float, float]:
