@@ -33,15 +33,12 @@ def test_the_step_after_an_impact_is_short_and_the_next_one_back_on_the_grid():
     H = 0.1
     grid = MacroGrid(1.0, 2.0, H)
     for struck, ends in [(1.0, (1.0125, 1.1)), (1.15, (1.1625, 1.2)), (1.28, (1.2925, 1.4)), (1.495, (1.5075, 1.6))]:
-        grid.reached(struck)
-        grid.shorten_after_impact()
+        grid.struck(struck)
         for start, end in pairwise((struck, *ends)):
             target, size = grid.next(start)
             assert target == pytest.approx(end, abs=1e-12)
             assert size == pytest.approx(end - start, abs=1e-12)
-            grid.reached(target)
-    grid.reached(1.99)
-    grid.shorten_after_impact()
+    grid.struck(1.99)
     assert grid.next(1.99) == (2.0, 2.0 - 1.99)
 
 
@@ -52,7 +49,6 @@ def test_the_grid_ends_where_the_run_does(end):
         target, size = grid.next(times[-1])
         assert size == pytest.approx(target - times[-1], abs=1e-12)
         times.append(target)
-        grid.reached(target)
     assert times[-1] == end
     assert times[:-1] == pytest.approx(1.0 + 0.1 * np.arange(len(times) - 1), abs=1e-12)
 

@@ -24,46 +24,40 @@ _SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
 class MacroGrid(Checkpointed):
     """The grid t₀ + k H up to t_end [s]."""
 
-    CHECKPOINTED = ("_index", "_after_impact")
+    CHECKPOINTED = ("_struck",)
 
     def __init__(self, start: float, end: float, macro_step: float) -> None:
         self._start, self._end = start, end
         self.size = macro_step  #: H [s]
-        self._index = 0
-        self._after_impact = False
+        self._struck = -inf  #: when the last impact was [s]
 
     def next(self, time: float, kink: float = inf) -> tuple[float, float]:
-        """The time at which the step from ``time`` should end, and its size (exactly H where it is a whole one).
+        """Return when the step from ``time`` should end, and its size [s] (exactly H where it is a whole one).
 
-        It ends at ``kink`` [s], where a load jumps or bends, if that comes first or soon after.
+        It ends at ``kink`` [s], where a load jumps or bends, if that comes first or soon after. It is short after an
+        impact.
         """
         H = self.size
-        if self._after_impact:
-            self._after_impact = False
+        if time == self._struck:
             size = _AFTER_IMPACT * H
             if time + size < self._end:
                 return (time + size, size) if kink >= time + size + _SHORT_REMAINDER * H else (kink, kink - time)
-        target = self._start + (self._index + 1) * H
+        k = int((time - self._start) / H + 1.0)
+        while (target := self._start + k * H) - time < _SHORT_REMAINDER * H:
+            k += 1
         size = target - time
-        if size < _SHORT_REMAINDER * H:
-            self._index += 1
-            target, size = target + H, size + H
         if target >= self._end - _SAME * H:
             target, size = self._end, self._end - time
         if kink < target + _SHORT_REMAINDER * H:
             target, size = kink, kink - time
         return target, H if abs(size - H) <= _SAME * H else size
 
-    def reached(self, time: float) -> None:
-        """Grid points up to ``time`` are behind."""
-        start, H = self._start, self.size
-        latest = time + _SAME * H
-        while start + (self._index + 1) * H <= latest:
-            self._index += 1
+    def struck(self, time: float) -> None:
+        """Note that the last event was an impact at ``time`` [s], or none if that is −∞.
 
-    def shorten_after_impact(self) -> None:
-        """Let the next step be short: an impact has just changed velocities, and ends that have met may part again."""
-        self._after_impact = True
+        It has changed velocities, and ends that have met may part again soon.
+        """
+        self._struck = time
 
 
 class AdaptiveSteps(Checkpointed):
@@ -100,10 +94,7 @@ class AdaptiveSteps(Checkpointed):
             return kink, kink - time
         return (self._end, left) if left <= (1.0 + _SHORT_REMAINDER) * size else (time + size, size)
 
-    def reached(self, time: float) -> None:
-        """Do nothing: events shift what follows."""
-
-    def shorten_after_impact(self) -> None:
+    def struck(self, time: float) -> None:
         """Do nothing: error estimates tell how long steps may be."""
 
     def judge(self, size: float, error: float, order: int) -> bool:

@@ -9,6 +9,7 @@ the run goes on from there. The records are checked some hundred at a time.
 from __future__ import annotations
 
 from itertools import islice
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -167,7 +168,6 @@ class Master(Checkpointed):
             self.macro_steps += 1
             if self._pair.opens_softly:
                 self._note_soft_contact(step)
-        steps.reached(state.time)
         if event is None:
             self._record(step, step.end)
         else:
@@ -257,8 +257,8 @@ class Master(Checkpointed):
         kind, phase, impact = self._transitions.after(
             kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
         )
-        if kind in ("impact", "stop_impact") and pair.divides:
-            self._steps.shorten_after_impact()
+        # Another event at the time of an impact settles what that has begun.
+        self._steps.struck(state.time if kind in ("impact", "stop_impact") and pair.divides else -inf)
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.follow_phase(phase)
         state.lost += lost
