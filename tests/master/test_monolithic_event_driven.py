@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from references import dips, kinds, linear, matrices, soft, tip_mass
+from references import dips, kinds, linear, soft, tip_mass
 from scenes import scene_from_dict
 
 from springbeam.monolithic.event_driven import ReferenceFailure, simulate
@@ -148,16 +148,6 @@ def test_stiff_damped_beam_agrees_with_radau() -> None:
     assert one.events[1].z == pytest.approx(two.events[1].z, rel=1e-6)
     np.testing.assert_allclose(one.y, two.y, rtol=1e-6)
     assert one.summary["counts"]["steps"] < 200
-
-
-def test_tied_phase_is_the_matrix_exponential() -> None:
-    """With k2 = 0 the tied phase is linear: exp of the full first-order system in nodal unknowns."""
-    scene = soft(6, beam={"alpha_b": 1e-3}, spring={"cubic_stiffness": 0.0, "damping": 0.4, "external_force": -0.5})
-    (M, K, x), times = matrices(scene), np.array([0.01, 0.02, 0.04])
-    y, z = exact.tied(scene, M, K, -x, times)
-    result = simulate(scene, sample_times=times, t_end=0.04)
-    np.testing.assert_allclose(result.y, y, atol=1e-13)
-    np.testing.assert_allclose(result.z, z, atol=1e-12)
 
 
 # Impacts ----------------------------------------------------------------------------------------------------------

@@ -18,23 +18,6 @@ def run(name: str, **coupling: object) -> Trajectory:
     return simulate(with_changes(load_scene(name), coupling=coupling))
 
 
-# -- soft: the numbers of an event-driven solution of the same semi-discrete model ----------------------------------
-
-
-def test_soft_follows_its_first_events():
-    trajectory = run("soft")
-    impact, foundation, release = trajectory.events[:3]
-    assert [e.kind for e in (impact, foundation, release)] == ["impact", "stop_impact", "release"]
-    assert impact.time == 0.0
-    # J = (z − v)/(1/m_tip + 1/m) leaves both at m_tip v/(m_tip + m).
-    assert impact.z == pytest.approx(-0.0057403607, abs=1e-10)
-    assert impact.v_tip == pytest.approx(impact.z, abs=1e-15)
-    assert foundation.time == pytest.approx(0.0712240094, abs=1e-7)
-    assert release.time == pytest.approx(0.1443694562, abs=1e-6)
-    at = int(np.argmin(np.abs(trajectory.time - 0.05)))
-    assert trajectory.y[at] == pytest.approx(-0.0087444212, abs=1e-9)
-
-
 # -- energy ---------------------------------------------------------------------------------------------------------
 
 

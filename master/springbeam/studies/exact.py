@@ -134,45 +134,11 @@ def linked(scene: Scene, M: np.ndarray, K: np.ndarray, q: np.ndarray, v: np.ndar
     damping += law.damping * np.outer(g, g)
     stiffness += law.stiffness * np.outer(g, g)
     start = np.append(q, spring.equilibrium), np.append(v, spring.initial_velocity)
-    return _moved(mass, damping, stiffness, spring.external_force, *start, times)[0][:, [n - 2, n - 1]]
-
-
-def tied(scene: Scene, M: np.ndarray, K: np.ndarray, v: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return y [m] and z [m/s] at ``times`` [s] of a beam tied to a linear spring at y = Ψ = 0.
-
-    ``M``, ``K`` are the matrices of the beam, whose last unknown is the tip, undeformed with the velocities ``v``; the
-    inelastic impact gives tip and spring one velocity first.
-    """
-    assert scene.beam is not None
-    assert scene.spring is not None
-    mass, damping, stiffness, spring = M.copy(), scene.beam.alpha_b * K, K.copy(), scene.spring
-    response = np.linalg.inv(M)[:, -1]  # of the velocities to a tip impulse
-    v = v + response * (spring.initial_velocity - v[-1]) / (response[-1] + 1.0 / spring.mass)
-    mass[-1, -1] += spring.mass
-    damping[-1, -1] += spring.damping
-    stiffness[-1, -1] += spring.linear_stiffness
-    q, rates = _moved(mass, damping, stiffness, spring.external_force, np.zeros(len(v)), v, times)
-    return q[:, -1], rates[:, -1]
-
-
-def _moved(
-    mass: np.ndarray,
-    damping: np.ndarray,
-    stiffness: np.ndarray,
-    force: float,
-    q: np.ndarray,
-    v: np.ndarray,
-    times: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the displacements and velocities, (len(times), n), of M q̈ + D q̇ + K q = (0, …, 0, ``force``) from q, v.
-
-    By the matrix exponential.
-    """
-    n = len(q)
-    load = np.zeros((n, 1))
-    load[-1] = force
-    A = np.zeros((2 * n + 1, 2 * n + 1))
+    size = 2 * n + 1
+    A = np.zeros((size, size))  # of displacements, velocities and 1
     A[:n, n : 2 * n] = np.eye(n)
+    load = np.zeros((n, 1))
+    load[-1] = spring.external_force
     A[n : 2 * n] = -np.linalg.solve(mass, np.hstack([stiffness, damping, -load]))
-    states = np.array([expm(A * t) @ np.concatenate([q, v, [1.0]]) for t in times])
-    return states[:, :n], states[:, n : 2 * n]
+    states = np.array([expm(A * t) @ np.concatenate([*start, [1.0]]) for t in times])
+    return states[:, [n - 2, n - 1]]
