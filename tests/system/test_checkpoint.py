@@ -75,7 +75,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, fmu_folder: Path) -> Path:
 # -- values ---------------------------------------------------------------------------------------------------------
 
 plain = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text() | st.binary(),
+    st.none() | st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | st.text() | st.binary(),
     lambda inner: (
         st.lists(inner, max_size=4)
         | st.lists(inner, max_size=4).map(tuple)
@@ -87,7 +87,7 @@ plain = st.recursive(
 
 @given(plain)
 def test_plain_values_come_back_to_the_last_bit(value):
-    back = decoded(json.loads(json.dumps(encoded(value))))
+    back = decoded(encoded(value))
     assert repr(back) == repr(value)  # tells −0.0 from 0.0 and lists from tuples
 
 
@@ -97,17 +97,16 @@ def test_plain_values_come_back_to_the_last_bit(value):
         Phase(Joint.TIED, seated=True),
         Motion(1.0 / 3.0, -0.0, 5e-324, 1.7976931348623157e308),
         {"a": {1e-3: ([[0.1]], {"FmuSpring": [[2.0]]})}},
-        {"$tuple": [1, 2]},
         -float("inf"),
     ],
 )
 def test_values_of_a_run_come_back(value):
-    assert decoded(json.loads(json.dumps(encoded(value)))) == value
+    assert decoded(encoded(value)) == value
 
 
 def test_arrays_come_back():
     array = np.array([[1.0 / 3.0, -0.0], [1e-320, 2.0]])
-    assert decoded(json.loads(json.dumps(encoded(array)))).tobytes() == array.tobytes()
+    assert decoded(encoded(array)).tobytes() == array.tobytes()
 
 
 @pytest.mark.parametrize("value", [object(), {1, 2}, np.float32(1.0), np.arange(3), lambda: None])
@@ -136,7 +135,7 @@ def foreign(content: bytes, _: bytes) -> bytes:
 def checksummed(old: bytes, new: bytes, file: bytes) -> bytes:
     """A file with a good checksum of content that no run writes: no accident, but no traceback either."""
     content = file.partition(b"\n")[2].replace(old, new, 1) if old else new
-    return b"springbeam checkpoint 1 sha256 %s\n%s" % (hashlib.sha256(content).hexdigest().encode(), content)
+    return b"springbeam checkpoint 2 sha256 %s\n%s" % (hashlib.sha256(content).hexdigest().encode(), content)
 
 
 #: What happens to the file, by what its refusal says.
@@ -146,15 +145,14 @@ DAMAGE = {
         *(partial(cut, size) for size in (0, 1, 21, 60, 120, 2000, -1)),
         *(partial(foreign, content) for content in (b"PK\x03\x04", b"{}", b"\xff" * 100)),
         partial(foreign, b"springbeam checkpoint\n"),
-        partial(foreign, b"springbeam checkpoint 1 sha256\n"),
+        partial(foreign, b"springbeam checkpoint 2 sha256\n"),
     ],
     "": [
-        *(partial(checksummed, b"", content) for content in (b"[]", b"[" * 100_000, b"nonsense")),
-        partial(checksummed, b'"version"', b'"vision"'),
-        partial(checksummed, b'"macro_steps"', b'"micro_steps"'),
-        partial(checksummed, b'"$Joint"', b'"$Phase"'),
-        partial(checksummed, b'"$bytes": "', b'"$bytes": "!'),
-        partial(checksummed, b'"$bytes": "c3By', b'"$bytes": "AAAA'),
+        *(partial(checksummed, b"", content) for content in (b"\x90", b"\x91" * 100_000, b"nonsense", b"\xc1")),
+        partial(checksummed, b"version", b"visions"),
+        partial(checksummed, b"macro_steps", b"micro_steps"),
+        partial(checksummed, b"touch", b"couch"),
+        partial(checksummed, b"springbm", b"AAAAngbm"),
     ],
 }
 

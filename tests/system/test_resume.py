@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import pickle
 from collections.abc import Iterator
 from contextlib import suppress
@@ -91,12 +90,12 @@ class Run:
         paper = scene.contact.law == "paper"
         self.bodies = load_bodies(_as_in_paper(scene) if paper else scene, start_time)
         self.recorder = MemoryRecorder(scene)
-        self.saved: list[str] = []
+        self.saved: list[bytes] = []
         self.simulation: Any = (PaperLaw if paper else Master)(scene, start_time, *self.bodies, self.recorder)
         self._each_step = each_step
 
     def _save(self) -> None:
-        self.saved.append(json.dumps(encoded(self.simulation.save())))
+        self.saved.append(encoded(self.simulation.save()))
 
     def finish(self) -> Run:
         while not self.simulation.done:
@@ -127,7 +126,7 @@ def test_a_run_goes_on_from_any_step_to_the_same_bits(name):
     chosen = {int(k) for k in at_events[:: max(1, len(at_events) // 6)]} | set(range(0, steps, steps // 2))
     for k in sorted(k for k in chosen if k < steps):
         rest = Run(scene)
-        rest.simulation.restore(decoded(json.loads(whole.saved[k])))
+        rest.simulation.restore(decoded(whole.saved[k]))
         steps = whole.recorder.steps()[: k + 2]  # the row at the start, and one per step
         events = whole.trajectory.events[: int(steps["events"][-1])]
         shapes = np.empty((0, 22)) if scene.beam is None else np.column_stack(whole.trajectory.shapes)

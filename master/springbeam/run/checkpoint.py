@@ -1,25 +1,21 @@
 """Checkpoints: all that a run needs to go on after it was killed, in one file of its directory.
 
-The file is a line with format and SHA-256, then JSON: numbers as the shortest text that reads back to the same
-double, FMU states in base64. Reading it executes nothing. It is replaced at once or not at all, after the rows it
-belongs to have reached the disk.
+The file is a line with format and SHA-256, then MessagePack. Reading it executes nothing. It is replaced at once or not
+at all, after the records it belongs to have reached the disk.
 """
 
 from __future__ import annotations
 
-import base64
 import dataclasses
 import hashlib
-import json
 import os
 from collections.abc import Callable
 from contextlib import suppress
-from enum import Enum
-from math import isfinite
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+import msgpack
 import numpy as np
 
 from ..bodies.protocol import Motion
@@ -31,7 +27,7 @@ if TYPE_CHECKING:  # a command that only reads a checkpoint loads no FMU
     from .master import Master
     from .paper_law import PaperLaw
 
-_FORMAT = 1
+_FORMAT = 2
 _TITLE = b"springbeam checkpoint"
 
 
@@ -55,7 +51,7 @@ class Checkpoint:
         """Replace the file ``path``. Raises OSError; the file is then as before."""
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         values["scene"] = self.scene.model_dump(exclude_none=True)
-        content = json.dumps(encoded(values)).encode()
+        content = encoded(values)
         scratch = path.with_name(path.name + ".part")
         try:
             with scratch.open("wb") as file:
@@ -88,7 +84,7 @@ class Checkpoint:
         if words[2] != _digest(content):
             raise CheckpointRefused(f"{path}: damaged, its checksum is wrong")
         try:
-            values = decoded(json.loads(content))
+            values = decoded(content)
             scene = scene_from_dict(values.pop("scene"), source=f"{path}: scene")
             return cls(scene=scene, **values)
         except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
@@ -145,56 +141,32 @@ def _digest(content: bytes) -> bytes:
     return hashlib.sha256(content).hexdigest().encode()
 
 
-# -- values as JSON: lists, and dicts with text for keys, are themselves; the others are {"$type": content} -----------
-
-_DECODERS: dict[str, Callable[[Any], Any]] = {
-    "$float": float,
-    "$tuple": tuple,
-    "$dict": dict,
-    "$bytes": lambda text: base64.b64decode(text, validate=True),
-    "$array": lambda numbers: np.array(numbers, dtype=float),
-    "$Joint": Joint,
-    "$Phase": lambda fields: Phase(*fields),
-    "$Motion": lambda fields: Motion(*fields),
+#: Types of values that MessagePack does not tell apart or does not know, by the number in its extension: what a value
+#: is made of, and how it is made again.
+_KINDS: dict[type, tuple[int, Callable[[Any], Any], Callable[[Any], Any]]] = {
+    tuple: (1, list, tuple),
+    Joint: (2, lambda joint: joint.value, Joint),
+    Phase: (3, lambda phase: [phase.joint, phase.seated], lambda parts: Phase(*parts)),
+    Motion: (4, list, lambda parts: Motion(*parts)),
+    np.ndarray: (5, np.ndarray.tolist, lambda parts: np.array(parts, dtype=float)),
+    np.float64: (6, float, float),
 }
 
 
-def encoded(value: Any) -> Any:
-    """``value`` in what JSON has. Raises TypeError for a type that a checkpoint cannot hold."""
-    kind = type(value)
-    if value is None or kind in (bool, int, str):
-        return value
-    if isinstance(value, float):
-        return float(value) if isfinite(value) else {"$float": repr(float(value))}
-    if kind is list:
-        return [encoded(item) for item in value]
-    if kind is dict:
-        if all(type(key) is str and not key.startswith("$") for key in value):
-            return {key: encoded(item) for key, item in value.items()}
-        return {"$dict": [[encoded(key), encoded(item)] for key, item in value.items()]}
-    if kind is bytes:
-        return {"$bytes": base64.b64encode(value).decode()}
-    if kind is np.ndarray and value.dtype == float:
-        return {"$array": value.tolist()}
-    if f"${kind.__name__}" in _DECODERS:
-        if isinstance(value, Enum):
-            return {f"${kind.__name__}": value.value}
-        fields = (
-            value if isinstance(value, tuple) else [getattr(value, field.name) for field in dataclasses.fields(value)]
-        )
-        return {f"${kind.__name__}": [encoded(item) for item in fields]}
-    raise TypeError(f"a checkpoint cannot hold a {kind.__name__}: {value!r}")
+def encoded(value: Any) -> bytes:
+    """Return ``value`` as MessagePack, numbers to the last bit. Raises TypeError for what a checkpoint cannot hold."""
+    packed: bytes = msgpack.packb(value, default=_extension, strict_types=True)
+    return packed
 
 
-def decoded(value: Any) -> Any:
-    """What `encoded` was given."""
-    if isinstance(value, list):
-        return [decoded(item) for item in value]
-    if not isinstance(value, dict):
-        return value
-    plain = {key: decoded(item) for key, item in value.items()}
-    if len(plain) == 1:
-        key, item = next(iter(plain.items()))
-        if key in _DECODERS:
-            return _DECODERS[key](item)
-    return plain
+def _extension(value: Any) -> msgpack.ExtType:
+    if type(value) not in _KINDS or (isinstance(value, np.ndarray) and value.dtype != float):
+        raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}: {value!r}")
+    number, parts, _ = _KINDS[type(value)]
+    return msgpack.ExtType(number, encoded(parts(value)))
+
+
+def decoded(content: bytes) -> Any:
+    """Return what `encoded` was given. Raises ValueError, TypeError or LookupError for anything else."""
+    made = {number: make for number, _, make in _KINDS.values()}
+    return msgpack.unpackb(content, ext_hook=lambda number, parts: made[number](decoded(parts)), strict_map_key=False)
