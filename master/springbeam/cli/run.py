@@ -79,7 +79,7 @@ def run(
         typer.Option(
             "--output-interval",
             metavar="DT",
-            help="Leave rows at multiples of DT [s] in trajectory.csv, not one per step. Not beside --checkpoint.",
+            help="Write rows at multiples of DT [s] into trajectory.csv, not one per step. Not beside --checkpoint.",
         ),
     ] = None,
     no_plots: NoPlotsOption = False,
@@ -131,7 +131,7 @@ def _check_interval(interval: float, scene: Scene, checkpoint: float | None) -> 
     if not 0.0 < interval < inf:
         cause = "must be a time above 0 s, as in --output-interval 1e-3"
     elif checkpoint is not None:
-        cause = "--checkpoint goes on from rows at every step; leave one of the two out"
+        cause = "--checkpoint: a run that is resumed writes rows of every step; leave one of the two out"
     elif scene.contact.algorithm:
         cause = f'contact.law = "{scene.contact.law}" has no data between its steps; leave one of the two out'
     elif scene.time.t_end / interval > _MOST_ROWS:
