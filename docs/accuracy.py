@@ -1,23 +1,30 @@
 """Pictures and tables of docs/accuracy.md:  .venv/bin/python docs/accuracy.py [STUDY]…   (all: a quarter of an hour)
 
-The studies are those of `springbeam tradeoff`, one after the other. Pictures go to docs/images/tradeoff-STUDY.png,
+The studies are those of `springbeam tradeoff`, one after the other, timed in processor time, of which what else runs on
+the machine takes none (with OMP_NUM_THREADS=1). Pictures go to docs/images/tradeoff-STUDY.png,
 tables into docs/accuracy.md, between the lines that name the study.
 """
 
 from __future__ import annotations
 
+import shutil
 import sys
+import tempfile
+from pathlib import Path
+from time import process_time
 from typing import Any, NamedTuple
 
 from pages import IMAGES, shrink, table, write_section  # beside this script
 
 from springbeam import load_scene, with_changes
+from springbeam.run import runner
 from springbeam.scene import Scene
 from springbeam.scene.automatic import choice
-from springbeam.studies.study import record_all
+from springbeam.studies import rivals, tradeoff
+from springbeam.studies.metrics import worst
+from springbeam.studies.study import Row, record_all
 from springbeam.studies.tables import number
-from springbeam.studies.tradeoff import Point, Points, Tradeoff
-from springbeam.studies.tradeoff.picture import draw
+from springbeam.studies.tradeoff import Tradeoff, cheapest
 
 
 class Window(NamedTuple):
@@ -36,38 +43,38 @@ WINDOWS = {
     "bar-impact": Window("bar-impact", {}, None),
     "paper-fig2": Window("paper-fig2", {"coupling": {"macro_step": 1e-7}}, 0.50002),
 }
+runner.perf_counter = tradeoff.perf_counter = rivals.perf_counter = process_time  # type: ignore[attr-defined]
 #: Schemes at the scene's own macro step and at 4 times of it.
 SCHEMES = ("energy 0", "energy 1", "energy 2", "hermite 1", "hermite 2")
 
 
-def cell(point: Point | None) -> str:
-    return "none" if point is None else f"{point.name}: {1e3 * point.solve:.3g}"
+def cell(row: Row | None) -> str:
+    return "none" if row is None else f"{row['family']}, {row['setting']}: {1e3 * row['cost_wall_time']:.3g}"
 
 
-def cheapest(found: Points) -> list[str]:
-    rows = []
-    for best in found.cheapest():
-        rows.append([f"{best.target:.0e}", cell(best.ours), cell(best.scipy), number(best.ratio, ".3g")])
-    return table(["error", "cheapest here: solve [ms]", "cheapest of scipy: solve [ms]", "ratio"], rows)
+def choices(rows: list[Row]) -> list[str]:
+    cells = [
+        [f"{best['error']:.0e}", cell(best["co_simulation"]), cell(best["scipy"]), number(best["ratio"], ".2g")]
+        for best in cheapest(rows)
+    ]
+    return table(["error", "cheapest here: solve [ms]", "cheapest of scipy: solve [ms]", "ratio"], cells)
 
 
-def side_by_side(found: Points, scene: Scene) -> list[str]:
+def side_by_side(rows: list[Row], scene: Scene) -> list[str]:
     """Compare error, time of events [s], energy residual and doStep calls."""
-    rows = []
+    lines = []
     for H in (4.0 * scene.coupling.H, scene.coupling.H):
-        here = {p.family: p for p in found.points if p.macro_step == H and p.setting.startswith("H = ")}
+        here = {row["family"]: row for row in rows if row.get("coupling.macro_step") == H}
         cells = [compared(here[name]) for name in SCHEMES if name in here]
-        if len(cells) < len(SCHEMES):
-            continue
-        rows.append([f"{H:.3g}", *cells, taken(scene, H)])
-    return table(["H [s]", *SCHEMES, "auto takes"], rows)
+        if len(cells) == len(SCHEMES):
+            lines.append([f"{H:.3g}", *cells, taken(scene, H)])
+    return table(["H [s]", *SCHEMES, "auto takes"], lines)
 
 
-def compared(point: Point) -> str:
-    if point.errors is None:
+def compared(row: Row) -> str:
+    if row["status"] != "done":
         return "stopped"
-    e = point.errors
-    return f"{point.displacement:.0e}, {e.event_time:.0e}, {e.energy:.0e}, {point.do_steps}"
+    return f"{worst(row):.0e}, {row['error_event_time']:.0e}, {row['error_energy']:.0e}, {row['cost_do_steps']}"
 
 
 def taken(scene: Scene, H: float) -> str:
@@ -83,12 +90,13 @@ def main(names: list[str]) -> None:
         scene = with_changes(load_scene(window.scene), **window.changes)
         study = Tradeoff.of(scene, window.until)
         records = record_all(study)
-        found, remarks = study.judged(records), study.notes(records)
-        picture = IMAGES / f"tradeoff-{name}.png"
-        draw(study.scene, found, remarks, picture)
-        shrink(picture)
+        rows, remarks = study.rows(records), study.notes(records)
+        with tempfile.TemporaryDirectory() as folder:
+            (picture,) = study.draw(records, Path(folder))
+            shutil.copy(picture, IMAGES / f"tradeoff-{name}.png")
+        shrink(IMAGES / f"tradeoff-{name}.png")
         notes = [f"* {note}" for note in remarks]
-        lines = [*cheapest(found), "", *side_by_side(found, study.scene), *([""] if notes else []), *notes]
+        lines = [*choices(rows), "", *side_by_side(rows, study.scene), *([""] if notes else []), *notes]
         write_section("accuracy.md", name, lines)
         print(f"{name}, up to t = {study.scene.time.t_end:.6g} s", *lines, "", sep="\n", flush=True)
 

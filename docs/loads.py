@@ -26,7 +26,7 @@ def bifurcation() -> None:
     )
     with tempfile.TemporaryDirectory() as folder:
         todo.write(record_all(todo, workers=os.cpu_count() or 1), Path(folder), pictures=True)
-        shutil.copy(Path(folder) / sweep.stroboscopic.PICTURE, IMAGES / "vibro-impact.png")
+        shutil.copy(Path(folder) / "sweep-bifurcation.png", IMAGES / "vibro-impact.png")
 
 
 def shock() -> None:

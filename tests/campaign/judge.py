@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from springbeam.run.outcome import RunStopped
 from springbeam.scene import Scene, SceneError
 from springbeam.scene.resolution import peak_force_doubt
 from springbeam.scene.suspicions import suspicions
-from springbeam.studies.tradeoff.points import errors
+from springbeam.studies.metrics import errors
 
 #: Ways to run a scene: an accuracy, or [coupling] at the scene's own macro step, or that over ``finer``.
 WAYS: dict[str, dict[str, Any]] = {
@@ -133,13 +133,14 @@ def _verdict(seed: int, number: int, way: str, run: Trajectory, reference: Traje
     span = float(run.time[-1] - run.time[0])
     picked = run.summary.get("accuracy")
     promised = WAYS[way].get("accuracy")
-    if promised is None:
-        found = errors(run, reference, span / run.summary["macro_steps"])
-        late = found.event_time
-    else:  # at all times; contacts are told apart as far as their times are promised
-        found = errors(run.at(np.unique(_times(way, run))), reference, span)
-        late, _ = contact_time_difference(run, reference, promised * span)
-    wrong = (found.u_tip_max, found.y_max, late / span, found.impulse)
+    # With an accuracy at all times, and contacts are told apart as far as their times are promised.
+    times, window = run.time, 2.0 * span / run.summary["macro_steps"]
+    if promised is not None:
+        times, window = _times(way, run), promised * span
+    rows = np.isin(reference.time, times)
+    exact = replace(reference, columns={name: values[rows] for name, values in reference.columns.items()})
+    found = errors(run, exact, window)
+    wrong = (found["error_u_tip"], found["error_y"], found["error_event_time"] / span, found["error_impulse"])
     said = set(run.summary["warnings"]) - {*suspicions(run.scene), peak_force_doubt(run.scene)}
     return Verdict(
         seed, number, way, "done", condition, bool(said) or not run.summary["resolved"],

@@ -22,11 +22,11 @@ from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.scene.reading import tomllib
 from springbeam.scene.statics import tip_load_deflection
 from springbeam.studies.accuracy import simulate
-from springbeam.studies.crosscheck import crosscheck
-from springbeam.studies.crosscheck.orders import Orders
+from springbeam.studies.crosscheck import compare
+from springbeam.studies.metrics import METRICS
+from springbeam.studies.orders import Orders
 from springbeam.studies.stability.predict import predict
 from springbeam.studies.sweep import Sweep
-from springbeam.studies.sweep.metrics import METRICS
 from springbeam.studies.tradeoff import Tradeoff
 
 sys.path.append(str(Path(__file__).parents[1] / "campaign"))
@@ -292,11 +292,13 @@ def asking(tmp_path):
 
 @pytest.mark.parametrize(
     "study_of",
-    [crosscheck, lambda scene: Orders(scene=scene).record(0), lambda scene: run(scene, MemoryRecorder(scene))],
+    [compare, lambda scene: run(scene, MemoryRecorder(scene))],
 )
 def test_what_runs_a_scene_as_it_is_wants_the_accuracy_picked(study_of, asking):
     with pytest.raises(SceneError, match=r"accuracy = 0\.0001"):
         study_of(load_scene(asking))
+    refused = Orders(scene=load_scene(asking)).record({"coupling.macro_step": 1e-3})
+    assert (refused["status"], "accuracy = 0.0001 picks" in refused["error"]) == ("refused", True)
 
 
 def test_crosscheck_compares_the_scene_that_was_picked(asking, tmp_path):
@@ -312,7 +314,7 @@ def test_orders_are_those_of_the_scheme_that_was_picked(asking, tmp_path):
     """`hermite` 2 has order 6 in the displacement, until rounding and IDA's looser tolerance take over."""
     found = json.loads(printed("crosscheck", asking, "--orders", "--json", "--out", tmp_path / "orders"))
     (tip,) = [row for row in found["orders"] if row["quantity"] == "u_tip"]
-    assert 4.5 <= tip["orders"][0] <= 7.0
+    assert 4.5 <= tip["order_H"] <= 7.0
 
 
 def test_crosscheck_compares_soft_laws_that_were_picked(asking, tmp_path):
@@ -322,7 +324,7 @@ def test_crosscheck_compares_soft_laws_that_were_picked(asking, tmp_path):
 
 def test_each_run_of_a_sweep_picks_its_own():
     scene = scene_from_dict({**STIFF_ON_SOFT, "accuracy": 1e-3})
-    found = Sweep(scene=scene, vary=(), metric=("y_min", "macro_steps")).record(())
+    found = Sweep(scene=scene, vary=(), metric=("y_min", "macro_steps")).record({})
     expected = simulate(scene)
     assert found["status"] == "done"
     assert (found["y_min"], found["macro_steps"]) == (METRICS["y_min"](expected), expected.summary["macro_steps"])
@@ -332,7 +334,8 @@ def test_tradeoff_leaves_the_accuracy_out_and_says_so(asking):
     """Each configuration once had the name of one and the settings that were picked."""
     study = Tradeoff.of(load_scene(asking), repeats=1)
     assert study.remarks == ("accuracy = 0.0001 is left out: each configuration has its own scheme and steps",)
-    calls = [point.macro_steps for point in study.record(study.cases()["energy 0"])["points"]]
+    cases = [case for case in study.cases().values() if case["family"] == "energy 0"]
+    calls = [study.record(case)["cost_macro_steps"] for case in cases]
     assert len(set(calls)) == len(calls) == 4
 
 

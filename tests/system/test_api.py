@@ -19,7 +19,7 @@ from springbeam.bodies.protocol import NO_FORCE, Energies, Motion
 from springbeam.monolithic import event_driven
 from springbeam.results.totals import LOSS_NAMES, TOTALS
 from springbeam.scene.statics import SHAPE_POINTS
-from springbeam.studies.sweep.metrics import METRICS
+from springbeam.studies.metrics import METRICS
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 

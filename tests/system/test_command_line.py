@@ -8,7 +8,6 @@ import re
 import shlex
 import subprocess
 import sys
-from importlib import util
 from pathlib import Path
 
 import pytest
@@ -21,8 +20,8 @@ from springbeam.cli.run import _ProgressBar
 from springbeam.results.reading import load_summary
 from springbeam.scene import load_scene, reference, scene_keys, shipped_scenes, with_changes
 from springbeam.scene.reading import tomllib
+from springbeam.studies.metrics import METRICS
 from springbeam.studies.stability.predict import predict
-from springbeam.studies.sweep.metrics import METRICS
 
 pytestmark = pytest.mark.usefixtures("unpainted")
 
@@ -139,7 +138,7 @@ def test_json_is_one_document_and_all_of_stdout(arguments, tmp_path, monkeypatch
         assert document["runs"] == {"done": 2, "stopped": 0, "refused": 0, "lost": 0}
         assert all(Path(file).exists() for file in document["files"])
     elif name == "crosscheck":
-        assert document["passed"] is True
+        assert document["verdict"] == "agrees"
         assert all(row["error"] <= row["bound"] for row in document["quantities"])
         assert [event["kind"] for event in document["events"]] == ["closes", "strikes"]
     elif name == "scenes":
@@ -316,10 +315,3 @@ def test_without_fmus_the_error_says_what_builds_them(desk, arguments, monkeypat
     assert len(re.findall(r"\berror:", said)) == 1
     assert fmu_directory() == desk / "empty"
     assert contents(desk).keys() == before
-
-
-def test_a_sweep_without_its_packages_says_how_to_get_them(desk, monkeypatch):
-    find = util.find_spec
-    monkeypatch.setattr("springbeam.cli.studies.find_spec", lambda name: None if name == "pyarrow" else find(name))
-    said = refused("sweep", "soft", "--vary", "spring.mass=1,2")
-    assert said == "error: sweep needs the package pyarrow: pip install pyarrow\n"

@@ -16,17 +16,33 @@ from springbeam.studies.mesh import pick_mesh
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
 
+@pytest.mark.parametrize("sizes", [(1, 2, 4, 8), (1, 2, 5, 10), (3, 4, 7, 30)])
 @pytest.mark.parametrize("order", [0.7, 2.0, 4.0])
-def test_a_sequence_of_one_order_gives_it_and_its_limit(order):
-    found = settled([3.0 + 0.1 * 2.0 ** (-order * k) for k in range(4)])
+def test_a_sequence_of_one_order_gives_it_and_its_limit(order, sizes):
+    """Also where the sizes are no halvings: 10, 5, 2 and 1 modes were taken for these."""
+    found = settled([3.0 + 0.1 * n**-order for n in sizes], sizes)
     assert (found.order, found.limit) == pytest.approx((order, 3.0), rel=1e-9)
-    assert found.error == pytest.approx(0.1 * 2.0 ** (-3 * order), rel=1e-6)
+    assert found.error == pytest.approx(0.1 * sizes[-1] ** -order, rel=1e-6)
 
 
-@pytest.mark.parametrize("values", [(1.0, 2.0, 1.5), (1.0, 1.1, 1.3), (1.0, 1.5, 1.9)])
+@pytest.mark.parametrize("values", [(1.0, 2.0, 1.5), (1.0, 1.1, 1.3), (1.0, 1.5, 1.9), (1.0, None, 1.1)])
 def test_values_that_do_not_settle_have_no_limit(values):
-    found = settled(values)
-    assert (found.change, found.order, found.limit) == (values[-1] - values[-2], None, None)
+    found = settled(values, (1, 2, 4))
+    change = None if None in values else values[-1] - values[-2]
+    assert (found.change, found.order, found.limit) == (change, None, None)
+
+
+def test_beyond_all_modes_there_is_nothing():
+    """24 of 24 modes are the mesh's own solution. Its "error" was extrapolated from 6 and 12."""
+    values, sizes = (1.0, 1.5, 1.75), (6, 12, 24)
+    assert settled(values, sizes).limit == pytest.approx(2.0)
+    assert settled(values, sizes, complete=True) == (0.25, None, 1.75, 0.0)
+    scene = with_changes(load_scene("soft"), beam={"n_elements": 12})
+    study = Converge(scene=scene, metric=("u_tip_end",))
+    rows = [{"refined": "modes", "unknowns": n, "u_tip_end": u} for n, u in zip(sizes, values, strict=True)]
+    assert study.settled(rows, "u_tip_end").error == 0.0
+    fewer = Converge(scene=with_changes(scene, beam={"n_modes": 12}), metric=("u_tip_end",))
+    assert fewer.settled(rows, "u_tip_end").error == pytest.approx(0.25)
 
 
 def test_linear_elements_converge_by_order_two(tmp_path):
@@ -34,10 +50,11 @@ def test_linear_elements_converge_by_order_two(tmp_path):
     metrics = ["--metric", "first_separation", "--metric", "contact_duration"]
     found = json.loads(printed("converge", "steel-bumper", *settings, *metrics, "--out", tmp_path / "found", "--json"))
     assert found["elements"]["settled"]["contact_duration"]["order"] == pytest.approx(2.0, abs=0.1)
-    assert [level["n_elements"] for level in found["elements"]["levels"]] == [20, 40, 80, 160]
-    assert [level["n_modes"] for level in found["modes"]["levels"]] == [1, 3, 6, 12]
+    assert [level["beam.n_elements"] for level in found["elements"]["levels"]] == [20, 40, 80, 160]
+    assert [level["unknowns"] for level in found["modes"]["levels"]] == [1, 3, 6, 12]
     assert found["elements"]["settled"]["first_separation"]["limit"] is None  # there is none
-    assert {file.name for file in (tmp_path / "found").iterdir()} == {"study.jsonl", "converge.csv", "converge.png"}
+    written = {file.name for file in (tmp_path / "found").iterdir()}
+    assert written == {"study.jsonl", "converge.csv", "converge.parquet", "converge.png"}
 
 
 @pytest.mark.parametrize("asked", [{"coupling": {"relative_tolerance": 1e-4}}, {"accuracy": 1e-3}])
@@ -45,8 +62,9 @@ def test_finer_steps_follow_from_what_the_scene_asks_for(asked):
     """Neither is a macro step, which there is none of to be halved: one was an error, the other changed nothing."""
     scene = with_changes(load_scene("soft"), beam={"n_elements": 5}, time={"t_end": 0.06}, **asked)
     study = Converge(scene=scene, metric=("y_end",), quick=True)
-    (*_, finest), finer = study.sequences()["elements"], list(study.cases().values())[-1]
-    given, changed = (study.record(mesh)["values"]["y_end"] for mesh in (finest, finer))
+    cases = list(study.cases().values())
+    finest = [case for case in cases if case["refined"] == "elements"][-1]
+    given, changed = (study.record(case)["y_end"] for case in (finest, cases[-1]))
     assert 0.0 < abs(changed - given) < 1e-8
 
 
@@ -69,7 +87,7 @@ def test_a_mesh_that_cannot_keep_the_accuracy_says_how_far_it_comes(tmp_path):
 
 @pytest.mark.parametrize(("arguments", "words"), [
     (["duffing"], "[beam]: the scene has no mesh to refine"),
-    (["soft", "--metric", "weight"], "weight: no such metric"),
+    (["soft", "--metric", "weight"], "--metric weight: unknown"),
 ])  # fmt: skip
 def test_what_cannot_be_refined_is_one_error(tmp_path, arguments, words):
     assert words in refused("converge", *arguments, "--out", tmp_path / "found")

@@ -9,7 +9,7 @@ import pytest
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.studies.sweep.metrics import METRICS
+from springbeam.studies.metrics import METRICS
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 

@@ -64,7 +64,7 @@ print(springbeam.__file__, len(springbeam.simulate(springbeam.load_scene("duffin
 
 def test_every_dependency_has_a_lowest_and_a_tested_version():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    groups = [project["dependencies"], *(project["optional-dependencies"][name] for name in ("sweep", "dev"))]
+    groups = [project["dependencies"], *(project["optional-dependencies"][name] for name in ("cluster", "dev"))]
     all_of_them = [requirement for group in groups for requirement in map(Requirement, group)]
     on = {"python_version": "3.11"}  # as constraints.txt says
     wanted = {r.name: r.specifier for r in all_of_them if r.marker is None or r.marker.evaluate(on)}

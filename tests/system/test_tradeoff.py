@@ -1,4 +1,4 @@
-"""The trade between error and cost, on the FMUs: what is swept, judged and named."""
+"""The trade between error and cost, on the FMUs: what is swept, judged and named; and scipy as its rival."""
 
 from __future__ import annotations
 
@@ -13,87 +13,102 @@ from commands import HANGS, printed
 from springbeam.monolithic import event_driven
 from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.studies import tradeoff
+from springbeam.studies.metrics import errors, motion_errors, worst
+from springbeam.studies.rivals import Rival
 from springbeam.studies.study import record_all
-from springbeam.studies.tradeoff import Tradeoff
-from springbeam.studies.tradeoff.configurations import ALGORITHM_1, configurations
-from springbeam.studies.tradeoff.points import Errors, Point, Points, errors
+from springbeam.studies.tradeoff import Tradeoff, cheapest, pareto
+
+
+def small(**changes):
+    return with_changes(load_scene("soft"), beam={"n_elements": 6}, coupling={"macro_step": 1e-3}, **changes)
 
 
 @pytest.fixture(scope="module")
-def found():
-    scene = with_changes(load_scene("soft"), beam={"n_elements": 6}, coupling={"macro_step": 1e-3})
-    study = Tradeoff.of(scene, until=0.06, repeats=1)
+def rows():
+    study = Tradeoff.of(small(), until=0.06, repeats=1)
     with pytest.MonkeyPatch.context() as patch:  # on a busy machine, too, nothing is given up
         patch.setattr(tradeoff, "_LIMIT", HANGS)
         patch.setattr(tradeoff, "_LIMIT_FINER", HANGS)
-        return study.judged(record_all(study))
+        return study.rows(record_all(study))
 
 
-def by_family(found, family):
-    return [p for p in found.points if p.family == family]
+def by_family(rows, family):
+    return [row for row in rows if row["family"] == family]
 
 
-@pytest.mark.parametrize(("family", "order"), [("energy 0", 4.0), ("energy 1", 4.0), ("hermite 1", 4.0)])
-def test_errors_fall_with_the_order_of_the_scheme(found, family, order):
-    points = [p for p in by_family(found, family) if 1e-10 < p.displacement < 1e-5]
-    assert len(points) >= 2
-    rates = [np.log2(a.displacement / b.displacement) for a, b in itertools.pairwise(points)]
-    assert order - 0.7 < np.median(rates) < order + 0.7
+@pytest.mark.parametrize(("family", "order"), [("energy 0", 3.0), ("energy 1", 3.0), ("hermite 1", 4.0)])
+def test_errors_fall_with_the_order_of_the_curve(rows, family, order):
+    """At macro points `energy` 0 and 1 are of order 4; between them velocities of order 2 decide."""
+    found = [worst(row) for row in by_family(rows, family) if 1e-10 < worst(row) < 1e-5]
+    assert len(found) >= 2
+    rates = [np.log2(a / b) for a, b in itertools.pairwise(found)]
+    assert order - 0.5 < np.median(rates) < order + 0.5
 
 
-def test_more_steps_cost_more_calls(found):
+def test_more_steps_cost_more_calls(rows):
     for family in ("energy 0", "energy 2", "hermite 2"):
-        calls = [p.do_steps for p in by_family(found, family)]
+        calls = [row["cost_do_steps"] for row in by_family(rows, family)]
         assert calls == sorted(calls)
-        assert all(p.rollbacks > 0 for p in by_family(found, family))
+        assert all(row["cost_rollbacks"] > 0 for row in by_family(rows, family))
 
 
-def test_front_and_choices_are_of_points_on_the_same_model():
-    """A point judged on a finer mesh is on no front; one that nothing is quicker and better than is; 0.1 is no result.
-    A choice is the cheapest that keeps the error, of this package and of scipy."""
-
-    def point(solve, error, method="co-simulation", refined=False):
-        against = Errors(error, None, None, None, 0.0, None, None)
-        return Point("family", "setting", method, refined, 0, None, against, "", solve, 0.0, 0.0)
-
-    rough, better, finer = point(1.0, 1e-3), point(2.0, 1e-5), point(0.5, 1e-9, refined=True)
-    slower, wrong, scipy, paper = (
-        point(3.0, 1e-4),
-        point(0.1, 0.2),
-        point(1.5, 1e-7, "Radau"),
-        point(0.2, 5e-3, ALGORITHM_1),
+def test_a_curve_between_few_points_is_judged_too(rows):
+    """Between them one step of the cubic start of a scheme is worse than at them: 16 ms, 4 steps."""
+    coarse = by_family(rows, "energy 2")[0]
+    scene = with_changes(
+        small(), time={"t_end": 0.06}, coupling={"degree": 2, "macro_step": coarse["coupling.macro_step"]}
     )
-    found = Points([better, slower, finer, rough, wrong, scipy, paper])
-    assert found.front() == [paper, rough, scipy]
-    assert [choice.ours for choice in found.cheapest()] == [rough, better, None, None]
-    assert [choice.scipy for choice in found.cheapest()] == [scipy, scipy, scipy, None]
-    assert [choice.ratio for choice in found.cheapest()] == [1.5, 0.75, None, None]
+    run = tradeoff.simulate(scene)
+    at_points = event_driven.simulate(scene, sample_times=run.time)
+    index = np.searchsorted(at_points.time, run.time)
+    scale = np.abs(at_points.u_tip - at_points.u_tip[0]).max()
+    assert coarse["error_u_tip"] > 3.0 * np.abs(run.u_tip - at_points.u_tip[index]).max() / scale
 
 
-def test_a_tradeoff_has_a_front_and_choices(found):
-    assert len(found.front()) >= 3
-    assert None not in (found.cheapest()[1].ours, found.cheapest()[1].scipy)
+def test_front_and_choices_are_of_rows_on_the_same_model():
+    """One judged on a finer mesh is on no front; one that nothing is quicker and better than is; 0.1 is no result.
+
+    A choice is the cheapest that keeps the error, as all finer ones of its family do: of this package and of scipy.
+    """
+
+    def row(seconds, error, family="ours", finer=False, **rival):
+        found = {"family": family, "setting": "", "finer": finer, "status": "done", "error_u_tip": error}
+        return found | {"cost_wall_time": seconds, "times": [seconds, 2.0 * seconds], **rival}
+
+    rough, better, finer = row(1.0, 1e-3), row(2.0, 1e-5), row(0.5, 1e-9, finer=True)
+    lucky, wrong, scipy = row(0.7, 1e-6, "luck"), row(0.1, 0.2, "luck"), row(1.5, 1e-7, "Radau", rtol=1e-4)
+    found = [rough, better, finer, lucky, wrong, scipy]
+    assert pareto(found) == [lucky, scipy]
+    assert [choice["co_simulation"] for choice in cheapest(found)] == [rough, better, None, None]
+    assert [choice["scipy"] for choice in cheapest(found)] == [scipy, scipy, scipy, None]
+    assert [choice["ratio"] for choice in cheapest(found)] == [1.5, 0.75, None, None]
 
 
-def test_modes_converge_to_the_mesh_and_not_beyond(found):
-    modes = by_family(found, "modes")
-    assert [p.displacement for p in modes] == sorted((p.displacement for p in modes), reverse=True)
-    own = next(p for p in by_family(found, "elements of degree 1") if p.setting == "6")
-    assert all(p.displacement > 0.5 * own.displacement for p in modes)
+def test_a_tradeoff_has_a_front_and_choices(rows):
+    assert len(pareto(rows)) >= 3
+    choice = cheapest(rows)[1]
+    assert None not in (choice["co_simulation"], choice["scipy"])
+
+
+def test_modes_converge_to_the_mesh_and_not_beyond(rows):
+    modes = [worst(row) for row in by_family(rows, "modes")]
+    assert modes == sorted(modes, reverse=True)
+    own = next(row for row in by_family(rows, "elements of degree 1") if row["setting"] == "6")
+    assert all(error > 0.5 * worst(own) for error in modes)
 
 
 def test_the_reference_has_no_error_and_a_shifted_one_has():
     scene = with_changes(load_scene("soft"), beam={"n_elements": 4}, time={"t_end": 0.1})
+    run = tradeoff.simulate(scene)
     times = np.linspace(0.0, 0.1, 101)
-    exact = event_driven.simulate(scene, sample_times=times)
-    same = errors(exact, exact, 1e-3)
-    assert (same.displacement, same.event_time, same.impulse) == (0.0, 0.0, 0.0)
-    moved = event_driven.simulate(scene, sample_times=times)
-    moved.columns["y"] = exact.y + 0.01 * np.abs(exact.y - exact.y[0]).max()
-    assert errors(moved, exact, 1e-3).displacement == pytest.approx(0.01, rel=1e-12)
-    missed = moved.events.pop()
+    exact = run.at(times)
+    same = errors(run, exact, 1e-3)
+    assert (worst(same), same["error_event_time"], same["error_impulse"]) == (0.0, 0.0, 0.0)
+    moved = exact.columns | {"y": exact.y + 0.01 * np.abs(exact.y - exact.y[0]).max()}
+    assert worst(motion_errors(moved, exact)) == pytest.approx(0.01, rel=1e-12)
+    missed = run.events.pop()
     assert missed.kind == "stop_impact"
-    assert errors(moved, exact, 1e-3).event_time == pytest.approx(0.1 - missed.time)  # to the end of the run
+    assert errors(run, exact, 1e-3)["error_event_time"] == pytest.approx(0.1 - missed.time)  # to the end of the run
 
 
 @pytest.mark.parametrize(
@@ -112,23 +127,24 @@ OTHERS = {"DOP853", "LSODA", "Radau", "modes", "elements of degree 1", "elements
 @pytest.mark.parametrize(
     ("law", "there", "absent"),
     [
-        ("transmission", {"hermite 1", "hermite 2, IDA 1e-04", "hermite 2 adaptive", "Algorithm 1"}, "jacobi 0"),
-        ("compliance", {"jacobi 0", "jacobi 1", "gauss_seidel 0", "gauss_seidel 1", "Algorithm 1"}, "hermite 2"),
-        ("tie", {"hermite 2"}, "Algorithm 1"),  # which lets go
-        ("link", {"jacobi 1"}, "Algorithm 1"),
+        ("transmission", {"hermite 1", "hermite 2, IDA 1e-04", "hermite 2 adaptive"}, "jacobi 0"),
+        ("compliance", {"jacobi 0", "jacobi 1", "gauss_seidel 0", "gauss_seidel 1"}, "hermite 2"),
+        ("tie", {"hermite 2"}, "jacobi 0"),
+        ("link", {"jacobi 1"}, "hermite 2"),
     ],
 )
 def test_every_axis_is_swept_that_the_law_has(law, there, absent):
-    scene = with_changes(load_scene("soft"), contact={"law": law}, beam={"n_elements": 6}, time={"t_end": 0.05})
-    families = {c.family for c in configurations(scene)}
+    study = Tradeoff(scene=small(contact={"law": law}, time={"t_end": 0.05}))
+    families = {case["family"] for case in study.configurations}
     assert ENERGY | OTHERS | {"energy 2 adaptive"} | there <= families
     assert absent not in families
 
 
-def test_of_scipy_a_beam_without_inertia_has_the_method_that_its_reference_has():
-    """The others ended the study in a traceback."""
+def test_a_beam_without_inertia_has_no_rival():
     scene = with_changes(load_scene("soft"), beam={"n_elements": 3, "fidelity": "quasi_static"})
-    assert {c.method for c in configurations(scene)} == {"co-simulation", "DOP853"}
+    study = Tradeoff(scene=scene)
+    assert not any("rtol" in case for case in study.configurations)
+    assert study.notes({}) == ["not run: scipy, since a quasi-static beam has no equation of motion to hand to it"]
 
 
 def test_command(tmp_path):
@@ -138,8 +154,8 @@ def test_command(tmp_path):
     assert table["cheapest"][3]["co_simulation"]["error"] <= 1e-8
     rows = list(csv.DictReader((tmp_path / "out" / "tradeoff.csv").open()))
     assert {row["family"] for row in rows} >= {"energy 0", "DOP853"}
-    assert all(row["u_tip_max"] == "" for row in rows)
-    assert any(float(row["solve_spread"]) > 0.0 for row in rows)  # of both times
+    assert all(row["error_u_tip"] == "" for row in rows)
+    assert all(len(json.loads(row["times"])) == 2 for row in rows if row["status"] == "done")
     assert (tmp_path / "out" / "tradeoff.png").stat().st_size > 10_000
 
 
@@ -147,8 +163,9 @@ def test_explicit_solvers_are_not_sent_after_a_mode_that_is_too_fast_for_them():
     """3.5e6 rad/s for 3 s are a million steps of DOP853; on `soft` to its first impact they are 40."""
 
     def left_out(name, until):
-        every = configurations(with_changes(load_scene(name), time={"t_end": until}))
-        return {c.method for c in every if tradeoff._hopeless(c)}
+        study = Tradeoff(scene=with_changes(load_scene(name), time={"t_end": until}))
+        every, taken = ({c.get("method") for c in cases} for cases in (study.configurations, study.cases().values()))
+        return every - taken
 
     assert left_out("bar-impact", 3.0) == {"DOP853", "LSODA"}
     assert left_out("soft", 0.0712) == set()
@@ -158,28 +175,81 @@ def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
     """With no time at all every run is given up: one of each family is begun, and none is judged."""
     monkeypatch.setattr(tradeoff, "_LIMIT", 0.0)
     monkeypatch.setattr(tradeoff, "_LIMIT_FINER", 0.0)
-    late = Tradeoff.of(with_changes(load_scene("soft"), beam={"n_elements": 4}), until=0.02)
-    cases = late.cases()
-    records = {name: late.record(cases[name]) for name in cases if name != "Algorithm 1"}
-    models = records.pop("modes and elements")
-    assert models["points"] == [] or all(point.cause for point in models["points"])
-    for name, record in records.items():
-        (point,) = record["points"]
-        assert (point.family, point.errors) == (name, None)
-        assert "takes more than 0 s" in point.cause or "diverges" in point.cause
-        assert record["notes"] == [f"given up after 0 s, finer ones of their kind not run: {name}, {point.setting}"]
+    study = Tradeoff.of(with_changes(load_scene("soft"), beam={"n_elements": 4}), until=0.02, repeats=2)
+    rows = study.rows(record_all(study))
+    begun = [row for row in rows if row["status"] != "skipped"]
+    assert len(begun) == len({row["family"] for row in rows}) < len(rows)
+    for row in begun:
+        assert row["status"] == "stopped"
+        assert "takes more than 0 s" in row["error"] or "diverges" in row["error"]
+    (note,) = study.notes(record_all(study))
+    assert note.startswith("given up after 0 s, finer ones of their kind not run: energy 0, H = 0.004; ")
 
 
-def test_models_are_left_out_if_their_reference_takes_too_long(monkeypatch):
-    monkeypatch.setattr(tradeoff, "_LIMIT_FINER", 0.0)
-    late = Tradeoff.of(with_changes(load_scene("soft"), beam={"n_elements": 4}), until=0.02, repeats=1)
-    record = late.record(late.cases()["modes and elements"])
-    assert record["points"] == []
-    assert "the reference takes more than 0 s" in record["notes"][-1]
+def test_a_configuration_is_timed_once_in_each_pass():
+    study = Tradeoff.of(small(), until=0.02)
+    turns = [case["pass"] for case in study.cases().values()]
+    assert turns == sorted(turns)
+    assert [turns.count(turn) for turn in range(3)] == [len(turns) // 3] * 3
 
 
 def test_quick_takes_every_third_of_a_family():
-    scene = with_changes(load_scene("soft"), beam={"n_elements": 6}, coupling={"macro_step": 1e-3})
-    whole, quick = (Tradeoff.of(scene, until=0.06, quick=quick).cases() for quick in (False, True))
-    assert quick["energy 0"] == whole["energy 0"][::3]
-    assert quick.keys() == whole.keys()
+    whole, quick = (
+        [case for case in Tradeoff.of(small(), until=0.06, quick=quick).cases().values() if not case["pass"]]
+        for quick in (False, True)
+    )
+    assert by_family(quick, "energy 0") == by_family(whole, "energy 0")[::3]
+    assert {case["family"] for case in quick} == {case["family"] for case in whole}
+
+
+# -- scipy ----------------------------------------------------------------------------------------------------------
+
+TIGHT = {"method": "DOP853", "rtol": 1e-9, "atol": 1e-13}
+LOADS = [
+    {"on": "tip", "signal": "harmonic", "frequency": 12.0, "amplitude": 0.5},
+    {"on": "spring", "signal": "step", "start": 0.02, "amplitude": -0.5},
+]
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes", "until"),
+    [
+        ("soft", {}, 0.4),  # tied, struck, free, touching
+        ("soft", {"beam": {"alpha_b": 1e-3}, "loads": LOADS}, 0.1),
+        ("soft", {"contact": {"law": "compliance", "damping": 1.0}}, 0.1),
+        ("soft", {"contact": {"law": "link", "damping": 0.5}}, 0.1),
+        ("soft", {"contact": {"law": "tie"}}, 0.1),
+        ("beam-on-stop", {}, 0.1),  # seated, and free again
+        ("duffing", {}, 2.0),
+    ],
+)
+def test_scipy_solves_what_the_reference_solves(scene, changes, until):
+    """To its tolerance; what it evaluates is no more than the equations of motion."""
+    beam = {} if scene == "duffing" else {"n_elements": 6, **changes.get("beam", {})}
+    what = with_changes(load_scene(scene), **{**changes, "time": {"t_end": until}} | ({"beam": beam} if beam else {}))
+    times = np.linspace(what.contact_time or 0.0, until, 101)
+    solved = Rival(what).solve(**TIGHT, times=times)
+    exact = event_driven.simulate(what, sample_times=times)
+    rows = np.searchsorted(exact.time, times)
+    for name, values in solved.columns.items():
+        scale = np.abs(exact[name] - exact[name][0]).max()
+        assert np.abs(values - exact[name][rows]).max() <= 1e-6 * scale
+
+
+@pytest.mark.parametrize("method", ["LSODA", "Radau"])
+def test_the_implicit_methods_get_the_jacobian(method):
+    """By differences it would take as many evaluations as there are unknowns."""
+    what = with_changes(load_scene("soft"), beam={"n_elements": 20}, time={"t_end": 0.02})
+    times = np.linspace(0.0, 0.02, 21)
+    solved = Rival(what).solve(method, 1e-5, 1e-9, times)
+    assert worst(motion_errors(solved.columns, event_driven.simulate(what, sample_times=times))) < 1e-4
+    phase = next(iter(Rival(what)._phases.values()), None)
+    assert phase is None
+    rival = Rival(what)
+    rival.solve(method, 1e-5, 1e-9, times)
+    (phase,) = rival._phases.values()
+    X = np.random.default_rng(0).normal(size=82)
+    for k in (0, 45, 80):
+        step = 1e-6 * np.eye(82)[k]
+        column = (phase.rhs(0.0, X + step) - phase.rhs(0.0, X - step)) / 2e-6
+        assert phase.jacobian(0.0, X)[:, k] == pytest.approx(column, rel=1e-6, abs=1e-4 * np.abs(column).max())

@@ -22,8 +22,8 @@ from ..scene.partners import kind_of
 from ..studies.tables import table
 from .common import BAD_INPUT, DISAGREES, JsonOption, SettingsOption, bad_input_reported, console_for, fail, print_json
 
-_REQUIRED = ("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly")
-_FOR_SWEEPS = ("distributed", "pyarrow")
+_REQUIRED = ("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly", "pebble", "pyarrow")
+_FOR_CLUSTERS = ("distributed",)
 
 
 def doctor(
@@ -57,7 +57,7 @@ def doctor(
     line("system", f"{found['system']}, {found['machine']}")
     for name, remedy in (
         ("packages", "pip install --upgrade springbeam"),
-        ("sweep", "pip install distributed pyarrow"),
+        ("cluster", "pip install distributed"),
     ):
         versions = found[name]
         absent = [package for package, number in versions.items() if number is None]
@@ -130,7 +130,7 @@ def _found() -> dict[str, Any]:
         "system": platform.platform(),
         "machine": platform.machine(),
         "packages": {name: _version(name) for name in _REQUIRED},
-        "sweep": {name: _version(name) for name in _FOR_SWEEPS},
+        "cluster": {name: _version(name) for name in _FOR_CLUSTERS},
         "ffmpeg": shutil.which("ffmpeg"),
         "fmus": fmus,
     }

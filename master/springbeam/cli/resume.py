@@ -10,6 +10,7 @@ import typer
 from ..results.directory import RunDirectory
 from .common import JsonOption, NoPlotsOption, QuietOption, bad_input_reported, results_directory
 from .run import carry_out
+from .study import Frame
 from .study import carry_out as carry_out_study
 
 
@@ -45,4 +46,4 @@ def resume(
             as_json=as_json,
         )
     elif study is not None:
-        carry_out_study(study, None, out=directory, no_plots=no_plots, quiet=quiet, as_json=as_json)
+        carry_out_study(lambda: study, None, Frame(directory, False, no_plots, quiet, as_json))

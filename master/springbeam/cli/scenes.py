@@ -68,7 +68,7 @@ def keys(
         print_json(reference.schema())
         return
     if metrics:
-        from ..studies.sweep.metrics import METRICS
+        from ..studies.metrics import METRICS
 
         if as_json:
             print_json([{"name": name, "unit": m.unit, "meaning": m.words} for name, m in METRICS.items()])

@@ -1,26 +1,29 @@
-"""The commands that carry out a study: ``springbeam sweep``, ``tradeoff``, ``converge``, ``crosscheck``, ``stability``.
-
-Each returns its study; `study_command` gives it the options that all have and carries it out.
-"""
+"""The commands that carry out a study: sweep, tradeoff, converge, crosscheck, stability."""
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from ..scene import load_scene
-from .common import BAD_INPUT, SceneArgument, SettingsOption, complete_key, fail
+from .common import (
+    ForceOption,
+    JsonOption,
+    NoPlotsOption,
+    QuietOption,
+    SceneArgument,
+    SettingsOption,
+    complete_key,
+)
 from .run import picked
-from .study import QuickOption, study_command
+from .study import Frame, QuickOption, SchedulerOption, StudyOption, WorkersOption, carry_out
 from .summary import picked_in_words
 
 if TYPE_CHECKING:
     from ..studies.study import Study
 
 
-@study_command("workers", "scheduler")
 def sweep(
     scene: SceneArgument,
     vary: Annotated[
@@ -55,27 +58,34 @@ def sweep(
             help="Keep the positions once a period of the harmonic load in the last third of each run, and draw them.",
         ),
     ] = False,
-) -> Study:
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    out: StudyOption = None,
+    force: ForceOption = False,
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Run a scene over many values of its keys, on all cores or a Dask cluster; one row per run.
 
     Example: springbeam sweep soft --vary spring.linear_stiffness=1:200:64:log
     """
-    if find_spec("pyarrow") is None:
-        fail(BAD_INPUT, "sweep needs the package pyarrow: pip install pyarrow")
     from ..studies.sweep import Sweep
 
-    return Sweep(
-        scene=load_scene(scene, settings or ()),
-        vary=tuple(vary or ()),
-        samples=samples,
-        sampling=sampling,
-        seed=seed,
-        metric=tuple(metric or ()),
-        stroboscopic=stroboscopic,
-    )
+    def study() -> Study:
+        return Sweep(
+            scene=load_scene(scene, settings or ()),
+            vary=tuple(vary or ()),
+            samples=samples,
+            sampling=sampling,
+            seed=seed,
+            metric=tuple(metric or ()),
+            stroboscopic=stroboscopic,
+        )
+
+    carry_out(study, scene, Frame(out, force, no_plots, quiet, as_json, workers, scheduler))
 
 
-@study_command()
 def tradeoff(
     scene: SceneArgument,
     settings: SettingsOption = None,
@@ -93,17 +103,24 @@ def tradeoff(
             "--quick", help="Every third configuration of a kind, timed once; the slow ones are left out sooner."
         ),
     ] = False,
-) -> Study:
+    out: StudyOption = None,
+    force: ForceOption = False,
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Measure error against cost over schemes, macro steps, modes, meshes and tolerances, beside scipy's solvers.
 
     Example: springbeam tradeoff soft --until 0.0712
     """
     from ..studies.tradeoff import Tradeoff
 
-    return Tradeoff.of(load_scene(scene, settings or ()), until, repeats=repeats, quick=quick)
+    def study() -> Study:
+        return Tradeoff.of(load_scene(scene, settings or ()), until, repeats=repeats, quick=quick)
+
+    carry_out(study, scene, Frame(out, force, no_plots, quiet, as_json))
 
 
-@study_command()
 def converge(
     scene: SceneArgument,
     settings: SettingsOption = None,
@@ -114,17 +131,24 @@ def converge(
         list[str] | None, typer.Option("--metric", metavar="NAME", help="Quantity to compare; may be repeated.")
     ] = None,
     quick: QuickOption = False,
-) -> Study:
+    out: StudyOption = None,
+    force: ForceOption = False,
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Show how the results settle with finer meshes and more modes: observed orders, extrapolated values, cost.
 
     Example: springbeam converge steel-bumper --metric contact_force_max
     """
     from ..studies.converge import Converge
 
-    return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()), quick=quick)
+    def study() -> Study:
+        return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()), quick=quick)
+
+    carry_out(study, scene, Frame(out, force, no_plots, quiet, as_json))
 
 
-@study_command()
 def crosscheck(
     scene: SceneArgument,
     settings: SettingsOption = None,
@@ -134,27 +158,32 @@ def crosscheck(
     quick: Annotated[
         bool, typer.Option("--quick", help="Compare only the first quarter of the time; with --orders, not H/8.")
     ] = False,
-) -> Study:
-    """Compare the co-simulation with the monolithic reference of its law. Exit code 1 if they disagree.
+    out: StudyOption = None,
+    force: ForceOption = False,
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare the co-simulation with the monolithic reference of its law.
+
+    Exit code 1 if they differ, 4 if they cannot be compared over the run that was asked for.
 
     Example: springbeam crosscheck soft --set coupling.scheme=hermite --set coupling.degree=2 --orders
     """
-    from ..studies.crosscheck.comparison import Crosscheck
-    from ..studies.crosscheck.orders import Orders
+    from ..studies.crosscheck import Crosscheck
+    from ..studies.orders import Orders
 
-    what = load_scene(scene, settings or ())
-    made = picked(what)
-    remarks = () if made is None else (f"accuracy {picked_in_words(made.summary['accuracy'])}",)
-    kind = Orders if with_orders else Crosscheck
-    return kind(scene=what if made is None else made.scene, quick=quick, remarks=remarks)
+    def study() -> Study:
+        what = load_scene(scene, settings or ())
+        made = picked(what)
+        remarks = () if made is None else (f"accuracy {picked_in_words(made.summary['accuracy'])}",)
+        kind = Orders if with_orders else Crosscheck
+        return kind(scene=what if made is None else made.scene, quick=quick, remarks=remarks)
+
+    carry_out(study, scene, Frame(out, force, no_plots, quiet, as_json))
 
 
-@study_command("workers")
 def stability(
-    critical: Annotated[
-        bool,
-        typer.Option("--critical", help="Compare predicted and measured critical macro steps of all schemes instead."),
-    ] = False,
     samples: Annotated[
         int, typer.Option("--samples", metavar="N", min=0, help="Cells of the hypercube over all parameters.")
     ] = 300,
@@ -163,12 +192,20 @@ def stability(
     ] = 6,
     seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the hypercube.")] = 1,
     quick: QuickOption = False,
-) -> Study:
-    """Run extreme scenes and classify each result. Exit code 1 if a wrong result came without a warning.
+    workers: WorkersOption = None,
+    out: StudyOption = None,
+    force: ForceOption = False,
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Run extreme scenes and classify each result. Exit code 1 if one is wrong.
 
     Example: springbeam stability --samples 100 --resolution 0
     """
-    from ..studies.stability.critical import Critical
     from ..studies.stability.grid import Grid
 
-    return Critical(quick=quick) if critical else Grid(samples=samples, resolution=resolution, seed=seed, quick=quick)
+    def study() -> Study:
+        return Grid(samples=samples, resolution=resolution, seed=seed, quick=quick)
+
+    carry_out(study, None, Frame(out, force, no_plots, quiet, as_json, workers))

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
-from inspect import signature
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -19,12 +19,7 @@ from rich.text import Text
 from ..results.directory import ResultsExist
 from .common import (
     BAD_INPUT,
-    DISAGREES,
     STOPPED,
-    ForceOption,
-    JsonOption,
-    NoPlotsOption,
-    QuietOption,
     bad_input_reported,
     cause_of,
     console_for,
@@ -34,7 +29,7 @@ from .common import (
 )
 
 if TYPE_CHECKING:
-    from ..studies.study import Record, Records, Study
+    from ..studies.study import Records, Row, Study
 
 StudyOption = Annotated[
     Path | None,
@@ -48,82 +43,59 @@ SchedulerOption = Annotated[
     typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster instead of local processes."),
 ]
 QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]
-#: Options of all studies.
-_SHARED = ("out", "force", "no_plots", "quiet", "as_json")
 #: Where no bar is shown, a study that takes longer, and so much more, says how long the rest takes [s].
 _LONG = 10.0
 
 
-def study_command(*more: str) -> Callable[[Callable[..., Study]], Callable[..., None]]:
-    """Return what makes a command of a function that returns a study: it is carried out.
+@dataclass(frozen=True)
+class Frame:
+    """The options of all studies; ``workers`` and ``scheduler`` of those whose cases workers compute."""
 
-    The command has the options of the function, those that all studies have, and of `carry_out` also ``more``.
-    """
-
-    def made(make: Callable[..., Study]) -> Callable[..., None]:
-        del make.__annotations__["return"]  # a type that only type checkers load
-        own, frame = signature(make, eval_str=True), signature(carry_out, eval_str=True)
-        shared = [frame.parameters[name] for name in (*more, *_SHARED)]
-
-        def command(**given: Any) -> None:
-            options = {parameter.name: given.pop(parameter.name) for parameter in shared}
-            carry_out(lambda: make(**given), given.get("scene"), **options)
-
-        command.__signature__ = own.replace(parameters=[*own.parameters.values(), *shared])  # type: ignore[attr-defined]
-        command.__name__, command.__doc__ = make.__name__, make.__doc__
-        return command
-
-    return made
+    out: Path | None
+    force: bool
+    no_plots: bool
+    quiet: bool
+    as_json: bool
+    workers: int | None = None
+    scheduler: str | None = None
 
 
-def carry_out(
-    what: Any,
-    scene: str | None,
-    *,
-    workers: WorkersOption = None,
-    scheduler: SchedulerOption = None,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+def carry_out(make: Callable[[], Study], scene: str | None, frame: Frame) -> None:
     """Compute what of a study is not yet in its directory, write its files, and show what was found.
 
-    ``what`` is a `Study`, or a function that returns one and may raise what bad input raises. The directory is ``out``,
-    else ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
+    ``make`` returns the study, and may raise what bad input raises. The directory is ``out``, else
+    ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
     """
     from .watchdog import watched
 
-    console = console_for(silent=quiet or as_json)
+    console = console_for(silent=frame.quiet or frame.as_json)
     with bad_input_reported():
-        study: Study = what() if callable(what) else what
+        study = make()
         study.cases()
-        default = study.kind if scene is None else f"{Path(scene).stem}-{study.kind}"
-        records = _opened(study, default, out, force)
+        records = _opened(study, study.kind if scene is None else f"{Path(scene).stem}-{study.kind}", frame)
         directory = records.path.parent
         with _going_on(records, len(study.cases())) as cut_short:
             with watched(cut_short):
-                computed = _computed(study, records, console, workers, scheduler, quiet=quiet or as_json)
-            files = study.write(computed, directory, pictures=not no_plots)
+                computed = _computed(study, records, console, frame)
+            files = study.write(computed, directory, pictures=not frame.no_plots)
         found = study.findings(computed)
-    if as_json:
+    if frame.as_json:
         print_json({"directory": directory, "files": files, **found.document})
-    elif quiet:
+    elif frame.quiet:
         typer.echo(directory)
     for part in (*map(Text, study.remarks), *found.shown):
         console.print(part)
     for file in files:
         console.print(Text(f"results   {file}"), soft_wrap=True)
-    if not found.passed:
-        raise typer.Exit(DISAGREES)
+    if found.code:
+        raise typer.Exit(found.code)
 
 
-def _opened(study: Study, default: str, out: Path | None, force: bool) -> Records:
+def _opened(study: Study, default: str, frame: Frame) -> Records:
     from ..studies.study import Records
 
-    if out is not None or force:
-        return Records(study, out or Path("results") / default, replace=force)
+    if frame.out is not None or frame.force:
+        return Records(study, frame.out or Path("results") / default, replace=frame.force)
     for number in count(1):
         try:
             return Records(study, Path("results") / (default if number == 1 else f"{default}-{number}"))
@@ -179,9 +151,7 @@ class Rest:
         return seconds
 
 
-def _computed(
-    study: Study, records: Records, console: Console, workers: int | None, scheduler: str | None, *, quiet: bool
-) -> dict[str, Record]:
+def _computed(study: Study, records: Records, console: Console, frame: Frame) -> dict[str, Row]:
     """Return all records, and show meanwhile how far it is."""
     from ..studies.study import dask_cluster, record_all
 
@@ -192,12 +162,13 @@ def _computed(
     if there:
         console.print(f"{there} of {total} records are there")
     state, left = TextColumn("{task.fields[failed]} failed"), TimeRemainingColumn()
+    quiet = frame.quiet or frame.as_json
     bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), state, left, quiet=quiet)
     task = bar.add_task("", total=total, completed=there, failed=0)
-    processes = (workers or os.cpu_count() or 1) if study.parallel else 0
+    processes = (frame.workers or os.cpu_count() or 1) if study.parallel else 0
     rest, failed = Rest(monotonic(), processes), 0
 
-    def report(record: Record) -> None:
+    def report(record: Row) -> None:
         nonlocal failed
         failed += study.failed(record)
         bar.update(task, advance=1, failed=failed)
@@ -206,5 +177,5 @@ def _computed(
         if bar.disable and seconds is not None:
             console.print(f"{done} of {total} records; some {seconds:.0f} s more if the others are like them")
 
-    with records, dask_cluster(scheduler) if scheduler else nullcontext() as cluster, bar:
+    with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
         return record_all(study, records, processes, cluster, report)

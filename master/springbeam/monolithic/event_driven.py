@@ -107,7 +107,7 @@ class _Run:
             )
         self._forms: dict[Phase, LinearForm] = {}
         self.counts = {"steps": 0, "phases": 0}
-        time, X = _start(self.system, velocity_perturbation)
+        time, X = initial(self.system, velocity_perturbation)
         self.state = HybridState(self.system, time, X)
         self.rows = Rows(self.state)
         self._happened: list[float] = []  #: times of what has ended a phase [s]
@@ -219,7 +219,7 @@ def _system(scene: Scene) -> HybridSystem:
     return HybridSystem(scene, None if scene.beam is None else modal_beam(scene.beam))
 
 
-def _start(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
+def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     """Return time [s] and state at the start, where an undeformed tip arrives; ``perturbation``: see `simulate`."""
     scene, X, time = s.scene, np.zeros(s.size), 0.0
     inertia = s.inverse_tip_mass not in (0.0, np.inf)

@@ -7,23 +7,18 @@ shows how fast each quantity settles (Richardson 1911, Roache 1994).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from time import perf_counter
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
-from matplotlib.figure import Figure
 from rich.text import Text
+from scipy.optimize import brentq
 
-from ..pictures.drawing import BLACK
-from ..run.outcome import RunStopped
-from ..scene import Scene, SceneError, with_changes
+from ..scene import Scene, SceneError
 from ..scene.tables import STEP_KEY, TOLERANCE_KEYS
-from .accuracy import simulate
-from .study import Findings, Record, Study
-from .sweep.metrics import METRICS, heading
-from .tables import number, table, write_csv
+from .metrics import heading, known
+from .study import Findings, Row, Study
+from .tables import number, table
 
 #: Quantities that are compared unless others are asked for, those that a scene has.
 QUANTITIES = (
@@ -31,80 +26,66 @@ QUANTITIES = (
     *("rebound_velocity", "first_impact", "first_stop_impact", "first_release", "first_separation"),
 )
 #: Factor from one level to the next.
-RATIO = 2
-#: Values that converge more slowly have no limit that one would trust.
-_LEAST_ORDER = 0.5
+_RATIO = 2
+#: Values that converge more slowly have no limit that one would trust; faster ones are as good as there.
+_LEAST_ORDER, _MOST_ORDER = 0.5, 20.0
 #: Changes below this part of the value are rounding.
 _ROUNDING = 1e-12
+_LAST = "finer steps"
 
 
-@dataclass(frozen=True)
-class Mesh:
-    """What a run differs in."""
-
-    n_elements: int
-    n_modes: int  #: kept; 0: all
-    finer_steps: bool = False  #: what the time steps change
-
-    @property
-    def name(self) -> str:
-        return f"{self.n_elements} elements, {self.n_modes or 'all'} modes{', finer steps' * self.finer_steps}"
-
-
-@dataclass(frozen=True)
-class Refinement:
-    """Runs whose mesh is finer by `RATIO` from one to the next."""
-
-    refined: str  #: ``elements`` or ``modes``
-    levels: list[Record]
-
-    def settled(self, quantity: str) -> Settled:
-        """Judge ``quantity`` by its last three values."""
-        values = [level["values"].get(quantity) for level in self.levels]
-        return settled([value for value in values if value is not None]) if None not in values[-3:] else Settled()
-
-
-@dataclass(frozen=True)
-class Settled:
+class Settled(NamedTuple):
     """How a quantity converges; ``None`` where its values do not say."""
 
     change: float | None = None  #: from the last level but one to the last
     order: float | None = None  #: observed, in the size of the mesh
-    limit: float | None = None  #: extrapolated to an infinitely fine mesh
+    limit: float | None = None  #: extrapolated to an infinitely fine mesh; of all modes the last value
     error: float | None = None  #: of the last level, from the limit
 
 
-def settled(values: Sequence[float]) -> Settled:
-    """Return the observed order and the limit of the last three of ``values``, at meshes finer by `RATIO` each.
+def settled(values: Sequence[float | None], sizes: Sequence[int], *, complete: bool = False) -> Settled:
+    """Return the observed order and the limit of the last three of ``values``, at meshes of ascending ``sizes``.
 
-    With the changes e₁ and e₂ the order is log(e₁/e₂)/log(RATIO), and the limit is e₂/(RATIO^order − 1) further on.
-    Values that do not approach anything monotonically have neither.
+    With errors e·n⁻ᵖ at the sizes n the order p follows from the two changes. Values that do not approach anything
+    monotonically have none. If the last mesh is ``complete``, as with all modes, its value is the limit.
     """
-    if len(values) < 2:
+    if len(values) < 2 or None in values[-3:]:
         return Settled()
-    change = values[-1] - values[-2]
-    if abs(change) <= _ROUNDING * abs(values[-1]):
-        return Settled(change, None, values[-1], 0.0)
-    before = values[-2] - values[-3] if len(values) > 2 else 0.0
-    if before * change <= 0.0 or abs(change) * RATIO**_LEAST_ORDER > abs(before):
+    *_, coarser, last = (float(value) for value in values if value is not None)
+    change = last - coarser
+    if complete:
+        return Settled(change, None, last, 0.0)
+    if abs(change) <= _ROUNDING * abs(last):
+        return Settled(change, None, last, 0.0)
+    before = coarser - float(values[-3]) if len(values) > 2 and values[-3] is not None else 0.0
+    a, b = (math.log(n / sizes[-2]) for n in (sizes[-3:][0], sizes[-1]))  # a < 0 < b
+
+    def excess(p: float) -> float:
+        return math.expm1(-a * p) / -math.expm1(-b * p) - before / change
+
+    if before * change <= 0.0 or excess(_LEAST_ORDER) > 0.0:
         return Settled(change)
-    order = math.log(before / change) / math.log(RATIO)
-    rest = change / (RATIO**order - 1.0)
-    return Settled(change, order, values[-1] + rest, abs(rest))
+    order = float(brentq(excess, _LEAST_ORDER, _MOST_ORDER)) if excess(_MOST_ORDER) > 0.0 else _MOST_ORDER
+    rest = change / math.expm1(b * order)
+    return Settled(change, order, last + rest, abs(rest))
 
 
 class Converge(Study):
     """A scene on finer and finer meshes, and with more and more modes of its own mesh."""
 
     kind: ClassVar[str] = "converge"
-    files: ClassVar[tuple[str, ...]] = ("converge.csv", "converge.png")
 
     scene: Scene
     levels: int = 4  #: of each sequence: n, 2n, 4n, … elements; modes by halves down from those that the scene keeps
     metric: tuple[str, ...] = ()  #: those of `QUANTITIES` that the scene has if there are none
 
-    def sequences(self) -> dict[str, list[Mesh]]:
-        """Return the meshes by what is refined.
+    @property
+    def metrics(self) -> Sequence[str]:
+        """Those asked for."""
+        return self.metric or QUANTITIES
+
+    def cases(self) -> dict[str, Row]:
+        """Return the meshes by what is refined, coarse to fine, and the finest with finer steps.
 
         Raises
         ------
@@ -116,102 +97,127 @@ class Converge(Study):
             raise SceneError("[beam]: the scene has no mesh to refine")
         if beam.fidelity == "quasi_static":
             raise SceneError('beam.fidelity = "quasi_static": a beam without inertia has no mesh to refine')
-        if unknown := [name for name in self.metric if name not in METRICS]:
-            raise SceneError(f"{unknown[0]}: no such metric; there are {', '.join(METRICS)}")
-        levels = 3 if self.quick else self.levels
-        more = [RATIO**k for k in range(levels)]
-        found = {"elements": [Mesh(beam.n_elements * k, beam.n_modes) for k in more]}
+        known(self.metrics)
+        more = [_RATIO**k for k in range(3 if self.quick else self.levels)]
+        found = [("elements", {"beam.n_elements": beam.n_elements * k, "beam.n_modes": beam.n_modes}) for k in more]
+        finest = found[-1][1]
         if beam.integrator == "modal" and beam.modes_kept >= more[-1]:
-            fewer = [Mesh(beam.n_elements, beam.modes_kept // k) for k in more[:0:-1]]
-            found["modes"] = [*fewer, found["elements"][0]]
+            fewer = [beam.modes_kept // k for k in more[:0:-1]]
+            found += [
+                ("modes", {"beam.n_elements": beam.n_elements, "beam.n_modes": k}) for k in [*fewer, beam.n_modes]
+            ]
+        found.append((_LAST, finest | _finer_steps(self.scene)))
+        return {
+            f"{refined}: {', '.join(f'{key} = {value}' for key, value in keys.items())}": {"refined": refined, **keys}
+            for refined, keys in found
+        }
+
+    def at(self, case: Row) -> Scene:
+        """Return the scene of a case."""
+        scene = super().at({name: value for name, value in case.items() if name != "accuracy"})
+        return scene.model_copy(update={"accuracy": case["accuracy"]}) if "accuracy" in case else scene
+
+    def record(self, case: Row) -> Row:
+        """Run one mesh. ``unknowns`` are the modes that take part; a value is ``None`` where it did not happen."""
+        beam = self.at(case).beam
+        assert beam is not None
+        return {"unknowns": beam.modes_kept, **self.observed(case)[0]}
+
+    def sequences(self, records: Mapping[str, Row]) -> dict[str, list[Row]]:
+        """Return the rows of each sequence as they were run."""
+        found: dict[str, list[Row]] = {}
+        for row in super().rows(records):
+            found.setdefault(row["refined"], []).append(row)
         return found
 
-    def cases(self) -> dict[str, Mesh]:
-        """Return all meshes, the finest one with finer steps too."""
-        sequences = self.sequences()
-        finest = next(iter(sequences.values()))[-1]
-        meshes = [mesh for sequence in sequences.values() for mesh in sequence]
-        return {mesh.name: mesh for mesh in [*meshes, replace(finest, finer_steps=True)]}
+    def settled(self, rows: Sequence[Row], name: str) -> Settled:
+        """Judge a quantity of a sequence. All modes of a mesh are its solution: no mode lies beyond the last."""
+        beam = self.scene.beam
+        assert beam is not None
+        refined = rows[-1]["refined"]
+        sizes = [row["beam.n_elements"] if refined == "elements" else row["unknowns"] for row in rows]
+        complete = refined == "modes" and beam.modes_kept == beam.unknowns
+        return settled([row[name] for row in rows], sizes, complete=complete)
 
-    def record(self, case: Mesh) -> Record:
-        """Run one mesh. ``unknowns`` are the modes that take part; a value is ``None`` where it did not happen."""
-        mesh = {"n_elements": case.n_elements, "n_modes": case.n_modes}
-        scene = with_changes(self.scene, beam=mesh)
-        if case.finer_steps:
-            scene = _with_finer_steps(scene)
-        assert scene.beam is not None
-        quantities, cause, began = self.metric or QUANTITIES, "", perf_counter()
-        try:
-            made = simulate(scene)
-            values = {name: METRICS[name](made) for name in quantities}
-        except (RunStopped, SceneError) as stopped:  # a SceneError if the accuracy cannot be reached
-            values, cause = dict.fromkeys(quantities), str(stopped)
-        mesh["unknowns"] = scene.beam.modes_kept
-        return {**mesh, "values": values, "seconds": perf_counter() - began, "cause": cause}
-
-    def refinements(self, records: Mapping[str, Record]) -> list[Refinement]:
-        """Return the sequences as they were run."""
-        return [
-            Refinement(refined, [records[mesh.name] for mesh in meshes]) for refined, meshes in self.sequences().items()
-        ]
-
-    def quantities(self, records: Mapping[str, Record]) -> list[str]:
+    def quantities(self, records: Mapping[str, Row]) -> list[str]:
         """Return what is compared: what was asked for, or what the scene has."""
-        given = next(iter(records.values()))["values"]
-        return [name for name, value in given.items() if self.metric or value is not None]
+        first = next(iter(records.values()))
+        return [name for name in self.metrics if self.metric or first[name] is not None]
 
-    def findings(self, records: Mapping[str, Record]) -> Findings:
+    def rows(self, records: Mapping[str, Row]) -> list[Row]:
+        """Return a row per run; errors are from the limits of its sequence."""
+        found = []
+        for rows in self.sequences(records).values():
+            limits = {name: self.settled(rows, name).limit for name in self.quantities(records)}
+            found += [row | {f"error_{name}": None if limit is None or row[name] is None else row[name] - limit
+                             for name, limit in limits.items()} for row in rows]  # fmt: skip
+        return found
+
+    def findings(self, records: Mapping[str, Row]) -> Findings:
         """Judge how the quantities settle."""
-        quantities, by_steps = self.quantities(records), list(records.values())[-1]
+        quantities, sequences = self.quantities(records), self.sequences(records)
+        (by_steps,) = sequences.pop(_LAST)
+        elements = next(iter(sequences.values()))
         document: dict[str, Any] = {"finer_steps": by_steps}
         shown: list[Any] = [Text(self.scene.title or "(untitled scene)", style="bold")]
-        refinements = self.refinements(records)
-        for refinement in refinements:
-            settled = {name: asdict(refinement.settled(name)) for name in quantities}
-            document[refinement.refined] = {"levels": refinement.levels, "settled": settled}
-            rows = [_row(name, refinement, refinements[0].levels, by_steps) for name in quantities]
+        for refined, rows in sequences.items():
+            found = {name: self.settled(rows, name) for name in quantities}
+            document[refined] = {"levels": rows, "settled": {name: s._asdict() for name, s in found.items()}}
+            cells = [_cells(name, s, elements, by_steps) for name, s in found.items()]
             names = ("", "as given", "extrapolated", "error", "order", "by steps")
-            shown.append(table(names, rows, f"more {refinement.refined}"))
-            meshes = ("{n_elements} el. {unknowns} modes {seconds:.2g} s".format(**x) for x in refinement.levels)
+            shown.append(table(names, cells, f"more {refined}"))
+            meshes = (
+                f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in rows
+            )
             shown.append(Text(f"runs      {', '.join(meshes)}"))
-        shown += [Text(f"stopped   {name}: {r['cause']}") for name, r in records.items() if r["cause"]]
+        shown += [Text(f"stopped   {name}: {r['error']}") for name, r in records.items() if r["error"]]
         shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
         shown.append(
             "by steps: what half the macro step, or a tenth of accuracy or tolerances, changes on the finest mesh"
         )
         return Findings(document, shown)
 
-    def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
-        """Write a row per run, and draw how far each quantity is from its limit."""
-        quantities, refinements = self.quantities(records), self.refinements(records)
-        levels = [(sequence.refined, level) for sequence in refinements for level in sequence.levels]
-        levels.append(("steps", list(records.values())[-1]))
-        rows = [
-            {"refined": refined, **{name: level[name] for name in ("n_elements", "n_modes", "unknowns")}}
-            | {"wall_time": level["seconds"], **{name: level["values"][name] for name in quantities}}
-            | {"stopped": level["cause"]}
-            for refined, level in levels
-        ]
-        files = [write_csv(directory / "converge.csv", rows)]
-        if pictures:
-            files.append(draw(self.scene.title, refinements, quantities, directory / "converge.png"))
-        return files
+    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+        """Draw how far each quantity is from its limit over the size of the mesh, a panel a sequence."""
+        from .picture import lines, panels
+
+        rows = [row for row in self.rows(records) if row["refined"] != _LAST]
+        refinements = list(dict.fromkeys(row["refined"] for row in rows))
+        figure, axes = panels(len(refinements), 2, (6.0, 5.0), f"{self.scene.title}: convergence with the mesh")
+        for ax, refined in zip(axes, refinements, strict=True):
+            points = [
+                {
+                    "unknowns": row["unknowns"],
+                    "quantity": heading(name),
+                    "error": abs(error / (row[name] - error or 1.0)),
+                }
+                for row in rows
+                for name in self.quantities(records)
+                if row["refined"] == refined and (error := row[f"error_{name}"]) is not None
+            ]
+            lines(ax, [point for point in points if point["error"] > _ROUNDING], "unknowns", "error", "quantity")
+            ax.set(title=f"more {refined}", xlabel="unknowns of the beam", ylabel="distance from the limit, relative")
+            if ax.lines:
+                ax.legend(fontsize="small")
+            else:
+                ax.text(0.5, 0.5, "no quantity converges monotonically", transform=ax.transAxes, ha="center")
+        figure.savefig(directory / "converge.png", dpi=110)
+        return [directory / "converge.png"]
 
 
-def _with_finer_steps(scene: Scene) -> Scene:
-    """Return ``scene`` with half the macro step, or with a tenth of what its steps follow from."""
+def _finer_steps(scene: Scene) -> Row:
+    """Return half the macro step, or a tenth of what the steps follow from."""
     if scene.accuracy is not None:
-        return with_changes(scene, accuracy=0.1 * scene.accuracy)
+        return {"accuracy": 0.1 * scene.accuracy}
     if not scene.coupling.adaptive:
-        return with_changes(scene, coupling={STEP_KEY: 0.5 * scene.coupling.H})
+        return {f"coupling.{STEP_KEY}": 0.5 * scene.coupling.H}
     given = {name: getattr(scene.coupling, name) for name in TOLERANCE_KEYS}
-    return with_changes(scene, coupling={name: 0.1 * value for name, value in given.items() if value is not None})
+    return {f"coupling.{name}": 0.1 * value for name, value in given.items() if value is not None}
 
 
-def _row(name: str, refinement: Refinement, elements: Sequence[Record], by_steps: Record) -> tuple[str, ...]:
+def _cells(name: str, settled: Settled, elements: Sequence[Row], by_steps: Row) -> tuple[str, ...]:
     """Return a quantity for a terminal: of the mesh as given, and where finer ones or more modes lead."""
-    given, last, finer = (level["values"][name] for level in (elements[0], elements[-1], by_steps))
-    settled = refinement.settled(name)
+    given, last, finer = (row[name] for row in (elements[0], elements[-1], by_steps))
     error = "" if settled.change is None else f"({settled.change:.1e})"
     if given is not None and settled.limit is not None:
         error = f"{given - settled.limit:.1e}"
@@ -223,43 +229,3 @@ def _row(name: str, refinement: Refinement, elements: Sequence[Record], by_steps
         number(settled.order, ".1f"),
         "" if last is None or finer is None else f"{finer - last:.1e}",
     )
-
-
-def draw(title: str, sequences: Sequence[Refinement], quantities: Sequence[str], path: Path) -> Path:
-    """Draw to ``path`` how far each quantity is from its limit over the size of the mesh, a panel a sequence."""
-    figure = Figure(figsize=(6.0 * len(sequences), 5.0), layout="constrained")
-    for ax, sequence in zip(figure.subplots(1, len(sequences), squeeze=False).flat, sequences, strict=True):
-        for name, sizes, errors in _errors(sequence, quantities):
-            ax.loglog(sizes, errors, ".-", label=name)
-        ax.set(xlabel=f"{sequence.refined} of the beam", title=f"more {sequence.refined}")
-        sizes = [_size(sequence, level) for level in sequence.levels]
-        ax.set_xticks(sizes, list(map(str, sizes)))
-        ax.minorticks_off()
-        ax.set_ylabel("distance from the extrapolated value, relative")
-        ax.grid(alpha=0.3)
-        if ax.lines:
-            ax.legend(fontsize="small")
-        else:
-            ax.text(0.5, 0.5, "no quantity converges monotonically", transform=ax.transAxes, ha="center", color=BLACK)
-    figure.suptitle(f"{title}: convergence with the mesh")
-    figure.savefig(path, dpi=110)
-    return path
-
-
-def _errors(sequence: Refinement, quantities: Sequence[str]) -> Iterator[tuple[str, list[int], list[float]]]:
-    for name in quantities:
-        limit = sequence.settled(name).limit
-        if not limit:
-            continue
-        points = [
-            (_size(sequence, level), abs(value / limit - 1.0))
-            for level in sequence.levels
-            if (value := level["values"][name]) is not None and abs(value / limit - 1.0) > _ROUNDING
-        ]
-        if points:
-            sizes, errors = zip(*points, strict=True)
-            yield heading(name), list(sizes), list(errors)
-
-
-def _size(sequence: Refinement, level: Record) -> int:
-    return int(level["n_elements" if sequence.refined == "elements" else "unknowns"])

@@ -8,8 +8,9 @@ from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, with_changes
 from ..scene.tables import ALL_MODES_UP_TO
 from .accuracy import differences, pick
-from .converge import RATIO
 
+#: Factor from one mesh to the next.
+_RATIO = 2
 #: Shares of the accuracy that the mesh may use, and the coupling and the time integration.
 _SHARE = 0.5
 #: Contacts shorter than this share of the run are not compared.
@@ -46,15 +47,15 @@ def pick_mesh(scene: Scene) -> Trajectory:
         if coarse is not None:
             apart = differences(coarse, fine, _SHORT)
             difference = max(apart["motion"], apart["times"])
-            order = math.log(before / difference, RATIO) if 0.0 < difference < before < math.inf else _LOWEST
-            error = difference / (RATIO ** min(max(order, _LOWEST), _HIGHEST) - 1.0)
+            order = math.log(before / difference, _RATIO) if 0.0 < difference < before < math.inf else _LOWEST
+            error = difference / (_RATIO ** min(max(order, _LOWEST), _HIGHEST) - 1.0)
             if error <= _SHARE * asked:
                 found = fine.summary["accuracy"]
                 found |= {"asked": asked, "picked": {**found["picked"], **mesh}, "estimated_mesh_error": error}
                 return fine
             before = difference
-        coarse, factor = fine, RATIO * factor
-    reached = f"{factor // RATIO * beam.n_elements} elements still leave some {error:.1e}"
+        coarse, factor = fine, _RATIO * factor
+    reached = f"{factor // _RATIO * beam.n_elements} elements still leave some {error:.1e}"
     raise SceneError(
         f"accuracy = {asked:g} with the mesh: not reached, {reached}; ask for less, shorten [time] t_end, or take "
         "elements of a higher degree where the motion is smooth (springbeam converge shows what settles)"

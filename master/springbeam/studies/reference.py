@@ -31,12 +31,13 @@ def refuse_without_reference(scene: Scene) -> None:
 def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:
     """Return the reference at ``times`` [s], and once more from initial velocities changed by `PERTURBATION`."""
     perturbed = event_driven.simulate(
-        scene, sample_times=times, velocity_perturbation=PERTURBATION * _initial_speed(scene)
+        scene, sample_times=times, velocity_perturbation=PERTURBATION * initial_speed(scene)
     )
     return event_driven.simulate(scene, sample_times=times), perturbed
 
 
-def _initial_speed(scene: Scene) -> float:
+def initial_speed(scene: Scene) -> float:
+    """Return a speed of the start [m/s], of the slope of a beam [1/s], that a perturbation is relative to."""
     if scene.beam is not None:
         return abs(scene.beam.initial_velocity_slope) or abs(scene.beam.initial_deflection_slope) or 1.0
     assert scene.spring is not None

@@ -1,13 +1,14 @@
-"""A study: a table of named cases, each giving one record.
+"""One engine for experiments: a study is a table of cases, each a run of a scene with other values of some keys.
 
+* The columns of a case are its **axes**: keys of a scene, as ``spring.mass``, with their values, or labels. Its record
+  adds columns: how the run ended, **metrics** of it, ``error_…`` beside a **reference**, ``cost_…``.
 * A `Study` holds what was asked for as plain values. They alone decide its cases, so `springbeam resume` needs no more
   than the results to go on.
-* A case is computed by itself, in any order, in this process or by workers. Its record is plain JSON data.
-* Each record is in ``study.jsonl`` of the results as soon as its case is done. The first line there says which study
-  it is, with which version and which FMUs. Nothing is written before the FMUs are found, and nothing stays where no
-  case was done.
+* A case is computed by itself, in any order, in this process or by workers. Each record is in ``study.jsonl`` of the
+  results as soon as its case is done. The first line there says which study it is, with which version and which FMUs.
+  Nothing is written before the FMUs are found, and nothing stays where no case was done.
 * A case whose record is there is not computed again. A study with all records is shown at once.
-* Tables, pictures and files are made from the records alone (`Study.findings`, `Study.write`).
+* Table (``KIND.parquet``, ``KIND.csv``), pictures and what is shown are made from the records alone.
 
 `record_all` computes, `Records` is the file, `cli/study.py` the frame that all commands share.
 """
@@ -17,24 +18,30 @@ from __future__ import annotations
 import errno
 import multiprocessing
 import os
-import signal
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module, metadata
-from itertools import chain, islice
+from itertools import islice
 from pathlib import Path
+from time import perf_counter
 from typing import Any, ClassVar
 
+from pebble import ProcessExpired, ProcessPool
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import from_json, to_json
 
 from ..bodies.factory import fingerprints
 from ..results.directory import ResultsExist, ResultsUnreadable, RunDirectory, lock
-from ..scene import Scene, load_scene
+from ..results.trajectory import Trajectory
+from ..run.outcome import RunStopped
+from ..scene import Scene, SceneError, load_scene, with_changes
+from ..scene.scene import split_key
+from .accuracy import simulate
+from .metrics import METRICS, costs
+from .tables import write_csv, write_parquet
 
 FILE = "study.jsonl"
 #: Where `study_in` finds each kind.
@@ -43,15 +50,15 @@ _STUDIES = {
     "tradeoff": ".tradeoff:Tradeoff",
     "converge": ".converge:Converge",
     "stability": ".stability.grid:Grid",
-    "crosscheck": ".crosscheck.comparison:Crosscheck",
-    "orders": ".crosscheck.orders:Orders",
-    "critical": ".stability.critical:Critical",
+    "crosscheck": ".crosscheck:Crosscheck",
+    "orders": ".orders:Orders",
 }
-Record = dict[str, Any]
+#: Columns of a case and of its record, by name.
+Row = dict[str, Any]
 #: ``report(record)``, called for each record that is new.
-Report = Callable[[Record], None]
-#: Cases under way on a cluster.
-_AHEAD_ON_CLUSTER = 256
+Report = Callable[[Row], None]
+#: Cases under way: on a cluster, and for each process here.
+_AHEAD_ON_CLUSTER, _AHEAD = 256, 2
 #: The matrices are small: more threads of a worker only wait for each other.
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -62,7 +69,7 @@ class Findings:
 
     document: dict[str, Any]  #: for programs (``--json``)
     shown: list[Any]  #: tables and lines for a terminal
-    passed: bool = True
+    code: int = 0  #: exit code of the command
 
 
 class Study(BaseModel, ABC):
@@ -70,8 +77,7 @@ class Study(BaseModel, ABC):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    kind: ClassVar[str]  #: names the command, and the files of the results
-    files: ClassVar[tuple[str, ...]]  #: patterns of all that `write` may write
+    kind: ClassVar[str]  #: names the command, and the files of the results begin with it
     #: Whether workers compute the cases; else they follow one another here, where they are timed or too few.
     parallel: ClassVar[bool] = False
 
@@ -79,32 +85,77 @@ class Study(BaseModel, ABC):
     quick: bool = False  #: a smaller table of cases
     remarks: tuple[str, ...] = ()  #: said before what is found
 
-    @abstractmethod
-    def cases(self) -> Mapping[str, Any]:
-        """Return what `record` takes, by name. Raises SceneError if there is nothing to compute."""
+    @property
+    def metrics(self) -> Sequence[str]:
+        """The numbers that are kept of each run, of `METRICS`."""
+        return ()
 
     @abstractmethod
-    def record(self, case: Any) -> Record:
-        """Compute one case; dataclasses and arrays in a record become JSON data, too.
+    def cases(self) -> Mapping[str, Row]:
+        """Return the axes of each case, by its name. Raises SceneError if there is nothing to compute."""
 
-        Raises FmuError if an FMU cannot be loaded.
+    def record(self, case: Row) -> Row:
+        """Compute one case; arrays in a record become lists. Raises FmuError if an FMU cannot be loaded."""
+        return self.observed(case)[0]
+
+    def observed(self, case: Row) -> tuple[Row, Trajectory | None]:
+        """Run one case; return its record, and the run if it is done.
+
+        ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` says why. Wall times, loading
+        included [s], are kept where cases follow one another.
         """
+        row: Row = {"status": "done", "error": "", "warnings": "", **dict.fromkeys(self.metrics)}
+        run, began = None, perf_counter()
+        try:
+            run = simulate(self.at(case))
+        except SceneError as refused:
+            row |= {"status": "refused", "error": str(refused)}
+        except RunStopped as stopped:
+            row |= {"status": "stopped", "error": str(stopped)}
+        else:
+            row["warnings"] = "\n".join(run.summary["warnings"])
+            row |= {name: METRICS[name](run) for name in self.metrics} | costs(run)
+        return row if self.parallel else {**row, "cost_wall_time": perf_counter() - began}, run
 
-    @abstractmethod
-    def findings(self, records: Mapping[str, Record]) -> Findings:
-        """Judge the records, which come in the order of the cases."""
+    def at(self, case: Row) -> Scene:
+        """Return the scene of a case. Raises SceneError if it cannot be run."""
+        tables: dict[str, dict[str, Any]] = {}
+        for name, value in case.items():
+            if (key := split_key(name)) is not None:  # others are labels
+                tables.setdefault(key[0], {})[key[1]] = value
+        assert self.scene is not None
+        return with_changes(self.scene, **tables)
 
-    @abstractmethod
-    def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
-        """Write tables and pictures into ``directory``; return the files, the main table first."""
+    def skipped(self, case: Row, records: Mapping[str, Row]) -> Row | None:
+        """Return the record of a case that those before it make needless. Asked where cases follow one another."""
+        return None
 
-    def lost(self, cause: str) -> Record:
+    def lost(self, cause: str) -> Row:
         """Return the record of a case whose worker process has died. Raises ChildProcessError if there is none."""
         raise ChildProcessError(errno.ECHILD, cause)
 
-    def failed(self, record: Record) -> bool:
+    def failed(self, record: Row) -> bool:
         """Tell whether the progress bar counts a record as failed."""
-        return bool(record.get("cause"))
+        return bool(record.get("error"))
+
+    def rows(self, records: Mapping[str, Row]) -> list[Row]:
+        """Return the table: a row per case, in their order."""
+        cases = self.cases()
+        return [{"index": k, **cases[name], **record} for k, (name, record) in enumerate(records.items())]
+
+    @abstractmethod
+    def findings(self, records: Mapping[str, Row]) -> Findings:
+        """Judge the records, which come in the order of the cases."""
+
+    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+        """Draw pictures into ``directory``; return their files."""
+        return []
+
+    def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
+        """Write the table, and with ``pictures`` these, into ``directory``; return the files."""
+        rows, path = self.rows(records), directory / self.kind
+        files = [write_csv(path.with_suffix(".csv"), rows), write_parquet(path.with_suffix(".parquet"), rows)]
+        return files + (self.draw(records, directory) if pictures else [])
 
     def cost(self) -> str:
         """Say how much there is to compute."""
@@ -137,12 +188,12 @@ class Records:
 
     def __init__(self, study: Study, directory: Path, *, replace: bool = False) -> None:
         self._settings, self.path = study.settings(), directory / FILE
-        self.by_name: dict[str, Record] = {}
+        self.by_name: dict[str, Row] = {}
         self._whole = 0  #: bytes of complete lines
-        self._replaced = study.files  #: patterns of what the first record removes
+        self._replaced = {study.kind}  #: kinds whose files the first record removes
         if replace:
             with suppress(ResultsUnreadable, KeyError):
-                self._replaced += _class_of(_read(self.path)[0]["study"]).files
+                self._replaced.add(_read(self.path)[0]["study"])
             return
         settings, self.by_name, self._whole = _read(self.path)
         if self._whole and settings != self._settings:
@@ -163,14 +214,16 @@ class Records:
             self.path.unlink()
             RunDirectory(self.path.parent).discard()
 
-    def add(self, name: str, record: Record) -> None:
+    def add(self, name: str, record: Row) -> None:
         """Append a record; the first one removes what it replaces. Raises OSError if the disk is full."""
         if not self._begun:
             self._begun = True
             self._file.truncate(self._whole)  # without a line that was cut short
             if not self._whole:
-                for stale in chain.from_iterable(map(self.path.parent.glob, self._replaced)):
-                    stale.unlink()
+                for kind in self._replaced:
+                    for pattern in (f"{kind}.*", f"{kind}-*"):
+                        for stale in self.path.parent.glob(pattern):
+                            stale.unlink()
                 self._write(self._settings)
         self._write({"case": name, "record": record})
         self.by_name[name] = record
@@ -181,7 +234,7 @@ class Records:
             left = left[self._file.write(left) :]
 
 
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, Record], int]:
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Row], int]:
     """Return the study, its records and the bytes of the complete lines; nothing where there is no file."""
     lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
     if lines and not lines[-1].endswith(b"\n"):
@@ -191,13 +244,6 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Record], int]:
         return settings, {entry["case"]: entry["record"] for entry in entries}, sum(map(len, lines))
     except (ValueError, KeyError, TypeError) as error:
         raise ResultsUnreadable(f"{path}: not a file of records: {error}") from error
-
-
-def _class_of(kind: str) -> type[Study]:
-    """Return the class of studies of ``kind``. Raises KeyError if it is not known."""
-    module, name = _STUDIES[kind].split(":")
-    found: type[Study] = getattr(import_module(module, __package__), name)
-    return found
 
 
 def study_in(directory: Path) -> Study | None:
@@ -212,7 +258,8 @@ def study_in(directory: Path) -> Study | None:
     if not first:
         return None
     try:
-        study = _class_of(first["study"]).model_validate(first["settings"])
+        module, name = _STUDIES[first["study"]].split(":")
+        study: Study = getattr(import_module(module, __package__), name).model_validate(first["settings"])
     except (KeyError, ValidationError) as error:
         raise ResultsUnreadable(f"{directory / FILE}: holds no study that is known: {error}") from error
     if first != study.settings():
@@ -231,7 +278,7 @@ def record_all(
     workers: int = 0,
     cluster: Executor | None = None,
     report: Report = lambda record: None,
-) -> dict[str, Record]:
+) -> dict[str, Row]:
     """Compute the cases that ``records`` lacks, and return all records in the order of the cases.
 
     Parameters
@@ -251,8 +298,8 @@ def record_all(
     cases = study.cases()
     known = {} if records is None else records.by_name
     todo = {name: case for name, case in cases.items() if name not in known}
-    lost: dict[str, Record] = {}
-    with closing(_computed(study, todo, workers, cluster)) as computed:
+    lost: dict[str, Row] = {}
+    with closing(_computed(study, todo, known, workers, cluster)) as computed:
         for name, made in computed:
             if made is None:  # not kept: the next time it is tried again
                 lost[name] = record = study.lost("its worker process died: an FMU has crashed, or memory ran out")
@@ -264,79 +311,58 @@ def record_all(
 
 
 def _computed(
-    study: Study, todo: dict[str, Any], workers: int, cluster: Executor | None
-) -> Generator[tuple[str, Record | None]]:
+    study: Study, todo: dict[str, Row], known: Mapping[str, Row], workers: int, cluster: Executor | None
+) -> Generator[tuple[str, Row | None]]:
     """Yield records as they come, ``None`` where a worker has died."""
     if cluster is not None:
-        from distributed import KilledWorker
+        from distributed import KilledWorker  # after several deaths, as the cluster is configured
 
-        for name, future in _as_done(cluster, study, todo, _AHEAD_ON_CLUSTER):
-            yield name, None if isinstance(future.exception(), KilledWorker) else future.result()
+        yield from _as_done(cluster.submit, study, todo, _AHEAD_ON_CLUSTER, KilledWorker)
     elif workers and todo:
-        yield from _by_processes(study, todo, workers)
+        with _processes(min(workers, len(todo))) as submit:
+            yield from _as_done(submit, study, todo, _AHEAD * workers, ProcessExpired)
     else:
-        yield from ((name, study.record(case)) for name, case in todo.items())
-
-
-def _by_processes(study: Study, todo: dict[str, Any], workers: int) -> Iterator[tuple[str, Record | None]]:
-    """Yield records as they come. Where a process dies, the cases that were under way are tried again, one by one."""
-    suspects: dict[str, Any] = {}
-    while todo or suspects:
-        batch, count, ahead = (suspects, 1, 1) if suspects else (todo, min(workers, len(todo)), 2 * workers)
-        died: list[str] = []
-        with _pool(count) as pool:
-            for name, future in _as_done(pool, study, dict(batch), ahead):
-                if isinstance(future.exception(), BrokenProcessPool):
-                    died.append(name)
-                else:
-                    del batch[name]
-                    yield name, future.result()
-        if suspects:  # which died alone
-            for name in died:
-                del suspects[name]
-                yield name, None
-        else:
-            suspects = {name: todo.pop(name) for name in died}
+        for name, case in todo.items():
+            skipped = study.skipped(case, known)
+            yield name, study.record(case) if skipped is None else skipped
 
 
 def _as_done(
-    executor: Executor, study: Study, cases: Mapping[str, Any], ahead: int
-) -> Iterator[tuple[str, Future[Record]]]:
-    """Yield cases as they are done; at most ``ahead`` are under way."""
-    waiting = iter(cases.items())
-    running: dict[Future[Record], str] = {}
+    submit: Callable[..., Future[Row]], study: Study, todo: Mapping[str, Row], ahead: int, died: type[Exception]
+) -> Iterator[tuple[str, Row | None]]:
+    """Yield records as they come, from cases of which at most ``ahead`` are under way; one that died is tried again."""
+    waiting, again = iter(todo.items()), set()
+    running: dict[Future[Row], str] = {}
     while True:
-        try:
-            for name, case in islice(waiting, ahead - len(running)):
-                running[executor.submit(study.record, case)] = name
-        except BrokenProcessPool:  # which the cases that are under way tell too
-            waiting = iter(())
+        for name, case in islice(waiting, ahead - len(running)):
+            running[submit(study.record, case)] = name
         if not running:
             return
         for future in wait(running, return_when=FIRST_COMPLETED).done:
-            yield running.pop(future), future
+            name = running.pop(future)
+            if not isinstance(future.exception(), died):
+                yield name, future.result()
+            elif name in again:
+                yield name, None
+            else:
+                again.add(name)
+                running[submit(study.record, todo[name])] = name
 
 
 @contextmanager
-def _pool(workers: int) -> Iterator[Executor]:
-    """Open a pool of processes, which are ended at once where its user gives up."""
-    others, environment = set(multiprocessing.active_children()), dict(os.environ)
+def _processes(workers: int) -> Iterator[Callable[..., Future[Row]]]:
+    """Open a pool of processes, of which one that dies is replaced; they are ended at once if its user gives up."""
+    environment = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(_ONE_THREAD)
+    pool = ProcessPool(workers, context=multiprocessing.get_context("spawn"))
     try:
-        with ProcessPoolExecutor(
-            workers, multiprocessing.get_context("spawn"), signal.signal, (signal.SIGINT, signal.SIG_IGN)
-        ) as pool:
-            try:
-                yield pool
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                for child in set(multiprocessing.active_children()) - others:
-                    child.terminate()
-                raise
+        yield lambda function, case: pool.schedule(function, (case,))
+        pool.close()
     finally:
-        for name in _ONE_THREAD:
-            os.environ.pop(name)
-        os.environ.update(environment)
+        pool.stop()
+        pool.join()
+        for name, value in environment.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Tables of what was found: for a terminal, all of one look, and as CSV files."""
+"""Tables of what was found: for a terminal, all of one look, and as CSV and Parquet files."""
 
 from __future__ import annotations
 
@@ -28,9 +28,24 @@ def number(value: float | None, form: str, lacking: str = "") -> str:
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
-    """Write rows with the keys of the first as header, ``None`` and NaN left empty; return the path."""
+    """Write rows, ``None`` left empty, and return the path."""
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]) if rows else [])
+        writer = csv.DictWriter(file, _names(rows))
         writer.writeheader()
-        writer.writerows({name: None if value != value else value for name, value in row.items()} for row in rows)
+        writer.writerows(rows)
     return path
+
+
+def write_parquet(path: Path, rows: Sequence[Mapping[str, Any]]) -> Path:
+    """Write rows, ``None`` as null, and return the path; a column without any value is one of numbers."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns = {name: pa.array([row.get(name) for row in rows]) for name in _names(rows)}
+    lacking = {name: column.cast(pa.float64()) for name, column in columns.items() if pa.types.is_null(column.type)}
+    pq.write_table(pa.table(columns | lacking), path)
+    return path
+
+
+def _names(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(name for row in rows for name in row))

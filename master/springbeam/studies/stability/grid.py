@@ -6,6 +6,7 @@ The same settings give the same cells and outcomes, in whatever order and in how
 from __future__ import annotations
 
 import re
+import statistics
 import textwrap
 from collections import Counter
 from collections.abc import Mapping
@@ -18,8 +19,8 @@ from rich.table import Table
 from rich.text import Text
 
 from ...scene import SceneError
-from ..study import Findings, Record, Study
-from ..tables import table, write_csv
+from ..study import Findings, Row, Study
+from ..tables import table
 from .cells import COUPLINGS, sampled_cells, scene_dict, slice_cells
 from .outcome import CLASSES, Outcome, run_cell
 
@@ -33,7 +34,6 @@ class Grid(Study):
     """A Latin hypercube over all parameters, and slices through two of them."""
 
     kind: ClassVar[str] = "stability"
-    files: ClassVar[tuple[str, ...]] = ("stability.csv", "classes.png", "residuals.png", "garbage-*.toml")
     parallel: ClassVar[bool] = True
 
     samples: int = 300
@@ -54,42 +54,56 @@ class Grid(Study):
         """Say how many cells there are."""
         return f"{len(self.cases())} cells, mostly below a second each; --samples and --resolution set how many"
 
-    def record(self, case: Mapping[str, Any]) -> Record:
+    def record(self, case: Mapping[str, Any]) -> Row:
         """Run a cell."""
         return asdict(run_cell(dict(case)))
 
-    def lost(self, cause: str) -> Record:
+    def lost(self, cause: str) -> Row:
         """Return the outcome of a cell that crashes."""
         return asdict(Outcome("garbage", f"crashed: {cause}"))
 
-    def failed(self, record: Record) -> bool:
+    def failed(self, record: Row) -> bool:
         """Tell whether a cell is garbage."""
         return bool(record["kind"] == "garbage")
 
-    def findings(self, records: Mapping[str, Record]) -> Findings:
+    def findings(self, records: Mapping[str, Row]) -> Findings:
         """Count classes and reasons; passed if no cell is garbage."""
         bad = {name: record["reason"] for name, record in records.items() if self.failed(record)}
         classes = Counter(record["kind"] for record in records.values())
-        garbage = [Text(f"garbage   garbage-{name}.toml: {reason}") for name, reason in bad.items()]
-        shown = [self._classes(records), _reasons(records), *garbage]
-        return Findings({"cells": len(records), "classes": classes, "garbage": bad}, shown, not bad)
+        garbage = [Text(f"garbage   {_file(name)}: {reason}") for name, reason in bad.items()]
+        errors = [record["error_motion"] for record in records.values() if record["error_motion"] is not None]
+        resolved = sum(record["resolved"] for record in records.values())
+        beside = f"{resolved} cells call themselves resolved, {len(errors)} were compared with the reference"
+        if errors:
+            beside += f": errors {statistics.median(errors):.0e} in the median, at most {max(errors):.0e}"
+        shown = [self._classes(records), _reasons(records), Text(beside), *garbage]
+        told = {"cells": len(records), "classes": classes, "resolved": resolved, "compared": len(errors)}
+        return Findings({**told, "garbage": bad}, shown, 1 if bad else 0)
 
-    def write(self, records: Mapping[str, Record], directory: Path, *, pictures: bool) -> list[Path]:
-        """Write a row per cell, the scenes of garbage, and the pictures."""
-        from .picture import draw
+    def rows(self, records: Mapping[str, Row]) -> list[Row]:
+        """Return a row per cell."""
+        found = []
+        for row in super().rows(records):
+            law, scheme, degree = row.pop("coupling")
+            coupling = {"law": law, "scheme": scheme, "degree": degree}
+            found.append(row | coupling | {"reason": " ".join(row["reason"].split())})
+        return found
 
+    def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
+        """Write the table, the pictures, and the scenes of garbage."""
         cells = self.cases()
-        rows = [_row(name, cells[name], record) for name, record in records.items()]
-        files = [write_csv(directory / "stability.csv", rows)]
         for name, record in records.items():
             if self.failed(record):
-                text = tomli_w.dumps(scene_dict(cells[name]))
-                (directory / f"garbage-{name}.toml").write_text(text, encoding="utf-8")
-        if pictures:
-            files += draw([(cells[name], Outcome(**record)) for name, record in records.items()], directory)
-        return files
+                (directory / _file(name)).write_text(tomli_w.dumps(scene_dict(cells[name])), encoding="utf-8")
+        return super().write(records, directory, pictures=pictures)
 
-    def _classes(self, records: Mapping[str, Record]) -> Table:
+    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+        """Draw the class of each cell, and its energy residual: slices as maps, the hypercube by coupling."""
+        from .picture import draw
+
+        return draw(self.rows(records), directory)
+
+    def _classes(self, records: Mapping[str, Row]) -> Table:
         """Return a row per coupling, with the largest residual of the runs that were done."""
         cells, rows = self.cases(), []
         for coupling in (*COUPLINGS, None):
@@ -105,7 +119,7 @@ class Grid(Study):
         return table(names, rows, f"{len(records)} cells")
 
 
-def _reasons(records: Mapping[str, Record]) -> Table:
+def _reasons(records: Mapping[str, Row]) -> Table:
     """Return why cells were refused or stopped, without numbers, the most frequent reasons first."""
     counts = Counter(
         (record["kind"], _without_numbers(record["reason"]))
@@ -125,13 +139,5 @@ def _without_numbers(reason: str) -> str:
     return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", " ".join(reason.removeprefix("cell: ").split()))
 
 
-def _row(name: str, cell: Mapping[str, Any], record: Record) -> dict[str, Any]:
-    """Return a cell with its outcome, as a row of the table."""
-    law, scheme, degree = cell["coupling"]
-    values = {key: value for key, value in cell.items() if key not in ("slice", "coupling")}
-    coupling = {"slice": cell["slice"], "law": law, "scheme": scheme, "degree": degree}
-    outcome = {
-        "class": record["kind"],
-        **{key: value for key, value in record.items() if key not in ("kind", "reason")},
-    }
-    return {"cell": name, **coupling, **values, **outcome, "reason": " ".join(record["reason"].split())}
+def _file(name: str) -> str:
+    return f"stability-garbage-{name}.toml"

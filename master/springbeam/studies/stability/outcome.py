@@ -7,8 +7,9 @@ dissipative  done, energy plus booked losses constant to `ledger.EXACT`; or a nu
 approximate  done, energy changed by more: within the bound of its scheme (`ledger.bounds`), or the run says so
 refused      a scene that cannot be run, with the reason
 stopped      ended early, with the cause
-garbage      anything else: energy changed without a warning, numbers that are not finite, bodies that overlap, damping
-             that returns energy, a crash
+garbage      anything else: a run that calls itself resolved and is far from the event-driven reference; a coupling that
+             changes no energy and has changed it; energy changed without a warning, numbers that are not finite, bodies
+             that overlap, damping that returns energy, a crash
 ===========  ==========================================================================================================
 """
 
@@ -21,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from ...bodies.protocol import FmuError
+from ...monolithic import event_driven
 from ...results.recording import MemoryRecorder
 from ...results.trajectory import Trajectory
 from ...run.ledger import EXACT, bounds
@@ -28,6 +30,8 @@ from ...run.outcome import RunStopped
 from ...run.runner import run
 from ...scene import Scene, SceneError, scene_from_dict
 from ...scene.automatic import with_scheme_chosen
+from ..metrics import motion_errors, worst
+from ..reference import PERTURBATION, initial_speed, refuse_without_reference
 from .cells import scene_dict
 
 #: In the order in which pictures and tables show them; the last must stay empty.
@@ -36,6 +40,14 @@ CLASSES = ("conserved", "dissipative", "approximate", "refused", "stopped", "gar
 _MOST_STEPS = 600
 #: Bodies may overlap or, joined, part by so much of their motion.
 _OVERLAP = 1e-9
+#: A coupling that changes no energy, at whatever step, may change it by so much of the largest before it is wrong: what
+#: rounding leaves of a gap costs energy where the force of a step is very large.
+_GUARANTEED = 1e-6
+#: What is resolved may be off by so much of its motion, unless a change of the initial velocity changes the motion by
+#: more than so many times as much.
+_RESOLVED, _WELL_CONDITIONED = 0.05, 100.0
+#: Times at which a resolved cell is compared with the reference, and how long that may take [s].
+_COMPARED, _PATIENCE = 60, 60.0
 #: Rounding of a sum of energies, of the largest so far.
 _SLACK = 1e-10
 
@@ -52,6 +64,10 @@ class Outcome:
     reason: str = ""  #: refused, stopped, garbage: why; approximate: the run's warnings
     residual: float | None = None  #: largest energy residual over the largest energy until then
     overlap: float | None = None  #: of bodies, or the gap of joined ones, over the largest motion
+    resolved: bool = False  #: whether the run calls itself resolved
+    error_motion: float | None = (
+        None  #: of u_tip and y beside the reference, over their largest changes; of what is resolved
+    )
     macro_steps: int = 0
     events: int = 0
 
@@ -83,7 +99,34 @@ def run_cell(cell: dict[str, Any]) -> Outcome:
     found = recorder.trajectory()
     if "traceback" in found.summary:  # an error that nobody foresaw
         return Outcome("garbage", f"crashed: {cause}")
-    return judged(found, cause)
+    outcome = judged(found, cause)
+    if outcome.resolved and outcome.kind not in ("stopped", "garbage"):
+        outcome.error_motion, conditioned = _beside_reference(found)
+        if conditioned and outcome.error_motion is not None and outcome.error_motion > _RESOLVED:
+            outcome.kind = "garbage"
+            outcome.reason = f"calls itself resolved, and is {outcome.error_motion:.1e} of its motion off the reference"
+    return outcome
+
+
+def _beside_reference(run: Trajectory) -> tuple[float | None, bool]:
+    """Return the error of ``run``, ``None`` without a reference, and whether the motion is well-conditioned."""
+    scene, end = run.scene, float(run.time[-1])
+    times = np.linspace(float(run.time[0]), end, _COMPARED)
+    try:
+        refuse_without_reference(scene)
+        if scene.contact.algorithm or end <= times[0]:
+            return None, False
+        exact = event_driven.simulate(scene, sample_times=times, t_end=end, time_limit=_PATIENCE)
+        error = worst(motion_errors(run.at(exact.time).columns, exact))
+        if error <= _RESOLVED:
+            return error, True
+        change = PERTURBATION * initial_speed(scene)
+        moved = event_driven.simulate(
+            scene, sample_times=times, t_end=end, time_limit=_PATIENCE, velocity_perturbation=change
+        )
+    except (SceneError, ValueError, event_driven.ReferenceFailure):
+        return None, False
+    return error, worst(motion_errors(moved.columns, exact)) <= _WELL_CONDITIONED * PERTURBATION
 
 
 def judged(run: Trajectory, cause: str = "") -> Outcome:
@@ -96,12 +139,16 @@ def judged(run: Trajectory, cause: str = "") -> Outcome:
     relative = np.divide(run.energy_residual, scale, out=np.zeros_like(scale), where=scale > 0.0)
     outcome.residual = float(np.abs(relative).max())
     outcome.overlap = _overlap(run)
-    if cause:
+    outcome.resolved = bool(summary["resolved"])
+    scene, _ = with_scheme_chosen(run.scene)
+    if _changes_no_energy(scene) and outcome.residual > _GUARANTEED:
+        outcome.kind = "garbage"
+        outcome.reason = f"energy residual {outcome.residual:.1e} of a coupling that changes none; {cause}"
+    if outcome.kind:
         return outcome
     if faults := list(_faults(run, outcome.overlap, scale)):
         outcome.kind, outcome.reason = "garbage", "; ".join(faults)
         return outcome
-    scene, _ = with_scheme_chosen(run.scene)
     bound, _ = bounds(scene)
     said = [text for text in summary["warnings"] if "energy" in text]
     lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
@@ -114,6 +161,11 @@ def judged(run: Trajectory, cause: str = "") -> Outcome:
     else:
         outcome.kind, outcome.reason = "garbage", f"energy residual {outcome.residual:.1e}, and nothing says so"
     return outcome
+
+
+def _changes_no_energy(scene: Scene) -> bool:
+    damped = scene.beam is not None and scene.beam.damped_numerically
+    return scene.coupling.scheme == "energy" and not damped and not scene.contact.algorithm
 
 
 def _only_damped_numerically(scene: Scene) -> bool:

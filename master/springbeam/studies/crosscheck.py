@@ -10,31 +10,44 @@ integrator in every step and the rounding of the beam's modes, grown as fast as 
 is what a one-way coupling neglects, since the reference is two-way.
 Nothing in it knows the reference, so a wrong sign, mass or law, which converges to something else, fails.
 
-Nonsmooth trajectories separate: comparable is what comes before the first change of contact that the macro step, or a
-tiny perturbation of the reference, moves to another place in the order of events.
-
-``comparison`` is the study, ``sampling`` has the values compared; ``orders`` observes orders.
+The verdict is about the run that was asked for. Nonsmooth trajectories separate: comparable is what comes before the
+first change of contact that the macro step, or a tiny perturbation of the reference, moves to another place in the
+order of events. A run that is not resolved at its own macro step is compared with smaller ones, as far as that goes;
+it may then differ, but it cannot agree.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
+from rich.text import Text
 
-from ...monolithic import algorithm1
-from ...results.contact_times import ContactChange, contact_changes
-from ...results.trajectory import Trajectory
-from ...run.outcome import RunStopped
-from ...run.runner import simulate
-from ...scene import Scene, SceneError, with_changes
-from ...scene.automatic import with_scheme_chosen
-from ...scene.resolution import mesh_frequency
-from ...scene.statics import tip_compliance
-from ..reference import PERTURBATION, reference_and_perturbed, refuse_without_reference
+from ..monolithic import algorithm1
+from ..pictures.drawing import POSITIONS, present
+from ..results.contact_times import ContactChange, contact_changes
+from ..results.trajectory import Event, Trajectory, columns_of
+from ..run.outcome import RunStopped
+from ..run.runner import simulate
+from ..scene import Scene, with_changes
+from ..scene.automatic import with_scheme_chosen
+from ..scene.resolution import mesh_frequency
+from ..scene.statics import tip_compliance
+from .reference import PERTURBATION, reference_and_perturbed, refuse_without_reference
 from .sampling import DISPLACEMENTS, SHORT, VELOCITIES, at, away_from, macro_points, quantities, sample
+from .study import Findings, Row, Study
+from .tables import table
 
+Verdict = Literal["agrees", "differs", "not comparable"]
+#: Exit codes of the command.
+CODES: dict[Verdict, int] = {"agrees": 0, "differs": 1, "not comparable": 4}
+_CASE = "comparison"
+#: What is told of a compared quantity; the errors at all times are for the picture.
+_TOLD = ("quantity", "error", "at", "l2", "bound", "passed")
 #: A scene whose comparable window is shorter than this many macro steps is resolved further, 4 times at a go.
 _ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 16
 #: Macro steps of a window that had to be resolved further.
@@ -47,12 +60,11 @@ _SAFETY = 4.0
 _LEAST = 1e-12
 
 
-@dataclass(frozen=True)
-class QuantityRow:
+class Quantity(NamedTuple):
     """One compared quantity."""
 
     quantity: str
-    error: float  #: max norm, in the quantity's unit
+    error: float  #: max norm, in the quantity's unit; where the bound is broken, the furthest out of it
     at: float  #: where it occurred [s]
     l2: float  #: root mean square over the window
     bound: float  #: at that time
@@ -62,8 +74,8 @@ class QuantityRow:
     bounds: np.ndarray
 
     @classmethod
-    def judged(cls, name: str, times: np.ndarray, error: np.ndarray, bound: np.ndarray) -> QuantityRow:
-        """Judge the errors of a quantity at ``times`` [s]; the row shows the largest, or the furthest out of bounds."""
+    def judged(cls, name: str, times: np.ndarray, error: np.ndarray, bound: np.ndarray) -> Quantity:
+        """Judge the errors of a quantity at ``times`` [s]."""
         worst, top = int(np.argmax(error / bound)), int(np.argmax(error))
         at = worst if error[worst] > bound[worst] else top
         return cls(
@@ -72,9 +84,8 @@ class QuantityRow:
         )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class EventRow:
-    """One change of contact."""
+class Change(NamedTuple):
+    """One compared change of contact."""
 
     kind: str
     time: float | None  #: ``None`` if the co-simulation lacks it
@@ -85,35 +96,39 @@ class EventRow:
 
 @dataclass
 class Report:
-    """What `crosscheck` found."""
+    """What `compare` found."""
 
+    asked: Scene
     scene: Scene  #: as compared: the macro step and t_end may be finer and shorter than asked
-    reference: Trajectory
-    trajectory: Trajectory
-    horizon: float  #: comparable up to here [s]
-    growth: float  #: of a perturbation of the reference up to the horizon
-    rows: list[QuantityRow] = field(default_factory=list)
-    events: list[EventRow] = field(default_factory=list)
+    reference: Trajectory | None = None
+    trajectory: Trajectory | None = None
+    horizon: float = 0.0  #: comparable up to here [s]
+    growth: float = 1.0  #: of a perturbation of the reference up to the horizon
+    rows: list[Quantity] = field(default_factory=list)
+    events: list[Change] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     @property
-    def passed(self) -> bool:
-        return all(row.passed for row in self.rows) and all(row.passed for row in self.events)
+    def verdict(self) -> Verdict:
+        """Judge the run that was asked for."""
+        if not (all(row.passed for row in self.rows) and all(change.passed for change in self.events)):
+            return "differs"
+        whole = self.scene == self.asked and self.horizon >= self.asked.time.t_end * (1.0 - 1e-12)
+        return "agrees" if self.rows and whole else "not comparable"
 
 
-def crosscheck(scene: Scene) -> Report:
+def compare(scene: Scene) -> Report:
     """Run ``scene`` and the reference of its law and compare them.
 
     Raises
     ------
     SceneError
-        If the reference is not defined for the scene (law `transmission` with ``contact.impact = "rest"``), or
-        nothing can be compared.
+        If the reference is not defined for the scene (law `transmission` with ``contact.impact = "rest"``).
     RunStopped, ReferenceFailure
         If either stops early.
     """
     if scene.contact.algorithm:
-        return _crosscheck_paper(scene)
+        return _compare_paper(scene)
     refuse_without_reference(scene)
     asked, note, failure = scene, "", None
     for _ in range(_MAX_REFINEMENTS):
@@ -132,14 +147,16 @@ def crosscheck(scene: Scene) -> Report:
             f"changes the motion from the first contact on. Compared instead: {size:.3g} s, up to {t_end:.9g} s."
         )
     else:
-        raise failure or SceneError(f"{note} Nothing could be compared at any macro step")
-    report = _compare(scene, coarse, fine, own_horizon)
+        if failure is not None:
+            raise failure
+        return Report(asked, asked, notes=[f"{note} Nothing could be compared at any macro step"])
+    report = _compared(asked, scene, coarse, fine, own_horizon)
     if note:
         report.notes.insert(0, note)
     return report
 
 
-def _crosscheck_paper(scene: Scene) -> Report:
+def _compare_paper(scene: Scene) -> Report:
     """Compare law `paper` through the FMUs with Algorithm 1 as one system, which differs by the midpoint rule alone.
 
     With a = (ωh)² one midpoint step and the exact flow differ in the displacement by y a²/12 and h z a/12. Algorithm 1
@@ -154,13 +171,13 @@ def _crosscheck_paper(scene: Scene) -> Report:
     changed = {"linear_stiffness": factor * spring.linear_stiffness, "cubic_stiffness": factor * spring.cubic_stiffness}
     moved = algorithm1.simulate(with_changes(scene, spring=changed))
     n = min(len(reference), len(ours), len(moved))
-    report = Report(scene, reference, ours, float(ours.time[n - 1]), 1.0)
+    report = Report(scene, scene, reference, ours, float(ours.time[n - 1]))
     for name in ("u_tip", "y", "z", "v_tip", "contact_force", "e_beam", "e_spring"):
         q, exact = ours[name][:n], reference[name][:n]
         scale = float(np.abs(exact).max()) or 1.0
         steps = np.arange(1, n + 1)
         bound = _SAFETY * np.maximum.accumulate(np.abs(moved[name][:n] - exact)) + _step_error(scene) * steps * scale
-        report.rows.append(QuantityRow.judged(name, ours.time[:n], np.abs(q - exact), bound))
+        report.rows.append(Quantity.judged(name, ours.time[:n], np.abs(q - exact), bound))
     report.notes.append(
         f"bounds from Algorithm 1 with 4/3 of its stiffness: as much as the midpoint rule changes a step of {h:g} s"
     )
@@ -192,17 +209,17 @@ def _with_half_the_step(scene: Scene) -> tuple[Trajectory, Trajectory, float]:
     return coarse, fine, horizon
 
 
-def _compare(scene: Scene, coarse: Trajectory, fine: Trajectory, own_horizon: float) -> Report:
+def _compared(asked: Scene, scene: Scene, coarse: Trajectory, fine: Trajectory, own_horizon: float) -> Report:
     reference, perturbed = reference_and_perturbed(scene, macro_points(coarse, scene))
     runs = (coarse, fine, reference, perturbed)
     changes = [contact_changes(run, SHORT * scene.coupling.H) for run in runs]
     stable = _agree_until(changes[2], changes[3], float(coarse.time[0]), float(coarse.time[-1]))
-    report = Report(scene, reference, coarse, min(own_horizon, stable), 1.0)
+    report = Report(asked, scene, reference, coarse, min(own_horizon, stable))
     for name in quantities(scene):
         _compare_quantity(report, name, runs)
     if not report.rows:
-        raise SceneError(
-            f"nothing could be compared: another change of contact comes first, from t = {report.horizon:.9g} s on, if "
+        report.notes.append(
+            f"Nothing could be compared: another change of contact comes first, from t = {report.horizon:.9g} s on, if "
             "the initial velocity changes a little; begin with another velocity, or at a distance"
         )
     _compare_events(report, changes[0], changes[1], changes[2])
@@ -235,7 +252,7 @@ def _compare_quantity(report: Report, name: str, runs: tuple[Trajectory, ...]) -
     always = _SAFETY * (_rounding(report.scene) + coarse.summary.get("neglected_share", 0.0))
     floor = _step_error(report.scene) * steps + always
     bound = _SAFETY * np.maximum.accumulate(np.abs(q - q_fine)) + floor * growth * scale
-    report.rows.append(QuantityRow.judged(name, times, np.abs(q - q_reference), bound))
+    report.rows.append(Quantity.judged(name, times, np.abs(q - q_reference), bound))
 
 
 def _step_error(scene: Scene) -> float:
@@ -267,11 +284,12 @@ def _compare_events(
     report: Report, coarse: list[ContactChange], fine: list[ContactChange], reference: list[ContactChange]
 ) -> None:
     size = report.scene.coupling.H
+    assert report.trajectory is not None
     moved, start = 0.0, report.trajectory.time[0]
     expected = [change for change in reference if change.time <= report.horizon]
     for i, (kind, time) in enumerate(expected):
         if i >= len(coarse) or coarse[i].kind != kind:
-            report.events.append(EventRow(kind, None, time, 0.0, False))
+            report.events.append(Change(kind, None, time, 0.0, False))
             return
         ours = coarse[i].time
         if i < len(fine):
@@ -281,4 +299,101 @@ def _compare_events(
         bound = _SAFETY * moved + _step_error(report.scene) * steps * report.growth * max(time - start, size)
         if kind in ("opens", "leaves") and with_scheme_chosen(report.scene)[0].coupling.degree == 0:
             bound += 0.5 * size  # a force known by its means tells no better when it vanishes
-        report.events.append(EventRow(kind, ours, time, bound, abs(ours - time) <= bound))
+        report.events.append(Change(kind, ours, time, bound, abs(ours - time) <= bound))
+
+
+class Crosscheck(Study):
+    """A scene beside the reference of its law."""
+
+    kind: ClassVar[str] = "crosscheck"
+
+    scene: Scene  #: its first quarter if quick
+
+    def cases(self) -> dict[str, Row]:
+        """Return the one comparison. Raises SceneError if there is no reference."""
+        if not self.scene.contact.algorithm:
+            refuse_without_reference(self.scene)
+        start, end = self.scene.contact_time or 0.0, self.scene.time.t_end
+        return {_CASE: {"time.t_end": start + 0.25 * (end - start)} if self.quick else {}}
+
+    def cost(self) -> str:
+        """Say what is run."""
+        if self.scene.contact.algorithm:
+            return "a run, and Algorithm 1 twice"
+        return "2 runs and 2 references, more where the motion is not resolved"
+
+    def record(self, case: Row) -> Row:
+        """Return what was found, and both motions."""
+        report = compare(self.at(case))
+        found: Row = {
+            "verdict": report.verdict,
+            "from": report.asked.contact_time or 0.0,
+            "horizon": report.horizon,
+            "t_end": report.asked.time.t_end,
+            "growth": report.growth,
+            "quantities": [row._asdict() for row in report.rows],
+            "events": [change._asdict() for change in report.events],
+            "notes": report.notes,
+            "scene": report.scene.model_dump(exclude_none=True),
+        }
+        run, reference = report.trajectory, report.reference
+        if run is not None and reference is not None:
+            positions = present(run, POSITIONS)
+            found["motion"] = {name: run[name] for name in ("time", "phase", *positions)}
+            found["marks"] = run.events
+            found["reference"] = {name: reference[name] for name in ("time", *positions)}
+        return found
+
+    def rows(self, records: Mapping[str, Row]) -> list[Row]:
+        """Return a row per quantity."""
+        return [{name: row[name] for name in _TOLD} for row in records[_CASE]["quantities"]]
+
+    def findings(self, records: Mapping[str, Row]) -> Findings:
+        """Show what was compared, quantities and changes of contact, and the verdict."""
+        record, units = records[_CASE], columns_of(self.scene)
+        shown: list[Any] = [*map(Text, record["notes"])]
+        if record["quantities"]:
+            quantities = [
+                (f"{row['quantity']} [{units[row['quantity']]}]", f"{row['error']:.2e}", f"{row['at']:.6g}",
+                 f"{row['l2']:.1e}", f"{row['bound']:.1e}", _ok(row))
+                for row in record["quantities"]
+            ]  # fmt: skip
+            shown.append(table(("quantity", "max error", "at t [s]", "L2 error", "bound", ""), quantities))
+        if record["events"]:
+            names = ("contact", "t [s]", "reference [s]", "error [s]", "bound [s]", "")
+            shown.append(table(names, map(_contact, record["events"])))
+        verdict: Verdict = record["verdict"]
+        if record["quantities"]:
+            shown.append(
+                f"comparable from {record['from']:.9g} to {record['horizon']:.9g} s of {record['t_end']:.9g} s; there "
+                f"a perturbation of the reference has grown {record['growth']:.3g} times"
+            )
+        looks = {"agrees": "bold green", "differs": "bold red", "not comparable": "bold"}
+        words = {"not comparable": "not comparable over the run that was asked for"}
+        shown.append(Text(words.get(verdict, verdict), style=looks[verdict]))
+        told = {name: record[name] for name in ("verdict", "horizon", "growth", "events", "notes", "scene")}
+        return Findings({**told, "quantities": self.rows(records)}, shown, CODES[verdict])
+
+    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+        """Draw both motions, and every error below its bound."""
+        from .crosscheck_picture import draw
+
+        record = records[_CASE]
+        if not record["quantities"]:
+            return []
+        run, reference = (
+            {name: np.array(values) for name, values in record[which].items()} for which in ("motion", "reference")
+        )
+        trajectory = Trajectory(self.scene, run, [Event(**mark) for mark in record["marks"]])
+        return [draw(trajectory, reference, record, directory / "crosscheck.png")]
+
+
+def _ok(row: Mapping[str, Any]) -> str:
+    return "ok" if row["passed"] else "DIFFERS"
+
+
+def _contact(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the row of a change of contact, which the co-simulation may lack."""
+    time, exact = row["time"], row["reference"]
+    ours, error = ("none", "") if time is None else (f"{time:.10f}", f"{time - exact:.1e}")
+    return row["kind"], ours, f"{exact:.10f}", error, f"{row['bound']:.1e}", _ok(row)

@@ -9,11 +9,11 @@ from typing import Any
 import matplotlib
 import numpy as np
 
-from ...pictures import drawing
-from ...pictures.drawing import BLACK, POSITIONS, Line, Look
-from ...pictures.panels import Curve, Panel
-from ...pictures.timeline import DPI, STYLE, timeline
-from ...results.trajectory import Trajectory
+from ..pictures import drawing
+from ..pictures.drawing import BLACK, POSITIONS, Line, Look
+from ..pictures.panels import Curve, Panel
+from ..pictures.timeline import DPI, STYLE, timeline
+from ..results.trajectory import Trajectory
 
 _COLOURS = (
     *(drawing.BLUE, drawing.SKY, drawing.VERMILLION, drawing.ORANGE, drawing.GREEN, drawing.PURPLE, drawing.GREY),

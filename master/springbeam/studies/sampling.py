@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ...results.trajectory import Trajectory
-from ...scene import Scene
+from ..results.trajectory import Trajectory
+from ..scene import Scene
 
 #: Intervals of contact shorter than this many macro steps are no evidence either way.
 SHORT = 2.0

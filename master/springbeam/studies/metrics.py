@@ -1,17 +1,20 @@
-"""What is kept of each run of a sweep: one number per metric, the same on every machine that runs it."""
+"""What is kept of a run: one number per metric, the same on every machine that runs it, its cost, and its errors."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter, itemgetter
+from typing import Any
 
 import numpy as np
 
-from ...results.dense import extremes
-from ...results.extremes import Extremes
-from ...results.totals import LOSS_NAMES, TOTALS
-from ...results.trajectory import EVENT_KINDS, Trajectory
+from ..results.contact_times import contact_time_difference, impulse_difference
+from ..results.dense import extremes
+from ..results.extremes import Extremes
+from ..results.totals import LOSS_NAMES, TOTALS
+from ..results.trajectory import EVENT_KINDS, Trajectory
+from ..scene import SceneError
 
 
 @dataclass(frozen=True)
@@ -84,3 +87,51 @@ def heading(name: str) -> str:
     """Return a metric with its unit."""
     unit = METRICS[name].unit
     return f"{name} [{unit}]" if unit else name
+
+
+def known(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of metrics as given. Raises SceneError if one is unknown."""
+    for name in names:
+        if name not in METRICS:
+            raise SceneError(f"--metric {name}: unknown; allowed: {', '.join(METRICS)}")
+    return tuple(names)
+
+
+def costs(run: Trajectory) -> dict[str, int]:
+    """Return the doStep calls of both FMUs, those that were rolled back included, and the rollbacks."""
+    rollbacks = sum(int(run.summary.get(f"{body}_rollbacks", 0)) for body in ("beam", "spring"))
+    return {"cost_do_steps": run.do_steps, "cost_rollbacks": rollbacks}
+
+
+def motion_errors(columns: Mapping[str, np.ndarray], reference: Trajectory) -> dict[str, float | None]:
+    """Return the largest errors of u_tip and y, over the largest change of the reference from its start.
+
+    ``columns`` are at the times of the rows of ``reference``; an error is ``None`` where there is no such body.
+    """
+    found: dict[str, float | None] = {}
+    for name in ("u_tip", "y"):
+        found[f"error_{name}"] = None
+        if name in columns and name in reference.columns:
+            exact = reference[name]
+            scale = float(np.abs(exact - exact[0]).max()) or 1.0
+            found[f"error_{name}"] = float(np.abs(columns[name] - exact).max()) / scale
+    return found
+
+
+def errors(run: Trajectory, reference: Trajectory, window: float) -> dict[str, Any]:
+    """Return the errors of ``run`` at all times of ``reference``, between the rows of the run too.
+
+    Those of the motion as `motion_errors` has them; the largest one of a change of contact [s], without contacts and
+    flights shorter than ``window`` [s]; that of all impulses over their sum; and the energy residual.
+    """
+    return {
+        **motion_errors(run.at(reference.time).columns, reference),
+        "error_event_time": contact_time_difference(run, reference, window)[0],
+        "error_impulse": impulse_difference(run, reference),
+        "error_energy": float(run.summary["max_energy_residual"]),
+    }
+
+
+def worst(row: Mapping[str, Any]) -> float:
+    """Return the larger of the errors of u_tip and y, ∞ without any."""
+    return max((row[name] for name in ("error_u_tip", "error_y") if row.get(name) is not None), default=np.inf)

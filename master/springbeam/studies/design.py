@@ -1,4 +1,4 @@
-"""The keys that a sweep varies, as ``TABLE.KEY=VALUES``, and the scenes that follow."""
+"""The keys that a sweep varies, as ``TABLE.KEY=VALUES``, and the values that they take."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any, Literal
 import numpy as np
 from scipy.stats import qmc
 
-from ...scene import Scene, SceneError, key_kind, parse_value, with_changes
-from ...scene.scene import split_key
-from ...scene.tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS
+from ..scene import Scene, SceneError, key_kind, parse_value
+from ..scene.scene import split_key
+from ..scene.tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS
 
 Sampling = Literal["random", "latin_hypercube"]
 #: A mistyped count, not a sweep.
@@ -152,11 +152,3 @@ def _sampled(axis: Axis, fraction: float) -> Any:
     if not axis.is_range:
         return axis.values[min(int(fraction * len(axis.values)), len(axis.values) - 1)]
     return axis.at(fraction)
-
-
-def varied(scene: Scene, axes: Sequence[Axis], values: Sequence[Any]) -> Scene:
-    """Return the scene of one run. Raise SceneError if it cannot be run."""
-    tables: dict[str, dict[str, Any]] = {}
-    for axis, value in zip(axes, values, strict=True):
-        tables.setdefault(axis.table, {})[axis.key] = value
-    return with_changes(scene, **tables)

@@ -1,0 +1,174 @@
+"""Pictures of a table of cases: values over one axis as a curve, over two as a map, over more as small multiples."""
+
+from __future__ import annotations
+
+import itertools
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import XAxis, YAxis
+from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from ..pictures.drawing import BLUE, VERMILLION
+
+Rows = Sequence[Mapping[str, Any]]
+#: Values of an axis that are named on it, and columns of small multiples.
+_FEW, _MOST = 8, 6
+#: Letters of a title to an inch.
+_LETTERS = 9
+_MARKERS = "os^DvPX*<>"
+
+
+class Scale(NamedTuple):
+    """An axis of the table: a column, and how its values are laid out."""
+
+    name: str
+    label: str
+    log: bool = False
+    words: bool = False  #: evenly, each with its value beside it
+
+    def places(self, values: Sequence[Any]) -> tuple[np.ndarray, list[Any]]:
+        """Return where ``values`` are drawn, and the different ones of them in the order of their places."""
+        if self.words:
+            levels = list(dict.fromkeys(values))
+            return np.array([levels.index(value) for value in values], dtype=float), levels
+        return np.array(values, dtype=float), sorted(set(values))
+
+    def mark(self, axis: XAxis | YAxis, levels: Sequence[Any], *, all_of_them: bool) -> None:
+        """Label an axis and its values."""
+        axis.set_label_text(self.label)
+        if self.words:
+            some = levels[:: max(1, -(-len(levels) // _FEW))] if len(levels) > _FEW else levels
+            axis.set_ticks([levels.index(value) for value in some], [_short(value) for value in some])
+        elif self.log:
+            logarithmic(axis, np.array(levels, dtype=float))
+        elif all_of_them and len(levels) <= _FEW:
+            axis.set_ticks(levels)
+
+
+def _short(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def logarithmic(axis: XAxis | YAxis, values: np.ndarray) -> None:
+    """Make an axis logarithmic, with plain numbers at decades, and at 2 and 5 if there are few."""
+    (axis.axes.set_xscale if isinstance(axis, XAxis) else axis.axes.set_yscale)("log")
+    wide = np.max(values) > 20.0 * np.min(values)
+    axis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def column(rows: Rows, name: str) -> np.ndarray:
+    """Return a column of numbers, NaN where there is none."""
+    return np.array([np.nan if row.get(name) is None else row[name] for row in rows], dtype=float)
+
+
+def panels(count: int, wide: int, size: tuple[float, float], title: str) -> tuple[Figure, list[Axes]]:
+    """Return a figure with ``count`` axes, at most ``wide`` beside each other."""
+    wide = min(wide, count)
+    high = -(-count // wide)
+    figure = Figure(figsize=(size[0] * wide, size[1] * high + 0.5), layout="constrained")
+    if title:
+        figure.suptitle(textwrap.fill(title, round(_LETTERS * figure.get_figwidth())))
+    return figure, [figure.add_subplot(high, wide, place) for place in range(1, count + 1)]
+
+
+def multiples(rows: Rows, scales: Sequence[Scale], values: Mapping[str, str], title: str) -> Figure:
+    """Return a figure of columns of ``rows``, given with their titles, over the axes of the table.
+
+    Over two axes and no more a panel a column, else a row of panels a column: of a full grid maps over the first two
+    axes, one for each pick of the others; of samples a panel over each axis.
+    """
+    draws: list[tuple[Axes, str, str, Rows, Sequence[Scale]]] = []
+    if len(scales) <= 2:
+        figure, axes = panels(len(values), 3, (4.0, 3.0), title)
+        draws = [(ax, name, words, rows, scales) for ax, (name, words) in zip(axes, values.items(), strict=True)]
+    else:
+        levels = [list(dict.fromkeys(row[scale.name] for row in rows)) for scale in scales]
+        of_grid = len(rows) == np.prod([len(level) for level in levels])
+        picks = list(itertools.product(*levels[2:])) if of_grid else [(scale,) for scale in scales]
+        picks = picks[:: -(-len(picks) // _MOST)]
+        figure, axes = panels(len(picks) * len(values), len(picks), (3.6, 3.0), title)
+        for ax, ((name, words), pick) in zip(axes, itertools.product(values.items(), picks), strict=True):
+            if of_grid:
+                fixed = dict(zip((scale.name for scale in scales[2:]), pick, strict=True))
+                mine: Rows = [row for row in rows if all(row[key] == value for key, value in fixed.items())]
+                where = ", ".join(f"{key.rpartition('.')[2]} = {_short(value)}" for key, value in fixed.items())
+                draws.append((ax, name, f"{words}, {where}", mine, scales[:2]))
+            else:
+                draws.append((ax, name, words, rows, pick))
+    drawn = []
+    for ax, name, _, some, over in draws:
+        every = column(rows, name)  # panels of one column share its colours
+        drawn.append(_panel(figure, ax, some, over, name, (np.nanmin(every), np.nanmax(every))))
+    figure.draw_without_rendering()  # which decides by what the numbers of a scale are multiplied
+    for (ax, _, words, *_), scale in zip(draws, drawn, strict=True):
+        factor = scale.get_offset_text()
+        ax.set_title(f"{words}   {factor.get_text()}", fontsize="medium")
+        factor.set_visible(False)
+    return figure
+
+
+def _panel(
+    figure: Figure, ax: Axes, rows: Rows, scales: Sequence[Scale], name: str, ends: tuple[float, float]
+) -> YAxis:
+    """Draw a column over one or two axes; return the scale of its values, whose colours go from end to end."""
+    values = column(rows, name)
+    if len(scales) == 2:
+        drawn = cells(ax, rows, scales[0], scales[1], values, cmap="cividis", vmin=ends[0], vmax=ends[1])
+        return figure.colorbar(drawn, ax=ax).ax.yaxis
+    (scale,) = scales
+    places, levels = scale.places([row[scale.name] for row in rows])
+    order, failed = np.argsort(places, kind="stable"), np.isnan(values)
+    joined = "none" if scale.words or len(set(places)) < len(places) else "-"
+    ax.plot(places[order], values[order], marker=".", linestyle=joined, color=BLUE, linewidth=1.0)
+    if failed.any():
+        low = ax.get_ylim()[0]
+        ax.plot(places[failed], np.full(failed.sum(), low), "x", color=VERMILLION, clip_on=False)
+    scale.mark(ax.xaxis, levels, all_of_them=False)
+    ax.grid(alpha=0.3)
+    return ax.yaxis
+
+
+def cells(ax: Axes, rows: Rows, x: Scale, y: Scale, values: np.ndarray, **look: Any) -> ScalarMappable:
+    """Draw values over two axes: of a full grid as cells, else as dots."""
+    (across, columns), (up, lines) = (scale.places([row[scale.name] for row in rows]) for scale in (x, y))
+    full = len(values) == len(columns) * len(lines)
+    if full:
+        order = np.lexsort((across, up))
+        found = values[order].reshape(len(lines), len(columns))
+        borders = (_borders(np.unique(places), scale.log) for places, scale in ((across, x), (up, y)))
+        drawn: ScalarMappable = ax.pcolormesh(*borders, found, **look)
+    else:
+        drawn = ax.scatter(across, up, c=values, s=14, **look)
+    x.mark(ax.xaxis, columns, all_of_them=full)
+    y.mark(ax.yaxis, lines, all_of_them=full)
+    return drawn
+
+
+def _borders(values: np.ndarray, log: bool) -> np.ndarray:
+    """Return the ends of cells around ascending values, shape (len(values) + 1,), halfway between; also of logarithms.
+
+    Of one value the cell has no width.
+    """
+    around = np.pad(np.log(values) if log else values, 1, "reflect", reflect_type="odd")
+    borders = 0.5 * (around[1:] + around[:-1])
+    return np.asarray(np.exp(borders) if log else borders)
+
+
+def lines(ax: Axes, rows: Rows, x: str, y: str | Callable[[Mapping[str, Any]], float], by: str) -> None:
+    """Draw one column over another, both logarithmic: a line for each value of the column ``by``."""
+    for k, name in enumerate(dict.fromkeys(row[by] for row in rows)):
+        mine = [row for row in rows if row[by] == name]
+        values = np.array([y(row) for row in mine]) if callable(y) else column(mine, y)
+        ax.plot(column(mine, x), np.where(values > 0.0, values, np.nan), label=name, color=f"C{k % 10}",
+                marker=_MARKERS[k % len(_MARKERS)], markersize=4.0, linewidth=1.1,
+                linestyle=("-", "--", ":")[k // 10 % 3])  # fmt: skip
+    ax.set(xscale="log", yscale="log")
+    ax.grid(alpha=0.3)

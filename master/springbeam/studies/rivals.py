@@ -1,0 +1,179 @@
+"""What a good user of scipy would write instead: the modal equations of motion, handed to `scipy.integrate.solve_ivp`.
+
+The state is X = (a, ȧ, y, z), a the coordinates of the beam's modes, so that a right-hand side is a few products of
+vectors (with 20 modes one matrix product takes as long, with 100 half as long again). LSODA and Radau are given the
+Jacobian. Events are given to ``solve_ivp``, which stops at them. What they do to the state is the reference's
+(`HybridState`), so that both solve one problem; its time is not counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from time import perf_counter
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from ..monolithic.event_driven import initial
+from ..monolithic.hybrid_system import HybridSystem, ReferenceFailure
+from ..monolithic.laws import Phase, Watch
+from ..monolithic.semi_discrete import modal_beam
+from ..monolithic.transitions import HybridState
+from ..scene import Scene
+
+#: Relative tolerances of scipy's solvers; they are stable from loose ones on, at the step that they take themselves.
+TOLERANCES = {
+    "DOP853": (1e-1, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10),
+    "LSODA": (1e-3, 1e-5, 1e-7, 1e-9),
+    "Radau": (1e-2, 1e-4, 1e-6, 1e-8),
+}
+_MOST_EVENTS = 10_000
+
+
+class Solved(NamedTuple):
+    """A solution by scipy."""
+
+    columns: dict[str, np.ndarray]  #: u_tip, y [m] at the times asked for, as far as the scene has them
+    seconds: float  #: that ``solve_ivp`` has taken
+    evaluations: int  #: of right-hand sides
+
+
+class Rival:
+    """A scene as scipy solves it; the matrices are made once, before any clock runs.
+
+    Not for a quasi-static beam, which has no equation of motion. Raises ValueError for a law without a reference.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._system = HybridSystem(scene, None if scene.beam is None else modal_beam(scene.beam))
+        self._phases: dict[Phase, _Phase] = {}
+
+    def solve(
+        self, method: str, rtol: float, atol: float, times: Sequence[float] | np.ndarray, limit: float = np.inf
+    ) -> Solved:
+        """Return the motion at ascending ``times`` [s] by a ``method`` of scipy, one of `TOLERANCES`.
+
+        Raises ReferenceFailure if the solver fails, or takes more than ``limit`` seconds.
+        """
+        s, wanted, seconds = self._system, np.asarray(times, dtype=float), 0.0
+        evaluations = events = 0
+        state = HybridState(s, *initial(s, 0.0))
+        n, found = s.T - 2, np.empty((len(wanted), s.T - 2))
+        found[wanted <= state.time] = state.X[:n]
+        state.start()
+        while state.time < wanted[-1]:
+            if state.phase not in self._phases:
+                self._phases[state.phase] = _Phase(s, state.phase)
+            phase = self._phases[state.phase]
+            until, watched = min(wanted[-1], s.loads.smooth_from(state.time)), state.watched()
+            inside = np.flatnonzero((wanted > state.time) & (wanted < until))
+            options: dict[str, Any] = {"rtol": rtol, "atol": atol, "t_eval": [*wanted[inside], until]}
+            if method != "DOP853" and phase.jacobian is not None:
+                options["jac"] = phase.jacobian
+            rhs = phase.rhs if limit == np.inf else _limited(phase.rhs, perf_counter() + limit - seconds, limit)
+            options["events"] = [phase.event(watch, state.X) for watch in watched]
+            began = perf_counter()
+            solution = solve_ivp(rhs, (state.time, until), state.X[:n], method, **options)
+            seconds += perf_counter() - began
+            evaluations += solution.nfev
+            if solution.status < 0:
+                raise ReferenceFailure(f"{method} failed in phase {state.phase.name}: {solution.message}")
+            states = np.reshape(solution.y, (n, -1)).T[: len(inside)]
+            found[inside[: len(states)]] = states
+            happened = next((k for k, at in enumerate(solution.t_events or ()) if len(at)), None)
+            state.time, X = (until, solution.y[:, -1]) if happened is None else (
+                float(solution.t_events[happened][-1]), solution.y_events[happened][-1]
+            )  # fmt: skip
+            state.X[:n], state.X[s.T] = X, state.time
+            if happened is not None:
+                state.happen(watched[happened])
+                events += 1
+                if events > _MOST_EVENTS:
+                    raise ReferenceFailure(f"{events} events by t = {state.time:.9g} s: they do not end")
+            found[wanted == state.time] = state.X[:n]
+        columns = {"u_tip": found[:, s.A] @ s.b} if self._scene.beam is not None else {}
+        return Solved(columns | ({"y": found[:, s.Y]} if s.has_spring else {}), seconds, evaluations)
+
+
+def _limited(rhs: Callable[..., np.ndarray], deadline: float, limit: float) -> Callable[..., np.ndarray]:
+    """Return ``rhs``, which gives up after the ``deadline``."""
+
+    def limited(time: float, X: np.ndarray) -> np.ndarray:
+        if perf_counter() > deadline:
+            raise ReferenceFailure(f"takes more than {limit:g} s; it is at t = {time:.6g} s")
+        return rhs(time, X)
+
+    return limited
+
+
+class _Phase:
+    """The equations of one phase of contact, and the functions that end it."""
+
+    def __init__(self, s: HybridSystem, phase: Phase) -> None:
+        self._system, self._phase = s, phase
+        self._soft = s.scene.coupled and not s.joined(phase) and s.law.acts(phase.contact)
+        self._by_beam, self._by_spring = s.multiplier(phase) if s.joined(phase) else (0.0, 0.0)
+        self._k2 = s.spring.cubic_stiffness
+        self.jacobian: Callable[[float, np.ndarray], np.ndarray] | None = None
+        if not self._soft or s.law.linear is not None:  # linear but for the cubic spring
+            n, cubic = s.T - 2, self._k2
+            units, self._k2 = np.eye(n), 0.0
+            start = self.rhs(0.0, np.zeros(n))
+            self._linear = np.transpose([self.rhs(0.0, unit) - start for unit in units])
+            self._k2 = 1.0
+            self._cubic = self.rhs(0.0, units[s.Y]) - start - self._linear[:, s.Y]
+            self._k2, self.jacobian = cubic, self._jacobian
+
+    def rhs(self, time: float, X: np.ndarray) -> np.ndarray:
+        s, spring = self._system, self._system.spring
+        a, v, (y, z) = X[s.A], X[s.V], X[s.Y :].tolist()
+        p = s.load - s.stiffness * (a + s.alpha_b * v if s.alpha_b else a)
+        S = spring.external_force - spring.damping * z - (spring.linear_stiffness + self._k2 * y * y) * y
+        if len(s.loads):
+            values = s.loads.values(np.array(time))
+            p, S = p + values @ s.loads.patterns, S + values @ s.loads.on_spring
+        if self._soft:
+            C = float(s.law.force(y - a @ s.b, z - v @ s.b))
+        else:
+            C = self._by_beam * (s.b @ p) + self._by_spring * S
+        p = p + s.b * C
+        if self._phase.seated:
+            return np.concatenate((v, p, (0.0, 0.0)))
+        return np.concatenate((v, p, (z, s.b @ p if s.alone else (S - C) * s.inverse_mass)))
+
+    def _jacobian(self, time: float, X: np.ndarray) -> np.ndarray:
+        J, y = self._linear.copy(), self._system.Y
+        J[:, y] += 3.0 * self._k2 * X[y] ** 2 * self._cubic
+        return np.asarray(J)
+
+    def event(self, watch: Watch, start: np.ndarray) -> Callable[[float, np.ndarray], float]:
+        """Return the function of an event, with the marks that ``solve_ivp`` looks for.
+
+        One that starts at zero, as after its own event, counts from where it first exceeds rounding, either way.
+        """
+        s, state, b, A, y = self._system, np.zeros(self._system.size), self._system.b, self._system.A, self._system.Y
+
+        def other(time: float, X: np.ndarray) -> float:
+            state[: len(X)], state[s.T] = X, time
+            return float(watch.function(s.motion(self._phase, state)))
+
+        quick: dict[str, Callable[[float, np.ndarray], float]] = {
+            "meet": lambda _, X: b @ X[A] - X[y],
+            "stop": lambda _, X: X[y] - s.stop.position,
+            "release": lambda _, X: s.law.equilibrium - X[y],
+            "retie": lambda _, X: X[y] - s.law.equilibrium,
+        }
+        function, noise = quick.get(watch.name, other), s.noise(watch.unit, start)
+        counts = function(float(start[s.T]), start[: s.T - 2]) > noise
+
+        def rising(time: float, X: np.ndarray) -> float:
+            nonlocal counts
+            value = function(time, X)
+            counts = counts or value > noise
+            return value if counts or value < -noise else noise
+
+        found: Any = function if counts else rising
+        found.terminal, found.direction = True, -1.0
+        return cast("Callable[[float, np.ndarray], float]", found)

@@ -1,0 +1,157 @@
+"""Many runs of one scene: a row of metrics per run, errors as rows.
+
+The rows depend on the design alone: not on the number of workers, nor on the order in which they finish.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from rich.text import Text
+
+from ..pictures.drawing import BLUE, VERMILLION
+from ..results.trajectory import Trajectory
+from ..scene import Load, Scene, SceneError
+from ..scene.reference import unit_of
+from .design import Axis, Sampling, compatible, design, parse_axis
+from .metrics import METRICS, PRINCIPAL, heading, known
+from .study import Findings, Row, Study
+
+STATUSES = ("done", "stopped", "refused", "lost")
+#: What is kept of each run of a driven scene: positions at equal phase [m], and half the range of the motion [m].
+POINTS, PEAK = "stroboscopic", "peak_response"
+#: The transient, as a share of the run.
+_TRANSIENT = 2.0 / 3.0
+#: A metric that varies less, relative to its largest value, is constant.
+_ROUNDING = 1e-12
+
+
+class Sweep(Study):
+    """What is swept: ``vary`` holds ``TABLE.KEY=VALUES``."""
+
+    kind: ClassVar[str] = "sweep"
+    parallel: ClassVar[bool] = True
+
+    scene: Scene
+    vary: tuple[str, ...]
+    samples: int = 0
+    sampling: Sampling = "latin_hypercube"
+    seed: int = 0
+    metric: tuple[str, ...] = ()  #: all if empty
+    stroboscopic: bool = False  #: whether each run is also seen once a period of its drive
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The keys that vary."""
+        return tuple(parse_axis(text) for text in self.vary)
+
+    @property
+    def metrics(self) -> Sequence[str]:
+        """Those asked for."""
+        return self.metric or tuple(METRICS)
+
+    def cases(self) -> dict[str, Row]:
+        """Return the values of the axes. Raises SceneError if a key, a metric or the drive is not there."""
+        known(self.metrics)
+        axes = self.axes
+        compatible(self.scene, axes)
+        if self.stroboscopic:
+            drive(self.scene)
+        values = design(axes, self.samples, self.seed, self.sampling)
+        names = [axis.name for axis in axes]
+        return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
+
+    def record(self, case: Row) -> Row:
+        """Run once."""
+        row, run = self.observed(case)
+        if self.stroboscopic:
+            row |= {POINTS: None, PEAK: None} if run is None else seen_once_a_period(run)
+        return row
+
+    def lost(self, cause: str) -> Row:
+        """Return a row that says why there is no run."""
+        return {"status": "lost", "error": cause, "warnings": ""}
+
+    def findings(self, records: Mapping[str, Row]) -> Findings:
+        """Count the rows by status, and name the first error."""
+        counts = Counter(record["status"] for record in records.values())
+        lines = [f"runs      {', '.join(f'{counts[status]} {status}' for status in STATUSES if counts[status])}"]
+        if first := next((record["error"] for record in records.values() if record["error"]), None):
+            lines.append(f"error     {first}, the first of them")
+        return Findings({"runs": {status: counts[status] for status in STATUSES}}, [Text(line) for line in lines])
+
+    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+        """Draw what of the metrics the axes change; of a driven scene the bifurcation diagram."""
+        from .picture import Scale, column, multiples
+
+        rows, axes, files = self.rows(records), self.axes, []
+        words = [any(isinstance(row[axis.name], str) for row in rows) for axis in axes]
+        scales = [Scale(axis.name, _labelled(axis), axis.log, word) for axis, word in zip(axes, words, strict=True)]
+        shown = {name: heading(name) for name in self.metric or PRINCIPAL if _varies(column(rows, name))}
+        if shown:
+            files.append(directory / "sweep.png")
+            multiples(rows, scales, shown, self.scene.title or "sweep").savefig(files[-1], dpi=100)
+        if self.stroboscopic and len(axes) == 1 and not words[0]:
+            files.append(_bifurcation(rows, scales[0], directory / "sweep-bifurcation.png"))
+        return files
+
+
+def rows(directory: str | Path) -> dict[str, list[Any]]:
+    """Read a finished sweep: ``index``, the varied keys, ``status``, ``error``, ``warnings``, metrics and costs."""
+    import pyarrow.parquet as pq
+
+    columns: dict[str, list[Any]] = pq.read_table(Path(directory) / "sweep.parquet").to_pydict()
+    return columns
+
+
+def drive(scene: Scene) -> Load:
+    """Return the first harmonic load of ``scene``. Raises SceneError if it has none."""
+    for load in scene.loads:
+        if load.signal == "harmonic":
+            return load
+    raise SceneError('--stroboscopic: the scene has no drive; it needs [[loads]] with signal = "harmonic"')
+
+
+def seen_once_a_period(run: Trajectory) -> Row:
+    """Return `POINTS` and `PEAK` of the last third of a run: of the tip, of the spring top where there is no beam."""
+    load, column = drive(run.scene), "u_tip" if "u_tip" in run.columns else "y"
+    assert load.frequency is not None
+    begin, end = float(run.time[0]), float(run.time[-1])
+    late = begin + _TRANSIENT * (end - begin)
+    first, last = np.ceil((late - load.start) * load.frequency), np.floor((end - load.start) * load.frequency)
+    times = load.start + np.arange(first, last + 1.0) / load.frequency
+    motion = run[column][run.time >= late]
+    return {POINTS: run.at(np.minimum(times, end))[column].tolist(), PEAK: 0.5 * float(np.ptp(motion))}
+
+
+def _bifurcation(rows: Sequence[Row], scale: Any, path: Path) -> Path:
+    """Draw positions at equal phase, and the peak response, over the axis of ``scale``."""
+    from .picture import column, panels
+
+    figure, (upper, lower) = panels(2, 1, (7.0, 3.5), "")
+    at = column(rows, scale.name)
+    for x, row in zip(at, rows, strict=True):
+        if row[POINTS] is not None:
+            upper.plot(np.full(len(row[POINTS]), x), row[POINTS], ".", color=BLUE, markersize=2.0)
+    order = np.argsort(at, kind="stable")
+    lower.plot(at[order], column(rows, PEAK)[order], ".-", color=VERMILLION, linewidth=1.0)
+    for ax, what in ((upper, "position once a period of the drive [m]"), (lower, "half the range of the motion [m]")):
+        scale.mark(ax.xaxis, at, all_of_them=False)
+        ax.set_ylabel(what)
+        ax.grid(alpha=0.3)
+    figure.savefig(path, dpi=100)
+    return path
+
+
+def _varies(values: np.ndarray) -> bool:
+    found = values[np.isfinite(values)]
+    return found.size > 1 and bool(np.ptp(found) > _ROUNDING * np.abs(found).max())
+
+
+def _labelled(axis: Axis) -> str:
+    unit = unit_of(axis.table, axis.key)
+    return f"{axis.name} [{unit}]" if unit != "–" else axis.name
