@@ -5,8 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 from scenes import scene_from_dict
+from scipy.integrate import solve_ivp
 
+from springbeam.monolithic.event_driven import simulate
+from springbeam.monolithic.exponential import ExponentialPropagator, Segment
 from springbeam.monolithic.semi_discrete import assemble
 from springbeam.results.trajectory import Trajectory
 from springbeam.scene import Scene, load_scene, with_changes
@@ -58,3 +62,41 @@ def matrices(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def tip_mass(scene: Scene) -> float:
     """Return what a tip impulse meets [kg]."""
     return float(1.0 / np.linalg.inv(matrices(scene)[0])[-1, -1])
+
+
+def integrated_anew(scene: Scene, patch: pytest.MonkeyPatch, t_end: float) -> Trajectory:
+    """Return the reference's run of ``scene`` after scipy has integrated the first and longest step of each phase.
+
+    Both have the equations of motion, `HybridSystem.motion`, and no numerical method in common.
+    """
+    kept: dict[Any, tuple[tuple[ExponentialPropagator, Segment], ...]] = {}
+    step = ExponentialPropagator._step
+
+    def noted(self: ExponentialPropagator, *arguments: Any) -> Segment | None:
+        segment = step(self, *arguments)
+        if segment is not None:
+            first, last = kept.get(self.phase, ((self, segment), (self, segment)))
+            kept[self.phase] = first, max(last, (self, segment), key=lambda step: step[1].size)
+        return segment
+
+    patch.setattr(ExponentialPropagator, "_step", noted)
+    run = simulate(scene, sample_times=np.linspace(0.0, t_end, 301), t_end=t_end)
+    for propagator, segment in (one for some in kept.values() for one in some):
+        s, phase = propagator.system, propagator.phase
+
+        def slope(_: float, X: np.ndarray) -> np.ndarray:
+            m = s.motion(phase, X)  # noqa: B023
+            rest = [m.z, m.z_dot, s.dissipation_rate(phase, X), s.load_power(X), 1.0]  # noqa: B023
+            return np.concatenate([X[s.V], m.a, rest])  # noqa: B023
+
+        options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-18}
+        begin, end = segment.states[0], segment.states[-1]
+        found = s.synchronise(phase, solve_ivp(slope, (0.0, segment.size), begin, **options).y[:, -1].copy())
+        energy = sum(np.abs(part) for part in s.energies(np.stack([begin, end]), phase).values()).max()
+        for beam, top in ((s.A, s.Y), (s.V, s.Z)):
+            parts = np.r_[np.arange(s.size)[beam], top]
+            error, size = np.abs(found - end)[parts], np.abs([begin, end])[:, parts]
+            assert np.max(error) <= 1e-11 * np.max(size), (phase, beam)
+        for part in (s.D, s.W):
+            assert abs(found[part] - end[part]) <= 1e-11 * energy, (phase, part)
+    return run

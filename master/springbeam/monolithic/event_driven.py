@@ -23,8 +23,7 @@ from .exponential import ExponentialPropagator, LinearForm
 from .hybrid_system import HybridSystem, ReferenceFailure
 from .laws import Phase
 from .location import EventLocator
-from .propagators import SCIPY_METHODS, Method, RungeKuttaPropagator
-from .quasi_static import QuasiStaticSystem
+from .quasi_static import QuasiStaticForm, QuasiStaticSystem
 from .rows import Rows
 from .semi_discrete import modal_beam
 from .transitions import HybridState
@@ -42,10 +41,6 @@ _SAMPLES = 1000
 def simulate(
     scene: Scene,
     *,
-    method: str = "exponential",
-    rtol: float = 1e-12,
-    atol: float = 1e-15,
-    nodes: int = 10,
     sample_times: Sequence[float] | np.ndarray | None = None,
     velocity_perturbation: float = 0.0,
     t_end: float | None = None,
@@ -55,12 +50,6 @@ def simulate(
 
     Parameters
     ----------
-    method
-        ``"exponential"``: exact modal form of each phase, for soft and stiff beams alike. ``"DOP853"``, ``"LSODA"``,
-        ``"Radau"``: scipy on the same equations, for soft beams, with ``rtol`` and ``atol``. A quasi-static beam is
-        integrated by DOP853.
-    nodes
-        Points of a scipy step at which events are looked for; 2, its ends, is what `scipy.integrate.solve_ivp` does.
     sample_times
         Times of the rows [s], as far as they lie in the run. Default: multiples of ``coupling.macro_step`` from the
         start (1000 of them where the scene gives tolerances instead), and a row before and after each event.
@@ -84,27 +73,19 @@ def simulate(
     ValueError
         If the scene or an argument is outside what this reference defines, or no row lies in the run.
     """
-    if scene.massless:
-        if method not in ("exponential", "DOP853"):
-            raise ValueError(f"method = {method!r}: a scene with a quasi-static beam is integrated by DOP853")
-        method = "DOP853"
-    if method not in ("exponential", *SCIPY_METHODS):
-        raise ValueError(f"method = {method!r}: one of exponential, {', '.join(SCIPY_METHODS)}")
-    if nodes < 2:
-        raise ValueError(f"nodes = {nodes}: at least 2, the ends of a step")
-    run = _Run(scene, Method(method, rtol, atol, nodes), velocity_perturbation, t_end)
-    return run.execute(sample_times, time_limit)
+    return _Run(scene, velocity_perturbation, t_end).execute(sample_times, time_limit)
 
 
 class _Run:
-    def __init__(self, scene: Scene, method: Method, velocity_perturbation: float, t_end: float | None) -> None:
-        self.scene, self.method, self.system = scene, method, _system(scene)
+    def __init__(self, scene: Scene, velocity_perturbation: float, t_end: float | None) -> None:
+        self.scene, self.system = scene, _system(scene)
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
         if scene.coupled and self.system.law.rigid and scene.contact.impact == "rest":
             raise ValueError(
                 "contact.impact = 'rest' leaves tip and spring with different velocities, which the rigid tie of law "
                 f"'{scene.contact.law}' excludes; allowed here: 'inelastic', 'tip'"
             )
+        self._form = QuasiStaticForm if isinstance(self.system, QuasiStaticSystem) else LinearForm
         self._forms: dict[Phase, LinearForm] = {}
         self.counts = {"steps": 0, "phases": 0}
         time, X = initial(self.system, velocity_perturbation)
@@ -192,25 +173,13 @@ class _Run:
         self.counts["phases"] += 1
         state, self._phase_start = self.state, self.state.time
         self._kink = self.system.loads.smooth_from(state.time)
-        self._propagator: ExponentialPropagator | RungeKuttaPropagator
-        if self.method.name == "exponential":
-            if state.phase not in self._forms:
-                self._forms[state.phase] = LinearForm(self.system, state.phase)
-            self._propagator = ExponentialPropagator(self._forms[state.phase], state.X)
-            return
-        horizon = max(min(self.t_end, self._kink) - state.time, 1e-300)
-        self._propagator = RungeKuttaPropagator(self.system, state.phase, state.X, horizon, self.method)
+        if state.phase not in self._forms:
+            self._forms[state.phase] = self._form(self.system, state.phase)
+        self._propagator = ExponentialPropagator(self.system, state.phase, self._forms[state.phase], state.X)
 
     def _summary(self, wall_time: float) -> dict[str, Any]:
-        summary = {
-            "reference": "event_driven",
-            "method": self.method.name,
-            "wall_time": wall_time,
-            "counts": {**self.counts, "events": len(self.state.events)},
-        }
-        if self.method.name != "exponential":
-            summary["tolerances"] = {"rtol": self.method.rtol, "atol": self.method.atol}
-        return summary
+        counts = {**self.counts, "events": len(self.state.events)}
+        return {"reference": "event_driven", "wall_time": wall_time, "counts": counts}
 
 
 def _system(scene: Scene) -> HybridSystem:

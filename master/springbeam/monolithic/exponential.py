@@ -12,13 +12,15 @@ so that no event slips through between two nodes. Beams whose fast modes stay si
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import scipy.linalg
 
 from .hybrid_system import HybridSystem, ReferenceFailure
 from .laws import Phase
 from .oscillators import GAUSS, STAGES, Oscillators, StepWeights
-from .propagators import Segment
 from .semi_discrete import singular_modes
 
 _MAX_ITERATIONS = 60
@@ -32,6 +34,26 @@ _UNSEEN_DISPLACEMENT, _UNSEEN_FORCE, _UNSEEN_ENERGY = 1e-12, 1e-9, 1e-13
 _TAIL = 1e-12
 _SMALLEST_SHARE = 2.0**-60
 _CACHED_SIZES = 64
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One accepted step: its states at ``nodes`` [s], from 0 to its size, and what finds those between them."""
+
+    nodes: np.ndarray  #: (k,)
+    states: np.ndarray  #: (k, 2r + 5)
+    inside: Callable[[float], np.ndarray]  #: τ [s] → X
+
+    @property
+    def size(self) -> float:
+        """How long it lasts [s]."""
+        return float(self.nodes[-1])
+
+    def state(self, tau: float) -> np.ndarray:
+        """Return X at ``tau`` after the start [s]."""
+        if tau <= 0.0 or tau == self.size:
+            return np.array(self.states[0 if tau <= 0.0 else -1])
+        return self.inside(tau)
 
 
 class LinearForm:
@@ -128,14 +150,15 @@ class LinearForm:
             x, x_dot = np.append(x, self.root_mass * X[s.Y]), np.append(x_dot, self.root_mass * X[s.Z])
         return (x, x_dot) if self.basis is None else ((x - self.offset) @ self.basis, x_dot @ self.basis)
 
-    def unpack(self, xi: np.ndarray, xi_dot: np.ndarray, X: np.ndarray) -> np.ndarray:
-        """Return states of shape (k, 2r + 5) from modes of shape (k, p); X supplies what does not move."""
+    def unpack(self, xi: np.ndarray, xi_dot: np.ndarray, times: np.ndarray, X: np.ndarray) -> np.ndarray:
+        """Return states (k, 2r + 5) from modes (k, p) at ``times`` (k,) [s]; X supplies what does not move."""
         s = self.system
         x, x_dot = (xi, xi_dot) if self.basis is None else (xi @ self.basis.T + self.offset, xi_dot @ self.basis.T)
         states = np.repeat(X[None, :], len(xi), axis=0)
         states[:, s.A], states[:, s.V] = x[:, : s.r], x_dot[:, : s.r]
         if self.spring_moves:
             states[:, s.Y], states[:, s.Z] = x[:, -1] / self.root_mass, x_dot[:, -1] / self.root_mass
+        states[:, s.T] = times
         return s.synchronise(self.phase, states)
 
     def load_at(self, times: np.ndarray) -> np.ndarray:
@@ -165,15 +188,14 @@ class LinearForm:
         self._cache[key] = known
         return known
 
-    def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray, time: float) -> float:
+    def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray, X: np.ndarray) -> float:
         """Return the step [s] that resolves the free motion seen in displacements, contact forces and dissipation.
 
-        ``r`` (k,) are the forces at the start, at ``time`` [s]. What is left out is no error: it only may hide an event
-        as small.
+        ``r`` (k,) are the forces at the start, X. What is left out is no error: it only may hide an event as small.
         """
         if not len(self.omega2):
             return self.system.loads.longest_step
-        force = r @ self.inputs + self.load_at(np.float64(time))
+        force = r @ self.inputs + self.load_at(X[self.system.T])
         rates, amplitudes = self.oscillators.components(xi, xi_dot, force)
         order = np.argsort(-rates)
         rates, amplitudes = rates[order], amplitudes[order]
@@ -207,10 +229,10 @@ def _modes(omega2: np.ndarray, space: np.ndarray, k: float, row: np.ndarray) -> 
 
 
 class ExponentialPropagator:
-    """Exact in the phase's linear part, Gauss collocation in the rest."""
+    """Integrates a phase from X on: exact in the linear part, ``form``, by Gauss collocation in the rest."""
 
-    def __init__(self, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
-        self.form, self.X = form, X
+    def __init__(self, system: HybridSystem, phase: Phase, form: LinearForm, X: np.ndarray, speed: float = 0.0) -> None:
+        self.system, self.phase, self.form, self.X = system, phase, form, X
         self._speed = speed  #: largest interface velocity so far × √mass, the scale of `_TAIL`
         self._force_limit = np.inf  #: what resolving r allows [s]
         self.elapsed = 0.0  #: since the start [s]
@@ -221,7 +243,7 @@ class ExponentialPropagator:
         xi, xi_dot = self.form.pack(self.X)
         outputs = self.form.outputs
         r = self.form.forces((outputs @ xi)[:, None], (outputs @ xi_dot)[:, None], self.X)
-        limit = self.form.longest_step(xi, xi_dot, r[:, 0], float(self.X[self.form.system.T]))
+        limit = self.form.longest_step(xi, xi_dot, r[:, 0], self.X)
         while True:
             size = self._next_size(remaining, resolution, min(limit, self._force_limit))
             segment = self._step(size, xi, xi_dot, r)
@@ -233,7 +255,7 @@ class ExponentialPropagator:
                 return segment
             self._force_limit = 0.5 * size
             if size < _SMALLEST_SHARE * remaining:
-                raise ReferenceFailure(f"no step resolves the interface force in phase {self.form.phase.name}")
+                raise ReferenceFailure(f"no step resolves the interface force in phase {self.phase.name}")
 
     def _next_size(self, remaining: float, resolution: float, limit: float) -> float:
         """Divide the way to the target into 2ᵏ equal steps, k changing on it: sizes recur, as weights are dear."""
@@ -247,9 +269,8 @@ class ExponentialPropagator:
 
     def _step(self, size: float, xi: np.ndarray, xi_dot: np.ndarray, start: np.ndarray) -> Segment | None:
         """Make one step, or None where it is too long for the forces r, whose values at its start are given."""
-        form, X = self.form, self.X
+        s, phase, form, X = self.system, self.phase, self.form, self.X
         w = form.weights(size)
-        s = form.system
         times = X[s.T] + size * GAUSS.nodes
         load = form.load_at(times)
         r = self._forces(w, xi, xi_dot, load, start)
@@ -261,19 +282,18 @@ class ExponentialPropagator:
         tail = np.sum(np.abs(r @ GAUSS.transform[-2:].T), axis=1)
         if np.any(tail * size * root_mobility > _TAIL * self._speed):
             return None
-        states = form.unpack(xi, xi_dot, X)
+        states = form.unpack(xi, xi_dot, np.append(times, X[s.T] + size), X)
         if not np.all(np.isfinite(states)):
             return None
-        states[:-1, s.T], states[-1, s.T] = times, X[s.T] + size
-        states[-1, s.D] = X[s.D] + size * float(GAUSS.weights @ s.dissipation_rate(form.phase, states[:-1]))
-        if len(form.loads):
+        states[-1, s.D] = X[s.D] + size * float(GAUSS.weights @ s.dissipation_rate(phase, states[:-1]))
+        if len(s.loads):
             states[-1, s.W] = X[s.W] + size * float(GAUSS.weights @ s.load_power(states[:-1]))
         nodes = np.concatenate([[0.0], GAUSS.nodes * size, [size]])
         states, speed = np.vstack([X, states]), self._speed
 
         def inside(tau: float) -> np.ndarray:
             # Stepped anew, because the forces of the whole segment may hold a kink that lies after τ.
-            inner = ExponentialPropagator(form, states[0], speed)
+            inner = ExponentialPropagator(s, phase, form, states[0], speed)
             while tau - inner.elapsed > 1e-15 * tau:
                 inner.advance(tau - inner.elapsed)
             return inner.X

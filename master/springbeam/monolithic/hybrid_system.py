@@ -26,9 +26,7 @@ from .loads import Loads
 from .semi_discrete import ModalBeam
 
 #: What rounding leaves of a sum that is exactly zero, as a share of its terms.
-_NOISE = 16.0 * float(np.finfo(float).eps)
-#: Its square is nothing beside any number.
-_COMPLEX_STEP = 1e-100
+NOISE = 16.0 * float(np.finfo(float).eps)
 
 
 class ReferenceFailure(RuntimeError):
@@ -63,10 +61,6 @@ class HybridSystem:
         self.Y, self.Z = 2 * self.r, 2 * self.r + 1
         self.D, self.W, self.T = 2 * self.r + 2, 2 * self.r + 3, 2 * self.r + 4
 
-    @property
-    def dissipative(self) -> bool:
-        return self.alpha_b > 0.0 or self.spring.damping > 0.0 or self.law.dissipative
-
     def joined(self, phase: Phase) -> bool:
         """Whether u = y holds as a constraint."""
         return self.alone or self.law.holds(phase.contact)
@@ -83,14 +77,14 @@ class HybridSystem:
             elastic = (spring.linear_stiffness + spring.cubic_stiffness * y**2) * y
             s = spring.external_force - spring.damping * z - elastic
         if len(self.loads):
-            values = self.loads.values(X[..., self.T].real)
+            values = self.loads.values(X[..., self.T])
             p, s = p + values @ self.loads.patterns, s + values @ self.loads.on_spring
         return p, s
 
     def load_power(self, X: np.ndarray) -> np.ndarray:
         """Return the power of the loads that vary [W] on states of shape (..., 2r + 5)."""
         speeds = X[..., self.V] @ self.loads.patterns.T + X[..., self.Z, None] * self.loads.on_spring
-        return np.asarray(np.sum(self.loads.values(X[..., self.T].real) * speeds, axis=-1))
+        return np.asarray(np.sum(self.loads.values(X[..., self.T]) * speeds, axis=-1))
 
     def motion(self, phase: Phase, X: np.ndarray) -> Motion:
         """Return accelerations and interface quantities of states of shape (..., 2r + 5)."""
@@ -112,25 +106,6 @@ class HybridSystem:
             return -1.0 / self.inverse_tip_mass, 0.0
         share = 1.0 / (1.0 + self.mass * self.inverse_tip_mass)
         return -self.mass * share, share
-
-    def derivative(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """Return dX/dt of states of shape (..., 2r + 5), which may be complex."""
-        m = self.motion(phase, X)
-        dX = np.zeros_like(X)
-        dX[..., self.A], dX[..., self.V] = X[..., self.V], m.a
-        if not phase.seated:
-            dX[..., self.Y], dX[..., self.Z] = m.z, m.z_dot
-        if self.dissipative:
-            dX[..., self.D] = self.dissipation_rate(phase, X)
-        if len(self.loads):
-            dX[..., self.W] = self.load_power(X)
-        dX[..., self.T] = 1.0
-        return dX
-
-    def jacobian(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        """Return ∂(dX/dt)/∂X of one state, (2r + 5, 2r + 5), but for the time: by complex steps, exact to rounding."""
-        steps = X + 1j * _COMPLEX_STEP * np.eye(self.size)
-        return np.asarray(self.derivative(phase, steps).imag.T / _COMPLEX_STEP)
 
     def dissipation_rate(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """Return α_b ȧᵀω²ȧ + α_s z², and what the law takes [W]."""
@@ -178,11 +153,11 @@ class HybridSystem:
         """Return what rounding leaves of a displacement, velocity or contact force that is exactly zero."""
         a, v, b = np.abs(X[self.A]), np.abs(X[self.V]), np.abs(self.b)
         if unit == "m":
-            return _NOISE * (float(a @ b) + abs(float(X[self.Y])) + abs(self.stop.position))
+            return NOISE * (float(a @ b) + abs(float(X[self.Y])) + abs(self.stop.position))
         if unit == "m/s":
-            return _NOISE * (float(v @ b) + abs(float(X[self.Z])))
+            return NOISE * (float(v @ b) + abs(float(X[self.Z])))
         beam = float(b @ (self.stiffness * (a + self.alpha_b * v) + np.abs(self.load)))
         p = self.spring
         spring = abs(p.external_force) + p.damping * abs(float(X[self.Z])) + abs(p.linear_stiffness * float(X[self.Y]))
         weight = self.inverse_tip_mass + self.inverse_mass
-        return _NOISE * ((beam if weight == np.inf else beam / weight) + spring)
+        return NOISE * ((beam if weight == np.inf else beam / weight) + spring)

@@ -84,7 +84,7 @@ class Law:
         return self.counts(contact) and contact != "slack"
 
     def force(self, p: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """Return C [N] at penetrations p [m] with rates ṗ [m/s], which are complex where it is differentiated."""
+        """Return C [N] at penetrations p [m] with rates ṗ [m/s]."""
         raise NotImplementedError
 
     def potential(self, p: np.ndarray) -> np.ndarray:

@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from .exponential import Segment
 from .hybrid_system import HybridSystem
 from .laws import Phase, Watch
-from .propagators import Segment
 
 
 class EventLocator:

@@ -14,14 +14,19 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 from scipy.integrate import fixed_quad
 
 from ..scene import Beam, Scene
-from .hybrid_system import HybridSystem
+from .exponential import LinearForm
+from .hybrid_system import NOISE, HybridSystem
 from .laws import Phase
 from .semi_discrete import ModalBeam
+
+#: What a spring alone has of a state X.
+_OF_SPRING = slice(2, None)
 
 
 class QuasiStaticSystem(HybridSystem):
@@ -50,14 +55,6 @@ class QuasiStaticSystem(HybridSystem):
     def multiplier(self, phase: Phase) -> tuple[float, float]:
         return -1.0, 0.0
 
-    def derivative(self, phase: Phase, X: np.ndarray) -> np.ndarray:
-        dX = super().derivative(phase, X)
-        if self.joined(phase):
-            dX[self.V] = dX[self.Z]
-        else:
-            dX[self.V] = -X[self.V] / self.alpha_b if self.alpha_b > 0.0 else 0.0
-        return dX
-
     def synchronise(self, phase: Phase, X: np.ndarray) -> np.ndarray:
         """Put the tip of X, in place, where the phase has it, on the spring or relaxing by itself; return X."""
         if self.joined(phase):
@@ -73,6 +70,11 @@ class QuasiStaticSystem(HybridSystem):
         after = self.synchronise(phase, X)[self.A] - self._rest
         return 0.5 * float(self.stiffness @ (before**2 - after**2)) if phase.contact == "free" else 0.0
 
+    def noise(self, unit: Literal["m", "m/s", "N"], X: np.ndarray) -> float:
+        """Return the noise of any pair, and what the rounding of an event's time makes of a place, and of the force."""
+        moved = NOISE * abs(float(X[self.T])) * (abs(float(X[self.V][0])) + abs(float(X[self.Z])))
+        return super().noise(unit, X) + {"m": moved, "m/s": 0.0, "N": float(self.stiffness[0]) * moved}[unit]
+
     def shapes(self, states: np.ndarray) -> None:
         """Return nothing: the unknowns are those of the tip alone."""
 
@@ -81,6 +83,42 @@ class QuasiStaticSystem(HybridSystem):
         found["e_beam"] = found["e_beam"] - 0.5 * np.sum(X[..., self.V] ** 2, axis=-1) + self._hidden
         found["e_load"] = found["e_load"] - 2.0 * self._hidden
         return found
+
+
+class QuasiStaticForm(LinearForm):
+    """A spring that bears the beam's stiffness, damping and load while it is joined; a free tip relaxes to u_F."""
+
+    def __init__(self, system: HybridSystem, phase: Phase) -> None:
+        spring, k = system.spring, float(system.stiffness[0])
+        joined = system.joined(phase)
+        if joined:
+            added = {
+                "linear_stiffness": spring.linear_stiffness + k,
+                "damping": spring.damping + system.alpha_b * k,
+                "external_force": spring.external_force + float(system.load[0]),
+            }
+            spring = spring.model_copy(update=added)
+        alone = HybridSystem(system.scene.model_copy(update={"upper": None, "lower": spring}), None)
+        super().__init__(alone, Phase("free", phase.seated))
+        self._pair, self._pair_phase = system, phase
+        self._relaxing = not joined and system.alpha_b > 0.0
+        self._rest = system.load / system.stiffness
+
+    def pack(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return super().pack(X[_OF_SPRING])
+
+    def unpack(self, xi: np.ndarray, xi_dot: np.ndarray, times: np.ndarray, X: np.ndarray) -> np.ndarray:
+        s, states = self._pair, np.repeat(X[None, :], len(xi), axis=0)
+        states[:, _OF_SPRING] = super().unpack(xi, xi_dot, times, X[_OF_SPRING])
+        if self._relaxing:
+            states[:, s.A] = self._rest + (X[s.A] - self._rest) * np.exp((X[s.T] - times) / s.alpha_b)[:, None]
+        return s.synchronise(self._pair_phase, states)
+
+    def longest_step(self, xi: np.ndarray, xi_dot: np.ndarray, r: np.ndarray, X: np.ndarray) -> float:
+        longest = super().longest_step(xi, xi_dot, r, X[_OF_SPRING])
+        if self._relaxing and abs(float(X[0] - self._rest[0])) > self._pair.noise("m", X):
+            return min(longest, self._pair.alpha_b)
+        return longest
 
 
 def _statics(beam: Beam) -> tuple[float, float, float]:
