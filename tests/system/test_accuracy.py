@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +18,13 @@ from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_time_difference, impulse_difference
 from springbeam.results.reading import load_trajectory
 from springbeam.results.recording import MemoryRecorder
+from springbeam.run.outcome import RunStopped
 from springbeam.run.runner import run
 from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.scene.reading import tomllib
 from springbeam.scene.statics import tip_load_deflection
-from springbeam.studies.accuracy import simulate
+from springbeam.studies import accuracy as search
+from springbeam.studies.accuracy import differences, simulate
 from springbeam.studies.crosscheck import compare
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.orders import Orders
@@ -109,6 +112,67 @@ def test_metrics_are_those_of_the_curve(name, of):
     assert METRICS[name](run) == pytest.approx(wanted, rel=2e-3)
     if name == "y_min":
         assert abs(rows / wanted - 1.0) > 2e-3
+
+
+def test_two_runs_are_compared_between_rows_in_events_and_in_the_peak_force():
+    """Copies of a run, each with one thing changed: a moment of the steps, an impulse, a time of contact, the peak."""
+    coupling = {"macro_step": 0.004}
+    run = simulate(scene_from_dict({**SCENES["compliance"], "stop": {"position": -0.03}, "coupling": coupling}))
+    struck = [event.impulse_foundation > 0.0 for event in run.events]
+    assert any(struck)
+    assert differences(run, run, 1e-3) == {"motion": 0.0, "times": 0.0, "impulses": 0.0, "force": 0.0}
+    steps = run.steps.copy()
+    for moment, power in (("y_integral", 1), ("y_integral_2", 2)):  # 30 s²(1 − s)² δ on each step, 15/8 δ at most
+        steps[moment] += 1e-2 * np.ptp(run.y) * steps["size"] ** power / power
+    louder = [replace(event, impulse_foundation=1.1 * event.impulse_foundation) for event in run.events]
+    later = [replace(event, time=event.time + 0.01 * hit) for event, hit in zip(run.events, struck, strict=True)]
+    peak = 1.1 * run.summary["contact_force_max"]
+    changed = {
+        "motion": (replace(run, steps=steps), 15.0 / 8.0 * 1e-2 * np.ptp(run.y) / np.abs(run.y - run.y[0]).max()),
+        "impulses": (replace(run, events=louder), 0.1),
+        "times": (replace(run, events=later), 0.01 / 0.25),
+        "force": (replace(run, summary={**run.summary, "contact_force_max": peak}), 0.1 / 1.1),
+    }
+    for name, (other, expected) in changed.items():
+        assert differences(run, other, 1e-3)[name] == pytest.approx(expected, rel=0.05), name
+
+
+FAR, NEAR = {"motion": 8e-3, "force": 1e-5}, {"motion": 1e-5, "force": 1.9e-3}
+
+
+@pytest.mark.parametrize(
+    ("apart", "runs"),
+    [
+        ([{"motion": 6e-4}], 2),
+        ([{"motion": 7e-4}, {"motion": 6e-4}], 3),  # 1.5 times that is more than 1e-3
+        ([{"motion": 8e-3}, {"motion": 1.9e-3}], 3),  # order 2: the finer run has a third of their difference
+        ([{"motion": 8e-3}, {"motion": 2.1e-3}, {"motion": 6e-4}], 4),
+        ([{"motion": 2.2e-3}, {"motion": 1.9e-3}, {"motion": 6e-4}], 4),  # order 1 at least
+        ([FAR, NEAR, {"motion": 1e-5, "force": 6e-4}], 4),  # the order of the motion says nothing of the force
+        ([{"motion": 8e-3}, None, {"motion": 1.9e-3}, {"motion": 6e-4}], 6),  # nor does a run before one that stopped
+    ],
+)
+def test_steps_are_halved_until_the_estimate_of_each_error_does(apart, runs, monkeypatch):
+    """Runs and their differences made up; ``None`` is a run that stops."""
+    scene = scene_from_dict({**SCENES["hard spring"], "accuracy": 1e-3})
+    run = simulate(with_changes(scene, accuracy=None, coupling={"macro_step": 0.01}))
+    given, sizes = iter(apart), []
+
+    def made(prepared):
+        sizes.append(prepared.coupling.H)
+        if len(sizes) == 3 and None in apart:
+            next(given)
+            error = RunStopped("made up", 0.0)
+            error.run = run
+            raise error
+        return run
+
+    monkeypatch.setattr(search.runner, "simulate", made)
+    monkeypatch.setattr(search, "differences", lambda *_: next(given))
+    found = search.pick(scene)
+    assert len(sizes) == runs
+    assert found.summary["accuracy"]["pilot_runs"] == runs - 1
+    np.testing.assert_allclose(sizes, sizes[0] / 2.0 ** np.arange(runs), rtol=1e-12)
 
 
 def test_a_search_costs_little_more_than_the_run_that_it_finds():
