@@ -45,12 +45,10 @@ def row(name: str, group: list[Verdict]) -> list[str]:
 
 
 def lines(verdicts: list[Verdict]) -> list[str]:
-    """Return the table: a line for each way, and for each kind of scene with an accuracy and at a fixed step."""
-    promised = [v for v in verdicts if "accuracy" in v.way]
+    """Return the table: a line for each way, and for each kind of scene at fixed steps."""
     fixed = [v for v in verdicts if "accuracy" not in v.way]
     rows = [row(way, [v for v in verdicts if v.way == way]) for way in WAYS]
-    for name, group in (("accuracy", promised), ("fixed step", fixed)):
-        rows += [row(f"{kind}, {name}", [v for v in group if v.kind == kind]) for kind in KINDS]
+    rows += [row(f"{kind}, fixed steps", [v for v in fixed if v.kind == kind]) for kind in KINDS]
     return table(HEAD, [cells for cells in rows if any(cell not in ("0", "0 (0)", "–") for cell in cells[1:])])
 
 
