@@ -47,7 +47,7 @@ void validate(const Parameters& p) {
   if (p.n_modes > unknowns) {
     reject("n_modes", p.n_modes, "between 0 (all) and " + std::to_string(unknowns) + ", the unknowns of " + mesh);
   }
-  const int most = std::min(unknowns / 2, max_dense_unknowns);
+  const int most = std::min({unknowns / 2, max_dense_unknowns, max_mode_values / unknowns});
   if (unknowns > max_dense_unknowns && (p.n_modes == 0 || p.n_modes > most)) {
     reject("n_modes", p.n_modes,
            "between 1 and " + std::to_string(most) + " with " + mesh + " (all modes only up to " +
@@ -162,6 +162,13 @@ Beam::Forecast Beam::forecast_per_load(double size, std::size_t shape) {
   trial.clear();
   now_.loads[shape] = 1.0;
   return forecast(size);
+}
+
+Beam::Response Beam::response_per_load(std::size_t shape) {
+  Trial trial(*this);
+  trial.clear();
+  (shape == Loads::count ? now_.tip_force : now_.loads[shape]) = 1.0;
+  return response(Order::value);
 }
 
 std::array<double, 3> Beam::tip_response(double size) {

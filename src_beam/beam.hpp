@@ -24,21 +24,23 @@ inline constexpr int max_elements = 1000000;
 /// Most unknowns of a dense eigenproblem: of the mesh (two per element and degree) where all modes are wanted, of the
 /// reduced basis where some are.
 inline constexpr int max_dense_unknowns = 1000;
+/// Most unknowns times modes: the search for modes holds five such arrays, 1 GB.
+inline constexpr int max_mode_values = 25'000'000;
 
 /// All in SI units; defaults are the unit beam of the paper's section 3.
 struct Parameters {
-  double density = 1.0;                ///< ρ [kg/m³]
-  double area = 1.0;                   ///< A [m²]
-  double second_moment_of_area = 1.0;  ///< I [m⁴]
-  double young_modulus = 1.0;          ///< E [Pa]
-  double shear_modulus = 1.0;          ///< G [Pa]
-  double shear_coefficient = 1.0;      ///< K [–]
-  double length = 1.0;                 ///< L [m]
-  double alpha_b = 0.0;                ///< Kelvin–Voigt retardation time [s]
-  int n_elements = 50;                 ///< uniform elements
-  int element_degree = 1;              ///< polynomial degree of u and θ in an element, 1 … 12; 1 = P1
-  int n_modes = 0;                     ///< lowest modes kept by `modal`; 0 = all of the mesh's
-  bool reduced_integration = false;    ///< p-point Gauss rule for the shear; false = exact (59)
+  double density = 1.0;                             ///< ρ [kg/m³]
+  double area = 1.0;                                ///< A [m²]
+  double second_moment_of_area = 1.0;               ///< I [m⁴]
+  double young_modulus = 1.0;                       ///< E [Pa]
+  double shear_modulus = 1.0;                       ///< G [Pa]
+  double shear_coefficient = 1.0;                   ///< K [–]
+  double length = 1.0;                              ///< L [m]
+  double alpha_b = 0.0;                             ///< Kelvin–Voigt retardation time [s]
+  int n_elements = 50;                              ///< uniform elements
+  int element_degree = 1;                           ///< polynomial degree of u and θ in an element, 1 … 12; 1 = P1
+  int n_modes = 0;                                  ///< lowest modes kept by `modal`; 0 = all of the mesh's
+  bool reduced_integration = false;                 ///< p-point Gauss rule for the shear; false = exact (59)
   MassMatrix mass_matrix = MassMatrix::consistent;  ///< see timoshenko.hpp
   Integrator integrator = Integrator::modal;
   double rho_inf = 1.0;                   ///< spectral radius at infinity of generalized-α; 1 = midpoint rule (62)
@@ -99,6 +101,11 @@ class Loads {
 inline constexpr int shape_points = 21;
 using Shape = std::array<double, shape_points>;
 
+/// There, on the part between x and the tip: Q > 0 pulls the part before it up, M > 0 bends the beam upwards.
+struct InternalForces {
+  Shape shear{}, moment{};  ///< Q [N], M [N·m]
+};
+
 /// One beam; make_beam() chooses the integrator behind it. Every step depends only on the state, the inputs and the
 /// step size: repeated from the same saved state it is bit-identical. Not thread-safe per object; objects share
 /// nothing.
@@ -124,10 +131,10 @@ class Beam {
   const Loads::Values& loads() const { return now_.loads; }  ///< acting now
   double tip_force() const { return now_.tip_force; }        ///< likewise
 
-  virtual double tip_displacement() const = 0;                            ///< u(L) [m]
-  virtual double tip_velocity() const = 0;                                ///< u_t(L) [m/s]
-  virtual double tip_acceleration() const = 0;                            ///< u_tt(L) [m/s²]
-  virtual double tip_rotation() const = 0;                                ///< θ(L) [rad]
+  virtual double tip_displacement() const = 0;                                         ///< u(L) [m]
+  virtual double tip_velocity() const = 0;                                             ///< u_t(L) [m/s]
+  double tip_acceleration() const { return response(Order::value).tip_acceleration; }  ///< u_tt(L) [m/s²]
+  virtual double tip_rotation() const = 0;                                             ///< θ(L) [rad]
   double tip_displacement_integral() const { return now_.integral; }      ///< ∫ u dτ over the last step [m·s]
   double tip_displacement_integral_2() const { return now_.integral_2; }  ///< ∫∫ u dτ dτ over it [m·s²]
   virtual double kinetic_energy() const = 0;                              ///< [J]
@@ -147,6 +154,22 @@ class Beam {
   virtual double tip_mass() const = 0;                              ///< 1/(eᵀ M⁻¹ e) [kg]
   virtual void deflection(Shape& u) const = 0;                      ///< [m]
   virtual void rotation(Shape& theta) const = 0;                    ///< [rad]
+
+  /// What follows the forces that act now without delay. Internal forces are those that equilibrium asks for, of C, the
+  /// loads and the inertia between a point and the tip: there M = 0 and Q = C + the tip load, and the clamp's reaction,
+  /// −Q and −M at x = 0, balances them and the rate of momentum.
+  struct Response {
+    double tip_acceleration = 0.0;
+    InternalForces forces;
+  };
+  enum class Order { value, rate };
+  /// `rate`: how it changes, with C and the loads at these rates.
+  virtual Response response(Order order, const Loads::Values& loads_rate = {}, double tip_force_rate = 0.0) const = 0;
+  /// What 1 N of the tip force (Loads::count) or a unit of a load adds to it.
+  Response response_per_load(std::size_t shape);
+
+  /// Put the beam at rest under the tip force and the loads that act now.
+  virtual void rest() = 0;
 
   /// How the tip goes on over two steps of `size` [s] without a tip force.
   struct Forecast {

@@ -149,7 +149,9 @@ class GeneralizedAlphaBeam final : public Beam {
         gamma_(0.5 - alpha_m_ + alpha_f_),
         K_(mesh_.stiffness()),
         M_(mesh_.mass()),
-        tip_response_(mesh_.mass_solve(mesh_.unit_tip_force()) / mu_),
+        mass_factor_(M_),
+        resultants_(mesh_),
+        tip_response_(mass_factor_.solve(mesh_.unit_tip_force()) / mu_),
         q_(p.initial_deflection_slope * mesh_.linear_shape()),
         v_(p.initial_velocity_slope * mesh_.linear_shape()),
         a_(VectorXd::Zero(midpoint_ ? 0 : mesh_.size())),
@@ -157,6 +159,7 @@ class GeneralizedAlphaBeam final : public Beam {
         v0_(mesh_.size()),
         a0_(a_),
         rhs_(mesh_.size()) {
+    require_factor(mass_factor_);
     const auto largest = [](const auto& values) { return values.cwiseAbs().maxCoeff(); };
     ordinary_ = true;
     for (const double value : {largest(K_.coeffs()), largest(shape(Loads::distributed)), largest(tip_response_), mu_,
@@ -167,7 +170,21 @@ class GeneralizedAlphaBeam final : public Beam {
 
   double tip_displacement() const override { return q_[mesh_.tip_index()]; }
   double tip_velocity() const override { return v_[mesh_.tip_index()]; }
-  double tip_acceleration() const override { return tip_response_.dot(inertia()); }
+  Response response(Order order, const Loads::Values& loads_rate, double tip_force_rate) const override {
+    const VectorXd now = mass_factor_.solve(inertia()) / mu_;
+    if (order == Order::value) return respond(now, now_.loads, now_.tip_force);
+    VectorXd force = load_of(loads_rate) - mu_ * mesh_.stiffness_times(VectorXd(v_ + alpha_ * now));
+    force[mesh_.tip_index()] += tip_force_rate;
+    return respond(mass_factor_.solve(force) / mu_, loads_rate, tip_force_rate);
+  }
+  void rest() override {
+    VectorXd force = load_of(now_.loads);
+    force[mesh_.tip_index()] += now_.tip_force;
+    q_ = mesh_.flexibility_times(force) / mu_;
+    v_.setZero();
+    a_.setZero();
+    last_ = {now_.tip_force, 0.0, 1.0, now_.loads};
+  }
   double tip_rotation() const override { return q_[mesh_.tip_rotation_index()] / mesh_.radius_of_gyration(); }
   double tip_rotation_rate() const override { return v_[mesh_.tip_rotation_index()] / mesh_.radius_of_gyration(); }
   double kinetic_power() const override { return v_.dot(inertia()); }
@@ -232,6 +249,16 @@ class GeneralizedAlphaBeam final : public Beam {
     VectorXd force = load_of(now_.loads) - mu_ * mesh_.stiffness_times(VectorXd(q_ + alpha_ * v_));
     force[mesh_.tip_index()] += now_.tip_force;
     return force;
+  }
+
+  Response respond(const VectorXd& acceleration, const Loads::Values& loads, double tip_force) const {
+    Response response{acceleration[mesh_.tip_index()], resultants_.of(loads, tip_force)};
+    const InternalForces inertia = mesh_.inertia(acceleration.data());
+    for (std::size_t j = 0; j < inertia.shear.size(); ++j) {
+      response.forces.shear[j] -= inertia.shear[j];
+      response.forces.moment[j] -= inertia.moment[j];
+    }
+    return response;
   }
 
   /// Makes q_ and v_ from q0_ and v0_; returns the loss.
@@ -356,6 +383,8 @@ class GeneralizedAlphaBeam final : public Beam {
   Eigen::SparseMatrix<double> K_, M_;                  // with the same pattern
   mutable std::array<VectorXd, Loads::count> shapes_;  // of the loads, where one was asked for
   mutable VectorXd load_;
+  Timoshenko::MassFactor mass_factor_;
+  LoadResultants resultants_;
   VectorXd tip_response_;  // M⁻¹e/ρA [1/kg], the velocity that a unit impulse leaves
 
   VectorXd q_, v_, a_;  // state [m, m/s, m/s²]; a only for ρ∞ < 1

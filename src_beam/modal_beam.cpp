@@ -55,6 +55,8 @@ class ModalBeam final : public Beam {
     for (const Eigen::VectorXd& load : modes_.loads) bound(load);
     bound(modes_.deflection);
     bound(modes_.rotation);
+    bound(modes_.shear);
+    bound(modes_.moment);
     bound(omega2_.matrix());
     bound(damping_.matrix());
     update_tip();
@@ -62,7 +64,18 @@ class ModalBeam final : public Beam {
 
   double tip_displacement() const override { return displacement_; }
   double tip_velocity() const override { return velocity_; }
-  double tip_acceleration() const override { return (tip_ * acceleration()).sum(); }
+  Response response(Order order, const Loads::Values& loads_rate, double tip_force_rate) const override {
+    const ArrayXd now = acceleration();
+    if (order == Order::value) return respond(now, now_.loads, now_.tip_force);
+    const ArrayXd jerk = modal_force(loads_rate, tip_force_rate) - omega2_ * v_ - damping_ * now;
+    return respond(jerk, loads_rate, tip_force_rate);
+  }
+  void rest() override {
+    unbooked_.size = 0.0;
+    eta_ = modal_force(now_.loads, now_.tip_force) / omega2_;
+    v_.setZero();
+    update_tip();
+  }
   double tip_rotation_rate() const override { return modes_.tip_rotation.dot(v_.matrix()); }
   double kinetic_power() const override { return (v_ * acceleration()).sum(); }
   double strain_power() const override { return (omega2_ * eta_ * v_).sum(); }
@@ -190,10 +203,20 @@ class ModalBeam final : public Beam {
   }
 
   /// η̈ of each mode under what acts now.
-  ArrayXd acceleration() const {
-    ArrayXd force = now_.tip_force * tip_;
-    for (std::size_t i = 0; i < Loads::count; ++i) force += now_.loads[i] * modes_.loads[i].array();
-    return force - omega2_ * eta_ - damping_ * v_;
+  ArrayXd acceleration() const { return modal_force(now_.loads, now_.tip_force) - omega2_ * eta_ - damping_ * v_; }
+  ArrayXd modal_force(const Loads::Values& loads, double tip_force) const {
+    ArrayXd force = tip_force * tip_;
+    for (std::size_t i = 0; i < Loads::count; ++i) {
+      if (loads[i] != 0.0) force += loads[i] * modes_.loads[i].array();
+    }
+    return force;
+  }
+  Response respond(const ArrayXd& acceleration, const Loads::Values& loads, double tip_force) const {
+    Response response{(tip_ * acceleration).sum(), modes_.resultants.of(loads, tip_force)};
+    const Eigen::VectorXd a = acceleration.matrix();
+    Eigen::Map<Eigen::VectorXd>(response.forces.shear.data(), shape_points) -= modes_.shear * a;
+    Eigen::Map<Eigen::VectorXd>(response.forces.moment.data(), shape_points) -= modes_.moment * a;
+    return response;
   }
 
   /// Due only when it is asked for or its work space is needed again: a step that is tried and taken back, as event

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gauss.hpp"
+
 namespace beam {
 namespace {
 
@@ -193,12 +195,6 @@ Gamma gamma_functions(const Roots& z) {
   return by_separation(z);
 }
 
-// Gauss–Legendre on [0, 1], exact to degree 15; the other half is symmetric about 1/2.
-constexpr std::array<double, 4> gauss_node = {0.0198550717512318841582, 0.1016667612931866302042,
-                                              0.2372337950418355070911, 0.4082826787521750975303};
-constexpr std::array<double, 4> gauss_weight = {0.0506142681451881295763, 0.1111905172266872352722,
-                                                0.1568533229389436436690, 0.1813418916891809914826};
-
 }  // namespace
 
 OscillatorResponse oscillator_response(double omega, double c, double t) {
@@ -228,13 +224,11 @@ std::array<double, 10> oscillator_dissipation(double omega, double c, double t) 
   double length = std::ldexp(t, -doublings);
 
   Matrix4d Q = Matrix4d::Zero();
-  for (std::size_t q = 0; q < 2 * gauss_node.size(); ++q) {
-    const std::size_t half = q / 2;
-    const double sigma = q % 2 == 0 ? gauss_node[half] : 1.0 - gauss_node[half];
+  at_gauss_points([&](double sigma, double weight) {
     const Gamma gamma = by_series(sigma * omega * length, sigma * c * length);
     const Vector4d basis(gamma[0], sigma * gamma[1], sigma * sigma * gamma[2], sigma * sigma * sigma * gamma[3]);
-    Q += gauss_weight[half] * basis * basis.transpose();
-  }
+    Q += weight * basis * basis.transpose();
+  });
 
   const Vector4d unit(0.5, 0.25, 0.125, 0.0625);  // of z, from t_j to 2 t_j; Q has one more ½, its own
   for (int step = 0; step < doublings; ++step) {

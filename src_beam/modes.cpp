@@ -245,6 +245,15 @@ Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
     mesh.sample_scaled_rotation(basis.col(k).data(), theta.col(k).data());
   }
   modes.deflection = u * W;
+  MatrixXd shear(shape_points, columns), moment(shape_points, columns);
+  for (Index k = 0; k < columns; ++k) {
+    const InternalForces forces = mesh.inertia(basis.col(k).data());
+    shear.col(k) = Eigen::Map<const VectorXd>(forces.shear.data(), shape_points);
+    moment.col(k) = Eigen::Map<const VectorXd>(forces.moment.data(), shape_points);
+  }
+  modes.shear = shear * W;
+  modes.moment = moment * W;
+  modes.resultants = LoadResultants(mesh);
   modes.rotation = rotation_norm * (theta * W);
   modes.tip = (basis.row(mesh.tip_index()) * W).transpose();
   modes.tip_rotation = rotation_norm * (basis.row(mesh.tip_rotation_index()) * W).transpose();

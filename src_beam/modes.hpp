@@ -33,6 +33,8 @@ struct Modes {
   Eigen::VectorXd linear_shape;                     ///< coordinates of u = x, θ = 0: φᵀ M q [m √kg], m
   Eigen::MatrixXd deflection;                       ///< φ_u at the output points, 21 × m
   Eigen::MatrixXd rotation;                         ///< φ_θ at the output points, 21 × m
+  Eigen::MatrixXd shear, moment;                    ///< of the inertia of φ there, 21 × m, see Timoshenko::inertia()
+  LoadResultants resultants;                        ///< of the loads there
   double residual = 0.0;  ///< largest ‖φ − ω² K⁻¹M φ‖_K / ω of the computed modes, φ with unit M-norm
 };
 

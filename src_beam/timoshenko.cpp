@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "gauss.hpp"
+
 namespace beam {
 
 using Eigen::Index;
@@ -41,6 +43,7 @@ Timoshenko::Timoshenko(const Parameters& p)
       b_(p.young_modulus / p.density),
       b_top_(b_),
       s_(p.shear_modulus * p.shear_coefficient / p.density),
+      length_(p.length),
       point_force_position_(p.point_force_position) {
   if (!p.reduced_integration) b_top_ += s_ * (h_ / r_) * (h_ / r_) / (4.0 * static_cast<double>(4 * p_ * p_ - 1));
   for (const double value : {h_, mu_, r_, b_, b_top_, s_}) {
@@ -398,6 +401,87 @@ Eigen::VectorXd Timoshenko::linear_shape() const {
   Eigen::VectorXd q = Eigen::VectorXd::Zero(size());
   for (Index e = 1; e <= n_; ++e) q[2 * p_ * e - 1] = static_cast<double>(e) * h_;
   return q;
+}
+
+InternalForces Timoshenko::inertia(const double* a) const {
+  InternalForces forces;
+  double shear = 0.0, moment = 0.0;  // about the point reached, from the tip on
+  constexpr Index intervals = shape_points - 1;
+  Index next = intervals - 1;  // output point
+  for (Index e = n_ - 1; e >= 0; --e) {
+    const Field theta = field(p_, a, 2 * p_ * e), u = field(p_, a, 2 * p_ * e + 1);
+    double right = 1.0;  // part of the element that is left
+    while (right > 0.0) {
+      // x_next, from this element's left end
+      const double place = static_cast<double>(next * n_ - e * intervals) / static_cast<double>(intervals);
+      const bool inside = next >= 0 && place >= 0.0;
+      const double left = inside ? place : 0.0, size = h_ * (right - left);
+      double force = 0.0, lever = 0.0, turn = 0.0;  // ∫u, ∫(s − x_left) u, ∫θ̃
+      at_gauss_points([&](double part, double weight) {
+        const double xi = 2.0 * (left + part * (right - left)) - 1.0, value = size * weight * legendre_sum(u, xi);
+        force += value;
+        lever += size * part * value;
+        turn += size * weight * legendre_sum(theta, xi);
+      });
+      moment += size * shear + mu_ * (lever + r_ * turn);
+      shear += mu_ * force;
+      right = left;
+      if (!inside) break;
+      forces.shear[static_cast<std::size_t>(next)] = shear;
+      forces.moment[static_cast<std::size_t>(next)] = moment;
+      --next;
+    }
+  }
+  return forces;
+}
+
+double Timoshenko::legendre_sum(const Field& v, double xi) const {
+  double sum = 0.5 * (v.left * (1.0 - xi) + v.right * (1.0 + xi)), before = 1.0, legendre = xi;
+  for (Index k = 2; k <= p_; ++k) {
+    const double degree = static_cast<double>(k);
+    const double next = ((2.0 * degree - 1.0) * xi * legendre - (degree - 1.0) * before) / degree;
+    sum += v.f[k] * next;
+    before = legendre;
+    legendre = next;
+  }
+  return sum;
+}
+
+InternalForces Timoshenko::load_resultants(std::size_t shape) const {
+  InternalForces forces;
+  for (std::size_t j = 0; j < forces.shear.size(); ++j) {
+    const double X = static_cast<double>(j) / (shape_points - 1), L = length_;  // x/L
+    double &Q = forces.shear[j], &M = forces.moment[j];
+    if (shape < Loads::point || shape == Loads::base_acceleration) {
+      const double i = shape < Loads::point ? static_cast<double>(shape) : 0.0;
+      const double scale = shape < Loads::point ? 1.0 : -mu_;
+      const double whole = (1.0 - std::pow(X, i + 1.0)) / (i + 1.0);
+      Q = scale * L * whole;
+      M = scale * L * L * ((1.0 - std::pow(X, i + 2.0)) / (i + 2.0) - X * whole);
+    } else if (shape == Loads::hat) {
+      const double from = 1.0 - h_ / L, r = std::max(0.0, (X - from) * L / h_);  // part of the last element
+      Q = h_ * (1.0 - r * r) / 2.0;
+      M = h_ * h_ * ((1.0 - r * r * r) / 3.0 - r * (1.0 - r * r) / 2.0) + std::max(0.0, from - X) * L * Q;
+    } else {
+      const double position = shape == Loads::tip ? 1.0 : point_force_position_[shape - Loads::point];
+      Q = position >= X ? 1.0 : 0.0;
+      M = std::max(0.0, position - X) * L;
+    }
+  }
+  return forces;
+}
+
+InternalForces LoadResultants::of(Loads::Values loads, double tip_force) const {
+  loads[Loads::tip] += tip_force;
+  InternalForces sum;
+  for (std::size_t i = 0; i < loads.size(); ++i) {
+    if (loads[i] == 0.0) continue;
+    for (std::size_t j = 0; j < sum.shear.size(); ++j) {
+      sum.shear[j] += loads[i] * unit_[i].shear[j];
+      sum.moment[j] += loads[i] * unit_[i].moment[j];
+    }
+  }
+  return sum;
 }
 
 /// At a part of the element: of its left node, of its right node, N_2, …, N_p.

@@ -90,6 +90,12 @@ class Timoshenko {
   Eigen::VectorXd load(std::size_t shape) const;
   Eigen::VectorXd linear_shape() const;  ///< u = x, θ = 0
 
+  /// Shear force [N] and bending moment [N·m] at x = 0, L/20, …, L that hold what lies between x and the tip, the exact
+  /// integrals Q = ∫ f ds, M = ∫ (s − x) f + g ds over x … L: of the inertia of an acceleration, f = ρA ü and g = ρI θ̈,
+  InternalForces inertia(const double* acceleration) const;
+  /// and of a load of 1 N/m, 1 N or 1 m/s² (Loads::Shape). A point force at x itself counts.
+  InternalForces load_resultants(std::size_t shape) const;
+
   /// Fields at x = 0, L/20, …, L: `values[j]` = u or θ̃.
   void sample_deflection(const double* q, double* values) const { sample(q, 1, values); }
   void sample_scaled_rotation(const double* q, double* values) const { sample(q, 0, values); }
@@ -113,6 +119,7 @@ class Timoshenko {
   Strains strains(Degree p, const double* x, Eigen::Index first) const;
   template <typename Degree>
   Field field(Degree p, const double* x, Eigen::Index first) const;
+  double legendre_sum(const Field& v, double xi) const;
   void add_linear_products(double a, const double* x, double c, const double* z, double* y) const;
   double bending_stiffness(Eigen::Index p, Eigen::Index j) const { return j + 1 < p ? b_ : b_top_; }
   template <typename Entry>
@@ -134,7 +141,22 @@ class Timoshenko {
   double b_;      // bending stiffness per ρI, b_j [m²/s²]
   double b_top_;  // b_{p−1}
   double s_;      // shear stiffness per ρA [m²/s²]
+  double length_;
   std::array<double, 4> point_force_position_;
+};
+
+/// Timoshenko::load_resultants() of all loads.
+class LoadResultants {
+ public:
+  LoadResultants() = default;
+  explicit LoadResultants(const Timoshenko& mesh) {
+    for (std::size_t i = 0; i < Loads::count; ++i) unit_[i] = mesh.load_resultants(i);
+  }
+  /// Of loads and a tip force.
+  InternalForces of(Loads::Values loads, double tip_force) const;
+
+ private:
+  std::array<InternalForces, Loads::count> unit_;
 };
 
 /// @throws std::runtime_error if the factor is not to be used

@@ -26,8 +26,13 @@ constexpr double far = 1e6;  ///< as many hilltops away, nothing brings a top ba
 /// One step of a spring: a sequence of segments, each smooth, joined by events. Leaves the spring as it is.
 class Spring::Step {
  public:
-  Step(Spring& spring, double size, const Loads& loads)
-      : spring_(spring), parameters_(spring.parameters_), state_(spring.state_), size_(size), loads_(loads) {}
+  Step(Spring& spring, double time, double size, const Loads& loads)
+      : spring_(spring),
+        start_(time),
+        parameters_(spring.parameters_),
+        state_(spring.state_),
+        size_(size),
+        loads_(loads) {}
 
   State run() {
     state_.integral = state_.integral_2 = state_.stop_force = state_.stop_impulse = 0.0;
@@ -81,6 +86,8 @@ class Spring::Step {
       const double tolerance = parameters_.relative_tolerance * std::abs(state_.y) + parameters_.absolute_tolerance;
       const bool dies_out = pressed && rebound * rebound <= 2.0 * pull * tolerance;
       state_.z = dies_out ? 0.0 : rebound;
+      state_.impacts += 1.0;
+      state_.last_impact = start_ + t_;
       state_.stop_impulse += parameters_.mass * (state_.z - before);
       state_.impact_loss += parameters_.mass / 2 * (before * before - state_.z * state_.z);
     }
@@ -139,6 +146,7 @@ class Spring::Step {
   }
 
   Spring& spring_;
+  const double start_;  ///< [s]
   const Parameters& parameters_;
   State state_;
   const double size_;
@@ -157,14 +165,14 @@ Spring::Spring(const Parameters& p)
   if (parameters_.stop_enabled) seat_.emplace(motion_, parameters_);
 }
 
-void Spring::step(double size, const Inputs& inputs) {
+void Spring::step(double size, const Inputs& inputs, double time) {
   if (size < smallest_step)
     throw StepFailure("spring: a step of " + number(size) + " s is too small, its square underflows; use a step size " +
                           "of at least " + number(smallest_step) + " s",
                       0.0);
   const Loads loads = Loads::from(parameters_, inputs);
   const State before = state_;
-  state_ = Step(*this, size, loads).run();
+  state_ = Step(*this, time, size, loads).run();
   see(loads, size, true);
   // Impacts turn the velocity around, y goes on: the step's integrals know the work through all of its events.
   state_.load_work += work(load_of(parameters_, inputs), size, state_.y - before.y, state_.integral - before.y * size,
@@ -205,6 +213,11 @@ void Spring::apply_impulse(double impulse) {
 double Spring::acceleration() const {
   return seated() ? 0.0 : motion_.acceleration(state_.y, state_.z, state_.force, reaction());
 }
+double Spring::jerk(double force_rate, double reaction_rate) const {
+  if (seated()) return 0.0;
+  return (force_rate - reaction_rate - parameters_.damping * acceleration()) / parameters_.mass +
+         motion_.acceleration_by_displacement(state_.y, 0.0) * state_.z;
+}
 double Spring::reaction() const {
   return parameters_.compliant() ? motion_.compliance().force(depth(), state_.z - state_.tip_rate) : 0.0;
 }
@@ -232,6 +245,8 @@ void Spring::restore(const std::vector<double>& state) {
     if (!std::isfinite(value))
       throw std::invalid_argument("spring: a saved state holds " + number(value) + ": must be finite");
   const auto restored = from_flat<State>(state.data());
+  if (!(restored.impacts >= 0.0 && restored.impacts < 0x1p31))
+    throw std::invalid_argument("spring: a saved state counts " + number(restored.impacts) + " impacts");
   if (!(restored.steps >= 0.0 && restored.steps < 0x1p53))
     throw std::invalid_argument("spring: a saved state counts " + number(restored.steps) + " internal steps");
   state_ = restored;

@@ -7,6 +7,7 @@
 //     0 ≤ N ⊥ y − φ ≥ 0,   z⁺ = −e z⁻ at an impact. Impacts that die out end seated, y = φ, until N would be < 0.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -34,9 +35,10 @@ class Spring {
   Spring(const Spring&) = delete;
   Spring& operator=(const Spring&) = delete;
 
-  /// Advance by `size` [s] > 0, finite. The work is bounded: a step that spans too much of the motion is refused.
+  /// Advance by `size` [s] > 0, finite, from `time`. The work is bounded: a step that spans too much of the motion is
+  /// refused.
   /// @throws StepFailure (state unchanged)
-  void step(double size, const Inputs& inputs);
+  void step(double size, const Inputs& inputs, double time = 0.0);
 
   /// Take `inputs` as acting at the present instant, for acceleration(), reaction() and contact_energy() before the
   /// first step or after an input has jumped. The motion does not depend on it. `extrapolated`: see there.
@@ -55,12 +57,18 @@ class Spring {
   double load_work() const { return state_.load_work; }           ///< of f_s and −m a since the start [J]
   double impact_loss() const { return state_.impact_loss; }       ///< in stop impacts since the start [J]
   bool seated() const { return state_.seated != 0.0; }            ///< held on the foundation by the law inside
-  long ida_steps() const { return static_cast<long>(state_.steps); }  ///< internal IDA steps since the start
-  double kinetic_energy() const;                                      ///< ½ m z² [J]
-  double potential_energy() const;                                    ///< ½ k1 y² + ¼ k2 y⁴ [J]
-  double spring_force() const;                                        ///< k1 y + k2 y³ [N]
+  std::int64_t ida_steps() const {
+    return static_cast<std::int64_t>(state_.steps);
+  }                                                                 ///< internal IDA steps since the start
+  int impacts() const { return static_cast<int>(state_.impacts); }  ///< on the foundation inside, since the start
+  double last_impact() const { return state_.last_impact; }         ///< when [s]; −1: there was none
+  double kinetic_energy() const;                                    ///< ½ m z² [J]
+  double potential_energy() const;                                  ///< ½ k1 y² + ¼ k2 y⁴ [J]
+  double spring_force() const;                                      ///< k1 y + k2 y³ [N]
   // Under the inputs at the end of the last step, or as observed since:
-  double acceleration() const;                 ///< ż [m/s²]
+  double acceleration() const;  ///< ż [m/s²]
+  /// Its rate [m/s³], with F at `force_rate` and C of the law inside at `reaction_rate` [N/s].
+  double jerk(double force_rate, double reaction_rate) const;
   double reaction() const;                     ///< C of the law inside [N]; 0 for external
   Compliance::Slopes reaction_slopes() const;  ///< of it
   double elastic_reaction() const { return motion_.compliance().elastic(depth()); }  ///< λ_nc (y − u_tip)₊^p [N]
@@ -84,8 +92,9 @@ class Spring {
     double seated = 0.0;                                    ///< 1 on the foundation
     double force = 0.0;                                     ///< F where the step ended, or as observed
     double tip = 0.0, tip_rate = 0.0, tip_curvature = 0.0;  ///< u_tip there
-    double extrapolated = 0.0;                              ///< 1: by a step, not observed
-    double steps = 0.0;                                     ///< IDA's, since the start
+    double impacts = 0.0, last_impact = -1.0;
+    double extrapolated = 0.0;  ///< 1: by a step, not observed
+    double steps = 0.0;         ///< IDA's, since the start
   };
   class Step;
   void see(const Loads& loads, double t, bool extrapolated);

@@ -1,7 +1,5 @@
 #include "watch.hpp"
 
-#include <algorithm>
-
 namespace spring {
 
 Watch::Watch(const Series& distance) {
@@ -16,8 +14,9 @@ Watch::Watch(const Series& distance) {
 }
 
 double Watch::direction(const Series& distance) {
-  const auto* const first = std::find_if(distance.begin(), distance.end(), [](double c) { return c != 0.0; });
-  return first == distance.end() ? 0.0 : *first > 0.0 ? 1.0 : -1.0;
+  for (const double c : distance)
+    if (c != 0.0) return c > 0.0 ? 1.0 : -1.0;
+  return 0.0;
 }
 
 double Watch::Scale::divided(double value, double s) const {

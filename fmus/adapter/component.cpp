@@ -50,6 +50,16 @@ fmi2FMUstate Component::keep(Snapshot snapshot) {
   return key;
 }
 
+void Component::save(fmi2FMUstate& key) {
+  Snapshot* const into = key ? &state(key) : nullptr;
+  instance.save(spare_);
+  if (into) {
+    std::swap(*into, spare_);
+  } else {
+    key = keep(std::exchange(spare_, {}));
+  }
+}
+
 void Component::free_state(fmi2FMUstate key) {
   state(key);
   states_.erase(key);

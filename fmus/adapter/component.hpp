@@ -40,6 +40,8 @@ class Component {
   /// @throws std::invalid_argument if the state was not made by this instance, or is already freed
   Snapshot& state(fmi2FMUstate key);
   fmi2FMUstate keep(Snapshot snapshot);
+  /// Save the instance into the state of `key`, or a new one if it is NULL. If that fails, nothing has changed.
+  void save(fmi2FMUstate& key);
   void free_state(fmi2FMUstate key);
 
   const char* phase_text() const;
@@ -51,6 +53,7 @@ class Component {
   const std::string name_;
   bool events_;  ///< whether they are logged
   std::map<fmi2FMUstate, std::unique_ptr<Snapshot>> states_;
+  Snapshot spare_;  ///< of the last save, whose memory the next one uses
 };
 
 /// Runs `body(component)`, which may throw, if the instance is in one of the `legal` phases.

@@ -41,6 +41,7 @@ constexpr Unit units[] = {
     {"N/m", "Stiffness", 1, 0, -2, 0},
     {"m/N", "Compliance", -1, 0, 2, 0},
     {"N/m3", "CubicStiffness", 1, -2, -2, 0},
+    {"N.m", "Torque", 1, 2, -2, 0},
     {"N.s", "Impulse", 1, 1, -1, 0},
     {"N.s/m", "Damping", 1, 0, -1, 0},
     {"J", "Energy", 1, 2, -2, 0},
@@ -68,7 +69,7 @@ std::string attribute(const char* name, const std::string& value) {
 std::string value_text(const Variable& v, double value) {
   if (v.type == Type::boolean) return value != 0.0 ? "true" : "false";
   if (v.type == Type::real) return number(value);
-  return std::to_string(static_cast<long>(value));
+  return std::to_string(static_cast<long long>(value));
 }
 
 void write_units(std::ostream& out, const std::set<std::string>& used) {

@@ -172,8 +172,7 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {
   return guard(c, "fmi2GetFMUstate", any_phase, [&](Component& k) {
     require(FMUstate, "FMUstate");
-    if (!*FMUstate) *FMUstate = k.keep({});
-    k.instance.save(k.state(*FMUstate));
+    k.save(*FMUstate);
   });
 }
 

@@ -268,7 +268,7 @@ void Instance::step(double time, double size) {
   }
   ensure_built();
   try {
-    model_->step(size);
+    model_->step(time, size);
   } catch (const Discarded&) {
     ++model_->refused;
     throw;

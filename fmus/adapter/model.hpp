@@ -37,7 +37,7 @@ class Model {
 
   /// Called by fmi2DoStep, the inputs having been set.
   /// @throws Discarded
-  virtual void step(double size) = 0;
+  virtual void step(double time, double size) = 0;
 
   /// Called after step() and after inputs have lost their derivatives and impulses.
   virtual void settle() {}

@@ -1,7 +1,10 @@
 // The beam FMU: its table of variables, bound to beam::Beam.
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -16,8 +19,13 @@ using beam::Loads;
 using beam::Parameters;
 
 /// The beam's parameters and what exchange between steps adds to them.
+enum class InitialState { given = 1, at_rest = 2 };
+
 struct FmuParameters : Parameters {
   double tip_load_coefficient = 0.0, communication_step = 0.0;
+  double gravity = 0.0;         ///< [m/s²]
+  double section_height = 0.0;  ///< [m], 0: not told
+  InitialState initial_state = InitialState::given;
   FmuParameters() { initial_velocity_slope = -1.0; }  // so that a first try shows a motion
 };
 
@@ -35,20 +43,24 @@ struct BeamModel final : fmi::Model {
   void build(double) override {
     beam = beam::make_beam(parameters);
     loads.set(Loads::hat, {parameters.tip_load_coefficient, 0.0, 0.0});
+    set_distributed({});
     forecast = {};
     tip_response = {};
     if (forecasts()) tip_response = beam->tip_response(parameters.communication_step);
-    deflection_.current = rotation_.current = false;
+    look_again();
     look_ahead();
   }
 
-  void observe(bool) override {
+  void observe(bool initial) override {
     const Loads::Values before = forecasts() ? beam->loads() : Loads::Values{};
     beam->observe(tip_force[0], loads);
-    if (forecasts() && beam->loads() != before) look_ahead();
+    resting = initial && parameters.initial_state == InitialState::at_rest;
+    if (resting) beam->rest();
+    look_again();
+    if (forecasts() && (resting || beam->loads() != before)) look_ahead();
   }
 
-  void step(double size) override {
+  void step(double, double size) override {
     std::vector<double> before;
     if (tip_impulse != 0.0 || forecasts()) beam->save(before);
     try {
@@ -59,16 +71,48 @@ struct BeamModel final : fmi::Model {
       if (!before.empty()) restore(before);
       throw fmi::Discarded(e.what());
     }
-    deflection_.current = rotation_.current = false;
+    resting = false;
+    look_again();
   }
 
   void save(std::vector<double>& state) const override { beam->save(state); }
   void require_state(const std::vector<double>& state) const override { beam->require_state(state); }
   void restore(const std::vector<double>& state) override {
     beam->restore(state);
-    deflection_.current = rotation_.current = false;
+    look_again();
     look_ahead();
   }
+
+  void set_distributed(fmi::Polynomial value) {
+    value[0] -= parameters.density * parameters.area * parameters.gravity;
+    loads.set(Loads::distributed, value);
+  }
+
+  /// What follows forces without delay, now, and per unit of a load (of the tip force: Loads::count), where that is not
+  /// all: a beam at rest follows them as a whole.
+  const Beam::Response& response() const {
+    if (!response_) response_ = beam->response(Beam::Order::value);
+    return *response_;
+  }
+  Beam::Response response_rate() const {
+    Loads::Values rates{};
+    loads.for_each([&](std::size_t i, const fmi::Polynomial& f) { rates[i] = f[1]; });
+    return beam->response(Beam::Order::rate, rates, tip_force[1]);
+  }
+  Beam::Response response_by(std::size_t load) const { return beam->response_per_load(load); }
+  double shear_force(std::size_t i) const { return response().forces.shear[i]; }
+  double bending_moment(std::size_t i) const { return response().forces.moment[i]; }
+
+  /// Of `forces`, at the point where the bending moment is largest now.
+  double bending_stress(const beam::InternalForces& forces) const {
+    const beam::Shape& moment = response().forces.moment;
+    const auto less = [](double a, double b) { return std::abs(a) < std::abs(b); };
+    const auto most = static_cast<std::size_t>(std::max_element(moment.begin(), moment.end(), less) - moment.begin());
+    const double sign = moment[most] < 0.0 ? -1.0 : 1.0;
+    return sign * forces.moment[most] * parameters.section_height / (2.0 * parameters.second_moment_of_area);
+  }
+
+  bool resting = false;  ///< at the start, where that is a state of rest
 
   // At point `i` of the shape.
   double deflection(std::size_t i) const { return at(i, deflection_, &Beam::deflection); }
@@ -82,6 +126,7 @@ struct BeamModel final : fmi::Model {
     return rate;
   }
   double forecast_by(std::size_t load) const {
+    if (resting) return std::numeric_limits<double>::quiet_NaN();
     return forecasts() ? beam->forecast_per_load(parameters.communication_step, load).velocity : 0.0;
   }
 
@@ -114,7 +159,13 @@ struct BeamModel final : fmi::Model {
     return field.values[i];
   }
 
+  void look_again() {
+    deflection_.current = rotation_.current = false;
+    response_.reset();
+  }
+
   mutable Field deflection_, rotation_;
+  mutable std::optional<Beam::Response> response_;
 };
 
 template <class Value>
@@ -137,6 +188,9 @@ fmi::Table fmi::make_table() {
                        "mass of an element",
                        {"consistent, its kinetic energy exact",
                         "averaged with the lumped one, so that short waves travel at the right speed"}});
+  t.choices.push_back({"InitialState",
+                       "state of the beam at the start",
+                       {"given by initial_deflection_slope and initial_velocity_slope", "at rest under the loads"}});
   t.choices.push_back({"Integrator",
                        "time integration of the beam",
                        {"modal, the exact step of each mode under polynomial loads",
@@ -185,6 +239,16 @@ fmi::Table fmi::make_table() {
            "where point_force[" + std::to_string(i + 1) + "] acts, x/L")
         .range(0, 1);
   }
+  parameter("gravity", "m/s2", &FmuParameters::gravity,
+            "acceleration of gravity g, downward: a uniform load of -density*area*g, part of distributed_load in "
+            "load_work and load_potential");
+  parameter("initial_state", "", &FmuParameters::initial_state,
+            "1 = as the two slopes say, 2 = at rest under the loads and the tip force at the start")
+      .range(1, 2)
+      .choice = "InitialState";
+  parameter("section_height", "m", &FmuParameters::section_height,
+            "height of the cross-section h, for max_bending_stress; 0 = not told")
+      .at_least(0);
   parameter(
       "communication_step", "s", &FmuParameters::communication_step,
       "size H of the communication steps, for a partner that foresees the tip (communication_step of the spring). "
@@ -202,7 +266,9 @@ fmi::Table fmi::make_table() {
   std::vector<std::string> load_names;
   const auto load = [&](std::size_t i, const char* unit, const std::string& text) {
     load_names.emplace_back(Loads::names[i]);
-    add.input(Loads::names[i], unit, text, [i](BeamModel& m, const fmi::Polynomial& value) { m.loads.set(i, value); });
+    add.input(Loads::names[i], unit, text, [i](BeamModel& m, const fmi::Polynomial& value) {
+      i == Loads::distributed ? m.set_distributed(value) : m.loads.set(i, value);
+    });
   };
   load(Loads::distributed, "N/m",
        "distributed load f_b, its part that is uniform in x, positive upward; derivatives as for tip_force");
@@ -221,46 +287,62 @@ fmi::Table fmi::make_table() {
        "acceleration a of the clamp, upward; all displacements are relative to it, so that it acts as a distributed "
        "load of -density*area*a; derivatives as for tip_force");
 
-  const std::vector<std::string> start_u{"initial_deflection_slope", "length"};
   // What the modal basis depends on. Every start is in it: u = s*x without a rotation, for any number of modes.
   const std::vector<std::string> basis{"density",        "area",    "second_moment_of_area", "young_modulus",
                                        "shear_modulus",  "length",  "shear_coefficient",     "n_elements",
                                        "element_degree", "n_modes", "reduced_integration",   "integrator",
                                        "mass_matrix"};
-  add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),
-             of(&Beam::tip_velocity))
-      .from(start_u);
+  // A state of rest follows all loads.
+  std::vector<std::string> everything = basis;
+  everything.insert(everything.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient",
+                                       "gravity", "initial_state", "tip_force"});
+  for (std::size_t i = 0; i < Loads::tip - Loads::point; ++i) everything.push_back(position(i));
+  everything.insert(everything.end(), load_names.begin(), load_names.end());
+  const auto without = [&everything](const std::vector<std::string>& names) {
+    std::vector<std::string> rest;
+    for (const std::string& name : everything)
+      if (std::find(names.begin(), names.end(), name) == names.end()) rest.push_back(name);
+    return rest;
+  };
   // What the steps ahead depend on besides.
   std::vector<std::string> motion = basis;
   motion.insert(motion.end(), {"alpha_b", "rho_inf", "communication_step"});
   std::vector<std::string> free_motion = motion;
   for (std::size_t i = 0; i < Loads::tip - Loads::point; ++i) free_motion.push_back(position(i));
-  free_motion.insert(free_motion.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient"});
+  free_motion.insert(free_motion.end(), {"initial_deflection_slope", "initial_velocity_slope", "tip_load_coefficient",
+                                         "gravity", "initial_state", "tip_force"});
   free_motion.insert(free_motion.end(), load_names.begin(), load_names.end());
+  add.output("tip_displacement", "m", "deflection of the tip u(L)", of(&Beam::tip_displacement),
+             of(&Beam::tip_velocity))
+      .from(without({"initial_velocity_slope", "integrator", "mass_matrix", "n_modes"}));
   add.output("tip_velocity", "m/s", "velocity of the tip", of(&Beam::tip_velocity), of(&Beam::tip_acceleration))
-      .from({"initial_velocity_slope", "length"});
+      .from({"initial_velocity_slope", "length", "initial_state"});
   add.output("tip_rotation", "rad", "rotation of the cross-section at the tip", of(&Beam::tip_rotation),
-             of(&Beam::tip_rotation_rate));
+             of(&Beam::tip_rotation_rate))
+      .from(without({"initial_deflection_slope", "initial_velocity_slope"}));
   add.output("tip_displacement_integral", "m.s", "integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral), of(&Beam::tip_displacement));
   add.output("tip_displacement_integral_2", "m.s2", "double integral of tip_displacement over the last step",
              of(&Beam::tip_displacement_integral_2), of(&Beam::tip_displacement_integral));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Beam::kinetic_energy), of(&Beam::kinetic_power))
-      .from({"density", "area", "length", "initial_velocity_slope", "mass_matrix", "element_degree", "n_elements"});
+      .from({"density", "area", "length", "initial_velocity_slope", "mass_matrix", "element_degree", "n_elements",
+             "initial_state"});
   add.output("strain_energy", "J", "strain energy", of(&Beam::strain_energy), of(&Beam::strain_power))
-      .from({"initial_deflection_slope", "area", "length", "shear_coefficient", "shear_modulus"});
+      .from(without({"initial_velocity_slope"}));
   add.output("dissipated_energy", "J", "work of the damping force since the start", of(&Beam::dissipated_energy),
              of(&Beam::dissipated_power));
   add.output("load_potential", "J",
-             "potential of the loads distributed_load and tip_load_coefficient, as if they were constant",
+             "potential of the loads distributed_load, gravity and tip_load_coefficient, as if they were constant",
              of(&Beam::load_potential), of(&Beam::load_potential_rate))
-      .from({"initial_deflection_slope", "tip_load_coefficient", "distributed_load", "length", "n_elements"});
-  add.depends("distributed_load", [](const BeamModel& m) { return -m.beam->load_work_per_unit(Loads::distributed); });
+      .from(without({"initial_velocity_slope"}));
+  add.depends("distributed_load", [](const BeamModel& m) {
+    return m.resting ? std::numeric_limits<double>::quiet_NaN() : -m.beam->load_work_per_unit(Loads::distributed);
+  });
   add.output(
       "load_work", "J",
       "work of all loads on the beam since the start, where it is 0: distributed_load, point_force, tip_load, "
       "base_acceleration and tip_load_coefficient, not tip_force or tip_impulse. A load that is there at the start "
-      "acts suddenly from then on: the start is no state of rest under it. kinetic_energy + strain_energy + "
+      "acts suddenly from then on, unless initial_state = 2. kinetic_energy + strain_energy + "
       "dissipated_energy - load_work changes by the work of tip_force and tip_impulse alone, for "
       "generalized_alpha if rho_inf = 1",
       of(&Beam::load_work), of(&Beam::load_power));
@@ -278,13 +360,39 @@ fmi::Table fmi::make_table() {
   for (std::size_t i = 0; i < load_names.size(); ++i) {
     add.depends(load_names[i], [i](const BeamModel& m) { return m.forecast_by(i); });
   }
-  add.output("tip_response", "m/N",
-             "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
-             [](const BeamModel& m) { return m.tip_response[0]; })
+  add.local("tip_response", "m/N",
+            "what 1 N held over one communication_step adds to tip_displacement at its end; 0 if that is 0",
+            [](const BeamModel& m) { return m.tip_response[0]; })
       .from(motion);
-  add.output("tip_response_2", "m/N", "the same at the end of the step after, without a force meanwhile",
-             [](const BeamModel& m) { return m.tip_response[1]; })
+  add.local("tip_response_2", "m/N", "the same at the end of the step after, without a force meanwhile",
+            [](const BeamModel& m) { return m.tip_response[1]; })
       .from(motion);
+  // What follows forces without delay, as linear functions of the response.
+  everything.emplace_back("alpha_b");
+  const auto instant = [&](const char* name, const char* unit, const char* text, auto of_response) {
+    add.output(
+           name, unit, text, [=](const BeamModel& m) { return of_response(m, m.response()); },
+           [=](const BeamModel& m) { return of_response(m, m.response_rate()); })
+        .from(everything);
+    const auto follows = [&](const std::string& input, std::size_t load) {
+      add.depends(input, [=](const BeamModel& m) {
+        return m.resting ? std::numeric_limits<double>::quiet_NaN() : of_response(m, m.response_by(load));
+      });
+    };
+    follows("tip_force", Loads::count);
+    for (std::size_t i = 0; i < load_names.size(); ++i) follows(load_names[i], i);
+  };
+  using M = const BeamModel&;
+  using R = const Beam::Response&;
+  instant("tip_acceleration", "m/s2", "acceleration of the tip", [](M, R r) { return r.tip_acceleration; });
+  instant("clamp_force", "N", "force of the clamp on the beam, upward; with all loads it balances the momentum",
+          [](M, R r) { return -r.forces.shear[0]; });
+  instant("clamp_moment", "N.m", "moment of the clamp on the beam, counter-clockwise",
+          [](M, R r) { return -r.forces.moment[0]; });
+  instant("max_bending_stress", "Pa",
+          "largest bending stress |M| h/2I at the points x = 0, L/20, ..., L; 0 if section_height is",
+          [](M m, R r) { return m.bending_stress(r.forces); });
+  t.variables.back().initial_dependencies.emplace_back("section_height");
   const auto shape = [&](const std::string& name, const char* unit, const std::string& text,
                          double (BeamModel::*at)(std::size_t) const) {
     for (std::size_t i = 0; i < beam::shape_points; ++i) {
@@ -294,6 +402,9 @@ fmi::Table fmi::make_table() {
   };
   shape("deflection", "m", "deflection", &BeamModel::deflection);
   shape("rotation", "rad", "rotation of the cross-section", &BeamModel::rotation);
+  shape("bending_moment", "N.m", "bending moment, positive where it bends the beam upwards",
+        &BeamModel::bending_moment);
+  shape("shear_force", "N", "shear force, upward on the part before it", &BeamModel::shear_force);
   return t;
 }
 

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -25,6 +26,7 @@ using spring::Spring;
 /// The spring's parameters, where its top rests, and what exchange between steps adds to them.
 struct FmuParameters : Parameters {
   double equilibrium = 0.0;  ///< Ψ [m]: for the partner; in (6) the spring's force is 0 at y = 0
+  double gravity = 0.0;      ///< [m/s²]
   double communication_step = 0.0, tip_response = 0.0, tip_response_2 = 0.0;
 };
 
@@ -58,7 +60,7 @@ struct SpringModel final : fmi::Model {
     look();
   }
 
-  void step(double size) override {
+  void step(double time, double size) override {
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
     const bool goes_on = held && size > rounding * held->size();
     if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
@@ -68,12 +70,11 @@ struct SpringModel final : fmi::Model {
     if (!has_force()) throw fmi::Discarded(no_force());
     std::vector<double> before;
     if (impulse != 0.0 || held) save(before);
-    spring::Inputs present = inputs;
-    if (parameters.compliant()) present.contact_force = {held ? held->force() : 0.0, 0.0, 0.0};
+    spring::Inputs present = acting();
     present.tip_displacement = tip();
     try {
       if (impulse != 0.0) spring->apply_impulse(impulse);
-      spring->step(size, present);
+      spring->step(size, present, time);
       if (goes_on) held->advance(message(), spring->displacement(), trial());
       if (!has_force()) throw spring::StepFailure(no_force(), 0.0);
     } catch (const spring::StepFailure& e) {
@@ -101,7 +102,18 @@ struct SpringModel final : fmi::Model {
     return parameters.damping * spring->velocity() * spring->velocity() + by_contact;
   }
   double kinetic_power() const { return parameters.mass * spring->velocity() * spring->acceleration(); }
-  double load() const { return inputs.external_force[0] - parameters.mass * inputs.base_acceleration[0]; }
+  /// The loads [N], or with 1 their rate.
+  double load(std::size_t order = 0) const {
+    const spring::Inputs present = acting();
+    return present.external_force[order] - parameters.mass * present.base_acceleration[order];
+  }
+  double jerk() const {
+    const spring::Inputs present = acting();
+    const double N = parameters.stop_enabled ? 0.0 : present.foundation_force[1];
+    return spring->jerk(load(1) + N - present.contact_force[1], held ? 0.0 : reaction_rate());
+  }
+  /// Per newton of an upward force that does not change C.
+  double mobility() const { return spring->seated() ? 0.0 : 1.0 / parameters.mass; }
   double contact_power() const { return elastic_reaction() * approach(); }
   double elastic_reaction() const { return held ? held->elastic(spring->displacement()) : spring->elastic_reaction(); }
 
@@ -145,8 +157,8 @@ struct SpringModel final : fmi::Model {
   }
 
  private:
-  static constexpr long most_trial_work = 1'000'000;  ///< of IDA's steps for one force, as for one step
-  static constexpr double rounding = 1e-6;            ///< of communication_step
+  static constexpr std::int64_t most_trial_work = 1'000'000;  ///< of IDA's steps for one force, as for one step
+  static constexpr double rounding = 1e-6;                    ///< of communication_step
   struct Misses {
     HeldContact::Miss kind;
     int most;  ///< steps: a sudden load takes 2, a harmonic one from rest up to 8
@@ -169,10 +181,17 @@ struct SpringModel final : fmi::Model {
     return tip;
   }
 
+  /// What acts, but for the tip.
+  spring::Inputs acting() const {
+    spring::Inputs present = inputs;
+    present.external_force[0] -= parameters.mass * parameters.gravity;
+    if (parameters.compliant()) present.contact_force = {held && has_force() ? held->force() : 0.0, 0.0, 0.0};
+    return present;
+  }
+
   /// To what outputs refer to. A tip that was not set since the last step is where that one left it.
   void look() {
-    spring::Inputs present = inputs;
-    if (parameters.compliant()) present.contact_force = {held && has_force() ? held->force() : 0.0, 0.0, 0.0};
+    spring::Inputs present = acting();
     const bool extrapolated = spring->extrapolated() && !tip_is_set;
     present.tip_displacement = extrapolated ? spring->tip() : tip();
     if (extrapolated && tip_velocity_is_set)
@@ -236,15 +255,15 @@ struct SpringModel final : fmi::Model {
   HeldContact::Top trial() const {
     std::vector<double> start;
     spring->save(start);
-    spring::Inputs next = inputs;
+    spring::Inputs next = acting();
     for (auto* input : {&next.foundation_force, &next.external_force, &next.base_acceleration})
       (*input)[1] = (*input)[2] = 0.0;
     trial_failure_.clear();
-    return [this, start, next, work = 0L](double force) mutable {
+    return [this, start, next, work = std::int64_t{0}](double force) mutable {
       constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
       if (work > most_trial_work) return unknown;
       next.contact_force = {force, 0.0, 0.0};
-      const long before = spring->ida_steps();
+      const std::int64_t before = spring->ida_steps();
       double reached = unknown;
       try {
         spring->step(held->size(), next);
@@ -293,6 +312,8 @@ fmi::Table fmi::make_table() {
             "position Psi of the top when nothing touches it, for whoever reads the parameters: the motion begins at "
             "the start "
             "value of displacement and the spring's force is 0 at y = 0");
+  parameter("gravity", "m/s2", &FmuParameters::gravity,
+            "acceleration of gravity g, downward: a force of -mass*g, part of external_force in load_work");
   parameter("contact_law", "", &Parameters::contact_law, "1 = external, 2 = normal compliance inside")
       .range(1, 2)
       .choice = "ContactLaw";
@@ -365,6 +386,14 @@ fmi::Table fmi::make_table() {
   add.exact_start(&SpringModel::parameters, &FmuParameters::displacement);
   add.output("velocity", "m/s", "velocity z of the top", of(&Spring::velocity), of(&Spring::acceleration));
   add.exact_start(&SpringModel::parameters, &FmuParameters::velocity);
+  const std::vector<std::string> motion{"contact_law", "compliance_stiffness", "compliance_exponent",
+                                        "compliance_damping", "displacement", "tip_displacement", "tip_velocity",
+                                        // with communication_step > 0, of which the first is foreseen:
+                                        "communication_step", "tip_response", "tip_velocity_forecast", "velocity",
+                                        "mass", "damping", "linear_stiffness", "cubic_stiffness", "external_force",
+                                        "base_acceleration", "foundation_force", "stop_enabled", "stop_position",
+                                        "restitution", "gravity"};
+  using M = const SpringModel&;
   add.output("displacement_integral", "m.s", "integral of displacement over the last step",
              of(&Spring::displacement_integral), of(&Spring::displacement));
   add.output("displacement_integral_2", "m.s2", "double integral of displacement over the last step",
@@ -372,19 +401,35 @@ fmi::Table fmi::make_table() {
   add.output(
          "reaction", "N", "contact force of the law inside, 0 when contact_law = 1",
          [](const SpringModel& m) { return m.reaction(); }, [](const SpringModel& m) { return m.reaction_rate(); })
-      .from({"contact_law", "compliance_stiffness", "compliance_exponent", "compliance_damping", "displacement",
-             "tip_displacement", "tip_velocity",
-             // with communication_step > 0, of which the first is foreseen:
-             "communication_step", "tip_response", "tip_velocity_forecast", "velocity", "mass", "damping",
-             "linear_stiffness", "cubic_stiffness", "external_force", "base_acceleration", "foundation_force",
-             "stop_enabled", "stop_position", "restitution"});
-  using M = const SpringModel&;
+      .from(motion);
   add.depends("tip_displacement", [](M m) { return m.reaction_by_tip_displacement(); });
   add.depends("tip_velocity", [](M m) { return m.reaction_by_tip_velocity(); });
   add.depends("tip_velocity_forecast", [](M m) { return m.reaction_by_forecast(); });
   add.depends("external_force", [](M m) { return m.reaction_by_load(); });
   add.depends("base_acceleration", [](M m) { return -m.parameters.mass * m.reaction_by_load(); });
   add.depends("foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : m.reaction_by_load(); });
+  add.output("acceleration", "m/s2", "acceleration of the top", of(&Spring::acceleration), [](M m) { return m.jerk(); })
+      .from(motion);
+  t.variables.back().initial_dependencies.emplace_back("contact_force");
+  const auto follows = [&](const char* input, auto force, auto reaction) {
+    add.depends(input, [=](M m) { return m.mobility() * (force(m) - reaction(m)); });
+  };
+  const auto none = [](M) { return 0.0; };
+  follows("contact_force", [](M m) { return m.parameters.compliant() ? 0.0 : -1.0; }, none);
+  follows(
+      "foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : 1.0; },
+      [](M m) { return m.parameters.stop_enabled ? 0.0 : m.reaction_by_load(); });
+  follows("external_force", [](M) { return 1.0; }, [](M m) { return m.reaction_by_load(); });
+  follows(
+      "base_acceleration", [](M m) { return -m.parameters.mass; },
+      [](M m) { return -m.parameters.mass * m.reaction_by_load(); });
+  follows("tip_displacement", none, [](M m) { return m.reaction_by_tip_displacement(); });
+  follows("tip_velocity", none, [](M m) { return m.reaction_by_tip_velocity(); });
+  follows("tip_velocity_forecast", none, [](M m) { return m.reaction_by_forecast(); });
+  add.output("seated", "", "whether the top rests on the foundation inside", of(&Spring::seated)).type =
+      fmi::Type::boolean;
+  add.output("number_of_impacts", "", "impacts on the foundation inside since the start", of(&Spring::impacts)).whole();
+  add.local("last_impact_time", "s", "time of the last of them; -1 if there was none", of(&Spring::last_impact));
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy),

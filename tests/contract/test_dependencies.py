@@ -18,6 +18,9 @@ BASES: dict[str, list[dict[str, float]]] = {
         {"integrator": 2, "reduced_integration": True},
         {"communication_step": 1e-3},
         {"communication_step": 0.1, "integrator": 2, "alpha_b": 1e-3},
+        {"initial_state": 2, "communication_step": 1e-3},
+        {"initial_state": 2, "integrator": 2, "reduced_integration": True, "element_degree": 2},
+        {"initial_state": 2, "n_modes": 3, "mass_matrix": 2},
     ],
     "spring": [
         {},
@@ -42,6 +45,8 @@ COMMON: dict[str, dict[str, float]] = {
         **{f"point_force[{i}]": 0.1 * i for i in range(1, 5)},
         "tip_load_coefficient": 0.2,
         "tip_force": 0.1,
+        "gravity": 0.4,
+        "section_height": 0.1,
     },
     "spring": {
         "mass": 1.2,
@@ -66,6 +71,7 @@ CHANGES: dict[str, list[float]] = {
     "reduced_integration": [True, False],
     "integrator": [1, 2],
     "mass_matrix": [1, 2],
+    "initial_state": [1, 2],
     "contact_law": [1, 2],
     "stop_enabled": [True, False],
     "rho_inf": [0.5],
@@ -151,7 +157,7 @@ def compare(k: Any, outputs: list[str], name: str, change: float) -> int:
     ups, downs = ([end] if one else end for end in ends)
     for output, up, down, partial in zip(outputs, ups, downs, partials, strict=True):
         difference = (up - down) / (2.0 * change)
-        rounding = 5e-13 * max(abs(up), 1e-3) / min(change, 1e-6)  # of the held force, which is solved for
+        rounding = 2e-13 * max(abs(up), 1e-2) / min(1e-2 * change, 1e-6)  # of the held force, of small differences
         assert abs(partial - difference) <= 1e-4 * abs(difference) + rounding, (output, name)
     return sum(partial != 0.0 for partial in partials)
 
@@ -190,11 +196,13 @@ def test_directional_derivatives_at_the_start_are_those_of_the_outputs(case: Any
     apart = {"kinetic_energy", "strain_energy", "tip_mass"}  # of many: those that n_modes or the mesh decide
     found = 0
     for base in BASES[case.name]:
+        # At rest the acceleration is the rounding of large inner forces.
+        skipped = apart | ({"tip_acceleration"} if base.get("initial_state") == 2 else set())
         k = case.instance().enter(**{**COMMON[case.name], **base})
         for name in sorted(set().union(*pairs.values())):
             if case.variables[name].type != "Real":
                 continue
-            outputs = [o for o in case.outputs if name in pairs.get(o, ()) and o not in apart]
+            outputs = [o for o in case.outputs if name in pairs.get(o, ()) and o not in skipped]
             value = k.get(name)
             edge = name in {"alpha_b", "rho_inf", "communication_step", "restitution", "compliance_damping"}
             if outputs and (not edge or value not in (0.0, 1.0)):

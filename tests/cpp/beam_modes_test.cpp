@@ -235,5 +235,49 @@ TEST(BeamModes, AThousandElementsInitialiseQuickly) {
   EXPECT_EQ(modes.omega.size(), 67);  // 64 modes, the shapes of tip force, uniform load and start
 }
 
+// Moment at the clamp and shear force half-way of the first modes, per tip deflection, against the continuous beam
+// (θ' = M, u' = Q + θ, M' = −Q − ω²θ, Q' = −ω²u, by Runge–Kutta): internal forces are as accurate as the frequencies.
+TEST(InternalForces, OfTheFirstModesConvergeWithTwiceTheDegree) {
+  using State = std::array<double, 4>;  // θ, u, M, Q
+  const auto exact = [](double omega) {
+    const double w2 = omega * omega;
+    const auto slope = [w2](const State& s) { return State{s[2], s[3] + s[0], -s[3] - w2 * s[0], -w2 * s[1]}; };
+    const auto end = [&](State s, int to) {
+      constexpr int steps = 2000;
+      for (int i = 0; i < to * steps / 2; ++i) {
+        const double h = 1.0 / steps;
+        const auto add = [](const State& a, double f, const State& b) {
+          return State{a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2], a[3] + f * b[3]};
+        };
+        const State k1 = slope(s), k2 = slope(add(s, h / 2, k1)), k3 = slope(add(s, h / 2, k2)),
+                    k4 = slope(add(s, h, k3));
+        s = add(add(add(add(s, h / 6, k1), h / 3, k2), h / 3, k3), h / 6, k4);
+      }
+      return s;
+    };
+    const State m = end({0, 0, 1, 0}, 2), q = end({0, 0, 0, 1}, 2);
+    const double Q0 = -m[2] / q[2];  // M(L) = 0
+    const double tip = m[1] + Q0 * q[1];
+    return std::array<double, 2>{1.0 / tip, end({0, 0, 1, Q0}, 1)[3] / tip};
+  };
+  for (const int degree : {1, 2}) {
+    for (const int mode : {0, 1}) {
+      std::array<std::array<double, 2>, 2> errors{};
+      const auto expected = exact(clamped_free_frequencies()[static_cast<std::size_t>(mode)]);
+      for (const int fine : {0, 1}) {
+        Parameters p;
+        p.n_elements = (degree == 1 ? 20 : 10) << fine;
+        p.element_degree = degree;
+        const Modes modes = compute_modes(Timoshenko(p), p);
+        const double scale = -modes.omega[mode] * modes.omega[mode] / modes.tip[mode];  // a = −ω² η
+        errors[fine] = {std::abs(-scale * modes.moment(0, mode) - expected[0]),
+                        std::abs(-scale * modes.shear(10, mode) - expected[1])};
+      }
+      for (const int i : {0, 1})
+        EXPECT_NEAR(std::log2(errors[0][i] / errors[1][i]), 2.0 * degree, 0.3) << degree << mode;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace beam

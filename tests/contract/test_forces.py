@@ -1,0 +1,115 @@
+"""What an engineer loads the pair for: forces, moments, stresses, gravity, a start at rest; impacts of the spring."""
+
+from __future__ import annotations
+
+import ctypes as ct
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+X = np.linspace(0.0, 1.0, 21)
+
+
+def along(k: Any, name: str) -> np.ndarray:
+    return np.array(k.get(*[f"{name}[{i}]" for i in range(1, 22)]))
+
+
+MESHES: list[dict[str, float]] = [
+    {"n_elements": 13},
+    {"n_elements": 13, "integrator": 2, "reduced_integration": True},
+    {"n_elements": 20, "n_modes": 4},
+    {"n_elements": 7, "element_degree": 3, "mass_matrix": 2},
+]
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+def test_a_cantilever_at_rest_has_the_forces_of_statics(beam: Any, mesh: dict[str, float]) -> None:
+    """Q = P + q (L − x), M = P (L − x) + q (L − x)²/2, and a point force at x = 0.5: to rounding on any mesh."""
+    point, g, height = 0.7, 9.81, 0.1
+    k = beam.running(**mesh, initial_state=2, tip_force=2.0, tip_load=0.5, distributed_load=-3.0, gravity=g,
+                     section_height=height, **{"point_force[1]": point})  # fmt: skip
+    q, P = -3.0 - g, 2.5
+    shear = P + q * (1.0 - X) + point * (X <= 0.5)
+    moment = P * (1.0 - X) + q * (1.0 - X) ** 2 / 2 + point * np.maximum(0.0, 0.5 - X)
+    assert along(k, "shear_force") == pytest.approx(shear, abs=2e-14)
+    assert along(k, "bending_moment") == pytest.approx(moment, abs=2e-14)
+    assert k.get("clamp_force", "clamp_moment") == pytest.approx([-shear[0], -moment[0]], abs=2e-14)
+    assert k.get("max_bending_stress") == pytest.approx(abs(moment).max() * height / 2, rel=1e-13)  # I = 1
+    u = k.get("tip_displacement")
+    if "n_modes" not in mesh:  # full integration makes linear elements stiffer
+        flexible = mesh.get("element_degree", 1) > 1
+        exact = P * (1 / 3 + 1) + q * (1 / 8 + 1 / 2) + point * (0.5**2 * (3 - 0.5) / 6 + 0.5)
+        assert u == pytest.approx(exact, rel=1e-12 if flexible else 5e-3)
+    k.step(0.0, 0.1)
+    assert k.get("tip_displacement") == pytest.approx(u, abs=1e-14 * abs(u))
+    assert k.get("kinetic_energy") < 1e-24
+
+
+@pytest.mark.parametrize("integrator", [1, 2])
+def test_the_clamp_balances_the_momentum(beam: Any, integrator: int) -> None:
+    """Clamp force + C + loads = d/dt ∫ρA u_t dx, clamp moment + moments of the loads = d/dt ∫x ρA u_t + ρI θ_t dx.
+
+    On 20 linear elements the 21 points are the nodes; accelerations are second differences over 1e-4 s.
+    """
+    C, q, tip_load, H = 0.7, -0.4, 0.2, 1e-4
+    k = beam.running(n_elements=20, integrator=integrator, distributed_load=q, tip_load=tip_load, tip_force=C)
+    rows, forces = [], []
+    for i in range(203):
+        k.step(i * H, H)
+        if i >= 200:
+            rows.append((along(k, "deflection"), along(k, "rotation")))
+            forces.append((k.get("clamp_force", "clamp_moment"), along(k, "shear_force"), along(k, "bending_moment")))
+    u, theta = ((rows[0][j] - 2 * rows[1][j] + rows[2][j]) / H**2 for j in range(2))
+    momentum = np.trapezoid(u, X)
+    nodes = np.interp(np.linspace(0, 1, 41), X, u) * np.linspace(0, 1, 41)
+    spin = np.sum((nodes[0:-2:2] + 4 * nodes[1::2] + nodes[2::2]) / 6) / 20 + np.trapezoid(theta, X)
+    (clamp, moment), shear, bending = forces[1]
+    assert clamp + C + tip_load + q == pytest.approx(momentum, abs=3e-5)
+    assert moment + C + tip_load + q / 2 == pytest.approx(spin, abs=3e-5)
+    assert abs(momentum) > 0.1
+    assert [shear[-1], bending[-1]] == [pytest.approx(C + tip_load, rel=1e-14), 0.0]
+    assert [clamp, moment] == [-shear[0], -bending[0]]
+
+
+def test_gravity_is_a_load(beam: Any, spring: Any) -> None:
+    """On the spring m g y, in load_work; at rest on k1 the deflection would be −m g/k1."""
+    g, m, k1 = 9.81, 2.0, 30.0
+    k = spring.running(gravity=g, mass=m, linear_stiffness=k1)
+    assert k.get("acceleration") == pytest.approx(-g, rel=1e-15)
+    for i in range(20):
+        k.step(0.1 * i, 0.1)
+    w = math.sqrt(k1 / m)
+    y = -m * g / k1 * (1.0 - math.cos(2.0 * w))
+    assert k.get("displacement") == pytest.approx(y, rel=1e-11)
+    assert k.get("load_work") == pytest.approx(-m * g * y, rel=1e-11)
+    heavy = beam.running(gravity=g, density=3.0, initial_velocity_slope=0.0)
+    loaded = beam.running(distributed_load=-3.0 * g, density=3.0, initial_velocity_slope=0.0)
+    for one in (heavy, loaded):
+        one.step(0.0, 0.3)
+    assert heavy.get("tip_displacement", "load_potential") == loaded.get("tip_displacement", "load_potential")
+
+
+def test_impacts_are_counted_and_timed(spring: Any) -> None:
+    """Free fall from 0.5 m with g = 10: impacts at √0.1, then every 2 e √0.1, e², …; at last the top rests."""
+    k = spring.running(gravity=10.0, linear_stiffness=0.0, stop_enabled=True, stop_position=0.0, displacement=0.5,
+                       restitution=0.5, stop_time=10.0, start_time=1.0)  # fmt: skip
+    assert k.get("last_impact_time") == -1.0
+    seated = (ct.c_int * 1)()
+
+    def rests() -> bool:
+        assert k.call("fmi2GetBoolean", spring.references("seated"), 1, seated) == 0
+        return bool(seated[0])
+
+    first, time = math.sqrt(0.1), 1.0
+    for count, until in ((0, 0.3), (1, 0.5), (2, 0.7)):
+        k.step(time, 1.0 + until - time)
+        time = 1.0 + until
+        assert k.integer("number_of_impacts") == count
+    assert k.get("last_impact_time") == pytest.approx(1.0 + 2.0 * first, rel=1e-9)
+    assert not rests()
+    k.step(time, 2.0)
+    assert rests()
+    assert k.get("acceleration", "displacement") == [0.0, 0.0]
+    assert k.get("last_impact_time") == pytest.approx(1.0 + 3.0 * first, rel=1e-6)  # the sum of the series
