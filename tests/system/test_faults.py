@@ -92,7 +92,7 @@ LASTING = [
         for law, where in EVERYWHERE
         for fault in (
             ("fmi2DoStep", "Discard", "fmi2DoStep returned discard"),
-            ("fmi2GetReal", "nan", "not finite: Motion(displacement="),
+            ("fmi2GetReal", "nan", "not finite: "),
             ("fmi2SetReal", "Error", "cannot set "),
         )
     ),
@@ -123,14 +123,16 @@ LASTING = [
     ("hermite", "event", "fmi2SetReal", "Fatal", "impulse"),
     ("energy", "row", "fmi2GetReal", "Error", "cannot read "),
     ("energy", "row", "fmi2GetReal", "Fatal", "cannot read "),
-    ("energy", "row", "fmi2GetReal", "nan", "not a finite number"),
-    ("compliance", "row", "fmi2GetReal", "inf", "not a finite number"),
-    ("energy", "tied", "fmi2GetReal", "inf", "not finite: Motion(displacement="),
+    ("energy", "row", "fmi2GetReal", "nan", "the beam's shape is not finite"),
+    ("energy", "tied", "fmi2GetReal", "inf", "not finite: "),
 ]
 
 
-@pytest.mark.parametrize("fmu", ["beam", "spring"])
-@pytest.mark.parametrize(("law", "where", "function", "kind", "cause"), LASTING)
+@pytest.mark.parametrize(
+    ("fmu", "law", "where", "function", "kind", "cause"),
+    # With a row only the beam is read, for its shape.
+    [(fmu, *case) for case in LASTING for fmu in ("beam", "spring") if (fmu, case[1]) != ("spring", "row")],
+)
 def test_a_lasting_fault_stops_the_run(
     run: Run, fmu: str, law: str, where: str, function: str, kind: str, cause: str
 ) -> None:

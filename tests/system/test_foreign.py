@@ -313,7 +313,7 @@ REFUSED = {
     ),
     "impulse": (
         {}, {"spring": {"impulse": None}, "contact": {"law": "transmission", "damping": 0.0}},
-        'law = "transmission"', 'no impulse; use "compliance", "link" or "tie"',
+        'law = "transmission"', "no impulse", 'use "compliance", "link" or "tie"',
     ),
     "velocity": (
         {},

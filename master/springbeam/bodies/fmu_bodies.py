@@ -185,9 +185,10 @@ class FmuBody(Body):
         if (status := self._get()) > WARNING:
             raise self.fmu.failed(status, f"cannot read {', '.join(self._outputs)}")
         self._told = told = self._unpack()
+        if not isfinite(sum(told)):
+            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs, told, strict=True))
+            raise StepRefused(f"not finite: {values} of {self.fmu.path.name}")
         self._current = motion = _motion_of(Motion, told[:4]) if self._tells_all else self._made_up(told)
-        if not isfinite(sum(motion)):
-            raise StepRefused(f"not finite: {motion} of {self.fmu.path.name}")
         return motion
 
     def _stored(self) -> tuple[float, ...]:

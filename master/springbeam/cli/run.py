@@ -239,6 +239,8 @@ def _run_into(
 
     def last_words(cause: str) -> str:
         progress.__exit__()
+        with suppress(RunStopped, OSError):
+            recorder.fetch()
         if recorder.begun:
             return ended("interrupted", cause)
         recorder.directory.discard()

@@ -110,6 +110,7 @@ class Master(Checkpointed):
         self.macro_steps = self._halvings = 0
         self._balance = Balance(scene, self._pair)
         self._log = Log(scene, recorder, self._balance)
+        recorder.fetch = self.hand_over
         self._pictured = beam if isinstance(beam, BeamBody) else None
         self._shapes_left, self._next_shape = _SHAPES_AFTER_CONTACT, start_time
         length = scene.time.t_end - start_time or 1.0  # 0 where contact is at t_end: the one shape is that of the start

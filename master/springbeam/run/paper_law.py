@@ -64,6 +64,7 @@ class PaperLaw(Checkpointed):
         assert scene.spring is not None
         self.scene, self._recorder = scene, recorder
         self._log = Log(scene, recorder)
+        recorder.fetch = self.hand_over
         self._beam, self._spring = beam, spring
         self._parameters = scene.spring
         self._phi = -np.inf if scene.stop is None else scene.stop.position
