@@ -24,9 +24,9 @@ missing (Debian, Ubuntu), otherwise it names them. Variables:
   PYTHON             the Python to start from, 3.10 or later (default: python3)
   CXX                the C++17 compiler
   SPRINGBEAM_PREFIX  where Eigen, Spectra, SUNDIALS and GoogleTest are if not in the system (also: CMAKE_PREFIX_PATH)
-  SPRINGBEAM_SUNDIALS_SOURCE  source of SUNDIALS 6 or 7 (default: Debian's source package, fetched into build/source);
-                     empty: take the installed SUNDIALS
-  SPRINGBEAM_CACHE   where `interop` puts the importers (default: ~/.cache/springbeam)
+  SPRINGBEAM_SUNDIALS_SOURCE  source of SUNDIALS 6.2 to 7 (default: Debian's source package, fetched once into the
+                     cache); empty: take the installed SUNDIALS
+  SPRINGBEAM_CACHE   where the source of SUNDIALS and the importers of `interop` are (default: ~/.cache/springbeam)
   CHROMIUM           the browser for `browser` (default: chromium, chromium-browser or google-chrome)
   JOBS               parallel compilations (default: all processors)
 TEXT
@@ -40,6 +40,7 @@ die() {
 
 readonly venv=.venv
 readonly python=$venv/bin/python
+readonly cache=${SPRINGBEAM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/springbeam}
 readonly sundials=${SPRINGBEAM_SUNDIALS_SOURCE-fetched}
 
 # install_packages WHAT PACKAGE… — with apt as root; otherwise say what is missing.
@@ -98,7 +99,7 @@ has_header() {
 # get_sundials — names the source of SUNDIALS in SPRINGBEAM_SUNDIALS_SOURCE, unless that is set.
 get_sundials() {
   if [ -z "${SPRINGBEAM_SUNDIALS_SOURCE+set}" ]; then
-    SPRINGBEAM_SUNDIALS_SOURCE=$(fmus/sundials_source.sh build/source) || say "the installed SUNDIALS is used instead"
+    SPRINGBEAM_SUNDIALS_SOURCE=$(fmus/sundials_source.sh "$cache/sundials") || say "the installed SUNDIALS is used instead"
   fi
   export SPRINGBEAM_SUNDIALS_SOURCE
   [ -n "$SPRINGBEAM_SUNDIALS_SOURCE" ]
@@ -194,7 +195,6 @@ print(*(name for name in extra if has[name]))')
     ;;
   interop)
     build fmus
-    cache=${SPRINGBEAM_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/springbeam}
     tests/interop/install.sh "$cache" "$python"
     SPRINGBEAM_CACHE=$cache exec $python -m pytest tests/interop "$@"
     ;;
