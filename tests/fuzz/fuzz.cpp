@@ -441,7 +441,7 @@ class Episode {
       return;
     k.phase = complete;
     Bits bits;
-    read_outputs(k, bits, ok | discard);  // inputs may be too large for a finite force
+    read_outputs(k, bits, ok | error_status);  // inputs may be too large for a finite force
   }
 
   void terminate(Instance& k) {
@@ -519,8 +519,7 @@ class Episode {
     unsigned expected = right && !null ? ok : error_status;
     if (right && !null && calculated) {
       // Not built yet: what was set may not go together. An output may have no finite value under the inputs.
-      if ((k.phase & (initialization | error | terminated)) != 0) expected |= error_status;
-      expected |= discard;
+      expected |= error_status;
     }
     const fmi2Status status = k.call(function, any_phase, expected, format("%zu values", n), [&] {
       return call(k.c, null && random_.chance(0.5) ? nullptr : vr.data(), n, null ? nullptr : values.data());
@@ -671,8 +670,7 @@ class Episode {
     double value = 0.0;
     const bool real = r < variables().size() && variables()[r].type == fmi::Type::real && order >= 1;
     const bool known = real && variables()[r].derivative && order == 1;
-    unsigned expected = known ? ok | discard : real ? discard : error_status;
-    if (known && (k.phase & (error | terminated)) != 0) expected |= error_status;
+    const unsigned expected = known ? ok | error_status : error_status;  // it may have no finite value
     const fmi2Status status = k.call("fmi2GetRealOutputDerivatives", stepped, expected, format("%u, %d", r, order),
                                      [&] { return fmi2GetRealOutputDerivatives(k.c, &r, 1, &order, &value); });
     if (status == fmi2OK) promise(std::isfinite(value), format("fmi2GetRealOutputDerivatives delivered %g", value));
@@ -708,7 +706,7 @@ class Episode {
     const double reached = k.time;
     Bits before, after;
     // An output may have no finite value under inputs just set.
-    const bool known = allowed && read_outputs(k, before, ok | discard) == fmi2OK;
+    const bool known = allowed && read_outputs(k, before, ok | error_status) == fmi2OK;
     if (allowed && k.phase != complete) return fmi2Error;
     const unsigned expected = of_step(k, time, size);
     const fmi2Status status = k.call("fmi2DoStep", complete, expected, format("%.17g, %.17g", time, size),
@@ -721,7 +719,7 @@ class Episode {
       k.time = time + size;
       read_outputs(k, after, ok);
     } else if (status == fmi2Discard) {
-      if (read_outputs(k, after, known ? ok : ok | discard) == fmi2OK && known)
+      if (read_outputs(k, after, known ? ok : ok | error_status) == fmi2OK && known)
         compare(before, after, "after a discarded step");
       double last = 0.0;
       k.call("fmi2GetRealStatus", stepped, ok, "",
@@ -795,7 +793,7 @@ class Episode {
     const std::size_t at = over ? random_.below(k.states.size()) : 0;
     if (over) saved.key = k.states[at].key;
     const unsigned phase = k.phase;
-    if (!k.wild && phase == complete) read_outputs(k, saved.outputs, ok | discard);
+    if (!k.wild && phase == complete) read_outputs(k, saved.outputs, ok | error_status);
     k.call("fmi2GetFMUstate", any_phase, ok, over ? "over another" : "",
            [&] { return fmi2GetFMUstate(k.c, &saved.key); });
     promise(saved.key != nullptr, "fmi2GetFMUstate delivered no state");
@@ -1008,9 +1006,8 @@ class Episode {
     double value = 0.0;
     const bool right = of < variables().size() && by < variables().size() && variables()[by].continuous_input() &&
                        variables()[of].type == fmi::Type::real && variables()[of].causality == fmi::Causality::output;
-    unsigned expected = right ? ok | discard : error_status;
-    if (!right && k.phase == initialization) expected |= discard;  // by a parameter
-    if (right && (k.phase & (initialization | error | terminated)) != 0) expected |= error_status;
+    const bool by_parameter = !right && k.phase == initialization;
+    const unsigned expected = right || by_parameter ? ok | error_status : error_status;
     const fmi2Status status =
         k.call("fmi2GetDirectionalDerivative", any_phase & ~instantiated, expected, format("%u, %u", of, by),
                [&] { return fmi2GetDirectionalDerivative(k.c, &of, 1, &by, 1, &direction, &value); });
