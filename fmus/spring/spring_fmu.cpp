@@ -429,7 +429,7 @@ fmi::Table fmi::make_table() {
   add.output("seated", "", "whether the top rests on the foundation inside", of(&Spring::seated)).type =
       fmi::Type::boolean;
   add.output("number_of_impacts", "", "impacts on the foundation inside since the start", of(&Spring::impacts)).whole();
-  add.local("last_impact_time", "s", "time of the last of them; -1 if there was none", of(&Spring::last_impact));
+  add.output("last_impact_time", "s", "time of the last of them; -1 if there was none", of(&Spring::last_impact));
   add.output("stop_force", "N", "mean foundation force of the law inside over the last step", of(&Spring::stop_force));
   add.output("stop_impulse", "N.s", "sum of the foundation's impulses over the last step", of(&Spring::stop_impulse));
   add.output("kinetic_energy", "J", "kinetic energy", of(&Spring::kinetic_energy),
@@ -450,8 +450,8 @@ fmi::Table fmi::make_table() {
              "work of external_force and base_acceleration since the start, where it is 0, impacts and rest on the "
              "foundation inside included",
              of(&Spring::load_work), [](M m) { return m.load() * m.spring->velocity(); });
-  add.output("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
-             of(&Spring::impact_loss));
+  add.local("impact_loss", "J", "energy lost in impacts on the foundation inside since the start",
+            of(&Spring::impact_loss));
   add.output(
          "warnings", "",
          "steps so far in which something was missed or refused: the wiring is wrong, or a step was discarded. Many "

@@ -91,12 +91,21 @@ AGREED = {
         output m.s2      tip_displacement_integral_2
         output J         kinetic_energy strain_energy dissipated_energy load_potential load_work
         output kg        tip_mass
+        output m/s2      tip_acceleration
+        output N         clamp_force
+        output N.m       clamp_moment
+        output Pa        max_bending_stress
+        output -         warnings
         local m          deflection[1:22]
         local rad        rotation[1:22]
+        local N.m        bending_moment[1:22]
+        local N          shear_force[1:22]
+        parameter m/s2   gravity
+        parameter m      section_height
         parameter s      alpha_b
         parameter N/m    tip_load_coefficient
         parameter -      shear_coefficient n_elements n_modes reduced_integration mass_matrix integrator rho_inf
-        parameter -      initial_deflection_slope point_force_position[1:5]
+        parameter -      initial_deflection_slope initial_state point_force_position[1:5]
         """,
     "spring": """
         input N          contact_force foundation_force external_force
@@ -108,7 +117,12 @@ AGREED = {
         output m/s       velocity
         output N         reaction stop_force
         output N.s       stop_impulse
-        output J         kinetic_energy potential_energy contact_energy dissipated_energy impact_loss load_work
+        output m/s2      acceleration
+        output s         last_impact_time
+        output -         seated number_of_impacts warnings
+        output J         kinetic_energy potential_energy contact_energy dissipated_energy load_work
+        local J          impact_loss
+        parameter m/s2   gravity
         parameter kg     mass
         parameter N.s/m  damping
         parameter N/m    linear_stiffness

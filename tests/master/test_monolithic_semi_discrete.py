@@ -154,9 +154,10 @@ def test_units_do_not_matter(metre: float, second: float) -> None:
         mesh = {"n_elements": 22, "element_degree": 12, "n_modes": 19}
         return beam(1e4 * stiffness, 4e3 * stiffness, **scales, density=100.0 / metre**3, **mesh)
 
-    assert modal_beam(slender(metre, second)).omega * second == pytest.approx(
-        modal_beam(slender(1.0, 1.0)).omega, rel=1e-12
-    )
+    found, expected = modal_beam(slender(metre, second)).omega * second, modal_beam(slender(1.0, 1.0)).omega
+    assert found[:19] == pytest.approx(expected[:19], rel=1e-12)
+    # The static shapes lie in the span of the modes but for some 1e-6 of them: what is left has lost so many digits.
+    assert found[19:] == pytest.approx(expected[19:], rel=1e-8)
 
 
 def test_sparse_and_dense_modes_span_the_same_space() -> None:

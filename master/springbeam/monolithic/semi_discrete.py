@@ -224,13 +224,18 @@ def singular_modes(factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return sigma[::-1], vt[::-1].T
 
 
+def _rotations_as_displacements(discrete: SemiDiscreteBeam) -> sp.csc_matrix:
+    """Return the diagonal matrix that turns unknowns (L θ, u) into (θ, u)."""
+    lengths = np.ones(discrete.size)
+    lengths[0::2] /= discrete.length
+    return sp.diags(lengths).tocsc()
+
+
 def _lowest_modes(discrete: SemiDiscreteBeam, count: int) -> np.ndarray:
     if discrete.size <= _DENSE_SIZE or 2 * count > discrete.size:
         return _rayleigh_ritz(discrete, np.eye(discrete.size))[1][:, :count]
-    # Without units of length and time: rotations as displacements, and no wanted eigenvalue of K⁻¹M far below 1.
-    lengths = np.ones(discrete.size)
-    lengths[0::2] /= discrete.length
-    D = sp.diags(lengths).tocsc()
+    # Without units of length and time: no wanted eigenvalue of K⁻¹M far below 1.
+    D = _rotations_as_displacements(discrete)
     K, M = D @ discrete.K @ D, D @ discrete.M @ D
     fastest = K.diagonal().max() / M.diagonal().min()  # rad²/s²
     modes = spla.eigsh(K / fastest, k=count, M=M, sigma=0.0, v0=np.ones(discrete.size))[1]
@@ -238,9 +243,10 @@ def _lowest_modes(discrete: SemiDiscreteBeam, count: int) -> np.ndarray:
 
 
 def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
-    solve = spla.factorized(discrete.K)
+    D = _rotations_as_displacements(discrete)
+    solve = spla.factorized(D @ discrete.K @ D)
     modes = _lowest_modes(discrete, beam.n_modes)
-    extra = [solve(discrete.tip_vector), solve(discrete.uniform_load), discrete.slope_shape]
+    extra = [D @ solve(D @ discrete.tip_vector), D @ solve(D @ discrete.uniform_load), discrete.slope_shape]
     space = [column / np.sqrt(column @ (discrete.M @ column)) for column in modes.T]
     for shape in extra:
         residual = shape / np.sqrt(shape @ (discrete.M @ shape))
