@@ -261,7 +261,7 @@ def test_a_run_that_stopped_names_what_goes_on_with_it(here, monkeypatch):
 
 
 def test_peaks_are_compared_over_one_window():
-    """The same motion, its force averaged over 1 ms and 4 ms."""
+    """One motion with its force averaged over 1 ms and over 4 ms."""
     soft = load_scene("soft")
     runs = []
     for window in (1e-3, 4e-3):

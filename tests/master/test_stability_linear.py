@@ -180,7 +180,7 @@ def test_soft_is_predicted():
 
 
 def test_modes_are_those_that_the_scene_keeps():
-    """Of 12 modes asked for, 15 shapes are kept: 3 are static, faster than any mode, and no modes."""
+    """A beam asked for 12 modes keeps 15 shapes: 3 are static, faster than any mode, and no modes."""
     p = predict(load_scene("steel-bumper"))
     assert p.modes == load_scene("steel-bumper").beam.n_modes == 12
     assert p.static_shapes == 3

@@ -98,7 +98,7 @@ def test_a_window_need_not_begin_or_end_at_a_row(ends, window):
 
 @pytest.mark.parametrize("window", [3e-3, 0.1])
 def test_no_window_has_a_larger_mean(window):
-    """Of forces that jump from step to step, windows shorter and longer than these."""
+    """The force jumps from step to step; windows are shorter and longer than these."""
     rng = np.random.default_rng(4)
     ends = np.cumsum(np.append(0.0, rng.uniform(5e-3, 2e-2, 60)))
     pieces = [np.polynomial.Polynomial([c, dc, 0.5 * ddc]) for c, dc, ddc in rng.normal(size=(60, 3)) * [1, 1e2, 1e4]]
@@ -195,7 +195,7 @@ def moving(ends, path):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_extremes_are_those_of_a_fine_grid(seed):
-    """Of 40 quintics with coefficients of any size, and of those that are constant or straight."""
+    """Extremes of 40 quintics with coefficients of any size, and of constant and straight ones."""
     random = np.random.default_rng(seed)
     powers = random.normal(size=(6, 40)) * 10.0 ** random.uniform(-3.0, 1.0, (6, 40))
     powers[1:, :5] = powers[2:, 5:10] = 0.0
