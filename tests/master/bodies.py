@@ -31,14 +31,20 @@ from springbeam.scene import Beam, Scene
 
 
 class Double(Body):
-    """Counts its steps."""
+    """Counts its steps; `CHANGES` names the attributes that a step changes."""
 
-    CHECKPOINTED = ("_integrals", "_dissipated", "_work")
+    CHANGES = ("_integrals", "_dissipated", "_work")
 
     def __init__(self):
         self._integrals = (0.0, 0.0)
         self._dissipated = self._work = 0.0
         self.steps = 0
+
+    def mark(self):
+        self._marked = {name: getattr(self, name) for name in self.CHANGES}
+
+    def rewind(self):
+        vars(self).update(self._marked)
 
 
 class ModalBody(Double, BeamBody):
@@ -54,7 +60,7 @@ class ModalBody(Double, BeamBody):
         a → shape.
     """
 
-    CHECKPOINTED = (*Double.CHECKPOINTED, "a", "v")
+    CHANGES = (*Double.CHANGES, "a", "v")
 
     def __init__(self, omega, b, a, v, f=0.0, alpha=0.0, sampler=None):
         super().__init__()
@@ -150,7 +156,7 @@ _ORDER = 22
 class DuffingBody(Double):
     """m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series in steps short enough for rounding."""
 
-    CHECKPOINTED = (*Double.CHECKPOINTED, "y", "z")
+    CHANGES = (*Double.CHANGES, "y", "z")
 
     def __init__(self, mass=1.0, k1=3.0, k2=-0.2, y=0.0, z=0.0, damping=0.0, external=0.0):
         super().__init__()

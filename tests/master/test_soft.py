@@ -78,17 +78,15 @@ def test_what_damping_takes_is_booked(law, degree, size):
 class Affine(Body):
     """Ends a step at ``free`` + ``response``·C [m]."""
 
-    CHECKPOINTED = ("w",)
-
     def __init__(self, free: float, response: float, size: float):
-        self.free, self.response, self.mass, self.w = free, response, 0.5 * size**2 / abs(response), 0.0
+        self.free, self.response, self.mass, self.state = free, response, 0.5 * size**2 / abs(response), 0.0
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
-        self.w = self.free + self.response * contact[0]
+        self.state = self.free + self.response * contact[0]
         return self.motion()
 
     def motion(self):
-        return Motion(self.w, 0.0, 0.0, 0.0)
+        return Motion(self.state, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("response", [1e-12, 1.0, 1e4])

@@ -305,34 +305,33 @@ def test_what_a_body_cannot_do_is_said():
 class Mass(springbeam.Body):
     """A free mass under constant forces that takes no impulses; ``fails`` is called with the time of each step."""
 
-    CHECKPOINTED = ("x", "v", "means")
-
     def __init__(self, x=0.0, v=0.0, fails=None):
-        self.mass, self.x, self.v, self.means, self.calls, self.fails = 1.0, x, v, (0.0, 0.0), 0, fails
+        self.mass, self.state, self.calls, self.fails = 1.0, Motion(x, v, 0.0, 0.0), 0, fails
 
     def motion(self):
-        return Motion(self.x, self.v, *self.means)
+        return self.state
 
     def energies(self):
-        return Energies(0.5 * self.v**2, 0.0, 0.0, 0.0)
+        return Energies(0.5 * self.state.velocity**2, 0.0, 0.0, 0.0)
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
         self.calls += 1
         if self.fails is not None:
             self.fails(time)
         a = foundation[0] - contact[0]
-        x, v = self.x, self.v
-        self.means = (
+        x, v, *_ = self.state
+        self.state = Motion(
+            x + v * size + a * size**2 / 2,
+            v + a * size,
             x * size + v * size**2 / 2 + a * size**3 / 6,
             x * size**2 / 2 + v * size**3 / 6 + a * size**4 / 24,
         )
-        self.x, self.v = x + v * size + a * size**2 / 2, v + a * size
-        return self.motion()
+        return self.state
 
 
 class StruckMass(Mass):
     def apply_impulse(self, impulse):
-        self.v += impulse / self.mass
+        self.state = self.state._replace(velocity=self.state.velocity + impulse / self.mass)
 
 
 APART = with_changes(

@@ -151,13 +151,16 @@ def test_the_scenes_pass_every_phase_and_event():
 
 #: What changes during a run, but is set anew before it is used.
 SET_ANEW = {
-    *(f"{body}.{name}" for body in ("FmuBeam", "FmuSpring") for name in ("_marked_pending", "_marked_values")),
+    *(f"{body}._marked" for body in ("FmuBeam", "FmuSpring")),
     *(f"Fmu.{name}" for name in ("moved", "_time", "_size", "_start_time", "_messages")),
     *(f"EventFunctions.{name}" for name in ("_phase", "_functions", "_ends", "_samples")),
     *("Detector._tolerance", "Detector._tolerance_of", "Pair._last"),
     # Follows from the records of the recorder.
     *("Balance._first", "Balance._scale", "Log._first", "Log._past", "Log.events", "Log._records", "Log._events"),
     "Log._shapes",
+    # In what the body saves.
+    "Fmu.steps",
+    "Fmu.rewinds",
     "Loads._last",
     "FmuBeam._loads",
     *(f"FmuSpring.{name}" for name in ("_loads", "_on_end")),
@@ -175,7 +178,7 @@ def attributes(part: Any, seen: dict[int, Any]) -> Iterator[tuple[str, bool, Any
         else:
             yield (
                 f"{type(part).__name__}.{name}",
-                isinstance(part, Checkpointed) and name in part.checkpointed_names(),
+                name == "state" or (isinstance(part, Checkpointed) and name in part.checkpointed_names()),
                 value,
             )
 

@@ -22,19 +22,19 @@ class Checkpointed:
         """Return `CHECKPOINTED`, or all fields of a dataclass."""
         return tuple(field.name for field in fields(cls)) if is_dataclass(cls) else cls.CHECKPOINTED
 
-    def save(self) -> dict[str, Any]:
+    def save(self) -> Any:
         """Return the checkpointed attributes by name, parts as nested dicts; lists and arrays are the run's own."""
         parts = {name: getattr(self, name) for name in self.checkpointed_names()}
-        return {name: part.save() if isinstance(part, Checkpointed) else part for name, part in parts.items()}
+        return {name: part.save() if hasattr(part, "save") else part for name, part in parts.items()}
 
-    def restore(self, saved: dict[str, Any]) -> None:
+    def restore(self, saved: Any) -> None:
         """Continue from what `save` of an equal part returned. Raises ValueError if it was another kind of part."""
         names = self.checkpointed_names()
         if not isinstance(saved, dict) or saved.keys() != set(names):
             raise ValueError(f"{type(self).__name__} checkpoints {', '.join(names)}; not found")
         for name in names:
             part = getattr(self, name)
-            if isinstance(part, Checkpointed):
+            if hasattr(part, "restore"):
                 part.restore(saved[name])
             else:
                 setattr(self, name, saved[name])

@@ -10,14 +10,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from ..scene import Load
 from .end_loaded import EndLoaded
+from .force import work_on
 from .protocol import NO_FORCE, Body, Energies, Force, Motion
 
 _SIZES_REMEMBERED = 64
+
+
+class MassState(NamedTuple):
+    """What changes of a mass."""
+
+    motion: Motion
+    dissipated: float = 0.0  #: so far [J]
+    load_work: float = 0.0  #: of the loads so far [J]
 
 
 class SpringDamper(EndLoaded):
@@ -37,7 +47,7 @@ class SpringDamper(EndLoaded):
     Raises ValueError for a mass or a damping that cannot be.
     """
 
-    CHECKPOINTED = ("_state", "_integrals", "_dissipated", "_load_work")
+    state: MassState
 
     def __init__(
         self,
@@ -53,26 +63,22 @@ class SpringDamper(EndLoaded):
             raise ValueError(f"mass = {mass}, damping = {damping}: a mass is positive and finite, damping not negative")
         self.mass, self._stiffness, self._damping, self._rest = mass, stiffness, damping, rest
         self._load, self._sign = external_force, 1.0
-        self._state = (displacement, velocity)
-        self._integrals = (0.0, 0.0)
-        self._dissipated = 0.0
+        self.state = MassState(Motion(displacement, velocity, 0.0, 0.0))
         self._maps = lru_cache(_SIZES_REMEMBERED)(self._map)
 
     def take_place(self, *, upper: bool) -> None:
         self._sign = 1.0 if upper else -1.0
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        before, on_end = self.motion(), self._on_end
+        (before, dissipated, load_work), on_end = self.state, self._on_end
         forces = [self._sign * c + n + q for c, n, q in zip(contact, foundation, on_end, strict=True)]
         forces[0] += self._load + self._stiffness * self._rest
         step, lost = self._maps(size)
-        start = np.array([*self._state, *forces, 0.0, 0.0])
-        x, v, once, twice = (step @ start).tolist()
+        start = np.array([*before[:2], *forces, 0.0, 0.0])
+        end = Motion(*(step @ start).tolist())
         if lost is not None:
-            self._dissipated += float(start @ lost @ start)
-        self._state, self._integrals = (x, v), (once, twice)
-        end = self.motion()
-        self._book_load(on_end, before, end, size)
+            dissipated += float(start @ lost @ start)
+        self.state = MassState(end, dissipated, load_work + work_on(on_end, before, end, size))
         return end
 
     def _map(self, size: float) -> tuple[np.ndarray, np.ndarray | None]:
@@ -95,17 +101,17 @@ class SpringDamper(EndLoaded):
         return expm(A * size)[[0, 1, 5, 6]], lost
 
     def motion(self) -> Motion:
-        return Motion(*self._state, *self._integrals)
+        return self.state.motion
 
     def energies(self) -> Energies:
-        x, v = self._state
+        (x, v, *_), dissipated, load_work = self.state
         stretched = x - self._rest
         kinetic, potential = 0.5 * self.mass * v * v, 0.5 * self._stiffness * stretched**2
-        return Energies(kinetic, potential, self._dissipated, -self._load * x - self._load_work)
+        return Energies(kinetic, potential, dissipated, -self._load * x - load_work)
 
     def apply_impulse(self, impulse: float) -> None:
-        x, v = self._state
-        self._state = (x, v + impulse / self.mass)
+        motion = self.state.motion
+        self.state = self.state._replace(motion=motion._replace(velocity=motion.velocity + impulse / self.mass))
 
     def holding_force(self, displacement: float, velocity: float) -> float:
         return self._stiffness * (displacement - self._rest) + self._damping * velocity - self._load
@@ -126,17 +132,18 @@ class Prescribed(Body):
     mass = float("inf")
 
     def __init__(self, motion: Motion) -> None:
-        self._motion = motion
+        self.state = motion
 
     def mark(self) -> None: ...
 
     def rewind(self) -> None: ...
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        return self._motion
+        return self.motion()
 
     def motion(self) -> Motion:
-        return self._motion
+        motion: Motion = self.state
+        return motion
 
     def apply_impulse(self, impulse: float) -> None: ...
 
@@ -144,15 +151,13 @@ class Prescribed(Body):
 class RigidWall(Prescribed):
     """An end held at rest at ``position`` [m]: the foundation, an elastic stop, or a seated spring."""
 
-    CHECKPOINTED = ("_motion",)
-
     def __init__(self, position: float) -> None:
         super().__init__(Motion(position, 0.0, 0.0, 0.0))
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        w = self._motion.displacement
-        self._motion = Motion(w, 0.0, w * size, 0.5 * w * size * size)
-        return self._motion
+        w = self.motion().displacement
+        self.state = Motion(w, 0.0, w * size, 0.5 * w * size * size)
+        return self.motion()
 
     def expect_loads(self, loads: Sequence[Load]) -> None: ...
 

@@ -17,7 +17,6 @@ from typing import Any, NoReturn
 from fmpy.model_description import ModelDescription, read_model_description
 
 from .archive import UnsafeArchive, unpack
-from .checkpointed import Checkpointed
 from .functions import DISCARD, ERROR, FATAL, VERSIONS, WARNING, Call, Functions
 from .protocol import FmuError, StepRefused
 
@@ -68,7 +67,7 @@ class Reals:
 Value = float | int | bool | str
 
 
-class Fmu(Checkpointed):
+class Fmu:
     """One instance of a co-simulation FMU and its state.
 
     Parameters
@@ -82,8 +81,6 @@ class Fmu(Checkpointed):
     start_time
         [s].
     """
-
-    CHECKPOINTED = ("steps", "rewinds")
 
     clock: Any  #: an array of C: time and size [s] of the step that `do_step` makes
     do_step: Call
@@ -270,23 +267,22 @@ class Fmu(Checkpointed):
         if (status := self.prepared(name, *arguments)()) > WARNING:
             raise self.failed(status, what)
 
-    def save(self) -> dict[str, Any]:
+    def serialized(self) -> bytes:
+        """Return the present state as the FMU writes it. Raises FmuError."""
         what, state, size = "cannot save the state", c_void_p(), c_size_t()
         self._must(what, "GetFMUState", byref(state))
         self._must(what, "SerializedFMUStateSize", state, byref(size))
         content = (c_char * size.value)()
         self._must(what, "SerializeFMUState", state, content, size)
         self._must(what, "FreeFMUState", byref(state))
-        return {**super().save(), "state": content.raw}
+        return content.raw
 
-    def restore(self, saved: dict[str, Any]) -> None:
-        counts = dict(saved)
-        content = counts.pop("state", b"")
+    def deserialize(self, content: bytes) -> None:
+        """Go on from what `serialized` of an equal FMU returned. Raises FmuError."""
         what, state, size = "cannot restore the state", c_void_p(), c_size_t(len(content))
         self._must(what, "DeserializeFMUState", (c_char * len(content)).from_buffer_copy(content), size, byref(state))
         self._must(what, "SetFMUState", state)
         self._must(what, "FreeFMUState", byref(state))
-        super().restore(counts)
 
     def close(self) -> None:
         """Free the instance, unless it has returned fmi2Fatal: then none of its library may be called again."""

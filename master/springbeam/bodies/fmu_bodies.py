@@ -9,8 +9,9 @@ from functools import partial
 from math import isfinite
 from pathlib import Path
 from struct import Struct
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar, NamedTuple, NoReturn
 
+import msgspec
 import numpy as np
 from typing_extensions import Self
 
@@ -26,15 +27,25 @@ from .protocol import NO_FORCE, BeamBody, Body, Energies, FmuError, Force, Motio
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
-#: ``Motion(*values)`` and ``Energies(*values)`` in a third of the time.
+
+
+class FmuState(NamedTuple):
+    """What changes of a body beside the state inside the FMU."""
+
+    motion: Motion = Motion(0.0, 0.0, 0.0, 0.0)
+    told: tuple[float, ...] = ()  #: motion and energies as the FMU has told them
+    pending: float = 0.0  #: upward impulse that the FMU applies at the start of its next step [N·s]
+    dissipated: float = 0.0  #: before the FMU was last started again [J]
+
+
+#: ``Motion(*values)``, ``Energies(*values)`` and ``FmuState(*values)`` in a third of the time.
 _motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
 _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
+_state_of: Callable[[type[FmuState], tuple[Motion, tuple[float, ...], float, float]], FmuState] = tuple.__new__
 
 
 class FmuBody(Body):
     """What both bodies do alike; a subclass names its variables."""
-
-    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("fmu", "_pending", "_current", "_told")
 
     _MOTION: tuple[str, ...]
     _ENERGIES: tuple[str, ...]
@@ -44,10 +55,7 @@ class FmuBody(Body):
     _bears_loads = False  #: whether the last of the energies is the work of the loads
     #: Highest derivative of a force that is handed over.
     _SLOPES: int = 2
-    _current: Motion
-    _told: tuple[float, ...]
-    #: Whether the FMU tells its whole motion.
-    _tells_all = True
+    state: Any
 
     def __init__(self, fmu: Fmu) -> None:
         self.fmu = fmu
@@ -61,7 +69,6 @@ class FmuBody(Body):
         self._prepare_outputs()
         self._impulse = Reals(fmu, *self._IMPULSE)
         self._prepare_inputs(())
-        self._pending = 0.0
         self.mass = self._mass()
         if not isfinite(self.mass):
             raise FmuError(f"{fmu.path}: the mass of its end is {self.mass}")
@@ -131,7 +138,7 @@ class FmuBody(Body):
         if (status := fmu.get_state()) > WARNING:
             raise fmu.failed(status, "cannot save the state")
         fmu.moved = False
-        self._marked_values = self._pending, self._current, self._told
+        super().mark()
 
     def rewind(self) -> None:
         fmu = self.fmu
@@ -140,16 +147,28 @@ class FmuBody(Body):
                 raise fmu.failed(status, "cannot restore the state")
             fmu.moved = False
             fmu.rewinds += 1
-            self._pending, self._current, self._told = self._marked_values
+            super().rewind()
+
+    def save(self) -> bytes:
+        fmu = self.fmu
+        return msgspec.msgpack.encode((super().save(), fmu.steps, fmu.rewinds, fmu.serialized()))
+
+    def restore(self, saved: bytes) -> None:
+        kept = msgspec.msgpack.decode(saved, type=tuple[bytes, int, int, bytes])
+        state, self.fmu.steps, self.fmu.rewinds, content = kept
+        super().restore(state)
+        self.fmu.deserialize(content)
 
     def motion(self) -> Motion:
-        return self._current
+        motion: Motion = self.state.motion
+        return motion
 
     def apply_impulse(self, impulse: float) -> None:
         # The FMU applies it at the start of its next step; motion and energies already show it.
-        self._pending += impulse
-        self._impulse.set((self._pending,))
-        self._current = self._current._replace(velocity=self._current.velocity + impulse / self.mass)
+        motion, pending = self.state.motion, self.state.pending + impulse
+        self._impulse.set((pending,))
+        struck = motion._replace(velocity=motion.velocity + impulse / self.mass)
+        self.state = self.state._replace(motion=struck, pending=pending)
 
     def _step(self, sloped: bool) -> Motion:
         """Step as has been written, under forces that vary if they are ``sloped``; return the motion."""
@@ -162,7 +181,6 @@ class FmuBody(Body):
             raise fmu.failed(status, "cannot set input derivatives")
         if (status := fmu.do_step()) > WARNING:
             fmu.refuse(status)
-        self._pending = 0.0
         return self._tell()
 
     def _begin(self) -> None:
@@ -171,32 +189,34 @@ class FmuBody(Body):
             self._tell()
         except StepRefused as refused:
             raise FmuError(f"{self.fmu.path}: starts with a motion that is {refused}") from refused
-        self._marked_values = self._pending, self._current, self._told
+        super().mark()
 
     def _refuse(self, *forces: Force) -> NoReturn:
         raise StepRefused(f"{self.fmu.path.name}: the force it should step under is not finite: {forces}")
 
-    def _made_up(self, told: tuple[float, ...]) -> Motion:
-        """Return the motion where the FMU does not tell all of it."""
-        raise NotImplementedError
+    def _take(self, told: tuple[float, ...]) -> Motion:
+        """Take what the FMU has told as the present motion and energies, with no impulse pending; return the motion."""
+        motion = _motion_of(Motion, told[:4])
+        self.state = _state_of(FmuState, (motion, told, 0.0, self.state.dissipated))
+        return motion
 
     def _tell(self) -> Motion:
         """Read the motion, and the energies that belong to it."""
         if (status := self._get()) > WARNING:
             raise self.fmu.failed(status, f"cannot read {', '.join(self._outputs)}")
-        self._told = told = self._unpack()
+        told = self._unpack()
         if not isfinite(sum(told)):
             values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs, told, strict=True))
             raise StepRefused(f"not finite: {values} of {self.fmu.path.name}")
-        self._current = motion = _motion_of(Motion, told[:4]) if self._tells_all else self._made_up(told)
-        return motion
+        return self._take(told)
 
     def _stored(self) -> tuple[float, ...]:
         """Return the energies [J]; the kinetic one has the impulse that is still pending."""
-        energies = self._told[len(self._MOTION) :]
-        if self._pending != 0.0:
-            before = self._current.velocity - self._pending / self.mass
-            return (energies[0] + 0.5 * self._pending * (before + self._current.velocity), *energies[1:])
+        motion, told, pending, *_ = self.state
+        energies: tuple[float, ...] = told[len(self._MOTION) :]
+        if pending != 0.0:
+            before = motion.velocity - pending / self.mass
+            return (energies[0] + 0.5 * pending * (before + motion.velocity), *energies[1:])
         return energies
 
     def close(self) -> None:
@@ -216,6 +236,7 @@ class OwnBody(FmuBody):
     """
 
     NAME: ClassVar[str]  #: of the FMU
+    state: FmuState = FmuState()
     _key: Hashable = None  #: what the body was made of, if it is to be kept
     _as_made: dict[str, Any]  #: the attributes then
 
@@ -326,8 +347,6 @@ class FmuSpring(OwnBody, EndLoaded):
     """``spring.fmu`` as a body; contact law and foundation are the master's."""
 
     NAME = "spring"
-    CHECKPOINTED = (*FmuBody.CHECKPOINTED, "_dissipated_before")
-
     _MOTION = ("displacement", "velocity", "displacement_integral", "displacement_integral_2")
     _ENERGIES = ("kinetic_energy", "potential_energy", "dissipated_energy")
     _IMPULSE = ("impulse",)
@@ -338,7 +357,6 @@ class FmuSpring(OwnBody, EndLoaded):
         parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
         parameters["displacement"] = spring.equilibrium
         parameters["velocity"] = spring.initial_velocity
-        self._dissipated_before = 0.0  #: before the last `restart` [J]
         super().__init__(Fmu(self.NAME, _path(self.NAME), parameters, start_time))
 
     def _mass(self) -> float:
@@ -365,8 +383,8 @@ class FmuSpring(OwnBody, EndLoaded):
 
     def energies(self) -> Energies:
         kinetic, potential, dissipated, *work = self._stored()
-        load = -work[0] if work else -self._spring.external_force * self._current.displacement
-        return _energies_of(Energies, (kinetic, potential, self._dissipated_before + dissipated, load))
+        load = -work[0] if work else -self._spring.external_force * self.state.motion.displacement
+        return _energies_of(Energies, (kinetic, potential, self.state.dissipated + dissipated, load))
 
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)
@@ -390,7 +408,6 @@ class FmuSpring(OwnBody, EndLoaded):
 
         ``dissipated`` is what damping has taken until then [J].
         """
-        self._dissipated_before = dissipated
         self.fmu.reset(time, {"displacement": displacement, "velocity": velocity})
-        self._pending = 0.0
+        self.state = FmuState(dissipated=dissipated)
         self._begin()

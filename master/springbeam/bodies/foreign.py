@@ -15,7 +15,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import isfinite, sqrt
 from pathlib import Path
+from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from ..scene.partners import ForeignFmu
@@ -48,6 +50,18 @@ _TWICE = _ONCE * (1.0 - _NODES)
 _SLOPE = np.linalg.solve(np.vander(_NODES, increasing=True).T, np.arange(5.0))
 
 
+class ForeignState(NamedTuple):
+    """What changes of a foreign body beside the state inside the FMU."""
+
+    motion: Motion
+    told: tuple[float, ...] = ()  #: motion and energies as far as the FMU has told them
+    pending: float = 0.0  #: upward impulse that the FMU applies at the start of its next step [N·s]
+    received: float = 0.0  #: work of all forces and impulses on the end so far, but not of loads [J]
+    load_work: float = 0.0  #: of the loads so far [J]
+    time: float = 0.0  #: of the present state [s]
+    size: float = 0.0  #: of the last step [s]
+
+
 class ForeignBody(FmuBody, EndLoaded):
     """A foreign FMU in either place.
 
@@ -63,7 +77,7 @@ class ForeignBody(FmuBody, EndLoaded):
         Whether moments are found by substeps.
     """
 
-    CHECKPOINTED = (*FmuBody.CHECKPOINTED, "received", "_load_work", "_size", "_time", "_held")
+    state: ForeignState
 
     #: Loads act on the end, and no input of the FMU is for them.
     expect_loads, set_loads = EndLoaded.expect_loads, EndLoaded.set_loads
@@ -73,15 +87,12 @@ class ForeignBody(FmuBody, EndLoaded):
         names, energies = spec.named(spec.MOTION), spec.named(spec.ENERGIES)
         self._MOTION = tuple(name for name in names if name is not None)
         self._at = [None if name is None else self._MOTION.index(name) for name in names]
-        self._tells_all = None not in self._at
         self._ENERGIES = tuple(name for name in energies if name is not None) if found.abilities.energies else ()
         self._IMPULSE = () if spec.impulse is None else (spec.impulse,)
         self._FORCES, self._SLOPES = (spec.force,), found.abilities.slopes
         self._upward = 1.0 if upper else -1.0
-        #: Work of all forces and impulses on the end so far, but not of loads [J].
-        self.received = 0.0
-        self._size = 0.0  #: of the last step [s]
-        self._time = start_time  #: of the present state [s]
+        self.state = ForeignState(Motion(0.0, 0.0, 0.0, 0.0), time=start_time)
+        self._size = 0.0  #: of the step that is being made [s]
         self._held: dict[float, float] = {}  #: holding forces [N] by displacement [m]
         fmu = Fmu(None, Path(spec.fmu), spec.parameters, start_time)
         state = found.abilities.state and bool(fmu.says.canGetAndSetFMUstate)
@@ -104,13 +115,13 @@ class ForeignBody(FmuBody, EndLoaded):
         super()._prepare(fmu)
 
     def told(self) -> tuple[Motion, float, int, int]:
-        """Return motion, `received`, doStep calls, and how often the state was set back."""
-        return self._current, self.received, self.steps, self.rewinds
+        """Return motion, the work received, doStep calls, and how often the state was set back."""
+        return self.state.motion, self.state.received, self.steps, self.rewinds
 
     def start_as_fast_as(self, velocity: float) -> None:
         """Start with the ``velocity`` [m/s] of what it is tied to, where its own is not told but measured."""
         if not self.abilities.velocity:
-            self._current = self._current._replace(velocity=velocity)
+            self.state = self.state._replace(motion=self.state.motion._replace(velocity=velocity))
 
     def _mass(self) -> float:
         return self._spec.mass or self._found.mass
@@ -120,24 +131,25 @@ class ForeignBody(FmuBody, EndLoaded):
             super().mark()
         else:
             self.fmu.moved = False
-        self._marked_work = (self.received, self._load_work, self._time)
+            self._marked = self.state
 
     def rewind(self) -> None:
         if self.fmu.moved:
             if not self.abilities.state:
                 raise BodyFailed(f"{self.fmu.path}: a step had to be repeated, and its state cannot be restored")
             super().rewind()
-            self.received, self._load_work, self._time = self._marked_work
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        up, sign, start = self._upward, self._spec.force_sign, self._current
+        up, sign, start = self._upward, self._spec.force_sign, self.state.motion
         load = self._followed(self._on_end, size)
         exchanged = force.combined((up, 1.0), (contact, foundation))
         inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
         end = self._in_parts(time, size, inputs) if self._by_substeps else self._part(time, size, inputs)
-        self._time, self._size = time + size, size
-        self.received += force.work_on(exchanged, start, end, size)
-        self._book_load(load, start, end, size)
+        received = self.state.received + force.work_on(exchanged, start, end, size)
+        load_work = self.state.load_work + force.work_on(load, start, end, size)
+        self.state = self.state._replace(
+            received=received, load_work=load_work, motion=end, time=time + size, size=size
+        )
         return end
 
     def _followed(self, given: Force, size: float) -> Force:
@@ -147,7 +159,7 @@ class ForeignBody(FmuBody, EndLoaded):
         return force.derivatives(force.legendre(given, size, self._SLOPES), size)
 
     def _part(self, time: float, size: float, inputs: Force) -> Motion:
-        struck, self._size = self._pending != 0.0, size
+        struck, self._size = self.state.pending != 0.0, size
         if not isfinite(sum(inputs)):
             self._refuse(inputs)
         self._write(time, size, *inputs)
@@ -157,31 +169,37 @@ class ForeignBody(FmuBody, EndLoaded):
         return end
 
     def _in_parts(self, time: float, size: float, inputs: Force) -> Motion:
-        places = [self._current.displacement]
+        places = [self.state.motion.displacement]
         for begin, until in pairwise((size * _NODES).tolist()):
             end = self._part(time + begin, until - begin, force.shifted(inputs, begin))
             places.append(end.displacement)
         x = np.array(places)
         velocity = end.velocity if self.abilities.velocity else float(_SLOPE @ x) / size
-        self._current = end = Motion(x[-1].item(), velocity, size * float(_ONCE @ x), size**2 * float(_TWICE @ x))
-        return end
+        return Motion(x[-1].item(), velocity, size * float(_ONCE @ x), size**2 * float(_TWICE @ x))
 
     def apply_impulse(self, impulse: float) -> None:
         if not self._IMPULSE:
-            if abs(impulse) <= ROUNDED_IMPULSE * self.mass * abs(self._current.velocity):
+            if abs(impulse) <= ROUNDED_IMPULSE * self.mass * abs(self.state.motion.velocity):
                 return
             raise BodyFailed(f"{self.fmu.path}: cannot take an impulse of {impulse:.6g} N·s, it has no input for one")
-        before = self._current.velocity
+        before = self.state.motion.velocity
         super().apply_impulse(impulse)
-        self.received += 0.5 * impulse * (before + self._current.velocity)
+        received = self.state.received + 0.5 * impulse * (before + self.state.motion.velocity)
+        self.state = self.state._replace(received=received)
+
+    def _take(self, told: tuple[float, ...]) -> Motion:
+        motion = self._made_up(told)
+        self.state = self.state._replace(motion=motion, told=told, pending=0.0)
+        return motion
 
     def _made_up(self, told: tuple[float, ...]) -> Motion:
+        """Return the motion with what the FMU does not tell of it."""
         size = self._size
         w, v, once, twice = (None if at is None else told[at] for at in self._at)
         assert w is not None
         if size == 0.0:
             return Motion(w, self._found.velocity if v is None else v, once or 0.0, twice or 0.0)
-        w0, v0 = self._current[:2]
+        w0, v0 = self.state.motion[:2]
         if v is None:
             v0 = v = (w - w0) / size
         first, second = moments(w0, v0, w, v, size)
@@ -192,10 +210,10 @@ class ForeignBody(FmuBody, EndLoaded):
             return self.exchanged()
         told = iter(self._stored())
         energies = Energies(*(0.0 if name is None else next(told) for name in self._spec.named(self._spec.ENERGIES)))
-        return energies._replace(load_potential=energies.load_potential - self._load_work)
+        return energies._replace(load_potential=energies.load_potential - self.state.load_work)
 
     def exchanged(self) -> Energies:
-        return Energies(0.0, self.received, 0.0, 0.0)
+        return Energies(0.0, self.state.received, 0.0, 0.0)
 
     def holding_force(self, displacement: float, velocity: float) -> float:
         """Return the force that holds the end where it now rests, found by trial steps.
@@ -204,12 +222,12 @@ class ForeignBody(FmuBody, EndLoaded):
         """
         if (known := self._held.get(displacement)) is not None:
             return known
-        size = self._size or self._found.H
+        size = self.state.size or self._found.H
         load, self._on_end = self._on_end, NO_FORCE
 
         def pushed(upward: float) -> Motion:
             self.rewind()
-            return self.advance(self._time, size, NO_FORCE, (upward, 0.0, 0.0))
+            return self.advance(self.state.time, size, NO_FORCE, (upward, 0.0, 0.0))
 
         let_go = pushed(0.0)
         last, left, found = 0.0, let_go.velocity, -self.mass * let_go.velocity / size
@@ -228,6 +246,13 @@ class ForeignBody(FmuBody, EndLoaded):
             )
         self._held[displacement] = found
         return found
+
+    def save(self) -> bytes:
+        return msgspec.msgpack.encode((super().save(), self._held))
+
+    def restore(self, saved: bytes) -> None:
+        of_fmu, self._held = msgspec.msgpack.decode(saved, type=tuple[bytes, dict[float, float]])
+        super().restore(of_fmu)
 
 
 def moments(w0: float, v0: float, w: float, v: float, size: float) -> tuple[float, float]:

@@ -189,8 +189,7 @@ def _examined(file: tuple[str, int, int], spec: str, upper: bool, start_time: fl
 class IsolatedBody(EndLoaded):
     """A `springbeam.bodies.foreign.ForeignBody` in a process of its own; parameters as of that."""
 
-    _motion: Motion
-    _received: float
+    state: tuple[Motion, float]  #: the motion, and the work received [J]
 
     def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings, by_substeps: bool) -> None:
         self.path, self.abilities = spec.fmu, found.abilities
@@ -206,7 +205,8 @@ class IsolatedBody(EndLoaded):
     def _ask(self, doing: str, *call: Any) -> Any:
         assert self._process is not None
         calls, self._waiting = [*self._waiting, call], []
-        value, (self._motion, self._received, self.steps, self.rewinds) = self._process.ask(calls, doing, CALL_PATIENCE)
+        value, (*state, self.steps, self.rewinds) = self._process.ask(calls, doing, CALL_PATIENCE)
+        self.state = tuple(state)
         return value
 
     def start_as_fast_as(self, velocity: float) -> None:
@@ -215,18 +215,18 @@ class IsolatedBody(EndLoaded):
 
     def mark(self) -> None:
         self._waiting.append(("mark",))
-        self._marked_motion = (self._motion, self._received)
+        super().mark()
 
     def rewind(self) -> None:
         self._waiting.append(("rewind",))
-        self._motion, self._received = self._marked_motion
+        super().rewind()
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         self._ask(f"its step at t = {time:.9g} s", "advance", time, size, contact, foundation)
-        return self._motion
+        return self.state[0]
 
     def motion(self) -> Motion:
-        return self._motion
+        return self.state[0]
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
         super().expect_loads(loads)
@@ -243,7 +243,7 @@ class IsolatedBody(EndLoaded):
         return energies
 
     def exchanged(self) -> Energies:
-        return Energies(0.0, self._received, 0.0, 0.0)
+        return Energies(0.0, self.state[1], 0.0, 0.0)
 
     def apply_impulse(self, impulse: float) -> None:
         self._ask("taking an impulse", "apply_impulse", impulse)
@@ -252,11 +252,11 @@ class IsolatedBody(EndLoaded):
         force: float = self._ask("a trial step", "holding_force", displacement, velocity)
         return force
 
-    def save(self) -> dict[str, Any]:
-        saved: dict[str, Any] = self._ask("saving its state", "save")
+    def save(self) -> bytes:
+        saved: bytes = self._ask("saving its state", "save")
         return saved
 
-    def restore(self, saved: dict[str, Any]) -> None:
+    def restore(self, saved: bytes) -> None:
         self._ask("restoring its state", "restore", saved)
 
     def close(self) -> None:

@@ -111,7 +111,7 @@ class Bench:
         return samples
 
     def _sample(self, body: ForeignBody) -> Sample:
-        sample = Sample(*body.motion(), sum(body.energies()), body.received)
+        sample = Sample(*body.motion(), sum(body.energies()), body.state.received)
         if not isfinite(sample.energy):
             raise FmuError(f"{self.spec.fmu}: tells energies that are not finite: {body.energies()}")
         return sample

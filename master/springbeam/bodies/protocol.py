@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from ..scene import Load, SceneError
 from .abilities import Abilities
-from .checkpointed import Checkpointed
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
@@ -53,7 +53,7 @@ class Energies(NamedTuple):
     load_potential: float
 
 
-class Body(Checkpointed):
+class Body:
     """A body with one interface end and a state that can be rewound; a body of one's own derives from it.
 
     ``advance`` prescribes the contact force C on the step: the upper body takes it as +C, the lower one as −C.
@@ -69,6 +69,8 @@ class Body(Checkpointed):
         """Whether the end has no inertia: it then has the velocity of what it is joined to, and springs back alone."""
         return self.mass == 0.0
 
+    #: What changes from step to step, a value that is replaced and never changed in place.
+    state: Any = None
     #: Where its state cannot be saved, a step is made once, by the schemes that never repeat one.
     abilities = Abilities()
 
@@ -76,14 +78,22 @@ class Body(Checkpointed):
         """Learn, before the run, whether it is the upper body; one that fits in either place needs to know."""
 
     def mark(self) -> None:
-        """Remember the present state as the one ``rewind`` returns to: the values of what `CHECKPOINTED` names."""
-        if not self.CHECKPOINTED:
-            raise NotImplementedError(f"{type(self).__name__} has neither mark nor CHECKPOINTED")
-        self._marked = {name: getattr(self, name) for name in self.CHECKPOINTED}
+        """Remember `state` as the one ``rewind`` returns to."""
+        if self.state is None:
+            raise NotImplementedError(f"{type(self).__name__} has neither mark nor state")
+        self._marked = self.state
 
     def rewind(self) -> None:
         """Return to the marked state."""
-        vars(self).update(self._marked)
+        self.state = self._marked
+
+    def save(self) -> bytes:
+        """Return `state` as MessagePack, numbers to the last bit."""
+        return msgspec.msgpack.encode(self.state)
+
+    def restore(self, saved: bytes) -> None:
+        """Go on from what `save` of an equal body returned. Raises msgspec.DecodeError if it was of another kind."""
+        self.state = msgspec.msgpack.decode(saved, type=type(self.state))
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         """Advance from ``time`` by ``size`` [s] and return `motion`. Raises StepRefused; ``rewind`` then recovers."""

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 from operator import mul
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -30,6 +31,16 @@ from . import force
 from .protocol import NO_FORCE, BeamBody, Energies, Force, Motion
 
 _SIZES_REMEMBERED = 16
+
+
+class BendState(NamedTuple):
+    """What changes of a beam without inertia."""
+
+    w: float  #: [m]
+    velocity: float  #: [m/s]
+    integral: float = 0.0  #: of u_tip over the last step, as in `Motion`
+    integral_2: float = 0.0
+    dissipated: float = 0.0  #: so far [J]
 
 
 class QuasiStaticBeam(BeamBody):
@@ -45,7 +56,7 @@ class QuasiStaticBeam(BeamBody):
         u_tip [m] and its rate [m/s] at the start.
     """
 
-    CHECKPOINTED = ("_w", "_velocity", "_integrals", "_dissipated")
+    state: BendState
 
     #: An impulse meets nothing.
     mass = 0.0
@@ -55,29 +66,24 @@ class QuasiStaticBeam(BeamBody):
         self._tip_shape = statics.tip_force_shape(beam, SHAPE_POINTS)
         self._load_shape = statics.load_shape(beam, SHAPE_POINTS)
         self._rest, self._load_energy = statics.tip_load_deflection(beam), statics.load_energy(beam)
-        self._w, self._velocity = tip - self._rest, velocity
-        self._integrals = (0.0, 0.0)  #: of u_tip over the last step, as in `Motion`
-        self._dissipated = 0.0
+        self.state = BendState(tip - self._rest, velocity)
         self._responses = lru_cache(_SIZES_REMEMBERED)(self._response)
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         k = self._stiffness
-        given = [*(c / k for c in force.legendre(contact, size, self._degree)), self._w]
-        self._w, self._velocity, first, second, *rate = [sum(map(mul, row, given)) for row in self._responses(size)]
-        self._integrate(size, first, second)
+        given = [*(c / k for c in force.legendre(contact, size, self._degree)), self.state.w]
+        w, velocity, first, second, *rate = [sum(map(mul, row, given)) for row in self._responses(size)]
         mean_square = sum(c * c / (2 * j + 1) for j, c in enumerate(rate))
-        self._dissipated += self._alpha * k * size * mean_square
-        return self.motion()
+        return self._arrive(size, w, velocity, first, second, self._alpha * k * size * mean_square)
 
     def advance_alone(self, time: float, size: float) -> Motion:
-        start, alpha = self._w, self._alpha
+        start, alpha = self.state.w, self._alpha
         # α_b = 0: at once.
         left, gone = (math.exp(-size / alpha), -math.expm1(-size / alpha)) if alpha > 0.0 else (0.0, 1.0)
-        self._w, self._velocity = start * left, -start * left / alpha if alpha > 0.0 else 0.0
+        w, velocity = start * left, -start * left / alpha if alpha > 0.0 else 0.0
         first = alpha * start * gone
-        self._integrate(size, first, alpha * (start * size - first))
-        self._dissipated += 0.5 * self._stiffness * (start * start - self._w * self._w)
-        return self.motion()
+        lost = 0.5 * self._stiffness * (start * start - w * w)
+        return self._arrive(size, w, velocity, first, alpha * (start * size - first), lost)
 
     def _response(self, size: float) -> list[list[float]]:
         """Return rows over (Legendre coefficients of C/k, w at the start), shape (d + 5, d + 2).
@@ -93,21 +99,25 @@ class QuasiStaticBeam(BeamBody):
         rows: list[list[float]] = [row.tolist() for row in (w.sum(axis=0), rate.sum(axis=0), once, twice, *rate)]
         return rows
 
-    def _integrate(self, size: float, first: float, second: float) -> None:
-        self._integrals = (self._rest * size + first, 0.5 * self._rest * size * size + second)
+    def _arrive(self, size: float, w: float, velocity: float, first: float, second: float, lost: float) -> Motion:
+        """Take what a step of ``size`` [s] has come to: w, ẇ, ∫w, ∫∫w, and the energy it has dissipated."""
+        integrals = self._rest * size + first, 0.5 * self._rest * size * size + second
+        self.state = BendState(w, velocity, *integrals, self.state.dissipated + lost)
+        return self.motion()
 
     def motion(self) -> Motion:
-        return Motion(self._rest + self._w, self._velocity, *self._integrals)
+        w, *others = self.state[:4]
+        return Motion(self._rest + w, *others)
 
     def energies(self) -> Energies:
         """Return the strain energy of w and the loads together, and the loads' potential, −(their work)."""
-        k, w, rest = self._stiffness, self._w, self._rest
+        k, w, rest = self._stiffness, self.state.w, self._rest
         strain = 0.5 * k * w * w + k * w * rest + 0.5 * self._load_energy
-        return Energies(0.0, strain, self._dissipated, -k * w * rest - self._load_energy)
+        return Energies(0.0, strain, self.state.dissipated, -k * w * rest - self._load_energy)
 
     def shape(self) -> np.ndarray:
         """Return the deflection [m] at `SHAPE_POINTS`, shape (21,)."""
-        return self._load_shape + self._stiffness * self._w * self._tip_shape
+        return self._load_shape + self._stiffness * self.state.w * self._tip_shape
 
     def apply_impulse(self, impulse: float) -> None:
         raise AssertionError("a massless tip takes no impulse")
@@ -116,13 +126,13 @@ class QuasiStaticBeam(BeamBody):
         return self._stiffness * (displacement - self._rest + self._alpha * velocity)
 
     def join(self, velocity: float) -> None:
-        self._velocity = velocity
+        self.state = self.state._replace(velocity=velocity)
 
     def release(self) -> float:
+        w = self.state.w
         if self._alpha > 0.0:
-            self._velocity = -self._w / self._alpha
+            self.join(-w / self._alpha)
             return 0.0
         # Without damping the tip is at rest at once.
-        lost = 0.5 * self._stiffness * self._w * self._w
-        self._w = self._velocity = 0.0
-        return lost
+        self.state = self.state._replace(w=0.0, velocity=0.0)
+        return 0.5 * self._stiffness * w * w
