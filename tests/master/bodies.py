@@ -20,7 +20,7 @@ from scipy.linalg import expm
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.force import combined, shifted, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
-from springbeam.coupling.protocol import Step, Window
+from springbeam.coupling.protocol import Step
 from springbeam.monolithic.loads import Loads
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.recording import MemoryRecorder
@@ -321,7 +321,7 @@ def solve(coupling, size: float, upper: Body, lower: Body, guess: Force = NO_FOR
     """Make a step from where the bodies are, and return its contact force."""
     for body in (upper, lower):
         body.mark()
-    return coupling.solve(upper, lower, Window(time, size, (upper.motion(), lower.motion())), guess)
+    return coupling.solve(upper, lower, time, size, (upper.motion(), lower.motion()), guess).contact
 
 
 def couple(coupling, size: float, steps: int, upper: Body, lower: Body) -> list[Row]:

@@ -14,7 +14,7 @@ from springbeam.bodies.protocol import NO_FORCE, Force, Motion
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.one_way import OneWay
 from springbeam.coupling.projection import Projection
-from springbeam.coupling.protocol import Step, Window
+from springbeam.coupling.protocol import Step
 from springbeam.results.steps import STEP
 from springbeam.run.neglect import Past, neglected
 from springbeam.run.outcome import RunStopped
@@ -107,7 +107,7 @@ def test_both_ends_known_leave_nothing_to_solve() -> None:
     law = Compliance(*LAW)
     one_way = OneWay(law, 0, 1e-12, upper_drives=True)
     ends = (beam.motion()._replace(displacement=-start), RigidWall(0.0).motion())
-    force = one_way.solve(beam, RigidWall(0.0), Window(0.0, 0.01, ends), (5.0, 0.0, 0.0))
+    force = one_way.solve(beam, RigidWall(0.0), 0.0, 0.01, ends, (5.0, 0.0, 0.0)).contact
     assert force == (Projection(law, 0).force(start, 0.01, [-beam.motion().displacement])[0], 0.0, 0.0)
     assert beam.steps == 1
 

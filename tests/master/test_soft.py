@@ -104,10 +104,10 @@ def test_a_step_made_at_degree_0_books_what_damping_takes_at_degree_0(law, monke
     """The solver fails at degree 2 in every step; energy to rounding all the same, at what degree 0 dissipates."""
     aim = SoftSolver.aim
 
-    def fails_above_0(self, gap, a, descent, window):
+    def fails_above_0(self, gap, a, descent, size, start):
         if self.degree > 0:
             raise NotConverged(1.0, 1)
-        return aim(self, gap, a, descent, window)
+        return aim(self, gap, a, descent, size, start)
 
     monkeypatch.setattr(SoftSolver, "aim", fails_above_0)
     rows, coupling = couple_by(law, 2, 2e-2, 100, unit_beam(4), DuffingBody(k1=3.0, k2=-0.2))

@@ -17,9 +17,9 @@ import pytest
 
 from springbeam.bodies import functions
 from springbeam.bodies.fmu_bodies import release
+from springbeam.coupling.algorithm_1 import Algorithm1
 from springbeam.run import detection
 from springbeam.run.master import Master
-from springbeam.run.paper_law import PaperLaw
 from springbeam.run.stepping import Pair
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
@@ -183,7 +183,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
         (Master, "_record", "row"),
         (detection, "locate", "location"),
         (Master, "_act", "event"),
-        (PaperLaw, "_step", "paper"),
+        (Algorithm1, "solve", "paper"),
     ):
         watch(owner, name, lambda *_, where=where: where)
     return script

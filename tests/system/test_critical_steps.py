@@ -17,7 +17,6 @@ from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.protocol import NO_FORCE
 from springbeam.contact.laws import law_of
 from springbeam.coupling import coupling_of
-from springbeam.coupling.protocol import Window
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.studies.stability.linear import spectral_radius
 from springbeam.studies.stability.predict import THRESHOLD, critical_step, linear_pair
@@ -66,8 +65,9 @@ def growth(scene):
         while len(energies) <= MOST_STEPS and energies[-1] < GROWN * energies[0]:
             beam.mark()
             top.mark()
-            window = Window(H * (len(energies) - 1), H, (beam.motion(), top.motion()))
-            guess = force.shifted(coupling.solve(beam, top, window, guess), H)
+            ends = (beam.motion(), top.motion())
+            step = coupling.solve(beam, top, H * (len(energies) - 1), H, ends, guess)
+            guess = force.shifted(step.contact, H)
             energies.append(energy())
     finally:
         beam.close()

@@ -115,7 +115,7 @@ LASTING = [
     ("energy", "start", "fmi2GetFMUstate", "Discard", "cannot save the state"),
     ("energy", "start", "fmi2GetFMUstate", "Fatal", "cannot save the state"),
     ("jacobi", "start", "fmi2GetFMUstate", "Error", "cannot save the state"),
-    ("paper", "paper", "fmi2GetFMUstate", "Error", "cannot save the state"),
+    ("paper", "start", "fmi2GetFMUstate", "Error", "cannot save the state"),
     ("hermite", "tied", "fmi2SetRealInputDerivatives", "Discard", "cannot set input derivatives"),
     ("hermite", "touch", "fmi2SetRealInputDerivatives", "Error", "cannot set input derivatives"),
     ("hermite", "location", "fmi2SetRealInputDerivatives", "Fatal", "cannot set input derivatives"),

@@ -18,8 +18,6 @@ from springbeam.contact.phases import Phase
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.checkpoint import decoded, encoded
 from springbeam.run.master import Master
-from springbeam.run.paper_law import PaperLaw
-from springbeam.run.runner import _as_in_paper
 from springbeam.scene import Scene, load_scene, with_changes
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
@@ -87,11 +85,10 @@ class Run:
 
     def __init__(self, scene: Scene, *, each_step: bool = False) -> None:
         start_time = scene.contact_time or 0.0
-        paper = scene.contact.law == "paper"
-        self.bodies = load_bodies(_as_in_paper(scene) if paper else scene, start_time)
+        self.bodies = load_bodies(scene, start_time)
         self.recorder = MemoryRecorder(scene)
         self.saved: list[bytes] = []
-        self.simulation: Any = (PaperLaw if paper else Master)(scene, start_time, *self.bodies, self.recorder)
+        self.simulation: Any = Master(scene, start_time, *self.bodies, self.recorder)
         self._each_step = each_step
 
     def _save(self) -> None:

@@ -52,6 +52,8 @@ def _body(scene: Scene, spec: Beam | Spring | Partner, start_time: float, found:
         return FmuSpring.of(spec, start_time)
     if not isinstance(spec, Beam):
         return ELEMENTS[spec.element](**spec.model_dump(exclude={"element"}))
+    if scene.contact.algorithm:  # (62): the midpoint rule on the whole mesh
+        spec = spec.model_copy(update={"integrator": "generalized_alpha", "rho_inf": 1.0, "n_modes": 0})
     rate = spec.initial_velocity_slope
     if spec.fidelity == "dynamic":
         return FmuBeam.of(spec, start_time, spec.initial_deflection_slope + start_time * rate, scene.loads)

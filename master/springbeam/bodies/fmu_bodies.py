@@ -404,10 +404,7 @@ class FmuSpring(OwnBody, EndLoaded):
         return round(steps)
 
     def restart(self, time: float, displacement: float, velocity: float, dissipated: float = 0.0) -> None:
-        """Start again at ``time`` [s] from y [m] and z [m/s], by the exact start values of the FMU.
-
-        ``dissipated`` is what damping has taken until then [J].
-        """
+        """Start again from y [m] and z [m/s], by the exact start values of the FMU."""
         self.fmu.reset(time, {"displacement": displacement, "velocity": velocity})
         self.state = FmuState(dissipated=dissipated)
         self._begin()

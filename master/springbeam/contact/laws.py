@@ -39,6 +39,10 @@ class Tie(RigidLaw):
     lasting = True
 
 
+class Algorithm(RigidLaw):
+    """Algorithm 1 of Ahn & Tate, which is a coupling: it decides in each step what touches."""
+
+
 class SoftLaw(Protocol):
     """A contact force that is a function of the penetration and its rate."""
 
@@ -146,12 +150,13 @@ class Link:
 
 Law = RigidLaw | SoftLaw
 
-#: How a scene's table ``[contact]`` names the laws; ``paper`` is an algorithm of its own, `springbeam.run.paper_law`.
+#: How a scene's table ``[contact]`` names the laws.
 LAWS: dict[str, Callable[[Contact], Law]] = {
     "transmission": lambda contact: Transmission(),
     "tie": lambda contact: Tie(),
     "compliance": lambda contact: Compliance(contact.stiffness, contact.exponent, contact.damping),
     "link": lambda contact: Link(contact.stiffness, contact.damping),
+    "paper": lambda contact: Algorithm(),
 }
 
 

@@ -12,10 +12,10 @@ for the second body of ``gauss_seidel`` towards the force at the step's end with
 
 from __future__ import annotations
 
-from ..bodies.protocol import Body, Force
+from ..bodies.protocol import NO_FORCE, Body, Ends, Force
 from ..contact.laws import SoftLaw
 from .projection import Booked
-from .protocol import Window
+from .protocol import Step
 
 
 class Exchange(Booked):
@@ -37,9 +37,9 @@ class Exchange(Booked):
         super().__init__(law, degree)
         self._sequential = sequential
 
-    def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
-        """Return the force on the upper body; ``guess`` plays no part. Raises StepRefused."""
-        time, size, (tip, low) = window
+    def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
+        """Return the step with the force on the upper body; ``guess`` plays no part. Raises StepRefused."""
+        tip, low = start
         p, rate = low.displacement - tip.displacement, low.velocity - tip.velocity
         force = (self.law.force(p, rate), self.law.slope(p) * rate if self.degree else 0.0, 0.0)
         upper.rewind()
@@ -50,5 +50,4 @@ class Exchange(Booked):
             end = self.law.force(moved - tip.displacement, low.velocity - tip.velocity)
             on_lower = (force[0], (end - force[0]) / size, 0.0) if self.degree else (end, 0.0, 0.0)
         lower.rewind()
-        lower.advance(time, size, on_lower)
-        return force
+        return Step(time, size, force, NO_FORCE, start, (tip, lower.advance(time, size, on_lower)))

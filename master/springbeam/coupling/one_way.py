@@ -18,10 +18,10 @@ from math import inf
 
 from ..bodies import force
 from ..bodies.elements import Prescribed
-from ..bodies.protocol import Body, Ends, Force
+from ..bodies.protocol import NO_FORCE, Body, Ends, Force
 from ..contact.laws import SoftLaw
 from .projection import penetration
-from .protocol import Booking, Step, Window
+from .protocol import Booking, Step
 from .soft import SoftSolver
 
 
@@ -43,17 +43,18 @@ class OneWay(SoftSolver):
         self._upper_drives = upper_drives
         self._work = 0.0  #: of the contact force on the driving end, which does not feel it [J]
 
-    def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
+    def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
         driver, driven = (upper, lower) if self._upper_drives else (lower, upper)
         driver.rewind()
-        end = Prescribed(driver.advance_alone(window.time, window.size))
+        end = Prescribed(driver.advance_alone(time, size))
         if driven.mass == inf:
-            driven.advance(window.time, window.size, guess)
-            ends = (end.motion(), driven.motion()) if self._upper_drives else (driven.motion(), end.motion())
-            start, x = penetration(Step(window.time, window.size, guess, guess, window.ends, ends), self.degree)
-            return force.derivatives(self._projection.force(start, window.size, x), window.size)
+            held = driven.advance(time, size, guess)
+            ends = (end.motion(), held) if self._upper_drives else (held, end.motion())
+            known = Step(time, size, guess, NO_FORCE, start, ends)
+            before, x = penetration(known, self.degree)
+            return known._replace(contact=force.derivatives(self._projection.force(before, size, x), size))
         upper, lower = (end, driven) if self._upper_drives else (driven, end)
-        return super().solve(upper, lower, window, guess)
+        return super().solve(upper, lower, time, size, start, guess)
 
     def accept(self, step: Step) -> None:
         super().accept(step)

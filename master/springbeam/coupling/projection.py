@@ -253,5 +253,5 @@ class Booked(Coupling):
             self.dissipated += projection.dissipated(start, step.size, x)
 
     def booking(self, ends: Ends) -> Booking:
-        tip, low = ends
-        return Booking(self.law.potential(low.displacement - tip.displacement), self.dissipated)
+        (u, v, _, _), (y, z, _, _) = ends
+        return Booking(self.law.force(y - u, z - v), self.law.potential(y - u), self.dissipated)

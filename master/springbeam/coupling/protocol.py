@@ -1,12 +1,13 @@
-"""What a run asks of a coupling, and what both exchange: windows and steps."""
+"""What a run asks of a coupling, and the step that it is given."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion, StepRefused
+from ..contact.phases import Impact, Phase
 
 #: Conditions on the gap over a step of size H as a linear map of an end's motion, each in metres.
 Conditions = Callable[[Motion, float], tuple[float, ...]]
@@ -14,34 +15,39 @@ Conditions = Callable[[Motion, float], tuple[float, ...]]
 ErrorEstimate = tuple[float, int]
 
 
-class Window(NamedTuple):
-    """A step that is to be made."""
-
-    time: float  #: where it begins [s]
-    size: float  #: [s]
-    ends: Ends  #: at its beginning
-
-
 class Step(NamedTuple):
     """An attempted step and what the bodies' ends did on it."""
 
-    time: float
-    size: float
+    time: float  #: where it begins [s]
+    size: float  #: [s]
     contact: Force  #: C on the step
     foundation: Force  #: N on the step
     start: Ends  #: at the mark
     end: Ends
 
 
-class Booking(NamedTuple):
-    """Energies that a coupling adds to those of the bodies [J]."""
+#: ``Step(*values)`` in a third of the time.
+step_of: Callable[[type[Step], tuple[float, float, Force, Force, Ends, Ends]], Step] = tuple.__new__
 
+
+class Booking(NamedTuple):
+    """What a coupling adds to a record: the force of its law [N], and energies beside those of the bodies [J]."""
+
+    law_force: float = 0.0
     stored: float = 0.0  #: in the contact law
     dissipated: float = 0.0  #: by the contact law since the start
     unfelt: float = 0.0  #: work of the contact force on an end that does not feel it
 
 
 NOTHING_BOOKED = Booking()
+
+
+class Settled(NamedTuple):
+    """What a coupling that decides phases has made of a step; both bodies already show it."""
+
+    phase: Phase
+    event: str | None = None  #: its kind
+    impact: Impact = Impact()
 
 
 class Scales(NamedTuple):
@@ -62,20 +68,53 @@ class Coupling(Checkpointed):
     sharpest: float = 1.0
     #: Whether the force does no net work but what is booked, at any step.
     energy_exact: bool = True
+    #: Whether it decides by itself what touches, by `settle`, and may put the ends elsewhere: no event is then looked
+    #: for, no step repeated, nothing known of the motion inside steps, and energy that appears stops no run.
+    decides: bool = False
     #: Corrections of the force since the start.
     iterations: int = 0
     #: Steps since the start whose force was not found at `degree`, but at degree 0.
     reduced: int = 0
 
-    def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
-        """Advance both bodies from their marks over ``window`` and return the contact force.
+    def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
+        """Advance both bodies from their marks, where their ends are at ``start``, and return the step.
 
-        ``guess`` is the force as far as known. Raises StepRefused, as NotConverged where the force was not found.
+        Parameters
+        ----------
+        upper, lower
+            The bodies.
+        time, size
+            Of the step [s].
+        start
+            The ends at the marks.
+        guess
+            The contact force as far as known.
+
+        Raises
+        ------
+        StepRefused
+            If a body does; as NotConverged if the force was not found.
         """
         raise NotImplementedError
 
     def accept(self, step: Step) -> None:
         """Count from now on what ``step``, which is made, has dissipated."""
+
+    def settle(self, time: float, upper: Body, lower: Body) -> Settled:
+        """Return the phase at ``time`` [s], at the start of the run or at the end of a step, of one that `decides`."""
+        raise NotImplementedError
+
+    def report(self, steps: int) -> tuple[dict[str, Any], list[str]]:
+        """Return what the summary of a run of so many ``steps`` says of the coupling, and warnings."""
+        reduced = {"reduced_steps": self.reduced} if self.reduced else {}
+        warnings = []
+        if self.reduced:
+            warnings.append(
+                f"the contact force of {self.reduced} of {steps} macro steps was not found at coupling.degree = "
+                f"{self.degree}; they were made at degree 0, which keeps the energy but has order 2. The "
+                "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
+            )
+        return {"iterations": self.iterations, **reduced}, warnings
 
     def booking(self, ends: Ends) -> Booking:
         """Return the energies at the ``ends``."""
@@ -96,11 +135,11 @@ class Coupling(Checkpointed):
 class Uncoupled(Coupling):
     """Nothing between the bodies: each advances alone."""
 
-    def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
-        for body in (upper, lower):
-            body.rewind()
-            body.advance_alone(window.time, window.size)
-        return NO_FORCE
+    def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
+        upper.rewind()
+        tip = upper.advance_alone(time, size)
+        lower.rewind()
+        return Step(time, size, NO_FORCE, NO_FORCE, start, (tip, lower.advance_alone(time, size)))
 
 
 class NotConverged(StepRefused):

@@ -16,11 +16,11 @@ from operator import add, neg, sub
 
 import numpy as np
 
-from ..bodies.protocol import Body, Force
+from ..bodies.protocol import Body, Ends, Force
 from ..contact.laws import SoftLaw
 from . import energy
 from .projection import Booked, penetration
-from .protocol import ErrorEstimate, NotConverged, Scales, Step, Window
+from .protocol import ErrorEstimate, NotConverged, Scales, Step
 from .small import Matrix, Vector, inverse, times
 from .solver import Aim, StepSolver
 
@@ -61,16 +61,16 @@ class SoftSolver(Booked, StepSolver):
         self._simpler = SoftSolver(law, 0, tolerance) if degree > 0 else None
         self._simplified, self.reduced = False, 0  #: the last step tried, and the steps made
 
-    def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
+    def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
         self._simplified = False
         try:
-            return super().solve(upper, lower, window, guess)
+            return super().solve(upper, lower, time, size, start, guess)
         except NotConverged:
             if self._simpler is None:
                 raise
         self._simplified = True
         before = self._simpler.iterations
-        found = self._simpler.solve(upper, lower, window, (guess[0], 0.0, 0.0))
+        found = self._simpler.solve(upper, lower, time, size, start, (guess[0], 0.0, 0.0))
         self.iterations += self._simpler.iterations - before
         return found
 
@@ -87,15 +87,14 @@ class SoftSolver(Booked, StepSolver):
             return []
         return [(step.size * neglected / (6.0 * scales.reduced_mass * scales.speed), self.degree + 2)]
 
-    def no_contact(self, gap: Vector, a: Vector, window: Window) -> bool:
+    def no_contact(self, gap: Vector, a: Vector, size: float, start: Ends) -> bool:
         if any(a):
             return False
-        tip, low = window.ends
-        return not any(self._projection.force(low.displacement - tip.displacement, window.size, list(map(neg, gap))))
+        tip, low = start
+        return not any(self._projection.force(low.displacement - tip.displacement, size, list(map(neg, gap))))
 
-    def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> Aim:
-        tip, low = window.ends
-        size, x = window.size, list(map(neg, gap))
+    def aim(self, gap: Vector, a: Vector, descent: Matrix, size: float, start: Ends) -> Aim:
+        (tip, low), x = start, list(map(neg, gap))
         step = (low.displacement - tip.displacement, size, x, a, descent)
         last_size, flexibility = self._last_crossing
         found = None

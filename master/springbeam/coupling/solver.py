@@ -20,8 +20,8 @@ from typing import ClassVar
 import numpy as np
 
 from ..bodies import force
-from ..bodies.protocol import Body, Force, Motion
-from .protocol import Conditions, Coupling, NotConverged, Window
+from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion
+from .protocol import Conditions, Coupling, NotConverged, Step, step_of
 from .small import Matrix, Vector, broyden, inverse, secant, times, transposed
 
 _log = logging.getLogger(__name__)
@@ -74,11 +74,11 @@ class StepSolver(Coupling):
         self._expected = expected
         self.iterations = 0
 
-    def no_contact(self, gap: Vector, a: Vector, window: Window) -> bool:
+    def no_contact(self, gap: Vector, a: Vector, size: float, start: Ends) -> bool:
         """Return whether nothing acts between the bodies under ``a``, nor should; parameters as of `aim`."""
         return False
 
-    def aim(self, gap: Vector, a: Vector, descent: Matrix, window: Window) -> Aim:
+    def aim(self, gap: Vector, a: Vector, descent: Matrix, size: float, start: Ends) -> Aim:
         """Return where force and conditions are to go.
 
         Parameters
@@ -87,18 +87,14 @@ class StepSolver(Coupling):
             The conditions [m] under the coefficients ``a`` [N].
         descent
             D = −(∂gap/∂a)⁻¹ [N/m].
-        window
-            The step.
+        size, start
+            Of the step, as of `solve`.
         """
         step = times(descent, gap)
         return None, step, list(map(add, a, step))
 
-    def solve(self, upper: Body, lower: Body, window: Window, guess: Force) -> Force:
-        """Advance both bodies from their marks over ``window`` so that the conditions hold; return the force.
-
-        ``guess`` is the contact force as far as known. Raises NotConverged (with the residual [m]) or StepRefused.
-        """
-        time, size, (start, _) = window
+    def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
+        """Advance both bodies so that the conditions hold, as `Coupling.solve` says."""
         conditions, derivatives = self._conditions, force.derivatives
         a = known = force.legendre(guess, size, self.degree)  # known: where the upper body has been
         acting = derivatives(a, size)
@@ -109,8 +105,8 @@ class StepSolver(Coupling):
         lower_end = lower.advance(time, size, acting)
         r_lower = conditions(lower_end, size)
         gap = list(map(sub, r_upper, r_lower))
-        if self.no_contact(gap, a, window):
-            return acting
+        if self.no_contact(gap, a, size, start):
+            return step_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
         B, descent, measured = remembered = self._sizes.get(size, _UNKNOWN)
         predicted = B is None  # whether the upper body is elsewhere than at its end under ``a``
         if B is None:
@@ -118,11 +114,11 @@ class StepSolver(Coupling):
             B = self._measure(upper, time, size, a, r_upper, length)
         if descent is None or lower.mass == inf:
             descent = _descent(B, self._free_response(lower, size))
-        goal, step, better = self.aim(gap, a, descent, window)
+        goal, step, better = self.aim(gap, a, descent, size, start)
         residual = gap if goal is None else list(map(sub, gap, goal))
         norm = max(map(abs, residual))
         # Rounding at least. What is asked is known once the motion is; that under the guess may be far from it.
-        enough = tolerance = _ROUNDING * max(self._reach, abs(start.displacement))
+        enough = tolerance = _ROUNDING * max(self._reach, abs(start[0].displacement))
         left = inf  # when the upper body advanced last, of the residual [m]
         noise = 0.0  # of the bodies' own rounding, once the iteration has met it [m]
         # S is measured once, when a size comes again: it then saves a step of the lower body in most.
@@ -146,7 +142,7 @@ class StepSolver(Coupling):
                 lower.rewind()
                 lower_end = lower.advance(time, size, acting)
                 r_lower = conditions(lower_end, size)
-                tolerance = self._absolute_tolerance(start, lower_end, size, times(B, a))
+                tolerance = self._absolute_tolerance(start[0], lower_end, size, times(B, a))
                 enough = tolerance if tolerance > noise else noise
             before, gap = gap, list(map(sub, r_upper, r_lower))
             residual = gap if goal is None else list(map(sub, gap, goal))
@@ -167,11 +163,11 @@ class StepSolver(Coupling):
                 length = 1e-4 * max(abs(lower_end.displacement), size * abs(lower_end.velocity))
                 S = self._measure(lower, time, size, a, r_lower, length)
                 lower.rewind()
-                lower.advance(time, size, acting)
+                lower_end = lower.advance(time, size, acting)
                 descent, measured, fresh, due = _descent(B, S), True, True, False
             elif stagnates and norm <= self._noise(tolerance):
                 noise = enough = self._noise(tolerance)
-            goal, step, better = self.aim(gap, a, descent, window)
+            goal, step, better = self.aim(gap, a, descent, size, start)
             residual = gap if goal is None else list(map(sub, gap, goal))
             norm = max(map(abs, residual))
         else:
@@ -188,7 +184,7 @@ class StepSolver(Coupling):
             self._sizes[size] = (B, descent, measured)
         if size != self._last_size:
             self._used_last(size)
-        return acting
+        return step_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
 
     def _noise(self, tolerance: float) -> float:
         """Return up to which residual [m] an iteration that stagnates may have met the bodies' own rounding."""

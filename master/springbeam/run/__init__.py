@@ -3,5 +3,5 @@
 Imports everything below: `coupling`, `contact`, `bodies`, `results`, `scene`. ``runner`` makes the parts of a scene and
 runs them, ``simulation`` is the loop (start there), ``stepping`` one step, ``detection`` the event that ends it,
 ``macro_steps`` and ``local_error`` its size, ``crowd`` when events are too many, ``ledger`` and ``rows`` what is
-reported, ``checkpoint`` how a killed run goes on. ``paper_law`` is Ahn & Tate's own algorithm through the FMUs.
+reported, ``checkpoint`` how a killed run goes on.
 """

@@ -25,7 +25,6 @@ from ..scene import Scene, scene_from_dict
 
 if TYPE_CHECKING:  # a command that only reads a checkpoint loads no FMU
     from .master import Master
-    from .paper_law import PaperLaw
 
 _FORMAT = 2
 _TITLE = b"springbeam checkpoint"
@@ -113,7 +112,7 @@ class Checkpoints:
         self._began = perf_counter() - wall_time
         self._due = self._began + wall_time
 
-    def take_when_due(self, simulation: Master | PaperLaw) -> None:
+    def take_when_due(self, simulation: Master) -> None:
         """To be called between two steps. Raises OSError if the disk refuses; the last checkpoint stays then."""
         now = perf_counter()
         if now < self._due:

@@ -17,7 +17,7 @@ from .stepping import Pair
 EXACT = 1e-8
 #: What a warning says where more of the energy has changed.
 CHANGED = "has changed the energy"
-#: Largest such residual where a scheme, an integrator or Algorithm 1 changes the energy itself.
+#: Largest such residual where a scheme or an integrator changes the energy itself.
 APPROXIMATE = 1e-3
 #: Energy-error allowance per unit of solver tolerance: 1e-12 gives `EXACT`.
 _TOLERANCES = EXACT / 1e-12
@@ -26,7 +26,7 @@ _TOLERANCES = EXACT / 1e-12
 def bounds(scene: Scene) -> tuple[float, float]:
     """Relative energy residuals above which a run warns, and above which it stops."""
     coupling, beam = scene.coupling, scene.beam
-    changes = coupling.scheme == "hermite" or coupling.scheme in ORDINARY_SCHEMES or scene.contact.algorithm
+    changes = coupling.scheme == "hermite" or coupling.scheme in ORDINARY_SCHEMES
     if changes or (beam is not None and beam.damped_numerically):
         return APPROXIMATE, 0.1
     tolerance = max(coupling.tolerance, 0.0 if scene.spring is None else scene.spring.relative_tolerance)
@@ -66,7 +66,7 @@ class Balance:
         self._warns, self._stops = bounds(scene)
         #: Bodies of the caller's may tell no energies; there is then no balance to judge by.
         self._untold = any(type(body).energies is Body.energies and body.mass < inf for body in pair.bodies)
-        if self._untold:
+        if self._untold or pair.joined.decides:
             self._warns = self._stops = inf
         self._first, self._scale = np.empty(0), 0.0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import ceil, inf, log2
 
 from ..bodies.checkpointed import Checkpointed
+from ..scene.scene import SHORTEST_STEP
 
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
 _SHORT_REMAINDER = 0.25
@@ -46,7 +47,7 @@ class MacroGrid(Checkpointed):
         while (target := self._start + k * H) - time < _SHORT_REMAINDER * H:
             k += 1
         size = target - time
-        if target >= self._end - _SAME * H:
+        if target >= self._end - SHORTEST_STEP * H:
             target, size = self._end, self._end - time
         if kink < target + _SHORT_REMAINDER * H:
             target, size = kink, kink - time

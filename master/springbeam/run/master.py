@@ -18,7 +18,7 @@ from ..bodies.checkpointed import Checkpointed
 from ..bodies.gate import admit
 from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, StepRefused
 from ..contact.laws import stiffest
-from ..contact.phases import Joint, Phase, Transitions
+from ..contact.phases import Impact, Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
 from ..results.columns import ledger
 from ..results.recording import Recorder
@@ -169,6 +169,8 @@ class Master(Checkpointed):
             self.macro_steps += 1
             if self._pair.opens_softly:
                 self._note_soft_contact(step)
+            elif self._pair.joined.decides:
+                step = self._settled()
         if event is None:
             self._record(step, step.end)
         else:
@@ -183,6 +185,8 @@ class Master(Checkpointed):
         halvings, cause = 0, ""
         while True:
             try:
+                if pair.joined.decides:
+                    return pair.attempt(state, size, start), None
                 at_start = self._detector.at_start(state, start)
                 if at_start is not None:
                     return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
@@ -222,6 +226,8 @@ class Master(Checkpointed):
     def _begin(self) -> None:
         """Record the start, after an event that is due there."""
         state, pair = self.state, self._pair
+        if pair.joined.decides:
+            self._settled()
         start = pair.ends()
         step = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
         # The ledger starts with the bodies as they arrive, before an impact.
@@ -238,7 +244,7 @@ class Master(Checkpointed):
     def _in_contact(self, start: Ends) -> bool:
         """Is the tip on the spring top (or the stop), moving down or at rest?"""
         pair = self._pair
-        if pair.beam is None or pair.law.soft or (pair.spring is None and pair.stop is None):
+        if pair.beam is None or pair.law.soft or pair.joined.decides or (pair.spring is None and pair.stop is None):
             return False
         tip, low = start
         tolerance = self._detector.tolerance(start) + 1e-12 * abs(low.displacement)
@@ -264,21 +270,23 @@ class Master(Checkpointed):
         lost = impact.energy_loss + pair.follow_phase(phase)
         state.lost += lost
         state.enter(phase)
-        tip, low = pair.ends()
-        beam, spring = pair.beam is not None, pair.spring is not None
-        self._log.happened(
-            Event(
-                state.time,
-                kind,
-                low.displacement if spring else None,
-                low.velocity if spring else None,
-                tip.displacement if beam else None,
-                tip.velocity if beam else None,
-                impact.on_beam,
-                impact.of_foundation,
-                lost,
-            )
-        )
+        self._happened(kind, impact, lost)
+
+    def _happened(self, kind: str, impact: Impact, lost: float) -> None:
+        pair, (tip, low) = self._pair, self._pair.ends()
+        y, z = (None, None) if pair.spring is None else low[:2]
+        u, v = (None, None) if pair.beam is None else tip[:2]
+        self._log.happened(Event(self.state.time, kind, y, z, u, v, impact.on_beam, impact.of_foundation, lost))
+
+    def _settled(self) -> Step:
+        """Let the coupling decide what touches now; return a step of no size, for nothing is known inside the last."""
+        state, pair = self.state, self._pair
+        phase, event, impact = pair.joined.settle(state.time, pair.upper, pair.lower)
+        state.phase, state.smoothed = phase, state.contact[0]
+        if event is not None:
+            self._happened(event, impact, 0.0)
+        tip, low = (end._replace(integral=0.0, integral_2=0.0) for end in pair.ends())
+        return Step(state.time, 0.0, state.contact, state.foundation, (tip, low), (tip, low))
 
     def _note_soft_contact(self, step: Step) -> None:
         state = self.state
@@ -307,18 +315,15 @@ class Master(Checkpointed):
             contact, foundation = state.contact, state.foundation
         (u, v, _, _), (y, z, _, _) = ends
         of_upper, of_lower, booked = pair.energies(ends)
-        law_force, received = 0.0, (0.0, 0.0)
-        if pair.law.soft:
-            law_force = pair.law.force(y - u, z - v)
-        if pair.foreign:
-            received = pair.received()
+        law_force, *booked_energies = booked
+        received = pair.received() if pair.foreign else (0.0, 0.0)
         if self._error is not None:
             energies = abs(of_upper.kinetic + of_upper.potential) + abs(of_lower.kinetic + of_lower.potential)
             self._error.note(energies + booked.stored)
         return packed(
             *(state.time, size, *before[0], *before[1], *contact, *foundation),
             *(u, v, y, z, state.phase.number, self._log.events, state.smoothed, law_force),
-            *(*of_upper, *of_lower, *booked, state.lost, *received, self._energy_at_start),
+            *(*of_upper, *of_lower, *booked_energies, state.lost, *received, self._energy_at_start),
         )
 
     def _shape(self, beam: BeamBody, early: bool) -> None:
@@ -335,24 +340,20 @@ class Master(Checkpointed):
         scene, H, steps = self._scene, self._steps.size, self._recorder.steps()
         known = int(steps["events"][-1]) if len(steps) else 0  # a full disk may have events without their records
         events = list(islice(self._recorder.events(), known))
-        made, joined = int(np.count_nonzero(steps["size"])), self._pair.joined
-        balance, seen = self._balance.report(steps, H), observed(scene, self._pair, steps, events)
-        free_at_end = not are_joined(steps[-1:]).any()
-        warnings = balance.warnings
-        if joined.reduced:
-            warnings.append(
-                f"the contact force of {joined.reduced} of {made} macro steps was not found at coupling.degree = "
-                f"{joined.degree}; they were made at degree 0, which keeps the energy but has order 2. The "
-                "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
-            )
-        shortest = shortest_contact(steps, events, CONTACT_STEPS * H, free_at_end=free_at_end)
+        made, joined = int(np.count_nonzero(np.diff(steps["time"]))), self._pair.joined
+        inside = steps[:0] if joined.decides else steps  # what tells of the motion inside steps
+        balance, seen = self._balance.report(steps, H), observed(scene, self._pair, inside, events)
+        free_at_end = not are_joined(inside[-1:]).any()
+        of_coupling, warned = joined.report(made)
+        warnings = [*balance.warnings, *warned]
+        shortest = shortest_contact(inside, events, CONTACT_STEPS * H, free_at_end=free_at_end)
         unresolved = not_resolved(
             scene,
             seen.mismatch_at_events,
             shortest_contact=shortest,
             contact_frequency=seen.contact_frequency,
             contact_steps=seen.contact_steps,
-            pace=pace(steps),
+            pace=pace(inside),
             strokes=any(event.kind in ("stop_impact", "seated") for event in events),
         )
         warnings += filter(None, [unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
@@ -369,11 +370,10 @@ class Master(Checkpointed):
             "events": len(events),
             "halved_steps": self._halvings,
             **({"rejected_steps": self._steps.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
-            "iterations": joined.iterations,
-            **({"reduced_steps": joined.reduced} if joined.reduced else {}),
+            **of_coupling,
             **balance.summary,
-            "max_velocity_mismatch": seen.mismatch,
             "resolved": unresolved is None and not balance.changed,
             "warnings": warnings,
-            **(totals(scene, steps, events, window, free_at_end=free_at_end) if len(steps) else {}),
+            **({"max_velocity_mismatch": seen.mismatch} if len(inside) else {}),
+            **(totals(scene, steps, events, window, free_at_end=free_at_end) if len(inside) else {}),
         }

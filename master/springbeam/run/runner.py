@@ -11,7 +11,7 @@ from typing import Any
 
 from .. import __version__
 from ..bodies.factory import findings, fingerprints, load_bodies
-from ..bodies.fmu_bodies import FmuBeam, FmuBody, FmuSpring
+from ..bodies.fmu_bodies import FmuBody, FmuSpring
 from ..bodies.isolated import IsolatedBody
 from ..bodies.protocol import Body, FmuError
 from ..results.directory import RunDirectory
@@ -19,11 +19,10 @@ from ..results.file_recorder import FileRecorder
 from ..results.reading import load_summary, load_trajectory
 from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
-from ..scene import Scene, SceneError, scene_from_dict, suspicions, with_changes
+from ..scene import Scene, SceneError, scene_from_dict, suspicions
 from .checkpoint import Checkpoint, CheckpointRefused, Checkpoints
 from .master import Master
 from .outcome import Progress, RunStopped
-from .paper_law import PaperLaw
 from .stepping import State
 
 
@@ -66,16 +65,9 @@ class Simulation:
         self.scene, self.recorder = scene, recorder or MemoryRecorder(scene)
         of_scene = _without_own(scene, upper=upper, lower=lower)
         start_time = 0.0 if upper is not None else scene.contact_time or 0.0
-        paper = scene.contact.algorithm
-        self._bodies = beam, spring = load_bodies(_as_in_paper(scene) if paper else of_scene, start_time)
+        self._bodies = beam, spring = load_bodies(of_scene, start_time)
         try:
-            self._master: Master | PaperLaw
-            if paper:
-                assert isinstance(beam, FmuBeam)
-                assert isinstance(spring, FmuSpring)
-                self._master = PaperLaw(scene, start_time, beam, spring, self.recorder)
-            else:
-                self._master = Master(scene, start_time, upper or beam, lower or spring, self.recorder)
+            self._master = Master(scene, start_time, upper or beam, lower or spring, self.recorder)
             if start is not None:
                 self._go_on(start)
         except BaseException:
@@ -339,15 +331,6 @@ def _without_own(scene: Scene, **own: Body | None) -> Scene:
     for what in (what for what, is_so in asked.items() if is_so):
         raise SceneError(f"{what}: takes the bodies from the scene, and cannot be used with a body of your own")
     return scene.model_copy(update=dict.fromkeys(given))
-
-
-def _as_in_paper(scene: Scene) -> Scene:
-    """The scene with the beam on its full mesh, stepped by the midpoint rule (62)."""
-    return with_changes(
-        scene,
-        beam={"integrator": "generalized_alpha", "rho_inf": 1.0, "n_modes": 0},
-        coupling={"scheme": "energy", "degree": 0},
-    )
 
 
 def _calls(**bodies: Body | None) -> dict[str, int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from ..bodies import force
@@ -12,7 +11,7 @@ from ..bodies.protocol import NO_FORCE, Body, Ends, Energies, Force
 from ..contact.laws import Transmission, law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
-from ..coupling.protocol import Booking, Coupling, Step, Uncoupled, Window
+from ..coupling.protocol import Booking, Coupling, Step, Uncoupled
 from ..scene import Scene
 from .loads import Loads
 
@@ -68,10 +67,6 @@ class State(Checkpointed):
             self.foundation = NO_FORCE
 
 
-#: ``Window(*values)`` and ``Step(*values)`` in a third of the time.
-_window_of: Callable[[type[Window], tuple[float, float, Ends]], Window] = tuple.__new__
-_step_of: Callable[[type[Step], tuple[float, float, Force, Force, Ends, Ends]], Step] = tuple.__new__
-
 #: In place of a body that the scene does not have: at rest at 0.
 _ABSENT = RigidWall(0.0)
 
@@ -92,7 +87,8 @@ class Pair(Checkpointed):
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self.beam, self.spring = beam, spring
         self.stop = None if scene.stop is None else scene.stop.position
-        self._held = None if self.stop is None else RigidWall(self.stop)
+        #: What holds a lower end that is seated.
+        self._held = None if self.stop is None or scene.contact.algorithm else RigidWall(self.stop)
         self.upper: Body = beam or _ABSENT
         self.lower: Body = spring or self._held or _ABSENT
         self.loads = Loads(scene, beam, spring)
@@ -102,8 +98,6 @@ class Pair(Checkpointed):
         #: Whether the upper and the lower body are FMUs that others made; empty if none is.
         self.foreign = tuple(table in scene.foreign for table in ("beam", "spring")) if scene.foreign else ()
         self.repeatable = all(body.abilities.state for body in self.bodies)
-        #: Whether a step can be repeated with another size.
-        self.divides = self.repeatable and all(body.abilities.any_size for body in self.bodies)
         #: Ψ: where the ends of a rigid law are tied below [m].
         self.equilibrium = scene.spring.equilibrium if scene.spring is not None else self.lower.motion().displacement
         #: Where the ends are; looked up once, since every step asks a few times.
@@ -117,7 +111,10 @@ class Pair(Checkpointed):
         self.opens_softly = self.law.soft and not self.law.lasting
         #: What couples the bodies where the law acts, and where the ends are apart.
         self.joined = coupling_of(scene, self.law)
-        self._uncoupled = self.joined if self.law.soft else Uncoupled()
+        self._uncoupled = self.joined if self.law.soft or self.joined.decides else Uncoupled()
+        #: Whether a step can be repeated with another size.
+        self.divides = self.repeatable and all(body.abilities.any_size for body in self.bodies)
+        self.divides &= not self.joined.decides
 
     def initial_state(self, time: float) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start."""
@@ -148,26 +145,26 @@ class Pair(Checkpointed):
         Raises StepRefused.
         """
         phase = state.phase if phase is None else phase
-        partner = self._held if phase.seated and self._held is not None else self.lower
-        time = state.time
-        self.loads.act(time, size)
-        window = _window_of(Window, (time, size, start))
-        contact = self.coupling(phase).solve(self.upper, partner, window, state.guess(size))
-        foundation = self._foundation_force(time, size, contact) if phase.seated else NO_FORCE
-        self._last = step = _step_of(Step, (time, size, contact, foundation, start, self.ends()))
+        held = self._held if phase.seated else None
+        self.loads.act(state.time, size)
+        coupling, guess = self.coupling(phase), state.guess(size)
+        step = coupling.solve(self.upper, held or self.lower, state.time, size, start, guess)
+        self._last = step = step if held is None else self._with_foundation(step)
         return step
 
-    def _foundation_force(self, time: float, size: float, contact: Force) -> Force:
-        """The foundation's force N on the lower end that it holds; the spring advances at rest under it."""
+    def _with_foundation(self, step: Step) -> Step:
+        """Return ``step`` with the force N on the lower end that the foundation holds; a spring is at rest under it."""
+        time, size, contact, _, _, (tip, _) = step
         if self.spring is None:
-            return contact
+            return step._replace(foundation=contact)
         assert self.stop is not None
         static, (load, slope, bend) = self.spring.holding_force(self.stop, 0.0), self.spring.load_on_end()
         bearing = (static - load, -slope, -bend)
         self.spring.rewind()
         # C and the part of N that bears it cancel: together, rounding of a large C would move a light top.
-        self.spring.advance(time, size, NO_FORCE, bearing)
-        return (contact[0] + bearing[0], contact[1] + bearing[1], contact[2] + bearing[2])
+        low = self.spring.advance(time, size, NO_FORCE, bearing)
+        foundation = (contact[0] + bearing[0], contact[1] + bearing[1], contact[2] + bearing[2])
+        return step._replace(foundation=foundation, end=(tip, low))
 
     def repeated(self, state: State, step: Step) -> Step:
         """Leave the bodies at the end of ``step``, repeating it if a look inside it has moved them."""

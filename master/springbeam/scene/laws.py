@@ -14,7 +14,7 @@ class LawFacts(NamedTuple):
     """What a law is, which keys of ``[contact]`` it has, and what people call it."""
 
     #: rigid: ends that have met share one position, C is a reaction; soft: C is a function of the penetration and its
-    #: rate; algorithm: it is a run of its own, defined by its macro step.
+    #: rate; algorithm: it decides what touches once a macro step, which is part of the law.
     kind: Literal["rigid", "soft", "algorithm"]
     #: Whether it joins the ends from the start and for good, for either sign of C.
     lasting: bool = False

@@ -15,7 +15,7 @@ from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time, key
 
 #: Remainders of the macro grid, as fractions of H: shorter than the first is rounding; shorter than the second, a step
 #: would drown in rounding.
-_SAME, _SHORTEST = 1e-9, 1e-6
+_SAME, SHORTEST_STEP = 1e-9, 1e-6
 
 
 class Height(NamedTuple):
@@ -190,7 +190,7 @@ class Scene(Table):
         rest = span - whole * H
         if rest <= _SAME * H:
             return whole, 0.0
-        return (whole, rest) if rest >= _SHORTEST * H or whole == 0 else (whole - 1, rest + H)
+        return (whole, rest) if rest >= SHORTEST_STEP * H or whole == 0 else (whole - 1, rest + H)
 
 
 #: The tables by their names in a file.

@@ -331,7 +331,7 @@ class Contact(Table):
 
     @property
     def algorithm(self) -> bool:
-        """Whether the law is an algorithm of its own, defined by its macro step."""
+        """Whether the law decides what touches once a macro step, which is part of the law."""
         return self.facts.kind == "algorithm"
 
     @property
