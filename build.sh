@@ -8,7 +8,7 @@ usage() {
 ./build.sh run [SCENE] [OPTION]…   set up, build, and simulate a scene (default: soft)
 ./build.sh test [PYTEST OPTION]…   set up, build, and run all tests (C++, then Python)
 ./build.sh kernels [OPTION]…        run the numeric tests as on other processors: with the linear algebra of three of them
-./build.sh fmus                    set up and build fmus/beam.fmu, spring.fmu and spring_beam.ssp
+./build.sh fmus                    set up and build fmus/beam.fmu, spring.fmu, beam3.fmu, spring3.fmu and spring_beam.ssp
 ./build.sh win64                   also cross-compile for 64-bit Windows; the FMUs then carry both
 ./build.sh interop                 install importers that others wrote into a cache folder and run the FMUs in them
 ./build.sh bench [GROUP]…          measure the speed and write the tables of docs/performance.md (minutes)

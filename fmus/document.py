@@ -1,6 +1,6 @@
-"""Write an FMU's documentation/index.html from its modelDescription.xml and its equations.
+"""Write an FMU's documentation/index.html from its modelDescription.xml, its equations and its list of source files.
 
-Usage: document.py modelDescription.xml equations.html OUT
+Usage: document.py modelDescription.xml equations.html LIST OUT
 """
 
 from __future__ import annotations
@@ -19,11 +19,13 @@ HEADINGS = {"parameter": "Parameters", "input": "Inputs", "output": "Outputs", "
 
 
 def row(variable: ET.Element) -> str:
-    kind = variable[0]
+    kind = variable[0] if variable.tag == "ScalarVariable" else variable  # FMI 2.0, FMI 3.0
+    dimension = variable.find("Dimension")
+    size = "" if dimension is None else f"[{dimension.get('start')}]"
     bounds = f"[{kind.get('min', '−∞')}, {kind.get('max', '∞')}]" if kind.get("min") or kind.get("max") else ""
     cells = [
         f"<code>{escape(variable.get('name', ''))}</code>",
-        escape(kind.tag),
+        escape(kind.tag) + size,
         escape(kind.get("unit", "–")),
         escape(kind.get("start", "")),
         bounds,
@@ -32,7 +34,7 @@ def row(variable: ET.Element) -> str:
     return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
-def document(description: ET.Element, equations: str) -> str:
+def document(description: ET.Element, equations: str, with_sources: bool) -> str:
     parts = [
         "<!DOCTYPE html>",
         f'<html lang="en"><head><meta charset="utf-8"><title>{escape(description.get("modelName", ""))}</title>',
@@ -41,7 +43,7 @@ def document(description: ET.Element, equations: str) -> str:
         f"<p>{escape(description.get('description', ''))}. Version {escape(description.get('version', ''))}.</p>",
         equations,
     ]
-    variables = list(description.iter("ScalarVariable"))
+    variables = description.findall("ModelVariables/*")
     for causality, heading in HEADINGS.items():
         if causality not in {v.get("causality") for v in variables}:
             continue
@@ -52,10 +54,10 @@ def document(description: ET.Element, equations: str) -> str:
         parts += [row(v) for v in variables if v.get("causality") == causality]
         parts.append("</table>")
     parts.append("<h2>Sources</h2><p>")
-    if description.find(".//SourceFiles") is not None:
+    if with_sources:
         parts.append(
-            "The files that modelDescription.xml names are compiled as C++17 and C, with <code>sources/</code> as the "
-            "only include folder (<code>fmpy compile</code>). <code>-fvisibility=hidden -ffp-contract=off</code> "
+            "The files that modelDescription.xml or buildDescription.xml names are compiled as C++17 and C, with "
+            "<code>sources/</code> as the only include folder (<code>fmpy compile</code>). <code>-fvisibility=hidden -ffp-contract=off</code> "
             "are what the binaries here were made with."
         )
     else:
@@ -66,7 +68,9 @@ def document(description: ET.Element, equations: str) -> str:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 4:
+    if len(sys.argv) != 5:
         sys.exit(__doc__)
-    xml, equations, out = (Path(argument) for argument in sys.argv[1:])
-    out.write_text(document(ET.parse(xml).getroot(), equations.read_text(encoding="utf-8")), encoding="utf-8")
+    xml, equations, sources, out = (Path(argument) for argument in sys.argv[1:])
+    with_sources = sources.stat().st_size > 0
+    page = document(ET.parse(xml).getroot(), equations.read_text(encoding="utf-8"), with_sources)
+    out.write_text(page, encoding="utf-8")

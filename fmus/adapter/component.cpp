@@ -2,25 +2,22 @@
 
 #include <algorithm>
 #include <iterator>
-#include <utility>
-
-#include "description.hpp"
 
 namespace fmi {
 
-Component::Component(const fmi2CallbackFunctions* functions, const char* name, bool log_events)
-    : callbacks_(functions ? *functions : fmi2CallbackFunctions{}), name_(name), events_(log_events) {}
-
-void Component::log(fmi2Status status, const char* category, const std::string& message) const {
-  if (!callbacks_.logger) return;
-  if (status == fmi2OK && !events_) return;
-  // Some importers treat the message as a printf format, some print it as it is: both get a readable text.
-  std::string format;
-  for (const char c : message) format += c == '%' ? std::string("%%") : std::string(1, c);
-  callbacks_.logger(callbacks_.componentEnvironment, name_.c_str(), status, category, format.c_str());
+void Component::enter(Phase phase, const char* event) {
+  instance.progress.phase = phase;
+  note(event);
 }
 
-bool Component::set_debugging(bool on, std::size_t n, const fmi2String categories[]) {
+bool Component::step(const char* function, double time, double size, bool to_event) {
+  const bool whole = instance.step(time, size, to_event);
+  const std::string warning = instance.take_warning();
+  if (!warning.empty()) log(Status::warning, "logStatusWarning", std::string(function) + ": " + warning);
+  return whole;
+}
+
+bool Component::set_debugging(const char* function, bool on, std::size_t n, const char* const categories[]) {
   bool all_known = true, events = n == 0;
   for (std::size_t i = 0; i < n; ++i) {
     require(categories[i], "a category");
@@ -29,13 +26,13 @@ bool Component::set_debugging(bool on, std::size_t n, const fmi2String categorie
     events = events || name == "logEvents" || name == "logAll";
     if (std::any_of(std::begin(log_categories), std::end(log_categories), same)) continue;
     all_known = false;
-    log(fmi2Warning, "logStatusWarning", "fmi2SetDebugLogging: there is no log category '" + name + "'");
+    log(Status::warning, "logStatusWarning", std::string(function) + ": there is no log category '" + name + "'");
   }
   events_ = on && events;
   return all_known;
 }
 
-Snapshot& Component::state(fmi2FMUstate key) {
+Snapshot& Component::state(void* key) {
   const auto found = states_.find(key);
   if (found == states_.end()) {
     throw std::invalid_argument("the FMU state was not made by this instance, or is already freed");
@@ -43,14 +40,14 @@ Snapshot& Component::state(fmi2FMUstate key) {
   return *found->second;
 }
 
-fmi2FMUstate Component::keep(Snapshot snapshot) {
+void* Component::keep(Snapshot snapshot) {
   auto owned = std::make_unique<Snapshot>(std::move(snapshot));
-  const fmi2FMUstate key = owned.get();
+  void* const key = owned.get();
   states_[key] = std::move(owned);
   return key;
 }
 
-void Component::save(fmi2FMUstate& key) {
+void Component::save(void*& key) {
   Snapshot* const into = key ? &state(key) : nullptr;
   instance.save(spare_);
   if (into) {
@@ -60,7 +57,7 @@ void Component::save(fmi2FMUstate& key) {
   }
 }
 
-void Component::free_state(fmi2FMUstate key) {
+void Component::free_state(void* key) {
   state(key);
   states_.erase(key);
 }
@@ -70,14 +67,123 @@ const char* Component::phase_text() const {
   return p == instantiated     ? "before initialization"
          : p == initialization ? "in initialization mode"
          : p == step_complete  ? "between steps"
+         : p == event_mode     ? "in event mode"
          : p == terminated     ? "after termination"
                                : "after an error (restore a state or reset first)";
 }
 
-fmi2Status Component::fail(const char* function, const char* why) {
-  log(fmi2Error, "logStatusError", std::string(function) + ": " + why);
+Status Component::fail(const char* function, const char* why) {
+  log(Status::error, "logStatusError", std::string(function) + ": " + why);
   instance.progress.phase = error;
-  return fmi2Error;
+  return Status::error;
+}
+
+Status instantiate(Component* c, const char* function, const char* name, const char* identity) {
+  return guard(c, function, instantiated, [&](Component& k) {
+    if (!name || !*name) throw std::invalid_argument("instanceName is empty");
+    require(identity, "the GUID");
+    if (guid() != identity) {
+      throw std::invalid_argument("the GUID " + std::string(identity) + " is not that of this FMU, " + guid());
+    }
+    k.note("instantiated");
+  });
+}
+
+Status set_debugging(void* c, const char* function, bool on, std::size_t n, const char* const categories[]) {
+  bool all_known = true;
+  const Status status = guard(c, function, any_phase, [&](Component& k) {
+    require_arrays(n, {{categories, "categories"}});
+    all_known = k.set_debugging(function, on, n, categories);
+  });
+  return all_known ? status : Status::warning;
+}
+
+Status reset(void* c, const char* function) {
+  return guard(c, function, any_phase, [](Component& k) {
+    k.instance.reset();
+    k.note("reset");
+  });
+}
+
+Status none_of(void* c, const char* function, unsigned legal, std::size_t n, const char* type) {
+  return guard(c, function, legal, [&](Component&) {
+    if (n > 0) throw std::invalid_argument(std::string("there are no variables of type ") + type);
+  });
+}
+
+Status get_state(void* c, const char* function, void** state) {
+  return guard(c, function, any_phase, [&](Component& k) {
+    require(state, "the FMU state");
+    k.save(*state);
+  });
+}
+
+Status set_state(void* c, const char* function, void* state) {
+  return guard(c, function, any_phase, [&](Component& k) {
+    require(state, "the FMU state");
+    k.instance.restore(k.state(state));
+  });
+}
+
+Status free_state(void* c, const char* function, void** state) {
+  return guard(c, function, any_phase, [&](Component& k) {
+    if (!state || !*state) return;
+    k.free_state(*state);
+    *state = nullptr;
+  });
+}
+
+Status state_size(void* c, const char* function, void* state, std::size_t* size) {
+  return guard(c, function, any_phase, [&](Component& k) {
+    require(size, "size");
+    *size = serialized_size(k.state(state));
+  });
+}
+
+Status serialize_state(void* c, const char* function, void* state, void* bytes, std::size_t size) {
+  return guard(c, function, any_phase, [&](Component& k) {
+    require(bytes, "serializedState");
+    const Snapshot& snapshot = k.state(state);
+    const std::size_t needed = serialized_size(snapshot);
+    if (size < needed) {
+      throw std::invalid_argument("size = " + std::to_string(size) + ", needed are " + std::to_string(needed));
+    }
+    serialize(snapshot, guid(), static_cast<char*>(bytes));
+  });
+}
+
+Status deserialize_state(void* c, const char* function, const void* bytes, std::size_t size, void** state) {
+  return guard(c, function, any_phase, [&](Component& k) {
+    require(bytes, "serializedState");
+    require(state, "the FMU state");
+    // Purely an output, unlike get_state's: importers leave anything in it.
+    *state = k.keep(
+        deserialize(static_cast<const char*>(bytes), size, guid(), k.instance.n_settings(), k.instance.n_inputs()));
+  });
+}
+
+Status output_derivatives(void* c, const char* function, const unsigned references[], std::size_t n, const int orders[],
+                          double values[]) {
+  return guard(c, function, stepped, [&](Component& k) {
+    require_arrays(n, {{references, "the array of value references"}, {orders, "order"}, {values, "value"}});
+    for (std::size_t i = 0; i < n; ++i) values[i] = k.instance.output_derivative(references[i], orders[i]);
+  });
+}
+
+Status directional_derivative(void* c, const char* function, const unsigned unknowns[], std::size_t n_unknowns,
+                              const unsigned knowns[], std::size_t n_knowns, const double seed[],
+                              double sensitivity[]) {
+  return guard(c, function, after_instantiation, [&](Component& k) {
+    require_arrays(n_unknowns, {{unknowns, "the array of unknowns"}, {sensitivity, "the array of results"}});
+    require_arrays(n_knowns, {{knowns, "the array of knowns"}, {seed, "the array of their changes"}});
+    for (std::size_t i = 0; i < n_unknowns; ++i) {
+      double sum = 0.0;
+      for (std::size_t j = 0; j < n_knowns; ++j) {
+        sum += k.instance.partial_derivative(unknowns[i], knowns[j]) * seed[j];
+      }
+      sensitivity[i] = sum;
+    }
+  });
 }
 
 }  // namespace fmi

@@ -1,20 +1,28 @@
-// Prints the FMU's modelDescription.xml. Argument: a file that lists the files of sources/ to compile, one per line.
+// Prints a description of the FMU: `2` or `3`, modelDescription.xml of FMI 2.0 or 3.0, `build3`, sources/
+// buildDescription.xml of FMI 3.0. Second argument: a file that lists the files of sources/ to compile, one per line.
 #include <fstream>
 #include <iostream>
-#include <iterator>
 
 #include "description.hpp"
 
 int main(int argc, char** argv) {
-  std::string source_files;
-  if (argc > 1) {
-    std::ifstream list(argv[1]);
+  const std::string which = argc > 1 ? argv[1] : "";
+  std::vector<std::string> source_files;
+  if (argc > 2) {
+    std::ifstream list(argv[2]);
     if (!list) {
-      std::cerr << "cannot read " << argv[1] << "\n";
+      std::cerr << "cannot read " << argv[2] << "\n";
       return 1;
     }
-    source_files.assign(std::istreambuf_iterator<char>(list), {});
+    for (std::string name; std::getline(list, name);) source_files.push_back(name);
   }
-  std::cout << fmi::description(source_files);
+  if (which == "2")
+    fmi::describe2(std::cout, source_files);
+  else if (which == "3")
+    fmi::describe3(std::cout);
+  else if (which == "build3")
+    fmi::describe_build3(std::cout, source_files);
+  else
+    return 2;
   return std::cout.good() ? 0 : 1;
 }

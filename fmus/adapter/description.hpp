@@ -1,29 +1,41 @@
-// modelDescription.xml and the GUID, from the table.
+// modelDescription.xml of each version of FMI, from the table.
 #pragma once
 
+#include <functional>
+#include <ostream>
 #include <string>
+#include <vector>
 
+#include "../common/text.hpp"
 #include "table.hpp"
 
 namespace fmi {
 
-/// A hash of everything the description says: two FMUs with the same GUID have the same variables.
-const std::string& guid();
+using common::number;
 
-/// `source_files`: names in sources/, one per line, empty if the FMU carries none.
-std::string description(const std::string& source_files);
+/// `source_files`: names in sources/, empty if the FMU carries none.
+void describe2(std::ostream& out, const std::vector<std::string>& source_files);
+void describe3(std::ostream& out);
+/// FMI 3.0: sources/buildDescription.xml.
+void describe_build3(std::ostream& out, const std::vector<std::string>& source_files);
 
-struct LogCategory {
-  const char *name, *description;
+// What they have in common; text of attributes begins with a space.
+
+struct Unit {
+  const char* name;
+  const char* quantity;  ///< also the name of its type
+  int kg, m, s, rad;
 };
-inline constexpr LogCategory log_categories[] = {
-    {"logStatusError", "errors; always reported"},
-    {"logStatusDiscard", "steps that could not be completed; always reported"},
-    {"logStatusWarning", "warnings; always reported"},
-    {"logEvents", "calls that change what the instance is doing"},
-    {"logAll", "everything"},
-};
+const Unit& unit(const std::string& name);  ///< @throws std::logic_error
 
-inline constexpr int max_output_derivative_order = 1;
+std::string attribute(const char* name, const std::string& value);
+std::string value_text(const Variable& v, double value);
+std::string about(const Table& t);  ///< what an FMU says of itself
+/// Writes a type by the attributes that name it and those of its values.
+using WriteType = std::function<void(Type, const std::string&, const std::string&)>;
+/// Units, types, log categories and the default experiment.
+void write_definitions(std::ostream& out, const Table& t, const WriteType& write_type);
+std::string role(const Variable& v);   ///< description, causality, variability, initial
+std::string range(const Variable& v);  ///< type, unit, bounds, start
 
 }  // namespace fmi

@@ -1,38 +1,37 @@
 // The FMI 2.0 co-simulation functions over Component. Each states in which phases it may be called (FMI 2.0.4,
 // section 4.2.4).
 #include <cstddef>
-#include <initializer_list>
 #include <limits>
 #include <memory>
 #include <new>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "component.hpp"
-#include "description.hpp"
+#include "fmi2Functions.h"
 
 namespace {
 
 using fmi::any_phase;
 using fmi::Component;
-using fmi::guard;
-using fmi::guid;
 using fmi::Progress;
 using fmi::require;
+using fmi::require_arrays;
+using fmi::Status;
 using fmi::Type;
 
-/// @throws std::invalid_argument if one of the arrays of `n` values is missing
-void require_arrays(size_t n, std::initializer_list<std::pair<const void*, const char*>> arrays) {
-  if (n == 0) return;
-  for (const auto& [array, name] : arrays) require(array, name);
+fmi2Status to2(Status status) { return static_cast<fmi2Status>(status); }
+
+template <class Body>
+fmi2Status call(fmi2Component c, const char* function, unsigned legal, const Body& body) {
+  return to2(fmi::guard(c, function, legal, body));
 }
 
 template <class Value>
 fmi2Status get(fmi2Component c, const char* function, const fmi2ValueReference vr[], size_t n, Value values[],
                Type type) {
-  return guard(c, function, any_phase, [&](Component& k) {
-    require_arrays(n, {{vr, "vr"}, {values, "value"}});
+  return call(c, function, any_phase, [&](Component& k) {
+    require_arrays(n, {{vr, "the array of value references"}, {values, "the array of values"}});
     for (size_t i = 0; i < n; ++i) values[i] = static_cast<Value>(k.instance.get(vr[i], type));
   });
 }
@@ -40,19 +39,11 @@ fmi2Status get(fmi2Component c, const char* function, const fmi2ValueReference v
 template <class Value>
 fmi2Status set(fmi2Component c, const char* function, const fmi2ValueReference vr[], size_t n, const Value values[],
                Type type) {
-  return guard(c, function, fmi::settable, [&](Component& k) {
-    require_arrays(n, {{vr, "vr"}, {values, "value"}});
+  return call(c, function, fmi::settable, [&](Component& k) {
+    require_arrays(n, {{vr, "the array of value references"}, {values, "the array of values"}});
     for (size_t i = 0; i < n; ++i) {
       k.instance.set(vr[i], type, static_cast<double>(type == Type::boolean ? Value(values[i] != 0) : values[i]));
     }
-  });
-}
-
-fmi2Status no_strings(fmi2Component c, const char* function, unsigned legal, const fmi2ValueReference vr[], size_t n) {
-  return guard(c, function, legal, [&](Component&) {
-    if (n == 0) return;
-    require(vr, "vr");
-    throw std::invalid_argument("value reference " + std::to_string(vr[0]) + " is not a String; there are none");
   });
 }
 
@@ -60,11 +51,18 @@ fmi2Status no_strings(fmi2Component c, const char* function, unsigned legal, con
 template <class Value, class Get>
 fmi2Status get_status(fmi2Component c, const char* function, bool known, const char* why_not, Value* value,
                       const Get& status_of) {
-  return guard(c, function, fmi::stepped, [&](Component& k) {
+  return call(c, function, fmi::stepped, [&](Component& k) {
     require(value, "value");
     if (!known) throw fmi::Discarded(why_not);
     *value = status_of(k.instance.progress);
   });
+}
+
+/// Some importers treat the message as a printf format, some print it as it is: both get a readable text.
+std::string as_format(const std::string& message) {
+  std::string format;
+  for (const char c : message) format += c == '%' ? std::string("%%") : std::string(1, c);
+  return format;
 }
 
 }  // namespace
@@ -74,223 +72,163 @@ extern "C" {
 const char* fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char* fmi2GetVersion(void) { return fmi2Version; }
 
+/// `functions` may be NULL, and gone after the call.
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID, fmi2String,
                               const fmi2CallbackFunctions* functions, fmi2Boolean, fmi2Boolean loggingOn) {
   std::unique_ptr<Component> component;
   try {
-    component = std::make_unique<Component>(functions, instanceName ? instanceName : "?", loggingOn != fmi2False);
+    fmi::Log log;
+    if (functions && functions->logger)
+      log = [callbacks = *functions, name = std::string(instanceName ? instanceName : "?")](
+                Status status, const char* category, const std::string& message) {
+        callbacks.logger(callbacks.componentEnvironment, name.c_str(), to2(status), category,
+                         as_format(message).c_str());
+      };
+    component = std::make_unique<Component>(log, loggingOn != fmi2False);
+    if (fmuType != fmi2CoSimulation) {
+      component->fail(__func__, "only co-simulation is provided");
+      return nullptr;
+    }
   } catch (const std::bad_alloc&) {
     return nullptr;
   }
-  const auto status = guard(component.get(), "fmi2Instantiate", fmi::instantiated, [&](Component& k) {
-    if (!instanceName || !*instanceName) throw std::invalid_argument("instanceName is empty");
-    if (fmuType != fmi2CoSimulation) throw std::invalid_argument("only co-simulation is provided");
-    require(fmuGUID, "fmuGUID");
-    if (guid() != fmuGUID) {
-      throw std::invalid_argument("fmuGUID = " + std::string(fmuGUID) + " is not that of this FMU, " + guid());
-    }
-    k.log(fmi2OK, "logEvents", "instantiated");
-  });
-  return status == fmi2OK ? component.release() : nullptr;
+  const Status status = fmi::instantiate(component.get(), __func__, instanceName, fmuGUID);
+  return status == Status::ok ? component.release() : nullptr;
 }
 
 void fmi2FreeInstance(fmi2Component c) { delete static_cast<Component*>(c); }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-  bool all_known = true;
-  const fmi2Status status = guard(c, "fmi2SetDebugLogging", any_phase, [&](Component& k) {
-    require_arrays(nCategories, {{categories, "categories"}});
-    all_known = k.set_debugging(loggingOn != fmi2False, nCategories, categories);
-  });
-  return all_known ? status : fmi2Warning;
+  return to2(fmi::set_debugging(c, __func__, loggingOn != fmi2False, nCategories, categories));
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
-  return guard(c, "fmi2SetupExperiment", fmi::instantiated, [&](Component& k) {
-    const bool usable = toleranceDefined && tolerance > 0.0 && tolerance < 1.0;
+  return call(c, __func__, fmi::instantiated, [&](Component& k) {
     k.instance.setup(startTime, stopTimeDefined ? stopTime : std::numeric_limits<double>::infinity(),
-                     usable ? tolerance : 0.0);
+                     toleranceDefined ? tolerance : 0.0);
   });
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-  return guard(c, "fmi2EnterInitializationMode", fmi::instantiated, [](Component& k) {
-    k.instance.progress.phase = fmi::initialization;
-    k.log(fmi2OK, "logEvents", "entered initialization mode");
-  });
+  return call(c, __func__, fmi::instantiated,
+              [](Component& k) { k.enter(fmi::initialization, "entered initialization mode"); });
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-  return guard(c, "fmi2ExitInitializationMode", fmi::initialization, [](Component& k) {
-    k.instance.exit_initialization();
-    k.log(fmi2OK, "logEvents", "initialized");
+  return call(c, __func__, fmi::initialization, [](Component& k) {
+    k.instance.ensure_built();
+    k.enter(fmi::step_complete, "initialized");
   });
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-  return guard(c, "fmi2Terminate", fmi::step_complete, [](Component& k) {
-    k.instance.progress.phase = fmi::terminated;
-    k.log(fmi2OK, "logEvents", "terminated");
-  });
+  return call(c, __func__, fmi::step_complete, [](Component& k) { k.enter(fmi::terminated, "terminated"); });
 }
 
-fmi2Status fmi2Reset(fmi2Component c) {
-  return guard(c, "fmi2Reset", any_phase, [](Component& k) {
-    k.instance.reset();
-    k.log(fmi2OK, "logEvents", "reset");
-  });
-}
+fmi2Status fmi2Reset(fmi2Component c) { return to2(fmi::reset(c, __func__)); }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
-  return get(c, "fmi2GetReal", vr, nvr, value, Type::real);
+  return get(c, __func__, vr, nvr, value, Type::real);
 }
 fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[]) {
-  return get(c, "fmi2GetInteger", vr, nvr, value, Type::integer);
+  return get(c, __func__, vr, nvr, value, Type::integer);
 }
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[]) {
-  return get(c, "fmi2GetBoolean", vr, nvr, value, Type::boolean);
+  return get(c, __func__, vr, nvr, value, Type::boolean);
 }
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String[]) {
-  return no_strings(c, "fmi2GetString", any_phase, vr, nvr);
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference[], size_t nvr, fmi2String[]) {
+  return to2(fmi::none_of(c, __func__, any_phase, nvr, "String"));
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
-  return set(c, "fmi2SetReal", vr, nvr, value, Type::real);
+  return set(c, __func__, vr, nvr, value, Type::real);
 }
 fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[]) {
-  return set(c, "fmi2SetInteger", vr, nvr, value, Type::integer);
+  return set(c, __func__, vr, nvr, value, Type::integer);
 }
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[]) {
-  return set(c, "fmi2SetBoolean", vr, nvr, value, Type::boolean);
+  return set(c, __func__, vr, nvr, value, Type::boolean);
 }
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String[]) {
-  return no_strings(c, "fmi2SetString", fmi::settable, vr, nvr);
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference[], size_t nvr, const fmi2String[]) {
+  return to2(fmi::none_of(c, __func__, fmi::settable, nvr, "String"));
 }
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {
-  return guard(c, "fmi2GetFMUstate", any_phase, [&](Component& k) {
-    require(FMUstate, "FMUstate");
-    k.save(*FMUstate);
-  });
+  return to2(fmi::get_state(c, __func__, FMUstate));
 }
-
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-  return guard(c, "fmi2SetFMUstate", any_phase, [&](Component& k) {
-    require(FMUstate, "FMUstate");
-    k.instance.restore(k.state(FMUstate));
-  });
+  return to2(fmi::set_state(c, __func__, FMUstate));
 }
-
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate* FMUstate) {
-  return guard(c, "fmi2FreeFMUstate", any_phase, [&](Component& k) {
-    if (!FMUstate || !*FMUstate) return;
-    k.free_state(*FMUstate);
-    *FMUstate = nullptr;
-  });
+  return to2(fmi::free_state(c, __func__, FMUstate));
 }
-
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t* size) {
-  return guard(c, "fmi2SerializedFMUstateSize", any_phase, [&](Component& k) {
-    require(size, "size");
-    *size = fmi::serialized_size(k.state(FMUstate));
-  });
+  return to2(fmi::state_size(c, __func__, FMUstate, size));
 }
-
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
-  return guard(c, "fmi2SerializeFMUstate", any_phase, [&](Component& k) {
-    require(serializedState, "serializedState");
-    const fmi::Snapshot& snapshot = k.state(FMUstate);
-    const size_t needed = fmi::serialized_size(snapshot);
-    if (size < needed) {
-      throw std::invalid_argument("size = " + std::to_string(size) + ", needed are " + std::to_string(needed));
-    }
-    fmi::serialize(snapshot, guid(), serializedState);
-  });
+  return to2(fmi::serialize_state(c, __func__, FMUstate, serializedState, size));
 }
-
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate* FMUstate) {
-  return guard(c, "fmi2DeSerializeFMUstate", any_phase, [&](Component& k) {
-    require(serializedState, "serializedState");
-    require(FMUstate, "FMUstate");
-    // Purely an output, unlike fmi2GetFMUstate's: importers leave anything in it.
-    *FMUstate = k.keep(fmi::deserialize(serializedState, size, guid(), k.instance.n_settings(), k.instance.n_inputs()));
-  });
+  return to2(fmi::deserialize_state(c, __func__, serializedState, size, FMUstate));
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown, const fmi2Real dvKnown[],
                                         fmi2Real dvUnknown[]) {
-  return guard(c, "fmi2GetDirectionalDerivative", fmi::after_instantiation, [&](Component& k) {
-    require_arrays(nUnknown, {{vUnknown_ref, "vUnknown_ref"}, {dvUnknown, "dvUnknown"}});
-    require_arrays(nKnown, {{vKnown_ref, "vKnown_ref"}, {dvKnown, "dvKnown"}});
-    for (size_t i = 0; i < nUnknown; ++i) {
-      double sum = 0.0;
-      for (size_t j = 0; j < nKnown; ++j) {
-        sum += k.instance.partial_derivative(vUnknown_ref[i], vKnown_ref[j]) * dvKnown[j];
-      }
-      dvUnknown[i] = sum;
-    }
-  });
+  return to2(fmi::directional_derivative(c, __func__, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown));
 }
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
-  return guard(c, "fmi2SetRealInputDerivatives", fmi::settable, [&](Component& k) {
-    require_arrays(nvr, {{vr, "vr"}, {order, "order"}, {value, "value"}});
+  return call(c, __func__, fmi::settable, [&](Component& k) {
+    require_arrays(nvr, {{vr, "the array of value references"}, {order, "order"}, {value, "value"}});
     for (size_t i = 0; i < nvr; ++i) k.instance.set_derivative(vr[i], order[i], value[i]);
   });
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
-  return guard(c, "fmi2GetRealOutputDerivatives", fmi::stepped, [&](Component& k) {
-    require_arrays(nvr, {{vr, "vr"}, {order, "order"}, {value, "value"}});
-    for (size_t i = 0; i < nvr; ++i) value[i] = k.instance.output_derivative(vr[i], order[i]);
-  });
+  return to2(fmi::output_derivatives(c, __func__, vr, nvr, order, value));
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean) {
-  const fmi2Status status = guard(c, "fmi2DoStep", fmi::step_complete, [&](Component& k) {
-    k.instance.step(currentCommunicationPoint, communicationStepSize);
-    // Only told: the step is done, and some masters stop at any status but fmi2OK.
-    const std::string warning = k.instance.take_warning();
-    if (!warning.empty()) k.log(fmi2Warning, "logStatusWarning", "fmi2DoStep: " + warning);
+  const fmi2Status status = call(c, __func__, fmi::step_complete, [&](Component& k) {
+    k.step("fmi2DoStep", currentCommunicationPoint, communicationStepSize);
   });
   if (c) static_cast<Component*>(c)->instance.progress.last_status = status;
   return status;
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
-  return guard(c, "fmi2CancelStep", 0, [](Component&) {});  // no step is ever in progress
+  return call(c, __func__, 0, [](Component&) {});  // no step is ever in progress
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status* value) {
-  return get_status(c, "fmi2GetStatus", s == fmi2DoStepStatus, "only fmi2DoStepStatus is a status", value,
+  return get_status(c, __func__, s == fmi2DoStepStatus, "only fmi2DoStepStatus is a status", value,
                     [](const Progress& p) { return static_cast<fmi2Status>(p.last_status); });
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real* value) {
-  return get_status(c, "fmi2GetRealStatus", s == fmi2LastSuccessfulTime, "only fmi2LastSuccessfulTime is a Real", value,
+  return get_status(c, __func__, s == fmi2LastSuccessfulTime, "only fmi2LastSuccessfulTime is a Real", value,
                     [](const Progress& p) { return p.time; });
 }
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind, fmi2Integer* value) {
-  return get_status(c, "fmi2GetIntegerStatus", false, "no status is an Integer", value,
-                    [](const Progress&) { return 0; });
+  return get_status(c, __func__, false, "no status is an Integer", value, [](const Progress&) { return 0; });
 }
 
 // The slave never ends a simulation by itself.
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean* value) {
-  return get_status(c, "fmi2GetBooleanStatus", s == fmi2Terminated, "only fmi2Terminated is a Boolean", value,
+  return get_status(c, __func__, s == fmi2Terminated, "only fmi2Terminated is a Boolean", value,
                     [](const Progress&) { return fmi2False; });
 }
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String* value) {
-  return get_status(c, "fmi2GetStringStatus", s == fmi2PendingStatus, "only fmi2PendingStatus is a String", value,
+  return get_status(c, __func__, s == fmi2PendingStatus, "only fmi2PendingStatus is a String", value,
                     [](const Progress&) { return "no step is pending"; });
 }
 

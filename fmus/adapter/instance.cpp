@@ -6,8 +6,7 @@
 #include <stdexcept>
 
 #include "../common/text.hpp"
-#include "description.hpp"
-
+#include "references3.hpp"
 namespace fmi {
 
 using common::number;
@@ -84,13 +83,9 @@ void Instance::setup(double start, double stop, double tolerance) {
   }
   progress.time = start;
   progress.stop_time = stop;
-  if (tolerance != progress.tolerance) progress.built = false;
-  progress.tolerance = tolerance;
-}
-
-void Instance::exit_initialization() {
-  ensure_built();
-  progress.phase = step_complete;
+  const double usable = tolerance > 0.0 && tolerance < 1.0 ? tolerance : 0.0;
+  if (usable != progress.tolerance) progress.built = false;
+  progress.tolerance = usable;
 }
 
 void Instance::ensure_built() {
@@ -143,7 +138,7 @@ double Instance::get(unsigned reference, Type type) {
   if (v.causality == Causality::parameter || (progress.phase == instantiated && v.exact))
     return (*settings_)[place_[reference]];
   if (progress.phase == instantiated) {
-    throw std::invalid_argument("'" + v.name + "' is not known before fmi2EnterInitializationMode");
+    throw std::invalid_argument("'" + v.name + "' is not known before initialization mode");
   }
   ensure_built();
   return finite(v, v.get(*model_));
@@ -155,7 +150,7 @@ void Instance::set(unsigned reference, Type type, double value) {
     throw std::invalid_argument("'" + v.name + "' is calculated and cannot be set");
   }
   if (is_setting(v) && (progress.phase & ~(instantiated | initialization)) != 0) {
-    throw std::invalid_argument("'" + v.name + "' can only be set before fmi2ExitInitializationMode");
+    throw std::invalid_argument("'" + v.name + "' can only be set before the end of initialization mode");
   }
   require_allowed(v, value);
   const std::size_t place = place_[reference];
@@ -177,7 +172,7 @@ void Instance::change_setting(std::size_t place, double value) {
 void Instance::set_derivative(unsigned reference, int order, double value) {
   const Variable& v = variable(reference, Type::real, "set a derivative of");
   if (!v.continuous_input()) throw std::invalid_argument("'" + v.name + "' is not an input that takes derivatives");
-  if (order < 1 || order > 2) {
+  if (order < 1 || order > max_input_derivative_order) {
     throw std::invalid_argument("derivative order " + std::to_string(order) + " of '" + v.name +
                                 "': orders 1 and 2 are possible");
   }
@@ -187,6 +182,13 @@ void Instance::set_derivative(unsigned reference, int order, double value) {
   const std::size_t place = place_[reference];
   use(place)[static_cast<std::size_t>(order)] = value;
   show(v, place);
+}
+
+double Instance::input_derivative(unsigned reference, int order) const {
+  const Variable& v = variable(reference, Type::real, "get a derivative of");
+  if (!v.continuous_input()) throw std::invalid_argument("'" + v.name + "' is not an input that takes derivatives");
+  const double value = values_[place_[reference]].at(static_cast<std::size_t>(order));
+  return std::isnan(value) ? 0.0 : value;
 }
 
 double Instance::output_derivative(unsigned reference, int order) {
@@ -202,19 +204,20 @@ double Instance::output_derivative(unsigned reference, int order) {
 
 double Instance::partial_derivative(unsigned unknown, unsigned known) {
   const Variable& of = variable(unknown, Type::real, "differentiate");
-  const Variable& by = variable(known, Type::real, "differentiate by");
+  const auto [place, order] = meant_by(known);
+  const Variable& by = variable(place, Type::real, "differentiate by");
   if (of.causality != Causality::output) throw std::invalid_argument("'" + of.name + "' is not an output");
   const bool starting = progress.phase == initialization;
-  if (!by.continuous_input() && !(is_setting(by) && starting))
+  if (!by.continuous_input() && !(is_setting(by) && starting && order == 0))
     throw std::invalid_argument("'" + by.name + "' is not a continuous input");
   ensure_built();
   for (const Dependency& d : of.dependencies) {
-    if (d.input != by.name) continue;
+    if (d.input != by.name || d.order != order) continue;
     const double partial = d.partial(*model_);
     return std::isnan(partial) ? difference(of, known) : finite(of, partial);
   }
   const auto& at_start = of.initial_dependencies;
-  const bool follows = starting && std::find(at_start.begin(), at_start.end(), by.name) != at_start.end();
+  const bool follows = starting && order == 0 && std::find(at_start.begin(), at_start.end(), by.name) != at_start.end();
   return follows ? difference(of, known) : 0.0;
 }
 
@@ -250,7 +253,7 @@ double Instance::difference(const Variable& of, unsigned known) {
   return finite(of, (above - below) / (high - low));
 }
 
-void Instance::step(double time, double size) {
+bool Instance::step(double time, double size, bool to_event) {
   if (!std::isfinite(time)) throw std::invalid_argument("currentCommunicationPoint = " + number(time));
   if (!std::isfinite(size) || size <= 0.0) {
     throw std::invalid_argument("communicationStepSize = " + number(size) + ": must be finite and > 0");
@@ -267,21 +270,34 @@ void Instance::step(double time, double size) {
                                 " goes past the stop time " + number(progress.stop_time));
   }
   ensure_built();
+  double reached = size;
   try {
-    model_->step(time, size);
+    reached = model_->step(time, size, to_event);
   } catch (const Discarded&) {
     ++model_->refused;
     throw;
   }
+  settle(true);
+  progress.time = time + reached;
+  return reached == size;
+}
+
+void Instance::update() {
+  ensure_built();
+  model_->update(progress.time);
+  settle(false);
+}
+
+/// Impulses have acted; after a step derivatives have, too.
+void Instance::settle(bool stepped) {
   for (const std::size_t i : used_) {
     Polynomial& value = values_[i];
-    const bool held = std::isnan(value[1]) && std::isnan(value[2]) && !inputs_[i]->consumed;
-    if (held) continue;
-    value = {inputs_[i]->consumed ? 0.0 : value[0], unset, unset};
+    const bool consumed = inputs_[i]->consumed, sloped = stepped && !(std::isnan(value[1]) && std::isnan(value[2]));
+    if (!consumed && !sloped) continue;
+    value = {consumed ? 0.0 : value[0], unset, unset};
     inputs_[i]->set(*model_, value);
   }
-  model_->settle();
-  progress.time = time + size;
+  if (stepped) model_->settle();
 }
 
 void Instance::save(Snapshot& s) const {

@@ -1,4 +1,4 @@
-// One instance of the FMU: the life cycle of FMI 2.0.4, section 4.2.4, over a Model and its table. No FMI types.
+// One instance of the FMU: parameters, inputs, outputs, steps and states, over a Model and its table. No FMI types.
 #pragma once
 
 #include <cstddef>
@@ -18,8 +18,10 @@ class Instance {
 
   Progress progress;
 
+  /// A `tolerance` that is no number between 0 and 1 counts as none.
   void setup(double start, double stop, double tolerance);
-  void exit_initialization();
+  /// Parameters that do not go together are found here.
+  void ensure_built();
   void reset();
 
   // What the importer asks for wrongly throws std::invalid_argument, also an output that the inputs which were set
@@ -28,12 +30,16 @@ class Instance {
   double get(unsigned reference, Type type);
   void set(unsigned reference, Type type, double value);
   void set_derivative(unsigned reference, int order, double value);
+  double input_derivative(unsigned reference, int order) const;  ///< 0 if it is not set
   double output_derivative(unsigned reference, int order);
-  /// ∂unknown/∂known at the present instant, of an output by a continuous input or, before the start, by a parameter.
+  /// ∂unknown/∂known at the present instant, of an output by a continuous input, by a derivative of one
+  /// (references3.hpp) or, before the start, by a parameter.
   double partial_derivative(unsigned unknown, unsigned known);
 
+  /// Returns whether the step came to its end; Model::step says what else it can come to.
   /// @throws Discarded
-  void step(double time, double size);
+  bool step(double time, double size, bool to_event);
+  void update();  ///< see Model::update
   /// What the model has to say after a step; empty if nothing.
   std::string take_warning() { return std::exchange(model_->warning, {}); }
 
@@ -47,9 +53,9 @@ class Instance {
 
  private:
   const Variable& variable(unsigned reference, Type type, const char* what) const;
-  void ensure_built();
   void observe() { model_->observe((progress.phase & (instantiated | initialization)) != 0); }
   void push_inputs();
+  void settle(bool stepped);
   void change_setting(std::size_t place, double value);
   double difference(const Variable& of, unsigned known);  ///< the derivative by differences
   Polynomial& use(std::size_t input);

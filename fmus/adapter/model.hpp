@@ -15,8 +15,9 @@ using common::Polynomial;
 /// In place of a derivative that the importer has not set.
 inline constexpr double unset = std::numeric_limits<double>::quiet_NaN();
 
-/// What was asked for cannot be had, and nothing has changed: becomes fmi2Discard, after which the instance goes on.
-/// So FMI 3.0 has it; an importer that follows FMI 2.0 restores a state before it repeats a step, which does no harm.
+/// What was asked for cannot be had, and nothing has changed: becomes fmi2Discard or fmi3Discard, after which the
+/// instance goes on. So FMI 3.0 has it; an importer that follows FMI 2.0 restores a state before it repeats a step,
+/// which does no harm.
 class Discarded : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -35,11 +36,15 @@ class Model {
   /// inputs are still start values.
   virtual void observe(bool initial) = 0;
 
-  /// Called by fmi2DoStep, the inputs having been set.
+  /// Called for each step, the inputs having been set; returns how far it came. Only `to_event` lets it end early,
+  /// where something happens: update() is due then.
   /// @throws Discarded
-  virtual void step(double time, double size) = 0;
+  virtual double step(double time, double size, bool to_event) = 0;
 
-  /// Called after step() and after inputs have lost their derivatives and impulses.
+  /// Called in event mode: what happens at this instant, impulses and impacts, happens now and not in the next step.
+  virtual void update(double time) = 0;
+
+  /// Called after step() or update() and after inputs have lost their derivatives and impulses.
   virtual void settle() {}
 
   /// Called for every saved state; the vector is flat and holds everything that build() does not make.

@@ -90,7 +90,7 @@ Snapshot deserialize(const char* bytes, std::size_t size, const std::string& gui
   const auto known = [&values](std::size_t i, std::initializer_list<double> allowed) {
     return std::find(allowed.begin(), allowed.end(), values[i]) != allowed.end();
   };
-  if (!known(0, {1, 2, 4, 8, 16}) || !known(1, {0, 1, 2, 3}) || !known(5, {0, 1}) || !std::isfinite(values[2]) ||
+  if (!known(0, {1, 2, 4, 8, 16, 32}) || !known(1, {0, 1, 2, 3}) || !known(5, {0, 1}) || !std::isfinite(values[2]) ||
       std::isnan(values[3]) || !(values[4] >= 0.0 && values[4] < 1.0)) {
     refuse("it says what no instance says of itself");
   }

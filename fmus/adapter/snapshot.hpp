@@ -12,13 +12,15 @@
 
 namespace fmi {
 
-/// The states of FMI 2.0.4, section 4.2.4, that a slave which completes every step at once can be in, as bits.
+/// The states of FMI 2.0.4, section 4.2.4, that a slave which completes every step at once can be in, as bits, and the
+/// event mode of FMI 3.0.
 enum Phase : unsigned {
   instantiated = 1U << 0,
   initialization = 1U << 1,
   step_complete = 1U << 2,
   terminated = 1U << 3,
   error = 1U << 4,
+  event_mode = 1U << 5,
 };
 
 /// How far an instance is in its life.

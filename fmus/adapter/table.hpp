@@ -1,5 +1,5 @@
-// The table of an FMU's variables: the one place where they are written down. modelDescription.xml, the GUID and
-// every fmi2Get/Set go by it. A value reference is the variable's position in the table.
+// The table of an FMU's variables: the one place where they are written down. The descriptions, the GUID and whatever
+// gets or sets a value go by it. A value reference is the variable's position in the table.
 #pragma once
 
 #include <cmath>
@@ -24,6 +24,7 @@ enum class Causality { parameter, input, output, local };
 struct Dependency {
   std::string input;
   std::function<double(const Model&)> partial;  ///< ∂output/∂input, not finite where it is not known
+  int order = 0;                                ///< of the input's derivative that it is, where that is a variable
 };
 
 /// Values of every type are held as double, which represents all of them exactly.
@@ -38,8 +39,9 @@ struct Variable {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
   double nominal = 1.0;
-  bool exact = false;     ///< an output whose start is the initial state (initial="exact")
-  bool consumed = false;  ///< an input that acts once: read back as 0 after the step that used it
+  bool exact = false;        ///< an output whose start is the initial state (initial="exact")
+  bool consumed = false;     ///< an input that acts once: read back as 0 after the step that used it
+  std::size_t elements = 1;  ///< of the array that begins here, where variables can be arrays; 0: within one
 
   std::function<void(Model&, const Polynomial&)> set;  ///< parameters, inputs, exact outputs
   std::function<double(const Model&)> get;             ///< outputs
@@ -66,10 +68,24 @@ struct Choice {
   std::vector<std::string> items;
 };
 
+struct LogCategory {
+  const char *name, *description;
+};
+inline constexpr LogCategory log_categories[] = {
+    {"logStatusError", "errors; always reported"},
+    {"logStatusDiscard", "steps that could not be completed; always reported"},
+    {"logStatusWarning", "warnings; always reported"},
+    {"logEvents", "calls that change what the instance is doing"},
+    {"logAll", "everything"},
+};
+
+inline constexpr int max_input_derivative_order = 2, max_output_derivative_order = 1;
+
 struct Table {
   std::string identifier;  ///< modelIdentifier
   std::string title, description;
   double stop_time = 1.0, step_size = 1e-3, tolerance = 0.0;  ///< DefaultExperiment; tolerance 0: none
+  bool ends_steps_early = false;                              ///< at events, where it may
   std::vector<Choice> choices;
   std::vector<Variable> variables;
 
@@ -81,6 +97,9 @@ Table make_table();
 std::unique_ptr<Model> make_model();
 
 const Table& table();  ///< made once
+
+/// A hash of everything the table says: two FMUs with the same GUID have the same variables.
+const std::string& guid();
 
 /// Adds variables bound to a concrete model `M`.
 template <class M>
@@ -157,9 +176,9 @@ class TableBuilder {
 
   /// Says that the last output follows `input` between steps, and with which derivative.
   template <class Partial>
-  void depends(const std::string& input, Partial partial) {
+  void depends(const std::string& input, Partial partial, int order = 0) {
     table_.variables.back().dependencies.push_back(
-        {input, [partial](const Model& m) { return static_cast<double>(partial(static_cast<const M&>(m))); }});
+        {input, [partial](const Model& m) { return static_cast<double>(partial(static_cast<const M&>(m))); }, order});
   }
 
   /// Makes the last output's start value settable: it is a field of the parameters.

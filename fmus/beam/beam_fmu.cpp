@@ -60,7 +60,7 @@ struct BeamModel final : fmi::Model {
     if (forecasts() && (resting || beam->loads() != before)) look_ahead();
   }
 
-  void step(double, double size) override {
+  double step(double, double size, bool) override {
     std::vector<double> before;
     if (tip_impulse != 0.0 || forecasts()) beam->save(before);
     try {
@@ -73,6 +73,15 @@ struct BeamModel final : fmi::Model {
     }
     resting = false;
     look_again();
+    return size;
+  }
+
+  void update(double) override {
+    if (tip_impulse == 0.0) return;
+    beam->apply_tip_impulse(tip_impulse);
+    resting = false;
+    look_again();
+    look_ahead();
   }
 
   void save(std::vector<double>& state) const override { beam->save(state); }
@@ -397,7 +406,8 @@ fmi::Table fmi::make_table() {
                          double (BeamModel::*at)(std::size_t) const) {
     for (std::size_t i = 0; i < beam::shape_points; ++i) {
       add.local(name + "[" + std::to_string(i + 1) + "]", unit, text + " at x = L*" + std::to_string(i) + "/20",
-                [i, at](const BeamModel& m) { return (m.*at)(i); });
+                [i, at](const BeamModel& m) { return (m.*at)(i); })
+          .elements = i == 0 ? beam::shape_points : 0;
     }
   };
   shape("deflection", "m", "deflection", &BeamModel::deflection);

@@ -60,7 +60,7 @@ struct SpringModel final : fmi::Model {
     look();
   }
 
-  void step(double time, double size) override {
+  double step(double time, double size, bool) override {
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
     const bool goes_on = held && size > rounding * held->size();
     if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
@@ -83,6 +83,13 @@ struct SpringModel final : fmi::Model {
     }
     if (held) look();
     check_wiring();
+    return size;
+  }
+
+  void update(double) override {
+    if (impulse == 0.0) return;
+    spring->apply_impulse(impulse);
+    look();
   }
 
   void settle() override { tip_is_set = tip_velocity_is_set = false; }
@@ -124,6 +131,9 @@ struct SpringModel final : fmi::Model {
   double reaction_by_tip_velocity() const {
     const bool read = spring->extrapolated() || !is_set(tip_displacement[1]);
     return read ? -spring->reaction_slopes().force_by_rate : 0.0;
+  }
+  double reaction_by_tip_rate() const {
+    return is_set(tip_displacement[1]) && !held ? -spring->reaction_slopes().force_by_rate : 0.0;
   }
   double reaction_by_forecast() const { return held ? held->size() * sensitivity().by_free : 0.0; }
   double reaction_by_load() const { return held ? sensitivity().by_load : 0.0; }
@@ -403,6 +413,7 @@ fmi::Table fmi::make_table() {
          [](const SpringModel& m) { return m.reaction(); }, [](const SpringModel& m) { return m.reaction_rate(); })
       .from(motion);
   add.depends("tip_displacement", [](M m) { return m.reaction_by_tip_displacement(); });
+  add.depends("tip_displacement", [](M m) { return m.reaction_by_tip_rate(); }, 1);
   add.depends("tip_velocity", [](M m) { return m.reaction_by_tip_velocity(); });
   add.depends("tip_velocity_forecast", [](M m) { return m.reaction_by_forecast(); });
   add.depends("external_force", [](M m) { return m.reaction_by_load(); });
@@ -411,8 +422,8 @@ fmi::Table fmi::make_table() {
   add.output("acceleration", "m/s2", "acceleration of the top", of(&Spring::acceleration), [](M m) { return m.jerk(); })
       .from(motion);
   t.variables.back().initial_dependencies.emplace_back("contact_force");
-  const auto follows = [&](const char* input, auto force, auto reaction) {
-    add.depends(input, [=](M m) { return m.mobility() * (force(m) - reaction(m)); });
+  const auto follows = [&](const char* input, auto force, auto reaction, int order = 0) {
+    add.depends(input, [=](M m) { return m.mobility() * (force(m) - reaction(m)); }, order);
   };
   const auto none = [](M) { return 0.0; };
   follows("contact_force", [](M m) { return m.parameters.compliant() ? 0.0 : -1.0; }, none);
@@ -424,6 +435,7 @@ fmi::Table fmi::make_table() {
       "base_acceleration", [](M m) { return -m.parameters.mass; },
       [](M m) { return -m.parameters.mass * m.reaction_by_load(); });
   follows("tip_displacement", none, [](M m) { return m.reaction_by_tip_displacement(); });
+  follows("tip_displacement", none, [](M m) { return m.reaction_by_tip_rate(); }, 1);
   follows("tip_velocity", none, [](M m) { return m.reaction_by_tip_velocity(); });
   follows("tip_velocity_forecast", none, [](M m) { return m.reaction_by_forecast(); });
   add.output("seated", "", "whether the top rests on the foundation inside", of(&Spring::seated)).type =

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# build.sh OUT PYTHON — cross-compiles beam.dll and spring.dll for 64-bit Windows into OUT, with zig from PyPI, self-
-# contained but for what Windows 10 has. SUNDIALS is compiled from SPRINGBEAM_SUNDIALS_SOURCE; Eigen and Spectra are the
-# system's or those of SPRINGBEAM_PREFIX.
+# build.sh OUT PYTHON — cross-compiles the libraries of the FMUs, beam.dll to spring3.dll, for 64-bit Windows into OUT,
+# with zig from PyPI, self-contained but for what Windows 10 has. SUNDIALS is compiled from SPRINGBEAM_SUNDIALS_SOURCE;
+# Eigen and Spectra are the system's or those of SPRINGBEAM_PREFIX.
 set -euo pipefail
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
@@ -57,6 +57,7 @@ if ! [ -f "$out/project/build.ninja" ]; then
     "-DSPECTRA_INCLUDE_DIR=$out/include" -DEigen3_ROOT=/usr -DEigen3_DIR="${Eigen3_DIR:-/usr/share/eigen3/cmake}"
 fi
 say "building for win64"
-quietly build "$tools/ninja" -C "$out/project" beam spring
-cmp -s "$out/project/fmus/beam.dll" "$out/beam.dll" || cp "$out/project/fmus/beam.dll" "$out/"
-cmp -s "$out/project/fmus/spring.dll" "$out/spring.dll" || cp "$out/project/fmus/spring.dll" "$out/"
+quietly build "$tools/ninja" -C "$out/project" beam spring beam3 spring3
+for name in beam spring beam3 spring3; do
+  cmp -s "$out/project/fmus/$name.dll" "$out/$name.dll" || cp "$out/project/fmus/$name.dll" "$out/"
+done

@@ -55,7 +55,7 @@ BROKEN: dict[str, tuple[Callable[[Files], None], str]] = {
         "co-simulation",
     ),
     "another model identifier": (edited(r'modelIdentifier="beam"', 'modelIdentifier="cable"'), "'cable'"),
-    "wrong GUID": (edited(r'guid="\{[^"]*\}"', 'guid="{0}"'), r"fmuGUID = \{0\} is not that of this FMU"),
+    "wrong GUID": (edited(r'guid="\{[^"]*\}"', 'guid="{0}"'), r"the GUID \{0\} is not that of this FMU"),
     "no binary": (without(BINARY), r"beam\.so|platform|binary|binaries"),
     "binary of another platform": (renamed(BINARY, "binaries/win64/beam.dll"), r"linux64|platform|beam\.so|binar"),
     "binary is no library": (replaced(BINARY, b"not an ELF file"), r"ELF|invalid|header|too short"),

@@ -29,7 +29,7 @@ def test_fmpy_validation_reports_nothing(case: Any) -> None:
 def test_static_model_is_the_packed_one_and_fmpy_reports_nothing(case: Any, tmp_path: Path) -> None:
     # The description printed from the table, before there is a binary. Only the list of sources is added to it.
     printed = tmp_path / "modelDescription.xml"
-    printed.write_text(output(str(ROOT / "build" / "fmus" / f"describe_{case.name}")), encoding="utf-8")
+    printed.write_text(output(str(ROOT / "build" / "fmus" / f"describe_{case.name}"), "2"), encoding="utf-8")
     assert validate_fmu(str(tmp_path)) == []
     packed = (case.folder / "modelDescription.xml").read_text(encoding="utf-8")
     without_list = re.sub(r">\n    <SourceFiles>.*</CoSimulation>", "/>", packed, flags=re.DOTALL)
