@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from springbeam.results.steps import STEP, STEP_COLUMNS
-from springbeam.results.trajectory import EVENT_KINDS, Event, Trajectory, columns_of
+from springbeam.results.trajectory import Event, EventKind, Trajectory, columns_of
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
 
@@ -70,4 +70,4 @@ def block(n=300, scene=PAIR, t_end=3.0, begin=0):
     return steps, events, shapes
 
 
-EVERY_EVENT = [Event(0.05 * (i + 1), kind, 0, 0, 0, 0, 0.1, 0.2, 0.3) for i, kind in enumerate(EVENT_KINDS)]
+EVERY_EVENT = [Event(0.05 * (i + 1), kind, 0, 0, 0, 0, 0.1, 0.2, 0.3) for i, kind in enumerate(EventKind)]

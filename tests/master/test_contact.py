@@ -20,6 +20,7 @@ from springbeam.contact.phases import (
     rebound,
     spring_force,
 )
+from springbeam.results.trajectory import EventKind
 from springbeam.scene import Spring, load_scene, with_changes
 
 MASSES = [(0.25, 1.0), (1.0, 0.01), (3.0, 100.0)]
@@ -112,12 +113,12 @@ def test_a_meeting_at_the_equilibrium_is_told_by_the_velocity(y, speed, joint):
         load_scene("soft"), Transmission(), tip_mass=0.01, mass=1.0, fastest=lambda: 0.3, equilibrium=0.0
     )
     end = Motion(y, speed, 0.0, 0.0)
-    _, phase, impact = transitions.after("impact", Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
+    _, phase, impact = transitions.after(EventKind("impact"), Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
     assert phase.joint is joint
     assert impact.energy_loss == 0.0
 
 
-@pytest.mark.parametrize("kind", ["release", "separation"])
+@pytest.mark.parametrize("kind", [EventKind.RELEASE, EventKind.SEPARATION])
 @pytest.mark.parametrize(("v", "one_velocity"), [(0.5, True), (0.69, True), (0.71, False), (-3.0, True)])
 def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, one_velocity):
     """Parting by 20 % of the largest speed, here 1 m/s, and more is no error of the scheme."""
@@ -141,7 +142,7 @@ def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(
     tip_mass, held = 0.01, Phase(Joint.TIED if mass is None else Joint.TOUCH, seated=True)
     transitions = Transitions(load_scene("soft"), Transmission(), tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, 0.0, 0.0, 0.0)
-    kind, phase, impact = transitions.after("separation", held, ends, 0.0, ends, -1.0, 1e-17)
+    kind, phase, impact = transitions.after(EventKind("separation"), held, ends, 0.0, ends, -1.0, 1e-17)
     assert (kind, phase) == ("separation", Phase(Joint.FREE, seated=mass is not None))
     assert impact.on_spring == 0.0
     assert impact.of_foundation == impact.on_beam
@@ -155,7 +156,7 @@ def struck_at(z, restitution, fastest=1.0):
     transitions = Transitions(scene, Transmission(), 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
     for speed in (-fastest, z):
         end = Motion(scene.stop.position, speed, 0.0, 0.0)
-        found = transitions.after("stop_impact", Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
+        found = transitions.after(EventKind("stop_impact"), Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
     return found
 
 

@@ -9,7 +9,7 @@ from springbeam.contact.laws import stiffest
 from springbeam.results.extremes import Extremes
 from springbeam.results.steps import STEP
 from springbeam.results.totals import shortest_contact, totals
-from springbeam.results.trajectory import EVENT_KINDS, Event
+from springbeam.results.trajectory import Event, EventKind
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.resolution import force_window, slowest_frequency
 from springbeam.scene.statics import tip_inertia
@@ -57,7 +57,7 @@ def test_a_peak_may_be_where_the_run_begins():
 
 def test_what_events_take_is_of_the_stop_or_of_the_ends_that_meet():
     """1, 2, 4 … 64 J by the events of each kind: strokes on the stop and seating take 2 + 32 J, the others 93."""
-    events = [Event(0.1 * k, kind, energy_loss=2.0**k) for k, kind in enumerate(EVENT_KINDS)]
+    events = [Event(0.1 * k, kind, energy_loss=2.0**k) for k, kind in enumerate(EventKind)]
     numbers = found(steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 1.0, 11)), *events)
     assert (numbers["loss_stop"], numbers["loss_impact"]) == (34.0, 93.0)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..bodies.protocol import Ends
 from ..results.paths import Means, Sample
+from ..results.trajectory import EventKind
 from ..scene import Beam, Scene, Spring
 from ..scene.statics import tip_compliance, tip_load_deflection
 from .laws import Law
@@ -102,12 +103,12 @@ class EventFunctions:
         self._ties = scene.joins and not law.soft
         self._meets = self._ties and not law.lasting
         self._phase: Phase | None = None
-        self._functions: list[tuple[str, EventFunction]] = []
+        self._functions: list[tuple[EventKind, EventFunction]] = []
         #: The ends last asked for, and the samples there: a step starts where the one before has ended.
         self._ends: Ends | None = None
         self._samples: list[Sample] = []
 
-    def of(self, phase: Phase) -> list[tuple[str, EventFunction]]:
+    def of(self, phase: Phase) -> list[tuple[EventKind, EventFunction]]:
         if phase is not self._phase:
             self._phase, self._functions, self._ends = phase, self._built(phase), None
         return self._functions
@@ -119,25 +120,25 @@ class EventFunctions:
             self._ends, self._samples = ends, [function(ends) for _, function in functions]
         return self._samples
 
-    def _built(self, phase: Phase) -> list[tuple[str, EventFunction]]:
+    def _built(self, phase: Phase) -> list[tuple[EventKind, EventFunction]]:
         tip, low = 0, 1
         stop = self._scene.stop
-        functions: list[tuple[str, EventFunction]] = []
+        functions: list[tuple[EventKind, EventFunction]] = []
         share = self._tip_share if self._ties and phase.joint is not Joint.FREE else 0.0
         if self._meets:
             if phase.joint is Joint.FREE:
-                functions.append(("impact", gap))
+                functions.append((EventKind.IMPACT, gap))
             if phase.joint is Joint.TIED and not phase.seated:
-                functions.append(("release", Height(low, self._equilibrium, share, -1.0)))
+                functions.append((EventKind.RELEASE, Height(low, self._equilibrium, share, -1.0)))
             if phase.joint is Joint.TOUCH:
-                functions.append(("retie", Height(low, self._equilibrium, share)))
+                functions.append((EventKind.RETIE, Height(low, self._equilibrium, share)))
                 beam, spring = self._scene.beam, self._scene.spring
                 if beam is not None and beam.fidelity == "quasi_static" and not phase.seated:
                     assert spring is not None
-                    functions.append(("separation", Holding(beam, spring)))
+                    functions.append((EventKind.SEPARATION, Holding(beam, spring)))
         if stop is not None and not phase.seated and not self._scene.elastic_stop:
             end, share = (tip, 1.0) if self._scene.lower is None else (low, share)
-            functions.append(("stop_impact", Height(end, stop.position, share)))
+            functions.append((EventKind.STOP_IMPACT, Height(end, stop.position, share)))
         return functions
 
 

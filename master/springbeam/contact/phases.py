@@ -13,6 +13,7 @@ from math import inf
 
 from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Ends, Motion
+from ..results.trajectory import EventKind
 from ..scene import Scene, Spring
 from ..scene.resolution import VIBRATION
 from ..scene.statics import tip_compliance, tip_load_deflection
@@ -133,35 +134,35 @@ class Transitions(Checkpointed):
 
     def after(
         self,
-        kind: str,
+        kind: EventKind,
         phase: Phase,
         start: Ends,
         elapsed: float,
         ends: Ends,
         end_force: float,
         tolerance: float,
-    ) -> tuple[str, Phase, Impact]:
+    ) -> tuple[EventKind, Phase, Impact]:
         """The event's kind (an impact on the foundation may end seated), the phase after it, and the impact.
 
         ``ends`` are (tip, lower end) before it, ``start`` the same ``elapsed`` [s] ago, where the step began that ends
         with it, ``end_force`` is C [N], ``tolerance`` what positions can be told apart to [m].
         """
         tip, low = ends
-        if kind == "impact":
+        if kind is EventKind.IMPACT:
             return kind, *self._meet(phase, tip, low, tolerance)
-        if kind == "stop_impact":
+        if kind is EventKind.STOP_IMPACT:
             return self._strike(phase, start, elapsed, ends, tolerance)
-        if kind == "release":
+        if kind is EventKind.RELEASE:
             if end_force > 0.0:
                 return kind, Phase(Joint.TOUCH), Impact()
             return kind, Phase(Joint.FREE), self._part(phase, tip, low)
-        if kind == "retie":
+        if kind is EventKind.RETIE:
             return kind, Phase(Joint.TIED), Impact()
-        if kind == "unseated":
+        if kind is EventKind.UNSEATED:
             return kind, Phase(phase.joint), Impact()
-        assert kind == "separation"
+        assert kind is EventKind.SEPARATION
         if self._tip_mass == 0.0 and low.velocity < 0.0 and self._at_equilibrium(low, tolerance):
-            return "retie", Phase(Joint.TIED), Impact()  # C vanishes at Ψ, where they are tied again
+            return EventKind.RETIE, Phase(Joint.TIED), Impact()  # C vanishes at Ψ, where they are tied again
         opened = Phase(Joint.FREE, seated=phase.seated and self._mass is not None)
         return kind, opened, self._part(opened, tip, low)
 
@@ -199,7 +200,7 @@ class Transitions(Checkpointed):
         elapsed: float,
         ends: Ends,
         tolerance: float,
-    ) -> tuple[str, Phase, Impact]:
+    ) -> tuple[EventKind, Phase, Impact]:
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
         assert self._scene.stop is not None
         e = self._scene.stop.restitution
@@ -218,8 +219,9 @@ class Transitions(Checkpointed):
         masses = self._mass or 0.0, self._tip_mass or 0.0
         if (dies_out and e < 1.0) or speed == 0.0:
             joint = phase.joint if self._mass is not None else Joint.TIED
-            return "seated", Phase(joint, seated=True), foundation_impact(z, masses[0], v, masses[1], restitution=0.0)
-        return "stop_impact", phase, foundation_impact(z, masses[0], v, masses[1], restitution=e)
+            stays = Phase(joint, seated=True)
+            return EventKind.SEATED, stays, foundation_impact(z, masses[0], v, masses[1], restitution=0.0)
+        return EventKind.STOP_IMPACT, phase, foundation_impact(z, masses[0], v, masses[1], restitution=e)
 
     def _striking(self, ends: Ends, tied: bool) -> tuple[float | None, float | None]:
         """Velocities (tip, spring top) [m/s] of those that strike the foundation; ``None`` for one that does not."""

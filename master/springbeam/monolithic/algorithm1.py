@@ -28,7 +28,7 @@ from typing import Literal, get_args
 import numpy as np
 import scipy.sparse.linalg as spla
 
-from ..results.trajectory import Event, Trajectory
+from ..results.trajectory import Event, EventKind, Trajectory
 from ..scene import Scene
 from .algorithm1_ledger import PairState, StepLedger
 from .hybrid_system import ReferenceFailure
@@ -206,7 +206,7 @@ class _Algorithm:
 
     def _note(self, kind: str, state: PairState, **impulse: float) -> None:
         q, v, y, z = state
-        self._events.append(Event(self.time, kind, y, z, float(q[-1]), float(v[-1]), **impulse))
+        self._events.append(Event(self.time, EventKind(kind), y, z, float(q[-1]), float(v[-1]), **impulse))
 
     def _right_side(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return the right side of (62) without a force on the tip."""

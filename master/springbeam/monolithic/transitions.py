@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..results.trajectory import Event
+from ..results.trajectory import Event, EventKind
 from .hybrid_system import HybridSystem
 from .laws import Contact, Phase, Watch
 
@@ -195,7 +195,7 @@ class HybridState:
         self.events.append(
             Event(
                 time=self.time,
-                kind=kind,
+                kind=EventKind(kind),
                 y=float(m.y) if s.has_spring else None,
                 z=float(m.z) if s.has_spring else None,
                 u_tip=float(m.u) if s.beam is not None else None,

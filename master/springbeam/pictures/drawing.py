@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..results.trajectory import EVENT_KINDS, PHASES, Trajectory
+from ..results.trajectory import PHASES, EventKind, Trajectory
 from ..scene import Scene
 
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -52,15 +52,15 @@ PHASE_LOOKS = {
     "seated": Look("#CFE8DD", "seated (at φ)"),
 }
 EVENT_LOOKS = {
-    "impact": Look(VERMILLION, "impact tip–spring", marker=Marker("▼", "v", "triangle-down")),
-    "stop_impact": Look(BLACK, "impact on foundation", marker=Marker("▲", "^", "triangle-up")),
-    "release": Look(BLUE, "release", marker=Marker("●", "o", "circle")),
-    "retie": Look(PURPLE, "retie", marker=Marker("■", "s", "square")),
-    "separation": Look(GREEN, "separation", marker=Marker("◆", "D", "diamond")),
-    "seated": Look(GREY, "seated", marker=Marker("◀", "<", "triangle-left")),
-    "unseated": Look(GREY, "unseated", marker=Marker("▶", ">", "triangle-right")),
+    EventKind.IMPACT: Look(VERMILLION, "impact tip–spring", marker=Marker("▼", "v", "triangle-down")),
+    EventKind.STOP_IMPACT: Look(BLACK, "impact on foundation", marker=Marker("▲", "^", "triangle-up")),
+    EventKind.RELEASE: Look(BLUE, "release", marker=Marker("●", "o", "circle")),
+    EventKind.RETIE: Look(PURPLE, "retie", marker=Marker("■", "s", "square")),
+    EventKind.SEPARATION: Look(GREEN, "separation", marker=Marker("◆", "D", "diamond")),
+    EventKind.SEATED: Look(GREY, "seated", marker=Marker("◀", "<", "triangle-left")),
+    EventKind.UNSEATED: Look(GREY, "unseated", marker=Marker("▶", ">", "triangle-right")),
 }
-assert (tuple(PHASE_LOOKS), tuple(EVENT_LOOKS)) == (PHASES, EVENT_KINDS)
+assert (tuple(PHASE_LOOKS), tuple(EVENT_LOOKS)) == (PHASES, tuple(EventKind))
 #: More events than this are not drawn through all panels.
 MANY_EVENTS = 60
 
@@ -142,7 +142,7 @@ def pairs(times: np.ndarray, number: int) -> np.ndarray:
 class EventMark(NamedTuple):
     """The events of one kind: look and marker with how many they are, times [s] and what each lost [J]."""
 
-    kind: str
+    kind: EventKind
     look: Look
     marker: Marker
     times: np.ndarray

@@ -87,7 +87,7 @@ def _since_contact(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     if trajectory.shapes is None:
         return np.empty(0), np.empty((0, len(SHAPE_POINTS)))
     times, shapes = trajectory.shapes
-    meetings = (event.time for event in trajectory.events if event.kind in ("impact", "stop_impact"))
+    meetings = (event.time for event in trajectory.events if event.kind.collision)
     first = int(np.searchsorted(times, next(meetings, trajectory.time[0])))
     return times[first:], shapes[first:]
 

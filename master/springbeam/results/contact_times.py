@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .steps import impulse
-from .trajectory import Event, Trajectory
+from .trajectory import Event, EventKind, Trajectory
 
 #: Share of the impulse of a run below which a contact or a stroke is none to speak of.
 SLIGHT = 2e-3
@@ -92,12 +92,12 @@ def _contacts(run: Trajectory, end: float) -> list[Interval]:
 def tip_contacts(events: Iterable[Event], end: float, *, free_at_end: bool) -> list[Interval]:
     """Return the contacts of tip and spring; one that goes on ends at ``end`` [s]."""
     edges: list[float] = []
-    events = [e for e in events if e.kind in ("impact", "separation", "release", "retie")]
+    events = [event for event in events if event.kind.joins]
     for event, after in itertools.zip_longest(events, events[1:]):
-        if event.kind == "release":  # to `touch`, or to `free`
-            joined = not free_at_end if after is None else after.kind != "impact"
+        if event.kind is EventKind.RELEASE:  # to `touch`, or to `free`
+            joined = not free_at_end if after is None else after.kind is not EventKind.IMPACT
         else:
-            joined = event.kind != "separation"
+            joined = event.kind is not EventKind.SEPARATION
         if joined == (len(edges) % 2 == 0):
             edges.append(event.time)
     if len(edges) % 2:
@@ -110,11 +110,11 @@ def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
     intervals: list[Interval] = []
     since: float | None = None
     for event in events:
-        if event.kind == "stop_impact":
+        if event.kind is EventKind.STOP_IMPACT:
             intervals.append((event.time, event.time))
-        elif event.kind == "seated":
+        elif event.kind is EventKind.SEATED:
             since = event.time
-        elif event.kind in ("unseated", "separation") and since is not None:
+        elif event.kind in (EventKind.UNSEATED, EventKind.SEPARATION) and since is not None:
             intervals.append((since, event.time))
             since = None
     return intervals if since is None else [*intervals, (since, end)]

@@ -15,7 +15,7 @@ from ..scene import scene_from_dict
 from .directory import ResultsUnreadable, RunDirectory
 from .recording import trajectory_of
 from .steps import steps_of
-from .trajectory import EVENT_COLUMNS, EVENT_KINDS, PHASES, SHAPE_COLUMNS, Event, Trajectory
+from .trajectory import EVENT_COLUMNS, PHASES, SHAPE_COLUMNS, Event, EventKind, Trajectory
 
 
 def load_trajectory(directory: str | Path) -> Trajectory:
@@ -92,15 +92,13 @@ def load_events(directory: str | Path) -> Iterator[Event]:
     _, lines = _complete_lines(path, EVENT_COLUMNS)
     for number, line in enumerate(lines, start=2):
         fields = line.rstrip("\n").split(",")
-        if len(fields) != len(EVENT_COLUMNS) or fields[1] not in EVENT_KINDS:
-            raise ResultsUnreadable(f"{path}: line {number}: not an event: {line.strip()[:60]!r}")
-        named = dict(zip(EVENT_COLUMNS, fields, strict=True))
-        kind = named.pop("kind")
         try:
-            values = {name: float(text) for name, text in named.items() if text}
-            yield Event(kind=kind, **values)
-        except (TypeError, ValueError) as error:
-            raise ResultsUnreadable(f"{path}: line {number}: {error}") from None
+            given = {name: text for name, text in zip(EVENT_COLUMNS, fields, strict=True) if text}
+            kind = EventKind(given.pop("kind"))
+            yield Event(kind=kind, **{name: float(text) for name, text in given.items()})
+        except (KeyError, TypeError, ValueError) as error:
+            said = f"not an event: {line.strip()[:60]!r}: {error}"
+            raise ResultsUnreadable(f"{path}: line {number}: {said}") from None
 
 
 def _complete_lines(path: Path, columns: tuple[str, ...] | None = None) -> tuple[tuple[str, ...], Iterator[str]]:

@@ -90,12 +90,12 @@ def totals(
     if beam:
         found["deepest_tip"], found["deepest_tip_time"] = extremes(scene, steps, "u_tip")[:2]
     if stop:
-        found["stop_strokes"] = sum(event.kind in ("stop_impact", "seated") for event in events)
+        found["stop_strokes"] = sum(event.kind.strikes for event in events)
         held = impulse(steps, steps["size"], name="foundation_force").sum()
         found["foundation_impulse"] = held + sum(event.impulse_foundation for event in events)
-        found["loss_stop"] = sum(event.energy_loss for event in events if event.kind in ("stop_impact", "seated"))
+        found["loss_stop"] = sum(event.energy_loss for event in events if event.kind.strikes)
     if beam and spring:
-        found["loss_impact"] = sum(e.energy_loss for e in events if e.kind not in ("stop_impact", "seated"))
+        found["loss_impact"] = sum(e.energy_loss for e in events if not e.kind.strikes)
     return {name: value if name == "stop_strokes" else float(value) for name, value in found.items()}
 
 

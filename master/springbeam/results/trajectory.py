@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 from html import escape
 from importlib import import_module
 from pathlib import Path
@@ -45,11 +46,44 @@ COLUMNS = {
 }
 #: What the column ``phase`` may hold.
 PHASES = ("free", "tied", "touch", "seated")
-EVENT_KINDS = ("impact", "stop_impact", "release", "retie", "separation", "seated", "unseated")
 #: Columns of the table of shapes: time [s] and deflections [m] at `SHAPE_POINTS`.
 SHAPE_COLUMNS = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
 #: A number below this share of its table's largest is a zero, rounded.
 _NOISE = 1e-13
+
+
+class EventKind(str, Enum):
+    """What happens at an event; the values are the words in ``events.csv``."""
+
+    IMPACT = "impact"  #: the tip meets what is below it
+    STOP_IMPACT = "stop_impact"  #: the lower end strikes the foundation and rebounds
+    RELEASE = "release"  #: tied ends rise through Ψ: from here on the contact can only push
+    RETIE = "retie"  #: the ends go below Ψ together and are tied
+    SEPARATION = "separation"  #: the ends part
+    SEATED = "seated"  #: the lower end strikes the foundation and stays there
+    UNSEATED = "unseated"  #: the lower end leaves the foundation
+
+    __str__ = str.__str__
+
+    @property
+    def collision(self) -> bool:
+        """Whether bodies meet that may part again at once."""
+        return self in (EventKind.IMPACT, EventKind.STOP_IMPACT)
+
+    @property
+    def strikes(self) -> bool:
+        """Whether the foundation is struck."""
+        return self in (EventKind.STOP_IMPACT, EventKind.SEATED)
+
+    @property
+    def opens(self) -> bool:
+        """Whether tied ends are let go."""
+        return self in (EventKind.RELEASE, EventKind.SEPARATION)
+
+    @property
+    def joins(self) -> bool:
+        """Whether the ends are joined in another way than before."""
+        return self.opens or self in (EventKind.IMPACT, EventKind.RETIE)
 
 
 @dataclass(frozen=True)
@@ -58,7 +92,7 @@ class Event:
     body."""
 
     time: float
-    kind: str
+    kind: EventKind  #: or its word
     y: float | None = None
     z: float | None = None
     u_tip: float | None = None
@@ -66,6 +100,9 @@ class Event:
     impulse_contact: float = 0.0  #: on the beam's tip, upward [N·s]
     impulse_foundation: float = 0.0  #: of the foundation, upward [N·s]
     energy_loss: float = 0.0  #: [J]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kind", EventKind(self.kind))
 
 
 EVENT_COLUMNS = tuple(Event.__dataclass_fields__)

@@ -21,7 +21,7 @@ from ..contact.events import (
 from ..contact.phases import Joint, common_velocity
 from ..coupling.protocol import Step
 from ..results.paths import Path, Sample
-from ..results.trajectory import Event
+from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .separation import Separation
@@ -78,7 +78,7 @@ class Detector:
         tip, low = ends
         return max(1e-12 * max(abs(tip.velocity), abs(low.velocity)), _VELOCITY_ROUNDING * self._fastest())
 
-    def at_start(self, state: State, start: Ends) -> str | None:
+    def at_start(self, state: State, start: Ends) -> EventKind | None:
         """The event that is due before any step: its function is 0 and falling, or a force that can only push pulls."""
         phase = state.phase
         for (kind, _), (value, rate) in zip(
@@ -86,11 +86,11 @@ class Detector:
         ):
             if rate < 0.0 and value <= self.tolerance(start) and rate < -self._rest(start):
                 return kind
-            if kind == "separation" and value < -self.simultaneity_tolerance(start):
+            if kind is EventKind.SEPARATION and value < -self.simultaneity_tolerance(start):
                 return kind
         return None
 
-    def first_event(self, state: State, step: Step) -> tuple[Step, str | None]:
+    def first_event(self, state: State, step: Step) -> tuple[Step, EventKind | None]:
         """The step, cut to its first event, and the kind of that; ``None`` if nothing happens in it."""
         step, found = self._first_by_position(state, step)
         if self._pair.opens_softly and step.size > 0.0:
@@ -111,9 +111,9 @@ class Detector:
                 return cut if cut.size == 0.0 else self._pair.repeated(state, cut), found
         return self._pair.repeated(state, cut) if cut.size > 0.0 else cut, kind
 
-    def _first_by_position(self, state: State, step: Step) -> tuple[Step, str | None]:
+    def _first_by_position(self, state: State, step: Step) -> tuple[Step, EventKind | None]:
         """The step, cut to the first event that positions tell of, and its kind; of size 0 if it is at the start."""
-        found: str | None = None
+        found: EventKind | None = None
         functions = self._functions.of(state.phase)
         if not functions:
             return step, None
@@ -229,7 +229,7 @@ class Detector:
         found = []
         for at in places:
             touching = not touching
-            joint, kind = (Joint.TOUCH, "impact") if touching else (Joint.FREE, "separation")
+            joint, kind = (Joint.TOUCH, EventKind.IMPACT) if touching else (Joint.FREE, EventKind.SEPARATION)
             (u, v), (y, z) = (_inside(*motions, step.size, at) for motions in zip(step.start, step.end, strict=True))
             if all(map(isfinite, (u, v, y, z))):  # else the energies of the row are out of range too and stop the run
                 found.append((joint, Event(step.time + at * step.size, kind, y, z, u, v)))

@@ -25,7 +25,7 @@ from ..results.recording import Recorder
 from ..results.steps import STEP, packed
 from ..results.steps import joined as are_joined
 from ..results.totals import pace, shortest_contact, totals
-from ..results.trajectory import Event
+from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from ..scene.automatic import with_scheme_chosen
 from ..scene.resolution import CONTACT_STEPS, force_window, not_resolved, peak_force_doubt
@@ -177,7 +177,7 @@ class Master(Checkpointed):
             self._act(event, step)
             self._record(step, self._pair.ends())
 
-    def _advance(self, size: float) -> tuple[Step, str | None]:
+    def _advance(self, size: float) -> tuple[Step, EventKind | None]:
         """The next step and the event it ends on, the bodies left at its end."""
         state, pair = self.state, self._pair
         pair.mark()
@@ -237,7 +237,7 @@ class Master(Checkpointed):
             self._error.note(abs(self._energy_at_start))
         if self._in_contact(start):
             pair.mark()
-            self._act("impact" if pair.joinable else "stop_impact", step)
+            self._act(EventKind.IMPACT if pair.joinable else EventKind.STOP_IMPACT, step)
         self._record(step, pair.ends())
         self._begun = True
 
@@ -251,21 +251,21 @@ class Master(Checkpointed):
         parting = tip.velocity - low.velocity > 0.0 and not pair.law.lasting
         return abs(tip.displacement - low.displacement) <= tolerance and not parting
 
-    def _act(self, kind: str, step: Step) -> None:
+    def _act(self, kind: EventKind, step: Step) -> None:
         """The event at the end of ``step`` happens."""
         state, pair = self.state, self._pair
-        if kind in ("separation", "release"):
+        if kind.opens:
             self._last_opening = state.time
-        if kind == "impact":
+        if kind is EventKind.IMPACT:
             state.reclosed = state.time - self._last_opening <= SIMULTANEOUS * self._steps.size
         ends = pair.ends()
-        meets = kind in ("impact", "separation")  # at Ψ, where it means something else
+        meets = kind in (EventKind.IMPACT, EventKind.SEPARATION)  # at Ψ, where it means something else
         tolerance = self._detector.simultaneity_tolerance(ends) if meets else self._detector.tolerance(ends)
         kind, phase, impact = self._transitions.after(
             kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
         )
         # Another event at the time of an impact settles what that has begun.
-        self._steps.struck(state.time if kind in ("impact", "stop_impact") and pair.divides else -inf)
+        self._steps.struck(state.time if kind.collision and pair.divides else -inf)
         pair.apply_impulses(impact.on_beam, impact.on_spring)
         lost = impact.energy_loss + pair.follow_phase(phase)
         state.lost += lost
@@ -354,7 +354,7 @@ class Master(Checkpointed):
             contact_frequency=seen.contact_frequency,
             contact_steps=seen.contact_steps,
             pace=pace(inside),
-            strokes=any(event.kind in ("stop_impact", "seated") for event in events),
+            strokes=any(event.kind.strikes for event in events),
         )
         warnings += filter(None, [unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
         neglect = {}

@@ -59,9 +59,8 @@ def _mismatch_at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Seq
     happens at the start of a phase: they may be as slow as one likes.
     """
     scale = float(errors(scene, steps, steps[:1], 0.0, of_interface=False).scale[-1])
-    kinds = np.array([event.kind for event in events])
-    strikes = np.isin(kinds, ("stop_impact", "seated"))
-    counted = np.flatnonzero(strikes | np.isin(kinds, ("separation", "release")))
+    strikes = np.array([event.kind.strikes for event in events], bool)
+    counted = np.flatnonzero(strikes | np.array([event.kind.opens for event in events], bool))
     if scale == 0.0 or not counted.size:
         return 0.0
     H = scene.coupling.macro_step or float(steps["size"].max())

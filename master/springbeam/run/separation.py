@@ -15,6 +15,7 @@ from ..bodies.protocol import Force
 from ..contact.events import EventFunction, Height, gap
 from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Step
+from ..results.trajectory import EventKind
 from .stepping import Pair, State
 
 #: Trial steps to find where the contact force vanishes, and the shortest of them as a share of the macro step.
@@ -26,7 +27,7 @@ _EARLY = 0.1
 class Push(NamedTuple):
     """A force that can only push, and the event that ends its phase."""
 
-    event: str
+    event: EventKind
     force: Callable[[Step], Force]
 
 
@@ -39,7 +40,7 @@ class Separation:
     def __init__(self, pair: Pair, no_time: float) -> None:
         self._pair, self._no_time = pair, no_time
 
-    def first_event(self, state: State, step: Step, macro_step: float) -> tuple[Step, str] | None:
+    def first_event(self, state: State, step: Step, macro_step: float) -> tuple[Step, EventKind] | None:
         """Return ``step`` cut to the event, of size 0 if it is at the start, and its kind; ``None`` if none is due."""
         push = self._pushing(state.phase)
         if push is None:
@@ -57,12 +58,14 @@ class Separation:
 
     def _pushing(self, phase: Phase) -> Push | None:
         if phase.seated:
-            return Push("unseated" if self._pair.spring is not None else "separation", lambda step: step.foundation)
+            return Push(
+                EventKind.SEPARATION if self._pair.spring is None else EventKind.UNSEATED, lambda step: step.foundation
+            )
         if phase.joint is Joint.TOUCH and not self._pair.law.soft and not self._pair.upper.massless:
-            return Push("separation", lambda step: step.contact)
+            return Push(EventKind.SEPARATION, lambda step: step.contact)
         return None
 
-    def _by_polynomial(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, str] | None:
+    def _by_polynomial(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, EventKind] | None:
         f = self._without_mismatch(state, step, push)
         falling = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
         if f[0] < 0.0:
@@ -95,13 +98,13 @@ class Separation:
             f[2] + contact[2] - step.contact[2],
         )
 
-    def _by_means(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, str] | None:
+    def _by_means(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, EventKind] | None:
         c = force.mean(push.force(step), step.size)
         if not state.middles:
             if c < 0.0 and not state.reclosed and self._opens(state, step, push.event):
                 return self.no_step(step), push.event
             return None
-        points = [(t, n if push.event == "unseated" else f) for t, f, n in state.middles]
+        points = [(t, n if push.event is EventKind.UNSEATED else f) for t, f, n in state.middles]
         zero = _zero_of_means([*points, (state.time + 0.5 * step.size, c)], state.time)
         if zero is None or (zero >= step.size and points[-1][1] + c > 0.0):
             return None
@@ -111,13 +114,13 @@ class Separation:
             return self._pair.repeated(state, step), push.event
         return self._pair.attempt(state, zero, step.start), push.event
 
-    def _opens(self, state: State, step: Step, event: str) -> bool:
+    def _opens(self, state: State, step: Step, event: EventKind) -> bool:
         """Do the ends part if they are let go for the step, or early in it, to meet again before its end?
 
-        ("unseated": does the lower end leave the foundation?)
+        (`EventKind.UNSEATED`: does the lower end leave the foundation?)
         """
         phase, pair = state.phase, self._pair
-        if event == "unseated":
+        if event is EventKind.UNSEATED:
             assert pair.stop is not None
             height: EventFunction = Height(1, pair.stop, share=0.0)
             let_go = Phase(phase.joint)

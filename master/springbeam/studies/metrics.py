@@ -13,7 +13,7 @@ from ..results.contact_times import contact_time_difference, impulse_difference
 from ..results.dense import extremes
 from ..results.extremes import Extremes
 from ..results.totals import LOSS_NAMES, TOTALS
-from ..results.trajectory import EVENT_KINDS, Trajectory
+from ..results.trajectory import EventKind, Trajectory
 from ..scene import SceneError
 
 
@@ -44,11 +44,11 @@ def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajec
     return of
 
 
-def _first(kind: str) -> Callable[[Trajectory], float | None]:
+def _first(kind: EventKind) -> Callable[[Trajectory], float | None]:
     return lambda run: next((event.time for event in run.events if event.kind == kind), None)
 
 
-def _number(kind: str) -> Callable[[Trajectory], float | None]:
+def _number(kind: EventKind) -> Callable[[Trajectory], float | None]:
     return lambda run: float(sum(event.kind == kind for event in run.events))
 
 
@@ -73,8 +73,8 @@ METRICS: dict[str, Metric] = {
     "impact_loss": Metric("J", "energy lost in impacts", _of("e_impact_loss", _last)),
     "energy_residual": Metric("", "largest change of the sum of all energies, relative", _total("max_energy_residual")),
     "macro_steps": Metric("", "macro steps", _total("macro_steps")),
-    **{f"first_{kind}": Metric("s", f"first event {kind}", _first(kind)) for kind in EVENT_KINDS},
-    **{f"number_of_{kind}": Metric("", f"events {kind}", _number(kind)) for kind in EVENT_KINDS},
+    **{f"first_{kind}": Metric("s", f"first event {kind}", _first(kind)) for kind in EventKind},
+    **{f"number_of_{kind}": Metric("", f"events {kind}", _number(kind)) for kind in EventKind},
 }
 #: What a picture shows of a sweep that was asked for no metric in particular.
 PRINCIPAL = (
