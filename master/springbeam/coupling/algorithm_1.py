@@ -14,6 +14,7 @@ from typing import Any
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force, StepRefused
 from ..contact.laws import Compliance
 from ..contact.phases import Impact, Joint, Phase
+from ..results.trajectory import EventKind
 from ..scene import Scene
 from .protocol import Booking, Coupling, Settled, Step
 
@@ -101,13 +102,13 @@ class Algorithm1(Coupling):
         """Return the phase; the first contact is where a step ends with the tip at Ψ or below, or the run begins so."""
         (phase, impulse), tip = self._made or (_FREE, 0.0), upper.motion()
         if self._touched or tip.displacement > self._spring.equilibrium:
-            event = "stop_impact" if phase is _SEATED else None
+            event = EventKind.STOP_IMPACT if phase is _SEATED else None
             return Settled(phase, event, Impact(of_foundation=impulse))
         self._touched, self._acting = True, self._stiffness
         # Line 5, or ẏ(t_c) as the scene has it.
         z = tip.velocity if self._impact == "tip" else lower.motion().velocity
         lower.restart(time, self._spring.equilibrium, z, lower.energies().dissipated)
-        return Settled(phase if self._made else _TIED, "impact")
+        return Settled(phase if self._made else _TIED, EventKind.IMPACT)
 
     def booking(self, ends: Ends) -> Booking:
         return Booking(law_force=self._law_force)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion, StepRefused
 from ..contact.phases import Impact, Phase
+from ..results.trajectory import EventKind
 
 #: Conditions on the gap over a step of size H as a linear map of an end's motion, each in metres.
 Conditions = Callable[[Motion, float], tuple[float, ...]]
@@ -46,7 +47,7 @@ class Settled(NamedTuple):
     """What a coupling that decides phases has made of a step; both bodies already show it."""
 
     phase: Phase
-    event: str | None = None  #: its kind
+    event: EventKind | None = None  #: its kind
     impact: Impact = Impact()
 
 

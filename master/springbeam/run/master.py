@@ -272,7 +272,7 @@ class Master(Checkpointed):
         state.enter(phase)
         self._happened(kind, impact, lost)
 
-    def _happened(self, kind: str, impact: Impact, lost: float) -> None:
+    def _happened(self, kind: EventKind, impact: Impact, lost: float) -> None:
         pair, (tip, low) = self._pair, self._pair.ends()
         y, z = (None, None) if pair.spring is None else low[:2]
         u, v = (None, None) if pair.beam is None else tip[:2]
