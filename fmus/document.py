@@ -57,8 +57,8 @@ def document(description: ET.Element, equations: str, with_sources: bool) -> str
     if with_sources:
         parts.append(
             "The files that modelDescription.xml or buildDescription.xml names are compiled as C++17 and C, with "
-            "<code>sources/</code> as the only include folder (<code>fmpy compile</code>). <code>-fvisibility=hidden -ffp-contract=off</code> "
-            "are what the binaries here were made with."
+            "<code>sources/</code> as the only include folder (<code>fmpy compile</code>). "
+            "<code>-fvisibility=hidden -ffp-contract=off</code> are what the binaries here were made with."
         )
     else:
         parts.append("To read: the source of SUNDIALS, which is needed to compile them, is not packed.")
