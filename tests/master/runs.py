@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from springbeam.results.steps import STEP, STEP_COLUMNS
+from springbeam.results.steps import BEAM_TELLS, SPRING_TELLS, STEP, STEP_COLUMNS
 from springbeam.results.trajectory import Event, EventKind, Trajectory, columns_of
 from springbeam.scene import load_scene, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
@@ -64,6 +64,7 @@ def block(n=300, scene=PAIR, t_end=3.0, begin=0):
     number = np.arange(begin, begin + n)
     steps["time"], steps["size"] = t_end * number / max(begin + n - 1, 1), np.where(number % 7, t_end / n, 0.0)
     steps["phase"], steps["events"], steps["energy_at_start"] = number % 6, (number + 9) // 10, 0.25
+    steps["told"] = BEAM_TELLS + SPRING_TELLS
     happen = number[number % 10 == 1]
     events = [Event(float(steps["time"][i - begin]), "impact", 0.5, -1.0, None, 0.1 * i) for i in happen]
     shapes = np.column_stack([steps["time"], rng.normal(size=(n, 21))]) if scene.beam is not None else np.empty((0, 22))

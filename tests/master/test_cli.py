@@ -75,7 +75,7 @@ def test_a_run_leaves_results_and_pictures_and_says_where(here, unpainted):
         ["trajectory.csv", "events.csv", "shapes.csv", "steps.bin", "summary.json", *PICTURES]
     )
     assert "results   results/soft\n" in shown
-    assert "pictures  results/soft/*.png (5)" in shown
+    assert f"pictures  results/soft/*.png ({len(PICTURES)})" in shown
     assert "largest relative residual 3.0e-14" in shown
     assert "31 macro steps" in shown
     (event,) = [line for line in shown.splitlines() if line.startswith("impact")]

@@ -11,7 +11,7 @@ from scenes import scene_from_dict
 
 from springbeam.monolithic.event_driven import ReferenceFailure, simulate
 from springbeam.monolithic.semi_discrete import assemble
-from springbeam.results.trajectory import COLUMNS, EventKind
+from springbeam.results.trajectory import COLUMNS, TOLD, EventKind
 from springbeam.scene import Scene, load_scene, with_changes
 from springbeam.studies import exact, verify
 
@@ -49,7 +49,7 @@ def test_soft_conserves_energy_and_visits_the_phases() -> None:
     assert kinds(result)[:6] == ["impact", "stop_impact", "release", "impact", "separation", "impact"]
     assert {"tied", "touch", "free"} <= set(result.phase)
     assert set(kinds(result)) <= set(EventKind)
-    assert list(result.columns) == [name for name in COLUMNS if name in result.columns]
+    assert list(result.columns) == [name for name in (*COLUMNS, *TOLD) if name in result.columns]
     joined = np.isin(result.phase, ["tied", "touch"])
     assert np.max(np.abs(result.gap[joined])) < 1e-15
     assert np.min(result.gap) > -1e-15

@@ -31,15 +31,15 @@ from springbeam.results.trajectory import Event
 from springbeam.scene import with_changes
 from springbeam.scene.statics import SHAPE_POINTS
 
-A, B, C, D, E = PICTURES
+A, B, C, D, E, F = PICTURES
 
 
 # -- which pictures -----------------------------------------------------------------------------------------------
 
 
 DRAWN = {
-    "all": PICTURES, "no stop": PICTURES, "no spring": PICTURES, "beam": (A, B, C, E), "no beam": (C, D, E),
-    "spring": (C, E),
+    "all": PICTURES, "no stop": PICTURES, "no spring": PICTURES, "beam": (A, B, C, E, F), "no beam": (C, D, E, F),
+    "spring": (C, E, F),
 }  # fmt: skip
 
 
@@ -56,7 +56,7 @@ def test_a_scene_gets_the_pictures_of_what_it_has(tmp_path, has):
         assert image[..., :3].std() > 0.02  # not blank
 
 
-@pytest.mark.parametrize(("rows", "drawn"), [(0, []), (1, []), (2, [A, C, D, E])])
+@pytest.mark.parametrize(("rows", "drawn"), [(0, []), (1, []), (2, [A, C, D, E, F])])
 def test_a_run_that_stopped_at_once_is_drawn_from_its_second_row_on(tmp_path, rows, drawn):
     whole = a_trajectory()
     columns = {name: values[:rows] for name, values in whole.columns.items()}

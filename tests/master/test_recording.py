@@ -36,8 +36,8 @@ from springbeam.results.export import export
 from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.reading import load_events, load_summary, load_trajectory, read_run
 from springbeam.results.recording import MemoryRecorder
-from springbeam.results.steps import PHASE_NAMES, STEP_COLUMNS
-from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, Event, columns_of
+from springbeam.results.steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP_COLUMNS
+from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event, columns_of
 from springbeam.scene import SceneError, with_changes
 
 #: Its first impacts, for a run that is computed.
@@ -66,15 +66,26 @@ OF_CONTACT = {
     [
         ("all", set()),
         ("no stop", {"foundation_force"}),
-        ("no spring", {"y", "z", "e_spring", *OF_CONTACT}),
-        ("beam", {"y", "z", "e_spring", *OF_CONTACT, "gap", "foundation_force"}),
-        ("spring", {"u_tip", "v_tip", "e_beam", *OF_CONTACT, "gap", "foundation_force"}),
+        ("no spring", {"y", "z", "e_spring", "a_y", *OF_CONTACT}),
+        ("beam", {"y", "z", "e_spring", "a_y", *OF_CONTACT, "gap", "foundation_force"}),
+        ("spring", {"u_tip", "v_tip", "e_beam", *TOLD.keys() - {"a_y"}, *OF_CONTACT, "gap", "foundation_force"}),
     ],
 )
 def test_columns_of_absent_bodies_are_left_out_in_order(has, without):
     scene, steps = SCENES[has], block(4)[0]
-    assert list(columns_of(scene)) == [name for name in COLUMNS if name not in without]
+    if scene.beam is not None:
+        scene = with_changes(scene, beam={"area": None, "second_moment_of_area": None, "width": 1.0, "height": 2.0})
+    assert list(columns_of(scene)) == [name for name in (*COLUMNS, *TOLD) if name not in without]
     assert list(columns(scene, steps, steps[:1])) == list(columns_of(scene))
+
+
+@pytest.mark.parametrize("told", range(4))
+def test_what_a_body_does_not_tell_is_no_column(told):
+    steps = block(4)[0]
+    steps["told"] = told
+    by_beam = ["a_tip", "clamp_force", "clamp_moment"] if told & BEAM_TELLS else []
+    expected = [*COLUMNS, *by_beam, *(["a_y"] if told & SPRING_TELLS else [])]
+    assert list(columns(PAIR, steps, steps[:1])) == expected
 
 
 LAWS = {
@@ -123,7 +134,15 @@ def test_columns_are_what_the_page_says_of_each_record(law):
             "velocity_mismatch": 0.0 if apart else r["v_tip_after"] - r["z_after"],
             "e_total": sum(parts.values()),
             "energy_residual": sum(parts.values()) - 0.25,
+            "clamp_force": r["clamp_force"],
+            "clamp_moment": r["clamp_moment"],
         }
+        spring, y, z = scene.spring, r["y_after"], r["z_after"]
+        elastic = spring.linear_stiffness * y + spring.cubic_stiffness * y**3
+        force = spring.external_force - spring.damping * z - elastic - contact
+        expected["a_y"] = 0.0 if r["phase"] >= 3.0 else force / spring.mass
+        together = not apart and law in ("transmission", "tie")
+        expected["a_tip"] = expected["a_y"] if together else r["tip_acceleration"]
         assert found["phase"][i] == ("free", "tied", "touch", "seated", "seated", "seated")[int(r["phase"])]
         for name in set(found) - {"phase"}:
             assert found[name][i] == pytest.approx(expected[name], rel=1e-14, abs=1e-15), (name, i)
@@ -249,7 +268,7 @@ def test_files_are_plain_csv_and_json(tmp_path):
     filed(tmp_path / "run", (steps, [Event(0.1, "impact", y=0.5, z=-1.0, energy_loss=0.25)], shapes))
     text = (tmp_path / "run" / "trajectory.csv").read_bytes().decode()
     lines = text.split("\n")
-    assert lines[0].split(",") == list(COLUMNS)
+    assert lines[0].split(",") == [*COLUMNS, *(name for name in TOLD if name != "bending_stress")]
     assert Fraction(lines[1].split(",")[1]) == Fraction(repr(1 / 3))
     assert len(lines) == 4
     assert lines[-1] == ""
@@ -628,13 +647,13 @@ def test_a_disk_that_fills_up_leaves_records_that_load_and_a_summary_that_says_s
 
 def test_rows_that_find_no_room_lose_no_record(small_disk):
     recorder = FileRecorder(PAIR, RunDirectory.create(small_disk / "run"))
-    recorder.keep(*block(300)[:2], np.empty((0, 22)))
+    recorder.keep(*block(240)[:2], np.empty((0, 22)))
     (small_disk / "ballast").write_bytes(bytes(1 << 16))
     with pytest.raises(OSError, match="No space left on device"):
         recorder.finish({"status": "done"})
     (small_disk / "ballast").unlink()
     assert not (small_disk / "run" / "trajectory.csv").exists()
-    assert len(load_trajectory(small_disk / "run")) == 300
+    assert len(load_trajectory(small_disk / "run")) == 240
     assert load_summary(small_disk / "run")["status"] == "done"
 
 

@@ -22,7 +22,7 @@ from .end_loaded import EndLoaded
 from .fmu import Fmu, Reals
 from .force import combined
 from .functions import WARNING
-from .protocol import NO_FORCE, BeamBody, Body, Energies, FmuError, Force, Motion, StepRefused
+from .protocol import NO_FORCE, BeamBody, Body, Energies, Felt, FmuError, Force, Motion, StepRefused
 
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
@@ -237,6 +237,7 @@ class OwnBody(FmuBody):
 
     NAME: ClassVar[str]  #: of the FMU
     state: FmuState = FmuState()
+    tells = True
     _key: Hashable = None  #: what the body was made of, if it is to be kept
     _as_made: dict[str, Any]  #: the attributes then
 
@@ -306,12 +307,14 @@ class FmuBeam(OwnBody, BeamBody):
         parameters["integrator"] = _INTEGRATORS[beam.integrator]
         parameters["mass_matrix"] = _MASS_MATRICES[beam.mass_matrix]
         parameters["initial_deflection_slope"] = deflection_slope
+        parameters["section_height"] = beam.section_height
         parameters |= {f"point_force_position[{k}]": at for k, at in enumerate(self._points, 1)}
         super().__init__(Fmu(self.NAME, _path(self.NAME), parameters, start_time))
 
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)
         self._shape = Reals(fmu, *[f"deflection[{i}]" for i in range(1, len(SHAPE_POINTS) + 1)])
+        self._felt = Reals(fmu, "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
 
     def _mass(self) -> float:
         return Reals(self.fmu, "tip_mass").get()[0]
@@ -336,6 +339,9 @@ class FmuBeam(OwnBody, BeamBody):
     def energies(self) -> Energies:
         kinetic, strain, dissipated, load = self._stored()
         return _energies_of(Energies, (kinetic, strain, dissipated, -load if self._bears_loads else load))
+
+    def felt(self) -> Felt:
+        return Felt(*self._felt.get())
 
     def shape(self) -> np.ndarray:
         """Return the deflection [m] at `SHAPE_POINTS`, shape (21,)."""

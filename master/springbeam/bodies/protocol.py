@@ -53,6 +53,15 @@ class Energies(NamedTuple):
     load_potential: float
 
 
+class Felt(NamedTuple):
+    """What happens inside a beam at the end of its last step, under the forces that act there."""
+
+    acceleration: float  #: of its tip [m/s²]
+    clamp_force: float  #: of the clamp on the beam, upward [N]
+    clamp_moment: float  #: of the clamp on the beam, counter-clockwise [N·m]
+    bending_stress: float  #: the largest along the beam [Pa]; 0 where the height of its section is not known
+
+
 class Body:
     """A body with one interface end and a state that can be rewound; a body of one's own derives from it.
 
@@ -63,6 +72,8 @@ class Body:
 
     #: What an impulse at the end meets [kg].
     mass: float
+    #: Whether columns tell its acceleration and the forces inside it: of our own beam and spring.
+    tells = False
 
     @property
     def massless(self) -> bool:
@@ -109,6 +120,10 @@ class Body:
     def energies(self) -> Energies:
         """Return what the body stores and has dissipated; a body that cannot tell stores nothing."""
         return Energies(0.0, 0.0, 0.0, 0.0)
+
+    def felt(self) -> Felt:
+        """Return what a beam that `tells` feels, asked once a step."""
+        raise NotImplementedError(f"{type(self).__name__} has no felt, and says that it tells")
 
     def exchanged(self) -> Energies:
         """Return the energies by which the coupling is judged, of a foreign body the work that it has received."""

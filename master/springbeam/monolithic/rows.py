@@ -9,6 +9,7 @@ import numpy as np
 
 from ..results.trajectory import Event, Trajectory, columns_of
 from ..scene import Scene
+from .clamp import Clamp
 from .laws import Phase
 from .transitions import HybridState
 
@@ -41,6 +42,7 @@ class Rows:
     def _columns(self, states: np.ndarray) -> dict[str, np.ndarray]:
         """Return what the equations of each row's phase give."""
         s, phases = self._system, [phase for _, _, phase, _ in self._rows]
+        clamp = None if s.beam is None or s.scene.massless else Clamp(s.scene, s.beam)
         columns: dict[str, np.ndarray] = {
             "time": np.array([time for time, _, _, _ in self._rows]),
             "phase": np.array([phase.name for phase in phases], dtype="<U8"),
@@ -58,6 +60,12 @@ class Rows:
                 "foundation_force": m.N,
                 **s.energies(states[index], phase),
             }
+            if s.has_spring:
+                values["a_y"] = m.z_dot
+            if clamp is not None:
+                values["a_tip"] = m.a @ s.b
+                reaction = clamp.reaction(m.a, m.C, s.loads.values(states[index, s.T]))
+                values["clamp_force"], values["clamp_moment"] = reaction
             for name, value in values.items():
                 columns.setdefault(name, np.zeros(len(phases)))[index] = value
         return columns

@@ -70,6 +70,8 @@ POSITIONS = {
     "y": Look(VERMILLION, "spring top y", Line(0.9)),
 }
 VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)", Line(1.5)), "z": Look(VERMILLION, "spring top z", Line(0.8))}
+ACCELERATIONS = {"a_tip": Look(BLUE, "tip", Line(1.4)), "a_y": Look(VERMILLION, "spring top", Line(0.8))}
+CLAMP = {"clamp_force": Look(BLUE, "on the beam, upward"), "clamp_moment": Look(BLUE, "on the beam, counter-clockwise")}
 FORCES = {
     "contact_force": Look(SKY, "contact C, as applied", Line(0.7)),
     "contact_force_smoothed": Look(BLUE, "contact C, smoothed", Line(1.2)),

@@ -13,9 +13,11 @@ import numpy as np
 
 from ..results.trajectory import Trajectory
 from .drawing import (
+    ACCELERATIONS,
     ALTERNATES,
     BLACK,
     BLUE,
+    CLAMP,
     ENERGIES,
     FORCES,
     GREEN,
@@ -106,6 +108,8 @@ def panels(trajectory: Trajectory) -> list[Panel]:
         velocities(trajectory, VELOCITIES),
         forces(trajectory),
         impulses(trajectory),
+        *loads(trajectory),
+        *inside(trajectory),
         gap(trajectory),
         energies(trajectory),
         residual(trajectory),
@@ -140,6 +144,30 @@ def forces(trajectory: Trajectory) -> Panel:
     seen, remarks = _seen(trajectory, looks, "N")
     remarks += _peak_in_words(trajectory)
     return _lines(trajectory, "forces", "Forces", seen, "force", "N", remarks, height=2.0)
+
+
+def loads(trajectory: Trajectory) -> list[Panel]:
+    """Return the loads, those of a unit together."""
+    found: list[Panel] = []
+    for unit in dict.fromkeys(load.unit for load in trajectory.scene.loads):
+        looks = {
+            f"load_{i}": Look(_COLOURS[i % len(_COLOURS)], f"load {i}, on the {load.on}", Line(1.1, dashed=i % 2 == 1))
+            for i, load in enumerate(trajectory.scene.loads)
+            if load.unit == unit
+        }
+        heading = "Loads" if unit != "m/s²" else "Acceleration of the base"
+        found.append(_lines(trajectory, f"loads-{len(found)}", heading, looks, "load", unit, height=1.2))
+    return found
+
+
+def inside(trajectory: Trajectory) -> list[Panel]:
+    """Return accelerations, and what the clamp does to the beam."""
+    force, moment = ({name: CLAMP[name]} for name in CLAMP)
+    return [
+        _lines(trajectory, "accelerations", "Accelerations", ACCELERATIONS, "acceleration", "m/s²"),
+        _lines(trajectory, "clamp-force", "Force of the clamp", force, "force", "N", height=1.2),
+        _lines(trajectory, "clamp-moment", "Moment of the clamp", moment, "moment", "N·m", height=1.2),
+    ]
 
 
 def _peak_in_words(trajectory: Trajectory) -> list[str]:

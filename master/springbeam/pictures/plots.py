@@ -196,6 +196,11 @@ def _gap_and_energy(trajectory: Trajectory) -> Figure | None:
     return timeline(trajectory, title, [gap, panels.energies(trajectory), panels.residual(trajectory)])
 
 
+def _loads_and_clamp(trajectory: Trajectory) -> Figure | None:
+    shown = [panel for panel in (*panels.loads(trajectory), *panels.inside(trajectory)) if panel.curves]
+    return timeline(trajectory, "(F) Loads, accelerations, and the clamp", shown) if shown else None
+
+
 #: What draws each picture, in the order of `PICTURES`.
 _DRAWINGS: dict[str, Callable[[Trajectory], Figure | None]] = {
     "shapes_after_contact": _shapes_after_contact,
@@ -203,4 +208,5 @@ _DRAWINGS: dict[str, Callable[[Trajectory], Figure | None]] = {
     "positions": _positions,
     "velocities_and_forces": _velocities_and_forces,
     "gap_and_energy": _gap_and_energy,
+    "loads_and_clamp": _loads_and_clamp,
 }

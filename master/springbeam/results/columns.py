@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ..scene import Scene
-from .steps import PHASE_NAMES, STEP_COLUMNS, force, joined
-from .trajectory import columns_of
+from ..scene import Scene, Spring
+from .steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP_COLUMNS, force, joined
+from .trajectory import TOLD, columns_of
 
 #: Largest value of a column that the motion does not depend on [N]; pictures multiply two of them.
 MOST_SHOWN = 1e150
 #: Records of which columns are made at once, so that those of a long run need no memory.
 _TOGETHER = 4096
+#: Columns that the beam tells, and their fields in a record.
+_TOLD_BY_BEAM = {
+    "a_tip": "tip_acceleration",
+    **{name: name for name in ("clamp_force", "clamp_moment", "bending_stress")},
+}
 
 
 def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.ndarray]:
@@ -53,7 +58,27 @@ def columns(scene: Scene, steps: np.ndarray, first: np.ndarray) -> dict[str, np.
         "energy_residual": energies["e_total"] - steps["energy_at_start"],
         **{f"load_{i}": load.value(steps["time"]) for i, load in enumerate(scene.loads)},
     }
-    return {name: np.array(found[name]) for name in columns_of(scene)}
+    told = int(first["told"][0]) if len(first) else BEAM_TELLS + SPRING_TELLS
+    if told & BEAM_TELLS:
+        found |= {name: steps[field] for name, field in _TOLD_BY_BEAM.items()}
+    if told & SPRING_TELLS and scene.spring is not None:
+        found["a_y"] = _acceleration(scene, scene.spring, found, steps)
+    if rigid and "a_tip" in found and (scene.lower is None or "a_y" in found):
+        # Ends that are joined move as one: beside that, the tip's own acceleration alternates from step to step.
+        found["a_tip"] = np.where(apart, found["a_tip"], found.get("a_y", 0.0))
+    return {name: np.array(found[name]) for name in columns_of(scene) if name in found or name not in TOLD}
+
+
+def _acceleration(scene: Scene, spring: Spring, found: Mapping[str, np.ndarray], steps: np.ndarray) -> np.ndarray:
+    """Return ÿ [m/s²] of the spring's top under the forces of its row, 0 while it is seated."""
+    y, z = found["y"], found["z"]
+    force = spring.external_force - spring.damping * z - (spring.linear_stiffness + spring.cubic_stiffness * y**2) * y
+    for i, load in enumerate(scene.loads):
+        if load.on in ("spring", "base"):
+            force = force + found[f"load_{i}"] * (1.0 if load.on == "spring" else -spring.mass)
+    if scene.coupled:
+        force = force - found["contact_force"]
+    return np.where(steps["phase"] < 3.0, force / spring.mass, 0.0)
 
 
 def first_not_finite(scene: Scene, steps: np.ndarray, first: np.ndarray) -> tuple[int, str] | None:

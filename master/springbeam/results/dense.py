@@ -33,6 +33,7 @@ from .trajectory import Event, Trajectory
 #: Fields that are linear between rows, and do not change with an event.
 _LINEAR = (
     *("law_force", "law_stored", "law_dissipated", "unfelt", "beam_received", "spring_received"),
+    *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress"),
     *(f"{body}_{what}" for body in ("beam", "spring") for what in ("potential", "dissipated", "load")),
 )
 #: Steps of which extremes are looked for at once, so that those of a long run need little memory.

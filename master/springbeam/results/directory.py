@@ -27,6 +27,7 @@ PICTURES = (
     "c_positions.png",
     "d_velocities_and_forces.png",
     "e_gap_and_energy.png",
+    "f_loads_and_clamp.png",
 )
 #: What `springbeam export --format parquet` leaves there.
 PARQUET = ("trajectory.parquet", "events.parquet", "shapes.parquet")

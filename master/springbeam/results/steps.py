@@ -33,7 +33,12 @@ STEP_COLUMNS = (
     *("impact_loss", "beam_received", "spring_received"),
     # All energies when the run began, before an impact at its start [J].
     "energy_at_start",
+    # What the beam tells at the end of the step, before the event, as of `springbeam.bodies.protocol.Felt`; and which
+    # bodies tell, `BEAM_TELLS` and `SPRING_TELLS` added up, the same in all records of a run.
+    *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress", "told"),
 )
+#: In ``told``: the record holds what the beam tells; the lower body is the spring of the scene.
+BEAM_TELLS, SPRING_TELLS = 1, 2
 #: Little-endian doubles, on every machine.
 STEP = np.dtype([(name, "<f8") for name in STEP_COLUMNS])
 #: Bytes of a record from its numbers.

@@ -44,6 +44,14 @@ COLUMNS = {
     "e_total": ("J", ""),
     "energy_residual": ("J", ""),
 }
+#: Columns after the loads: the unit of each, and the body that tells it. A body that does not tell leaves it out.
+TOLD = {
+    "a_tip": ("m/s²", "beam"),
+    "clamp_force": ("N", "beam"),
+    "clamp_moment": ("N·m", "beam"),
+    "bending_stress": ("Pa", "section"),
+    "a_y": ("m/s²", "spring"),
+}
 #: What the column ``phase`` may hold.
 PHASES = ("free", "tied", "touch", "seated")
 #: Columns of the table of shapes: time [s] and deflections [m] at `SHAPE_POINTS`.
@@ -111,8 +119,8 @@ EVENT_COLUMNS = tuple(Event.__dataclass_fields__)
 def columns_of(scene: Scene) -> dict[str, str]:
     """Return the columns of ``scene`` in file order with their units, "" for ``phase``, which has none.
 
-    They are `COLUMNS` without those of absent bodies, and its loads: ``load_0`` for ``loads.0``. ``gap`` is u_tip − y
-    of a pair, u_tip − φ of a beam above a stop.
+    They are `COLUMNS` without those of absent bodies, its loads: ``load_0`` for ``loads.0``, and `TOLD` without those
+    of bodies that are not our own. ``gap`` is u_tip − y of a pair, u_tip − φ of a beam above a stop.
     """
     beam, spring, stop = scene.upper is not None, scene.lower is not None, scene.stop is not None
     there = {
@@ -124,7 +132,11 @@ def columns_of(scene: Scene) -> dict[str, str]:
         "gap": beam and (spring or stop),
     }
     units = {name: unit for name, (unit, part) in COLUMNS.items() if there[part]}
-    return units | {f"load_{i}": load.unit for i, load in enumerate(scene.loads)}
+    units |= {f"load_{i}": load.unit for i, load in enumerate(scene.loads)}
+    own = scene.beam is not None and not scene.massless and not scene.contact.algorithm
+    section = own and scene.beam is not None and scene.beam.section_height > 0.0
+    tells = {"beam": own, "section": section, "spring": scene.spring is not None and not scene.contact.algorithm}
+    return units | {name: unit for name, (unit, body) in TOLD.items() if tells[body]}
 
 
 def rounded(value: float, scale: float) -> str:
@@ -230,7 +242,7 @@ class Trajectory:
 
     def plot(self, picture: str = "positions") -> Figure:
         """Return a matplotlib Figure: ``shapes_after_contact``, ``shapes_later``, ``positions``,
-        ``velocities_and_forces`` or ``gap_and_energy``.
+        ``velocities_and_forces``, ``gap_and_energy`` or ``loads_and_clamp``.
 
         Raises ValueError for another name, and where the run has nothing of it to show.
         """

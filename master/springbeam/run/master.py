@@ -22,7 +22,7 @@ from ..contact.phases import Impact, Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
 from ..results.columns import ledger
 from ..results.recording import Recorder
-from ..results.steps import STEP, packed
+from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
 from ..results.steps import joined as are_joined
 from ..results.totals import pace, shortest_contact, totals
 from ..results.trajectory import Event, EventKind
@@ -44,6 +44,7 @@ from .stepping import Pair
 _SAME_TIME = 1e-9
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
+_NOTHING_FELT = (0.0, 0.0, 0.0, 0.0)
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
 
@@ -111,6 +112,7 @@ class Master(Checkpointed):
         self._balance = Balance(scene, self._pair)
         self._log = Log(scene, recorder, self._balance)
         recorder.fetch = self.hand_over
+        self._told = BEAM_TELLS * self._pair.upper.tells + SPRING_TELLS * self._pair.lower.tells
         self._pictured = beam if isinstance(beam, BeamBody) else None
         self._shapes_left, self._next_shape = _SHAPES_AFTER_CONTACT, start_time
         length = scene.time.t_end - start_time or 1.0  # 0 where contact is at t_end: the one shape is that of the start
@@ -324,6 +326,8 @@ class Master(Checkpointed):
             *(state.time, size, *before[0], *before[1], *contact, *foundation),
             *(u, v, y, z, state.phase.number, self._log.events, state.smoothed, law_force),
             *(*of_upper, *of_lower, *booked_energies, state.lost, *received, self._energy_at_start),
+            *(pair.upper.felt() if self._told & BEAM_TELLS else _NOTHING_FELT),
+            self._told,
         )
 
     def _shape(self, beam: BeamBody, early: bool) -> None:

@@ -216,6 +216,11 @@ class Beam(Table):
         return follows
 
     @property
+    def section_height(self) -> float:
+        """Height of the section in the direction of motion [m]; 0 if only its area and second moment are known."""
+        return self.height or self.diameter or 0.0
+
+    @property
     def damped_numerically(self) -> bool:
         """Whether the integrator takes energy that nothing books."""
         return self.fidelity == "dynamic" and self.integrator == "generalized_alpha" and self.rho_inf < 1.0

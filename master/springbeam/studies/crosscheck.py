@@ -30,7 +30,7 @@ from rich.text import Text
 from ..monolithic import algorithm1
 from ..pictures.drawing import POSITIONS, present
 from ..results.contact_times import ContactChange, contact_changes
-from ..results.trajectory import Event, Trajectory, columns_of
+from ..results.trajectory import TOLD, Event, Trajectory, columns_of
 from ..run.outcome import RunStopped
 from ..run.runner import simulate
 from ..scene import Scene, with_changes
@@ -249,7 +249,7 @@ def _compare_quantity(report: Report, name: str, runs: tuple[Trajectory, ...]) -
     growth = np.maximum(1.0, np.maximum.accumulate(grown))
     report.growth = max(report.growth, float(growth[-1]))
     steps = (times - coarse.time[0]) / size + 1.0
-    always = _SAFETY * (_rounding(report.scene) + coarse.summary.get("neglected_share", 0.0))
+    always = _SAFETY * (_rounding(report.scene, name) + coarse.summary.get("neglected_share", 0.0))
     floor = _step_error(report.scene) * steps + always
     bound = _SAFETY * np.maximum.accumulate(np.abs(q - q_fine)) + floor * growth * scale
     report.rows.append(Quantity.judged(name, times, np.abs(q - q_reference), bound))
@@ -260,13 +260,17 @@ def _step_error(scene: Scene) -> float:
     return _LEAST if scene.spring is None else max(_LEAST, scene.spring.relative_tolerance)
 
 
-def _rounding(scene: Scene) -> float:
-    """Return the relative rounding of the beam's slow motion beside its fastest modes, ε √(λ_max/λ₁), estimated."""
+def _rounding(scene: Scene, name: str) -> float:
+    """Return the relative rounding of the beam's slow motion beside its fastest modes, estimated.
+
+    It is ε √(λ_max/λ₁), of accelerations and of forces inside, which follow from these, ε λ_max/λ₁.
+    """
     beam = scene.beam
     if beam is None:
         return 0.0
     slowest = 2.0 / np.sqrt(beam.density * beam.area * beam.length * tip_compliance(beam))
-    return float(np.finfo(float).eps * max(1.0, mesh_frequency(beam) / slowest))
+    ratio = max(1.0, mesh_frequency(beam) / slowest)
+    return float(np.finfo(float).eps * ratio ** (2 if name in TOLD else 1))
 
 
 def _agree_until(first: list[ContactChange], second: list[ContactChange], start: float, t_end: float) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..results.trajectory import Trajectory
+from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..scene import Scene
 
 #: Intervals of contact shorter than this many macro steps are no evidence either way.
@@ -30,9 +30,9 @@ def away_from(times: np.ndarray, events: Iterable[float], size: float) -> np.nda
 
 def quantities(scene: Scene) -> list[str]:
     """Return the columns that are compared."""
-    beam = ("u_tip", "v_tip", "e_beam") if scene.beam is not None else ()
-    spring = ("y", "z", "e_spring") if scene.spring is not None else ()
-    return [*beam, *spring, *(("contact_force",) if scene.coupled else ())]
+    wanted = ("u_tip", "v_tip", "e_beam", "y", "z", "e_spring", "contact_force", *TOLD)
+    there = columns_of(scene).keys() - {"bending_stress"}  # which follows from strains: the references have none
+    return [name for name in wanted if name in there]
 
 
 def sample(trajectory: Trajectory, times: np.ndarray, name: str) -> np.ndarray:

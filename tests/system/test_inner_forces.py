@@ -1,0 +1,102 @@
+"""Accelerations, clamp forces and stresses of a run: of the reference, of statics, and of the spring's equation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from springbeam import PointMass, load_scene, simulate, with_changes
+from springbeam.monolithic import event_driven
+
+#: From the first impact to just before the foundation is struck.
+SOFT = with_changes(load_scene("soft"), time={"t_end": 0.05}, coupling={"degree": 2})
+LOADS = [
+    {"on": "beam", "shape": [1.0, -2.0, 0.5], "amplitude": 2.0, "signal": "harmonic", "frequency": 1.0, "phase": 0.3},
+    {"on": "beam", "at": 0.5},
+    {"on": "tip", "amplitude": -1.0},
+    {"on": "base", "amplitude": 3.0},
+    {"on": "spring", "amplitude": 0.3},
+]
+#: The rounding of forces that follow from accelerations: ε (ω_max/ω₁)² is 2e-12 of the beam.
+ROUNDING = 1e-10
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"loads": LOADS}, {"beam": {"tip_load_coefficient": -6.0, "distributed_load": 0.7}}],
+    ids=["bare", "loads", "loads of the beam"],
+)
+def test_they_converge_to_the_reference_of_the_same_mesh(changes):
+    """The force of a tie is of order 3 with degree 2; the clamp follows the motion, which is exact but for rounding."""
+    errors = []
+    for size in (4e-4, 2e-4):
+        scene = with_changes(SOFT, coupling={"macro_step": size}, **changes)
+        run = simulate(scene)
+        times = run.time[2:-1]
+        exact = event_driven.simulate(scene, sample_times=times)
+        rows = np.searchsorted(exact.time, times)
+        assert np.array_equal(exact.time[rows], times)
+        off = {
+            name: np.abs(run[name][2:-1] - exact[name][rows]).max() / np.abs(exact[name]).max()
+            for name in ("a_tip", "a_y", "clamp_force", "clamp_moment")
+        }
+        assert max(off["clamp_force"], off["clamp_moment"]) < ROUNDING
+        errors.append(off)
+    for name in ("a_tip", "a_y"):
+        assert 7.0 < errors[0][name] / errors[1][name] < 9.0
+
+
+@pytest.mark.parametrize("degree", [0, 2])
+def test_every_row_satisfies_the_equation_of_the_spring(degree):
+    run = simulate(with_changes(SOFT, time={"t_end": 0.3}, coupling={"degree": degree}, loads=LOADS))
+    s = run.scene.spring
+    inertia = s.mass * (run.a_y + run.load_3)
+    elastic = s.damping * run.z + s.linear_stiffness * run.y + s.cubic_stiffness * run.y**3
+    rest = inertia + elastic + run.contact_force - run.foundation_force - run.load_4 - s.external_force
+    assert np.abs(rest).max() < 1e-13 * np.abs(inertia).max()
+
+
+def test_a_beam_that_has_come_to_rest_holds_its_load_by_statics():
+    """Under a tip force F: clamp force −F, moment −F L, and the stress F L h/2I at the clamp."""
+    force, length, width, height = 2.5, 0.4, 0.02, 0.005
+    scene = with_changes(
+        load_scene("steel-bumper"),
+        time={"t_end": 1.0},
+        spring=None,
+        stop=None,
+        beam={
+            "length": length,
+            "width": width,
+            "height": height,
+            "alpha_b": 5e-3,
+            "approach": "elastic",
+            "approach_speed": 0.0,
+        },
+        loads=[{"on": "tip", "amplitude": force}],
+        coupling={"macro_step": 1e-2},
+    )
+    run = simulate(scene)
+    stress = force * length * height / (2.0 * width * height**3 / 12.0)
+    assert run.clamp_force[-1] == pytest.approx(-force, rel=1e-9)
+    assert run.clamp_moment[-1] == pytest.approx(-force * length, rel=1e-9)
+    assert run.bending_stress[-1] == pytest.approx(stress, rel=1e-9)
+    # The load comes at once: on the way the stress is twice that of statics without damping, and less with it.
+    assert 1.0 < run.bending_stress.max() / stress < 2.0
+
+
+def test_between_rows_they_are_there_too():
+    run = simulate(SOFT)
+    middle = 0.5 * (run.time[40] + run.time[41])
+    found = run.at([run.time[40], middle])
+    assert found.clamp_force[0] == run.clamp_force[40]
+    assert found.clamp_force[1] == pytest.approx(0.5 * (run.clamp_force[40] + run.clamp_force[41]), rel=1e-12)
+    s = run.scene.spring
+    force = -s.linear_stiffness * found.y[1] - s.cubic_stiffness * found.y[1] ** 3 - found.contact_force[1]
+    assert found.a_y[1] == pytest.approx(force / s.mass, rel=1e-13)
+
+
+def test_a_body_of_the_callers_leaves_its_columns_out():
+    scene = with_changes(SOFT, stop=None)
+    run = simulate(scene, lower=PointMass(1.0))
+    assert "a_y" not in run.columns
+    assert {"a_tip", "clamp_force", "clamp_moment"} <= run.columns.keys()
