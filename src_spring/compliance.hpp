@@ -21,6 +21,7 @@ class Compliance {
   double elastic(double depth) const;  ///< λ δ₊^p [N]
   double energy(double depth) const;   ///< Φ [J]
   bool damped() const { return chi_ > 0.0; }
+  double release_speed() const { return 1.0 / chi_; }  ///< −δ̇ from which on damping leaves no force [m/s]
   /// (1 + χ δ̇)₊
   double damping_factor(double rate) const { return std::max(0.0, 1.0 + chi_ * rate); }
   double force(double depth, double rate) const { return elastic(depth) * damping_factor(rate); }  ///< C [N]

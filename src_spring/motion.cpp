@@ -34,7 +34,7 @@ Motion::Motion(const Parameters& parameters)
       compliance_(parameters.compliance_stiffness, parameters.compliance_exponent, parameters.compliance_damping) {}
 
 double Motion::acceleration(double y, double z, double force, double contact) const {
-  return (force - damping_ * z - (k1_ + k2_ * y * y) * y - contact) / mass_;
+  return (force - damping_ * z - spring_force(y) - contact) / mass_;
 }
 
 double Motion::acceleration_by_displacement(double y, double contact_slope) const {
@@ -78,20 +78,14 @@ Motion::Remainder Motion::remainder(const Taylor& R, const Loads& loads, double 
   return remainder;
 }
 
-double Motion::acceleration_scale(double y, double z, double force, double contact) const {
-  return (std::abs(force) + std::abs(damping_ * z) + (std::abs(k1_) + std::abs(k2_) * y * y) * std::abs(y) +
-          std::abs(contact)) /
-         mass_;
-}
-
-double Motion::rate(double reach, const Compliance::Slopes& contact) const {
+Motion::Rates Motion::rates(double reach, const Compliance::Slopes& contact) const {
   const double stiffness = std::abs(k1_) + 3.0 * std::abs(k2_) * reach * reach + contact.force_by_depth;
-  return std::sqrt(stiffness / mass_) + (damping_ + contact.force_by_rate) / mass_;
+  return {std::sqrt(stiffness / mass_), (damping_ + contact.force_by_rate) / mass_};
 }
 
 Polynomial Motion::holding_force(double y, const Loads& loads, bool touching, double depth) const {
   Compliance::Along contact;
-  Polynomial force{(k1_ + k2_ * y * y) * y, 0.0, 0.0};
+  Polynomial force{spring_force(y), 0.0, 0.0};
   for (std::size_t k = 0; k < 3; ++k) {
     if (touching) compliance_.extend(contact, k, {depth, -loads.tip[1], -loads.tip[2] / 2}, 1.0);
     force[k] += (contact.elastic[k] + contact.damping[k]) * (k == 2 ? 2.0 : 1.0) - loads.force[k];

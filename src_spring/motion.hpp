@@ -69,12 +69,16 @@ class Motion {
     return (remainder - damping_ * w - (k1_ + k2_ * (3.0 * R * (R + q) + q * q)) * q - contact) / mass_;
   }
 
-  /// Σ|forces|/m: what rounding in acceleration() is relative to.
-  double acceleration_scale(double y, double z, double force, double contact) const;
-  /// Bound of the rates with which the solution can change, √(stiffness/m) + damping/m [1/s], for |y| ≤ `reach`.
-  double rate(double reach, const Compliance::Slopes& contact) const;
+  /// Bounds of the rates with which the solution can change, for |y| ≤ `reach`: √(stiffness/m), damping/m [1/s].
+  struct Rates {
+    double oscillation, decay;
+  };
+  Rates rates(double reach, const Compliance::Slopes& contact) const;
 
-  /// Force that would hold the top at y, at rest, with its first two derivatives: −F + k1 y + k2 y³ + C. [N, N/s, N/s²]
+  double spring_force(double y) const { return (k1_ + k2_ * y * y) * y; }  ///< k1 y + k2 y³ [N]
+  /// Force that would hold the top at y, at rest, under F and C: −F + k1 y + k2 y³ + C [N].
+  double holding_force(double y, double force, double contact) const { return spring_force(y) - force + contact; }
+  /// The same with its first two derivatives [N, N/s, N/s²].
   Polynomial holding_force(double y, const Loads& loads, bool touching, double depth) const;
 
   double potential_energy(double y) const;

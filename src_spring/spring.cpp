@@ -6,6 +6,7 @@
 
 #include "../fmus/common/text.hpp"
 #include "flat.hpp"
+#include "rest.hpp"
 
 namespace spring {
 
@@ -16,10 +17,10 @@ namespace {
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
 /// In one step, counted in internal steps of IDA: thousands of periods of the spring. A step that needs more is
 /// refused, so that no call lasts longer than a second or two. To start a segment costs as much as some steps.
-constexpr long most_work = 1'000'000, work_of_start = 20;
+constexpr long most_work = 1'000'000, work_of_start = 3;
 constexpr long most_stalled = 100;  ///< events without progress
 constexpr double smallest_step = 1e-100;
-constexpr double far = 1e6;  ///< as many hilltops away, nothing brings a top back
+constexpr double far = 1e9;  ///< as many hilltops away, nothing brings a top back
 
 }  // namespace
 
@@ -47,10 +48,10 @@ class Spring::Step {
       now_ = loads_.from_time(t_);
       depth_ = !parameters_.compliant() ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
       if (parameters_.stop_enabled) land();
-      if (spring_.seat_ && state_.seated != 0.0)
-        advance(*spring_.seat_);
+      if (state_.seated != 0.0)
+        stay();
       else
-        advance(spring_.flight_);
+        fly();
     }
     state_.stop_force = held_ / size_;
     return state_;
@@ -78,7 +79,7 @@ class Spring::Step {
       return;
     }
     const auto N = spring_.motion_.holding_force(state_.y, now_, touching(), depth_);
-    const bool pressed = Seated::holds(N);
+    const bool pressed = Watch::direction({N[0], N[1], N[2] / 2}) >= 0.0;
     const double before = state_.z;
     if (before < 0.0) {
       const double pull = std::max(N[0], 0.0) / parameters_.mass;  // −ÿ
@@ -94,44 +95,52 @@ class Spring::Step {
     state_.seated = state_.z == 0.0 && pressed && !released_ ? 1.0 : 0.0;
   }
 
-  /// One segment, and what it did.
-  void advance(Segment& segment) {
+  void stay() {
+    const Rest rest = spring::rest(spring_.motion_, state_.y, depth_, parameters_.compliant(), now_, remaining());
+    state_.integral_2 += (state_.integral + state_.y * rest.size / 2) * rest.size;
+    state_.integral += state_.y * rest.size;
+    state_.dissipated += rest.dissipated;
+    held_ += rest.impulse;
+    t_ = rest.released ? t_ + rest.size : size_;
+    released_ = rest.released;
+    if (released_) state_.seated = 0.0;
+    meeting_ = false;
+  }
+
+  void fly() {
     const double gap = parameters_.stop_enabled ? state_.y - parameters_.stop_position : 1.0;
-    const Start start{state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_};
-    const auto event = attempt(segment, start);
-    const auto& [y, z, integral, integral_2, dissipated, impulse] = segment.reached();
-    state_.integral_2 += state_.integral * segment.elapsed() + integral_2;
+    Flight& flight = spring_.flight_;
+    const auto [event, y, z, integral, integral_2, dissipated] =
+        attempt({state_.y, state_.z, now_, remaining(), gap, depth_, released_, most_work - work_});
+    state_.integral_2 += state_.integral * flight.elapsed() + integral_2;
     state_.integral += integral;
     state_.dissipated += dissipated;
     state_.y = y;
     state_.z = z;
-    held_ += impulse;
-    t_ += segment.elapsed();
+    t_ = event == Flight::Event::none && flight.at_end() ? size_ : t_ + flight.elapsed();
     throw_if_run_away(y / far, t_);
     // Rounding must not put the top below the stop. Not from the gap: a distant stop would quantise y.
     if (parameters_.stop_enabled)
-      state_.y =
-          event == Segment::Event::stop ? parameters_.stop_position : std::max(state_.y, parameters_.stop_position);
-    released_ = event == Segment::Event::release;
-    if (released_) state_.seated = 0.0;
-    meeting_ = event == Segment::Event::contact;
-    if (event == Segment::Event::none) t_ = size_;
+      state_.y = event == Flight::Event::stop ? parameters_.stop_position : std::max(y, parameters_.stop_position);
+    released_ = false;
+    meeting_ = event == Flight::Event::contact;
+    if (event != Flight::Event::none) ++events_;
   }
 
-  Segment::Event attempt(Segment& segment, const Start& start) {
+  Flight::Reached attempt(const Start& start) {
+    Flight& flight = spring_.flight_;
     try {
-      const auto event = segment.run(start);
-      const long steps = segment.solver().steps();
-      state_.steps += static_cast<double>(steps);
-      work_ += steps + work_of_start;
-      return event;
+      const auto reached = flight.run(start);
+      state_.steps += static_cast<double>(flight.steps());
+      work_ += flight.steps() + work_of_start;
+      return reached;
     } catch (const IdaError& error) {
-      const double reached = t_ + segment.solver().s() * start.size;
-      const long steps = most_work - start.most_steps - work_of_start * segments_ + segment.solver().steps();
+      const double reached = t_ + flight.elapsed();
+      const long steps = most_work - start.most_steps - work_of_start * segments_ + flight.steps();
       const std::string why = "spring: a step of " + number(size_) + " s fails after " + number(reached) + " s, " +
-                              std::to_string(steps) + " internal steps and " + std::to_string(segments_) +
+                              std::to_string(steps) + " internal steps and " + std::to_string(events_) +
                               " contact events: " + error.what();
-      throw_if_run_away(segment.displacement(), reached);
+      throw_if_run_away(flight.displacement(), reached);
       throw StepFailure(why + "; use a smaller step size", reached);
     }
   }
@@ -152,18 +161,17 @@ class Spring::Step {
   const double size_;
   const Loads loads_;
   double t_ = 0.0;                ///< since the step's start
-  long segments_ = 0, work_ = 0;  ///< done, and their internal steps
-  Loads now_;                     ///< loads_ from t_ on
-  double depth_ = -1.0;           ///< y − u_tip at t_
-  bool meeting_ = false;          ///< tip and top are at a contact event: y = u_tip
-  double held_ = 0.0;             ///< ∫N while seated
-  bool released_ = false;         ///< has just left the foundation, N = 0
+  long segments_ = 0, work_ = 0;  ///< done, and what they cost
+  long events_ = 0;
+  Loads now_;              ///< loads_ from t_ on
+  double depth_ = -1.0;    ///< y − u_tip at t_
+  bool meeting_ = false;   ///< tip and top are at a contact event: y = u_tip
+  double held_ = 0.0;      ///< ∫N while seated
+  bool released_ = false;  ///< has just left the foundation, N = 0
 };
 
 Spring::Spring(const Parameters& p)
-    : parameters_((check(p), p)), motion_(p), flight_(motion_, parameters_), state_{p.displacement, p.velocity} {
-  if (parameters_.stop_enabled) seat_.emplace(motion_, parameters_);
-}
+    : parameters_((check(p), p)), motion_(p), flight_(motion_, parameters_), state_{p.displacement, p.velocity} {}
 
 void Spring::step(double size, const Inputs& inputs, double time) {
   if (size < smallest_step)
@@ -227,9 +235,7 @@ Compliance::Slopes Spring::reaction_slopes() const {
 }
 double Spring::kinetic_energy() const { return parameters_.mass / 2 * state_.z * state_.z; }
 double Spring::potential_energy() const { return motion_.potential_energy(state_.y); }
-double Spring::spring_force() const {
-  return (parameters_.linear_stiffness + parameters_.cubic_stiffness * state_.y * state_.y) * state_.y;
-}
+double Spring::spring_force() const { return motion_.spring_force(state_.y); }
 double Spring::contact_energy() const { return motion_.compliance().energy(depth()); }
 
 void Spring::save(std::vector<double>& state) const {

@@ -8,7 +8,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -16,7 +15,6 @@
 #include "flight.hpp"
 #include "motion.hpp"
 #include "parameters.hpp"
-#include "seated.hpp"
 
 namespace spring {
 
@@ -59,7 +57,7 @@ class Spring {
   bool seated() const { return state_.seated != 0.0; }            ///< held on the foundation by the law inside
   std::int64_t ida_steps() const {
     return static_cast<std::int64_t>(state_.steps);
-  }                                                                 ///< internal IDA steps since the start
+  }  ///< internal IDA steps since the start
   int impacts() const { return static_cast<int>(state_.impacts); }  ///< on the foundation inside, since the start
   double last_impact() const { return state_.last_impact; }         ///< when [s]; −1: there was none
   double kinetic_energy() const;                                    ///< ½ m z² [J]
@@ -104,7 +102,6 @@ class Spring {
   const Parameters parameters_;
   const Motion motion_;
   Flight flight_;
-  std::optional<Seated> seat_;
   State state_;
 };
 

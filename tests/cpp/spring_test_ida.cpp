@@ -9,7 +9,6 @@
 #include "flight.hpp"
 #include "ida_solver.hpp"
 #include "parameters.hpp"
-#include "seated.hpp"
 #include "spring_support.hpp"
 
 using namespace spring;
@@ -195,21 +194,6 @@ TEST(Flight, JacobianMatchesDifferences) {
       const double d = 1e-5;
       expect_jacobian<5>(flight, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2, 0.3}, {d, d * size, d, d, d}, 1e-7);
     }
-  }
-}
-
-TEST(Seated, JacobianMatchesDifferences) {
-  Parameters p = nonlinear();
-  Loads loads;
-  loads.force = {-20.0, 1.0, 3.0};
-  for (const auto& [damping, speed] : std::array<std::pair<double, double>, 3>{{{0.0, 0.4}, {0.8, 0.4}, {0.8, 3.0}}}) {
-    p.compliance_damping = damping;
-    const Motion motion(p);
-    Seated seated(motion, p);
-    loads.tip = {-0.3, speed, -1.0};
-    EXPECT_EQ(seated.run({-0.2, 0.0, loads, 0.02, 0.0, 0.1, false, 100000}), Seated::Event::none);
-    const double d = 1e-5;
-    expect_jacobian<5>(seated, 0.3, 17.0, {0.01, 0.003, 0.1, 0.2, 0.3}, {d, d, d, d, d}, 1e-7);
   }
 }
 

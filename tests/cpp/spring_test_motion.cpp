@@ -217,8 +217,8 @@ TEST(Spring, TolerancesControlCostAndError) {
     p.relative_tolerance = tolerance;
     p.absolute_tolerance = tolerance / 100;
     Spring s(p);
-    s.step(0.05, Inputs{});
-    EXPECT_NEAR(s.displacement(), exact.displacement(0.05), 2 * tolerance);
+    s.step(0.2, Inputs{});  // 4 rad, several parts at any tolerance
+    EXPECT_NEAR(s.displacement(), exact.displacement(0.2), 2 * tolerance);
     EXPECT_LT(s.ida_steps(), steps_before);
     steps_before = s.ida_steps();
   }
