@@ -1,17 +1,11 @@
 """The FMUs through their C API, by ctypes alone: statuses and messages are seen as an importer sees them."""
 
-from __future__ import annotations
-
 import ctypes as ct
 import math
 import shutil
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import fmpy
 import pytest
-from fmpy.model_description import ModelDescription
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 CO_SIMULATION = 1
@@ -37,7 +31,7 @@ ENDS = {
 #: Parameters that make something happen.
 HILL = {"linear_stiffness": 3.0, "cubic_stiffness": -0.2}
 SOFT = {"young_modulus": 100.0, "shear_modulus": 100.0}
-MOVING: dict[str, dict[str, float]] = {
+MOVING = {
     "beam": {**SOFT, "n_elements": 12, "alpha_b": 1e-3, "initial_velocity_slope": -1.0},
     "spring": {**HILL, "damping": 0.1, "displacement": 0.5, "velocity": -1.0},
 }
@@ -46,38 +40,38 @@ MOVING: dict[str, dict[str, float]] = {
 class Fmu:
     """A loaded FMU: description, library, and what the tests need to know of it."""
 
-    def __init__(self, path: Path, folder: Path) -> None:
+    def __init__(self, path, folder):
         self.path, self.folder, self.name = path, folder, path.stem
         fmpy.extract(str(path), unzipdir=str(folder))
-        self.description: ModelDescription = fmpy.read_model_description(str(path))
+        self.description = fmpy.read_model_description(str(path))
         identifier = self.description.coSimulation.modelIdentifier
         self.binary = folder / "binaries" / "linux64" / f"{identifier}.so"
         self.library = ct.CDLL(str(self.binary))
         self.library.fmi2Instantiate.restype = ct.c_void_p
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.outputs = [name for name in self.named("output") if self.variables[name].type == "Real"]
-        self.instances: list[Instance] = []
+        self.instances = []
         self.parameters = MOVING[self.name]
         self.force, self.impulse, self.displacement, self.velocity = ENDS[self.name]
 
-    def named(self, causality: str) -> list[str]:
+    def named(self, causality):
         """The variables of a causality."""
         return [name for name, v in self.variables.items() if v.causality == causality]
 
-    def references(self, *names: str) -> Any:
+    def references(self, *names):
         """The value references, as C takes them."""
         return (ct.c_uint * len(names))(*[self.variables[name].valueReference for name in names])
 
-    def instance(self, **options: Any) -> Instance:
+    def instance(self, **options):
         made = Instance(self, **options)
         self.instances.append(made)
         return made
 
-    def running(self, **values: Any) -> Instance:
+    def running(self, **values):
         """An instance that was started, see `Instance.enter`."""
         return self.instance().start(**values)
 
-    def moving(self, **values: Any) -> Instance:
+    def moving(self, **values):
         """One in which something happens."""
         return self.running(**{**self.parameters, **values})
 
@@ -87,16 +81,16 @@ class Instance:
 
     def __init__(
         self,
-        fmu: Fmu,
-        name: bytes | None = b"test",
-        kind: int = CO_SIMULATION,
-        guid: bytes | None = None,
-        resources: bytes | None = None,
-        callbacks: bool = True,
-        logging: bool = False,
-    ) -> None:
+        fmu,
+        name=b"test",
+        kind=CO_SIMULATION,
+        guid=None,
+        resources=None,
+        callbacks=True,
+        logging=False,
+    ):
         self.fmu = fmu
-        self.messages: list[tuple[int, str, str]] = []
+        self.messages = []
         self._logger = Logger(self._log)
         struct = Callbacks(self._logger, None, None, None, None)
         pointer = ct.byref(struct) if callbacks else None
@@ -106,30 +100,28 @@ class Instance:
         # The FMU must have copied the struct.
         ct.memset(ct.byref(struct), 0xFF, ct.sizeof(struct))
 
-    def _log(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+    def _log(self, environment, name, status, category, message):
         self.messages.append((status, category.decode(), message.decode()))
 
     @property
-    def message(self) -> str:
+    def message(self):
         """The last one."""
         return self.messages[-1][2] if self.messages else ""
 
-    def call(self, function: str, *arguments: Any) -> int:
+    def call(self, function, *arguments):
         return int(getattr(self.fmu.library, function)(self.component, *arguments))
 
-    def free(self) -> None:
+    def free(self):
         if self.component:
             self.fmu.library.fmi2FreeInstance(self.component)
             self.component = ct.c_void_p()
 
-    def setup(self, start: float = 0.0, stop: float | None = None, tolerance: float | None = None) -> int:
+    def setup(self, start=0.0, stop=None, tolerance=None):
         known = int(tolerance is not None), ct.c_double(tolerance or 0.0)
         end = int(stop is not None), ct.c_double(stop or 0.0)
         return self.call("fmi2SetupExperiment", *known, ct.c_double(start), *end)
 
-    def enter(
-        self, start_time: float = 0.0, stop_time: float | None = None, tolerance: float | None = None, **values: float
-    ) -> Instance:
+    def enter(self, start_time=0.0, stop_time=None, tolerance=None, **values):
         """Enter initialization mode, with values of parameters and inputs."""
         assert self.setup(start_time, stop_time, tolerance) == OK, self.message
         for name, value in values.items():
@@ -137,13 +129,13 @@ class Instance:
         assert self.call("fmi2EnterInitializationMode") == OK, self.message
         return self
 
-    def start(self, **values: Any) -> Instance:
+    def start(self, **values):
         """Enter initialization mode and leave it."""
         self.enter(**values)
         assert self.call("fmi2ExitInitializationMode") == OK, self.message
         return self
 
-    def try_set(self, name: str, value: float) -> int:
+    def try_set(self, name, value):
         variable = self.fmu.variables[name]
         reference = self.fmu.references(name)
         if variable.type == "Real":
@@ -151,56 +143,56 @@ class Instance:
         function = "fmi2SetBoolean" if variable.type == "Boolean" else "fmi2SetInteger"
         return self.call(function, reference, 1, (ct.c_int * 1)(int(value)))
 
-    def set(self, name: str, value: float) -> None:
+    def set(self, name, value):
         assert self.try_set(name, value) == OK, self.message
 
-    def get(self, *names: str) -> Any:
+    def get(self, *names):
         """Real values: one, or a list."""
         values = (ct.c_double * len(names))(*[math.nan] * len(names))
         assert self.call("fmi2GetReal", self.fmu.references(*names), len(names), values) == OK, self.message
         return values[0] if len(names) == 1 else list(values)
 
-    def integer(self, name: str) -> int:
+    def integer(self, name):
         value = (ct.c_int * 1)()
         assert self.call("fmi2GetInteger", self.fmu.references(name), 1, value) == OK, self.message
         return int(value[0])
 
-    def outputs(self) -> list[float]:
+    def outputs(self):
         """The Real ones."""
         return list(self.get(*self.fmu.outputs))
 
-    def derive(self, name: str, order: int, value: float) -> int:
+    def derive(self, name, order, value):
         """Set an input's derivative."""
         reference = self.fmu.references(name)
         return self.call("fmi2SetRealInputDerivatives", reference, 1, (ct.c_int * 1)(order), (ct.c_double * 1)(value))
 
-    def derivative(self, name: str, order: int = 1) -> tuple[int, float]:
+    def derivative(self, name, order=1):
         reference = self.fmu.references(name)
         value = (ct.c_double * 1)(math.nan)
         return self.call("fmi2GetRealOutputDerivatives", reference, 1, (ct.c_int * 1)(order), value), value[0]
 
-    def partials(self, outputs: list[str], name: str) -> tuple[int, list[float]]:
+    def partials(self, outputs, name):
         """Return the status, and the derivatives of the outputs by an input or, before the start, by a parameter."""
         values = (ct.c_double * len(outputs))(*[math.nan] * len(outputs))
         unknown, known, one = self.fmu.references(*outputs), self.fmu.references(name), (ct.c_double * 1)(1.0)
         arguments = (unknown, ct.c_size_t(len(outputs)), known, ct.c_size_t(1), one, values)
         return self.call("fmi2GetDirectionalDerivative", *arguments), list(values)
 
-    def try_step(self, time: float, size: float) -> int:
+    def try_step(self, time, size):
         return self.call("fmi2DoStep", ct.c_double(time), ct.c_double(size), 0)
 
-    def step(self, time: float, size: float) -> None:
+    def step(self, time, size):
         assert self.try_step(time, size) == OK, self.message
 
-    def state(self) -> ct.c_void_p:
+    def state(self):
         token = ct.c_void_p()
         assert self.call("fmi2GetFMUstate", ct.byref(token)) == OK, self.message
         return token
 
-    def restore(self, token: ct.c_void_p) -> None:
+    def restore(self, token):
         assert self.call("fmi2SetFMUstate", token) == OK, self.message
 
-    def serialized(self) -> bytes:
+    def serialized(self):
         token, size = self.state(), ct.c_size_t()
         assert self.call("fmi2SerializedFMUstateSize", token, ct.byref(size)) == OK
         buffer = ct.create_string_buffer(size.value)
@@ -208,19 +200,19 @@ class Instance:
         assert self.call("fmi2FreeFMUstate", ct.byref(token)) == OK
         return buffer.raw
 
-    def try_deserialize(self, blob: bytes) -> tuple[int, ct.c_void_p]:
+    def try_deserialize(self, blob):
         token = ct.c_void_p()
         status = self.call("fmi2DeSerializeFMUstate", blob, ct.c_size_t(len(blob)), ct.byref(token))
         return status, token
 
-    def deserialized(self, blob: bytes) -> ct.c_void_p:
+    def deserialized(self, blob):
         status, token = self.try_deserialize(blob)
         assert status == OK, self.message
         return token
 
 
 @pytest.fixture
-def folder(fmu_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(fmu_folder, tmp_path, monkeypatch):
     """Copies of the FMUs, to be spoilt; the master takes these."""
     for name in ("beam", "spring"):
         shutil.copy(fmu_folder / f"{name}.fmu", tmp_path)
@@ -229,12 +221,12 @@ def folder(fmu_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.fixture(scope="session")
-def fmus(fmu_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Fmu]:
+def fmus(fmu_folder, tmp_path_factory):
     return {name: Fmu(fmu_folder / f"{name}.fmu", tmp_path_factory.mktemp(name)) for name in ENDS}
 
 
 @pytest.fixture
-def loaded(fmus: dict[str, Fmu]) -> Iterator[dict[str, Fmu]]:
+def loaded(fmus):
     """Both FMUs; the instances that the test makes are freed after it."""
     yield fmus
     for fmu in fmus.values():
@@ -244,16 +236,16 @@ def loaded(fmus: dict[str, Fmu]) -> Iterator[dict[str, Fmu]]:
 
 
 @pytest.fixture
-def beam(loaded: dict[str, Fmu]) -> Fmu:
+def beam(loaded):
     return loaded["beam"]
 
 
 @pytest.fixture
-def spring(loaded: dict[str, Fmu]) -> Fmu:
+def spring(loaded):
     return loaded["spring"]
 
 
 @pytest.fixture(params=ENDS)
-def case(request: pytest.FixtureRequest, loaded: dict[str, Fmu]) -> Fmu:
+def case(request, loaded):
     """Each of them in turn."""
     return loaded[request.param]

@@ -1,11 +1,7 @@
 """Archives made to do harm: refused by name before anything of them is unpacked."""
 
-from __future__ import annotations
-
 import stat
 import zipfile
-from collections.abc import Callable
-from pathlib import Path
 from zipfile import ZipFile, ZipInfo
 
 import pytest
@@ -15,26 +11,26 @@ from springbeam.bodies import archive
 from springbeam.bodies.archive import UnsafeArchive, unpack
 
 
-def named(name: str) -> ZipInfo:
+def named(name):
     info = ZipInfo("x")
     info.filename = info.orig_filename = name  # as it is: ZipInfo(name) would tidy it up
     return info
 
 
-def add(name: str, content: bytes = b"evil") -> Callable[[ZipFile], None]:
+def add(name, content=b"evil"):
     return lambda file: file.writestr(named(name), content)
 
 
-def twice(first: str, second: str) -> Callable[[ZipFile], None]:
-    def write(file: ZipFile) -> None:
+def twice(first, second):
+    def write(file):
         file.writestr(named(first), b"good")
         file.writestr(named(second), b"evil")
 
     return write
 
 
-def special(kind: int) -> Callable[[ZipFile], None]:
-    def write(file: ZipFile) -> None:
+def special(kind):
+    def write(file):
         info = ZipInfo("resources/link")
         info.external_attr = (kind | 0o777) << 16
         file.writestr(info, b"/etc")
@@ -42,11 +38,11 @@ def special(kind: int) -> Callable[[ZipFile], None]:
     return write
 
 
-def bomb(file: ZipFile) -> None:
+def bomb(file):
     file.writestr("resources/zeros", bytes(5_000_000), zipfile.ZIP_DEFLATED)
 
 
-EVIL: dict[str, tuple[Callable[[ZipFile], None], str]] = {
+EVIL = {
     "above": (add("../evil"), "member '../evil' leads out of the folder"),
     "above, from within": (add("resources/../../evil"), "member 'resources/../../evil' leads out of the folder"),
     "up and back": (add("binaries/../evil"), "leads out of the folder"),
@@ -71,14 +67,14 @@ EVIL: dict[str, tuple[Callable[[ZipFile], None], str]] = {
 
 
 @pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch) -> None:
+def small(monkeypatch):
     monkeypatch.setattr(archive, "MOST_BYTES", 4_000_000)
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 @pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("name", EVIL)
-def test_refused_by_name_and_nothing_is_unpacked(tmp_path: Path, name: str) -> None:
+def test_refused_by_name_and_nothing_is_unpacked(tmp_path, name):
     write, cause = EVIL[name]
     folder = tmp_path / "outer" / "inner"
     folder.mkdir(parents=True)
@@ -91,7 +87,7 @@ def test_refused_by_name_and_nothing_is_unpacked(tmp_path: Path, name: str) -> N
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["evil.fmu", "inner", "outer"]
 
 
-def test_too_many_members(tmp_path: Path) -> None:
+def test_too_many_members(tmp_path):
     with ZipFile(tmp_path / "many.fmu", "w") as file:
         for i in range(archive.MOST_MEMBERS + 1):
             file.writestr(ZipInfo(str(i)), b"")
@@ -99,7 +95,7 @@ def test_too_many_members(tmp_path: Path) -> None:
         unpack(tmp_path / "many.fmu", tmp_path / "in")
 
 
-def test_a_size_that_is_declared_too_small_is_not_exceeded(tmp_path: Path) -> None:
+def test_a_size_that_is_declared_too_small_is_not_exceeded(tmp_path):
     """A member that unpacks to more than it says is damaged: what it says is all that is ever read of it."""
     path = tmp_path / "liar.fmu"
     with ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
@@ -114,14 +110,14 @@ def test_a_size_that_is_declared_too_small_is_not_exceeded(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("name", ["beam", "spring"])
-def test_our_own_are_unpacked_to_the_last_byte(fmu_folder: Path, tmp_path: Path, name: str) -> None:
+def test_our_own_are_unpacked_to_the_last_byte(fmu_folder, tmp_path, name):
     unpack(fmu_folder / f"{name}.fmu", tmp_path)
     with ZipFile(fmu_folder / f"{name}.fmu") as file:
         files = {info.filename: file.read(info) for info in file.infolist() if not info.is_dir()}
     assert {str(p.relative_to(tmp_path)): p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == files
 
 
-def test_the_command_names_file_and_member(folder: Path) -> None:
+def test_the_command_names_file_and_member(folder):
     with ZipFile(folder / "spring.fmu", "a") as file:
         file.writestr(named("../../evil"), b"evil")
     said = f"error: {folder / 'spring.fmu'}: not a usable FMU: member '../../evil' leads"

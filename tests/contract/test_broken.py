@@ -1,11 +1,7 @@
 """Broken FMUs: the master names the file and the cause."""
 
-from __future__ import annotations
-
 import re
 import zipfile
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -18,8 +14,8 @@ XML = "modelDescription.xml"
 BINARY = "binaries/linux64/beam.so"
 
 
-def edited(pattern: str, replacement: str) -> Callable[[Files], None]:
-    def edit(files: Files) -> None:
+def edited(pattern, replacement):
+    def edit(files):
         before = files[XML].decode()
         after = re.sub(pattern, replacement, before, count=1, flags=re.S)
         assert after != before, pattern
@@ -28,20 +24,20 @@ def edited(pattern: str, replacement: str) -> Callable[[Files], None]:
     return edit
 
 
-def without(name: str) -> Callable[[Files], None]:
+def without(name):
     return lambda files: files.__delitem__(name)
 
 
-def replaced(name: str, content: bytes) -> Callable[[Files], None]:
+def replaced(name, content):
     return lambda files: files.__setitem__(name, content)
 
 
-def renamed(old: str, new: str) -> Callable[[Files], None]:
+def renamed(old, new):
     return lambda files: files.__setitem__(new, files.pop(old))
 
 
 TIP_FORCE = r'(name="tip_force" valueReference=")\d+'
-BROKEN: dict[str, tuple[Callable[[Files], None], str]] = {
+BROKEN = {
     "no description": (without(XML), "modelDescription.xml"),
     "description is not XML": (replaced(XML, b"<fmiModelDescription"), "XML|markup|parse|syntax|find end"),
     "an entity from outside": (
@@ -69,7 +65,7 @@ BROKEN: dict[str, tuple[Callable[[Files], None], str]] = {
 }
 
 
-def refusal(folder: Path) -> str:
+def refusal(folder):
     with pytest.raises(FmuError) as caught:
         load_bodies(springbeam.load_scene("soft"), 0.0)
     message = str(caught.value)
@@ -78,7 +74,7 @@ def refusal(folder: Path) -> str:
 
 
 @pytest.mark.parametrize("name", [*BROKEN, "library of the other FMU"])
-def test_broken_content_is_named(folder: Path, fmu_folder: Path, name: str) -> None:
+def test_broken_content_is_named(folder, fmu_folder, name):
     with zipfile.ZipFile(fmu_folder / "spring.fmu") as other:
         library = replaced(BINARY, other.read("binaries/linux64/spring.so"))
     damage, cause = BROKEN.get(name, (library, "is not that of this FMU"))
@@ -102,6 +98,6 @@ def test_broken_content_is_named(folder: Path, fmu_folder: Path, name: str) -> N
     ],
     ids=["missing", "empty", "no archive", "truncated"],
 )
-def test_a_file_that_is_no_archive_is_named(folder: Path, damage: Callable[[Path], None], cause: str) -> None:
+def test_a_file_that_is_no_archive_is_named(folder, damage, cause):
     damage(folder / "beam.fmu")
     assert cause in refusal(folder).lower()

@@ -1,10 +1,7 @@
 """What an engineer loads the pair for: forces, moments, stresses, gravity, a start at rest; impacts of the spring."""
 
-from __future__ import annotations
-
 import ctypes as ct
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +9,11 @@ import pytest
 X = np.linspace(0.0, 1.0, 21)
 
 
-def along(k: Any, name: str) -> np.ndarray:
+def along(k, name):
     return np.array(k.get(*[f"{name}[{i}]" for i in range(1, 22)]))
 
 
-MESHES: list[dict[str, float]] = [
+MESHES = [
     {"n_elements": 13},
     {"n_elements": 13, "integrator": 2, "reduced_integration": True},
     {"n_elements": 20, "n_modes": 4},
@@ -25,7 +22,7 @@ MESHES: list[dict[str, float]] = [
 
 
 @pytest.mark.parametrize("mesh", MESHES)
-def test_a_cantilever_at_rest_has_the_forces_of_statics(beam: Any, mesh: dict[str, float]) -> None:
+def test_a_cantilever_at_rest_has_the_forces_of_statics(beam, mesh):
     """Q = P + q (L − x), M = P (L − x) + q (L − x)²/2, and a point force at x = 0.5: to rounding on any mesh."""
     point, g, height = 0.7, 9.81, 0.1
     k = beam.running(**mesh, initial_state=2, tip_force=2.0, tip_load=0.5, distributed_load=-3.0, gravity=g,
@@ -48,7 +45,7 @@ def test_a_cantilever_at_rest_has_the_forces_of_statics(beam: Any, mesh: dict[st
 
 
 @pytest.mark.parametrize("integrator", [1, 2])
-def test_the_clamp_balances_the_momentum(beam: Any, integrator: int) -> None:
+def test_the_clamp_balances_the_momentum(beam, integrator):
     """Clamp force + C + loads = d/dt ∫ρA u_t dx, clamp moment + moments of the loads = d/dt ∫x ρA u_t + ρI θ_t dx.
 
     On 20 linear elements the 21 points are the nodes; accelerations are second differences over 1e-4 s.
@@ -73,7 +70,7 @@ def test_the_clamp_balances_the_momentum(beam: Any, integrator: int) -> None:
     assert [clamp, moment] == [-shear[0], -bending[0]]
 
 
-def test_gravity_is_a_load(beam: Any, spring: Any) -> None:
+def test_gravity_is_a_load(beam, spring):
     """On the spring m g y, in load_work; at rest on k1 the deflection would be −m g/k1."""
     g, m, k1 = 9.81, 2.0, 30.0
     k = spring.running(gravity=g, mass=m, linear_stiffness=k1)
@@ -91,14 +88,14 @@ def test_gravity_is_a_load(beam: Any, spring: Any) -> None:
     assert heavy.get("tip_displacement", "load_potential") == loaded.get("tip_displacement", "load_potential")
 
 
-def test_impacts_are_counted_and_timed(spring: Any) -> None:
+def test_impacts_are_counted_and_timed(spring):
     """Free fall from 0.5 m with g = 10: impacts at √0.1, then every 2 e √0.1, e², …; at last the top rests."""
     k = spring.running(gravity=10.0, linear_stiffness=0.0, stop_enabled=True, stop_position=0.0, displacement=0.5,
                        restitution=0.5, stop_time=10.0, start_time=1.0)  # fmt: skip
     assert k.get("last_impact_time") == -1.0
     seated = (ct.c_int * 1)()
 
-    def rests() -> bool:
+    def rests():
         assert k.call("fmi2GetBoolean", spring.references("seated"), 1, seated) == 0
         return bool(seated[0])
 

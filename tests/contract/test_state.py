@@ -1,9 +1,6 @@
 """Saved states: the same step repeated is the same to the last bit, here and in another instance."""
 
-from __future__ import annotations
-
 import ctypes as ct
-from typing import Any
 
 import pytest
 
@@ -11,7 +8,7 @@ OK, ERROR = 0, 3
 PHASES = ["instantiated", "initialization", "stepping"]
 
 
-def advance(case: Any, k: Any, time: float, steps: int, impulse: float) -> list[list[float]]:
+def advance(case, k, time, steps, impulse):
     """A run with changing inputs; all outputs after every step."""
     rows = []
     for i in range(steps):
@@ -26,7 +23,7 @@ def advance(case: Any, k: Any, time: float, steps: int, impulse: float) -> list[
     return rows
 
 
-def test_steps_from_a_saved_state_are_bit_identical(case: Any) -> None:
+def test_steps_from_a_saved_state_are_bit_identical(case):
     """In the same instance, in another that had the same history, and in one that only gets the bytes."""
     k, twin, fresh = case.moving(), case.moving(), case.instance()
     for one in (k, twin):
@@ -44,24 +41,8 @@ def test_steps_from_a_saved_state_are_bit_identical(case: Any) -> None:
     assert fresh.serialized() != blob
 
 
-def test_pending_inputs_belong_to_the_state(case: Any) -> None:
-    k = case.moving()
-    k.set(case.force, 0.7)
-    assert k.derive(case.force, 1, 2.0) == OK
-    assert k.derive(case.force, 2, -5.0) == OK
-    k.set(case.impulse, 0.1)
-    token = k.state()
-    k.step(0.0, 0.05)
-    first = k.outputs()
-    k.set(case.force, 0.0)
-    k.restore(token)
-    assert k.get(case.force, case.impulse) == [0.7, 0.1]
-    k.step(0.0, 0.05)
-    assert k.outputs() == first
-
-
 @pytest.mark.parametrize("overwritten", [False, True])
-def test_inputs_that_were_not_set_yet_belong_to_the_state(case: Any, overwritten: bool) -> None:
+def test_inputs_that_were_not_set_yet_belong_to_the_state(case, overwritten):
     """A state from outside may know a force, or come from an instance that does not."""
     k, other = case.moving(), case.moving()
     other.set(case.force, 0.7)
@@ -73,7 +54,7 @@ def test_inputs_that_were_not_set_yet_belong_to_the_state(case: Any, overwritten
     assert k.get(case.force) == (0.0 if overwritten else 0.7)
 
 
-def test_a_state_can_be_overwritten_and_freed(case: Any) -> None:
+def test_a_state_can_be_overwritten_and_freed(case):
     k = case.moving()
     token = k.state()
     k.step(0.0, 0.01)
@@ -90,20 +71,9 @@ def test_a_state_can_be_overwritten_and_freed(case: Any) -> None:
     assert k.call("fmi2FreeFMUstate", None) == OK
 
 
-def test_a_state_of_another_instance_or_freed_is_refused(case: Any) -> None:
-    one, other = case.moving(), case.moving()
-    token = one.state()
-    assert other.call("fmi2SetFMUstate", token) == ERROR
-    assert "not made by this instance" in other.message
-    copy = ct.c_void_p(token.value)
-    assert one.call("fmi2FreeFMUstate", ct.byref(token)) == OK
-    assert one.call("fmi2SetFMUstate", copy) == ERROR
-    assert "already freed" in one.message
-
-
 @pytest.mark.parametrize("phase", PHASES)
-def test_a_state_carries_its_phase_parameters_and_time(case: Any, phase: str) -> None:
-    def finish(k: Any) -> list[float]:
+def test_a_state_carries_its_phase_parameters_and_time(case, phase):
+    def finish(k):
         if phase == "instantiated":
             assert k.call("fmi2EnterInitializationMode") == OK
         if phase != "stepping":
@@ -129,7 +99,7 @@ def test_a_state_carries_its_phase_parameters_and_time(case: Any, phase: str) ->
 
 
 @pytest.mark.parametrize("before", ["garbage", "another state"])
-def test_deserializing_ignores_what_the_pointer_held(case: Any, before: str) -> None:
+def test_deserializing_ignores_what_the_pointer_held(case, before):
     # FMI 2.0.4: the state is an output only; JavaFMI passes what is not initialised.
     k = case.moving()
     advance(case, k, 0.0, 3, 0.2)
@@ -147,7 +117,7 @@ def test_deserializing_ignores_what_the_pointer_held(case: Any, before: str) -> 
     assert k.outputs() == at_late
 
 
-def damaged(blob: bytes, position: int) -> bytes:
+def damaged(blob, position):
     return blob[:position] + bytes([blob[position] ^ 0x55]) + blob[position + 1 :]
 
 
@@ -166,7 +136,7 @@ def damaged(blob: bytes, position: int) -> bytes:
         (lambda b: bytes(len(b)), "do not begin with its mark"),
     ],
 )
-def test_foreign_bytes_are_refused_with_the_reason(case: Any, damage: Any, why: str) -> None:
+def test_foreign_bytes_are_refused_with_the_reason(case, damage, why):
     k = case.moving()
     blob = k.serialized()
     status, token = k.try_deserialize(damage(blob))
@@ -175,7 +145,7 @@ def test_foreign_bytes_are_refused_with_the_reason(case: Any, damage: Any, why: 
     assert why in k.message
 
 
-def test_a_state_of_the_other_fmu_is_refused(beam: Any, spring: Any) -> None:
+def test_a_state_of_the_other_fmu_is_refused(beam, spring):
     blob = beam.running().serialized()
     k = spring.running()
     assert k.try_deserialize(blob)[0] == ERROR

@@ -1,25 +1,14 @@
 """fmi2DoStep: which steps are refused, and what a refused step leaves behind."""
 
-from __future__ import annotations
-
 import ctypes as ct
 import math
-from typing import Any
 
 import pytest
 
 OK, DISCARD, ERROR = 0, 2, 3
 
 
-def test_a_run_may_start_at_any_time(case: Any) -> None:
-    start = 1234.5
-    early, late = case.moving(), case.moving(start_time=start)
-    early.step(0.0, 0.01)
-    late.step(start, 0.01)
-    assert late.outputs() == early.outputs()
-
-
-def test_times_may_be_multiplied_or_summed_and_sizes_be_differences(case: Any) -> None:
+def test_times_may_be_multiplied_or_summed_and_sizes_be_differences(case):
     # 1e5 s into a run, times carry 1e-11 s of rounding; 1e-9 of this step would be less.
     k = case.moving(start_time=1e5)
     size, time = 1e-3, 1e5
@@ -30,7 +19,7 @@ def test_times_may_be_multiplied_or_summed_and_sizes_be_differences(case: Any) -
         time += size
 
 
-def test_no_step_past_the_stop_time(case: Any) -> None:
+def test_no_step_past_the_stop_time(case):
     k = case.running(stop_time=0.3)
     # 0.1 + 0.1 + 0.1 > 0.3 in floating point: rounding is no reason to refuse.
     time = 0.0
@@ -44,7 +33,7 @@ def test_no_step_past_the_stop_time(case: Any) -> None:
 
 AHEAD = {"contact_law": 2, "communication_step": 1e-3, "tip_response": 1e-4}
 #: FMU, parameters, inputs of a step that is refused, its size, the size of one that is not, and what is said.
-REFUSALS: list[tuple[str, dict[str, float], dict[str, float], float, float, str]] = [
+REFUSALS = [
     ("beam", {}, {"tip_impulse": 1e308}, 0.1, 0.1, "not finite"),
     ("beam", {"integrator": 2}, {"tip_force": 1e308}, 0.1, 0.1, "not finite"),
     ("beam", {"communication_step": 1e-3}, {"tip_force": 1e308}, 1e-3, 1e-3, "not finite"),
@@ -57,9 +46,7 @@ REFUSALS: list[tuple[str, dict[str, float], dict[str, float], float, float, str]
 
 
 @pytest.mark.parametrize(("name", "parameters", "inputs", "size", "smaller", "why"), REFUSALS)
-def test_after_any_refusal_a_master_goes_on(
-    loaded: Any, name: str, parameters: Any, inputs: Any, size: float, smaller: float, why: str
-) -> None:
+def test_after_any_refusal_a_master_goes_on(loaded, name, parameters, inputs, size, smaller, why):
     """With another step or other inputs, without restoring a state, as if the refused step had not been tried."""
     k, twin = (loaded[name].running(**parameters) for _ in range(2))
     for slave in (k, twin):
@@ -90,22 +77,15 @@ def test_after_any_refusal_a_master_goes_on(
     assert k.outputs() == twin.outputs()
 
 
-def test_a_held_contact_of_infinite_energy_is_discarded(spring: Any) -> None:
-    k = spring.running(**{**AHEAD, "communication_step": 1e3})
-    k.set("tip_displacement", -1e100)  # λ δ³ = 1e304 N, λ δ⁴/4 overflows
-    assert k.try_step(0.0, 1e-6) == DISCARD
-    assert "no contact force was found" in k.message
-
-
 @pytest.mark.parametrize("tolerance", [0.1, 1e-4, 0.0, -1.0, math.nan, 1e-3])
-def test_a_loose_tolerance_of_the_importer_changes_nothing(case: Any, tolerance: float) -> None:
+def test_a_loose_tolerance_of_the_importer_changes_nothing(case, tolerance):
     plain, loose = case.moving(), case.moving(tolerance=tolerance)
     for k in (plain, loose):
         k.step(0.0, 0.5)
     assert loose.outputs() == plain.outputs()
 
 
-def test_a_tighter_tolerance_of_the_importer_is_followed(spring: Any) -> None:
+def test_a_tighter_tolerance_of_the_importer_is_followed(spring):
     # Softening Duffing from rest at 0.5: the period is 4K(m)/ω with ω² = k1 + k2 A²/2, m = −k2 A²/(2 ω²).
     period = 3.650498199690303
     values = {"linear_stiffness": 3.0, "cubic_stiffness": -0.2, "displacement": 0.5}

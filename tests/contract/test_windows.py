@@ -1,13 +1,10 @@
 """The Windows binaries under Wine, by the same C host as the Linux ones."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
 import zipfile
 from pathlib import Path
-from typing import Any
 
 import fmpy
 import pytest
@@ -18,23 +15,23 @@ HEADERS = Path(fmpy.__file__).parent / "c-code"
 ZIG = HERE.parents[1] / "build" / "win64" / "zig-cc"
 
 
-def run(*command: str | Path, **options: Any) -> str:
+def run(*command, **options):
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=HANGS, **options)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
-def arguments(case: Any) -> list[str]:
+def arguments(case):
     names = [case.force, case.impulse, case.displacement, case.velocity, "kinetic_energy", "dissipated_energy"]
     return [case.description.guid, *(str(case.variables[n].valueReference) for n in names)]
 
 
-def rows(output: str) -> list[list[str]]:
+def rows(output):
     return [line.split() for line in output.splitlines()]
 
 
 @pytest.fixture(scope="module")
-def linux_host(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def linux_host(tmp_path_factory):
     compiler = shutil.which(os.environ.get("CC", "cc"))
     if compiler is None:
         pytest.skip("no C compiler: the FMUs are not tried in a C host")
@@ -44,19 +41,19 @@ def linux_host(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def wine_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wine_prefix(tmp_path_factory):
     """Made by the first run; takes half a minute."""
     return tmp_path_factory.mktemp("wine") / "prefix"
 
 
-def test_c_host(case: Any, linux_host: Path) -> None:
+def test_c_host(case, linux_host):
     result = rows(run(linux_host, case.binary, *arguments(case)))
     repeated = [row for row in result if row[0] == "100"]
     assert len(repeated) == 8  # step 100 was made twice, from the same state
     assert repeated[:4] == repeated[4:]
 
 
-def test_windows_binary_under_wine(case: Any, linux_host: Path, wine_prefix: Path, tmp_path: Path) -> None:
+def test_windows_binary_under_wine(case, linux_host, wine_prefix, tmp_path):
     with zipfile.ZipFile(case.path) as archive:
         name = f"binaries/win64/{case.name}.dll"
         if name not in archive.namelist():

@@ -7,8 +7,6 @@ is tested by itself:
 * `DuffingBody`: m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series of order 22.
 """
 
-from __future__ import annotations
-
 from functools import reduce
 from itertools import pairwise
 from typing import NamedTuple
@@ -24,10 +22,9 @@ from springbeam.coupling.protocol import Step
 from springbeam.monolithic.loads import Loads
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.results.recording import MemoryRecorder
-from springbeam.results.trajectory import Trajectory
 from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped
-from springbeam.scene import Beam, Scene
+from springbeam.scene import Beam
 
 
 class Double(Body):
@@ -79,7 +76,7 @@ class ModalBody(Double, BeamBody):
     def set_loads(self, forces):
         self._load = sum(np.outer(f, pattern) for f, pattern in zip(forces, self.patterns, strict=True))
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+    def advance(self, time, size, contact, foundation=NO_FORCE):
         self.steps += 1
         p = np.outer(contact, self.b) + self._load
         p[0] += self.f
@@ -121,29 +118,29 @@ class ModalBody(Double, BeamBody):
         self.a, self.v = x[:, 0] / self.omega, x[:, 1]
         return x[:, 5], x[:, 6]
 
-    def motion(self) -> Motion:
+    def motion(self):
         return Motion(float(self.b @ self.a), float(self.b @ self.v), *self._integrals)
 
-    def energies(self) -> Energies:
+    def energies(self):
         stretch = self.omega * self.a
         load = -float(self.f @ self.a) - self._work
         return Energies(0.5 * float(self.v @ self.v), 0.5 * float(stretch @ stretch), self._dissipated, load)
 
-    def apply_impulse(self, impulse: float):
+    def apply_impulse(self, impulse):
         self.v = self.v + self.b * impulse
 
-    def shape(self) -> np.ndarray:
+    def shape(self):
         return self._sampler @ self.a
 
 
-def beam_body(beam: Beam, slope: float | None = None) -> ModalBody:
+def beam_body(beam, slope=None):
     """The scene's beam. ``slope`` replaces initial_deflection_slope."""
     m = modal_beam(beam)
     a = (beam.initial_deflection_slope if slope is None else slope) * m.slope_shape
     return ModalBody(m.omega, m.tip, a, beam.initial_velocity_slope * m.slope_shape, m.load, beam.alpha_b, m.sampler)
 
 
-def unit_beam(n: int, stiffness: float = 100.0, slope: float = -1.0) -> ModalBody:
+def unit_beam(n, stiffness=100.0, slope=-1.0):
     """An undamped unit beam of ``n`` elements, EI = KAG = ``stiffness``, moving as u̇ = slope·x."""
     return beam_body(
         Beam.with_ones(n_elements=n, young_modulus=stiffness, shear_modulus=stiffness, initial_velocity_slope=slope)
@@ -173,7 +170,7 @@ class DuffingBody(Double):
     def load_on_end(self):
         return self._load
 
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+    def advance(self, time, size, contact, foundation=NO_FORCE):
         self.steps += 1
         force = tuple(n - p + f for n, p, f in zip(foundation, contact, self._load, strict=True))
         start = self.motion()
@@ -197,9 +194,9 @@ class DuffingBody(Double):
         self._work += work_on(self._load, start, self.motion(), size)
         return self.motion()
 
-    def _series(self, f0: float, f1: float, f2: float) -> list[float]:
+    def _series(self, f0, f1, f2):
         y, z = [self.y, self.z], [self.z]
-        squares: list[float] = []
+        squares = []
         for k, f in enumerate((f0 + self.external, f1, 0.5 * f2, *[0.0] * (_ORDER - 4))):
             f -= self.damping * z[k] + self.k1 * y[k]
             if self.k2 != 0.0:
@@ -210,7 +207,7 @@ class DuffingBody(Double):
         return y
 
     @staticmethod
-    def _reach(y: list[float], size: float) -> float:
+    def _reach(y, size):
         """The step over which the last coefficients are rounding of the largest term."""
         h = size
         for _ in range(200):
@@ -220,10 +217,10 @@ class DuffingBody(Double):
             h *= 0.75
         raise AssertionError(f"no step: {y}")
 
-    def motion(self) -> Motion:
+    def motion(self):
         return Motion(self.y, self.z, *self._integrals)
 
-    def energies(self) -> Energies:
+    def energies(self):
         y, z = self.y, self.z
         return Energies(
             0.5 * self.mass * z * z,
@@ -232,7 +229,7 @@ class DuffingBody(Double):
             -self.external * y - self._work,
         )
 
-    def apply_impulse(self, impulse: float):
+    def apply_impulse(self, impulse):
         self.z += impulse / self.mass
 
     def holding_force(self, displacement, velocity):
@@ -247,12 +244,12 @@ class Upper(DuffingBody):
         return super().advance(time, size, tuple(-c for c in contact), foundation)
 
 
-def _value(coefficients: list[float], h: float) -> float:
+def _value(coefficients, h):
     """Faster than numpy for a few coefficients."""
     return reduce(lambda total, c: total * h + c, reversed(coefficients))
 
 
-def bodies(scene: Scene) -> tuple[BeamBody | None, DuffingBody | None]:
+def bodies(scene):
     """The scene's bodies at `first_contact`; a beam without inertia is that of the package, which is exact."""
     beam = spring = None
     if scene.massless:
@@ -276,14 +273,14 @@ def bodies(scene: Scene) -> tuple[BeamBody | None, DuffingBody | None]:
     return beam, spring
 
 
-def simulate(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> Trajectory:
+def simulate(scene, wrap=lambda beam, spring: (beam, spring)):
     """The master's run with the doubles (``wrap`` may replace them), which must not stop."""
     trajectory, stopped = stopping(scene, wrap)
     assert stopped is None
     return trajectory
 
 
-def stopping(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> tuple[Trajectory, RunStopped | None]:
+def stopping(scene, wrap=lambda beam, spring: (beam, spring)):
     """The run of `simulate`, and what stopped it."""
     beam, spring = wrap(*bodies(scene))
     recorder = MemoryRecorder(scene)
@@ -302,7 +299,7 @@ def stopping(scene: Scene, wrap=lambda beam, spring: (beam, spring)) -> tuple[Tr
     return trajectory, stopped
 
 
-def orders(errors, sizes) -> list[float]:
+def orders(errors, sizes):
     """Observed orders between neighbouring step sizes."""
     pairs = zip(pairwise(errors), pairwise(sizes), strict=True)
     return [float(np.log(e0 / e1) / np.log(h0 / h1)) for (e0, e1), (h0, h1) in pairs]
@@ -317,17 +314,17 @@ class Row(NamedTuple):
     energy: float  #: of both bodies, and what the coupling books [J]
 
 
-def solve(coupling, size: float, upper: Body, lower: Body, guess: Force = NO_FORCE, time: float = 0.0) -> Force:
+def solve(coupling, size, upper, lower, guess=NO_FORCE, time=0.0):
     """Make a step from where the bodies are, and return its contact force."""
     for body in (upper, lower):
         body.mark()
     return coupling.solve(upper, lower, time, size, (upper.motion(), lower.motion()), guess).contact
 
 
-def couple(coupling, size: float, steps: int, upper: Body, lower: Body) -> list[Row]:
+def couple(coupling, size, steps, upper, lower):
     """Make ``steps`` steps; the first row is the start."""
 
-    def row(contact: Force) -> Row:
+    def row(contact):
         ends = (upper.motion(), lower.motion())
         booked = coupling.booking(ends)
         return Row(*ends, contact, sum(upper.energies()) + sum(lower.energies()) + booked.stored + booked.dissipated)

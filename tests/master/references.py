@@ -1,34 +1,14 @@
-"""Scenes that the references are tested with, and what their exact solutions need of them."""
-
-from __future__ import annotations
-
-from typing import Any
+"""Scenes that the references are tested with, and an integration of theirs by scipy."""
 
 import numpy as np
-import pytest
 from scenes import scene_from_dict
 from scipy.integrate import solve_ivp
 
 from springbeam.monolithic.event_driven import simulate
-from springbeam.monolithic.exponential import ExponentialPropagator, Segment
-from springbeam.monolithic.semi_discrete import assemble
-from springbeam.results.trajectory import Trajectory
-from springbeam.scene import Scene, load_scene, with_changes
+from springbeam.monolithic.exponential import ExponentialPropagator
 
 
-def soft(n_elements: int = 6, **tables: Any) -> Scene:
-    """The scene `soft` on a coarser beam, with changes."""
-    tables["beam"] = {"n_elements": n_elements, **tables.get("beam", {})}
-    tables.setdefault("coupling", {"macro_step": 1e-3})
-    return with_changes(load_scene("soft"), **tables)
-
-
-def linear(**tables: Any) -> Scene:
-    """Return the scene of `soft` with a linear spring."""
-    return soft(**{**tables, "spring": {"cubic_stiffness": 0.0, **tables.get("spring", {})}})
-
-
-def dips(restitution: float, turn: float) -> tuple[Scene, list[float]]:
+def dips(restitution, turn):
     """Return a spring of ω = 10 rad/s that swings 0.1 m about 0, by steps of ``turn`` [rad], and when it strikes [s].
 
     The foundation is at −0.08 m: above it for (π − acos(0.08/A))·2/ω after each impact, A² = 0.08² + (e z/ω)². The dips
@@ -48,31 +28,15 @@ def dips(restitution: float, turn: float) -> tuple[Scene, list[float]]:
     return scene_from_dict(tables), times
 
 
-def kinds(trajectory: Trajectory) -> list[str]:
-    return [event.kind for event in trajectory.events]
-
-
-def matrices(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return M and K of the beam, and u = x, θ = 0."""
-    assert scene.beam is not None
-    mesh = assemble(scene.beam)
-    return mesh.M.toarray(), mesh.K.toarray(), mesh.slope_shape
-
-
-def tip_mass(scene: Scene) -> float:
-    """Return what a tip impulse meets [kg]."""
-    return float(1.0 / np.linalg.inv(matrices(scene)[0])[-1, -1])
-
-
-def integrated_anew(scene: Scene, patch: pytest.MonkeyPatch, t_end: float) -> Trajectory:
+def integrated_anew(scene, patch, t_end):
     """Return the reference's run of ``scene`` after scipy has integrated the first and longest step of each phase.
 
     Both have the equations of motion, `HybridSystem.motion`, and no numerical method in common.
     """
-    kept: dict[Any, tuple[tuple[ExponentialPropagator, Segment], ...]] = {}
+    kept = {}
     step = ExponentialPropagator._step
 
-    def noted(self: ExponentialPropagator, *arguments: Any) -> Segment | None:
+    def noted(self, *arguments):
         segment = step(self, *arguments)
         if segment is not None:
             first, last = kept.get(self.phase, ((self, segment), (self, segment)))
@@ -84,10 +48,9 @@ def integrated_anew(scene: Scene, patch: pytest.MonkeyPatch, t_end: float) -> Tr
     for propagator, segment in (one for some in kept.values() for one in some):
         s, phase = propagator.system, propagator.phase
 
-        def slope(_: float, X: np.ndarray) -> np.ndarray:
-            m = s.motion(phase, X)  # noqa: B023
-            rest = [m.z, m.z_dot, s.dissipation_rate(phase, X), s.load_power(X), 1.0]  # noqa: B023
-            return np.concatenate([X[s.V], m.a, rest])  # noqa: B023
+        def slope(_, X, s=s, phase=phase):
+            m = s.motion(phase, X)
+            return np.concatenate([X[s.V], m.a, [m.z, m.z_dot, s.dissipation_rate(phase, X), s.load_power(X), 1.0]])
 
         options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-18}
         begin, end = segment.states[0], segment.states[-1]

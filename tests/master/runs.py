@@ -1,7 +1,5 @@
 """Made-up runs: whatever a scene can have, without computing anything."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from springbeam.results.steps import BEAM_TELLS, SPRING_TELLS, STEP, STEP_COLUMNS

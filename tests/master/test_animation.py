@@ -1,7 +1,5 @@
 """The animation: its frames are the recorded ones, it plays as long as asked, and it says why it cannot be made."""
 
-from __future__ import annotations
-
 import subprocess
 from itertools import pairwise
 
@@ -35,24 +33,6 @@ def test_each_frame_is_a_recorded_one():
         assert motion.at(run.time[frame]) == frame
         assert shown._cursor.get_xdata() == [run.time[frame]] * 2
         assert shown._words.get_text().split() == ["t", "=", f"{run.time[frame]:.4f}", "s", str(run.phase[frame])]
-
-
-def test_what_stands_still_is_drawn_as_it_was_laid_out(monkeypatch):
-    """The frozen background with the moving parts upon it is the picture drawn in full, but for lines that cross."""
-
-    def pixels():
-        shown = picture_of(a_trajectory())
-        shown.show(77)
-        canvas = animation.FigureCanvasAgg(shown.figure)
-        canvas.draw()
-        return np.asarray(canvas.buffer_rgba())[..., :3].astype(float)
-
-    frozen = pixels()
-    monkeypatch.setattr(animation._Picture, "_freeze", lambda self: None)
-    full = pixels()
-    assert frozen.shape == full.shape == (500, 800, 3)
-    assert np.mean(np.any(np.abs(frozen - full) > 40.0, axis=2)) < 0.005
-    assert full.std() > 20.0
 
 
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)

@@ -1,21 +1,17 @@
 """``scheme = "auto"``: what it takes for which scene, and that what it takes is stable."""
 
-from __future__ import annotations
-
-import json
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import printed
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
 from springbeam.scene.automatic import choice, with_scheme_chosen
 from springbeam.scene.linearised import spring_frequency
-from springbeam.scene.resolution import STABLE, mesh_frequency, not_resolved, slowest_frequency
+from springbeam.scene.resolution import STABLE, mesh_frequency, slowest_frequency
 from springbeam.studies.stability.linear import LinearBody, LinearPair, spectral_radius
 
 PAIR = load_scene("soft")
@@ -47,12 +43,6 @@ def test_the_bound_is_on_the_fastest_frequency(share, expected):
 @pytest.mark.parametrize(("turn", "expected"), [(0.99, ("energy", 2)), (1.01, ("energy", 0))])
 def test_unresolved_motion_gets_degree_0(turn, expected):
     assert choice(auto(coupling={"macro_step": turn / slowest_frequency(PAIR.beam)}))[:2] == expected
-
-
-def test_the_fastest_frequency_is_above_all_that_are_kept():
-    for degree, modes in ((1, 0), (1, 5), (2, 0), (4, 7)):
-        beam = PAIR.beam.model_copy(update={"n_elements": 7, "element_degree": degree, "n_modes": modes})
-        assert modal_beam(beam).omega[-1] <= 1.0001 * mesh_frequency(beam)
 
 
 def test_below_the_bound_no_pair_amplifies():
@@ -129,19 +119,3 @@ def test_a_run_is_that_of_the_scheme_it_takes_and_says_so():
     }
     assert found.scene.coupling.scheme == "auto"
     assert "coupling" not in named.summary
-
-
-def test_the_command_says_what_it_took(tmp_path):
-    arguments = ["run", "soft", "--set", "time.t_end=0.02", "--set", "coupling.scheme=auto", "--no-plots"]
-    assert "coupling  hermite 2: the whole mesh's ω_max H = 0.433 <= 3" in printed(
-        *arguments, "--out", tmp_path / "out"
-    )
-    assert json.loads((tmp_path / "out" / "summary.json").read_text())["coupling"]["scheme"] == "hermite"
-
-
-@pytest.mark.parametrize(("share", "told"), [(0.9, False), (1.5, True)])
-def test_hermite_beyond_its_limit_is_told(share, told):
-    H = share * STABLE / mesh_frequency(PAIR.beam)
-    scene = with_changes(PAIR, coupling={"scheme": "hermite", "degree": 2, "macro_step": H})
-    said = not_resolved(scene, 0.0)
-    assert (said is not None and 'scheme = "hermite"' in said) == told

@@ -1,7 +1,5 @@
 """The command: exit codes, what it prints and where, and what an interruption leaves."""
 
-from __future__ import annotations
-
 import errno
 import io
 import json
@@ -9,7 +7,6 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
-from importlib import metadata
 from pathlib import Path
 
 import numpy as np
@@ -105,13 +102,6 @@ def test_results_are_named_after_the_file_and_a_second_run_does_not_touch_the_fi
     assert summary.stat().st_mtime_ns == first
 
 
-def test_force_replaces(here, unpainted):
-    printed("run", "soft", "--out", "here", "--set", "time.t_end=1")
-    printed("run", "soft", "--out", "here", "--force", "--no-plots")
-    assert load_trajectory(here / "here").time[-1] == 0.6
-    assert not list((here / "here").glob("*.png"))  # pictures of the earlier run would lie
-
-
 def test_report_fits_80_columns_with_whole_numbers_and_warnings_as_they_are(here, monkeypatch):
     """It says how many events are not shown; what rounding leaves of a zero is 0."""
 
@@ -140,18 +130,7 @@ def test_what_can_hardly_be_meant_is_told_before_the_run(here):
     assert command(*arguments, "--quiet").stderr == ""
 
 
-@pytest.mark.parametrize("name", ["duffing", "beam-on-stop"])
-def test_scenes_without_a_body(here, name, unpainted):
-    assert "impact" in printed("run", name)
-
-
 # -- bad input: exit code 2, nothing written (mistakes in the command line: tests/system/test_command_line.py) ------
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="nothing is forbidden to root")
-def test_a_place_that_cannot_be_written_is_bad_input(here):
-    (here / "locked").mkdir(mode=0o500)
-    assert "locked" in refused("run", "soft", "--out", "locked/run")
 
 
 # -- stopped early: exit code 3, what was computed is there -------------------------------------------------------
@@ -219,10 +198,6 @@ def test_progress_is_for_terminals(here, monkeypatch, terminal, options):
 # -- the other commands -------------------------------------------------------------------------------------------
 
 
-def test_version_is_that_of_the_package():
-    assert printed("--version") == f"springbeam {metadata.version('springbeam')}\n"
-
-
 def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch):
     """Keys that are alike are left out; a result that one run lacks is told nevertheless."""
     forces = iter((3.0, None))
@@ -243,21 +218,6 @@ def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch
     assert Path("p.png").stat().st_size > 10_000
     assert "spring.mass" in printed("compare", "a", "b", "--no-plots")
     refused("compare", "a")
-
-
-def test_a_run_that_stopped_names_what_goes_on_with_it(here, monkeypatch):
-    def stopping(scene, recorder, *args, **kwargs):
-        fake_steps(scene, recorder)
-        recorder.directory.checkpoint.write_bytes(b"")
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(springbeam.run.runner, "run", stopping)
-    result = command("run", "soft", "--no-plots")
-    assert result.exit_code == 3
-    assert "interrupted" in result.stderr
-    assert result.stderr.endswith(
-        "what was computed is in results/soft; springbeam resume results/soft goes on from the last checkpoint\n"
-    )
 
 
 def test_peaks_are_compared_over_one_window():

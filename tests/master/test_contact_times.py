@@ -1,7 +1,5 @@
 """How far two runs are apart in the times of their contacts, on events made by hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

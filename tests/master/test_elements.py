@@ -1,12 +1,10 @@
 """The simple partners: a mass on spring and damper beside a Taylor series, a wall that stays where it is."""
 
-from __future__ import annotations
-
 import pytest
 from bodies import DuffingBody
 
-from springbeam.bodies.elements import RigidWall, SpringDamper
-from springbeam.bodies.protocol import NO_FORCE, Motion
+from springbeam.bodies.elements import SpringDamper
+from springbeam.bodies.protocol import NO_FORCE
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.7])
@@ -21,10 +19,3 @@ def test_a_spring_damper_moves_and_stores_as_its_series(damping):
         assert found == pytest.approx(exact, rel=1e-12)
     assert element.energies() == pytest.approx(series.energies(), rel=1e-11)
     assert element.holding_force(0.2, -0.3) == pytest.approx(series.holding_force(0.2, -0.3), rel=1e-14)
-
-
-def test_a_wall_stays_where_it_is():
-    wall = RigidWall(0.3)
-    assert wall.advance(0.0, 0.2, (5.0, 0.0, 0.0)) == pytest.approx(Motion(0.3, 0.0, 0.3 * 0.2, 0.3 * 0.02))
-    wall.apply_impulse(1.0)
-    assert wall.motion()[:2] == (0.3, 0.0)

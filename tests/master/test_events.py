@@ -1,7 +1,5 @@
 """Where an event is: the cubic through both ends against numpy, and location to rounding."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -12,7 +10,7 @@ from springbeam.bodies.protocol import Motion
 from springbeam.contact.events import EventFunctions, Height, Holding, clearance, gap, locate
 from springbeam.contact.laws import Transmission
 from springbeam.contact.phases import Joint, Phase, common_velocity
-from springbeam.results.paths import Path, Sample
+from springbeam.results.paths import Path
 from springbeam.scene import Beam, Spring, load_scene
 
 SIZE = 0.02
@@ -34,17 +32,17 @@ def test_a_cubic_lies_in_its_hull(coefficients):
 class Counted:
     """f = cos(ωτ) − level; falls through zero at acos(level)/ω."""
 
-    def __init__(self, omega: float, level: float, slope_sign: float = 1.0) -> None:
+    def __init__(self, omega, level, slope_sign=1.0):
         self.omega, self.level, self.slope_sign = omega, level, slope_sign
-        self.sizes: list[float] = []
+        self.sizes = []
 
-    def __call__(self, size: float) -> Sample:
+    def __call__(self, size):
         self.sizes.append(size)
         angle = self.omega * size
         return math.cos(angle) - self.level, -self.slope_sign * self.omega * math.sin(angle)
 
 
-def located(f, size: float, tolerance: float, time: float) -> float:
+def located(f, size, tolerance, time):
     """`locate`, from where the cubic through both ends falls through zero."""
     guess = Path.through(f(0.0), f(size), size).falls_through_zero() * size
     return locate(f, guess, size, tolerance, time)
@@ -63,7 +61,7 @@ def test_locate_finds_the_event_to_the_tolerance(level):
 def test_locate_does_not_take_a_zero_that_the_function_rises_from():
     """f = τ² cos τ rises from zero; the cubic through (0, π) falls from there."""
 
-    def f(size: float) -> Sample:
+    def f(size):
         return size**2 * math.cos(size), 2.0 * size * math.cos(size) - size**2 * math.sin(size)
 
     assert Path.through(f(0.0), f(math.pi), math.pi).falls_through_zero() < 1e-12

@@ -1,7 +1,5 @@
 """The polynomial contact force of one step against numpy's polynomials and closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.polynomial import Legendre, Polynomial

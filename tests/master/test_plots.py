@@ -1,7 +1,5 @@
 """Pictures: which are drawn, what is in them, and that thinning keeps extremes."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import matplotlib
@@ -107,14 +105,6 @@ def test_shapes_start_at_first_contact():
     assert np.allclose(velocities.get_array(), 0.5 * (times[1:] + times[:-1]), rtol=1e-12)
 
 
-def test_mean_velocity_of_shapes():
-    """A beam moving as u = −2 t x² has the mean velocity −2 x² between any two shapes."""
-    t = np.linspace(0.0, 1.0, 30)
-    moving = dataclasses.replace(a_trajectory(), shapes=(t, np.outer(-2.0 * t, SHAPE_POINTS**2)))
-    for curve in plots._shapes_after_contact(moving).axes[1].collections[0].get_segments():
-        assert np.allclose(curve[:, 1], -2.0 * SHAPE_POINTS**2, rtol=1e-12)
-
-
 def test_shapes_too_far_apart_for_the_motion_say_so():
     fast = a_trajectory(v_tip=np.full(400, 1e3))
     assert any("1 km/s" in text or "1e+03 m/s" in text for text in texts(plots._shapes_after_contact(fast)))
@@ -123,25 +113,6 @@ def test_shapes_too_far_apart_for_the_motion_say_so():
     bouncing = dataclasses.replace(a_trajectory(v_tip=np.full(400, 0.5)), shapes=(t, inner))
     for slow in (a_trajectory(), bouncing):
         assert not any("faster than the steps" in text for text in texts(plots._shapes_after_contact(slow)))
-
-
-@pytest.mark.parametrize("draw", [plots._positions, plots._shapes_later])
-def test_names_of_levels_that_are_near_do_not_overprint(draw):
-    figure = draw(a_trajectory(with_changes(PAIR, stop={"position": -1e-5})))
-    figure.canvas.draw()
-    psi, phi = (
-        next(t for t in figure.findobj(matplotlib.text.Text) if t.get_text() == name).get_window_extent()
-        for name in "Ψφ"
-    )
-    assert psi.y0 >= phi.y1
-
-
-def test_many_events_become_ticks_in_rows():
-    events = [Event(0.6 * i / 100, "impact" if i % 2 else "separation") for i in range(100)]
-    figure = plots._positions(a_trajectory(events=events))
-    marks = [line for line in figure.axes[0].lines if line.get_marker() == "|"]
-    assert [len(line.get_xdata()) for line in marks] == [50, 50]
-    assert len({line.get_ydata()[0] for line in marks}) == 2
 
 
 FLIPS = np.where(np.arange(400) % 2, 1.0, -1.0)
@@ -186,12 +157,6 @@ def test_what_is_compared_is_drawn_in_the_unit_of_its_axis(tmp_path, monkeypatch
         assert np.abs(ax.lines[0].get_ydata()).max() == pytest.approx(1e3 * np.abs(run[column]).max(), rel=1e-12)
 
 
-def test_runs_in_which_nothing_moves_are_compared(tmp_path):
-    still = a_trajectory(SCENES["spring"], y=np.zeros(400), z=np.zeros(400))
-    comparison.draw({"one": still, "other": still}, tmp_path / "compared.png")
-    assert imread(tmp_path / "compared.png")[..., :3].std() > 0.02  # not blank
-
-
 # -- panels: what plots and report draw over time ---------------------------------------------------------------------
 
 
@@ -211,11 +176,6 @@ def test_a_motion_lost_in_the_other_is_enlarged():
     assert [p.axis for p in panels(a_trajectory())][:2] == ["position [mm]", "velocity [mm/s]"]
 
 
-def test_equilibrium_and_foundation_are_drawn_unless_far_outside():
-    assert panel("positions", a_trajectory()).levels == {"Ψ": 0.0, "φ": -0.015}
-    assert panel("positions", a_trajectory(with_changes(PAIR, stop={"position": -100.0}))).levels == {"Ψ": 0.0}
-
-
 @pytest.mark.parametrize(
     ("law", "phase", "force"),
     [
@@ -231,11 +191,6 @@ def test_phases_and_forces_have_the_words_of_the_law(law, phase, force):
     run = a_trajectory(scene, phase=np.where(np.arange(400) < 200, joined, "free"))
     assert [look.words for look, _ in shaded_phases(run)] == [phase, "free"]
     assert force in words_in(panel("forces", run))
-
-
-def test_what_alternates_is_said_to_do_so():
-    assert panel("velocities", a_trajectory(v_tip=FLIPS)).remarks == ["tip v(t, L) alternates from step to step"]
-    assert panel("velocities", a_trajectory()).remarks == []
 
 
 def test_energies_are_stacked_to_the_total_unless_one_is_negative_and_those_too_small_are_named():
@@ -282,12 +237,6 @@ def test_thinning_keeps_ends_order_and_the_extremes_of_every_column_of_pixels(va
         if len(span):
             assert values[kept].min() == values[span].min()
             assert values[kept].max() == values[span].max()
-
-
-def test_phases_hold_until_the_next_row():
-    time = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 4.0])
-    phase = np.array(["free", "free", "tied", "tied", "touch", "free"])
-    assert phase_intervals(time, phase) == [("free", 0.0, 2.0), ("tied", 2.0, 3.0), ("touch", 3.0, 4.0)]
 
 
 def test_more_phases_than_pixels_are_sampled_in_proportion():

@@ -1,7 +1,5 @@
 """The recipe of docs/contributing.md: a new contact law is one class in the master, one in the references."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -15,7 +13,7 @@ from springbeam.monolithic import laws as references
 from springbeam.pictures.panels import forces
 from springbeam.pictures.report.described import described
 from springbeam.run import runner
-from springbeam.scene import Scene, SceneError, load_scene, with_changes
+from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.scene import laws as facts
 from springbeam.scene.linearised import contact_energy
 from springbeam.scene.resolution import WINDOW
@@ -27,7 +25,7 @@ BLOCKS = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), 
 
 
 @pytest.fixture
-def stiffening(monkeypatch: pytest.MonkeyPatch) -> None:
+def stiffening(monkeypatch):
     """The law of the page, under its own name."""
     for block, module in zip(BLOCKS, (laws, facts, references), strict=True):
         for name in module.LAWS.keys() - {"stiffening"}:  # restored, with the new name taken out, after the test
@@ -36,7 +34,7 @@ def stiffening(monkeypatch: pytest.MonkeyPatch) -> None:
         exec(block, vars(module).copy())
 
 
-def bumper() -> Scene:
+def bumper():
     """A tip on the bumper, on a beam of 6 elements."""
     return with_changes(
         load_scene("soft"),
@@ -52,12 +50,12 @@ def bumper() -> Scene:
 K = 300.0
 
 
-def test_it_is_short() -> None:
+def test_it_is_short():
     assert sum(len(block.splitlines()) for block in BLOCKS) < 60
 
 
 @pytest.mark.usefixtures("stiffening")
-def test_master_and_reference_agree_and_keep_the_energy() -> None:
+def test_master_and_reference_agree_and_keep_the_energy():
     """Degree 2 on a beam of 6 elements: the reference's tolerance is 1e-11; p is past the knee √(k/h) = 1 cm."""
     scene = bumper()
     run, exact = simulate(scene), event_driven.simulate(scene)
@@ -71,7 +69,7 @@ def test_master_and_reference_agree_and_keep_the_energy() -> None:
 
 
 @pytest.mark.usefixtures("stiffening")
-def test_the_window_of_its_peak_force_and_its_frequency_are_its_own() -> None:
+def test_the_window_of_its_peak_force_and_its_frequency_are_its_own():
     """The energy at first contact goes into ½ k p² + ¼ h p⁴; there F′ = k + 3 h p²."""
     scene = bumper()
     h = K / 1e-4
@@ -91,7 +89,7 @@ def test_the_window_of_its_peak_force_and_its_frequency_are_its_own() -> None:
 
 
 @pytest.mark.usefixtures("stiffening")
-def test_pictures_report_and_messages_call_it_what_it_is() -> None:
+def test_pictures_report_and_messages_call_it_what_it_is():
     run = simulate(bumper())
     legends = {curve.name: curve.look.words for curve in forces(run).curves}
     assert legends["compliance_force"] == "of the bumper k p₊ + h p₊³"

@@ -1,7 +1,5 @@
 """The report: one valid page that needs nothing else, holds the run's own numbers, and says what is wrong with them."""
 
-from __future__ import annotations
-
 import base64
 import dataclasses
 import json
@@ -11,10 +9,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 from commands import printed, refused
-from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
+from runs import EVERY_EVENT, PAIR, SCENES, a_trajectory
 
 from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS
-from springbeam.pictures.frames import COIL_HEIGHTS, MOST_FRAMES, frames_of
+from springbeam.pictures.frames import MOST_FRAMES
 from springbeam.pictures.panels import panels
 from springbeam.pictures.report import page, shipped_command
 from springbeam.pictures.report.described import described
@@ -22,7 +20,6 @@ from springbeam.results.directory import REPORT
 from springbeam.results.trajectory import Event
 from springbeam.scene import load_scene, scene_from_dict, shipped_scenes, with_changes
 from springbeam.scene.reading import tomllib
-from springbeam.scene.statics import SHAPE_POINTS
 
 VOID = {"meta", "input", "br", "link", "img", "hr"}
 LOADS = {"src", "href", "srcset", "poster", "data", "action", "formaction", "background"}
@@ -110,10 +107,6 @@ def test_every_scene_has_one_valid_page_that_loads_nothing(has):
     assert not [name for name, body in absent.items() if body is None and name in curves(data)]
 
 
-def test_the_same_run_gives_the_same_page():
-    assert page(a_trajectory(events=EVERY_EVENT)) == page(a_trajectory(events=EVERY_EVENT))
-
-
 def test_what_a_scene_says_is_text_not_markup():
     scene = PAIR.model_copy(update={"title": "</script><script>alert(1)</script>"})
     found = Page(page(a_trajectory(scene)))
@@ -173,15 +166,6 @@ def test_events_are_marked_when_they_happened():
         assert array(curves(found.data)[name]["y"]).tolist() == [size] * len(EVERY_EVENT)
 
 
-def test_many_events_are_not_drawn_through_the_charts_nor_all_listed():
-    few, many = (
-        Page(page(a_trajectory(events=[Event(0.6 * i / n, "impact", 0, 0, 0, 0) for i in range(n)]))) for n in (60, 300)
-    )
-    assert len(few.data["backdrop"]) == 3
-    assert len(many.data["backdrop"]) == 2
-    assert "100 more are in events.csv" in many.texts["events"]
-
-
 def test_a_cascade_of_impacts_is_one_line_that_opens():
     bounces = [Event(0.1 + 0.01 * i, "stop_impact", 0, 0, 0, 0, 0.0, 0.5**i, 0.25**i) for i in range(5)]
     text = page(
@@ -205,14 +189,6 @@ def test_the_page_opens_with_the_scene_the_motion_and_the_results():
     assert "energy of degree 0, macro step 0.00025 s, to 0.6 s" in found.texts["described"]
 
 
-def test_a_scene_without_a_macro_step_or_with_other_bodies_is_described():
-    given = {"time": {"t_end": 1.0}, "coupling": {"relative_tolerance": 1e-4}, "contact": {"law": "tie"}}
-    scene = scene_from_dict({**given, "beam": {"element": "point_mass", "mass": 1.0}, "spring": {}})
-    said = dict(described(scene))
-    assert said["beam"] == "another body in its place: point mass"
-    assert said["steps"] == "energy of degree 0, macro steps that follow from tolerances, to 1 s"
-
-
 def test_phases_are_shaded_where_they_hold():
     run = a_trajectory(phase=np.where(np.linspace(0.0, 0.6, 400) < 0.3, "tied", "free"))
     tied, free = Page(page(run)).data["backdrop"]
@@ -234,39 +210,6 @@ def test_frames_are_the_recorded_shapes_with_the_spring_of_the_same_time():
     assert motion["time"] == times.tolist()
     assert motion["deflection"] == sparse.shapes[1].tolist()
     assert motion["y"] == run.y[::3].tolist()
-
-
-def test_the_coil_stands_below_the_stop_and_ends_at_the_spring():
-    motion = frames_of(a_trajectory())
-    assert motion.foot < PAIR.stop.position
-    for frame in (0, 17, len(motion.time) - 1):
-        heights = motion.heights("coil", frame)
-        assert (heights[0], heights[-1]) == (motion.foot, pytest.approx(motion.y[frame], rel=1e-15, abs=1e-15))
-        assert np.all(np.diff(heights) > 0.0)
-    assert np.all(np.diff(COIL_HEIGHTS) > 0.0)
-
-
-def test_frames_that_alternate_are_thinned_in_pairs():
-    n = 34 * (MOST_FRAMES // 2 - 1) + 1  # every 34th is of one kind
-    flips = np.where(np.arange(n) % 2, 1.0, -1.0)
-    time = np.arange(n) / 2.0**14
-    run = a_trajectory(n=n, time=time)
-    motion = frames_of(dataclasses.replace(run, shapes=(time, np.outer(flips, SHAPE_POINTS))))
-    assert len(motion.time) <= MOST_FRAMES
-    tips = motion.deflection[:, -1]
-    assert abs(np.mean(tips)) < 0.01
-    assert set(tips) == {-1.0, 1.0}
-
-
-def test_a_beam_lost_beside_the_spring_is_drawn_once_more_enlarged():
-    t = np.linspace(0.0, 0.6, 400)
-    tiny = 2e-6 * np.sin(9.0 * t)
-    run = a_trajectory(u_tip=tiny, y=-1e-2 * np.sin(5.0 * t))
-    run = dataclasses.replace(run, shapes=(t, np.outer(tiny, SHAPE_POINTS)))
-    data = Page(page(run)).data
-    assert data["motion"]["parts"].keys() == {"motion", "motion-beam"}
-    assert data["motion"]["parts"]["motion-beam"]["factor"] == pytest.approx(1e6)
-    assert "position-u_tip" in data["overTime"]
 
 
 def test_a_contact_lost_in_the_motion_is_drawn_once_more_enlarged():
@@ -324,11 +267,6 @@ def test_a_run_that_stopped_at_once_has_a_page(scene, rows):
     assert ("slider" in found.ids) == (rows == 2)
     assert (found.data is None) == (rows < 2)
     assert "stopped" in found.texts["warnings"]
-
-
-@pytest.mark.parametrize("columns", ODD_COLUMNS.values(), ids=ODD_COLUMNS)
-def test_odd_columns_have_a_page(columns):
-    Page(page(a_trajectory(events=EVERY_EVENT, **columns)))
 
 
 # -- how to run it again ------------------------------------------------------------------------------------------

@@ -1,9 +1,5 @@
 """Whether a macro step resolves the motion: frequencies beside the mesh's, and the criterion from both sides."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 from scenes import scene_from_dict
@@ -177,7 +173,7 @@ def test_steps_of_the_midpoint_rule_may_lag_behind_what_an_impact_sets_off(share
     """n steps that turn it by x lag by n x³/12: 1 rad of the fastest waves is the limit, those that die out left out,
     or 5 % of the way of a beam without inertia that moves at ω. The modal integrator and degree 2 do not lag."""
 
-    def said(omega: float, limit: float, other: dict[str, dict[str, Any]], **tables: dict[str, Any]) -> None:
+    def said(omega, limit, other, **tables):
         turn = share * (12.0 * limit / (omega * PAIR.duration)) ** 0.5
         given = with_changes(PAIR, **tables, coupling={"degree": 0, "macro_step": turn / omega})
         assert (not_resolved(given, 0.0, pace=omega) is None) is resolved

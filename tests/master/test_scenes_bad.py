@@ -1,13 +1,10 @@
 """Scene files that cannot be run: each is refused with its message, and leaves nothing behind."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
 from copy import deepcopy
 from pathlib import Path
-from typing import Any
 
 import jsonschema
 import pytest
@@ -25,11 +22,11 @@ TOML_IS = "; a line is a [table] or key = value, with numbers like 0.5 or 1e-3 a
 CASES = {f"{group}-{name}": case for group, cases in GROUPS.items() for name, case in cases.items()}
 
 
-def text_of(case: dict[str, Any]) -> str:
+def text_of(case):
     """The scene file of a case."""
     if "text" in case:
         return f"{case['text']}\n"
-    data: dict[str, Any] = deepcopy(BASE)
+    data = deepcopy(BASE)
     for name in case.get("without", []):
         table, _, key = name.partition(".")
         del (data[table] if key else data)[key or table]
@@ -40,7 +37,7 @@ def text_of(case: dict[str, Any]) -> str:
     return tomli_w.dumps(data)
 
 
-def check(path: Path | str, expected: list[str], here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def check(path, expected, here, monkeypatch):
     monkeypatch.chdir(here)
     before = sorted(here.rglob("*"))
     said = refused("run", path)
@@ -53,7 +50,7 @@ def check(path: Path | str, expected: list[str], here: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_refused_with_its_message(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refused_with_its_message(name, tmp_path, monkeypatch):
     expected = CASES[name]["error"]
     if name.startswith("syntax-"):
         expected += TOML_IS
@@ -65,7 +62,7 @@ def test_refused_with_its_message(name: str, tmp_path: Path, monkeypatch: pytest
 NO_TIME = "[time]: missing table; it must have t_end"
 GOOD = "[time]\nt_end = 1.0\n[spring]\nmass = 1.0\nlinear_stiffness = 3.0\n"
 NOT_UTF8 = "not TOML, which is text in UTF-8: … at byte "
-BYTES: dict[str, tuple[bytes, str]] = {
+BYTES = {
     "empty": (b"", NO_TIME),
     "blank": (b" \n\t\n", NO_TIME),
     "byte order mark": (b"\xef\xbb\xbf", NO_TIME),
@@ -110,21 +107,21 @@ BYTES: dict[str, tuple[bytes, str]] = {
 
 
 @pytest.mark.parametrize("name", BYTES)
-def test_whatever_bytes_are_in_it(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_whatever_bytes_are_in_it(name, tmp_path, monkeypatch):
     content, expected = BYTES[name]
     path = tmp_path / "scene.toml"
     path.write_bytes(content)
     check(path, [expected], tmp_path, monkeypatch)
 
 
-def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
+def test_a_byte_order_mark_does_no_harm(tmp_path):
     (tmp_path / "marked.toml").write_bytes(b"\xef\xbb\xbf" + GOOD.replace("\n", "\r\n").encode())
     (tmp_path / "plain.toml").write_text(GOOD)
     assert load_scene(tmp_path / "marked.toml") == load_scene(tmp_path / "plain.toml")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX files")
-def test_what_is_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_no_file(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe.toml")
     (tmp_path / "folder.toml").mkdir()
     (tmp_path / "circle.toml").symlink_to("circle.toml")
@@ -149,12 +146,12 @@ NOT_IN_SCHEMA |= {"type-exponent-as-count", "type-float-as-count", "type-float-a
 
 
 @pytest.mark.parametrize("name", [n for n in CASES if n.split("-")[0] in ("key", "table", "missing", "type", "range")])
-def test_the_schema_refuses_it_too(name: str) -> None:
+def test_the_schema_refuses_it_too(name):
     accepted = SCHEMA.is_valid(json.loads(json.dumps(tomllib.loads(text_of(CASES[name])), default=str)))
     assert accepted == (name in NOT_IN_SCHEMA)
 
 
-def test_the_schema_accepts_the_scenes_that_are_shipped_and_begun() -> None:
+def test_the_schema_accepts_the_scenes_that_are_shipped_and_begun():
     SCHEMA.check_schema(SCHEMA.schema)
     texts = [
         reference.beginning('a "scene"'),

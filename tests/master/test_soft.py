@@ -1,10 +1,8 @@
 """Soft laws on bodies exact to rounding: energy at any stiffness, orders 2, 4 and 6, cost."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-from bodies import DuffingBody, Row, Upper, couple, orders, solve, unit_beam
+from bodies import DuffingBody, Upper, couple, orders, solve, unit_beam
 
 from springbeam.bodies.protocol import NO_FORCE, Body, Motion
 from springbeam.contact.laws import Compliance, Link
@@ -15,7 +13,7 @@ from springbeam.coupling.soft import SoftSolver
 DEGREES = [0, 1, 2]
 
 
-def couple_by(law, degree: int, size: float, steps: int, upper: Body, lower: Body) -> tuple[list[Row], SoftSolver]:
+def couple_by(law, degree, size, steps, upper, lower):
     """The rows; their energies are conserved to 1e-11, through whatever is dissipated."""
     coupling = SoftSolver(law, degree, 1e-13)
     rows = couple(coupling, size, steps, upper, lower)
@@ -46,7 +44,7 @@ def test_the_order_is_twice_the_number_of_coefficients(degree, order, q):
     law, t = Compliance({1.5: 3e2, 2.0: 1e4, 3.0: 1e6}[q], q), 0.08
     counts = (4, 8, 16) if degree == 2 else (16, 32, 64)
 
-    def last(d: int, n: int) -> np.ndarray:
+    def last(d, n):
         rows, _ = couple_by(law, d, t / n, n, unit_beam(2, slope=-0.3), DuffingBody(k1=3.0, k2=-0.2))
         return np.array([rows[-1].upper.displacement, rows[-1].lower.displacement])
 
@@ -78,7 +76,7 @@ def test_what_damping_takes_is_booked(law, degree, size):
 class Affine(Body):
     """Ends a step at ``free`` + ``response``·C [m]."""
 
-    def __init__(self, free: float, response: float, size: float):
+    def __init__(self, free, response, size):
         self.free, self.response, self.mass, self.state = free, response, 0.5 * size**2 / abs(response), 0.0
 
     def advance(self, time, size, contact, foundation=NO_FORCE):

@@ -3,17 +3,11 @@
 The script is below the master, in place of the functions of the shared library, so that whatever is called is seen.
 """
 
-from __future__ import annotations
-
 import ctypes
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from types import SimpleNamespace
-from typing import Any
-
-import pytest
 
 from springbeam.bodies import functions
 from springbeam.bodies.fmu_bodies import release
@@ -48,7 +42,7 @@ class Fault:
     skip: int = 3
     happened: int = 0
 
-    def after(self, fmu: str, function: str, where: str) -> bool:
+    def after(self, fmu, function, where):
         if (fmu, function) != (self.fmu, self.function) or (self.once and self.happened):
             return False
         if not self.happened:
@@ -70,18 +64,18 @@ class Script:
     where: str = "start"
 
     @contextmanager
-    def at(self, where: str) -> Iterator[None]:
+    def at(self, where):
         before, self.where = self.where, where
         try:
             yield
         finally:
             self.where = before
 
-    def check(self) -> None:
+    def check(self):
         """Every instance is used as FMI allows, and freed once; but for one that returned fmi2Fatal, never touched."""
         release()
         for fmu in ("beam", "spring"):
-            allowed: set[str] | None = None
+            allowed = None
             alive = False
             for name, function, status in self.calls:
                 if name != fmu:
@@ -107,7 +101,7 @@ class Script:
             assert alive == (allowed == set()), f"{fmu} was not freed"
 
 
-def hang() -> None:
+def hang():
     """Call a C function that never returns, not even for a signal: the second lock of a mutex."""
     print("hanging", flush=True)
     library, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(256)
@@ -120,19 +114,19 @@ def hang() -> None:
 class Library:
     """A shared library with the script between it and its callers."""
 
-    def __init__(self, script: Script, path: str) -> None:
+    def __init__(self, script, path):
         self._script, self._library = script, real_cdll.LoadLibrary(path)
         self._fmu = "beam" if "beam" in path.rsplit("/", 1)[-1] else "spring"
         self._handle = self._library._handle
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name):
         return getattr(self._library, name)
 
-    def __getitem__(self, name: str) -> Callable[..., Any]:
+    def __getitem__(self, name):
         script, fmu, function = self._script, self._fmu, self._library[name]
 
-        def call(*arguments: Any) -> Any:
-            function.restype = call.restype  # type: ignore[attr-defined]
+        def call(*arguments):
+            function.restype = call.restype
             fault = next((f for f in script.faults if f.after(fmu, name, script.where)), None)
             if fault is None:
                 result = function(*arguments)
@@ -155,7 +149,7 @@ class Library:
 real_cdll = functions.cdll
 
 
-def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
+def installed(monkeypatch, *faults):
     """The script of all FMUs loaded from now on; it follows where the master is.
 
     That is "start", the phase of the step attempted, "location" while an event is being located, "rollback" while
@@ -165,16 +159,16 @@ def installed(monkeypatch: pytest.MonkeyPatch, *faults: Fault) -> Script:
     release()  # what is kept would not be loaded
     monkeypatch.setattr(functions, "cdll", SimpleNamespace(LoadLibrary=partial(Library, script)))
 
-    def watch(owner: Any, name: str, where: Callable[..., str]) -> None:
+    def watch(owner, name, where):
         function = getattr(owner, name)
 
-        def watched(*arguments: Any) -> Any:
+        def watched(*arguments):
             with script.at(where(*arguments)):
                 return function(*arguments)
 
         monkeypatch.setattr(owner, name, watched)
 
-    def phase(_: Pair, state: Any, *_arguments: Any) -> str:
+    def phase(_, state, *_arguments):
         return script.where if script.where == "location" else state.phase.name
 
     watch(Pair, "attempt", phase)

@@ -1,7 +1,5 @@
 """`oscillator.c` as FMUs: a plain C FMU that is not ours, with the capabilities that a test wants it to have."""
 
-from __future__ import annotations
-
 import functools
 import subprocess
 import tempfile
@@ -37,7 +35,7 @@ ALL = {
 
 
 @functools.cache
-def _library(lacks: str | None) -> bytes:
+def _library(lacks):
     folder = Path(tempfile.mkdtemp(prefix="springbeam-oscillator-"))
     source, library = Path(__file__).with_suffix(".c"), folder / "oscillator.so"
     renamed = [] if lacks is None else [f"-D{lacks}=renamed"]
@@ -48,7 +46,7 @@ def _library(lacks: str | None) -> bytes:
     return content
 
 
-def _description(version: str, **flags: bool) -> str:
+def _description(version, **flags):
     variables, outputs = [], ""
     for number, name in enumerate([*_INPUTS, *_OUTPUTS, *_PARAMETERS]):
         said, start = f'name="{name}" valueReference="{number}" ', ""
@@ -77,7 +75,7 @@ def _description(version: str, **flags: bool) -> str:
     )
 
 
-def made(path: Path, *, version: str = "2.0", lacks: str | None = None, slopes: bool = True, **flags: bool) -> Path:
+def made(path, *, version="2.0", lacks=None, slopes=True, **flags):
     """Write the FMU ``path`` of a version of FMI, without one of its functions, and return the path.
 
     ``flags`` are "state" and "variable", of the size of its steps; it can do what is not said.

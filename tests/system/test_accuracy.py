@@ -1,7 +1,5 @@
 """An accuracy asked for is kept: judged by the monolithic reference, on scenes that are not shipped."""
 
-from __future__ import annotations
-
 import json
 import sys
 from dataclasses import replace
@@ -12,7 +10,6 @@ import pytest
 import tomli_w
 from commands import printed, refused
 from scenes import completed, scene_from_dict
-from scipy.special import ellipj
 
 from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_time_difference, impulse_difference
@@ -28,7 +25,6 @@ from springbeam.studies.accuracy import differences, simulate
 from springbeam.studies.crosscheck import compare
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.orders import Orders
-from springbeam.studies.stability.predict import predict
 from springbeam.studies.sweep import Sweep
 from springbeam.studies.tradeoff import Tradeoff
 
@@ -82,36 +78,6 @@ def test_the_peak_force_is_that_of_the_laws_curve(window):
     begins = times[times <= 0.25 - window]
     means = (np.interp(begins + window, exact.time, impulse) - np.interp(begins, exact.time, impulse)) / window
     assert run.summary["contact_force_max"] == pytest.approx(means.max(), rel=1e-3)
-
-
-def test_a_soft_spring_is_right_at_every_row_of_an_output_interval(tmp_path):
-    """y = A cn(ωt, -μ) = A cd(ω √(1 + μ) t, μ/(1 + μ)), ω² = k₁ + k₂A² [m = 1], μ = -k₂A²/2ω²: 27 periods."""
-    scene = load_scene("duffing")
-    spring = scene.spring
-    out = tmp_path / "out"
-    arguments = ("run", "duffing", "--set", "time.t_end=100", "--accuracy", "1e-3", "--output-interval", "0.1")
-    printed(*arguments, "--no-plots", "--out", out)
-    found = np.genfromtxt(out / "trajectory.csv", delimiter=",", names=True, dtype=None)
-    assert len(found) == 1001
-    reach = spring.equilibrium
-    omega2 = spring.linear_stiffness + spring.cubic_stiffness * reach**2
-    mu = -spring.cubic_stiffness * reach**2 / (2.0 * omega2)
-    _, cn, dn, _ = ellipj(np.sqrt(omega2 * (1.0 + mu)) * found["time"], mu / (1.0 + mu))
-    exact = reach * cn / dn
-    assert np.abs(found["y"] - exact).max() <= 1e-3 * np.abs(exact - exact[0]).max()
-    assert load_trajectory(out).summary["resolved"] is True
-
-
-@pytest.mark.parametrize(("name", "of"), [("y_min", np.min), ("y_max", np.max), ("z_max", np.max)])
-def test_metrics_are_those_of_the_curve(name, of):
-    """At 1e-3 a hard spring has few rows a period: the lowest is not the lowest place."""
-    run = simulate(scene_from_dict({**SCENES["hard spring"], "accuracy": 1e-3}))
-    exact = event_driven.simulate(run.scene, sample_times=np.linspace(0.0, run.time[-1], 2001))
-    wanted = of(np.abs(exact.z) if name == "z_max" else exact.y)
-    rows = of(np.abs(run.z) if name == "z_max" else run.y)
-    assert METRICS[name](run) == pytest.approx(wanted, rel=2e-3)
-    if name == "y_min":
-        assert abs(rows / wanted - 1.0) > 2e-3
 
 
 def test_two_runs_are_compared_between_rows_in_events_and_in_the_peak_force():
@@ -242,24 +208,6 @@ def test_what_a_scheme_changes_of_the_energy_is_settled_by_runs_that_agree():
     assert any("has changed the energy" in warning for warning in again.summary["warnings"])
 
 
-def test_more_accuracy_costs_more_steps():
-    steps = [simulate(scene_from_dict({**WITH_STOP, "accuracy": a})).summary["macro_steps"] for a in (1e-2, 1e-4, 1e-6)]
-    assert steps[0] < steps[1] < steps[2]
-
-
-def test_the_scene_as_run_says_how_it_is_run():
-    found = simulate(scene_from_dict({**STIFF_ON_SOFT, "accuracy": 1e-3}))
-    assert found.scene.accuracy is None
-    again = simulate(found.scene)
-    np.testing.assert_array_equal(again.u_tip, found.u_tip)
-
-
-def test_the_papers_law_has_no_accuracy():
-    scene = {**WITH_STOP, "contact": {"law": "paper"}, "accuracy": 1e-3}
-    with pytest.raises(SceneError, match='law = "paper"'):
-        simulate(scene_from_dict(scene))
-
-
 @pytest.mark.parametrize("reach", [1e3, 1.0, 1e-9, 1e-15])
 @pytest.mark.parametrize(
     ("asked", "rows", "bound"), [({"accuracy": 1e-3}, 51, 1e-7), ({"coupling": {"macro_step": 0.1}}, 51, 1e-10)]
@@ -381,11 +329,6 @@ def test_orders_are_those_of_the_scheme_that_was_picked(asking, tmp_path):
     assert 4.5 <= tip["order_H"] <= 7.0
 
 
-def test_crosscheck_compares_soft_laws_that_were_picked(asking, tmp_path):
-    asking.write_text(tomli_w.dumps(completed({**ASKING, "contact": {"law": "compliance"}})))
-    assert "accuracy 0.0001 asked: energy 2, H = " in printed("crosscheck", asking, "--out", tmp_path / "out")
-
-
 def test_each_run_of_a_sweep_picks_its_own():
     scene = scene_from_dict({**STIFF_ON_SOFT, "accuracy": 1e-3})
     found = Sweep(scene=scene, vary=(), metric=("y_min", "macro_steps")).record({})
@@ -401,10 +344,6 @@ def test_tradeoff_leaves_the_accuracy_out_and_says_so(asking):
     cases = [case for case in study.cases().values() if case["family"] == "energy 0"]
     calls = [study.record(case)["cost_macro_steps"] for case in cases]
     assert len(set(calls)) == len(calls) == 4
-
-
-def test_a_prediction_says_that_the_accuracy_picks_otherwise(asking):
-    assert any("accuracy = 0.0001 picks" in note for note in predict(load_scene(asking)).notes)
 
 
 @pytest.mark.parametrize("key", ["scheme", "degree", "macro_step", "relative_tolerance", "tolerance"])

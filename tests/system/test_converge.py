@@ -1,7 +1,5 @@
 """`springbeam converge`, and `--accuracy --mesh`: sequences and beams whose order and limit are known."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -23,13 +21,6 @@ def test_a_sequence_of_one_order_gives_it_and_its_limit(order, sizes):
     found = settled([3.0 + 0.1 * n**-order for n in sizes], sizes)
     assert (found.order, found.limit) == pytest.approx((order, 3.0), rel=1e-9)
     assert found.error == pytest.approx(0.1 * sizes[-1] ** -order, rel=1e-6)
-
-
-@pytest.mark.parametrize("values", [(1.0, 2.0, 1.5), (1.0, 1.1, 1.3), (1.0, 1.5, 1.9), (1.0, None, 1.1)])
-def test_values_that_do_not_settle_have_no_limit(values):
-    found = settled(values, (1, 2, 4))
-    change = None if None in values else values[-1] - values[-2]
-    assert (found.change, found.order, found.limit) == (change, None, None)
 
 
 def test_beyond_all_modes_there_is_nothing():

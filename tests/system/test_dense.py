@@ -1,7 +1,5 @@
 """A run between its rows: the order of its dense output from both sides, and every column at its place."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -46,16 +44,6 @@ def test_the_order_between_rows(fine, scheme, degree):
         at_coarse, at_fine = (error(run, fine, column, parts) for run in (coarse, finer))
         assert at_fine < allowed, column
         assert low < np.log2(at_coarse / at_fine) < high, column
-
-
-def test_the_fine_run_is_right_between_its_rows(fine):
-    """By the reference, which shares nothing with the co-simulation."""
-    times = np.linspace(0.005, 0.14, 301) + 1.7e-5
-    exact = event_driven.simulate(SOFT, sample_times=times)
-    assert np.isin(times, exact.time).all()
-    known = np.searchsorted(exact.time, times)
-    assert np.abs(fine.at(times).y - exact.y[known]).max() < 1e-10
-    assert np.abs(fine.at(times).u_tip - exact.u_tip[known]).max() < 1e-10
 
 
 @pytest.mark.parametrize(

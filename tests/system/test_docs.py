@@ -1,7 +1,5 @@
 """The documentation is followed literally: programs and commands run, links lead somewhere, its table is current."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os
@@ -10,9 +8,7 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from commands import COMMAND, HANGS, command
@@ -59,7 +55,7 @@ NOT_RUN = {
 }
 
 
-def module(name: str) -> ModuleType:
+def module(name):
     """A script of the folder of the pages."""
     specification = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     loaded = importlib.util.module_from_spec(specification)
@@ -76,11 +72,11 @@ def test_every_page_has_its_place_on_the_site_and_in_the_index():
     assert sorted(listed) == sorted(["../README.md", *(p.name for p in DOCS.glob("*.md") if p.name != "README.md")])
 
 
-def blocks(page: Path, language: str) -> list[str]:
+def blocks(page, language):
     return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), re.M | re.S)
 
 
-def shell_lines() -> list[tuple[str, int, str]]:
+def shell_lines():
     return [
         (page.name, number, line)
         for page in PAGES
@@ -89,11 +85,11 @@ def shell_lines() -> list[tuple[str, int, str]]:
     ]
 
 
-def reason_not_to_run(line: str) -> str | None:
+def reason_not_to_run(line):
     return next((reason for start, reason in NOT_RUN.items() if line.startswith(start)), None)
 
 
-def shell_pages() -> list[Path]:
+def shell_pages():
     return [page for page in PAGES if not all(map(reason_not_to_run, "\n".join(blocks(page, "sh")).splitlines()))]
 
 
@@ -188,16 +184,16 @@ SOURCES = {
 }
 
 
-def sources(path: str) -> list[str]:
+def sources(path):
     """Return the sources at the end of whose path this one stands, or all of a folder."""
     return [text for at, text in SOURCES.items() if at.endswith(f"/{path}") or (path[-1] == "/" and f"/{path}" in at)]
 
 
-def holds(text: str, name: str) -> bool:
+def holds(text, name):
     return all(re.search(rf"\b{word}\b", text) for word in re.split(r"\W+", name))
 
 
-def missing(text: str) -> Iterator[str]:
+def missing(text):
     """Names of a page that are not there: `path/file.py`, `file.py: name`, `name` of `file.py`, `Class.member`, and the
     functions in a line of a table that ends with their files."""
     for span in re.findall(r"`([^`\n]+)`", text):

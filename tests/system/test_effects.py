@@ -1,15 +1,10 @@
 """Keys without effect: told where, and only where, a run is the same to the last bit without them."""
 
-from __future__ import annotations
-
-from typing import Any
-
 import numpy as np
 import pytest
 
 from springbeam import SceneError, load_scene, simulate, with_changes
-from springbeam.results.trajectory import Trajectory
-from springbeam.scene import Scene, suspicions
+from springbeam.scene import suspicions
 from springbeam.scene.effects import effects
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
@@ -45,7 +40,7 @@ SCENES = {
         load_scene("paper-fig2"), time={"t_end": 0.6}, beam={"n_elements": 4, "n_modes": 0}, contact={"law": "paper"}
     ),
 }
-VALUES: dict[str, Any] = {
+VALUES = {
     "beam.n_elements": 3,
     "beam.element_degree": 2,
     "beam.reduced_integration": True,
@@ -62,10 +57,10 @@ VALUES: dict[str, Any] = {
     "coupling.tolerance": 1e-3,
     "coupling.feedback_tolerance": 1e-2,
 }
-_RUNS: dict[str, Trajectory] = {}
+_RUNS = {}
 
 
-def same(a: Trajectory, b: Trajectory) -> bool:
+def same(a, b):
     """Return whether two runs are the same to the last bit, but for what the clock says."""
     numbers = [
         {
@@ -82,13 +77,13 @@ def same(a: Trajectory, b: Trajectory) -> bool:
     )
 
 
-def made(name: str, scene: Scene) -> Trajectory:
+def made(name, scene):
     return _RUNS.setdefault(name, simulate(scene))
 
 
 @pytest.mark.parametrize("place", VALUES)
 @pytest.mark.parametrize("name", SCENES)
-def test_a_key_is_told_where_it_changes_nothing(name: str, place: str) -> None:
+def test_a_key_is_told_where_it_changes_nothing(name, place):
     table, key = place.split(".")
     if SCENES[name].under(table) is None or (table == "coupling" and name in ("beam", "spring")):
         return  # an accuracy gives a scheme to one body as well: nothing is said of it
@@ -104,19 +99,19 @@ def test_a_key_is_told_where_it_changes_nothing(name: str, place: str) -> None:
     assert same(made(name, SCENES[name]), simulate(scene)) == bool(told), (told, suspicions(scene))
 
 
-def test_every_row_of_the_table_is_looked_at() -> None:
+def test_every_row_of_the_table_is_looked_at():
     """But the law itself and the scheme, which other keys come with."""
     listed = {place for effect in effects() for place in effect.keys}
     assert listed - VALUES.keys() == {"contact.law", "coupling.scheme"}
 
 
-def test_a_load_that_begins_after_the_run_is_told() -> None:
+def test_a_load_that_begins_after_the_run_is_told():
     late = with_changes(SOFT, loads=[{"on": "tip", "signal": "step", "start": 0.03}])
     assert suspicions(late) == ["[loads.0] start = 0.03: plays no part here; the run ends at 0.03 s"]
     assert np.array_equal(simulate(late).y, simulate(SOFT).y)
 
 
-def test_a_law_between_no_two_bodies_is_told() -> None:
+def test_a_law_between_no_two_bodies_is_told():
     scene = with_changes(SCENES["spring"], contact={"law": "compliance", **LAW})
     assert [line.partition(":")[0] for line in suspicions(scene)] == [
         '[contact] law = "compliance"',

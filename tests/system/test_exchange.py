@@ -1,7 +1,5 @@
 """What ordinary masters do, measured against the energy scheme and the reference."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,7 @@ from springbeam.monolithic import event_driven
 ORDINARY = [("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
 
 
-def soft(stiffness: float, size: float, scheme: str, degree: int, t_end: float):
+def soft(stiffness, size, scheme, degree, t_end):
     law = {"law": "compliance", "stiffness": stiffness, "exponent": 1.0}
     coupling = {"scheme": scheme, "degree": degree, "macro_step": size}
     return with_changes(load_scene("soft"), time={"t_end": t_end}, contact=law, coupling=coupling)

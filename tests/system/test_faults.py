@@ -1,12 +1,9 @@
 """FMUs that fail in every phase: the run goes on as designed or stops by name, and nothing computed is lost."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -20,10 +17,10 @@ from springbeam.scene.reading import tomllib
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
 PATH = Path(__file__).with_name("faults.toml")
-SCENE: dict[str, Any] = tomllib.loads(PATH.read_text(encoding="utf-8"))
+SCENE = tomllib.loads(PATH.read_text(encoding="utf-8"))
 COMPLIANCE = {"law": "compliance", "stiffness": 1e3, "exponent": 1.5}
 #: Tables that differ, and where the master comes by.
-LAWS: dict[str, tuple[dict[str, dict[str, Any]], tuple[str, ...]]] = {
+LAWS = {
     "energy": ({}, ("free", "tied", "touch", "seated", "location")),
     "hermite": (
         {"coupling": {"scheme": "hermite", "degree": 2}},
@@ -39,8 +36,8 @@ Run = Callable[..., tuple[int, Path, Script]]
 
 
 @pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
-    def started(law: str, *faults: Fault, name: str = "faulty") -> tuple[int, Path, Script]:
+def run(tmp_path, monkeypatch):
+    def started(law, *faults, name="faulty"):
         changes, _ = LAWS[law]
         scene = SCENE | {table: {**SCENE[table], **change} for table, change in changes.items()}
         (tmp_path / "scene.toml").write_text(tomli_w.dumps(scene))
@@ -54,10 +51,10 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     return started
 
 
-_WHOLE: dict[str, dict[str, bytes]] = {}
+_WHOLE = {}
 
 
-def whole(run: Run, law: str) -> dict[str, bytes]:
+def whole(run, law):
     """The files of a run without a fault."""
     if law not in _WHOLE:
         code, directory, script = run(law, name="whole")
@@ -69,7 +66,7 @@ def whole(run: Run, law: str) -> dict[str, bytes]:
     return _WHOLE[law]
 
 
-def check_stopped(code: int, directory: Path, expected: dict[str, bytes], cause: str) -> None:
+def check_stopped(code, directory, expected, cause):
     """Exit code 3; the summary says why and when; the rows are the first ones of the run without a fault."""
     assert code == 3
     summary = json.loads((directory / "summary.json").read_text())
@@ -133,9 +130,7 @@ LASTING = [
     # With a row only the beam is read, for its shape.
     [(fmu, *case) for case in LASTING for fmu in ("beam", "spring") if (fmu, case[1]) != ("spring", "row")],
 )
-def test_a_lasting_fault_stops_the_run(
-    run: Run, fmu: str, law: str, where: str, function: str, kind: str, cause: str
-) -> None:
+def test_a_lasting_fault_stops_the_run(run, fmu, law, where, function, kind, cause):
     expected = whole(run, law)
     fault = Fault(fmu, function, where, kind)
     code, directory, script = run(law, fault)
@@ -147,9 +142,7 @@ def test_a_lasting_fault_stops_the_run(
 @pytest.mark.parametrize("fmu", ["beam", "spring"])
 @pytest.mark.parametrize(("law", "where"), [case for case in EVERYWHERE if case[0] != "paper"])
 @pytest.mark.parametrize(("function", "kind"), [("fmi2DoStep", "Discard"), ("fmi2GetReal", "nan")])
-def test_a_fault_that_passes_is_stepped_over(
-    run: Run, fmu: str, law: str, where: str, function: str, kind: str
-) -> None:
+def test_a_fault_that_passes_is_stepped_over(run, fmu, law, where, function, kind):
     fault = Fault(fmu, function, where, kind, once=True)
     code, directory, script = run(law, fault)
     assert fault.happened == 1
@@ -169,7 +162,7 @@ def test_a_fault_that_passes_is_stepped_over(
 @pytest.mark.parametrize("fmu", ["beam", "spring"])
 @pytest.mark.parametrize("law", ["energy", "hermite", "compliance", "jacobi"])
 @pytest.mark.parametrize("kind", [*NAMES, "raise"])
-def test_a_rollback_that_fails_stops_the_run(run: Run, fmu: str, law: str, kind: str) -> None:
+def test_a_rollback_that_fails_stops_the_run(run, fmu, law, kind):
     expected = whole(run, law)
     discard = Fault(fmu, "fmi2DoStep", "touch", "Discard", once=True)
     code, directory, script = run(law, discard, Fault(fmu, "fmi2SetFMUstate", "rollback", kind, skip=0))
@@ -179,7 +172,7 @@ def test_a_rollback_that_fails_stops_the_run(run: Run, fmu: str, law: str, kind:
 
 @pytest.mark.parametrize("fmu", ["beam", "spring"])
 @pytest.mark.parametrize("law", ["energy", "hermite", "compliance", "jacobi"])
-def test_wild_numbers_stop_the_run(run: Run, fmu: str, law: str) -> None:
+def test_wild_numbers_stop_the_run(run, fmu, law):
     """1e300 m is a finite number: it is recorded, as it came, and the energy tells."""
     code, directory, script = run(law, Fault(fmu, "fmi2GetReal", "touch", "1e300", skip=2))
     script.check()
@@ -194,14 +187,14 @@ def test_wild_numbers_stop_the_run(run: Run, fmu: str, law: str) -> None:
     ("function", "kind"),
     [*product(("fmi2SetupExperiment", "fmi2GetReal"), NAMES), ("fmi2GetReal", "nan")],
 )
-def test_an_fmu_that_does_not_start_is_refused(run: Run, fmu: str, function: str, kind: str) -> None:
+def test_an_fmu_that_does_not_start_is_refused(run, fmu, function, kind):
     code, directory, script = run("energy", Fault(fmu, function, "start", kind, skip=0))
     script.check()
     assert code == 2
     assert not directory.exists()
 
 
-def test_after_fmi2_fatal_the_next_run_is_as_ever(run: Run) -> None:
+def test_after_fmi2_fatal_the_next_run_is_as_ever(run):
     expected = whole(run, "energy")
     code, *_ = run("energy", Fault("spring", "fmi2DoStep", "tied", "Fatal"))
     assert code == 3

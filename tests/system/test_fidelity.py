@@ -1,7 +1,5 @@
 """As much model as a scene needs: elements of any degree, a beam without inertia."""
 
-from __future__ import annotations
-
 from contextlib import closing
 
 import numpy as np
@@ -12,8 +10,7 @@ from springbeam import simulate, with_changes
 from springbeam.bodies.fmu_bodies import FmuBeam
 from springbeam.bodies.protocol import NO_FORCE
 from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene import Beam, Scene
-from springbeam.studies.crosscheck import compare
+from springbeam.scene import Beam
 
 
 @pytest.mark.parametrize("reduced", [False, True])
@@ -35,7 +32,7 @@ def test_the_fmu_vibrates_with_the_frequencies_of_the_reference(degree, n, reduc
             assert body.motion().velocity == pytest.approx(exact, abs=1e-10 * modes.inverse_tip_mass)
 
 
-def quasi_static(**beam: object) -> Scene:
+def quasi_static(**beam):
     """A loaded beam comes down on a heavy spring that moves already."""
     return scene_from_dict(
         {
@@ -62,10 +59,3 @@ def test_without_inertia_is_the_limit_of_a_light_beam():
     assert differences[0] / differences[1] == pytest.approx(10.0, rel=0.01)
     assert differences[1] / differences[2] == pytest.approx(10.0, rel=0.01)
     assert differences[2] < 1e-6
-
-
-@pytest.mark.parametrize("loads", [[], [{"on": "spring", "signal": "harmonic", "frequency": 2.0, "amplitude": 0.5}]])
-def test_crosscheck_knows_the_beam_without_inertia(loads):
-    report = compare(with_changes(quasi_static(), loads=loads))
-    assert report.verdict == "agrees", report.rows
-    assert report.horizon == 2.0

@@ -1,7 +1,5 @@
 """An FMU call that never returns: Ctrl-C ends the command all the same, by name, and nothing computed is lost."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -35,7 +33,7 @@ cli.main()
 """
 
 
-def interrupted(number: signal.Signals, fmu: str, function: str, where: str, skip: int, *arguments: object) -> str:
+def interrupted(number, fmu, function, where, skip, *arguments):
     """What the command says when it is sent a signal while the FMU hangs."""
     process = subprocess.Popen(
         [sys.executable, "-c", HANGING, fmu, function, where, str(skip), *map(str, arguments), "--no-plots", "-q"],
@@ -57,7 +55,7 @@ def interrupted(number: signal.Signals, fmu: str, function: str, where: str, ski
     return errors
 
 
-def check_interrupted(directory: Path, whole: dict[str, bytes], said: str, named: str) -> None:
+def check_interrupted(directory, whole, said, named):
     """One line names the call and the time; the rows are the first ones of the run that did not hang."""
     trajectory = load_trajectory(directory)
     summary = trajectory.summary
@@ -85,9 +83,7 @@ def check_interrupted(directory: Path, whole: dict[str, bytes], said: str, named
     [(signal.SIGINT, "spring", "tied"), (signal.SIGTERM, "beam", "location")],
     ids=["tied", "location"],
 )
-def test_a_call_that_never_returns_can_be_interrupted(
-    tmp_path: Path, number: signal.Signals, fmu: str, where: str
-) -> None:
+def test_a_call_that_never_returns_can_be_interrupted(tmp_path, number, fmu, where):
     directory = tmp_path / "run"
     printed("run", PATH, "--out", tmp_path / "whole", "--no-plots", "-q")
     whole = written(tmp_path / "whole")
@@ -100,7 +96,7 @@ def test_a_call_that_never_returns_can_be_interrupted(
     assert written(directory) == whole
 
 
-def test_a_call_that_never_returns_before_the_first_row_leaves_nothing(tmp_path: Path) -> None:
+def test_a_call_that_never_returns_before_the_first_row_leaves_nothing(tmp_path):
     run = ("run", PATH, "--out", tmp_path / "run")
     said = interrupted(signal.SIGINT, "beam", "fmi2ExitInitializationMode", "start", 0, *run)
     assert said == "error: interrupted: initialisation of beam.fmu at t = 0 s has not returned within 0.5 s\n"

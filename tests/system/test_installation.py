@@ -1,7 +1,5 @@
 """What `pip install` and `springbeam doctor` promise."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

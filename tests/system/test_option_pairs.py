@@ -1,7 +1,5 @@
 """Every pair of options of a run: it ends well, with complete files, or is refused by one clear error."""
 
-from __future__ import annotations
-
 import json
 from itertools import combinations
 from pathlib import Path
@@ -63,7 +61,7 @@ OPTIONS = {
 
 
 @pytest.mark.parametrize("pair", combinations(OPTIONS, 2), ids=" + ".join)
-def test_a_pair_runs_or_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pair: tuple[str, str]) -> None:
+def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
     monkeypatch.chdir(tmp_path)
     words = " ".join(OPTIONS[name] for name in pair).split()
     left_out = {word.removeprefix("no-") for word in words if word.startswith("no-")}
@@ -108,6 +106,6 @@ def test_a_pair_runs_or_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize("name", OPTIONS)
-def test_an_option_alone_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+def test_an_option_alone_runs(tmp_path, monkeypatch, name):
     test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, (name, name))
     assert (tmp_path / "run").exists()

@@ -1,12 +1,8 @@
 """A run goes on from a checkpoint to the same bits, whenever it was stopped and whatever it was doing."""
 
-from __future__ import annotations
-
 import pickle
-from collections.abc import Iterator
 from contextlib import suppress
 from enum import Enum
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +14,7 @@ from springbeam.contact.phases import Phase
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.checkpoint import decoded, encoded
 from springbeam.run.master import Master
-from springbeam.scene import Scene, load_scene, with_changes
+from springbeam.scene import load_scene, with_changes
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
@@ -83,18 +79,18 @@ SCENES = {
 class Run:
     """A run into memory, and what it remembered: after each step, or at the end only."""
 
-    def __init__(self, scene: Scene, *, each_step: bool = False) -> None:
+    def __init__(self, scene, *, each_step=False):
         start_time = scene.contact_time or 0.0
         self.bodies = load_bodies(scene, start_time)
         self.recorder = MemoryRecorder(scene)
-        self.saved: list[bytes] = []
-        self.simulation: Any = Master(scene, start_time, *self.bodies, self.recorder)
+        self.saved = []
+        self.simulation = Master(scene, start_time, *self.bodies, self.recorder)
         self._each_step = each_step
 
-    def _save(self) -> None:
+    def _save(self):
         self.saved.append(encoded(self.simulation.save()))
 
-    def finish(self) -> Run:
+    def finish(self):
         while not self.simulation.done:
             self.simulation.step()
             if self._each_step:
@@ -105,7 +101,7 @@ class Run:
         self.close()
         return self
 
-    def close(self) -> None:
+    def close(self):
         for body in self.bodies:
             if body is not None:
                 body.close()
@@ -164,7 +160,7 @@ SET_ANEW = {
 }
 
 
-def attributes(part: Any, seen: dict[int, Any]) -> Iterator[tuple[str, bool, Any]]:
+def attributes(part, seen):
     """(name, whether it is remembered, value) of everything that ``part`` consists of."""
     seen[id(part)] = part
     for name, value in vars(part).items():
@@ -180,7 +176,7 @@ def attributes(part: Any, seen: dict[int, Any]) -> Iterator[tuple[str, bool, Any
             )
 
 
-def snapshot(part: Any) -> list[tuple[str, bool, bytes]]:
+def snapshot(part):
     found = []
     for name, remembered, value in attributes(part, {}):
         with suppress(TypeError, AttributeError, ValueError, pickle.PicklingError):  # functions, what belongs to C

@@ -1,7 +1,5 @@
 """Sweeps on a real local cluster of worker processes."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -17,7 +15,7 @@ from runs import a_trajectory
 from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
 from springbeam.studies import picture, sweep
-from springbeam.studies.design import Axis, design, parse_axis
+from springbeam.studies.design import design, parse_axis
 from springbeam.studies.metrics import METRICS as METRICS_THERE_ARE
 from springbeam.studies.picture import Scale
 from springbeam.studies.study import Records, dask_cluster, record_all
@@ -80,22 +78,12 @@ def test_a_wrong_axis_is_named(text, words):
     assert text in str(error.value)
 
 
-def test_the_product_has_the_last_axis_fastest():
-    axes = [Axis("spring", "mass", (1, 2)), Axis("spring", "damping", (0.0, 0.1, 0.2))]
-    assert design(axes, 0, 0, "random") == [(1, 0.0), (1, 0.1), (1, 0.2), (2, 0.0), (2, 0.1), (2, 0.2)]
-
-
 @pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize("tolerance", ["relative_tolerance", "absolute_tolerance"])
 def test_a_macro_step_beside_a_tolerance_is_refused_with_both_named(tolerance, order):
     texts = ["coupling.macro_step=1e-3,2e-3", f"coupling.{tolerance}=1e-3,1e-4"]
     with pytest.raises(SceneError, match=rf"--vary coupling\.macro_step.* --vary coupling\.{tolerance}"):
         planned(*texts[::order]).cases()
-
-
-def test_what_the_accuracy_picks_cannot_be_varied():
-    with pytest.raises(SceneError, match=r"--vary coupling\.degree: accuracy = 0\.001 picks"):
-        planned("coupling.degree=0,1", scene=with_changes(small(), accuracy=1e-3)).cases()
 
 
 def test_a_latin_hypercube_has_one_sample_in_each_of_its_rows():
@@ -181,17 +169,6 @@ def test_samples_of_three_axes_are_drawn_over_each():
         [-4, -3, -2, -1, 0],
         [0, 1, 4, 9, 16],
     ]
-
-
-def test_rows_do_not_depend_on_the_number_of_workers(tmp_path):
-    plan = planned("spring.mass=0.5:2", "spring.damping=0:1", samples=12)
-    for workers in (0, 2):
-        (tmp_path / str(workers)).mkdir()
-        plan.write(record_all(plan, workers=workers), tmp_path / str(workers), pictures=False)
-    assert all(
-        (tmp_path / "0" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
-        for name in ("sweep.parquet", "sweep.csv")
-    )
 
 
 def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_doubled_period(tmp_path):

@@ -1,9 +1,6 @@
 """The trade between error and cost, on the FMUs: what is swept, judged and named; and scipy as its rival."""
 
-from __future__ import annotations
-
 import csv
-import itertools
 import json
 
 import numpy as np
@@ -36,22 +33,6 @@ def by_family(rows, family):
     return [row for row in rows if row["family"] == family]
 
 
-@pytest.mark.parametrize(("family", "order"), [("energy 0", 3.0), ("energy 1", 3.0), ("hermite 1", 4.0)])
-def test_errors_fall_with_the_order_of_the_curve(rows, family, order):
-    """At macro points `energy` 0 and 1 are of order 4; between them velocities of order 2 decide."""
-    found = [worst(row) for row in by_family(rows, family) if 1e-10 < worst(row) < 1e-5]
-    assert len(found) >= 2
-    rates = [np.log2(a / b) for a, b in itertools.pairwise(found)]
-    assert order - 0.5 < np.median(rates) < order + 0.5
-
-
-def test_more_steps_cost_more_calls(rows):
-    for family in ("energy 0", "energy 2", "hermite 2"):
-        calls = [row["cost_do_steps"] for row in by_family(rows, family)]
-        assert calls == sorted(calls)
-        assert all(row["cost_rollbacks"] > 0 for row in by_family(rows, family))
-
-
 def test_a_curve_between_few_points_is_judged_too(rows):
     """Between them one step of the cubic start of a scheme is worse than at them: 16 ms, 4 steps."""
     coarse = by_family(rows, "energy 2")[0]
@@ -82,12 +63,6 @@ def test_front_and_choices_are_of_rows_on_the_same_model():
     assert [choice["co_simulation"] for choice in cheapest(found)] == [rough, better, None, None]
     assert [choice["scipy"] for choice in cheapest(found)] == [scipy, scipy, scipy, None]
     assert [choice["ratio"] for choice in cheapest(found)] == [1.5, 0.75, None, None]
-
-
-def test_a_tradeoff_has_a_front_and_choices(rows):
-    assert len(pareto(rows)) >= 3
-    choice = cheapest(rows)[1]
-    assert None not in (choice["co_simulation"], choice["scipy"])
 
 
 def test_modes_converge_to_the_mesh_and_not_beyond(rows):
@@ -140,13 +115,6 @@ def test_every_axis_is_swept_that_the_law_has(law, there, absent):
     assert absent not in families
 
 
-def test_a_beam_without_inertia_has_no_rival():
-    scene = with_changes(load_scene("soft"), beam={"n_elements": 3, "fidelity": "quasi_static"})
-    study = Tradeoff(scene=scene)
-    assert not any("rtol" in case for case in study.configurations)
-    assert study.notes({}) == ["not run: scipy, since a quasi-static beam has no equation of motion to hand to it"]
-
-
 def test_command(tmp_path):
     arguments = ["tradeoff", "duffing", "--until", "0.5", "--repeats", "2", "--json", "--out", str(tmp_path / "out")]
     table = json.loads(printed(*arguments))
@@ -184,22 +152,6 @@ def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
         assert "takes more than 0 s" in row["error"] or "diverges" in row["error"]
     (note,) = study.notes(record_all(study))
     assert note.startswith("given up after 0 s, finer ones of their kind not run: energy 0, H = 0.004; ")
-
-
-def test_a_configuration_is_timed_once_in_each_pass():
-    study = Tradeoff.of(small(), until=0.02)
-    turns = [case["pass"] for case in study.cases().values()]
-    assert turns == sorted(turns)
-    assert [turns.count(turn) for turn in range(3)] == [len(turns) // 3] * 3
-
-
-def test_quick_takes_every_third_of_a_family():
-    whole, quick = (
-        [case for case in Tradeoff.of(small(), until=0.06, quick=quick).cases().values() if not case["pass"]]
-        for quick in (False, True)
-    )
-    assert by_family(quick, "energy 0") == by_family(whole, "energy 0")[::3]
-    assert {case["family"] for case in quick} == {case["family"] for case in whole}
 
 
 # -- scipy ----------------------------------------------------------------------------------------------------------

@@ -1,0 +1,422 @@
+"""The references: what the paper reports of Algorithm 1, exact solutions, extended precision, and scipy."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from references import dips, integrated_anew
+from scenes import kinds, soft
+from scipy.integrate import quad
+from scipy.sparse.linalg import spsolve
+
+from springbeam.monolithic import algorithm1, event_driven
+from springbeam.monolithic.laws import law_of
+from springbeam.monolithic.semi_discrete import assemble, modal_beam
+from springbeam.scene import Beam, load_scene, with_changes
+from springbeam.scene.statics import SHAPE_POINTS
+from springbeam.studies import exact, verify
+from springbeam.studies.verify.beam import clamped_free_frequencies
+
+
+def linear(**tables):
+    """Return the scene of `soft` with a linear spring."""
+    return soft(**{**tables, "spring": {"cubic_stiffness": 0.0, **tables.get("spring", {})}})
+
+
+# -- Algorithm 1 ----------------------------------------------------------------------------------------------------
+
+
+def figure(number):
+    return load_scene(f"paper-fig{number}", ['contact.law="paper"'])
+
+
+@cache
+def printed(number):
+    return algorithm1.simulate(figure(number))
+
+
+def small(**tables):
+    """A soft beam whose tip does reach the foundation, resolved in time."""
+    return soft(10, contact={"law": "paper", "impact": "tip", **tables.pop("contact", {})}, **tables)
+
+
+@pytest.mark.parametrize(("number", "reported", "with_this_reading"), [(2, 1.990, 1.998), (4, 2.000, 1.999)])
+def test_algorithm_1_has_the_iterations_of_table_2_and_a_tip_that_flips(number, reported, with_this_reading):
+    """Section 6: "the beams move up and down almost the same speed at each time step" (ω₁h = 967).
+
+    f_b = (0, …, 0, −6) of the next figure bends the tip by 6 h_x/3 × its compliance 4/(3κ) ≈ 7e-14 m: nothing to see.
+    """
+    run, loaded = printed(number), printed(number + 1)
+    assert run.summary["newton"]["spring"] == pytest.approx(with_this_reading, abs=6e-4)
+    assert run.summary["newton"]["spring"] == pytest.approx(reported, abs=0.01)
+    v = run.v_tip
+    assert (run.time[0], len(run)) == (0.5, 876)
+    np.testing.assert_allclose(v[:5], [-1.0, 1.0, -1.0, 1.0, -1.0], atol=2e-4)
+    assert np.mean(v[1:] * v[:-1] < 0.0) > 0.99
+    assert np.max(np.abs(run.u_tip)) < 4.4e-6
+    assert run.summary["steps_apart"] == {2: 0, 4: 1}[number]
+    assert loaded.summary["newton"]["spring"] == pytest.approx(run.summary["newton"]["spring"], abs=1e-12)
+    assert 0.0 < np.max(np.abs(loaded.u_tip - run.u_tip)) < 2e-11
+    # Nothing in the model does the work of the tip that is overwritten: 75 % of the initial energy, ½∫x² dx.
+    assert run.e_total[0] == pytest.approx(1.0 / 6.0, rel=1e-12)
+    if number == 2:
+        assert np.max(run.energy_residual) == pytest.approx(0.1253, abs=2e-4)
+
+
+def test_other_readings_of_algorithm_1_are_other_algorithms():
+    guess = algorithm1.simulate(figure(2), y_temp="guess")
+    assert np.max(np.abs(guess.y)) == 0.0  # nothing ever reaches the spring
+    assert algorithm1.simulate(figure(2), y_temp="both").summary["steps_apart"] > 1
+    with pytest.raises(algorithm1.AlgorithmFailure) as failure:
+        algorithm1.simulate(with_changes(figure(4), contact={"impact": "tip"}))
+    assert np.max(failure.value.trajectory.e_total) > 1e9
+
+
+def test_the_first_step_of_algorithm_1_is_the_printed_system():
+    """(62), (53), (54) and lines 16–19 written out densely for one step."""
+    scene = small(spring={"damping": 0.3}, beam={"alpha_b": 1e-3}, time={"t_end": 1e-3})
+    result = algorithm1.simulate(scene)
+    h, stiffness = 1e-3, 1e4
+    d = assemble(scene.beam)
+    M, K = d.M.toarray(), d.K.toarray()
+    A, B = 4.0 * M + (h**2 + 2e-3 * h) * K, 4.0 * M + (2e-3 * h - h**2) * K
+    q, v, e = np.zeros(d.size), -d.slope_shape, d.tip_vector
+
+    def compliance(w):
+        return stiffness * max(-w, 0.0) ** 3
+
+    new = q
+    for _ in range(50):
+        new = np.linalg.solve(A, B @ q + 4.0 * h * M @ v + h**2 * e * (compliance(new[-1]) + compliance(0.0)))
+    assert new[-1] < 0.0  # line 14
+    y_temp, z = new[-1], -1.0
+    y = y_temp
+    for _ in range(50):
+        mean = 0.5 * (y + y_temp)
+        force = -3.0 * mean + 0.2 * 0.5 * (y**2 + y_temp**2) * mean - 0.3 * (y - y_temp) / h
+        force -= 0.5 * (compliance(y) + compliance(y_temp))
+        y = y_temp + h * z + 0.5 * h**2 * force
+    interior = np.arange(d.size - 1)
+    right = (B @ q + 4.0 * h * M @ v - A[:, -1] * y)[interior]
+    full = np.append(np.linalg.solve(A[np.ix_(interior, interior)], right), y)
+    assert (result.y[1], result.u_tip[1]) == (pytest.approx(y, abs=1e-16), result.y[1])
+    np.testing.assert_allclose(result.shapes[1][1], d.deflection_sampler() @ full, atol=1e-16)
+    assert (result.z[1], result.v_tip[1]) == pytest.approx((2.0 * y / h - z, 2.0 * y / h + 1.0), abs=1e-12)
+
+
+def test_algorithm_1_books_all_that_it_injects_and_stops_at_the_foundation():
+    """ΔE = what the tip and the spring are given, what the compliance pair does on u ≠ y, and N on the way to φ."""
+    scene = small(spring={"damping": 0.5, "external_force": -0.3}, beam={"alpha_b": 1e-3}, time={"t_end": 0.3})
+    result = algorithm1.simulate(scene, y_temp="guess")
+    du, dy = np.diff(result.u_tip), np.diff(result.y)
+    penetration = np.maximum(-result.y, 0.0) ** 3 * 1e4
+    # λ_nc is 0 on a step that starts after line 12; its force on the spring is then booked as 0.
+    spring_side = np.where(result["case"][1:] == 11, 0.0, 0.5 * (penetration[1:] + penetration[:-1]))
+    pair = result.compliance_force[1:] * du - spring_side * dy + result.foundation_force[1:] * dy
+    injected = result["e_injected_beam"] + result["e_injected_spring"]
+    assert np.max(np.abs(injected)) > 1e-6
+    np.testing.assert_allclose(result.energy_residual[1:], injected[1:] + np.cumsum(pair), atol=1e-12)
+    hit = result.phase == "seated"
+    assert np.any(hit)
+    assert {*result.y[hit], *result.u_tip[hit], np.min(result.y)} == {-0.015}
+
+
+def test_what_algorithm_1_starts_with_and_does_not_have():
+    short = {"time": {"t_end": 4e-3}, "coupling": {"macro_step": 4e-3}}
+    for impact, expected in (("rest", 0.0), ("tip", -1.0), ("inelastic", 0.0)):
+        assert algorithm1.simulate(small(contact={"impact": impact}, **short)).z[0] == expected
+    for changes in ({"loads": [{"on": "tip", "amplitude": 1.0}]}, {"beam": {"fidelity": "quasi_static"}}):
+        with pytest.raises(ValueError, match=r"knows no .* needs a dynamic"):
+            algorithm1.simulate(soft(**changes))
+
+
+# -- the event-driven reference: exact solutions --------------------------------------------------------------------
+
+#: (time, velocity afterwards) of the foundation impact and the release of `soft`, rounded to double: by a program that
+#: shared nothing with the package, in 80-bit arithmetic, a Taylor series of order 46 on steps of 4 ms.
+EXTENDED_PRECISION = [(0.07122400935981067, 0.298683962257942), (0.14436945620340189, 0.2019135428932935)]
+
+
+def test_soft_agrees_with_extended_precision():
+    """The lowest frequencies carry ε·ω_max/ω_min of their own size."""
+    result = event_driven.simulate(soft(50), sample_times=[0.0, 0.05, 0.15], t_end=0.15)
+    assert kinds(result) == ["impact", "stop_impact", "release"]
+    assert (result.events[0].z, result.y[1]) == pytest.approx((-0.0057403607, -0.0087444212), abs=5e-11)
+    for event, (time, velocity) in zip(result.events[1:], EXTENDED_PRECISION, strict=True):
+        assert event.time == pytest.approx(time, abs=3e-14)
+        assert (event.z, event.v_tip) == pytest.approx((velocity, velocity), abs=2e-13)
+
+
+LAWS = [verify.compliant_impact, verify.hunt_crossley, verify.linked_masses, verify.damped_link, verify.tied_masses]
+
+
+@pytest.mark.parametrize(
+    ("section", "share"),
+    [*((law, 1e-3) for law in LAWS), (verify.moving_base, 1.0)],
+    ids=lambda given: getattr(given, "solution", float).__name__,
+)
+def test_the_reference_meets_the_exact_solutions_of_a_run(section, share, monkeypatch):
+    """The bounds of laws are errors of a coupling and of IDA, of which the reference has neither."""
+    for module in (verify.laws, verify.loads):
+        monkeypatch.setattr(module, "simulate", event_driven.simulate)
+    for check in section():
+        assert abs(check.error or 0.0) <= share * check.bound, check
+
+
+def test_the_reference_of_a_bar_on_a_stop_approaches_the_exact_impact(monkeypatch):
+    monkeypatch.setattr(verify.impact, "simulate", event_driven.simulate)
+    assert [check.quantity for check in verify.bar_impact.solution(10) if not check.passed] == []
+
+
+def test_the_closed_forms_are_those_of_the_oscillator_and_of_the_quadrature():
+    """q = 1: half a period of √(λ/μ), damping without closed form as Hertz's in the limit; q = 1.5: ∫ dp/v."""
+    reduced, stiffness = 0.4, 1e4
+    omega = np.sqrt(stiffness / reduced)
+    found = exact.impact(reduced, 3.0, stiffness, 1.0)
+    assert (found.duration, found.penetration) == pytest.approx((np.pi / omega, 3.0 / omega), rel=1e-14)
+    hertz = exact.impact(reduced, 3.0, stiffness, 1.5)
+    # p = p_max (1 − s²) takes the singularity of 1/ṗ at p_max away.
+    half, _ = quad(lambda s: 2.0 * s * hertz.penetration / 3.0 / np.sqrt(1.0 - (1.0 - s * s) ** 2.5), 0.0, 1.0)
+    assert hertz.duration == pytest.approx(2.0 * half, rel=1e-9)
+    weak = exact.impact(reduced, 3.0, stiffness, 1.5, 1e-4)
+    assert weak.penetration == pytest.approx(hertz.penetration, rel=2e-4)
+    assert weak.rebound == pytest.approx(3.0 * (1.0 - 2e-4), rel=1e-7)  # e = 1 − 2χv/3 + …, whatever q
+
+
+@pytest.mark.parametrize("alpha", [0.0, 1e-3])
+@pytest.mark.parametrize(("stiffness", "damping"), [(0.0, 3.0), (1e2, 0.0), (1e4, 3.0)])
+def test_a_beam_on_a_link_is_the_matrix_exponential(stiffness, damping, alpha):
+    contact = {"law": "link", "stiffness": stiffness, "damping": damping}
+    spring = {"damping": 0.4, "external_force": -0.5}
+    scene = linear(beam={"alpha_b": alpha, "initial_deflection_slope": 0.02}, spring=spring, contact=contact, stop=None)
+    times = np.array([0.01, 0.05, 0.1, 0.2])
+    result = event_driven.simulate(scene, sample_times=times, t_end=0.2)
+    mesh = assemble(scene.beam)
+    x = mesh.slope_shape
+    expected = exact.linked(scene, mesh.M.toarray(), mesh.K.toarray(), 0.02 * x, -x, times)
+    found = np.column_stack([result.u_tip, result.y])
+    np.testing.assert_allclose(found, expected, atol=2e-13)
+
+
+@pytest.mark.parametrize("fidelity", ["dynamic", "quasi_static"])
+def test_ends_that_move_alike_are_tied_without_an_impact(fidelity):
+    changes = {"fidelity": fidelity, "initial_velocity_slope": 0.5}
+    scene = linear(contact={"law": "tie"}, beam=changes, spring={"initial_velocity": 0.5}, stop=None)
+    result = event_driven.simulate(scene)
+    assert (result.events, set(result.phase)) == ([], {"tied"})
+    assert np.max(np.abs(result.gap)) < 1e-15
+    assert np.max(np.abs(result.energy_residual)) < 1e-12
+
+
+@pytest.mark.parametrize(("name", "contact"), [("compliance", "touch"), ("compliance", "slack"), ("link", "tied")])
+def test_what_a_law_stores_and_takes_is_the_power_of_its_force(name, contact):
+    """C ṗ = dΦ/dt + dissipation, with dΦ/dt from Φ itself."""
+    law = law_of(linear(contact={"law": name, "stiffness": 30.0, "exponent": 2.5, "damping": 0.7}))
+    p, rate, h = np.array([0.1, 0.3]), np.array([-2.0, 0.5]), 1e-6
+    force = law.force(p, rate) if law.acts(contact) else np.zeros_like(p)
+    stored = (law.potential(p + h * rate) - law.potential(p - h * rate)) / (2.0 * h)
+    np.testing.assert_allclose(force * rate, stored + law.dissipation(contact, p, rate), rtol=1e-9, atol=1e-9)
+
+
+# -- beside scipy ---------------------------------------------------------------------------------------------------
+
+LIFTED = {
+    "equilibrium": 0.01, "mass": 0.1, "external_force": 1.0, "linear_stiffness": 150.0, "cubic_stiffness": 67.0
+}  # fmt: skip
+UNSTABLE = {"linear_stiffness": -3.0, "cubic_stiffness": 2000.0}
+SEATING = {"law": "compliance", "stiffness": 1e3, "exponent": 1.0}
+CASES = {
+    "damped": soft(beam={"alpha_b": 2e-3}, spring={"damping": 0.7}),
+    "overdamped": soft(beam={"alpha_b": 2e-2}, spring={"damping": 5.0}),
+    "seating": soft(
+        beam={"distributed_load": -9.0}, spring={"external_force": -4.0}, stop={"restitution": 0.3}, time={"t_end": 0.5}
+    ),
+    "stiffer": soft(beam={"initial_deflection_slope": 0.02}, spring=LIFTED),
+    "elastic": soft(beam={"initial_deflection_slope": 0.02, "approach": "elastic", "young_modulus": 10.0}),
+    "line 5": soft(contact={"impact": "tip"}),
+    "modes": soft(40, beam={"n_modes": 6, "tip_load_coefficient": -6.0}),
+    "unstable spring": soft(spring=UNSTABLE),
+    "compliance": soft(contact={"law": "compliance", "exponent": 1.5}),
+    "compliance, seating": soft(
+        beam={"alpha_b": 1e-3}, contact=SEATING, spring={"damping": 1.0, "external_force": -5.0},
+        stop={"restitution": 0.3},
+    ),
+    "tie, on a foundation": soft(
+        contact={"law": "tie"}, stop={"restitution": 0.6}, beam={"alpha_b": 1e-4}, spring={"cubic_stiffness": 50.0}
+    ),
+    "tie, seated": linear(
+        contact={"law": "tie"}, stop={"restitution": 0.0}, beam={"alpha_b": 1e-3}, spring={"external_force": -2.0}
+    ),
+    "link, seating": linear(
+        contact={"law": "link", "stiffness": 1e4, "damping": 1.0}, stop={"restitution": 0.3},
+        spring={"external_force": -3.0}, time={"t_end": 0.3},
+    ),
+    "link, damped as its modes": linear(
+        contact={"law": "link", "stiffness": 1e3, "damping": 1.0}, beam={"alpha_b": 1e-3}, stop={"restitution": 0.8}
+    ),
+    "link, unstable spring": soft(contact={"law": "link"}, spring=UNSTABLE),
+    "stiff link": linear(contact={"law": "link", "stiffness": 1e8}, stop=None),  # which is part of the modes
+    "Hunt and Crossley": linear(
+        contact={"law": "compliance", "exponent": 1.5, "damping": 0.8}, beam={"alpha_b": 1e-3}, spring={"damping": 0.2}
+    ),
+    "Hunt and Crossley, seating": linear(
+        contact={**SEATING, "damping": 2.0}, stop={"restitution": 0.3}, spring={"external_force": -5.0}
+    ),
+    "steel-bumper": load_scene("steel-bumper"),  # damped roots up to 7e7 1/s beside a first mode of 105 rad/s
+    "paper-fig2": load_scene("paper-fig2"),  # κ = 3.6e10, 64 modes
+}  # fmt: skip
+UNTIL = {"stiff link": 0.02, "steel-bumper": 1.9e-3, "paper-fig2": 0.50001}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_phase_is_integrated_as_scipy_does(name, monkeypatch):
+    run = integrated_anew(CASES[name], monkeypatch, UNTIL.get(name, 0.3))
+    assert run.summary["largest_relative_energy_residual"] < 1e-11
+    assert run.summary["counts"]["steps"] < 1000
+
+
+@pytest.mark.parametrize(
+    ("speed", "e", "kind"), [(1.0, 0.5, "stop_impact"), (1.0, 0.0, "seated"), (0.0, 0.5, "seated")]
+)
+def test_a_tip_that_starts_on_the_stop_acts_on_it_at_once(speed, e, kind):
+    """It arrives with −speed, or a load presses it down; the row of that time is of what follows."""
+    start = {"initial_deflection_slope": 0.0, "initial_velocity_slope": -speed, "distributed_load": -5.0}
+    beam = {"n_elements": 8, "approach": "elastic", **start}
+    scene = with_changes(load_scene("beam-on-stop"), beam=beam, stop={"position": 0.0, "restitution": e})
+    result = event_driven.simulate(scene, sample_times=[0.0], t_end=1e-4)
+    assert (result.events[0].kind, result.events[0].time) == (kind, 0.0)
+    assert result.v_tip[0] == pytest.approx(e * speed, abs=1e-14)
+    assert result.phase[0] == ("seated" if kind == "seated" else "free")
+
+
+def test_an_event_moves_in_proportion_to_a_perturbation_and_not_with_the_rows():
+    scene = soft()
+    base, once, twice = (
+        event_driven.simulate(scene, velocity_perturbation=delta, t_end=0.15).events[2].time
+        for delta in (0.0, 1e-6, 2e-6)
+    )
+    assert (twice - base) / (once - base) == pytest.approx(2.0, rel=1e-4)
+    few = event_driven.simulate(scene, sample_times=[0.2, 0.0], t_end=0.2)
+    assert (few.time.tolist(), few.events[2].time) == ([0.0, 0.2], pytest.approx(base, abs=1e-13))
+
+
+@pytest.mark.parametrize(
+    ("changes", "arguments", "message"),
+    [
+        ({"contact": {"impact": "rest"}}, {}, "rigid tie"),
+        ({"contact": {"law": "paper"}}, {}, "knows 'transmission', 'compliance'"),
+        ({"beam": {"initial_deflection_slope": -0.1}}, {}, "below"),
+        ({"beam": {"initial_deflection_slope": 0.1, "initial_velocity_slope": 0.0}}, {}, "never"),
+        ({}, {"sample_times": []}, "no row lies between the start of the run, 0 s, and its end, 0.6 s"),
+        ({}, {"sample_times": [0.3], "t_end": 0.1}, "its end, 0.1 s"),
+    ],
+)
+def test_the_reference_refuses_what_it_does_not_define(changes, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        event_driven.simulate(soft(**changes), **arguments)
+
+
+def test_a_spring_that_runs_away_is_a_failure_of_the_reference():
+    """½ z² = 12.5 J, the barrier is k1²/4|k2| = 11.25 J high."""
+    scene = with_changes(soft(), beam=None, stop=None, time={"t_end": 20.0})
+    unchecked = scene.model_copy(update={"lower": scene.spring.model_copy(update={"initial_velocity": 5.0})})
+    with pytest.raises(event_driven.ReferenceFailure):
+        event_driven.simulate(unchecked, sample_times=[0.0])
+
+
+def test_a_dip_between_nodes_is_not_missed():
+    """After 8 impacts it dips 7 μm past the foundation."""
+    scene, times = dips(0.7, 1.0)
+    assert [event.time for event in event_driven.simulate(scene).events] == pytest.approx(times, abs=1e-8)
+
+
+# -- its beam -------------------------------------------------------------------------------------------------------
+
+
+def beam(bending=1.0, shear=1.0, **changes):
+    return Beam.with_ones(young_modulus=bending, shear_modulus=shear, **changes)
+
+
+def static_compliance(bending, shear, n, reduced):
+    """Tip deflection of the discrete unit-length beam under a unit tip force, exact."""
+    h = 1.0 / n
+    if reduced:
+        return (1.0 - h**2 / 4.0) / (3.0 * bending) + 1.0 / shear
+    return (1.0 / (3.0 * bending) + 1.0 / shear) / (1.0 + shear * h**2 / (12.0 * bending))
+
+
+@pytest.mark.parametrize("reduced", [False, True])
+@pytest.mark.parametrize(("bending", "shear", "n"), [(1.0, 1.0, 1), (2.0, 7.0, 5), (1.0, 1e6, 10), (100.0, 100.0, 50)])
+def test_static_tip_deflection_is_the_discrete_one(bending, shear, n, reduced):
+    d = assemble(beam(bending, shear, n_elements=n, reduced_integration=reduced))
+    u = spsolve(d.K, d.tip_vector)[d.tip]
+    # Rounding × condition number of K, at most about n⁴ KAG/EI here.
+    assert u == pytest.approx(static_compliance(bending, shear, n, reduced), rel=1e-8 if shear > 1e5 else 1e-11)
+
+
+@pytest.mark.parametrize(("degree", "n"), [(1, 40), (2, 16), (3, 8), (4, 5)])
+@pytest.mark.parametrize("reduced", [False, True])
+def test_the_order_of_the_frequencies_is_twice_the_degree(degree, n, reduced):
+    exact = np.array(clamped_free_frequencies()[:6])
+    assert exact[0] == pytest.approx(1.27396492100357, abs=1e-12)
+    elements = {"element_degree": degree, "reduced_integration": reduced}
+    errors = [modal_beam(beam(n_elements=m, **elements)).omega[:6] / exact - 1.0 for m in (n, 2 * n)]
+    orders = np.log2(errors[0] / errors[1])
+    # Of higher degrees the errors of the lowest modes are rounding, those of the highest not small yet.
+    judged = orders if degree == 1 else orders[2:4]
+    assert np.all(np.abs(judged - 2 * degree) < 0.08 * degree)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 8, 12])
+def test_forms_are_the_integrals_of_polynomials(degree):
+    """θ = x^p, u = x^p/2 lie in the space: ∫ of their squares and strains, ∫u and ∫ψₙu in closed form."""
+    n, length, p = 2, 1.4, degree
+    d = assemble(beam(3.0, 5.0, n_elements=n, element_degree=degree, length=length, density=7.0, area=0.5,
+                      second_moment_of_area=0.25))  # fmt: skip
+    # Values at the nodes, which are where u = x of the slope shape says.
+    x, q = d.slope_shape[1::2], np.zeros(d.size)
+    q[0::2], q[1::2] = x**p, 0.5 * x**p
+    moment = 3.0 * 0.25 * p * p * length ** (2 * p - 1) / (2 * p - 1)
+    slope, product, square = (length ** (2 * p - 1 + k) / (2 * p - 1 + k) for k in range(3))
+    shear = 5.0 * 0.5 * (0.25 * p * p * slope - p * product + square)
+    assert q @ d.K @ q == pytest.approx(moment + shear, rel=1e-12)
+    assert q @ d.M @ q == pytest.approx(7.0 * (0.25 + 0.25 * 0.5) * square, rel=1e-13)
+    assert d.uniform_load @ q == pytest.approx(0.5 * length ** (p + 1) / (p + 1), rel=1e-13)
+    h = length / n
+    left = length - h
+    terms = ((1, p + 2, 1 / h), (-1, p + 1, left / h))
+    hat = sum(sign * (length**k - left**k) / k * factor for sign, k, factor in terms)
+    assert d.hat_load @ q == pytest.approx(0.5 * hat, rel=1e-12)
+    np.testing.assert_allclose(d.deflection_sampler() @ q, 0.5 * (SHAPE_POINTS * length) ** p, atol=1e-14)
+
+
+@pytest.mark.parametrize("n_modes", [1, 3, 8])
+def test_truncated_beam_keeps_static_answers_and_its_start(n_modes):
+    """Tip force, uniform load and u = x lie in the space, however few the modes; the tip is exact under any load."""
+    b = beam(4.0, 9.0, n_elements=30, n_modes=n_modes, distributed_load=-2.0, tip_load_coefficient=-6.0)
+    d, m = assemble(b), modal_beam(b)
+    assert len(m.omega) == n_modes + 3
+    assert m.tip**2 @ m.omega**-2.0 == pytest.approx(static_compliance(4.0, 9.0, 30, False), rel=1e-11)
+    full = spsolve(d.K, -2.0 * d.uniform_load - 6.0 * d.hat_load)
+    assert m.tip @ (m.load / m.omega**2) == pytest.approx(full[d.tip], rel=1e-11)
+    uniform = spsolve(d.K, d.uniform_load)
+    found = m.basis @ (m.basis.T @ d.uniform_load / m.omega**2)
+    np.testing.assert_allclose(found, uniform, atol=1e-11 * abs(uniform).max())
+    np.testing.assert_allclose(m.basis @ m.slope_shape, d.slope_shape, atol=1e-12)
+    np.testing.assert_allclose(m.omega[:n_modes], modal_beam(b.model_copy(update={"n_modes": 0})).omega[:n_modes])
+
+
+@pytest.mark.parametrize(("metre", "second"), [(1e-9, 1.0), (1.0, 1e-9), (1e3, 1.0)])
+def test_units_do_not_matter(metre, second):
+    """Rotations are then far larger than displacements: the sparse modes of a beam of micrometres were lost."""
+
+    def slender(metre, second):
+        scales = {"length": metre, "area": 1e-2 * metre**2, "second_moment_of_area": 1e-5 * metre**4}
+        stiffness = 1.0 / (metre * second**2)
+        mesh = {"n_elements": 22, "element_degree": 12, "n_modes": 19}
+        return beam(1e4 * stiffness, 4e3 * stiffness, **scales, density=100.0 / metre**3, **mesh)
+
+    found, expected = modal_beam(slender(metre, second)).omega * second, modal_beam(slender(1.0, 1.0)).omega
+    assert found[:19] == pytest.approx(expected[:19], rel=1e-12)
+    # The static shapes lie in the span of the modes but for some 1e-6 of them: what is left has lost so many digits.
+    assert found[19:] == pytest.approx(expected[19:], rel=1e-8)
