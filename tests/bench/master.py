@@ -153,7 +153,7 @@ def profile(effort: Effort) -> Iterator[Row]:
         "is an event due at the start": lambda: detector.at_start(state, start),
         "does one come inside": lambda: detector.first_event(state, step),
         "its record": lambda: master._record(step, end),
-        "of it, energies of both bodies": lambda: pair.energies(end),
+        "of it, energies of both bodies": lambda: (beam.energies(), spring.energies()),
         "256 records checked and kept, and made": lambda: recorded(256),
         "a shape (400 a run)": lambda: master._shape(beam, early=False),
     }

@@ -138,7 +138,7 @@ class FmuBody(Body):
         if (status := fmu.get_state()) > WARNING:
             raise fmu.failed(status, "cannot save the state")
         fmu.moved = False
-        super().mark()
+        self._marked = self.state
 
     def rewind(self) -> None:
         fmu = self.fmu
@@ -147,7 +147,7 @@ class FmuBody(Body):
                 raise fmu.failed(status, "cannot restore the state")
             fmu.moved = False
             fmu.rewinds += 1
-            super().rewind()
+            self.state = self._marked
 
     def save(self) -> bytes:
         fmu = self.fmu

@@ -117,8 +117,8 @@ class StepSolver(Coupling):
         goal, step, better = self.aim(gap, a, descent, size, start)
         residual = gap if goal is None else list(map(sub, gap, goal))
         norm = max(map(abs, residual))
-        # Rounding at least. What is asked is known once the motion is; that under the guess may be far from it.
-        enough = tolerance = _ROUNDING * max(self._reach, abs(start[0].displacement))
+        # Rounding is always enough. What is asked follows from the motion, and is looked at where that is not reached.
+        enough = rounding = _ROUNDING * max(self._reach, abs(start[0].displacement))
         left = inf  # when the upper body advanced last, of the residual [m]
         noise = 0.0  # of the bodies' own rounding, once the iteration has met it [m]
         # S is measured once, when a size comes again: it then saves a step of the lower body in most.
@@ -142,12 +142,15 @@ class StepSolver(Coupling):
                 lower.rewind()
                 lower_end = lower.advance(time, size, acting)
                 r_lower = conditions(lower_end, size)
-                tolerance = self._absolute_tolerance(start[0], lower_end, size, times(B, a))
-                enough = tolerance if tolerance > noise else noise
+                enough = rounding if rounding > noise else noise
             before, gap = gap, list(map(sub, r_upper, r_lower))
             residual = gap if goal is None else list(map(sub, gap, goal))
             norm = max(map(abs, residual))
             if not norm > enough:
+                continue
+            tolerance = self._absolute_tolerance(start[0], lower_end, size, times(B, a))
+            enough = tolerance if tolerance > noise else noise
+            if norm <= enough:
                 continue
             if predicted:
                 stagnates = norm > _STAGNATES * previous

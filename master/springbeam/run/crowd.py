@@ -23,10 +23,7 @@ class Crowd(Checkpointed):
         self._simultaneous = self._in_step = (0, time)
 
     def count(self, end: float, size: float, macro_step: float) -> None:
-        """Count a step of ``size`` [s] that ends at ``end`` [s]. Raises RunStopped if events crowd."""
-        if size >= macro_step:
-            self._simultaneous = self._in_step = (1, end)
-            return
+        """Count a step of ``size`` [s] that was cut and ends at ``end`` [s]. Raises RunStopped if events crowd."""
         self._simultaneous = _counted(self._simultaneous, end, SIMULTANEOUS * macro_step)
         self._in_step = _counted(self._in_step, end, macro_step)
         if self._simultaneous[0] > _MAX_SIMULTANEOUS:

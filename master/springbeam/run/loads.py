@@ -113,7 +113,8 @@ class Loads:
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self._loads = scene.loads
         self._signals = [Signal(load, scene.coupling.macro_step) for load in scene.loads]
-        self._kinks = sorted({kink for signal in self._signals for kink in signal.kinks if kink < scene.time.t_end})
+        #: When loads jump or bend [s], ascending.
+        self.kinks = sorted({kink for signal in self._signals for kink in signal.kinks if kink < scene.time.t_end})
         self._bodies: list[tuple[Body, list[int]]] = []
         self._last = (-1.0, 0.0)
         for body, places in ((beam, ON_BEAM), (spring, ON_SPRING)):
@@ -121,10 +122,11 @@ class Loads:
             if body is not None and taken:
                 body.expect_loads([scene.loads[i] for i in taken])
                 self._bodies.append((body, taken))
+        self.any = bool(self._bodies)
 
     def act(self, time: float, size: float) -> None:
         """Let the loads act on every step from ``time`` by ``size`` [s], until told otherwise."""
-        if self._bodies and (time, size) != self._last:
+        if (time, size) != self._last:
             self._last = (time, size)
             forces = [signal.over(time, size) for signal in self._signals]
             for body, taken in self._bodies:
@@ -132,8 +134,8 @@ class Loads:
 
     def next_kink(self, time: float) -> float:
         """Return when a load next jumps or bends after ``time`` [s]; ∞ if it does not before the end."""
-        index = bisect_right(self._kinks, time)
-        return self._kinks[index] if index < len(self._kinks) else inf
+        index = bisect_right(self.kinks, time)
+        return self.kinks[index] if index < len(self.kinks) else inf
 
     def values(self, time: float) -> tuple[float, ...]:
         """Return the loads at ``time`` [s], each in its unit."""

@@ -13,8 +13,8 @@ from .ledger import Balance
 from .neglect import Past, neglected
 from .outcome import RunStopped
 
-#: Bytes of the records that are checked and handed on together.
-_TOGETHER = 256 * STEP.itemsize
+#: Records that are checked and handed on together.
+TOGETHER = 256
 
 
 class Log:
@@ -24,14 +24,10 @@ class Log:
         self._scene, self._recorder, self._balance = scene, recorder, balance
         self._stiffness = scene.driver_stiffness
         self.events = 0  #: number of events so far
-        #: What the recorder does not have yet.
-        self._records, self._events, self._shapes = bytearray(), list[Event](), list[list[float]]()
+        #: What the recorder does not have yet; records are as of `springbeam.results.steps.packed`.
+        self.records, self._events, self._shapes = list[bytes](), list[Event](), list[list[float]]()
         #: What the checks of later records need of those before.
         self._first, self._past = np.empty(0, STEP), Past()
-
-    def add(self, record: bytes) -> None:
-        """Take the record of the next step, `springbeam.results.steps.packed`."""
-        self._records += record
 
     def happened(self, event: Event) -> None:
         """Take an event of the step whose record comes next."""
@@ -43,11 +39,6 @@ class Log:
         if not np.isfinite(shape).all():
             raise RunStopped("the beam's shape is not finite", time)
         self._shapes.append([time, *shape.tolist()])
-
-    @property
-    def full(self) -> bool:
-        """Whether it is time for `hand_over`."""
-        return len(self._records) >= _TOGETHER
 
     def catch_up(self) -> None:
         """Take note of the records that the recorder has of a run that goes on."""
@@ -65,13 +56,13 @@ class Log:
         Raises RunStopped where one shows that the run has gone wrong; what came after it is dropped. ``macro_step`` [s]
         is named then.
         """
-        if not self._records:
+        if not self.records:
             return
-        steps, stopped = self._sound(np.frombuffer(bytes(self._records), STEP), macro_step)
+        steps, stopped = self._sound(np.frombuffer(b"".join(self.records), STEP), macro_step)
         last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-np.inf, self.events)
         shapes = np.reshape(self._shapes, (-1, len(SHAPE_COLUMNS)))
         events = self._events[: len(self._events) - (self.events - known)] if len(steps) else []
-        self._records, self._events, self._shapes = bytearray(), [], []
+        self.records, self._events, self._shapes = [], [], []
         self._recorder.keep(steps, events, shapes[shapes[:, 0] <= last])
         if stopped is not None:
             raise stopped

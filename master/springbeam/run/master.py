@@ -33,7 +33,7 @@ from .crowd import SIMULTANEOUS, Crowd
 from .detection import Detector
 from .ledger import Balance
 from .local_error import LocalError
-from .log import Log
+from .log import TOGETHER, Log
 from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .neglect import Past, neglected
 from .observed import NOT_SHOWN, observed
@@ -45,6 +45,8 @@ _SAME_TIME = 1e-9
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
 _NOTHING_FELT = (0.0, 0.0, 0.0, 0.0)
+#: Work that bodies have received which tell their own energies [J].
+_NOT_RECEIVED = (0.0, 0.0)
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
 
@@ -137,7 +139,7 @@ class Master(Checkpointed):
                 self._begin()
             if not self.done:
                 self._step()
-            if self._log.full or self.done:
+            if len(self._log.records) >= TOGETHER or self.done:
                 self.hand_over()
         except (BodyFailed, OverflowError, RunStopped) as failed:
             if isinstance(failed, OverflowError) and not raised_here(failed):
@@ -157,27 +159,29 @@ class Master(Checkpointed):
         self._log.catch_up()
 
     def _step(self) -> None:
-        state, steps, loads = self.state, self._steps, self._pair.loads
-        target, size = steps.next(state.time, loads.next_kink(state.time + _SAME_TIME * steps.size))
+        state, steps, pair = self.state, self._steps, self._pair
+        kink = pair.loads.next_kink(state.time + _SAME_TIME * steps.size) if pair.loads.kinks else inf
+        target, size = steps.next(state.time, kink)
         step, event = self._advance(size)
         whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
         end = target if whole else state.time + step.size
-        self._crowd.count(end, step.size, steps.size)
+        if step.size < steps.size:
+            self._crowd.count(end, step.size, steps.size)
         if step.size > 0.0:
             if self._error is not None:
                 self._error.accept(step)
-            self._pair.coupling(state.phase).accept(step)
+            pair.joined.accept(step)
             state.accept(step, end)
             self.macro_steps += 1
-            if self._pair.opens_softly:
+            if pair.opens_softly:
                 self._note_soft_contact(step)
-            elif self._pair.joined.decides:
+            elif pair.joined.decides:
                 step = self._settled()
         if event is None:
             self._record(step, step.end)
         else:
             self._act(event, step)
-            self._record(step, self._pair.ends())
+            self._record(step, pair.ends())
 
     def _advance(self, size: float) -> tuple[Step, EventKind | None]:
         """The next step and the event it ends on, the bodies left at its end."""
@@ -301,10 +305,10 @@ class Master(Checkpointed):
     def _record(self, step: Step, ends: Ends) -> None:
         """Leave the record of ``step`` with the ``ends`` after its event, and now and then the beam's shape."""
         state, (tip, low) = self.state, ends
-        speed = max(abs(tip.velocity), abs(low.velocity))
+        speed = max(tip[1], -tip[1], low[1], -low[1])
         if speed > state.fastest:
             state.fastest = speed
-        self._log.add(self._packed(step, ends))
+        self._log.records.append(self._packed(step, ends))
         if self._pictured is not None:
             early = self._shapes_left > 0 and state.phase.joint is not Joint.FREE
             if early or state.time >= self._next_shape:
@@ -316,16 +320,15 @@ class Master(Checkpointed):
         if size == 0.0:
             contact, foundation = state.contact, state.foundation
         (u, v, _, _), (y, z, _, _) = ends
-        of_upper, of_lower, booked = pair.energies(ends)
-        law_force, *booked_energies = booked
-        received = pair.received() if pair.foreign else (0.0, 0.0)
+        of_upper, of_lower, booked = pair.upper.energies(), pair.lower.energies(), pair.joined.booking(ends)
+        received = pair.received() if pair.foreign else _NOT_RECEIVED
         if self._error is not None:
             energies = abs(of_upper.kinetic + of_upper.potential) + abs(of_lower.kinetic + of_lower.potential)
             self._error.note(energies + booked.stored)
         return packed(
             *(state.time, size, *before[0], *before[1], *contact, *foundation),
-            *(u, v, y, z, state.phase.number, self._log.events, state.smoothed, law_force),
-            *(*of_upper, *of_lower, *booked_energies, state.lost, *received, self._energy_at_start),
+            *(u, v, y, z, state.phase.number, self._log.events, state.smoothed, booked.law_force),
+            *(*of_upper, *of_lower, *booked[1:], state.lost, *received, self._energy_at_start),
             *(pair.upper.felt() if self._told & BEAM_TELLS else _NOTHING_FELT),
             self._told,
         )

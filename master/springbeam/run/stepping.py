@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from ..bodies import force
 from ..bodies.checkpointed import Checkpointed
 from ..bodies.elements import RigidWall
-from ..bodies.protocol import NO_FORCE, Body, Ends, Energies, Force
+from ..bodies.protocol import NO_FORCE, Body, Ends, Force
 from ..contact.laws import Transmission, law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
-from ..coupling.protocol import Booking, Coupling, Step, Uncoupled
+from ..coupling.protocol import Coupling, Step, Uncoupled
 from ..scene import Scene
 from .loads import Loads
 
@@ -39,8 +39,8 @@ class State(Checkpointed):
     def accept(self, step: Step, time: float) -> None:
         """The step that ends at ``time`` is made."""
         _, size, contact, foundation, _, _ = step
-        middle = (self.time + 0.5 * size, contact[0], force.mean(foundation, size))
-        self.middles = [*self.middles[-1:], middle]
+        bearing = 0.0 if foundation is NO_FORCE else force.mean(foundation, size)
+        self.middles = [*self.middles[-1:], (self.time + 0.5 * size, contact[0], bearing)]
         self.time, self.last_size = time, size
         # At the macro point between two steps both forces are wrong by nearly the same, one up, one down.
         self.smoothed = 0.5 * (contact[0] + self.contact[0]) if self.steps_in_phase else contact[0]
@@ -146,7 +146,8 @@ class Pair(Checkpointed):
         """
         phase = state.phase if phase is None else phase
         held = self._held if phase.seated else None
-        self.loads.act(state.time, size)
+        if self.loads.any:
+            self.loads.act(state.time, size)
         coupling, guess = self.coupling(phase), state.guess(size)
         step = coupling.solve(self.upper, held or self.lower, state.time, size, start, guess)
         self._last = step = step if held is None else self._with_foundation(step)
@@ -187,10 +188,6 @@ class Pair(Checkpointed):
     def ends(self) -> Ends:
         """(tip, lower end); the one that is missing is at rest at 0."""
         return self._tip(), self._low()
-
-    def energies(self, ends: Ends) -> tuple[Energies, Energies, Booking]:
-        """Energies of the beam, of the spring and of what couples them [J], where the ends are."""
-        return self.upper.energies(), self.lower.energies(), self.joined.booking(ends)
 
     def received(self) -> tuple[float, float]:
         """Return the work that the bodies have received if they are foreign FMUs [J], 0 of others."""
