@@ -92,6 +92,14 @@ def test_a_contact_shorter_than_a_macro_step_is_said():
     assert not_resolved(PAIR, 0.0, shortest_contact=3.0 * PAIR.coupling.H) is None
 
 
+def test_a_soft_contact_within_a_macro_step_is_lost_to_an_exchange_alone():
+    """It finds the force at the ends of the step, where the contact is over: a cell of the grid was 110 % off."""
+    for scheme, resolved in (("energy", True), ("gauss_seidel", False), ("jacobi", False)):
+        scene = with_changes(PAIR, contact={"law": "compliance"}, coupling={"scheme": scheme, "degree": 1})
+        told = not_resolved(scene, 0.0, shortest_contact=0.9 * PAIR.coupling.H)
+        assert (told is None) is resolved
+
+
 def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
     coarse = with_changes(PAIR, coupling={"macro_step": 0.2})
     assert "slowest oscillation of the beam" in not_resolved(coarse, 0.0)

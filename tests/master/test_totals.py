@@ -118,6 +118,8 @@ def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_
     assert shortest_contact(steps, events, 1.0, free_at_end=True) == pytest.approx(0.2, rel=1e-14)
     assert shortest_contact(steps, events, 0.15, free_at_end=True) == np.inf
     assert shortest_contact(steps[:0], events, 1.0, free_at_end=True) == np.inf
+    silent = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))  # no contact has passed anything on
+    assert shortest_contact(silent, events, 1.0, free_at_end=True) == pytest.approx(0.1, rel=1e-14)
 
 
 def test_a_tip_that_strikes_the_stop_itself():

@@ -113,8 +113,8 @@ def pace(steps: np.ndarray) -> float:
 def shortest_contact(steps: np.ndarray, events: Iterable[Event], below: float, *, free_at_end: bool) -> float:
     """Return how long the shortest contact or rest on the foundation that has ended lasts [s]; ∞ if not ``below`` [s].
 
-    Those that pass on hardly any impulse are left out, and one whose end has no row, of a run that was interrupted
-    there. Other parameters as of `totals`.
+    Those that pass on hardly any of the impulse of a run are left out, and one whose end has no row, of a run that was
+    interrupted there. Other parameters as of `totals`.
     """
     if len(steps) == 0:
         return inf
@@ -126,7 +126,7 @@ def shortest_contact(steps: np.ndarray, events: Iterable[Event], below: float, *
     before, after = _cumulative(steps, events)
     first, last = (np.searchsorted(steps["time"], times) for times in np.transpose(short))
     passed = np.abs(before[last] - after[first])
-    return min((u - s for (s, u), j in zip(short, passed, strict=True) if j > SLIGHT * abs(after[-1])), default=inf)
+    return min((u - s for (s, u), j in zip(short, passed, strict=True) if j >= SLIGHT * abs(after[-1])), default=inf)
 
 
 def _contact(

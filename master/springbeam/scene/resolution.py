@@ -12,7 +12,7 @@ from math import inf, pi, sqrt
 from .linearised import spring_frequency, spring_stiffness
 from .scene import Scene
 from .statics import bending_stiffness, locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
-from .tables import Beam
+from .tables import ORDINARY_SCHEMES, Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
 TURN = 1.0
@@ -63,7 +63,8 @@ def not_resolved(
         The largest difference w of the joined ends' velocities as they part or strike the foundation, √(μ w²/2E) with
         their reduced mass μ and the largest energy E.
     shortest_contact
-        How long the shortest contact by a rigid law, or rest on the foundation, has lasted [s].
+        How long the shortest contact, or rest on the foundation, has lasted [s]; of a soft law it counts where the
+        force is exchanged once per macro step.
     contact_frequency
         Of tip and lower end on a soft contact law at the deepest penetration reached [rad/s], 0 without one.
     contact_steps
@@ -93,7 +94,8 @@ def not_resolved(
             f"{100.0 * mismatch:.2g} % of the motion, as √ of the energies; what they do then depends on it. "
             f"{_remedy(scene)}"
         )
-    if H is not None and scene.contact.rigid and shortest_contact < CONTACT_STEPS * H:
+    held = scene.contact.rigid or scene.coupling.scheme in ORDINARY_SCHEMES  # a force that does not see the contact end
+    if H is not None and held and shortest_contact < CONTACT_STEPS * H:
         return (
             f"not resolved: a contact lasts {shortest_contact / H:.2g} macro steps only, so that one polynomial of the "
             f"force decides when it ends, and with it what follows; coupling.macro_step <= "
