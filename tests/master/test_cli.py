@@ -21,7 +21,6 @@ import springbeam.run.runner
 from springbeam import cli
 from springbeam.cli import common
 from springbeam.cli.compare import results_of
-from springbeam.cli.study import Rest
 from springbeam.results.directory import PICTURES
 from springbeam.results.reading import load_trajectory
 from springbeam.results.steps import STEP
@@ -245,17 +244,3 @@ def test_peaks_are_compared_over_one_window():
     assert found["contact_force_max [N]"] == [pytest.approx(own[1], rel=1e-14)] * 2
     runs[0].steps = None
     assert results_of(runs)["contact_force_max [N]"] == [None, own[1]]
-
-
-def test_the_rest_of_a_study_is_told_without_its_start_and_again_when_it_proves_wrong():
-    """Two processes start in 20 s; ten records take 4 s each, the 190 others 1 s."""
-    rest, now, told = Rest(0.0, 2), 20.0, {}
-    for done in range(1, 201):
-        now += 4.0 if done <= 10 else 1.0
-        if (seconds := rest.after(now, done, 200 - done)) is not None:
-            told[done] = seconds
-    assert list(told) == [4, 8, 16, 32, 64, 128]
-    assert told[4] == pytest.approx(4.0 * 196)
-    assert told[128] == pytest.approx((9 * 4.0 + 118.0) / 127 * 72)
-    quick = Rest(0.0, 2)
-    assert [quick.after(0.1 * n, n, 20 - n) for n in range(1, 21)] == [None] * 20

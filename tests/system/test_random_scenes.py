@@ -37,7 +37,7 @@ def decades(low, high):
 @st.composite
 def scenes(draw):
     """Some sixty macro steps of an extreme scene: a cell of `springbeam stability`, with what its cells leave out."""
-    cell = {axis.name: axis.value(draw(st.floats(0.0, 1.0, exclude_max=True))) for axis in PARAMETERS}
+    cell = {axis.name: axis.at(draw(st.floats(0.0, 1.0, exclude_max=True))) for axis in PARAMETERS}
     tables = scene_dict({**cell, "steps": draw(st.integers(10, 60))})
     contact, coupling = tables["contact"], tables["coupling"]
     if beam := tables.get("beam"):

@@ -20,7 +20,7 @@ from springbeam.run.master import Master
 from springbeam.scene import Coupling, SceneError
 from springbeam.scene.laws import LAWS
 from springbeam.studies.stability import grid
-from springbeam.studies.stability.cells import COUPLINGS, PARAMETERS, SLICES, sampled_cells, slice_cells
+from springbeam.studies.stability.cells import AT_REST, COUPLINGS, PARAMETERS, SLICES, sampled_cells, slice_cells
 from springbeam.studies.stability.grid import Grid
 from springbeam.studies.stability.outcome import CLASSES, Outcome, judged, run_cell
 from springbeam.studies.study import record_all
@@ -110,8 +110,7 @@ FAULTS = {
 
 def short(**coupling):
     """A cell near the scene `soft`, in steps that resolve it."""
-    name, at_rest = coupling.pop("name", ""), {p.name: p.rest for p in PARAMETERS}
-    return {"slice": name, **at_rest, "n_elements": 4, "macro_step": 2e-3, "steps": 40, **coupling}
+    return {"slice": "", **AT_REST, "n_elements": 4, "macro_step": 2e-3, "steps": 40, **coupling}
 
 
 @pytest.mark.parametrize("law", ["transmission", "compliance"])
@@ -192,11 +191,11 @@ def test_the_grid_covers_the_ranges():
     cells = sampled_cells(300, 1)
     assert len(cells) + len(slice_cells(6)) >= 600
     for axis in PARAMETERS:
-        if axis.choices:
-            assert {cell[axis.name] for cell in cells} == set(axis.choices)
+        if axis.values:
+            assert {cell[axis.name] for cell in cells} == set(axis.values)
             continue
         values = sorted(cell[axis.name] for cell in cells if cell[axis.name] != 0.0)
-        if axis.linear:
+        if not axis.log:
             tolerance = 0.01 * (axis.high - axis.low)
             assert values[0] == pytest.approx(axis.low, abs=tolerance)
             assert values[-1] == pytest.approx(axis.high, abs=tolerance)

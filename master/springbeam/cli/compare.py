@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 from rich.text import Text
 
 from ..results.reading import load_trajectory
 from ..results.totals import LOSS_NAMES, TOTALS, totals
 from ..results.trajectory import Trajectory
 from ..scene import Scene
+from ..studies.tables import table
 from .common import (
     BAD_INPUT,
     JsonOption,
@@ -59,8 +59,8 @@ def compare(
     elif quiet and drawn:
         typer.echo(out)
     console = console_for(silent=quiet or as_json)
-    console.print(_table("keys that differ", names, keys))
-    console.print(_table("results", names, results))
+    for title, found in (("keys that differ", keys), ("results", results)):
+        console.print(table(("", *names), _rows(found), title))
     if drawn:
         console.print(Text(f"picture   {out}"), soft_wrap=True)
 
@@ -77,11 +77,8 @@ def results_of(runs: list[Trajectory]) -> dict[str, list[Any]]:
     """Return the numbers of `springbeam.results.totals` that any of the runs has, with their units, by run."""
     units = {name: unit for name, (_, unit) in TOTALS.items()} | dict.fromkeys(LOSS_NAMES, "J")
     summaries = _over_one_window(runs)
-    found = {}
-    for name, unit in units.items():
-        values = [summary.get(name) for summary in summaries]
-        if any(values):
-            found[f"{name} [{unit}]" if unit else name] = values
+    found = {f"{name} [{unit}]" if unit else name: [s.get(name) for s in summaries] for name, unit in units.items()}
+    found = {name: values for name, values in found.items() if any(values)}
     return {**found, "warnings": [len(run.summary.get("warnings", ())) for run in runs]}
 
 
@@ -92,29 +89,18 @@ def _over_one_window(runs: list[Trajectory]) -> list[dict[str, Any]]:
     peak beside those of other windows.
     """
     windows = [run.summary.get("contact_force_window") for run in runs]
-    known = [window for window in windows if window is not None]
-    common = max(known, default=0.0)
-    summaries = []
-    for run, window in zip(runs, windows, strict=True):
-        summary = dict(run.summary)
+    common = max((window for window in windows if window is not None), default=0.0)
+    summaries = [dict(run.summary) for run in runs]
+    for run, window, summary in zip(runs, windows, summaries, strict=True):
         if window is not None and abs(window - common) > _SAME_WINDOW * common:
-            peak = None
+            for name in ("contact_force_max", "contact_force_window"):
+                del summary[name]
             if run.steps is not None:
-                peak = totals(run.scene, run.steps, run.events, common, free_at_end=True)["contact_force_max"]
-            summary |= {"contact_force_max": peak, "contact_force_window": None if peak is None else common}
-        summaries.append(summary)
+                found = totals(run.scene, run.steps, run.events, common, free_at_end=True)
+                summary |= {"contact_force_max": found["contact_force_max"], "contact_force_window": common}
     return summaries
 
 
-def _table(title: str, names: list[str], rows: dict[str, list[Any]]) -> Table:
-    table = Table(box=None, pad_edge=False, header_style="bold", title=title, title_justify="left")
-    table.add_column("", overflow="fold")
-    for name in names:
-        table.add_column(Text(name), justify="right", overflow="fold")
-    for name, values in rows.items():
-        table.add_row(Text(name), *(_shown(value) for value in values))
-    return table
-
-
-def _shown(value: Any) -> Text:
-    return Text("" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value))
+def _rows(found: dict[str, list[Any]]) -> list[list[str]]:
+    return [[name, *("" if value is None else f"{value:.5g}" if isinstance(value, float) else str(value)
+                     for value in values)] for name, values in found.items()]  # fmt: skip

@@ -47,29 +47,23 @@ def doctor(
     found = _found()
     if as_json:
         print_json(found)
-    console = console_for(silent=as_json)
-
-    def line(name: str, text: str) -> None:
-        console.print(Text(f"{name:<12}{text}"), soft_wrap=True)
-
-    line("springbeam", f"{found['version']} in {found['path']}")
-    line("Python", f"{found['python']['version']} ({found['python']['executable']})")
-    line("system", f"{found['system']}, {found['machine']}")
-    for name, remedy in (
-        ("packages", "pip install --upgrade springbeam"),
-        ("cluster", "pip install distributed"),
-    ):
-        versions = found[name]
-        absent = [package for package, number in versions.items() if number is None]
-        there = [f"{package} {number}" for package, number in versions.items()]
-        lines = [f"not available: {', '.join(absent)} missing; {remedy}"] if absent else _wrapped(there)
-        for k, text in enumerate(lines):
-            line("" if k else name, text)
-    line("ffmpeg", found["ffmpeg"] or "not found: springbeam animate then writes GIFs only, no MP4")
-    for name, fmu in found["fmus"].items():
+    versions, python, fmus = found["packages"] | found["cluster"], found["python"], found["fmus"]
+    absent = [package for package, number in versions.items() if number is None]
+    there = ", ".join(f"{package} {number}" for package, number in versions.items() if number is not None)
+    lines = [
+        ("springbeam", f"{found['version']} in {found['path']}"),
+        ("Python", f"{python['version']} ({python['executable']})"),
+        ("system", f"{found['system']}, {found['machine']}"),
+        ("packages", textwrap.fill(there, 66, break_on_hyphens=False, subsequent_indent=" " * 12)),
+        *(("missing", f"{package}: pip install --upgrade {package}") for package in absent),
+        ("ffmpeg", found["ffmpeg"] or "not found: springbeam animate then writes GIFs only, no MP4"),
+    ]
+    for name, fmu in fmus.items():
         state = f"loads; binaries for {', '.join(fmu['platforms'])}" if fmu["error"] is None else "FAILED"
-        line(f"{name}.fmu", f"{state}\n{'':<12}{fmu['error'] or fmu['path']}")
-    if any(fmu["error"] is not None for fmu in found["fmus"].values()):
+        lines.append((f"{name}.fmu", f"{state}\n{'':<12}{fmu['error'] or fmu['path']}"))
+    for name, text in lines:
+        console_for(silent=as_json).print(Text(f"{name:<12}{text}"), soft_wrap=True)
+    if any(fmu["error"] is not None for fmu in fmus.values()):
         raise typer.Exit(DISAGREES)
 
 
@@ -78,22 +72,17 @@ def _examine(scene: Scene, as_json: bool) -> None:
     from ..bodies.abilities import OFFERED, refusals
     from ..bodies.factory import findings
 
-    found = findings(scene)
-    bodies = {"beam": scene.upper, "spring": scene.lower}
-    console = console_for(silent=as_json)
-    for name, body in bodies.items():
-        if body is None:
+    found, console = findings(scene), console_for(silent=as_json)
+    for name, body in {"beam": scene.upper, "spring": scene.lower}.items():
+        if name not in found:
+            if body is not None:
+                console.print(Text(f"[{name}] {kind_of(body).replace('_', ' ')}: everything is offered"))
             continue
-        finding = found.get(name)
-        if finding is None:
-            console.print(Text(f"[{name}] {kind_of(body).replace('_', ' ')}: everything is offered"))
-            continue
-        path, told = scene.foreign[name].fmu, asdict(finding.abilities)
-        mass = scene.foreign[name].mass
-        console.print(Text(f"[{name}] {path}", style="bold"), soft_wrap=True)
-        given = f"{finding.mass:.9g} kg" + (" (measured)" if mass is None else f" measured, {mass:.9g} kg given")
-        console.print(Text(f"mass that a force or an impulse meets: {given}"))
-        names = ("", "capability", "shown by", "what is offered")
+        finding, given = found[name], scene.foreign[name]
+        mass = "(measured)" if given.mass is None else f"measured, {given.mass:.9g} kg given"
+        console.print(Text(f"[{name}] {given.fmu}", style="bold"), soft_wrap=True)
+        console.print(Text(f"mass that a force or an impulse meets: {finding.mass:.9g} kg {mass}"))
+        names, told = ("", "capability", "shown by", "what is offered"), asdict(finding.abilities)
         rows = [
             ("yes", key, shown_by, having) if told[key] > 0 else ("no", key, shown_by, lacking)
             for key, shown_by, having, lacking in OFFERED
@@ -113,16 +102,17 @@ def _found() -> dict[str, Any]:
     from ..bodies.fmu_bodies import FmuBeam, FmuSpring
 
     fmus = {}
-    for name in ("beam", "spring"):
-        path = fmu_directory() / f"{name}.fmu"
-        platforms: list[str] = []
-        error = None
+    for name, body in (("beam", lambda: FmuBeam(Beam.with_ones(), 0.0, 0.0)),
+                       ("spring", lambda: FmuSpring(Spring.with_ones(), 0.0))):  # fmt: skip
+        found: dict[str, Any] = {"path": fmu_directory() / f"{name}.fmu", "platforms": [], "error": None}
         try:
-            (FmuBeam(Beam.with_ones(), 0.0, 0.0) if name == "beam" else FmuSpring(Spring.with_ones(), 0.0)).close()
-            platforms = _platforms(path)
+            body().close()
+            with zipfile.ZipFile(found["path"]) as archive:
+                binaries = {file.split("/")[1] for file in archive.namelist() if file.startswith("binaries/")}
+            found["platforms"] = sorted(binaries)
         except FmuError as failure:
-            error = str(failure)
-        fmus[name] = {"path": path, "platforms": platforms, "error": error}
+            found["error"] = str(failure)
+        fmus[name] = found
     return {
         "version": metadata.version("springbeam"),
         "path": Path(__file__).parents[1],
@@ -141,12 +131,3 @@ def _version(name: str) -> str | None:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return None
-
-
-def _wrapped(words: list[str]) -> list[str]:
-    return textwrap.wrap(", ".join(words), width=66, break_on_hyphens=False)
-
-
-def _platforms(path: Path) -> list[str]:
-    with zipfile.ZipFile(path) as archive:
-        return sorted({name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")})

@@ -50,43 +50,38 @@ def predict(
         console.print(Text(f'fits      {scheme} {degree}, which coupling.scheme = "auto" takes: {because}'))
 
 
-def _estimated(p: Prediction) -> Iterator[tuple[str, str]]:
-    e = p.estimates
+def _lines(p: Prediction) -> Iterator[tuple[str, str]]:
+    """Yield what is predicted, a line a subject."""
+    e, H = p.estimates, p.macro_step
     masses = {"beam": e.beam_mass, "spring": e.spring_mass}
     yield "mass", ", ".join(f"{name} {mass:.4g} kg" for name, mass in masses.items() if mass is not None)
     if e.frequency is not None and p.frequencies:
         found = ", ".join(f"{frequency:.4g}" for frequency in p.frequencies)
         yield "vibrates", f"at {found} Hz on this mesh; first without a mesh {e.frequency:.4g} Hz"
-    stiffness = [] if e.tip_stiffness is None else [f"tip {e.tip_stiffness:.4g} N/m (static)"]
-    if e.locking is not None and e.locking > _LOCKS:
-        stiffness[0] += f", {e.locking:.3g} times that on this mesh, which locks"
-    yield (
-        "stiffness",
-        ", ".join([*stiffness, *([] if e.spring_stiffness is None else [f"spring {e.spring_stiffness:.4g} N/m"])]),
-    )
-    times = [] if e.contact_time is None or e.contact_time == inf else [f"first at t = {e.contact_time:.4g} s"]
-    if e.contact_duration is not None:
-        times.append(f"lasts about {e.contact_duration:.2g} s (half a period together)")
-    if times:
-        yield "contact", ", ".join(times)
-
-
-def _lines(p: Prediction) -> list[tuple[str, str]]:
-    lines = [*_estimated(p), ("H", f"{p.macro_step:g} s")]
+    locks = e.locking is not None and e.locking > _LOCKS
+    yield "stiffness", ", ".join([
+        *([] if e.tip_stiffness is None else [f"tip {e.tip_stiffness:.4g} N/m (static)"]),
+        *([f"{e.locking:.3g} times that on this mesh, which locks"] if locks else []),
+        *([] if e.spring_stiffness is None else [f"spring {e.spring_stiffness:.4g} N/m"]),
+    ])  # fmt: skip
+    if e.contact_time not in (None, inf) or e.contact_duration is not None:
+        yield "contact", ", ".join([
+            *([] if e.contact_time in (None, inf) else [f"first at t = {e.contact_time:.4g} s"]),
+            *([] if e.contact_duration is None
+              else [f"lasts about {e.contact_duration:.2g} s (half a period together)"]),
+        ])  # fmt: skip
+    yield "H", f"{H:g} s"
     if p.omega_1 is not None and p.omega_max is not None:
-        lines.append(("beam", f"ω₁H = {p.omega_1 * p.macro_step:.3g}, ω_max H = {p.omega_max * p.macro_step:.3g}; "
-                              f"{p.resolved_modes} of {p.modes} modes resolved (ωH ≤ 1)"
-                              + (f", beside {p.static_shapes} static shapes" if p.static_shapes else "")))  # fmt: skip
-        lines.append(("", f"tip mass {p.tip_mass:.3g} kg, impedance Z = {p.impedance:.3g} N·s/m"))
-    if p.spring_frequency is not None:
-        lines.append(("spring", f"ωH = {p.spring_frequency * p.macro_step:.3g} at its stiffest"))
-    if p.contact_frequency is not None:
-        lines.append(("contact", f"ωH = {p.contact_frequency * p.macro_step:.3g} at its stiffest"))
+        beside = f", beside {p.static_shapes} static shapes" if p.static_shapes else ""
+        yield "beam", (f"ω₁H = {p.omega_1 * H:.3g}, ω_max H = {p.omega_max * H:.3g}; "
+                       f"{p.resolved_modes} of {p.modes} modes resolved (ωH ≤ 1){beside}")  # fmt: skip
+        yield "", f"tip mass {p.tip_mass:.3g} kg, impedance Z = {p.impedance:.3g} N·s/m"
+    for name, omega in (("spring", p.spring_frequency), ("contact", p.contact_frequency)):
+        if omega is not None:
+            yield name, f"ωH = {omega * H:.3g} at its stiffest"
     if p.displacement_gain is not None:
         verdict = "diverges" if p.displacement_gain > 1.0 else "converges"
-        gain = f"of displacement against force: gain 2m/(ZH) = {p.displacement_gain:.3g}, {verdict}"
-        lines.append(("exchange", gain))
-    return lines
+        yield "exchange", f"of displacement against force: gain 2m/(ZH) = {p.displacement_gain:.3g}, {verdict}"
 
 
 def _scheme(s: SchemePrediction, threshold: float) -> tuple[str, ...]:

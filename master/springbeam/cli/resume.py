@@ -10,8 +10,8 @@ import typer
 from ..results.directory import RunDirectory
 from .common import JsonOption, NoPlotsOption, QuietOption, bad_input_reported, results_directory
 from .run import carry_out
-from .study import Frame
-from .study import carry_out as carry_out_study
+from .studies import Frame
+from .studies import carry_out as carry_out_study
 
 
 def resume(

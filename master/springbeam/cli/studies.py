@@ -1,29 +1,108 @@
-"""The commands that carry out a study: sweep, tradeoff, converge, crosscheck, stability."""
+"""The commands that carry out a study: sweep, tradeoff, converge, crosscheck, stability.
+
+Each is a function that makes the study of its own options. `study_command` adds those that all studies share, `Frame`,
+and carries the study out: where records go, cost, progress, how it stops and goes on.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+import inspect
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.text import Text
 
+from ..results.directory import ResultsExist
 from ..scene import load_scene
 from .common import (
+    BAD_INPUT,
+    STOPPED,
     ForceOption,
     JsonOption,
     NoPlotsOption,
     QuietOption,
     SceneArgument,
     SettingsOption,
+    bad_input_reported,
+    cause_of,
     complete_key,
+    console_for,
+    fail,
+    print_json,
+    progress_bar,
 )
 from .run import picked
-from .study import Frame, QuickOption, SchedulerOption, StudyOption, WorkersOption, carry_out
 from .summary import picked_in_words
 
 if TYPE_CHECKING:
-    from ..studies.study import Study
+    from ..studies.study import Records, Row, Study
+else:
+    Study = Any
+
+MetricOption = Annotated[
+    list[str] | None,
+    typer.Option("--metric", metavar="NAME", help="A number of each run; may be repeated. Default: those that fit."),
+]
+QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]
+SeedOption = Annotated[
+    int, typer.Option("--seed", metavar="N", min=0, help="Seed of the samples; one seed gives the same runs again.")
+]
 
 
+@dataclass(frozen=True)
+class Frame:
+    """The options of all studies; ``workers`` and ``scheduler`` of those whose cases workers compute."""
+
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", metavar="DIR", help="Directory of the results; a study that was begun there goes on."
+        ),
+    ] = None
+    force: ForceOption = False
+    no_plots: NoPlotsOption = False
+    quiet: QuietOption = False
+    as_json: JsonOption = False
+    workers: Annotated[
+        int | None, typer.Option("--workers", metavar="N", min=1, help="Local processes. Default: one per core.")
+    ] = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Run on this Dask cluster instead of local processes."),
+    ] = None
+
+
+def study_command(*of_workers: str) -> Callable[[Callable[..., Study]], Callable[..., None]]:
+    """Return what makes a command of a function that returns a study: with its options, then those of `Frame`.
+
+    ``of_workers`` names the options of workers that the command offers.
+    """
+
+    def decorate(make: Callable[..., Study]) -> Callable[..., None]:
+        own, frame = (inspect.signature(what, eval_str=True).parameters for what in (make, Frame))
+        shared = {name: p for name, p in frame.items() if name in of_workers or name not in ("workers", "scheduler")}
+
+        def command(**given: Any) -> None:
+            taken = {name: given.pop(name) for name in shared}
+            carry_out(lambda: make(**given), given.get("scene"), Frame(**taken))
+
+        command.__name__, command.__doc__ = make.__name__, make.__doc__
+        parameters = [p.replace(kind=p.KEYWORD_ONLY) for p in (own | shared).values()]
+        command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return command
+
+    return decorate
+
+
+@study_command("workers", "scheduler")
 def sweep(
     scene: SceneArgument,
     vary: Annotated[
@@ -42,15 +121,8 @@ def sweep(
     sampling: Annotated[
         Literal["latin_hypercube", "random"], typer.Option("--sampling", help="How --samples are placed.")
     ] = "latin_hypercube",
-    seed: Annotated[
-        int, typer.Option("--seed", metavar="N", min=0, help="Seed of the samples; one seed gives the same runs again.")
-    ] = 0,
-    metric: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--metric", metavar="NAME", help="Keep only this number of each run; may be repeated. Default: all."
-        ),
-    ] = None,
+    seed: SeedOption = 0,
+    metric: MetricOption = None,
     stroboscopic: Annotated[
         bool,
         typer.Option(
@@ -58,34 +130,25 @@ def sweep(
             help="Keep the positions once a period of the harmonic load in the last third of each run, and draw them.",
         ),
     ] = False,
-    workers: WorkersOption = None,
-    scheduler: SchedulerOption = None,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+) -> Study:
     """Run a scene over many values of its keys, on all cores or a Dask cluster; one row per run.
 
     Example: springbeam sweep soft --vary spring.linear_stiffness=1:200:64:log
     """
     from ..studies.sweep import Sweep
 
-    def study() -> Study:
-        return Sweep(
-            scene=load_scene(scene, settings or ()),
-            vary=tuple(vary or ()),
-            samples=samples,
-            sampling=sampling,
-            seed=seed,
-            metric=tuple(metric or ()),
-            stroboscopic=stroboscopic,
-        )
-
-    carry_out(study, scene, Frame(out, force, no_plots, quiet, as_json, workers, scheduler))
+    return Sweep(
+        scene=load_scene(scene, settings or ()),
+        vary=tuple(vary or ()),
+        samples=samples,
+        sampling=sampling,
+        seed=seed,
+        metric=tuple(metric or ()),
+        stroboscopic=stroboscopic,
+    )
 
 
+@study_command()
 def tradeoff(
     scene: SceneArgument,
     settings: SettingsOption = None,
@@ -103,52 +166,36 @@ def tradeoff(
             "--quick", help="Every third configuration of a kind, timed once; the slow ones are left out sooner."
         ),
     ] = False,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+) -> Study:
     """Measure error against cost over schemes, macro steps, modes, meshes and tolerances, beside scipy's solvers.
 
     Example: springbeam tradeoff soft --until 0.0712
     """
     from ..studies.tradeoff import Tradeoff
 
-    def study() -> Study:
-        return Tradeoff.of(load_scene(scene, settings or ()), until, repeats=repeats, quick=quick)
-
-    carry_out(study, scene, Frame(out, force, no_plots, quiet, as_json))
+    return Tradeoff.of(load_scene(scene, settings or ()), until, repeats=repeats, quick=quick)
 
 
+@study_command()
 def converge(
     scene: SceneArgument,
     settings: SettingsOption = None,
     levels: Annotated[
         int, typer.Option("--levels", metavar="N", min=3, max=8, help="Meshes, each with twice the elements.")
     ] = 4,
-    metric: Annotated[
-        list[str] | None, typer.Option("--metric", metavar="NAME", help="Quantity to compare; may be repeated.")
-    ] = None,
+    metric: MetricOption = None,
     quick: QuickOption = False,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+) -> Study:
     """Show how the results settle with finer meshes and more modes: observed orders, extrapolated values, cost.
 
     Example: springbeam converge steel-bumper --metric contact_force_max
     """
     from ..studies.converge import Converge
 
-    def study() -> Study:
-        return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()), quick=quick)
-
-    carry_out(study, scene, Frame(out, force, no_plots, quiet, as_json))
+    return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()), quick=quick)
 
 
+@study_command()
 def crosscheck(
     scene: SceneArgument,
     settings: SettingsOption = None,
@@ -158,12 +205,7 @@ def crosscheck(
     quick: Annotated[
         bool, typer.Option("--quick", help="Compare only the first quarter of the time; with --orders, not H/8.")
     ] = False,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+) -> Study:
     """Compare the co-simulation with the monolithic reference of its law.
 
     Exit code 1 if they differ, 4 if they cannot be compared over the run that was asked for.
@@ -173,16 +215,14 @@ def crosscheck(
     from ..studies.crosscheck import Crosscheck
     from ..studies.orders import Orders
 
-    def study() -> Study:
-        what = load_scene(scene, settings or ())
-        made = picked(what)
-        remarks = () if made is None else (f"accuracy {picked_in_words(made.summary['accuracy'])}",)
-        kind = Orders if with_orders else Crosscheck
-        return kind(scene=what if made is None else made.scene, quick=quick, remarks=remarks)
-
-    carry_out(study, scene, Frame(out, force, no_plots, quiet, as_json))
+    what = load_scene(scene, settings or ())
+    made = picked(what)
+    remarks = () if made is None else (f"accuracy {picked_in_words(made.summary['accuracy'])}",)
+    kind = Orders if with_orders else Crosscheck
+    return kind(scene=what if made is None else made.scene, quick=quick, remarks=remarks)
 
 
+@study_command("workers")
 def stability(
     samples: Annotated[
         int, typer.Option("--samples", metavar="N", min=0, help="Cells of the hypercube over all parameters.")
@@ -190,22 +230,104 @@ def stability(
     resolution: Annotated[
         int, typer.Option("--resolution", metavar="N", min=0, help="Values of each parameter of a slice; 0: no slices.")
     ] = 6,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", min=0, help="Seed of the hypercube.")] = 1,
+    seed: SeedOption = 1,
     quick: QuickOption = False,
-    workers: WorkersOption = None,
-    out: StudyOption = None,
-    force: ForceOption = False,
-    no_plots: NoPlotsOption = False,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-) -> None:
+) -> Study:
     """Run extreme scenes and classify each result. Exit code 1 if one is wrong.
 
     Example: springbeam stability --samples 100 --resolution 0
     """
     from ..studies.stability.grid import Grid
 
-    def study() -> Study:
-        return Grid(samples=samples, resolution=resolution, seed=seed, quick=quick)
+    return Grid(samples=samples, resolution=resolution, seed=seed, quick=quick)
 
-    carry_out(study, None, Frame(out, force, no_plots, quiet, as_json, workers))
+
+def carry_out(make: Callable[[], Study], scene: str | None, frame: Frame) -> None:
+    """Compute what of a study is not yet in its directory, write its files, and show what was found.
+
+    ``make`` returns the study, and may raise what bad input raises. The directory is ``out``, else
+    ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
+    """
+    from .watchdog import watched
+
+    console = console_for(silent=frame.quiet or frame.as_json)
+    with bad_input_reported():
+        study = make()
+        study.cases()
+        records = _opened(study, study.kind if scene is None else f"{Path(scene).stem}-{study.kind}", frame)
+        directory = records.path.parent
+        with _going_on(records, len(study.cases())) as cut_short:
+            with watched(cut_short):
+                computed = _computed(study, records, console, frame)
+            files = study.write(computed, directory, pictures=not frame.no_plots)
+        found = study.findings(computed)
+    if frame.as_json:
+        print_json({"directory": directory, "files": files, **found.document})
+    elif frame.quiet:
+        typer.echo(directory)
+    for part in (*map(Text, study.remarks), *found.shown):
+        console.print(part)
+    for file in files:
+        console.print(Text(f"results   {file}"), soft_wrap=True)
+    if found.code:
+        raise typer.Exit(found.code)
+
+
+def _opened(study: Study, default: str, frame: Frame) -> Records:
+    from ..studies.study import Records
+
+    if frame.out is not None or frame.force:
+        return Records(study, frame.out or Path("results") / default, replace=frame.force)
+    for number in count(1):
+        try:
+            return Records(study, Path("results") / (default if number == 1 else f"{default}-{number}"))
+        except ResultsExist:
+            continue
+    raise AssertionError("unreachable")
+
+
+@contextmanager
+def _going_on(records: Records, total: int) -> Iterator[Callable[[str], str]]:
+    """Where the study stops, end the command with the cause and how it goes on; yield what says that of a cause."""
+    from ..monolithic.hybrid_system import ReferenceFailure
+    from ..run.outcome import RunStopped
+
+    directory = records.path.parent
+
+    def cut_short(cause: str) -> str:
+        if not records.by_name:
+            return cause
+        there = f"{len(records.by_name)} of {total} records are in {directory}"
+        return f"{cause}; {there}; springbeam resume {directory} goes on"
+
+    try:
+        yield cut_short
+    except ConnectionError as error:
+        fail(BAD_INPUT, str(error))
+    except (KeyboardInterrupt, RunStopped, ReferenceFailure, OSError) as error:
+        if isinstance(error, OSError) and not records.by_name:
+            raise
+        fail(STOPPED, cut_short(cause_of(error, directory)))
+
+
+def _computed(study: Study, records: Records, console: Console, frame: Frame) -> dict[str, Row]:
+    """Return all records, and show meanwhile how far it is."""
+    from ..studies.study import dask_cluster, record_all
+
+    total, there = len(study.cases()), len(records.by_name)
+    if there == total:
+        return record_all(study, records)
+    console.print(Text(study.cost()))
+    if there:
+        console.print(f"{there} of {total} records are there")
+    state, left = TextColumn("{task.fields[failed]} failed"), TimeRemainingColumn()
+    bar = progress_bar(BarColumn(bar_width=20), MofNCompleteColumn(), state, left, quiet=frame.quiet or frame.as_json)
+    task, failed = bar.add_task("", total=total, completed=there, failed=0), [0]
+
+    def report(record: Row) -> None:
+        failed[0] += study.failed(record)
+        bar.update(task, advance=1, failed=failed[0])
+
+    processes = (frame.workers or os.cpu_count() or 1) if study.parallel else 0
+    with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
+        return record_all(study, records, processes, cluster, report)

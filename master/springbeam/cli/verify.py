@@ -12,11 +12,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..studies.tables import number
+from ..studies.tables import number, table
 from .common import DISAGREES, JsonOption, bad_input_reported, console_for, print_json
 
 if TYPE_CHECKING:
     from ..studies.verify.check import Check, Section
+
+
+_COLUMNS = ("quantity", "exact", "computed", "error", "bound", "")
 
 
 def verify(as_json: JsonOption = False) -> None:
@@ -45,33 +48,21 @@ def report(sections: Iterable[Section], console: Console) -> dict[str, list[Chec
     found: dict[str, list[Check]] = {}
     for section in sections:
         checks = found[section.title] = list(section())
-        console.print(Text(section.title, style="bold"))
-        marks = {reason: chr(ord("a") + i) for i, reason in enumerate(dict.fromkeys(c.reason for c in checks))}
-        console.print(_table(checks, marks))
+        reasons = dict.fromkeys(check.reason for check in checks)
+        marks = dict(zip(reasons, "abcdefghijklmnopqrstuvwxyz", strict=False))
+        console.print(table(_COLUMNS, [_row(check, marks) for check in checks], section.title))
         notes = Table.grid(padding=(0, 1))
         for reason, mark in marks.items():
             notes.add_row(Text(mark), Text(reason))
-        console.print(notes)
-        console.print()
+        console.print(notes, "")
     verdicts = [check.passed for checks in found.values() for check in checks]
     counts = f"{verdicts.count(True)} passed, {verdicts.count(False)} failed"
     console.print(f"{counts}; {perf_counter() - began:.0f} s")
     return found
 
 
-def _table(checks: list[Check], marks: dict[str, str]) -> Table:
-    """Return a row per check, with the mark of its reason."""
-    table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    table.add_column("quantity", no_wrap=True, min_width=30)
-    for heading, width in (("exact", 11), ("computed", 11), ("error", 8), ("bound", 7)):
-        table.add_column(heading, justify="right", no_wrap=True, min_width=width)
-    table.add_column("", no_wrap=True)
-    for check in checks:
-        verdict = Text("pass") if check.passed else Text("FAIL", style="bold red")
-        table.add_row(
-            Text(check.quantity),
-            *(number(value, ".6g", "–") for value in (check.exact, check.computed)),
-            *(number(value, ".1e", "–") for value in (check.error, check.bound)),
-            verdict.append(f" {marks[check.reason]}"),
-        )
-    return table
+def _row(check: Check, marks: dict[str, str]) -> tuple[str, ...]:
+    """Return a check in words, with the mark of its reason."""
+    numbers = ((check.exact, ".6g"), (check.computed, ".6g"), (check.error, ".1e"), (check.bound, ".1e"))
+    verdict = f"{'pass' if check.passed else 'FAIL'} {marks[check.reason]}"
+    return check.quantity, *(number(value, form, "–") for value, form in numbers), verdict

@@ -23,16 +23,16 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from functools import partial
-from typing import Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import scipy.sparse.linalg as spla
 
 from ..results.trajectory import Event, EventKind, Trajectory
 from ..scene import Scene
-from .algorithm1_ledger import PairState, StepLedger
 from .hybrid_system import ReferenceFailure
-from .semi_discrete import SemiDiscreteBeam, assemble
+from .rows import finished
+from .semi_discrete import assemble
 
 YTemp = Literal["equation", "guess", "both"]
 
@@ -43,6 +43,23 @@ class AlgorithmFailure(ReferenceFailure):
     """Newton's method did not converge, or the solution overflows; ``trajectory`` holds what came before."""
 
     trajectory: Trajectory | None = None
+
+
+class _Row(NamedTuple):
+    """Beam and spring after a step; forces are means over it [N]."""
+
+    time: float
+    q: np.ndarray  #: unknowns of the mesh [rad, m], their last the tip's deflection
+    v: np.ndarray
+    y: float  #: [m]
+    z: float  #: [m/s]
+    phase: str = "free"
+    on_tip: float = 0.0  #: on the tip, of whatever kind
+    inside: float = 0.0  #: of the law on the tip
+    pressing: float = 0.0  #: of the law on the spring
+    foundation: float = 0.0
+    case: int = 0
+    booked: bool = False  #: whether the step was one in contact
 
 
 def simulate(
@@ -94,32 +111,30 @@ class _Algorithm:
         assert scene.spring is not None
         self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
         self.y_temp, self.tolerance = y_temp, tolerance
-        self.discrete: SemiDiscreteBeam = assemble(scene.beam)
-        d = self.discrete
+        self.discrete = d = assemble(scene.beam)
         self.load = scene.beam.distributed_load * d.uniform_load + scene.beam.tip_load_coefficient * d.hat_load
         self._set_step(scene.coupling.H)
         self.phi = -np.inf if scene.stop is None else scene.stop.position
-        self.ledger = StepLedger(scene, d, self.load)
+        self.stiffness = 0.0  #: λ_nc as the last step has left it
         self.iterations: dict[str, list[int]] = {"beam": [], "predicted": [], "joined": []}
+        self.events: list[Event] = []
+        self.rows: list[_Row] = []
 
     def _set_step(self, h: float) -> None:
         """Factorise (62) for steps of ``h`` [s]."""
         d, alpha = self.discrete, self.beam.alpha_b
         self.h = h
         self.B = (4.0 * d.M + (2.0 * alpha * h - h**2) * d.K).tocsr()
-        self.A = (4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()
-        self.solve: Callable[[np.ndarray], np.ndarray] = spla.splu(self.A).solve
-        #: A⁻¹e: how (62) answers to a force at the tip.
-        self.tip_response = self.solve(d.tip_vector)
+        self.solve = spla.splu((4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()).solve
+        #: How (62) answers to a force at the tip.
+        self.tip_response: np.ndarray = self.solve(d.tip_vector)
 
     # Laws -----------------------------------------------------------------------------------------------------------
 
     def _compliance(self, w: float, stiffness: float) -> tuple[float, float]:
         """Return λ (Ψ − w)₊^p and its derivative by w."""
-        depth = max(self.spring.equilibrium - w, 0.0)
-        p = self.scene.contact.exponent
-        slope = -p * stiffness * depth ** (p - 1.0) if depth > 0.0 else 0.0
-        return stiffness * depth**p, slope
+        depth, p = max(self.spring.equilibrium - w, 0.0), self.scene.contact.exponent
+        return stiffness * depth**p, -p * stiffness * depth ** (p - 1.0) if depth > 0.0 else 0.0
 
     def _newton(self, f: Callable[[float], tuple[float, float]], guess: float, solve: str) -> float:
         x = guess
@@ -134,166 +149,175 @@ class _Algorithm:
                 return x
         raise AlgorithmFailure(f"Newton's method for the {solve} position does not converge at t = {self.time:.6g} s")
 
-    def _foundation_force(self, y: float, z: float, stiffness: float, Y: float) -> tuple[float, float]:
+    def _foundation_force(self, y: float, z: float, Y: float) -> tuple[float, float]:
         """Return N of (53) with (54) for a step from (y, z) that ends at ``Y``, and its derivative by ``Y``."""
         p, h = self.spring, self.h
-        force, slope = self._compliance(Y, stiffness)
+        force, slope = self._compliance(Y, self.stiffness)
         value = (
             2.0 * p.mass * ((Y - y) / h - z) / h
             + p.damping * (Y - y) / h
             + 0.5 * p.linear_stiffness * (Y + y)
             + 0.25 * p.cubic_stiffness * (Y**2 + y**2) * (Y + y)
-            + 0.5 * (force + self._compliance(y, stiffness)[0])
+            + 0.5 * (force + self._compliance(y, self.stiffness)[0])
             - p.external_force
         )
-        tangent = (
-            2.0 * p.mass / h**2
-            + p.damping / h
-            + 0.5 * p.linear_stiffness
-            + 0.25 * p.cubic_stiffness * (3.0 * Y**2 + 2.0 * Y * y + y**2)
-            + 0.5 * slope
-        )
+        cubic = 0.25 * p.cubic_stiffness * (3.0 * Y**2 + 2.0 * Y * y + y**2)
+        tangent = 2.0 * p.mass / h**2 + p.damping / h + 0.5 * p.linear_stiffness + cubic + 0.5 * slope
         return value, tangent
 
     # Algorithm ------------------------------------------------------------------------------------------------------
 
     def run(self) -> Trajectory:
-        self.time, self._began = 0.0, clock.perf_counter()
-        self._events: list[Event] = []
-        state = PairState(*self._initial_beam(), self.spring.equilibrium, self.spring.initial_velocity)
-        touched = self.beam.approach == "undeformed" or state.q[-1] <= self.spring.equilibrium
-        if touched:  # nothing to integrate before t_c
-            state = self._first_contact(state)
-        self.ledger.record(self.time, state, "tied" if touched else "free")
-        stiffness = self.scene.contact.stiffness if touched else 0.0
-        whole, rest = self.scene.equal_steps
-        steps = whole + (rest > 0.0)
-        begin = self.time
-        for step in range(1, steps + 1):
+        self.time, began, psi = 0.0, clock.perf_counter(), self.spring.equilibrium
+        row = self._start()
+        touched = self.beam.approach == "undeformed" or row.q[-1] <= psi  # else lines 1–4 come first
+        self.rows.append(self._first_contact(row) if touched else row)
+        (whole, rest), start = self.scene.equal_steps, self.time
+        for step in range(1, whole + (rest > 0.0) + 1):
             if step > whole:
                 self._set_step(rest)
-            self.time = begin + step * self.h if step <= whole else self.scene.time.t_end
+            self.time = start + step * self.h if step <= whole else self.scene.time.t_end
             if touched:
                 try:
-                    state, stiffness = self._contact_step(state, stiffness)
+                    row = self._contact_step(self.rows[-1])
                 except AlgorithmFailure as failure:
-                    failure.trajectory = self._trajectory(step)
+                    failure.trajectory = self._trajectory(began)
                     raise
-                continue
-            state = self._free_beam_step(state)  # lines 1–4
-            if state.q[-1] <= self.spring.equilibrium:
-                touched, stiffness = True, self.scene.contact.stiffness  # line 6
-                state = self._first_contact(state)  # line 5
-            self.ledger.record(self.time, state, "tied" if touched else "free")
-        return self._trajectory(steps)
+            else:
+                row = self._free_step(self.rows[-1])
+                touched = bool(row.q[-1] <= psi)
+                row = self._first_contact(row) if touched else row
+            self.rows.append(row)
+        return self._trajectory(began)
 
-    def _initial_beam(self) -> tuple[np.ndarray, np.ndarray]:
-        slope, rate = self.beam.initial_deflection_slope, self.beam.initial_velocity_slope
-        gap = slope * self.beam.length - self.spring.equilibrium
+    def _start(self) -> _Row:
+        slope, rate, psi = self.beam.initial_deflection_slope, self.beam.initial_velocity_slope, self.spring.equilibrium
+        gap = slope * self.beam.length - psi
         if gap < 0.0 or (gap > 0.0 and rate >= 0.0 and self.beam.approach == "undeformed"):
             raise ValueError("Algorithm 1 needs a tip above the spring that moves down")
         if self.beam.approach == "undeformed":
-            if gap > 0.0:
-                self.time = -gap / (rate * self.beam.length)
-            slope = self.spring.equilibrium / self.beam.length
+            self.time = -gap / (rate * self.beam.length) if gap > 0.0 else 0.0
+            slope = psi / self.beam.length
         shape = self.discrete.slope_shape
-        return slope * shape, rate * shape
+        return _Row(self.time, slope * shape, rate * shape, psi, self.spring.initial_velocity)
 
-    def _first_contact(self, state: PairState) -> PairState:
-        state = state._replace(z=float(state.v[-1]) if self.scene.contact.impact == "tip" else 0.0)
-        self._note("impact", state)
-        return state
+    def _first_contact(self, row: _Row) -> _Row:
+        """Make lines 5 and 6."""
+        self.stiffness = self.scene.contact.stiffness
+        row = row._replace(z=float(row.v[-1]) if self.scene.contact.impact == "tip" else 0.0, phase="tied")
+        self._note("impact", row)
+        return row
 
-    def _note(self, kind: str, state: PairState, **impulse: float) -> None:
-        q, v, y, z = state
-        self._events.append(Event(self.time, EventKind(kind), y, z, float(q[-1]), float(v[-1]), **impulse))
+    def _note(self, kind: str, row: _Row, **impulse: float) -> None:
+        self.events.append(Event(self.time, EventKind(kind), row.y, row.z, float(row.q[-1]), float(row.v[-1]), **impulse))
 
-    def _right_side(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return the right side of (62) without a force on the tip."""
-        right: np.ndarray = self.B @ q + 4.0 * self.h * (self.discrete.M @ v) + 2.0 * self.h**2 * self.load
-        return right
+    def _unforced(self, row: _Row) -> np.ndarray:
+        """Return q of (62) without a force on the tip."""
+        M = self.discrete.M
+        q: np.ndarray = self.solve(self.B @ row.q + 4.0 * self.h * (M @ row.v) + 2.0 * self.h**2 * self.load)
+        return q
 
-    def _free_beam_step(self, before: PairState) -> PairState:
-        q, v, *_ = before
-        new = self.solve(self._right_side(q, v))
-        after = before._replace(q=new, v=2.0 * (new - q) / self.h - v)
-        self.ledger.dissipate(self.h, before, after)
-        return after
+    def _free_step(self, before: _Row) -> _Row:
+        q = self._unforced(before)
+        return _Row(self.time, q, 2.0 * (q - before.q) / self.h - before.v, before.y, before.z)
 
-    def _tip(self, q: np.ndarray, v: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
-        """Return u_tip by (62), which is nonlinear only there, and what the beam would do without a force on it."""
-        h, response = self.h, self.tip_response
-        before = self._compliance(q[-1], stiffness)[0]
-        known = self.solve(self._right_side(q, v))
-        known_tip = float(known[-1] + h**2 * response[-1] * before)
+    def _contact_step(self, before: _Row) -> _Row:
+        """Make lines 8–30."""
+        h, psi, response = self.h, self.spring.equilibrium, self.tip_response
+        q, v, y, z = before.q, before.v, before.y, before.z
+        known, at_start = self._unforced(before), self._compliance(q[-1], self.stiffness)[0]
+        known_tip = float(known[-1] + h**2 * response[-1] * at_start)
 
-        def equation(w: float) -> tuple[float, float]:
-            force, slope = self._compliance(w, stiffness)
+        def tip(w: float) -> tuple[float, float]:  # (62), which is nonlinear only there
+            force, slope = self._compliance(w, self.stiffness)
             return w - known_tip - h**2 * response[-1] * force, 1.0 - h**2 * response[-1] * slope
 
-        return self._newton(equation, float(q[-1]), "beam"), known
-
-    def _beam(self, known: np.ndarray, u: float) -> tuple[np.ndarray, float]:
-        """Return q by (62) with u_tip given in place of its row, and the mean force on the tip that does so [N]."""
-        h, response = self.h, self.tip_response
-        force = (u - known[-1]) / response[-1]
-        return known + response * force, float(force / (2.0 * h**2))
-
-    def _contact_step(self, before: PairState, stiffness: float) -> tuple[PairState, float]:
-        """Make lines 8–30; return the state at l + 1, and λ_nc as the step leaves it."""
-        h, psi, (q, v, y, z) = self.h, self.spring.equilibrium, before
-        u_new, known = self._tip(q, v, stiffness)  # line 9
-        y_new = self._newton(partial(self._foundation_force, y, z, stiffness), y, "predicted")  # line 10, N = 0
-        case, foundation, y_used = 0, 0.0, y
-        acting = stiffness
+        u_new = self._newton(tip, float(q[-1]), "beam")  # line 9
+        y_new = self._newton(partial(self._foundation_force, y, z), y, "predicted")  # line 10, N = 0
+        case, foundation, y_used, acting = 0, 0.0, y, self.stiffness
         if psi < y_new < u_new:  # lines 11–13: the interior of (62) does not see λ_nc
-            case, stiffness = 11, 0.0
+            case, self.stiffness = 11, 0.0
         elif u_new <= psi or u_new <= y_new:  # line 14
             case = 14
-            stiffness = acting = self.scene.contact.stiffness  # line 15
-            u_temp = u_new  # line 16
-            y_used = y if self.y_temp == "guess" else u_temp
-            y_new = self._newton(partial(self._foundation_force, y_used, z, stiffness), u_temp, "joined")  # line 17
+            self.stiffness = acting = self.scene.contact.stiffness  # line 15
+            y_used = y if self.y_temp == "guess" else u_new  # line 16
+            y_new = self._newton(partial(self._foundation_force, y_used, z), u_new, "joined")  # line 17
             u_new = y_new  # line 18
             if y_new <= self.phi:  # lines 20–24
                 u_new = y_new = self.phi
-                foundation, _ = self._foundation_force(y, z, stiffness, y_new)
-        q_new, on_tip = self._beam(known, u_new)  # lines 13, 19, 22
+                foundation, _ = self._foundation_force(y, z, y_new)
+        force = (u_new - known[-1]) / response[-1]  # lines 13, 19, 22: the tip's row of (62) is overwritten
+        q_new, on_tip = known + response * force, float(force / (2.0 * h**2))
         v_new = 2.0 * (q_new - q) / h - v  # line 29
-        z_base = y_used if self.y_temp == "both" and case == 14 else y
-        z_new = 2.0 * (y_new - z_base) / h - z
+        z_new = 2.0 * (y_new - (y_used if self.y_temp == "both" and case == 14 else y)) / h - z
         if not (np.all(np.isfinite(v_new)) and np.isfinite(z_new)):
             raise AlgorithmFailure(f"the solution overflows at t = {self.time:.6g} s")
-        inside = 0.5 * (self._compliance(u_new, acting)[0] + self._compliance(q[-1], acting)[0])
-        pressing = 0.5 * (self._compliance(y_new, acting)[0] + self._compliance(y, acting)[0])
-        after = PairState(q_new, v_new, y_new, z_new)
-        self.ledger.book(h, before, after, on_tip - inside, pressing, foundation)
+        ends = ((u_new, q[-1]), (y_new, y))
+        inside, pressing = (0.5 * sum(self._compliance(w, acting)[0] for w in pair) for pair in ends)
         seated = case == 14 and y_new == self.phi
         phase = "seated" if seated else "tied" if case == 14 else "free"
+        forces = (on_tip, inside, pressing, foundation)
+        after = _Row(self.time, q_new, v_new, y_new, z_new, phase, *forces, case, booked=True)
         if seated:
             self._note("stop_impact", after, impulse_foundation=h * foundation)
-        self.ledger.record(self.time, after, phase, on_tip, inside, foundation, case)
-        return after, stiffness
+        return after
 
     # Result ---------------------------------------------------------------------------------------------------------
 
-    def _trajectory(self, steps: int) -> Trajectory:
-        def mean(*solves: str) -> float:
-            counts = [k for solve in solves for k in self.iterations[solve]]
-            return float(np.mean(counts)) if counts else 0.0
+    def _trajectory(self, began: float) -> Trajectory:
+        """Return the rows as a result, with energies, and the work that no force of the model does.
 
+        That is the work of the overwritten tip on the beam, and of yˡ's exchange on the spring.
+        """
+        d, p, alpha = self.discrete, self.spring, self.beam.alpha_b
+        found = {
+            name: np.array(values) for name, values in zip(_Row._fields, zip(*self.rows, strict=True), strict=True)
+        }
+        q, v, y, z = (found[name] for name in "qvyz")
+        h, dq, dy, booked = np.diff(found["time"]), np.diff(q, axis=0), np.diff(y), found["booked"][1:]
+        by_spring = p.damping * dy**2 / h
+        taken = alpha * np.sum(dq * (d.K @ dq.T).T, axis=1) / h + by_spring
+        e_spring = 0.5 * p.mass * z**2 + 0.5 * p.linear_stiffness * y**2 + 0.25 * p.cubic_stiffness * y**4
+        worked = (found["foundation"] - found["pressing"] + p.external_force)[1:] * dy - by_spring
+        overwritten = (found["on_tip"] - found["inside"])[1:] * dq[:, -1]
+
+        def total(rates: np.ndarray) -> np.ndarray:
+            return np.append(0.0, np.cumsum(rates))
+
+        columns = {
+            "time": found["time"],
+            "phase": found["phase"],
+            "u_tip": q[:, -1],
+            "v_tip": v[:, -1],
+            "y": y,
+            "z": z,
+            "contact_force": found["on_tip"],
+            "compliance_force": found["inside"],
+            "foundation_force": found["foundation"],
+            "e_beam": 0.5 * np.sum(v * (d.M @ v.T).T, axis=1) + 0.5 * np.sum((d.B @ q.T) ** 2, axis=0),
+            "e_spring": e_spring,
+            "e_contact": np.zeros(len(y)),
+            "e_dissipated": total(taken),
+            "e_impact_loss": np.zeros(len(y)),
+            "e_load": -(q @ self.load) - p.external_force * y,
+            "case": found["case"].astype(float),
+            "e_injected_beam": total(booked * overwritten),
+            "e_injected_spring": total(booked * (np.diff(e_spring) - worked)),
+        }
+        cases, steps = found["case"], max(len(self.rows) - 1, 1)
+        solves = self.iterations | {"spring": self.iterations["predicted"] + self.iterations["joined"]}
+        means = {name: float(np.mean(counts)) if counts else 0.0 for name, counts in solves.items()}
         newton = {
             "tolerance": self.tolerance,
-            "beam": mean("beam"),
-            "spring_predicted": mean("predicted"),
-            "spring_joined": mean("joined"),
-            "spring": mean("predicted", "joined"),
-            "solves": len(self.iterations["predicted"]) + len(self.iterations["joined"]),
-            "time_per_step": (clock.perf_counter() - self._began) / max(steps, 1),
+            "beam": means["beam"],
+            "spring_predicted": means["predicted"],
+            "spring_joined": means["joined"],
+            "spring": means["spring"],
+            "solves": len(solves["spring"]),
+            "time_per_step": (clock.perf_counter() - began) / steps,
         }
-        summary = {
-            "reference": "algorithm1",
-            "y_temp": self.y_temp,
-            "newton": newton,
-        }
-        return self.ledger.trajectory(self._events, summary)
+        summary: dict[str, Any] = {"reference": "algorithm1", "y_temp": self.y_temp, "newton": newton}
+        summary |= {"steps_apart": int(np.sum(cases == 11)), "steps_joined": int(np.sum(cases == 14))}
+        extra = ("case", "e_injected_beam", "e_injected_spring")
+        shapes = (d.deflection_sampler() @ q.T).T
+        return finished(self.scene, columns, shapes, self.events, summary, extra)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -53,9 +54,7 @@ def settled(values: Sequence[float | None], sizes: Sequence[int], *, complete: b
         return Settled()
     *_, coarser, last = (float(value) for value in values if value is not None)
     change = last - coarser
-    if complete:
-        return Settled(change, None, last, 0.0)
-    if abs(change) <= _ROUNDING * abs(last):
+    if complete or abs(change) <= _ROUNDING * abs(last):
         return Settled(change, None, last, 0.0)
     before = coarser - float(values[-3]) if len(values) > 2 and values[-3] is not None else 0.0
     a, b = (math.log(n / sizes[-2]) for n in (sizes[-3:][0], sizes[-1]))  # a < 0 < b
@@ -87,6 +86,8 @@ class Converge(Study):
     def cases(self) -> dict[str, Row]:
         """Return the meshes by what is refined, coarse to fine, and the finest with finer steps.
 
+        ``unknowns`` are the modes that take part.
+
         Raises
         ------
         SceneError
@@ -95,48 +96,34 @@ class Converge(Study):
         beam = self.scene.beam
         if beam is None:
             raise SceneError("[beam]: the scene has no mesh to refine")
-        if beam.fidelity == "quasi_static":
+        if self.scene.massless:
             raise SceneError('beam.fidelity = "quasi_static": a beam without inertia has no mesh to refine')
         known(self.metrics)
         more = [_RATIO**k for k in range(3 if self.quick else self.levels)]
-        found = [("elements", {"beam.n_elements": beam.n_elements * k, "beam.n_modes": beam.n_modes}) for k in more]
+        found: list[tuple[str, Row]] = [
+            ("elements", {"beam.n_elements": beam.n_elements * k, "beam.n_modes": beam.n_modes}) for k in more
+        ]
         finest = found[-1][1]
         if beam.integrator == "modal" and beam.modes_kept >= more[-1]:
-            fewer = [beam.modes_kept // k for k in more[:0:-1]]
-            found += [
-                ("modes", {"beam.n_elements": beam.n_elements, "beam.n_modes": k}) for k in [*fewer, beam.n_modes]
-            ]
+            for n_modes in (*(beam.modes_kept // k for k in more[:0:-1]), beam.n_modes):
+                found.append(("modes", {"beam.n_elements": beam.n_elements, "beam.n_modes": n_modes}))
         found.append((_LAST, finest | _finer_steps(self.scene)))
         return {
-            f"{refined}: {', '.join(f'{key} = {value}' for key, value in keys.items())}": {"refined": refined, **keys}
+            f"{refined}: {', '.join(f'{key} = {value}' for key, value in keys.items())}": {
+                "refined": refined, "unknowns": _modes_kept(self.at(keys)), **keys
+            }
             for refined, keys in found
-        }
-
-    def at(self, case: Row) -> Scene:
-        """Return the scene of a case."""
-        scene = super().at({name: value for name, value in case.items() if name != "accuracy"})
-        return scene.model_copy(update={"accuracy": case["accuracy"]}) if "accuracy" in case else scene
-
-    def record(self, case: Row) -> Row:
-        """Run one mesh. ``unknowns`` are the modes that take part; a value is ``None`` where it did not happen."""
-        beam = self.at(case).beam
-        assert beam is not None
-        return {"unknowns": beam.modes_kept, **self.observed(case)[0]}
+        }  # fmt: skip
 
     def sequences(self, records: Mapping[str, Row]) -> dict[str, list[Row]]:
         """Return the rows of each sequence as they were run."""
-        found: dict[str, list[Row]] = {}
-        for row in super().rows(records):
-            found.setdefault(row["refined"], []).append(row)
-        return found
+        return {refined: list(rows) for refined, rows in groupby(super().rows(records), lambda row: row["refined"])}
 
     def settled(self, rows: Sequence[Row], name: str) -> Settled:
         """Judge a quantity of a sequence. All modes of a mesh are its solution: no mode lies beyond the last."""
-        beam = self.scene.beam
-        assert beam is not None
-        refined = rows[-1]["refined"]
-        sizes = [row["beam.n_elements"] if refined == "elements" else row["unknowns"] for row in rows]
-        complete = refined == "modes" and beam.modes_kept == beam.unknowns
+        beam, refined = self.scene.beam, rows[-1]["refined"]
+        sizes = [row["beam.n_elements" if refined == "elements" else "unknowns"] for row in rows]
+        complete = refined == "modes" and beam is not None and beam.modes_kept == beam.unknowns
         return settled([row[name] for row in rows], sizes, complete=complete)
 
     def quantities(self, records: Mapping[str, Row]) -> list[str]:
@@ -179,30 +166,23 @@ class Converge(Study):
 
     def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
         """Draw how far each quantity is from its limit over the size of the mesh, a panel a sequence."""
-        from .picture import lines, panels
+        from .picture import Point, curves
 
-        rows = [row for row in self.rows(records) if row["refined"] != _LAST]
-        refinements = list(dict.fromkeys(row["refined"] for row in rows))
-        figure, axes = panels(len(refinements), 2, (6.0, 5.0), f"{self.scene.title}: convergence with the mesh")
-        for ax, refined in zip(axes, refinements, strict=True):
-            points = [
-                {
-                    "unknowns": row["unknowns"],
-                    "quantity": heading(name),
-                    "error": abs(error / (row[name] - error or 1.0)),
-                }
-                for row in rows
-                for name in self.quantities(records)
-                if row["refined"] == refined and (error := row[f"error_{name}"]) is not None
-            ]
-            lines(ax, [point for point in points if point["error"] > _ROUNDING], "unknowns", "error", "quantity")
-            ax.set(title=f"more {refined}", xlabel="unknowns of the beam", ylabel="distance from the limit, relative")
-            if ax.lines:
-                ax.legend(fontsize="small")
-            else:
-                ax.text(0.5, 0.5, "no quantity converges monotonically", transform=ax.transAxes, ha="center")
+        points = []
+        for row in (row for row in self.rows(records) if row["refined"] != _LAST):
+            for name in self.quantities(records):
+                if (error := row.get(f"error_{name}")) is not None:
+                    share = abs(error / (row[name] - error or 1.0))
+                    points.append(Point(f"more {row['refined']}", heading(name), row["unknowns"], share))
+        points = [point for point in points if point.y > _ROUNDING]
+        title = f"{self.scene.title}: convergence with the mesh"
+        figure = curves(points, title, "unknowns of the beam", "distance from the limit, relative")
         figure.savefig(directory / "converge.png", dpi=110)
         return [directory / "converge.png"]
+
+
+def _modes_kept(scene: Scene) -> int:
+    return 0 if scene.beam is None else scene.beam.modes_kept
 
 
 def _finer_steps(scene: Scene) -> Row:

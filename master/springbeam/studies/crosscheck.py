@@ -19,16 +19,20 @@ it may then differ, but it cannot agree.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
 
+import matplotlib
 import numpy as np
 from rich.text import Text
 
 from ..monolithic import algorithm1
-from ..pictures.drawing import POSITIONS, present
+from ..pictures import drawing
+from ..pictures.drawing import BLACK, POSITIONS, Line, Look, present
+from ..pictures.panels import Curve, Panel
+from ..pictures.timeline import DPI, STYLE, timeline
 from ..results.contact_times import ContactChange, contact_changes
 from ..results.trajectory import TOLD, Event, Trajectory, columns_of
 from ..run.outcome import RunStopped
@@ -38,7 +42,6 @@ from ..scene.automatic import with_scheme_chosen
 from ..scene.resolution import mesh_frequency
 from ..scene.statics import tip_compliance
 from .reference import PERTURBATION, reference_and_perturbed, refuse_without_reference
-from .sampling import DISPLACEMENTS, SHORT, VELOCITIES, at, away_from, macro_points, quantities, sample
 from .study import Findings, Row, Study
 from .tables import table
 
@@ -53,11 +56,16 @@ _ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 16
 #: Macro steps of a window that had to be resolved further.
 _WINDOW_STEPS = 400
 #: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
-_RESOLVED, _RESOLVED_VELOCITY = 0.05, 0.25
+_RESOLVED = {"u_tip": 0.05, "y": 0.05, "v_tip": 0.25, "z": 0.25}
+#: Intervals of contact shorter than this many macro steps are no evidence either way.
+SHORT = 2.0
 #: Factor on what halving the macro step changes.
 _SAFETY = 4.0
 #: Least relative error of a step, where IDA's tolerance is not a looser one.
 _LEAST = 1e-12
+_COLOURS = (
+    *(drawing.BLUE, drawing.SKY, drawing.VERMILLION, drawing.ORANGE, drawing.GREEN, drawing.PURPLE, drawing.GREY),
+)
 
 
 class Quantity(NamedTuple):
@@ -117,6 +125,34 @@ class Report:
         return "agrees" if self.rows and whole else "not comparable"
 
 
+def macro_points(scene: Scene) -> np.ndarray:
+    """Return the times of the macro grid of ``scene`` [s]."""
+    start, H, end = scene.contact_time or 0.0, scene.coupling.H, scene.time.t_end
+    return np.minimum(start + H * np.arange(np.floor((end - start) / H * (1.0 + 1e-9)) + 1.0), end)
+
+
+def away_from(times: np.ndarray, events: Iterable[float], size: float) -> np.ndarray:
+    """Return which of ``times`` are more than `SHORT` and a half macro steps of ``size`` [s] away from all events."""
+    apart = np.abs(times[:, None] - np.array([*events, np.inf]))
+    return np.asarray(np.all(apart > (SHORT + 0.5) * size, axis=1))
+
+
+def quantities(scene: Scene) -> list[str]:
+    """Return the columns that are compared."""
+    wanted = ("u_tip", "v_tip", "e_beam", "y", "z", "e_spring", "contact_force", *TOLD)
+    there = columns_of(scene).keys() - {"bending_stress"}  # which follows from strains: the references have none
+    return [name for name in wanted if name in there]
+
+
+def sample(run: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
+    """Return a quantity at macro points [s]; of the contact force the mean of both limits, the next row's smoothed."""
+    if name != "contact_force":
+        return run.at(times)[name]
+    after = times + run.scene.coupling.H
+    inside = after <= run.time[-1]
+    return np.where(inside, run.at(np.minimum(after, run.time[-1]))["contact_force_smoothed"], np.nan)
+
+
 def compare(scene: Scene) -> Report:
     """Run ``scene`` and the reference of its law and compare them.
 
@@ -130,12 +166,13 @@ def compare(scene: Scene) -> Report:
     if scene.contact.algorithm:
         return _compare_paper(scene)
     refuse_without_reference(scene)
-    asked, note, failure = scene, "", None
+    asked, note, failure, start = scene, "", None, scene.contact_time or 0.0
     for _ in range(_MAX_REFINEMENTS):
-        start, size = scene.contact_time or 0.0, scene.coupling.H
+        size = scene.coupling.H
         try:
-            coarse, fine, own_horizon = _with_half_the_step(scene)
-            if own_horizon - start >= min(_ENOUGH_STEPS * size, 0.5 * (scene.time.t_end - start)):
+            runs = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
+            horizon = _same_story_until(*runs)
+            if horizon - start >= min(_ENOUGH_STEPS * size, 0.5 * (scene.time.t_end - start)):
                 break
         except RunStopped as stopped:  # a finer step may get through
             failure = stopped
@@ -150,9 +187,8 @@ def compare(scene: Scene) -> Report:
         if failure is not None:
             raise failure
         return Report(asked, asked, notes=[f"{note} Nothing could be compared at any macro step"])
-    report = _compared(asked, scene, coarse, fine, own_horizon)
-    if note:
-        report.notes.insert(0, note)
+    report = Report(asked, scene, trajectory=runs[0], horizon=horizon, notes=[note] if note else [])
+    _compare_with_reference(report, *runs)
     return report
 
 
@@ -164,95 +200,76 @@ def _compare_paper(scene: Scene) -> Report:
     step by y a/6 and h z a/12, at least as much, and running Algorithm 1 with it shows what IDA may change.
     """
     assert scene.spring is not None
-    h, spring = scene.coupling.H, scene.spring
-    reference = algorithm1.simulate(scene)
-    ours = simulate(scene)
-    factor = 4.0 / 3.0
-    changed = {"linear_stiffness": factor * spring.linear_stiffness, "cubic_stiffness": factor * spring.cubic_stiffness}
-    moved = algorithm1.simulate(with_changes(scene, spring=changed))
+    stiffer = {name: 4.0 / 3.0 * getattr(scene.spring, name) for name in ("linear_stiffness", "cubic_stiffness")}
+    reference, ours = algorithm1.simulate(scene), simulate(scene)
+    moved = algorithm1.simulate(with_changes(scene, spring=stiffer))
     n = min(len(reference), len(ours), len(moved))
     report = Report(scene, scene, reference, ours, float(ours.time[n - 1]))
     for name in ("u_tip", "y", "z", "v_tip", "contact_force", "e_beam", "e_spring"):
-        q, exact = ours[name][:n], reference[name][:n]
-        scale = float(np.abs(exact).max()) or 1.0
-        steps = np.arange(1, n + 1)
-        bound = _SAFETY * np.maximum.accumulate(np.abs(moved[name][:n] - exact)) + _step_error(scene) * steps * scale
+        q, exact, other = (run[name][:n] for run in (ours, reference, moved))
+        floor = _step_error(scene) * np.arange(1, n + 1) * (float(np.abs(exact).max()) or 1.0)
+        bound = _SAFETY * np.maximum.accumulate(np.abs(other - exact)) + floor
         report.rows.append(Quantity.judged(name, ours.time[:n], np.abs(q - exact), bound))
     report.notes.append(
-        f"bounds from Algorithm 1 with 4/3 of its stiffness: as much as the midpoint rule changes a step of {h:g} s"
+        "bounds from Algorithm 1 with 4/3 of its stiffness: as much as the midpoint rule changes a step of "
+        f"{scene.coupling.H:g} s"
     )
     return report
 
 
-def _with_half_the_step(scene: Scene) -> tuple[Trajectory, Trajectory, float]:
-    """Return the run, the run at half the macro step, and the time [s] up to which both tell the same story.
+def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
+    """Return the time [s] up to which a run and that at half its macro step tell the same story.
 
     That is the same events, a run that does not call itself unresolved, and displacements and velocities, away from
     events, that halving hardly changes.
     """
-    size = scene.coupling.H
-    coarse, fine = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
-    start, end = float(coarse.time[0]), float(coarse.time[-1])
+    times, size = macro_points(coarse.scene), coarse.scene.coupling.H
     if not coarse.summary["resolved"]:
-        return coarse, fine, start
-    horizon = _agree_until(contact_changes(coarse, SHORT * size), contact_changes(fine, SHORT * size), start, end)
-    times = macro_points(coarse, scene)
+        return float(times[0])
+    changes, others = (contact_changes(run, SHORT * size) for run in (coarse, fine))
+    horizon = _agree_until(changes, others, float(times[0]), float(coarse.time[-1]))
     away = away_from(times, (event.time for run in (coarse, fine) for event in run.events), size)
-    for name in (*DISPLACEMENTS, *VELOCITIES):
-        if name in coarse.columns:
-            values = at(coarse, times, name)
-            allowed = _RESOLVED if name in DISPLACEMENTS else _RESOLVED_VELOCITY
-            differ = np.abs(values - at(fine, times, name)) > allowed * np.abs(values - values[0]).max()
-            differ &= away
-            if differ[1:].any():
-                horizon = min(horizon, float(times[1:][differ[1:]][0]) - size)
-    return coarse, fine, horizon
+    for name in present(coarse, _RESOLVED):
+        values, finer = (run.at(times)[name] for run in (coarse, fine))
+        allowed = _RESOLVED[name] * np.abs(values - values[0]).max()
+        differ = away & (np.abs(values - finer) > allowed)
+        if differ[1:].any():
+            horizon = min(horizon, float(times[1:][differ[1:]][0]) - size)
+    return horizon
 
 
-def _compared(asked: Scene, scene: Scene, coarse: Trajectory, fine: Trajectory, own_horizon: float) -> Report:
-    reference, perturbed = reference_and_perturbed(scene, macro_points(coarse, scene))
-    runs = (coarse, fine, reference, perturbed)
-    changes = [contact_changes(run, SHORT * scene.coupling.H) for run in runs]
-    stable = _agree_until(changes[2], changes[3], float(coarse.time[0]), float(coarse.time[-1]))
-    report = Report(asked, scene, reference, coarse, min(own_horizon, stable))
+def _compare_with_reference(report: Report, coarse: Trajectory, fine: Trajectory) -> None:
+    """Judge ``coarse``, the run of the report, by bounds from ``fine``, at half its macro step."""
+    scene, times, size = report.scene, macro_points(report.scene), report.scene.coupling.H
+    reference, perturbed = reference_and_perturbed(scene, times)
+    report.reference = reference
+    changes = [contact_changes(run, SHORT * size) for run in (coarse, fine, reference, perturbed)]
+    stable = _agree_until(changes[2], changes[3], float(times[0]), float(coarse.time[-1]))
+    report.horizon = min(report.horizon, stable)
+    before = times <= report.horizon
+    # A jump at slightly different times is an event error, judged there.
+    jumps = [event.time for run in (coarse, reference) for event in run.events]
+    away = away_from(times, jumps + [kink for load in scene.loads for kink in load.kinks(size)], size)
+    neglected = coarse.summary.get("neglected_share", 0.0)
     for name in quantities(scene):
-        _compare_quantity(report, name, runs)
+        ours, halved = (sample(run, times, name) for run in (coarse, fine))
+        exact, moved = reference[name], perturbed[name]
+        good = before & np.isfinite(ours) & np.isfinite(halved) & (away | (name in POSITIONS))
+        if good.sum() < 2:
+            continue
+        scale = float(np.abs(exact[good]).max()) or 1.0
+        floor = _step_error(scene) * (np.arange(len(times)) + 1.0) + _SAFETY * (_rounding(scene, name) + neglected)
+        grown = np.abs(moved - exact)[good] / (PERTURBATION * scale)
+        growth = np.maximum(1.0, np.maximum.accumulate(grown))
+        report.growth = max(report.growth, float(growth[-1]))
+        bound = _SAFETY * np.maximum.accumulate(np.abs(ours - halved)[good]) + (floor[good] * growth * scale)
+        report.rows.append(Quantity.judged(name, times[good], np.abs(ours - exact)[good], bound))
     if not report.rows:
         report.notes.append(
             f"Nothing could be compared: another change of contact comes first, from t = {report.horizon:.9g} s on, if "
             "the initial velocity changes a little; begin with another velocity, or at a distance"
         )
-    _compare_events(report, changes[0], changes[1], changes[2])
-    return report
-
-
-def _compare_quantity(report: Report, name: str, runs: tuple[Trajectory, ...]) -> None:
-    coarse, _, reference, _ = runs
-    size = report.scene.coupling.H
-    times = macro_points(coarse, report.scene)
-    times = times[times <= report.horizon]
-    if name not in DISPLACEMENTS:
-        # A jump at slightly different times is an event error, judged there.
-        jumps = [event.time for run in (coarse, reference) for event in run.events]
-        jumps += [kink for load in report.scene.loads for kink in load.kinks(size)]
-        times = times[away_from(times, jumps, size)]
-    if len(times) < 2:
-        return
-    values = [sample(run, times, name) for run in runs]
-    good = np.all(np.isfinite(values), axis=0)
-    if good.sum() < 2:
-        return
-    times = times[good]
-    q, q_fine, q_reference, q_perturbed = (v[good] for v in values)
-    scale = float(np.abs(q_reference).max()) or 1.0
-    grown = np.abs(q_perturbed - q_reference) / (PERTURBATION * scale)
-    growth = np.maximum(1.0, np.maximum.accumulate(grown))
-    report.growth = max(report.growth, float(growth[-1]))
-    steps = (times - coarse.time[0]) / size + 1.0
-    always = _SAFETY * (_rounding(report.scene, name) + coarse.summary.get("neglected_share", 0.0))
-    floor = _step_error(report.scene) * steps + always
-    bound = _SAFETY * np.maximum.accumulate(np.abs(q - q_fine)) + floor * growth * scale
-    report.rows.append(Quantity.judged(name, times, np.abs(q - q_reference), bound))
+    _compare_events(report, *changes[:3])
 
 
 def _step_error(scene: Scene) -> float:
@@ -287,11 +304,10 @@ def _agree_until(first: list[ContactChange], second: list[ContactChange], start:
 def _compare_events(
     report: Report, coarse: list[ContactChange], fine: list[ContactChange], reference: list[ContactChange]
 ) -> None:
-    size = report.scene.coupling.H
-    assert report.trajectory is not None
-    moved, start = 0.0, report.trajectory.time[0]
-    expected = [change for change in reference if change.time <= report.horizon]
-    for i, (kind, time) in enumerate(expected):
+    scene, size, start = report.scene, report.scene.coupling.H, report.scene.contact_time or 0.0
+    by_means = with_scheme_chosen(scene)[0].coupling.degree == 0
+    moved = 0.0
+    for i, (kind, time) in enumerate(change for change in reference if change.time <= report.horizon):
         if i >= len(coarse) or coarse[i].kind != kind:
             report.events.append(Change(kind, None, time, 0.0, False))
             return
@@ -300,8 +316,8 @@ def _compare_events(
             moved = max(moved, abs(ours - fine[i].time))
         steps = (time - start) / size + 1.0
         # The unit of time in which the state changes as a whole is what the events so far have taken.
-        bound = _SAFETY * moved + _step_error(report.scene) * steps * report.growth * max(time - start, size)
-        if kind in ("opens", "leaves") and with_scheme_chosen(report.scene)[0].coupling.degree == 0:
+        bound = _SAFETY * moved + _step_error(scene) * steps * report.growth * max(time - start, size)
+        if kind in ("opens", "leaves") and by_means:
             bound += 0.5 * size  # a force known by its means tells no better when it vanishes
         report.events.append(Change(kind, ours, time, bound, abs(ours - time) <= bound))
 
@@ -380,8 +396,6 @@ class Crosscheck(Study):
 
     def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
         """Draw both motions, and every error below its bound."""
-        from .crosscheck_picture import draw
-
         record = records[_CASE]
         if not record["quantities"]:
             return []
@@ -389,7 +403,36 @@ class Crosscheck(Study):
             {name: np.array(values) for name, values in record[which].items()} for which in ("motion", "reference")
         )
         trajectory = Trajectory(self.scene, run, [Event(**mark) for mark in record["marks"]])
-        return [draw(trajectory, reference, record, directory / "crosscheck.png")]
+        path = directory / "crosscheck.png"
+        with matplotlib.rc_context(STYLE):
+            shown = [_positions(run, reference), _errors(record["quantities"])]
+            figure = timeline(trajectory, "Co-simulation and reference", shown)
+            horizon = drawing.time_unit(trajectory).factor * record["horizon"]
+            figure.axes[1].axvline(horizon, color=BLACK, lw=0.8, ls="--")
+            figure.savefig(path, dpi=DPI)
+        return [path]
+
+
+def _positions(run: Mapping[str, np.ndarray], reference: Mapping[str, np.ndarray]) -> Panel:
+    curves = []
+    for name in (name for name in POSITIONS if name in reference):
+        ours = Look(POSITIONS[name].colour, f"{name}, co-simulation", Line(2.5, opacity=0.5))
+        curves.append(Curve(name, ours, run["time"], run[name]))
+        curves.append(Curve(name, Look(BLACK, f"{name}, reference", Line(0.7)), reference["time"], reference[name]))
+    return Panel("positions", "Positions", "position", "m", curves, 2.2)
+
+
+def _errors(rows: list[Row]) -> Panel:
+    curves, seen = [], [0.0]
+    for row, colour in zip(rows, _COLOURS, strict=False):
+        name, time = row["quantity"], np.array(row["times"])
+        error, bound = (np.where(np.array(row[part]) > 0.0, row[part], np.nan) for part in ("errors", "bounds"))
+        curves.append(Curve(name, Look(colour, name, Line(0.9)), time, error))
+        curves.append(Curve(name, Look(colour, "", Line(0.9, dashed=True)), time, bound))
+        seen += [float(x) for x in (*error, *bound) if x > 1e-18]
+    limits = min(seen[1:], default=1e-16), 10.0 * (max(seen) or 1.0)
+    quantity = "error (lines), bound (dashed)\n"
+    return Panel("errors", "Errors", quantity, "unit of the quantity", curves, 3.0, logarithmic=limits)
 
 
 def _ok(row: Mapping[str, Any]) -> str:

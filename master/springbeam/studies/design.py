@@ -24,31 +24,33 @@ _LARGEST_WHOLE = 2**53
 
 @dataclass(frozen=True)
 class Axis:
-    """One varied key: ``values``, or a range that is sampled, or both for a grid."""
+    """A key, as ``spring.mass``, or another number that varies: ``values``, or a range that is sampled, or both."""
 
-    table: str
-    key: str
+    name: str
     values: tuple[Any, ...] = ()
     low: float = 0.0
     high: float = 0.0
     log: bool = False
-    whole: bool = False  #: the key takes whole numbers
+    whole: bool = False  #: it takes whole numbers
+    zero: float = 0.0  #: the share of samples at which it is 0
 
-    @property
-    def name(self) -> str:
-        return f"{self.table}.{self.key}"
-
-    @property
-    def is_range(self) -> bool:
-        return self.high != self.low
-
-    def at(self, fraction: float) -> float | int:
-        """Return the value at a fraction in [0, 1] of the range, exactly its ends at 0 and 1."""
+    def at(self, fraction: float) -> Any:
+        """Return the value at a fraction in [0, 1] of the range, exactly its ends at 0 and 1; without one, a value."""
+        if self.low == self.high:
+            return self.values[min(int(fraction * len(self.values)), len(self.values) - 1)]
+        if fraction < self.zero:
+            return 0.0
+        fraction = (fraction - self.zero) / (1.0 - self.zero)
         if self.log:
             value = self.low ** (1.0 - fraction) * self.high**fraction
         else:
             value = self.low * (1.0 - fraction) + self.high * fraction
         return round(value) if self.whole else float(value)
+
+    def grid(self, count: int) -> tuple[Any, ...]:
+        """Return ``count`` values from end to end of the range; one that may be 0 begins there."""
+        inside = [self.at(self.zero + (1.0 - self.zero) * k / (count - 1)) for k in range(count)]
+        return (0.0, *inside[1:]) if self.zero else tuple(inside)
 
 
 def parse_axis(text: str) -> Axis:
@@ -65,9 +67,8 @@ def parse_axis(text: str) -> Axis:
     split = split_key(target)
     if not separator or split is None or not values.strip():
         raise _wrong(text, "must be TABLE.KEY=VALUES, as in spring.mass=0.5:2:16")
-    table, key = split
     try:
-        kind = key_kind(table, key)
+        kind = key_kind(*split)
     except SceneError as error:
         raise _wrong(text, str(error)) from None
     parts = [part.strip() for part in values.split(":")]
@@ -75,8 +76,8 @@ def parse_axis(text: str) -> Axis:
         listed = tuple(parse_value(value.strip()) for value in values.split(","))
         for value in listed:
             if not _is(kind, value):
-                raise _wrong(text, f"{value!r} is no value of {key}; a list is 1,2,5, a range LOW:HIGH:COUNT")
-        return Axis(table, key, listed)
+                raise _wrong(text, f"{value!r} is no value of {split[1]}; a list is 1,2,5, a range LOW:HIGH:COUNT")
+        return Axis(target, listed)
     log = parts[-1] == "log"
     parts = parts[:-1] if log else parts
     try:
@@ -90,8 +91,8 @@ def parse_axis(text: str) -> Axis:
         raise _wrong(text, "a logarithmic range needs LOW and HIGH greater than 0")
     if count > MOST_RUNS:
         raise _wrong(text, f"at most {MOST_RUNS} values are allowed")
-    axis = Axis(table, key, (), low, high, log, kind is int)
-    return replace(axis, values=tuple(axis.at(k / (count - 1)) for k in range(count)))
+    axis = Axis(target, (), low, high, log, kind is int)
+    return replace(axis, values=axis.grid(count)) if count else axis
 
 
 def _is(kind: type, value: Any) -> bool:
@@ -127,28 +128,22 @@ def design(axes: Sequence[Axis], samples: int, seed: int, sampling: Sampling) ->
         unit = qmc.LatinHypercube(len(axes), seed=seed).random(samples)
     else:
         unit = np.random.default_rng(seed).random((samples, len(axes)))
-    return [tuple(_sampled(axis, float(x)) for axis, x in zip(axes, row, strict=True)) for row in unit]
+    return [tuple(axis.at(float(x)) for axis, x in zip(axes, row, strict=True)) for row in unit]
 
 
 def compatible(scene: Scene, axes: Sequence[Axis]) -> None:
     """Raise SceneError if an axis has no effect because of another one, or because of the accuracy of ``scene``."""
-    if scene.accuracy is not None:
-        for axis in axes:
-            if axis.key in PICKED_BY_ACCURACY.get(axis.table, ()):
-                raise SceneError(
-                    f"--vary {axis.name}: accuracy = {scene.accuracy:g} picks it in each run; vary something else, or "
-                    "take accuracy out of the scene"
-                )
-    keys = [axis.key for axis in axes if axis.table == "coupling"]
-    tolerances = [key for key in TOLERANCE_KEYS if key in keys]
-    if STEP_KEY in keys and tolerances:
+    names = [axis.name for axis in axes]
+    for name in names if scene.accuracy is not None else ():
+        table, _, key = name.rpartition(".")
+        if key in PICKED_BY_ACCURACY.get(table, ()):
+            raise SceneError(
+                f"--vary {name}: accuracy = {scene.accuracy:g} picks it in each run; vary something else, or take "
+                "accuracy out of the scene"
+            )
+    tolerances = [f"coupling.{key}" for key in TOLERANCE_KEYS if f"coupling.{key}" in names]
+    if f"coupling.{STEP_KEY}" in names and tolerances:
         raise SceneError(
-            f"--vary coupling.{STEP_KEY}: with --vary coupling.{tolerances[0]} the steps follow from the tolerance; "
-            "vary one of the two"
+            f"--vary coupling.{STEP_KEY}: with --vary {tolerances[0]} the steps follow from the tolerance; vary one of "
+            "the two"
         )
-
-
-def _sampled(axis: Axis, fraction: float) -> Any:
-    if not axis.is_range:
-        return axis.values[min(int(fraction * len(axis.values)), len(axis.values) - 1)]
-    return axis.at(fraction)

@@ -13,8 +13,9 @@ import numpy as np
 from ..monolithic import event_driven
 from ..results.contact_times import contact_changes
 from ..results.trajectory import Trajectory
-from ..scene import Scene, SceneError
-from .sampling import SHORT, away_from, quantities, sample
+from ..scene import Scene
+from .crosscheck import SHORT, away_from, macro_points, quantities, sample
+from .reference import refuse_without_reference
 from .study import Findings, Row, Study
 from .tables import table
 
@@ -34,46 +35,37 @@ class Orders(Study):
     scene: Scene
 
     def cases(self) -> dict[str, Row]:
-        """Return the macro steps. Raises SceneError if the law does not converge."""
-        if self.scene.contact.algorithm:
-            raise SceneError("contact.law = 'paper': Algorithm 1 does not converge; --orders needs another law")
+        """Return the macro steps. Raises SceneError if there is no reference to converge to."""
+        refuse_without_reference(self.scene)
         H, halvings = self.scene.coupling.H, range(_HALVINGS + 1 - self.quick)
         return {f"H/{2**k}" if k else "H": {"coupling.macro_step": H / 2**k} for k in halvings}
 
     @cached_property
-    def times(self) -> np.ndarray:
-        """The macro points [s]."""
-        start, H = self.scene.contact_time or 0.0, self.scene.coupling.H
-        return start + H * np.arange(np.floor((self.scene.time.t_end - start) / H * (1.0 + 1e-9)) + 1.0)
-
-    @cached_property
     def reference(self) -> Trajectory:
         """The solution at the macro points."""
-        return event_driven.simulate(self.scene, sample_times=self.times)
+        return event_driven.simulate(self.scene, sample_times=macro_points(self.scene))
 
-    def record(self, case: Row) -> Row:
-        """Run once; ``stretches`` has the errors between two changes of contact each."""
-        row, run = self.observed(case)
-        if run is None:
-            return {**row, "stretches": []}
-        reference, times, H = self.reference, self.times, self.scene.coupling.H
+    def measured(self, run: Trajectory, case: Row) -> Row:
+        """Return ``stretches``: the largest errors between two changes of contact each."""
+        reference, times, H = self.reference, macro_points(self.scene), self.scene.coupling.H
+        names = [name for name in quantities(self.scene) if name not in ("e_beam", "e_spring")]
+        off = {name: np.abs(sample(run, times, name) - reference[name]) for name in names}
         changes = [change.time for change in contact_changes(reference, SHORT * H)]
         stretches = []
         for begin, end in itertools.pairwise([times[0], *changes, self.scene.time.t_end]):
             inside = np.flatnonzero((times > begin) & (times < end) & away_from(times, (begin, end), H))
             if len(inside) >= 4:
-                phase = reference.phase[np.searchsorted(reference.time, times[inside[len(inside) // 2]])]
+                phase = reference.phase[inside[len(inside) // 2]]
                 stretch = {"phase": phase, "begin": begin, "end": end}
-                for name in quantities(self.scene):
-                    if name not in ("e_beam", "e_spring") and (name, phase) != ("contact_force", "free"):
-                        off = np.abs(sample(run, times, name) - sample(reference, times, name))[inside]
-                        stretch[f"error_{name}"] = None if np.isnan(off).all() else float(np.nanmax(off))
+                for name in (name for name in names if (name, phase) != ("contact_force", "free")):
+                    known = off[name][inside]
+                    stretch[f"error_{name}"] = float(np.nanmax(known)) if np.isfinite(known).any() else None
                 stretches.append(stretch)
-        return {**row, "stretches": stretches}
+        return {"stretches": stretches}
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per stretch and quantity: the errors at all steps, and the orders between neighbours."""
-        steps, several = list(records), [record["stretches"] for record in records.values()]
+        steps, several = list(records), [record.get("stretches", ()) for record in records.values()]
         found = []
         for stretches in zip(*several, strict=True):
             first = stretches[0]
@@ -100,21 +92,14 @@ class Orders(Study):
 
     def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
         """Draw errors over the macro step, a panel a stretch."""
-        from .picture import lines, panels
+        from .picture import Point, curves
 
         steps = {name: case["coupling.macro_step"] for name, case in self.cases().items()}
         points = [
-            {"at": (row["begin"], row["phase"]), "quantity": row["quantity"], "H": H, "error": row[f"error_{step}"]}
+            Point(f"{row['phase']} from {row['begin']:.4g} s", row["quantity"], H, row[f"error_{step}"])
             for row in self.rows(records)
             for step, H in steps.items()
         ]
-        stretches = list(dict.fromkeys(point["at"] for point in points))
-        if not stretches:
-            return []
-        figure, axes = panels(len(stretches), 3, (4.0, 3.4), f"{self.scene.title}: largest errors")
-        for ax, at in zip(axes, stretches, strict=True):
-            lines(ax, [point for point in points if point["at"] == at], "H", "error", "quantity")
-            ax.set(title=f"{at[1]} from {at[0]:.4g} s", xlabel="macro step [s]", ylabel="unit of the quantity")
-        axes[0].legend(fontsize="small")
-        figure.savefig(directory / "orders.png", dpi=110)
+        title = f"{self.scene.title}: largest errors"
+        curves(points, title, "macro step [s]", "unit of the quantity").savefig(directory / "orders.png", dpi=110)
         return [directory / "orders.png"]

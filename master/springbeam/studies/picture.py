@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -162,13 +162,33 @@ def _borders(values: np.ndarray, log: bool) -> np.ndarray:
     return np.asarray(np.exp(borders) if log else borders)
 
 
-def lines(ax: Axes, rows: Rows, x: str, y: str | Callable[[Mapping[str, Any]], float], by: str) -> None:
-    """Draw one column over another, both logarithmic: a line for each value of the column ``by``."""
-    for k, name in enumerate(dict.fromkeys(row[by] for row in rows)):
-        mine = [row for row in rows if row[by] == name]
-        values = np.array([y(row) for row in mine]) if callable(y) else column(mine, y)
-        ax.plot(column(mine, x), np.where(values > 0.0, values, np.nan), label=name, color=f"C{k % 10}",
-                marker=_MARKERS[k % len(_MARKERS)], markersize=4.0, linewidth=1.1,
-                linestyle=("-", "--", ":")[k // 10 % 3])  # fmt: skip
-    ax.set(xscale="log", yscale="log")
-    ax.grid(alpha=0.3)
+class Point(NamedTuple):
+    """A value of a curve: of which panel, and of which line in it."""
+
+    panel: str
+    line: str
+    x: float
+    y: float
+
+
+def curves(points: Sequence[Point], title: str, x: str, y: str, size: tuple[float, float] = (5.0, 4.0)) -> Figure:
+    """Return a figure with a panel for each name of a panel, and its lines, both axes logarithmic; 0 is left out.
+
+    ``x`` and ``y`` are the labels of the axes; without ``x`` the name of the panel is.
+    """
+    names, every = (list(dict.fromkeys(getattr(point, what) for point in points)) for what in ("panel", "line"))
+    figure, axes = panels(len(names) or 1, 3, size, title)
+    for ax, name in zip(axes, names or [""], strict=True):
+        for k, line in enumerate(every):
+            mine = [point for point in points if (point.panel, point.line) == (name, line)]
+            across, up = (np.array([value or np.nan for value in values]) for values in
+                          ([point.x for point in mine], [point.y for point in mine]))  # fmt: skip
+            ax.plot(across, up, label=line, color=f"C{k % 10}", marker=_MARKERS[k % len(_MARKERS)], markersize=4.0,
+                    linewidth=1.1, linestyle=("-", "--", ":")[k // 10 % 3])  # fmt: skip
+        ax.set(xscale="log", yscale="log", title=name if x else "", xlabel=x or name, ylabel=y)
+        ax.grid(alpha=0.3)
+    if every:
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", fontsize="small", ncols=6)
+    else:
+        axes[0].text(0.5, 0.5, "nothing to draw", transform=axes[0].transAxes, ha="center")
+    return figure

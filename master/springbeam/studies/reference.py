@@ -15,6 +15,11 @@ PERTURBATION, _GROWTH = 1e-7, 1e4
 
 def refuse_without_reference(scene: Scene) -> None:
     """Raise SceneError if `event_driven` cannot solve ``scene``; the message names what it can solve."""
+    if scene.contact.algorithm:
+        raise SceneError(
+            f'[contact] law = "{scene.contact.law}": Algorithm 1 has no exact solution to compare with, and does not '
+            'converge; law = "transmission" or "compliance" has, and does'
+        )
     for table, body in scene.partners.items():
         raise SceneError(
             f"[{table}] {'fmu' if table in scene.foreign else 'element'}: no reference knows this body, a "

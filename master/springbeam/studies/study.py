@@ -10,18 +10,18 @@
 * A case whose record is there is not computed again. A study with all records is shown at once.
 * Table (``KIND.parquet``, ``KIND.csv``), pictures and what is shown are made from the records alone.
 
-`record_all` computes, `Records` is the file, `cli/study.py` the frame that all commands share.
+`record_all` computes, `Records` is the file, `cli/studies.py` the frame that all commands share.
 """
 
 from __future__ import annotations
 
-import errno
 import multiprocessing
 import os
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from importlib import import_module, metadata
 from itertools import islice
@@ -95,17 +95,13 @@ class Study(BaseModel, ABC):
         """Return the axes of each case, by its name. Raises SceneError if there is nothing to compute."""
 
     def record(self, case: Row) -> Row:
-        """Compute one case; arrays in a record become lists. Raises FmuError if an FMU cannot be loaded."""
-        return self.observed(case)[0]
-
-    def observed(self, case: Row) -> tuple[Row, Trajectory | None]:
-        """Run one case; return its record, and the run if it is done.
+        """Run one case; arrays in a record become lists. Raises FmuError if an FMU cannot be loaded.
 
         ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` says why. Wall times, loading
         included [s], are kept where cases follow one another.
         """
         row: Row = {"status": "done", "error": "", "warnings": "", **dict.fromkeys(self.metrics)}
-        run, began = None, perf_counter()
+        began = perf_counter()
         try:
             run = simulate(self.at(case))
         except SceneError as refused:
@@ -115,11 +111,16 @@ class Study(BaseModel, ABC):
         else:
             row["warnings"] = "\n".join(run.summary["warnings"])
             row |= {name: METRICS[name](run) for name in self.metrics} | costs(run)
-        return row if self.parallel else {**row, "cost_wall_time": perf_counter() - began}, run
+            row |= self.measured(run, case)
+        return row if self.parallel else {**row, "cost_wall_time": perf_counter() - began}
+
+    def measured(self, run: Trajectory, case: Row) -> Row:
+        """Return what is kept of a run besides metrics and cost."""
+        return {}
 
     def at(self, case: Row) -> Scene:
         """Return the scene of a case. Raises SceneError if it cannot be run."""
-        tables: dict[str, dict[str, Any]] = {}
+        tables: dict[str, Any] = {"accuracy": case["accuracy"]} if "accuracy" in case else {}
         for name, value in case.items():
             if (key := split_key(name)) is not None:  # others are labels
                 tables.setdefault(key[0], {})[key[1]] = value
@@ -131,8 +132,8 @@ class Study(BaseModel, ABC):
         return None
 
     def lost(self, cause: str) -> Row:
-        """Return the record of a case whose worker process has died. Raises ChildProcessError if there is none."""
-        raise ChildProcessError(errno.ECHILD, cause)
+        """Return the record of a case whose worker process has died."""
+        return {"status": "lost", "error": cause, "warnings": ""}
 
     def failed(self, record: Row) -> bool:
         """Tell whether the progress bar counts a record as failed."""
@@ -190,10 +191,7 @@ class Records:
         self._settings, self.path = study.settings(), directory / FILE
         self.by_name: dict[str, Row] = {}
         self._whole = 0  #: bytes of complete lines
-        self._replaced = {study.kind}  #: kinds whose files the first record removes
         if replace:
-            with suppress(ResultsUnreadable, KeyError):
-                self._replaced.add(_read(self.path)[0]["study"])
             return
         settings, self.by_name, self._whole = _read(self.path)
         if self._whole and settings != self._settings:
@@ -220,10 +218,9 @@ class Records:
             self._begun = True
             self._file.truncate(self._whole)  # without a line that was cut short
             if not self._whole:
-                for kind in self._replaced:
-                    for pattern in (f"{kind}.*", f"{kind}-*"):
-                        for stale in self.path.parent.glob(pattern):
-                            stale.unlink()
+                for stale in self.path.parent.iterdir():
+                    if re.split(r"[.-]", stale.name)[0] in _STUDIES:
+                        stale.unlink()
                 self._write(self._settings)
         self._write({"case": name, "record": record})
         self.by_name[name] = record

@@ -65,16 +65,9 @@ class Sweep(Study):
         names = [axis.name for axis in axes]
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
 
-    def record(self, case: Row) -> Row:
-        """Run once."""
-        row, run = self.observed(case)
-        if self.stroboscopic:
-            row |= {POINTS: None, PEAK: None} if run is None else seen_once_a_period(run)
-        return row
-
-    def lost(self, cause: str) -> Row:
-        """Return a row that says why there is no run."""
-        return {"status": "lost", "error": cause, "warnings": ""}
+    def measured(self, run: Trajectory, case: Row) -> Row:
+        """Return what is seen once a period, if that is asked for."""
+        return seen_once_a_period(run) if self.stroboscopic else {}
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Count the rows by status, and name the first error."""
@@ -135,8 +128,8 @@ def _bifurcation(rows: Sequence[Row], scale: Any, path: Path) -> Path:
     figure, (upper, lower) = panels(2, 1, (7.0, 3.5), "")
     at = column(rows, scale.name)
     for x, row in zip(at, rows, strict=True):
-        if row[POINTS] is not None:
-            upper.plot(np.full(len(row[POINTS]), x), row[POINTS], ".", color=BLUE, markersize=2.0)
+        points = row.get(POINTS, ())
+        upper.plot(np.full(len(points), x), points, ".", color=BLUE, markersize=2.0)
     order = np.argsort(at, kind="stable")
     lower.plot(at[order], column(rows, PEAK)[order], ".-", color=VERMILLION, linewidth=1.0)
     for ax, what in ((upper, "position once a period of the drive [m]"), (lower, "half the range of the motion [m]")):
@@ -153,5 +146,6 @@ def _varies(values: np.ndarray) -> bool:
 
 
 def _labelled(axis: Axis) -> str:
-    unit = unit_of(axis.table, axis.key)
+    table, _, key = axis.name.rpartition(".")
+    unit = unit_of(table, key)
     return f"{axis.name} [{unit}]" if unit != "–" else axis.name

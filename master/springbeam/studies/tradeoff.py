@@ -47,18 +47,17 @@ _SHORT = 2e-3
 #: Relative errors for which the cheapest configuration is named.
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8)
 
-#: Macro steps are the scene's times powers of 2 between these, where a run has this many of them.
-_COARSEST, _FINEST = 6, -2
+#: Macro steps are the scene's times these, where a run has this many of them.
+_STEPS = tuple(2.0**k for k in range(6, -3, -1))
 _FEWEST_STEPS, _MOST_STEPS = 4, 20_000
 _ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 #: Steps that follow from tolerances resolve the motion: with more turns of the slowest mode [rad] that takes too many.
 _MOST_RESOLVED = 2000.0
-#: Tolerance of IDA, where it is not the scene's own; that of the tie is a hundredth.
-_IDA_TOLERANCE = 1e-4
+#: Looser tolerances of IDA, and of the tie.
+_LOOSER = {"coupling.tolerance": 1e-6, "spring.relative_tolerance": 1e-4, "spring.absolute_tolerance": 1e-6}
 _MODES = (2, 4, 8, 16, 32, 64, 128)
 _MESHES = (0.25, 0.5, 1.0, 2.0)
 _DEGREES = (1, 4, 8)
-_HIGHEST_DEGREE = 8
 
 
 class Tradeoff(Study):
@@ -73,79 +72,77 @@ class Tradeoff(Study):
     def of(cls, scene: Scene, until: float | None = None, **settings: Any) -> Tradeoff:
         """Return the study of ``scene`` up to ``until`` [s], or as far as it can be compared.
 
-        Raises
-        ------
-        SceneError
-            If no reference is defined for the scene.
+        Raises SceneError if no reference is defined for the scene.
         """
-        if scene.contact.algorithm:
-            raise SceneError("[contact] law = \"paper\": Algorithm 1 has no exact solution to compare with; "
-                             'law = "transmission" or "compliance" has')  # fmt: skip
         refuse_without_reference(scene)
         window = comparable_until(scene) if until is None else min(until, scene.time.t_end)
         remarks = []
         if scene.accuracy is not None:
-            remarks.append(
-                f"accuracy = {scene.accuracy:g} is left out: each configuration has its own scheme and steps"
-            )
+            left_out = f"accuracy = {scene.accuracy:g} is left out: each configuration has its own scheme and steps"
+            remarks.append(left_out)
         scene = with_changes(scene, accuracy=None, time={"t_end": window})
         return cls(scene=scene, remarks=tuple(remarks), **settings)
 
     @cached_property
     def configurations(self) -> list[Row]:
         """The axes of all configurations that the scene can have: family, setting, and keys or scipy's tolerance."""
-        return list(_configurations(self.scene))
+        return [case for case in _configurations(self.scene) if "rtol" in case or self._allowed(case)]
+
+    def _allowed(self, case: Row) -> bool:
+        try:
+            self.at(case)
+        except SceneError:
+            return False
+        return True
 
     def cases(self) -> dict[str, Row]:
         """Return the configurations of each pass; if quick, every third of a family, once."""
-        places: dict[str, int] = {}
-        chosen = []
+        families: dict[str, list[Row]] = {}
         for case in self.configurations:
-            place = places[case["family"]] = places.get(case["family"], -1) + 1
-            if not (_hopeless(self.scene, case) or (self.quick and place % 3)):
-                chosen.append(case)
-        passes = range(1 if self.quick else self.repeats)
-        return {_name(case, turn): {**case, "pass": turn} for turn in passes for case in chosen}
+            families.setdefault(case["family"], []).append(case)
+        chosen = [case for cases in families.values() for case in cases[:: 3 if self.quick else 1]
+                  if not _hopeless(self.scene, case)]  # fmt: skip
+        return {_name(case, turn): {**case, "pass": turn} for turn in range(self.passes) for case in chosen}
+
+    @property
+    def passes(self) -> int:
+        """How often each configuration is timed."""
+        return 1 if self.quick else self.repeats
 
     def cost(self) -> str:
         """Say how many configurations there are."""
-        cases, passes = self.cases(), 1 if self.quick else self.repeats
-        return (
-            f"{len(cases) // passes} configurations, timed {passes}×; finer ones of a kind are left out after one that "
-            "takes too long"
-        )
+        what = f"{len(self.cases()) // self.passes} configurations, timed {self.passes}×"
+        return f"{what}; finer ones of a kind are left out after one that takes too long"
 
     def skipped(self, case: Row, records: Mapping[str, Row]) -> Row | None:
-        """Leave out what a coarser one of the family was too slow for, and needless timings."""
+        """Leave out what a coarser one of the family was too slow for, needless timings, and what none can judge."""
         first = records.get(_name(case, 0))
         if case["pass"]:
             again = first is not None and first["status"] == "done" and first["cost_wall_time"] <= _TIMED_ONCE
             return None if again else {"status": "skipped", "error": "timed once"}
+        if case["finer"]:
+            for record in records.values():
+                if record["status"] == "not judged":
+                    return record
+        limit = 0.1 * _LIMIT if self.quick else _LIMIT
         family = (_name(other, 0) for other in self.configurations if other["family"] == case["family"])
-        slow = next((name for name in family if records.get(name, {}).get("cost_wall_time", 0.0) > self._limit), None)
+        slow = next((name for name in family if records.get(name, {}).get("cost_wall_time", 0.0) > limit), None)
         if slow is None:
             return None
-        return {"status": "skipped", "error": f"{slow.rpartition(',')[0]} took more than {self._limit:g} s"}
-
-    @property
-    def _limit(self) -> float:
-        return 0.1 * _LIMIT if self.quick else _LIMIT
+        return {"status": "skipped", "error": f"{slow.rpartition(',')[0]} took more than {limit:g} s"}
 
     def record(self, case: Row) -> Row:
-        """Run, time and, in the first pass, judge a configuration: ``cost_wall_time`` [s] is without ``cost_setup``."""
-        began, judged = perf_counter(), not case["pass"]
-        row: Row = {"status": "done", "error": ""}
+        """Run, time and judge a configuration: ``cost_wall_time`` [s] is without ``cost_setup``."""
+        if case["finer"] and isinstance(self.finer_reference, str):
+            return {"status": "not judged", "error": self.finer_reference}
+        began = perf_counter()
         try:
-            if "rtol" in case:
-                return row | self._by_scipy(case, judged)
-            return row | self._by_us(case, judged)
-        except event_driven.ReferenceFailure as failed:
-            row["error"] = str(failed)
-        except RunStopped as stopped:
-            row["error"] = str(stopped)
-        return {**row, "status": "stopped", "cost_wall_time": perf_counter() - began}
+            found = self._by_scipy(case) if "rtol" in case else self._by_us(case)
+        except (event_driven.ReferenceFailure, RunStopped) as failed:
+            return {"status": "stopped", "error": str(failed), "cost_wall_time": perf_counter() - began}
+        return {"status": "done", "error": "", **found}
 
-    def _by_us(self, case: Row, judged: bool) -> Row:
+    def _by_us(self, case: Row) -> Row:
         scene, limit, began = self.at(case), _LIMIT, perf_counter()
 
         def limited(time: float, phase: str, macro_steps: int) -> None:
@@ -155,26 +152,26 @@ class Tradeoff(Study):
         run = simulate(scene, limited)
         done = perf_counter()
         run.at(self.times)
-        row = {
-            "cost_wall_time": float(run.summary["wall_time"]) + perf_counter() - done,
+        seconds = float(run.summary["wall_time"]) + perf_counter() - done
+        reference = self.finer_reference if case["finer"] else self.reference
+        assert isinstance(reference, Trajectory)
+        return {
+            "cost_wall_time": seconds,
             "cost_setup": float(run.summary["setup_time"]),
             **costs(run),
+            "unknowns": 0 if scene.beam is None else scene.beam.modes_kept,
+            "cost_macro_steps": int(run.summary.get("macro_steps", 0)),
+            **errors(run, reference, _SHORT * (self.times[-1] - self.times[0])),
         }
-        if judged:
-            unknowns = 0 if scene.beam is None else scene.beam.modes_kept
-            row |= {"unknowns": unknowns, "cost_macro_steps": int(run.summary.get("macro_steps", 0))}
-            reference = self.finer_reference if case["finer"] else self.reference
-            row |= errors(run, reference, _SHORT * (self.times[-1] - self.times[0]))
-        return row
 
-    def _by_scipy(self, case: Row, judged: bool) -> Row:
+    def _by_scipy(self, case: Row) -> Row:
         began = perf_counter()
         rival = Rival(self.scene)
-        ready, scale = perf_counter(), self.reach
-        atol = 1e-3 * case["rtol"] * scale
-        solved = rival.solve(case["method"], case["rtol"], atol, self.times, _LIMIT)
-        row = {"cost_wall_time": solved.seconds, "cost_setup": ready - began, "cost_evaluations": solved.evaluations}
-        return row | (motion_errors(solved.columns, self.reference) if judged else {})
+        ready, exact = perf_counter(), self.reference
+        reach = max((float(np.abs(exact[k]).max()) for k in ("u_tip", "y") if k in exact.columns), default=1.0) or 1.0
+        solved = rival.solve(case["method"], case["rtol"], 1e-3 * case["rtol"] * reach, self.times, _LIMIT)
+        cost = {"cost_wall_time": solved.seconds, "cost_setup": ready - began, "cost_evaluations": solved.evaluations}
+        return cost | motion_errors(solved.columns, exact)
 
     @cached_property
     def times(self) -> np.ndarray:
@@ -187,34 +184,26 @@ class Tradeoff(Study):
         return event_driven.simulate(self.scene, sample_times=self.times)
 
     @cached_property
-    def finer_reference(self) -> Trajectory:
-        """The solution on a finer mesh. Raises ReferenceFailure if that takes too long."""
+    def finer_reference(self) -> Trajectory | str:
+        """The solution on a finer mesh, or why there is none."""
         model = finer(self.scene)
         assert model is not None
-        return event_driven.simulate(model, sample_times=self.times, time_limit=_LIMIT_FINER)
-
-    @cached_property
-    def reach(self) -> float:
-        """The largest displacement [m]; scipy's absolute tolerances are relative to it."""
-        found = (float(np.abs(self.reference[k]).max()) for k in ("u_tip", "y") if k in self.reference.columns)
-        return max(found, default=1.0) or 1.0
+        try:
+            return event_driven.simulate(model, sample_times=self.times, time_limit=_LIMIT_FINER)
+        except event_driven.ReferenceFailure as failed:
+            return f"the reference on a finer mesh {failed}"
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
-        """Return a row per configuration: its errors, and the medians of its times."""
-        found: dict[str, Row] = {}
-        times: dict[str, list[float]] = {}
-        cases = self.cases()
-        for name, record in records.items():
-            case, key = cases[name], name.rpartition(",")[0]
-            if not case["pass"]:
-                axes = {column: value for column, value in case.items() if column != "pass"}
-                found[key] = {"index": len(found), **axes, "unknowns": None, **record}
-            if record["status"] == "done":
-                times.setdefault(key, []).append(record["cost_wall_time"])
-        for key, several in times.items():
-            found[key] |= {"cost_wall_time": statistics.median(several), "times": several}
-        front = pareto(found.values())
-        return [row | {"on_front": row in front} for row in found.values()]
+        """Return a row per configuration: the errors of the first pass, and the medians of the times."""
+        cases, found = self.cases(), list[Row]()
+        for name in (name for name in records if not cases[name]["pass"]):
+            turns = [records.get(_name(cases[name], turn), {}) for turn in range(self.passes)]
+            times = [turn["cost_wall_time"] for turn in turns if turn.get("status") == "done"]
+            row = {"index": len(found), **cases[name], "unknowns": None, **records[name]}
+            del row["pass"]
+            found.append(row | ({"cost_wall_time": statistics.median(times), "times": times} if times else {}))
+        front = pareto(found)
+        return [row | {"on_front": row in front} for row in found]
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Name the cheapest configurations, and those that nothing beats."""
@@ -238,20 +227,16 @@ class Tradeoff(Study):
                   "Pareto front"),
             *(Text(f"note      {note}") for note in notes),
         ]  # fmt: skip
-        told = [
-            {"error": c["error"], "ratio": c["ratio"], **{side: _told(c[side]) for side in ("co_simulation", "scipy")}}
-            for c in best
-        ]
-        document = {"until": until, "cheapest": told, "front": list(map(_told, front)), "notes": notes}
-        return Findings(document, shown)
+        told = [c | {side: _told(c[side]) for side in ("co_simulation", "scipy")} for c in best]
+        return Findings({"until": until, "cheapest": told, "front": list(map(_told, front)), "notes": notes}, shown)
 
     def notes(self, records: Mapping[str, Row]) -> list[str]:
         """Return what was left out, and why."""
-        found = list(self.remarks)
-        stopped = [row for row in self.rows(records) if row["status"] == "stopped" and "takes more" in row["error"]]
-        if stopped:
-            names = "; ".join(map(_label, stopped))
-            found.append(f"given up after {_LIMIT:g} s, finer ones of their kind not run: {names}")
+        found, rows = list(self.remarks), self.rows(records)
+        if slow := [_label(row) for row in rows if row["status"] == "stopped" and "takes more" in row["error"]]:
+            found.append(f"given up after {_LIMIT:g} s, finer ones of their kind not run: {'; '.join(slow)}")
+        if unjudged := {row["family"]: row["error"] for row in rows if row["status"] == "not judged"}:
+            found.append(f"not run, {next(iter(unjudged.values()))}: {', '.join(unjudged)}")
         if hopeless := dict.fromkeys(c["method"] for c in self.configurations if _hopeless(self.scene, c)):
             turns = f"explicit steps would follow the mesh's fastest mode over {_MOST_TURNS:g} rad"
             found.append(f"not run, {turns}: {', '.join(hopeless)}")
@@ -261,25 +246,22 @@ class Tradeoff(Study):
 
     def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
         """Draw the work–precision diagrams: error over time, over doStep calls, and the model's over its size."""
-        from .picture import lines, panels
+        from .picture import Point, curves
 
         rows = [row for row in self.rows(records) if np.isfinite(worst(row))]
-        same, models = ([row for row in rows if row["finer"] == finer] for finer in (False, True))
-        ours = [row for row in same if "rtol" not in row]
+        over = {"wall time [s]": "cost_wall_time", "doStep calls of both FMUs": "cost_do_steps",
+                "unknowns of the beam, beside a finer mesh": "unknowns"}  # fmt: skip
+        points = [
+            Point(words, row["family"], row[cost], min(worst(row), 1.0))
+            for words, cost in over.items()
+            for row in rows
+            if row["finer"] == (cost == "unknowns") and cost in row
+        ]
         title = f"{self.scene.title}: errors up to t = {self.scene.time.t_end:.6g} s"
-        figure, axes = panels(3 if models else 2, 3, (6.0, 6.5), title)
-        for ax, mine, cost, words in zip(
-            axes, (same, ours, models), ("cost_wall_time", "cost_do_steps", "unknowns"),
-            ("wall time [s]", "doStep calls of both FMUs", "unknowns of the beam"), strict=False,
-        ):  # fmt: skip
-            lines(ax, mine, cost, lambda row: min(worst(row), 1.0), "family")
-            ax.set(xlabel=words, ylabel="largest relative error of u_tip and y")
+        figure = curves(points, title, "", "largest relative error of u_tip and y", (6.0, 6.5))
         front = pareto(rows)
-        axes[0].plot([row["cost_wall_time"] for row in front], list(map(worst, front)), color="black", linewidth=6.0,
-                     alpha=0.15, zorder=0, label="Pareto front")  # fmt: skip
-        for ax in axes[2:]:
-            ax.legend(fontsize="small")
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", fontsize="small", ncols=6)
+        figure.axes[0].plot([row["cost_wall_time"] for row in front], list(map(worst, front)), color="black",
+                            linewidth=6.0, alpha=0.15, zorder=0)  # fmt: skip
         figure.savefig(directory / "tradeoff.png", dpi=110)
         return [directory / "tradeoff.png"]
 
@@ -309,8 +291,7 @@ def cheapest(rows: Iterable[Row]) -> list[Row]:
         kept = []
         for family in dict.fromkeys(row["family"] for row in same if ("rtol" not in row) == ours):
             done = [row for row in same if row["family"] == family and row["status"] == "done"]
-            good = [worst(row) <= target for row in done]
-            kept += [row for k, row in enumerate(done) if all(good[k:])]
+            kept += [row for k, row in enumerate(done) if all(worst(finer) <= target for finer in done[k:])]
         return min(kept, key=lambda row: row["cost_wall_time"], default=None)
 
     found = []
@@ -341,76 +322,37 @@ def _told(row: Row | None) -> Row | None:
     return {"name": _label(row), "error": worst(row), "solve": row["cost_wall_time"], "setup": row["cost_setup"]}
 
 
-# -- configurations -------------------------------------------------------------------------------------------------
-
-
 def _configurations(scene: Scene) -> Iterator[Row]:
-    """Yield the axes of all configurations, those left out that the scene cannot have."""
-    for family, setting, keys, of_finer in (*_steps(scene), *_tolerances(scene), *_models(scene)):
-        tables: dict[str, dict[str, Any]] = {}
-        for name, value in keys.items():
-            tables.setdefault(name.partition(".")[0], {})[name.partition(".")[2]] = value
-        try:
-            with_changes(scene, **tables)
-        except SceneError:
-            continue
-        yield {"family": family, "setting": setting, "finer": of_finer, **keys}
-    for method, tolerances in TOLERANCES.items():
-        for rtol in () if scene.massless else tolerances:
-            axes = {"family": method, "setting": f"rtol {rtol:.0e}", "finer": False}
-            yield axes | {"method": method, "rtol": rtol}
-
-
-def _steps(scene: Scene) -> Iterator[tuple[str, str, Row, bool]]:
-    """Yield all schemes with equal steps, the best ones with a looser tolerance of IDA too, and `auto`."""
-    sizes = [scene.coupling.H * 2.0**k for k in range(_COARSEST, _FINEST - 1, -1)]
-    sizes = [H for H in sizes if _FEWEST_STEPS <= scene.duration / H <= _MOST_STEPS]
-    families: list[tuple[str, str, int, Row]] = [
-        (f"{scheme} {degree}", scheme, degree, {}) for scheme, degree in _schemes(scene)
-    ]
-    if scene.spring is not None:
-        looser = {"coupling.tolerance": 1e-2 * _IDA_TOLERANCE, "spring.relative_tolerance": _IDA_TOLERANCE,
-                  "spring.absolute_tolerance": 1e-2 * _IDA_TOLERANCE}  # fmt: skip
-        families += [(f"{s} {d}, IDA {_IDA_TOLERANCE:.0e}", s, d, looser) for s, d in _best(scene)]
-    for family, scheme, degree, more in [*families, ("auto", "auto", 0, {})]:
-        for H in sizes:
-            keys = {"coupling.scheme": scheme, "coupling.degree": degree, "coupling.macro_step": H, **more}
-            yield family, f"H = {H:.3g}", keys, False
-
-
-def _schemes(scene: Scene) -> tuple[tuple[str, int], ...]:
-    return RIGID if scene.contact.rigid else SOFT
-
-
-def _best(scene: Scene) -> list[tuple[str, int]]:
-    return [("energy", 2), ("hermite", 2)] if scene.contact.rigid else [("energy", 2)]
-
-
-def _tolerances(scene: Scene) -> Iterator[tuple[str, str, Row, bool]]:
-    beam = scene.beam
-    if beam is not None and beam.fidelity == "dynamic" and slowest_frequency(beam) * scene.duration > _MOST_RESOLVED:
-        return
-    for scheme, degree in _best(scene):
-        for tolerance in _ADAPTIVE_TOLERANCES:
-            keys = {"coupling.scheme": scheme, "coupling.degree": degree, "coupling.relative_tolerance": tolerance}
-            yield f"{scheme} {degree} adaptive", f"{tolerance:.0e}", keys, False
-
-
-def _models(scene: Scene) -> Iterator[tuple[str, str, Row, bool]]:
-    beam, fine = scene.beam, finer(scene)
-    if beam is None or fine is None or fine.beam is None:
-        return
-    limit = fine.beam.n_elements * fine.beam.element_degree
-    for modes in _MODES:
-        if modes < beam.unknowns:
-            yield "modes", f"{modes}", {"beam.n_modes": modes}, True
-    for degree in _DEGREES:
-        for factor in _MESHES:
-            n = round(factor * beam.n_elements / degree)
-            if n >= 1 and 2 * n * degree <= limit:
-                mesh = {"beam.n_elements": n, "beam.element_degree": degree, "beam.n_modes": 0}
-                full = {"beam.reduced_integration": False} if degree > 2 else {}
-                yield f"elements of degree {degree}", f"{n}", mesh | full, True
+    """Yield the axes of all configurations, also those that the scene cannot have."""
+    rigid, beam = scene.contact.rigid, scene.beam
+    schemes: dict[str, Row] = {
+        f"{scheme} {degree}": {"coupling.scheme": scheme, "coupling.degree": degree}
+        for scheme, degree in (RIGID if rigid else SOFT)
+    }
+    best = {name: schemes[name] for name in ("energy 2", "hermite 2") if name in schemes}
+    looser = {f"{name}, IDA 1e-04": keys | _LOOSER for name, keys in best.items() if scene.spring is not None}
+    auto = {"auto": {"coupling.scheme": "auto", "coupling.degree": 0}}
+    sizes = [scene.coupling.H * share for share in _STEPS]
+    for family, keys in (schemes | looser | auto).items():
+        for H in (H for H in sizes if _FEWEST_STEPS <= scene.duration / H <= _MOST_STEPS):
+            yield {"family": family, "setting": f"H = {H:.3g}", "finer": False, **keys, "coupling.macro_step": H}
+    turns = 0.0 if beam is None or scene.massless else slowest_frequency(beam) * scene.duration
+    for family, keys in best.items():
+        for tolerance in _ADAPTIVE_TOLERANCES if turns <= _MOST_RESOLVED else ():
+            axes = {"family": f"{family} adaptive", "setting": f"{tolerance:.0e}", "finer": False}
+            yield axes | keys | {"coupling.relative_tolerance": tolerance}
+    if (fine := finer(scene)) is not None and beam is not None and fine.beam is not None:
+        for modes in (modes for modes in _MODES if modes < beam.unknowns):
+            yield {"family": "modes", "setting": f"{modes}", "finer": True, "beam.n_modes": modes}
+        for degree in _DEGREES:
+            for n in (round(factor * beam.n_elements / degree) for factor in _MESHES):
+                if n >= 1 and 2 * n * degree <= fine.beam.n_elements * fine.beam.element_degree:
+                    axes = {"family": f"elements of degree {degree}", "setting": f"{n}", "finer": True}
+                    mesh = {"beam.n_elements": n, "beam.element_degree": degree, "beam.n_modes": 0}
+                    yield axes | mesh | ({"beam.reduced_integration": False} if degree > 2 else {})
+    for method in () if scene.massless else TOLERANCES:
+        for rtol in TOLERANCES[method]:
+            yield {"family": method, "setting": f"rtol {rtol:.0e}", "finer": False, "method": method, "rtol": rtol}
 
 
 def finer(scene: Scene) -> Scene | None:
@@ -418,7 +360,7 @@ def finer(scene: Scene) -> Scene | None:
     beam = scene.beam
     if beam is None or beam.integrator != "modal":
         return None
-    degree = min(_HIGHEST_DEGREE, ALL_MODES_UP_TO // (2 * beam.n_elements))
+    degree = min(max(_DEGREES), ALL_MODES_UP_TO // (2 * beam.n_elements))
     if degree < 2 * beam.element_degree:
         return None
     return with_changes(scene, beam={"element_degree": degree, "n_modes": 0, "reduced_integration": False})
@@ -426,6 +368,5 @@ def finer(scene: Scene) -> Scene | None:
 
 def _hopeless(scene: Scene, case: Row) -> bool:
     """Tell whether an explicit method would have to follow the fastest mode of the mesh for too long."""
-    if case.get("method") not in _EXPLICIT or scene.beam is None:
-        return False
-    return mesh_frequency(scene.beam) * scene.duration > _MOST_TURNS
+    beam = scene.beam if case.get("method") in _EXPLICIT else None
+    return beam is not None and mesh_frequency(beam) * scene.duration > _MOST_TURNS

@@ -10,43 +10,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from ...scene import Beam
 from ...scene.laws import LAWS
+from ..design import Axis, design
 from ..schemes import RIGID, SOFT
 
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
 _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A parameter of a cell and how a number in [0, 1) becomes its value.
-
-    ``zero`` is the share of cells where it is 0, the rest is spread over ``low`` … ``high``, logarithmically unless
-    ``linear``. ``choices`` takes the place of a range.
-    """
-
-    name: str
-    rest: Any  #: where slices leave it: the scene ``soft``, coarser
-    low: float = 0.0
-    high: float = 1.0
-    zero: float = 0.0
-    linear: bool = False
-    choices: tuple[Any, ...] = ()
-
-    def value(self, x: float) -> Any:
-        if self.choices:
-            return self.choices[min(int(x * len(self.choices)), len(self.choices) - 1)]
-        if x < self.zero:
-            return 0.0
-        x = (x - self.zero) / (1.0 - self.zero)
-        if self.linear:
-            return self.low + (self.high - self.low) * x
-        return float(self.low * (self.high / self.low) ** x)
-
-
 _AUTO = ("auto", 0)
 #: law, scheme, degree: all that a scene may ask for; Algorithm 1 has no scheme.
 COUPLINGS = (
@@ -57,42 +28,77 @@ COUPLINGS = (
     ("paper", "energy", 0),
 )
 
+#: What varies, over its range; a share of the cells has none of what may be 0.
 PARAMETERS = (
-    Parameter("coupling", ("transmission", "energy", 0), choices=COUPLINGS),
-    Parameter("stiffness", 100.0, 1.0, 3.6e10),  # √(EI·KAG)
-    Parameter("shear_ratio", 1.0, 1e-6, 1e6),  # KAG/EI
-    Parameter("macro_step", 1e-3, 1e-6, 0.1),
-    Parameter("mass", 1.0, 1e-6, 1e6),
-    Parameter("k1", 3.0, 1e-2, 1e6),
-    Parameter("k2_kind", "softening", choices=("hardening", "hardening", "softening", "linear")),
-    Parameter("k2", 1.0, 1e-2, 1e8),
-    Parameter(
-        "escape", 6.7, 0.3, 30.0
-    ),  # hilltop of the softening spring / the deflection that takes the beam's energy
-    Parameter("contact_stiffness", 1e4, 1.0, 1e12),
-    Parameter("exponent", 1.5, 1.0, 5.0, linear=True),
-    Parameter("contact_damping", 0.0, 1e-3, 1e3, zero=0.5),
-    Parameter("alpha_b", 0.0, 1e-9, 1.0, zero=0.4),
-    Parameter("alpha_s", 0.0, 1e-3, 1e3, zero=0.4),
-    Parameter("speed", 1.0, 1e-6, 1e3),
-    Parameter("restitution", 1.0, 0.0, 1.0, linear=True),
-    Parameter("elasticity", "given", choices=("given", "plastic", "elastic")),
-    Parameter("stop_depth", 0.015, 1e-12, 0.1, zero=0.2),  # Ψ − φ; 0: no stop
-    Parameter("equilibrium", 0.0, -0.1, 0.1, linear=True),
-    Parameter("clearance", 0.0, 1e-9, 0.1, zero=0.6),  # tip above the spring at the start
-    Parameter("approach", "undeformed", choices=("undeformed", "elastic")),
-    Parameter("impact", "inelastic", choices=("inelastic", "inelastic", "rest", "tip")),
-    Parameter("bodies", "both", choices=("both", "both", "both", "both", "both", "both", "beam", "spring")),
-    Parameter("fidelity", "dynamic", choices=("dynamic", "dynamic", "dynamic", "dynamic", "quasi_static")),
-    Parameter("n_elements", 20, choices=(1, 2, 5, 10, 20, 50)),
-    Parameter("element_degree", 1, choices=(1, 1, 1, 2, 5, 12)),
-    Parameter("n_modes", 0, choices=(0, 0, 1, 4)),
-    Parameter("integrator", "modal", choices=("modal", "modal", "modal", "midpoint", "damped")),
-    Parameter("reduced_integration", False, choices=(False, True)),
-    Parameter("distributed_load", 0.0, 1e-3, 1e3, zero=0.6),
-    Parameter("external_force", 0.0, 1e-3, 1e3, zero=0.6),
-    Parameter("steps", 200, 100, 400),
+    Axis("coupling", COUPLINGS),
+    Axis("stiffness", (), 1.0, 3.6e10, log=True),  # √(EI·KAG)
+    Axis("shear_ratio", (), 1e-6, 1e6, log=True),  # KAG/EI
+    Axis("macro_step", (), 1e-6, 0.1, log=True),
+    Axis("mass", (), 1e-6, 1e6, log=True),
+    Axis("k1", (), 0.01, 1e6, log=True),
+    Axis("k2_kind", ("hardening", "hardening", "softening", "linear")),
+    Axis("k2", (), 0.01, 1e8, log=True),
+    # The hilltop of the softening spring over the deflection that takes the beam's energy.
+    Axis("escape", (), 0.3, 30.0, log=True),
+    Axis("contact_stiffness", (), 1.0, 1e12, log=True),
+    Axis("exponent", (), 1.0, 5.0),
+    Axis("contact_damping", (), 0.001, 1000.0, log=True, zero=0.5),
+    Axis("alpha_b", (), 1e-9, 1.0, log=True, zero=0.4),
+    Axis("alpha_s", (), 0.001, 1000.0, log=True, zero=0.4),
+    Axis("speed", (), 1e-6, 1000.0, log=True),
+    Axis("restitution", (), 0.0, 1.0),
+    Axis("elasticity", ("given", "plastic", "elastic")),
+    Axis("stop_depth", (), 1e-12, 0.1, log=True, zero=0.2),  # Ψ − φ; 0: no stop
+    Axis("equilibrium", (), -0.1, 0.1),
+    Axis("clearance", (), 1e-9, 0.1, log=True, zero=0.6),  # tip above the spring at the start
+    Axis("approach", ("undeformed", "elastic")),
+    Axis("impact", ("inelastic", "inelastic", "rest", "tip")),
+    Axis("bodies", ("both", "both", "both", "both", "both", "both", "beam", "spring")),
+    Axis("fidelity", ("dynamic", "dynamic", "dynamic", "dynamic", "quasi_static")),
+    Axis("n_elements", (1, 2, 5, 10, 20, 50)),
+    Axis("element_degree", (1, 1, 1, 2, 5, 12)),
+    Axis("n_modes", (0, 0, 1, 4)),
+    Axis("integrator", ("modal", "modal", "modal", "midpoint", "damped")),
+    Axis("reduced_integration", (False, True)),
+    Axis("distributed_load", (), 0.001, 1000.0, log=True, zero=0.6),
+    Axis("external_force", (), 0.001, 1000.0, log=True, zero=0.6),
+    Axis("steps", (), 100, 400, log=True),
 )
+#: Where slices leave it: the scene ``soft``, coarser.
+AT_REST: dict[str, Any] = {
+    "coupling": ("transmission", "energy", 0),
+    "stiffness": 100.0,
+    "shear_ratio": 1.0,
+    "macro_step": 0.001,
+    "mass": 1.0,
+    "k1": 3.0,
+    "k2_kind": "softening",
+    "k2": 1.0,
+    "escape": 6.7,
+    "contact_stiffness": 10000.0,
+    "exponent": 1.5,
+    "contact_damping": 0.0,
+    "alpha_b": 0.0,
+    "alpha_s": 0.0,
+    "speed": 1.0,
+    "restitution": 1.0,
+    "elasticity": "given",
+    "stop_depth": 0.015,
+    "equilibrium": 0.0,
+    "clearance": 0.0,
+    "approach": "undeformed",
+    "impact": "inelastic",
+    "bodies": "both",
+    "fidelity": "dynamic",
+    "n_elements": 20,
+    "element_degree": 1,
+    "n_modes": 0,
+    "integrator": "modal",
+    "reduced_integration": False,
+    "distributed_load": 0.0,
+    "external_force": 0.0,
+    "steps": 200,
+}
 
 
 @dataclass(frozen=True)
@@ -127,27 +133,19 @@ SLICES = (
 
 def sampled_cells(count: int, seed: int) -> list[dict[str, Any]]:
     """Return a Latin hypercube of ``count`` cells over all `PARAMETERS`."""
-    points = qmc.LatinHypercube(len(PARAMETERS), seed=seed).random(count)
-    return [{"slice": "", **{p.name: p.value(x) for p, x in zip(PARAMETERS, point, strict=True)}} for point in points]
+    found = design(PARAMETERS, count, seed, "latin_hypercube") if count else []
+    return [{"slice": "", **dict(zip(AT_REST, values, strict=True))} for values in found]
 
 
 def slice_cells(resolution: int) -> list[dict[str, Any]]:
     """Return ``resolution``² cells of each of `SLICES`, both ends of the ranges included."""
-    by_name, at_rest = {p.name: p for p in PARAMETERS}, {p.name: p.rest for p in PARAMETERS}
-    ends = np.linspace(0.0, 1.0, resolution)
+    grids = {axis.name: axis.grid(resolution) for axis in PARAMETERS if axis.low != axis.high} if resolution else {}
     return [
-        {"slice": s.name, **at_rest, **s.fixed, s.x: _spread(by_name[s.x], i), s.y: _spread(by_name[s.y], j)}
+        {"slice": s.name, **AT_REST, **s.fixed, s.x: x, s.y: y}
         for s in SLICES
-        for i in ends
-        for j in ends
+        for x in grids.get(s.x, ())
+        for y in grids.get(s.y, ())
     ]
-
-
-def _spread(parameter: Parameter, x: float) -> Any:
-    """Return the value at ``x`` of the range without the share of zeros, but 0 itself first."""
-    if parameter.zero > 0.0 and x == 0.0:
-        return 0.0
-    return parameter.value(parameter.zero + (1.0 - parameter.zero) * x)
 
 
 def _spring_frequency(cell: dict[str, Any], k1: float, k2: float) -> float:

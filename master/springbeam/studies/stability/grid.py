@@ -5,27 +5,27 @@ The same settings give the same cells and outcomes, in whatever order and in how
 
 from __future__ import annotations
 
-import re
 import statistics
-import textwrap
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
 import tomli_w
 from rich.table import Table
 from rich.text import Text
 
+from ...pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
 from ...scene import SceneError
 from ..study import Findings, Row, Study
 from ..tables import table
-from .cells import COUPLINGS, sampled_cells, scene_dict, slice_cells
+from .cells import COUPLINGS, SLICES, sampled_cells, scene_dict, slice_cells
 from .outcome import CLASSES, Outcome, run_cell
 
-#: How many reasons the summary lists, and how many characters of each.
-_REASONS, _REASON_WIDTH = 12, 62
+#: Of `CLASSES`; residuals outside are drawn in the colours of the ends.
+_COLOURS, _RESIDUALS = (BLUE, SKY, GREEN, STONE, ORANGE, BLACK), (1e-16, 1.0)
 #: Quick: the hypercube has so many times fewer cells, each axis of a slice half as many.
 _QUICK = 5
 
@@ -67,7 +67,7 @@ class Grid(Study):
         return bool(record["kind"] == "garbage")
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Count classes and reasons; passed if no cell is garbage."""
+        """Count classes; passed if no cell is garbage."""
         bad = {name: record["reason"] for name, record in records.items() if self.failed(record)}
         classes = Counter(record["kind"] for record in records.values())
         garbage = [Text(f"garbage   {_file(name)}: {reason}") for name, reason in bad.items()]
@@ -76,7 +76,7 @@ class Grid(Study):
         beside = f"{resolved} cells call themselves resolved, {len(errors)} were compared with the reference"
         if errors:
             beside += f": errors {statistics.median(errors):.0e} in the median, at most {max(errors):.0e}"
-        shown = [self._classes(records), _reasons(records), Text(beside), *garbage]
+        shown = [self._classes(records), Text(beside), *garbage]
         told = {"cells": len(records), "classes": classes, "resolved": resolved, "compared": len(errors)}
         return Findings({**told, "garbage": bad}, shown, 1 if bad else 0)
 
@@ -98,10 +98,36 @@ class Grid(Study):
         return super().write(records, directory, pictures=pictures)
 
     def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
-        """Draw the class of each cell, and its energy residual: slices as maps, the hypercube by coupling."""
-        from .picture import draw
+        """Draw maps of the slices: the class of each cell, and its energy residual."""
+        import matplotlib
+        from matplotlib.colors import ListedColormap, LogNorm
 
-        return draw(self.rows(records), directory)
+        from ..picture import Scale, cells, column, panels
+
+        rows, paths = self.rows(records), []
+        slices = [s for s in SLICES if any(row["slice"] == s.name for row in rows)]
+        looks: dict[str, dict[str, Any]] = {
+            "classes": {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": len(CLASSES) - 0.5},
+            "residuals": {"cmap": matplotlib.colormaps["cividis"], "norm": LogNorm(*_RESIDUALS, clip=True)},
+        }
+        for what, look in looks.items() if slices else ():
+            figure, axes = panels(len(slices), 4, (4.2, 3.6), f"Slices through the extremes: {what}")
+            for ax, s in zip(axes, slices, strict=True):
+                mine = [row for row in rows if row["slice"] == s.name]
+                values = np.maximum(column(mine, "residual"), _RESIDUALS[0])
+                if what == "classes":
+                    values = np.array([CLASSES.index(row["kind"]) for row in mine], dtype=float)
+                drawn = cells(ax, mine, Scale(s.x, s.x, words=True), Scale(s.y, s.y, words=True), values, **look)
+                ax.set(title=s.name, facecolor=STONE)  # where nothing was run
+                ax.tick_params(labelsize="small")
+            bar = figure.colorbar(drawn, ax=axes, shrink=0.6)
+            if what == "classes":
+                bar.set_ticks(range(len(CLASSES)), labels=CLASSES)
+            else:
+                bar.set_label("largest energy residual / largest energy so far (grey: refused)")
+            paths.append(directory / f"stability-{what}.png")
+            figure.savefig(paths[-1], dpi=100)
+        return paths
 
     def _classes(self, records: Mapping[str, Row]) -> Table:
         """Return a row per coupling, with the largest residual of the runs that were done."""
@@ -109,34 +135,11 @@ class Grid(Study):
         for coupling in (*COUPLINGS, None):
             mine = [r for name, r in records.items() if coupling in (cells[name]["coupling"], None)]
             counts = Counter(record["kind"] for record in mine)
-            done = [
-                r["residual"] for r in mine if r["kind"] not in ("refused", "stopped") and r["residual"] is not None
-            ]
+            done = [r["residual"] or 0.0 for r in mine if r["kind"] not in ("refused", "stopped")]
             name = "all" if coupling is None else " ".join(map(str, coupling)).removeprefix("transmission ")
-            numbers = [str(counts[kind] or "") for kind in CLASSES]
-            rows.append((name, *numbers, f"{max(done):.0e}" if done else ""))
+            rows.append((name, *(str(counts[kind] or "") for kind in CLASSES), f"{max(done):.0e}" if done else ""))
         names = ("coupling", *(f"{kind[:4]}." for kind in CLASSES), "residual")
         return table(names, rows, f"{len(records)} cells")
-
-
-def _reasons(records: Mapping[str, Row]) -> Table:
-    """Return why cells were refused or stopped, without numbers, the most frequent reasons first."""
-    counts = Counter(
-        (record["kind"], _without_numbers(record["reason"]))
-        for record in records.values()
-        if record["kind"] in ("refused", "stopped")
-    )
-    rows = [
-        (kind, str(number), textwrap.shorten(reason, _REASON_WIDTH, placeholder=" …"))
-        for (kind, reason), number in counts.most_common(_REASONS)
-    ]
-    if len(counts) > _REASONS:
-        rows.append(("", "", f"and {len(counts) - _REASONS} further reasons, see the table"))
-    return table(("", "cells", "why"), rows, words=("why",))
-
-
-def _without_numbers(reason: str) -> str:
-    return re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "…", " ".join(reason.removeprefix("cell: ").split()))
 
 
 def _file(name: str) -> str:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from ...results.trajectory import Trajectory
 from ...run.ledger import EXACT, bounds
 from ...run.outcome import RunStopped
 from ...run.runner import run
-from ...scene import Scene, SceneError, scene_from_dict
+from ...scene import SceneError, scene_from_dict
 from ...scene.automatic import with_scheme_chosen
 from ..metrics import motion_errors, worst
 from ..reference import PERTURBATION, initial_speed, refuse_without_reference
@@ -78,18 +79,14 @@ def run_cell(cell: dict[str, Any]) -> Outcome:
         scene = scene_from_dict(scene_dict(cell), source="cell")
     except SceneError as error:
         return Outcome("refused", str(error))
-    recorder = MemoryRecorder(scene)
-    accepted = 0
+    recorder, accepted, cause = MemoryRecorder(scene), count(1), ""
 
-    def count(*_: object) -> None:
-        nonlocal accepted
-        accepted += 1
-        if accepted >= _MOST_STEPS:
+    def enough(*_: object) -> None:
+        if next(accepted) >= _MOST_STEPS:
             raise _Enough
 
-    cause = ""
     try:
-        run(scene, recorder, count)
+        run(scene, recorder, enough)
     except FmuError as error:
         return Outcome("refused", str(error))
     except RunStopped as stopped:
@@ -114,7 +111,7 @@ def _beside_reference(run: Trajectory) -> tuple[float | None, bool]:
     times = np.linspace(float(run.time[0]), end, _COMPARED)
     try:
         refuse_without_reference(scene)
-        if scene.contact.algorithm or end <= times[0]:
+        if end <= times[0]:
             return None, False
         exact = event_driven.simulate(scene, sample_times=times, t_end=end, time_limit=_PATIENCE)
         error = worst(motion_errors(run.at(exact.time).columns, exact))
@@ -141,36 +138,27 @@ def judged(run: Trajectory, cause: str = "") -> Outcome:
     outcome.overlap = _overlap(run)
     outcome.resolved = bool(summary["resolved"])
     scene, _ = with_scheme_chosen(run.scene)
-    if _changes_no_energy(scene) and outcome.residual > _GUARANTEED:
+    damped = scene.beam is not None and scene.beam.damped_numerically
+    keeps = scene.coupling.scheme == "energy" and not scene.contact.algorithm
+    if keeps and not damped and outcome.residual > _GUARANTEED:
         outcome.kind = "garbage"
         outcome.reason = f"energy residual {outcome.residual:.1e} of a coupling that changes none; {cause}"
     if outcome.kind:
         return outcome
-    if faults := list(_faults(run, outcome.overlap, scale)):
-        outcome.kind, outcome.reason = "garbage", "; ".join(faults)
-        return outcome
     bound, _ = bounds(scene)
     said = [text for text in summary["warnings"] if "energy" in text]
     lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
-    if outcome.residual <= EXACT:
+    if faults := list(_faults(run, outcome.overlap, scale)):
+        outcome.kind, outcome.reason = "garbage", "; ".join(faults)
+    elif outcome.residual <= EXACT:
         outcome.kind = "dissipative" if lost > EXACT * scale[-1] else "conserved"
-    elif _only_damped_numerically(scene) and relative.max() <= EXACT:
+    elif keeps and damped and relative.max() <= EXACT:
         outcome.kind = "dissipative"
     elif outcome.residual <= bound or said:
         outcome.kind, outcome.reason = "approximate", "; ".join(said)
     else:
         outcome.kind, outcome.reason = "garbage", f"energy residual {outcome.residual:.1e}, and nothing says so"
     return outcome
-
-
-def _changes_no_energy(scene: Scene) -> bool:
-    damped = scene.beam is not None and scene.beam.damped_numerically
-    return scene.coupling.scheme == "energy" and not damped and not scene.contact.algorithm
-
-
-def _only_damped_numerically(scene: Scene) -> bool:
-    beam, scheme = scene.beam, scene.coupling.scheme
-    return beam is not None and beam.damped_numerically and scheme == "energy" and not scene.contact.algorithm
 
 
 def _energy_scale(run: Trajectory) -> np.ndarray:
@@ -184,38 +172,35 @@ def _faults(run: Trajectory, overlap: float, scale: np.ndarray) -> Iterator[str]
     for name, values in run.columns.items():
         if name != "phase" and not np.all(np.isfinite(values)):
             yield f"{name} is not finite"
-    beam = run.scene.beam
-    # What damping takes over an unresolved generalized-α step is exact, but of no sign.
-    if beam is None or not beam.damped_numerically:
-        yield from _given_back("damping gives", run.e_dissipated, scale)
-    if run.scene.contact.impact != "tip":
-        yield from _given_back("impacts give", run.e_impact_loss, scale)
+    beam, booked = run.scene.beam, {"damping": run.e_dissipated, "impacts": run.e_impact_loss}
+    if beam is not None and beam.damped_numerically:
+        del booked["damping"]  # what it takes over an unresolved generalized-α step is exact, but of no sign
+    if run.scene.contact.impact == "tip":
+        del booked["impacts"]
+    for what, energy in booked.items():
+        change = np.diff(energy)
+        if np.any(change < -_SLACK * scale[1:]):
+            gives = "gives" if what == "damping" else "give"
+            yield f"{what} {gives} energy back: {change.min() / scale[-1]:.1e} of the largest"
     if np.any(np.diff(run.time) < 0.0):
         yield "time runs backwards"
     if overlap > _OVERLAP:
         yield f"the bodies overlap or part by {overlap:.1e} of their motion"
 
 
-def _given_back(what: str, booked: np.ndarray, scale: np.ndarray) -> Iterator[str]:
-    change = np.diff(booked)
-    if np.any(change < -_SLACK * scale[1:]):
-        yield f"{what} energy back: {change.min() / scale[-1]:.1e} of the largest"
-
-
 def _overlap(run: Trajectory) -> float:
     """Return the largest overlap of bodies that may not, over the largest deflection or motion in a step."""
-    scene = run.scene
+    scene, overlap = run.scene, 0.0
     positions = [run[name] for name in ("u_tip", "y") if name in run.columns]
     if run.shapes is not None and len(run.shapes[0]):
         positions.append(run.shapes[1])  # the tip is as exact as the largest deflection, however little it moves
     speeds = [run[name] for name in ("v_tip", "z") if name in run.columns]
-    motion = max(float(np.abs(p).max()) for p in positions)
-    motion += scene.coupling.H * max(float(np.abs(v).max()) for v in speeds)
-    overlap = 0.0
-    if scene.contact.rigid and scene.beam is not None and scene.spring is not None:
+    motion, moved = (max(float(np.abs(values).max()) for values in several) for several in (positions, speeds))
+    motion += scene.coupling.H * moved
+    if scene.contact.rigid and scene.coupled:
         joined = np.isin(run.phase, ("tied", "touch"))
         overlap = float(np.max(np.where(joined, np.abs(run.gap), np.where(run.phase == "free", -run.gap, 0.0))))
-    elastic = scene.spring is None and not scene.contact.rigid  # a stop with a soft law
-    if scene.stop is not None and not scene.contact.algorithm and not elastic:
-        overlap = max(overlap, float(np.max(scene.stop.position - (run.y if scene.spring is not None else run.u_tip))))
+    if scene.stop is not None and not scene.contact.algorithm and not scene.elastic_stop:
+        low = run.y if "y" in run.columns else run.u_tip
+        overlap = max(overlap, float(np.max(scene.stop.position - low)))
     return max(overlap, 0.0) / motion if motion > 0.0 else 0.0
