@@ -209,7 +209,9 @@ class _Algorithm:
         return row
 
     def _note(self, kind: str, row: _Row, **impulse: float) -> None:
-        self.events.append(Event(self.time, EventKind(kind), row.y, row.z, float(row.q[-1]), float(row.v[-1]), **impulse))
+        self.events.append(
+            Event(self.time, EventKind(kind), row.y, row.z, float(row.q[-1]), float(row.v[-1]), **impulse)
+        )
 
     def _unforced(self, row: _Row) -> np.ndarray:
         """Return q of (62) without a force on the tip."""

@@ -146,11 +146,12 @@ def quantities(scene: Scene) -> list[str]:
 
 def sample(run: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
     """Return a quantity at macro points [s]; of the contact force the mean of both limits, the next row's smoothed."""
-    if name != "contact_force":
-        return run.at(times)[name]
-    after = times + run.scene.coupling.H
-    inside = after <= run.time[-1]
-    return np.where(inside, run.at(np.minimum(after, run.time[-1]))["contact_force_smoothed"], np.nan)
+    H, rows = run.scene.coupling.H, run.time
+    wanted = times + H * (name == "contact_force")
+    nearest = rows[np.searchsorted(rows, wanted - 1e-9 * H).clip(max=len(rows) - 1)]  # what is known at rows alone
+    wanted = np.where(np.abs(nearest - wanted) <= 1e-9 * H, nearest, wanted)
+    found = run.at(np.minimum(wanted, rows[-1]))[name if name != "contact_force" else "contact_force_smoothed"]
+    return np.where(wanted <= rows[-1], found, np.nan)
 
 
 def compare(scene: Scene) -> Report:
