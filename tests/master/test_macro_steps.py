@@ -64,7 +64,7 @@ def test_a_step_after_a_rejected_one_does_not_grow():
     assert rejected < LENGTH * 2.0**-14
     assert after(steps, (1e-9, 4)) == rejected
     assert after(steps, (1e-9, 4)) == 2.0 * rejected
-    assert steps.rejections == 1
+    assert steps.state.rejections == 1
 
 
 def test_the_last_step_ends_the_run():

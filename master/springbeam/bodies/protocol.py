@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import msgspec
 import numpy as np
 
 from ..scene import Load, SceneError
 from .abilities import Abilities
+from .stateful import Stateful
 
 #: A force over one step, as FMI carries it: (F, Ḟ, F̈) at the step's start [N, N/s, N/s²].
 Force = tuple[float, float, float]
@@ -62,10 +62,11 @@ class Felt(NamedTuple):
     bending_stress: float  #: the largest along the beam [Pa]; 0 where the height of its section is not known
 
 
-class Body:
+class Body(Stateful):
     """A body with one interface end and a state that can be rewound; a body of one's own derives from it.
 
     ``advance`` prescribes the contact force C on the step: the upper body takes it as +C, the lower one as −C.
+    What changes is its `state`, a value that is replaced and never changed in place.
     Impulses act at once: ``motion`` and ``energies`` show the state after them. Every method but ``close`` may raise
     BodyFailed.
     """
@@ -80,8 +81,6 @@ class Body:
         """Whether the end has no inertia: it then has the velocity of what it is joined to, and springs back alone."""
         return self.mass == 0.0
 
-    #: What changes from step to step, a value that is replaced and never changed in place.
-    state: Any = None
     #: Where its state cannot be saved, a step is made once, by the schemes that never repeat one.
     abilities = Abilities()
 
@@ -97,14 +96,6 @@ class Body:
     def rewind(self) -> None:
         """Return to the marked state."""
         self.state = self._marked
-
-    def save(self) -> bytes:
-        """Return `state` as MessagePack, numbers to the last bit."""
-        return msgspec.msgpack.encode(self.state)
-
-    def restore(self, saved: bytes) -> None:
-        """Go on from what `save` of an equal body returned. Raises msgspec.DecodeError if it was of another kind."""
-        self.state = msgspec.msgpack.decode(saved, type=type(self.state))
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
         """Advance from ``time`` by ``size`` [s] and return `motion`. Raises StepRefused; ``rewind`` then recovers."""

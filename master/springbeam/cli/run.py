@@ -102,7 +102,7 @@ def run(
                 "has nothing to resume before; leave one of the two out",
             )
         if interval is not None:
-            _check_interval(interval, what, checkpoint)
+            _check_interval(interval, what)
         if mesh and what.accuracy is None:
             fail(BAD_INPUT, "--mesh: picks a mesh that keeps an accuracy; give one, as in --accuracy 1e-3 --mesh")
         for line in () if quiet or as_json else implausible(what):
@@ -126,12 +126,10 @@ def run(
     )
 
 
-def _check_interval(interval: float, scene: Scene, checkpoint: float | None) -> None:
+def _check_interval(interval: float, scene: Scene) -> None:
     cause = None
     if not 0.0 < interval < inf:
         cause = "must be a time above 0 s, as in --output-interval 1e-3"
-    elif checkpoint is not None:
-        cause = "--checkpoint: a run that is resumed writes rows of every step; leave one of the two out"
     elif scene.contact.algorithm:
         cause = f'contact.law = "{scene.contact.law}" has no data between its steps; leave one of the two out'
     elif scene.time.t_end / interval > _MOST_ROWS:

@@ -11,8 +11,8 @@ from enum import Enum
 from functools import cached_property
 from math import inf
 
-from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Ends, Motion
+from ..bodies.stateful import Stateful
 from ..results.trajectory import EventKind
 from ..scene import Scene, Spring
 from ..scene.resolution import VIBRATION
@@ -102,7 +102,7 @@ def spring_force(spring: Spring, y: float) -> float:
     return spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
 
 
-class Transitions(Checkpointed):
+class Transitions(Stateful):
     """What each kind of event does to the phase and to the velocities.
 
     Parameters
@@ -117,7 +117,7 @@ class Transitions(Checkpointed):
         Ψ: the height below which the ends are tied [m].
     """
 
-    CHECKPOINTED = ("_fastest_impact",)
+    state: float = 0.0  #: speed of the fastest impact on the foundation so far [m/s]
 
     def __init__(
         self,
@@ -130,7 +130,6 @@ class Transitions(Checkpointed):
     ) -> None:
         self._law, self._equilibrium = law, equilibrium
         self._scene, self._tip_mass, self._mass, self._fastest = scene, tip_mass, mass, fastest
-        self._fastest_impact = 0.0
 
     def after(
         self,
@@ -207,11 +206,11 @@ class Transitions(Checkpointed):
         tied = self._tip_mass is not None and phase.joint is not Joint.FREE and not self._law.soft
         v, z = self._striking(ends, tied)
         speed = max(abs(w) for w in (z, v) if w is not None)
-        self._fastest_impact = max(self._fastest_impact, speed)
+        self.state = max(self.state, speed)
         after, before = (self._common(*self._striking(motions, tied)) for motions in (ends, start))
         # It strikes while rising if the rebound would be over in no time.
-        dies_out = after > 0.0 or e * speed <= _SEATING_SPEED * self._fastest_impact
-        if z is not None and elapsed > 0.0 and e * speed <= _SEATING_SPEED_UNSEEN * self._fastest_impact:
+        dies_out = after > 0.0 or e * speed <= _SEATING_SPEED * self.state
+        if z is not None and elapsed > 0.0 and e * speed <= _SEATING_SPEED_UNSEEN * self.state:
             # What presses it down is told by the flight: C at its end may be off by what reverses a mismatch of
             # velocities, (d + 1)(d + 2) times their quotient by the step. It rises by (e z)²/2a; each impact is found
             # to no better than the tolerance, which brings it as much.

@@ -16,7 +16,7 @@ from ..contact.laws import Compliance
 from ..contact.phases import Impact, Joint, Phase
 from ..results.trajectory import EventKind
 from ..scene import Scene
-from .protocol import Booking, Coupling, Settled, Step
+from .protocol import Booking, Counts, Coupling, Settled, Step
 
 _MAX_ITERATIONS = 50
 #: Newton's tolerance of the spring's and the tip's position (section 6: ε = 1e-12) [m].
@@ -24,13 +24,25 @@ _TOLERANCE = 1e-12
 _FREE, _TIED, _SEATED = Phase(), Phase(Joint.TIED), Phase(Joint.TIED, seated=True)
 
 
+class Progress(Counts):
+    """How far the algorithm is."""
+
+    solves: int = 0
+    touched: bool = False
+    acting: float = 0.0  #: λ_nc as lines 12 and 15 have left it
+    #: Size of a step [s], and u_tip per unit tip force over it [m/N]; the beam is linear.
+    response: tuple[float, float] = (0.0, 0.0)
+    law_force: float = 0.0  #: mean of λ_nc(Ψ − u)₊^p over the last step [N]
+    #: The phase of the last step, and the impulse of the foundation over it [N·s].
+    made: tuple[Phase, float] | None = None
+    injected_into_beam: float = 0.0  #: [J]
+    injected_into_spring: float = 0.0  #: [J]
+
+
 class Algorithm1(Coupling):
     """Coupling by lines 8–30 of Algorithm 1, which decide in each step whether the ends are joined."""
 
-    CHECKPOINTED = (
-        *("iterations", "_solves", "_touched", "_acting", "_response", "_law_force", "_made"),
-        *("_injected_into_beam", "_injected_into_spring"),
-    )
+    state: Progress
     decides, energy_exact = True, False
 
     def __init__(self, scene: Scene) -> None:
@@ -38,39 +50,31 @@ class Algorithm1(Coupling):
         self._spring, self._impact = scene.spring, scene.contact.impact
         self._stiffness, self._exponent = scene.contact.stiffness, scene.contact.exponent
         self._phi = -inf if scene.stop is None else scene.stop.position
-        self._touched = False
-        self._acting = 0.0  #: λ_nc as lines 12 and 15 have left it
-        #: Size of a step [s], and u_tip per unit tip force over it [m/N]; the beam is linear.
-        self._response = (0.0, 0.0)
-        self._law_force = 0.0  #: mean of λ_nc(Ψ − u)₊^p over the last step [N]
-        #: The phase of the last step, and the impulse of the foundation over it [N·s].
-        self._made: tuple[Phase, float] | None = None
-        self._solves = 0
-        self._injected_into_beam = self._injected_into_spring = 0.0  #: [J]
+        self.state = Progress()
 
     def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
         """Make lines 8–30; the forces of the step are means. Raises StepRefused where Newton's method fails."""
         psi, u, (y, z, _, _) = self._spring.equilibrium, start[0].displacement, start[1]
-        if size != self._response[0]:
-            self._response = (size, self._measured(upper, time, size))
+        if size != self.state.response[0]:
+            self.state.response = (size, self._measured(upper, time, size))
         u_free = upper.advance(time, size, NO_FORCE).displacement
         phase, contact, inside, foundation = _FREE, 0.0, 0.0, 0.0
-        if not self._touched:
+        if not self.state.touched:
             lower.advance(time, size, NO_FORCE)
         else:
             u_new = self._predicted_tip(u_free, u)  # line 9
             kinetic, potential, dissipated, _ = lower.energies()
-            acting = self._acting
+            acting = self.state.acting
             joined = u_new <= psi  # line 14 then asks for no y_new
             if not joined:
                 y_new, pressing = self._spring_end(lower, time, size, y)  # line 10
                 if psi < y_new < u_new:  # lines 11–13
-                    self._acting = 0.0
+                    self.state.acting = 0.0
                 else:
                     joined = u_new <= y_new  # line 14
             if joined:
                 phase = _TIED
-                self._acting = acting = self._stiffness  # line 15
+                self.state.acting = acting = self._stiffness  # line 15
                 lower.restart(time, u_new, z, dissipated)  # line 16
                 y_new, pressing = self._spring_end(lower, time, size, u_new)  # line 17
                 if y_new <= self._phi:  # lines 20–24
@@ -84,42 +88,42 @@ class Algorithm1(Coupling):
                     lower.restart(time + size, y_new, z_new, lower.energies().dissipated)
                 else:  # the spring has come to y_new: only its velocity is another
                     lower.apply_impulse(lower.mass * (z_new - lower.motion().velocity))
-            contact = (u_new - u_free) / self._response[1]  # lines 13, 19, 22
+            contact = (u_new - u_free) / self.state.response[1]  # lines 13, 19, 22
             if contact != 0.0:  # else the beam is there
                 upper.rewind()
                 upper.advance(time, size, (contact, 0.0, 0.0))
             inside = 0.5 * (self._law(u_new, acting) + self._law(u, acting))
             # What no force of the model does: the overwritten tip's work on the beam, the exchanged yˡ on the spring.
-            self._injected_into_beam += (contact - inside) * (u_new - u)
+            self.state.injected_into_beam += (contact - inside) * (u_new - u)
             worked = (foundation - pressing + self._spring.external_force) * (y_new - y)
             after = lower.energies()
-            self._injected_into_spring += after.kinetic + after.potential - kinetic - potential - worked
-        self._law_force, self._made = inside, (phase, size * foundation)
+            self.state.injected_into_spring += after.kinetic + after.potential - kinetic - potential - worked
+        self.state.law_force, self.state.made = inside, (phase, size * foundation)
         ends = (upper.motion(), lower.motion())
         return Step(time, size, (contact, 0.0, 0.0), (foundation, 0.0, 0.0), start, ends)
 
     def settle(self, time: float, upper: Body, lower: Body) -> Settled:
         """Return the phase; the first contact is where a step ends with the tip at Ψ or below, or the run begins so."""
-        (phase, impulse), tip = self._made or (_FREE, 0.0), upper.motion()
-        if self._touched or tip.displacement > self._spring.equilibrium:
+        (phase, impulse), tip = self.state.made or (_FREE, 0.0), upper.motion()
+        if self.state.touched or tip.displacement > self._spring.equilibrium:
             event = EventKind.STOP_IMPACT if phase is _SEATED else None
             return Settled(phase, event, Impact(of_foundation=impulse))
-        self._touched, self._acting = True, self._stiffness
+        self.state.touched, self.state.acting = True, self._stiffness
         # Line 5, or ẏ(t_c) as the scene has it.
         z = tip.velocity if self._impact == "tip" else lower.motion().velocity
         lower.restart(time, self._spring.equilibrium, z, lower.energies().dissipated)
-        return Settled(phase if self._made else _TIED, EventKind.IMPACT)
+        return Settled(phase if self.state.made else _TIED, EventKind.IMPACT)
 
     def booking(self, ends: Ends) -> Booking:
-        return Booking(law_force=self._law_force)
+        return Booking(law_force=self.state.law_force)
 
     def report(self, steps: int) -> tuple[dict[str, Any], list[str]]:
         """Return what `Coupling.report` does, with what the algorithm has injected [J]."""
         found, _ = super().report(steps)
         found |= {
-            "spring_steps_per_solve": self.iterations / self._solves if self._solves else 0.0,
-            "injected_into_beam": self._injected_into_beam,
-            "injected_into_spring": self._injected_into_spring,
+            "spring_steps_per_solve": self.state.iterations / self.state.solves if self.state.solves else 0.0,
+            "injected_into_beam": self.state.injected_into_beam,
+            "injected_into_spring": self.state.injected_into_spring,
         }
         return found, [
             "contact.law = 'paper' overwrites the tip's position, which changes the energy by energy_residual"
@@ -137,7 +141,7 @@ class Algorithm1(Coupling):
 
     def _law(self, w: float, stiffness: float | None = None) -> float:
         """Return λ (Ψ − w)₊^p [N] with the λ_nc that lines 12 and 15 have left, or with ``stiffness``."""
-        acting = self._acting if stiffness is None else stiffness
+        acting = self.state.acting if stiffness is None else stiffness
         return Compliance(acting, self._exponent).force(self._spring.equilibrium - w)
 
     def _slope(self, w: float, force: float) -> float:
@@ -147,7 +151,7 @@ class Algorithm1(Coupling):
 
     def _predicted_tip(self, u_free: float, u: float) -> float:
         """Return uˡ⁺¹ of (62), nonlinear only at the tip: u = u_free + b ½ (λ(Ψ−u)₊^p + λ(Ψ−uˡ)₊^p)."""
-        before, w, half = self._law(u), u, 0.5 * self._response[1]
+        before, w, half = self._law(u), u, 0.5 * self.state.response[1]
         for _ in range(_MAX_ITERATIONS):
             force = self._law(w)
             change = (w - u_free - half * (force + before)) / (1.0 - half * self._slope(w, force))
@@ -168,8 +172,8 @@ class Algorithm1(Coupling):
             reached = spring.advance(time, size, (pressing, 0.0, 0.0)).displacement
             change = (end - reached) / (1.0 + 0.5 * response * self._slope(end, force))
             if abs(change) <= _TOLERANCE:
-                self._solves += 1
-                self.iterations += k
+                self.state.solves += 1
+                self.state.iterations += k
                 return reached, pressing
             end -= change
         raise StepRefused("lines 10 and 17 of Algorithm 1: Newton's method for the spring does not converge")

@@ -36,12 +36,9 @@ class OneWay(SoftSolver):
         Whether the upper body drives the lower one, or the lower the upper.
     """
 
-    CHECKPOINTED = (*SoftSolver.CHECKPOINTED, "_work")
-
     def __init__(self, law: SoftLaw, degree: int, tolerance: float, *, upper_drives: bool) -> None:
         super().__init__(law, degree, tolerance)
         self._upper_drives = upper_drives
-        self._work = 0.0  #: of the contact force on the driving end, which does not feel it [J]
 
     def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
         driver, driven = (upper, lower) if self._upper_drives else (lower, upper)
@@ -60,7 +57,7 @@ class OneWay(SoftSolver):
         super().accept(step)
         driver = 0 if self._upper_drives else 1
         work = force.work_on(step.contact, step.start[driver], step.end[driver], step.size)
-        self._work += work if self._upper_drives else -work
+        self.state.unfelt += work if self._upper_drives else -work
 
     def booking(self, ends: Ends) -> Booking:
-        return super().booking(ends)._replace(unfelt=self._work)
+        return super().booking(ends)._replace(unfelt=self.state.unfelt)

@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import isfinite
 from operator import sub
-from typing import ClassVar
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
 from ..results.paths import last
 from . import energy
-from .protocol import Booking, Coupling, Step
+from .protocol import Booking, Counts, Coupling, Step
 from .small import Matrix, Vector, transposed
 
 #: p̃ by its coefficients in powers of s, up to degree 3.
@@ -238,11 +237,9 @@ def penetration(step: Step, degree: int) -> tuple[float, Vector]:
 class Booked(Coupling):
     """Books what a soft law stores and dissipates; parameters as of `Projection`."""
 
-    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("dissipated",)
-
     def __init__(self, law: SoftLaw, degree: int) -> None:
         self.law, self.degree, self._projection = law, degree, Projection(law, degree)
-        self.dissipated = 0.0  #: by the law since the start [J]
+        self.state = Counts()
 
     def accept(self, step: Step) -> None:
         self._book(step, self._projection)
@@ -250,8 +247,8 @@ class Booked(Coupling):
     def _book(self, step: Step, projection: Projection) -> None:
         if self.law.damped:
             start, x = penetration(step, projection.degree)
-            self.dissipated += projection.dissipated(start, step.size, x)
+            self.state.dissipated += projection.dissipated(start, step.size, x)
 
     def booking(self, ends: Ends) -> Booking:
         (u, v, _, _), (y, z, _, _) = ends
-        return Booking(self.law.force(y - u, z - v), self.law.potential(y - u), self.dissipated)
+        return Booking(self.law.force(y - u, z - v), self.law.potential(y - u), self.state.dissipated)

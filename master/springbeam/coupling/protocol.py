@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion, StepRefused
+from ..bodies.stateful import Memory, Stateful
 from ..contact.phases import Impact, Phase
 from ..results.trajectory import EventKind
 
@@ -60,7 +60,15 @@ class Scales(NamedTuple):
     reduced_mass: float  #: of both ends [kg]
 
 
-class Coupling(Checkpointed):
+class Counts(Memory):
+    """What a coupling remembers: at least what it has counted."""
+
+    iterations: int = 0  #: corrections of the force since the start
+    reduced: int = 0  #: steps since the start whose force was not found at the degree asked for, but at degree 0
+    dissipated: float = 0.0  #: by a soft law since the start [J]
+
+
+class Coupling(Stateful):
     """Finds the contact force of a step and advances both bodies under it."""
 
     #: Degree of the contact force over a step.
@@ -72,10 +80,7 @@ class Coupling(Checkpointed):
     #: Whether it decides by itself what touches, by `settle`, and may put the ends elsewhere: no event is then looked
     #: for, no step repeated, nothing known of the motion inside steps, and energy that appears stops no run.
     decides: bool = False
-    #: Corrections of the force since the start.
-    iterations: int = 0
-    #: Steps since the start whose force was not found at `degree`, but at degree 0.
-    reduced: int = 0
+    state: Counts
 
     def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
         """Advance both bodies from their marks, where their ends are at ``start``, and return the step.
@@ -107,15 +112,15 @@ class Coupling(Checkpointed):
 
     def report(self, steps: int) -> tuple[dict[str, Any], list[str]]:
         """Return what the summary of a run of so many ``steps`` says of the coupling, and warnings."""
-        reduced = {"reduced_steps": self.reduced} if self.reduced else {}
+        reduced = {"reduced_steps": self.state.reduced} if self.state.reduced else {}
         warnings = []
-        if self.reduced:
+        if reduced:
             warnings.append(
-                f"the contact force of {self.reduced} of {steps} macro steps was not found at coupling.degree = "
+                f"the contact force of {self.state.reduced} of {steps} macro steps was not found at coupling.degree = "
                 f"{self.degree}; they were made at degree 0, which keeps the energy but has order 2. The "
                 "contact is stiffer than the macro step follows: take a smaller coupling.macro_step"
             )
-        return {"iterations": self.iterations, **reduced}, warnings
+        return {"iterations": self.state.iterations, **reduced}, warnings
 
     def booking(self, ends: Ends) -> Booking:
         """Return the energies at the ``ends``."""

@@ -22,7 +22,7 @@ from . import energy
 from .projection import Booked, penetration
 from .protocol import ErrorEstimate, NotConverged, Scales, Step
 from .small import Matrix, Vector, inverse, times
-from .solver import Aim, StepSolver
+from .solver import Aim, Responses, StepSolver
 
 _MAX_NEWTON, _MAX_DAMPING = 60, 8
 #: A correction smaller than this share of the penetration's numbers changes nothing.
@@ -33,6 +33,15 @@ _SLOW = 1e-3
 _ROUNDING = 1e-12
 #: A softened law is this much stiffer from one crossing to the next.
 _STIFFER = 16.0
+
+
+class SoftState(Responses):
+    """What the solver of a soft law remembers."""
+
+    #: Size of the last step [s], and (E + A′)⁻¹ [m/N] where its crossing was found.
+    last_crossing: tuple[float, Matrix] = (0.0, [])
+    simpler: SoftState | None = None  #: of the solver at degree 0
+    unfelt: float = 0.0  #: work of the contact force on a driving end, which does not feel it [J]
 
 
 class SoftSolver(Booked, StepSolver):
@@ -48,18 +57,19 @@ class SoftSolver(Booked, StepSolver):
         Tolerance as of `StepSolver`.
     """
 
-    CHECKPOINTED = (
-        *(*StepSolver.CHECKPOINTED, *Booked.CHECKPOINTED),
-        *("_last_crossing", "_simpler", "_simplified", "reduced"),
-    )
+    state: SoftState
 
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
         StepSolver.__init__(self, energy.CONDITIONS[degree], degree, tolerance)
         Booked.__init__(self, law, degree)
-        #: Size of the last step [s], and (E + A′)⁻¹ [m/N] where its crossing was found.
-        self._last_crossing: tuple[float, Matrix] = (0.0, [])
         self._simpler = SoftSolver(law, 0, tolerance) if degree > 0 else None
-        self._simplified, self.reduced = False, 0  #: the last step tried, and the steps made
+        self._simplified = False  #: whether the last step tried was made at degree 0
+        self.state = SoftState(simpler=None if self._simpler is None else self._simpler.state)
+
+    def restore(self, saved: bytes) -> None:
+        super().restore(saved)
+        if self._simpler is not None and self.state.simpler is not None:
+            self._simpler.state = self.state.simpler
 
     def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
         self._simplified = False
@@ -69,13 +79,13 @@ class SoftSolver(Booked, StepSolver):
             if self._simpler is None:
                 raise
         self._simplified = True
-        before = self._simpler.iterations
+        before = self._simpler.state.iterations
         found = self._simpler.solve(upper, lower, time, size, start, (guess[0], 0.0, 0.0))
-        self.iterations += self._simpler.iterations - before
+        self.state.iterations += self._simpler.state.iterations - before
         return found
 
     def accept(self, step: Step) -> None:
-        self.reduced += self._simplified
+        self.state.reduced += self._simplified
         made = self._simpler if self._simplified and self._simpler is not None else self
         self._book(step, made._projection)
 
@@ -96,7 +106,7 @@ class SoftSolver(Booked, StepSolver):
     def aim(self, gap: Vector, a: Vector, descent: Matrix, size: float, start: Ends) -> Aim:
         (tip, low), x = start, list(map(neg, gap))
         step = (low.displacement - tip.displacement, size, x, a, descent)
-        last_size, flexibility = self._last_crossing
+        last_size, flexibility = self.state.last_crossing
         found = None
         try:
             if self.degree > 0 and size == last_size:  # at degree 0 the law's slope costs no more than a third force
@@ -144,7 +154,7 @@ class SoftSolver(Booked, StepSolver):
             x, slow = tried, left > _SLOW * length
             settled = left * left <= _SETTLED * scale * length or length <= _ROUNDING * scale
             if settled and not (guessed and slow):
-                self._last_crossing = (size, flexibility)
+                self.state.last_crossing = (size, flexibility)
                 # The correction after the next would be left²/length. For the next one the law's slope tells the force.
                 felt = times(descent, following)
                 return list(map(add, x, following)), [c + m + d for c, m, d in zip(of_law, missing, felt, strict=True)]

@@ -15,13 +15,13 @@ import logging
 from collections.abc import Sequence
 from math import inf
 from operator import add, sub
-from typing import ClassVar
 
+import msgspec
 import numpy as np
 
 from ..bodies import force
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion
-from .protocol import Conditions, Coupling, NotConverged, Step, step_of
+from .protocol import Conditions, Counts, Coupling, NotConverged, Step, step_of
 from .small import Matrix, Vector, broyden, inverse, secant, times, transposed
 
 _log = logging.getLogger(__name__)
@@ -47,6 +47,14 @@ Response = tuple[Matrix, Matrix | None, bool]
 _UNKNOWN: tuple[None, None, bool] = (None, None, False)
 
 
+class Responses(Counts):
+    """What a solver remembers."""
+
+    of_size: dict[float, Response] = msgspec.field(default_factory=dict)  #: by size [s], the last used at the end
+    last_size: float = 0.0  #: [s]
+    reach: float = 0.0  #: largest displacement of an end under a force found [m]
+
+
 class StepSolver(Coupling):
     """Solver of one set of conditions; keeps the responses of the bodies between steps.
 
@@ -62,17 +70,14 @@ class StepSolver(Coupling):
         A displacement that is to be expected [m]: modes whose sum, the tip, is held at 0 are as large.
     """
 
-    CHECKPOINTED: ClassVar[tuple[str, ...]] = ("_sizes", "_last_size", "_reach", "iterations")
+    state: Responses
 
     def __init__(self, conditions: Conditions, degree: int, tolerance: float, expected: float = 0.0) -> None:
         self._conditions = conditions
         self.degree = degree
         self._tolerance = tolerance
-        self._sizes: dict[float, Response] = {}
-        self._last_size = 0.0
-        self._reach = 0.0  #: largest displacement of an end under a force found [m]
         self._expected = expected
-        self.iterations = 0
+        self.state = Responses()
 
     def no_contact(self, gap: Vector, a: Vector, size: float, start: Ends) -> bool:
         """Return whether nothing acts between the bodies under ``a``, nor should; parameters as of `aim`."""
@@ -107,7 +112,7 @@ class StepSolver(Coupling):
         gap = list(map(sub, r_upper, r_lower))
         if self.no_contact(gap, a, size, start):
             return step_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
-        B, descent, measured = remembered = self._sizes.get(size, _UNKNOWN)
+        B, descent, measured = remembered = self.state.of_size.get(size, _UNKNOWN)
         predicted = B is None  # whether the upper body is elsewhere than at its end under ``a``
         if B is None:
             length = max(self._expected, abs(upper_end.displacement), size * abs(upper_end.velocity))
@@ -118,7 +123,7 @@ class StepSolver(Coupling):
         residual = gap if goal is None else list(map(sub, gap, goal))
         norm = max(map(abs, residual))
         # Rounding is always enough. What is asked follows from the motion, and is looked at where that is not reached.
-        enough = rounding = _ROUNDING * max(self._reach, abs(start[0].displacement))
+        enough = rounding = _ROUNDING * max(self.state.reach, abs(start[0].displacement))
         left = inf  # when the upper body advanced last, of the residual [m]
         noise = 0.0  # of the bodies' own rounding, once the iteration has met it [m]
         # S is measured once, when a size comes again: it then saves a step of the lower body in most.
@@ -135,7 +140,7 @@ class StepSolver(Coupling):
                 upper_end = upper.advance(time, size, acting)
                 r_upper, predicted = conditions(upper_end, size), False
             else:
-                self.iterations += 1
+                self.state.iterations += 1
                 a = better
                 acting = derivatives(a, size)
                 r_upper, predicted = list(map(add, r_upper, times(B, step))), True
@@ -180,12 +185,13 @@ class StepSolver(Coupling):
             _log.debug(said, time, size, iteration, norm, enough)
         # Not of the forces tried on the way, which may have thrown the ends as far as they liked.
         u, y = upper_end[0], lower_end[0]
-        self._reach = max(self._reach, u, -u, y, -y)
+        state = self.state
+        state.reach = max(state.reach, u, -u, y, -y)
         if lower.mass == inf:
             descent, measured = remembered[1:]
         if B is not remembered[0] or descent is not remembered[1]:
-            self._sizes[size] = (B, descent, measured)
-        if size != self._last_size:
+            state.of_size[size] = (B, descent, measured)
+        if size != state.last_size:
             self._used_last(size)
         return step_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
 
@@ -195,9 +201,10 @@ class StepSolver(Coupling):
 
     def _used_last(self, size: float) -> None:
         """Forget the size that was used least recently, if there are too many."""
-        self._sizes[size], self._last_size = self._sizes.pop(size), size
-        if len(self._sizes) > SIZES_REMEMBERED:
-            del self._sizes[next(iter(self._sizes))]
+        of_size, self.state.last_size = self.state.of_size, size
+        of_size[size] = of_size.pop(size)
+        if len(of_size) > SIZES_REMEMBERED:
+            del of_size[next(iter(of_size))]
 
     def _free_response(self, lower: Body, size: float) -> Matrix:
         if lower.mass == inf:
@@ -228,7 +235,7 @@ class StepSolver(Coupling):
         (u, v, _, _), (y, z, _, _) = start, end
         change = max(size * max(v, -v, z, -z), abs(y - u))
         # The end is a sum of modes as large as it has ever been, and of what the force does; both are rounded.
-        rounding = _ROUNDING * max(self._reach, u, -u, y, -y, *map(abs, by_force))
+        rounding = _ROUNDING * max(self.state.reach, u, -u, y, -y, *map(abs, by_force))
         return max(self._tolerance * change, rounding)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -28,6 +29,14 @@ from .trajectory import EVENT_COLUMNS, SHAPE_COLUMNS, Event, Trajectory
 _SUMMARY_ROOM = 16384
 #: Times closer than this share are one.
 _SAME = 1e-12
+
+
+@dataclass(frozen=True)
+class Written:
+    """What has reached the disk of a run that goes on later."""
+
+    files: dict[str, tuple[int, int]]  #: by name, bytes and CRC-32
+    interval: float | None  #: of the rows [s], as of `FileRecorder`
 
 
 class FileRecorder(Recorder):
@@ -131,14 +140,15 @@ class FileRecorder(Recorder):
             for appended in self._files.values():
                 files.callback(appended.file.close)
 
-    def save(self) -> dict[str, Any]:
+    def save(self) -> Written:
         """Write what was recorded to the disk, and return what `restore` needs."""
         self._begin()
         for appended in self._files.values():
             os.fsync(appended.file.fileno())
-        return {path.name: (appended.size, appended.crc) for path, appended in self._files.items()}
+        files = {path.name: (appended.size, appended.crc) for path, appended in self._files.items()}
+        return Written(files, self._interval)
 
-    def restore(self, saved: Mapping[str, Any]) -> None:
+    def restore(self, saved: Written) -> None:
         """Go on from what `save` of a recorder in the same directory returned; what came later is removed.
 
         Raises
@@ -152,12 +162,12 @@ class FileRecorder(Recorder):
         with ExitStack() as opened:
             files: dict[Path, _Appended] = {}
             for path in self._headers:
-                files[path] = _Appended(path, *saved[path.name])
+                files[path] = _Appended(path, *saved.files[path.name])
                 opened.callback(files[path].file.close)
             for appended in files.values():
                 appended.check()
             opened.pop_all()
-        self._files = files
+        self._files, self._interval = files, saved.interval
         for appended in files.values():
             appended.file.truncate(appended.size)
         self.directory.trajectory.unlink(missing_ok=True)

@@ -9,24 +9,21 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import os
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-import msgpack
-import numpy as np
+import msgspec
 
-from ..bodies.protocol import Motion
-from ..contact.phases import Joint, Phase
-from ..results.file_recorder import FileRecorder
+from ..bodies.stateful import RunState
+from ..results.file_recorder import FileRecorder, Written
 from ..scene import Scene, scene_from_dict
 
 if TYPE_CHECKING:  # a command that only reads a checkpoint loads no FMU
     from .master import Master
 
-_FORMAT = 2
+_FORMAT = 3
 _TITLE = b"springbeam checkpoint"
 
 
@@ -43,14 +40,12 @@ class Checkpoint:
     files: dict[str, str]  #: SHA-256 of the FMUs and tables, by name
     seconds: float  #: between checkpoints [s]
     wall_time: float  #: so far [s]
-    results: dict[str, Any]  #: `springbeam.results.file_recorder.FileRecorder.save`
-    simulation: dict[str, Any]  #: `springbeam.bodies.checkpointed.Checkpointed.save`
+    results: Written
+    state: RunState
 
     def write(self, path: Path) -> None:
         """Replace the file ``path``. Raises OSError; the file is then as before."""
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        values["scene"] = self.scene.model_dump(exclude_none=True)
-        content = encoded(values)
+        content = msgspec.msgpack.encode(self, enc_hook=lambda scene: scene.model_dump(exclude_none=True))
         scratch = path.with_name(path.name + ".part")
         try:
             with scratch.open("wb") as file:
@@ -67,10 +62,11 @@ class Checkpoint:
 
     @classmethod
     def read(cls, path: Path) -> Checkpoint:
-        """Raises CheckpointRefused if the file is missing or not, to the last byte, what was written.
+        """Raises CheckpointRefused if the file is missing or not, to the last byte, what this version writes."""
 
-        SceneError if its scene is not one of this version.
-        """
+        def scene_of(_: type, data: Any) -> Scene:
+            return scene_from_dict(data, source=f"{path}: scene")
+
         try:
             first, _, content = path.read_bytes().partition(b"\n")
         except OSError as error:
@@ -83,10 +79,8 @@ class Checkpoint:
         if words[2] != _digest(content):
             raise CheckpointRefused(f"{path}: damaged, its checksum is wrong")
         try:
-            values = decoded(content)
-            scene = scene_from_dict(values.pop("scene"), source=f"{path}: scene")
-            return cls(scene=scene, **values)
-        except (ValueError, TypeError, AttributeError, LookupError, RecursionError) as error:
+            return msgspec.msgpack.decode(content, type=cls, dec_hook=scene_of)
+        except (ValueError, RecursionError) as error:
             raise CheckpointRefused(f"{path}: not what this version writes: {error!r}") from error
 
 
@@ -118,9 +112,8 @@ class Checkpoints:
         if now < self._due:
             return
         simulation.hand_over()
-        scene, results = self._recorder.scene, self._recorder.save()
-        wall_time = now - self._began
-        checkpoint = Checkpoint(scene, self._version, self._files, self._seconds, wall_time, results, simulation.save())
+        begun = self._recorder.scene, self._version, self._files, self._seconds
+        checkpoint = Checkpoint(*begun, now - self._began, self._recorder.save(), simulation.run_state())
         checkpoint.write(self._recorder.directory.checkpoint)
         self._due = perf_counter() + self._seconds
 
@@ -138,34 +131,3 @@ def _sync_directory(path: Path) -> None:
 
 def _digest(content: bytes) -> bytes:
     return hashlib.sha256(content).hexdigest().encode()
-
-
-#: Types of values that MessagePack does not tell apart or does not know, by the number in its extension: what a value
-#: is made of, and how it is made again.
-_KINDS: dict[type, tuple[int, Callable[[Any], Any], Callable[[Any], Any]]] = {
-    tuple: (1, list, tuple),
-    Joint: (2, lambda joint: joint.value, Joint),
-    Phase: (3, lambda phase: [phase.joint, phase.seated], lambda parts: Phase(*parts)),
-    Motion: (4, list, lambda parts: Motion(*parts)),
-    np.ndarray: (5, np.ndarray.tolist, lambda parts: np.array(parts, dtype=float)),
-    np.float64: (6, float, float),
-}
-
-
-def encoded(value: Any) -> bytes:
-    """Return ``value`` as MessagePack, numbers to the last bit. Raises TypeError for what a checkpoint cannot hold."""
-    packed: bytes = msgpack.packb(value, default=_extension, strict_types=True)
-    return packed
-
-
-def _extension(value: Any) -> msgpack.ExtType:
-    if type(value) not in _KINDS or (isinstance(value, np.ndarray) and value.dtype != float):
-        raise TypeError(f"a checkpoint cannot hold a {type(value).__name__}: {value!r}")
-    number, parts, _ = _KINDS[type(value)]
-    return msgpack.ExtType(number, encoded(parts(value)))
-
-
-def decoded(content: bytes) -> Any:
-    """Return what `encoded` was given. Raises ValueError, TypeError or LookupError for anything else."""
-    made = {number: make for number, _, make in _KINDS.values()}
-    return msgpack.unpackb(content, ext_hook=lambda number, parts: made[number](decoded(parts)), strict_map_key=False)

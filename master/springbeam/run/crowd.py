@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..bodies.checkpointed import Checkpointed
 from .outcome import RunStopped
+from .stepping import State
 
 #: Events closer than this fraction of H are at once; so many of them and the contact is said to chatter. Impacts that
 #: die out are up to 370 (e = 0.997) between this and `_NO_TIME` of `springbeam.run.detection`, where they are seated.
@@ -13,27 +13,18 @@ SIMULTANEOUS, _MAX_SIMULTANEOUS = 1e-6, 500
 _MAX_IN_STEP = 20_000
 
 
-class Crowd(Checkpointed):
-    """The steps that events have cut, counted since ``time`` [s]."""
-
-    CHECKPOINTED = ("_simultaneous", "_in_step")
-
-    def __init__(self, time: float) -> None:
-        #: Events at once, and within one macro step: how many, and since when [s].
-        self._simultaneous = self._in_step = (0, time)
-
-    def count(self, end: float, size: float, macro_step: float) -> None:
-        """Count a step of ``size`` [s] that was cut and ends at ``end`` [s]. Raises RunStopped if events crowd."""
-        self._simultaneous = _counted(self._simultaneous, end, SIMULTANEOUS * macro_step)
-        self._in_step = _counted(self._in_step, end, macro_step)
-        if self._simultaneous[0] > _MAX_SIMULTANEOUS:
-            raise RunStopped(f"the contact chatters: {_MAX_SIMULTANEOUS} events at once", end - size)
-        if self._in_step[0] > _MAX_IN_STEP:
-            raise RunStopped(
-                f"the contact chatters: {_MAX_IN_STEP} events within a macro step of {macro_step:g} s; a restitution "
-                "below 1 lets impacts die out",
-                end - size,
-            )
+def count_crowd(state: State, end: float, size: float, macro_step: float) -> None:
+    """Count a step of ``size`` [s] that was cut and ends at ``end`` [s]. Raises RunStopped if events crowd."""
+    state.at_once = _counted(state.at_once, end, SIMULTANEOUS * macro_step)
+    state.in_step = _counted(state.in_step, end, macro_step)
+    if state.at_once[0] > _MAX_SIMULTANEOUS:
+        raise RunStopped(f"the contact chatters: {_MAX_SIMULTANEOUS} events at once", end - size)
+    if state.in_step[0] > _MAX_IN_STEP:
+        raise RunStopped(
+            f"the contact chatters: {_MAX_IN_STEP} events within a macro step of {macro_step:g} s; a restitution "
+            "below 1 lets impacts die out",
+            end - size,
+        )
 
 
 def _counted(events: tuple[int, float], end: float, span: float) -> tuple[int, float]:

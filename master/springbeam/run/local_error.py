@@ -6,8 +6,8 @@ step has them anyway (``docs/coupling.md``, "Adaptive macro steps").
 
 from __future__ import annotations
 
-from ..bodies.checkpointed import Checkpointed
 from ..bodies.protocol import Motion
+from ..bodies.stateful import Memory, Stateful
 from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Scales, Step
 from ..results.paths import Path
@@ -22,26 +22,31 @@ _ULPS, _EPS = 16.0, 2.0**-52
 _CUBIC = 4
 
 
-class LocalError(Checkpointed):
+class Reach(Memory):
+    """How far the motion has come."""
+
+    lowest: list[float]  #: positions of the ends [m]
+    highest: list[float]
+    fastest: float = 0.0  #: [m/s]
+    energy: float = 0.0  #: the largest [J]
+
+
+class LocalError(Stateful):
     """Estimates relative to the tolerances of a scene, and the scales that these are relative to."""
 
-    CHECKPOINTED = ("_lowest", "_highest", "_fastest", "_energy")
+    state: Reach
 
     def __init__(self, scene: Scene, pair: Pair) -> None:
         self._scene, self._pair = scene, pair
         self._relative = scene.coupling.relative_tolerance or 0.0
         self._absolute = scene.coupling.absolute_tolerance or 0.0
-        ends = pair.ends()
-        #: Positions of the ends so far [m].
-        self._lowest: list[float] = [end.displacement for end in ends]
-        self._highest = self._lowest
-        self._fastest = 0.0  #: [m/s]
-        self._energy = 0.0  #: the largest so far [J]
+        at_start = [end.displacement for end in pair.ends()]
+        self.state = Reach(at_start, at_start)
 
     def note(self, energy: float) -> None:
         """Note that all energies together have been as large as this [J]."""
-        if energy > self._energy:
-            self._energy = energy
+        if energy > self.state.energy:
+            self.state.energy = energy
 
     def estimate(self, state: State, step: Step) -> tuple[float, int]:
         """The step's error, 1 is the tolerance, and the order in which it falls with the size of the step."""
@@ -54,7 +59,7 @@ class LocalError(Checkpointed):
             return 0.0, _CUBIC
         tolerance = self._relative + self._absolute / span
         coupling = pair.coupling(state.phase)
-        scales = Scales(span, speed, self._energy, pair.reduced_mass(Phase()))
+        scales = Scales(span, speed, self.state.energy, pair.reduced_mass(Phase()))
         tied = not pair.law.soft and state.phase.joint is not Joint.FREE
         curve = self._curve(cubic, ranges, max(self._relative, _SEEN) if tied else self._relative)
         told = coupling.local_errors(step, scales)
@@ -62,14 +67,14 @@ class LocalError(Checkpointed):
 
     def accept(self, step: Step) -> None:
         """The motion has come so far."""
-        self._lowest, self._highest, self._fastest = self._extremes(step)
+        self.state = Reach(*self._extremes(step), self.state.energy)
 
     def _extremes(self, step: Step) -> tuple[list[float], list[float], float]:
         """Return the lowest and the highest positions of the ends [m] and their largest speed [m/s], with ``step``."""
         passed = [[a.displacement, b.displacement] for a, b in zip(step.start, step.end, strict=True)]
-        lowest = [min(low, *places) for low, places in zip(self._lowest, passed, strict=True)]
-        highest = [max(high, *places) for high, places in zip(self._highest, passed, strict=True)]
-        return lowest, highest, max(self._fastest, *(abs(end.velocity) for end in (*step.start, *step.end)))
+        lowest = [min(low, *places) for low, places in zip(self.state.lowest, passed, strict=True)]
+        highest = [max(high, *places) for high, places in zip(self.state.highest, passed, strict=True)]
+        return lowest, highest, max(self.state.fastest, *(abs(end.velocity) for end in (*step.start, *step.end)))
 
     def _curve(self, errors: list[float], ranges: list[float], relative: float) -> tuple[float, int]:
         allowed = (self._absolute + relative * r for r in ranges)
@@ -80,7 +85,7 @@ class LocalError(Checkpointed):
     def _rounding(self) -> list[float]:
         """Up to where displacements of the ends are rounding, and the spring's tolerance [m]: no step is too long for
         that, though from rest the motion so far is shorter still."""
-        reach = [max(abs(low), abs(high)) for low, high in zip(self._lowest, self._highest, strict=True)]
+        reach = [max(abs(low), abs(high)) for low, high in zip(self.state.lowest, self.state.highest, strict=True)]
         tip, lower = (_ULPS * _EPS * r for r in reach)
         if (spring := self._scene.spring) is not None:
             lower += spring.relative_tolerance * reach[1] + spring.absolute_tolerance

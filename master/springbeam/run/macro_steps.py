@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import ceil, inf, log2
 
-from ..bodies.checkpointed import Checkpointed
+from ..bodies.stateful import Memory, Stateful
 from ..scene.scene import SHORTEST_STEP
 
 #: A remainder of the macro grid shorter than this fraction of H joins the next step.
@@ -22,15 +22,14 @@ _FIRST, _LONGEST, _SHORTEST = 14, 2, 40
 _SHRINK, _GROW, _SAFETY = 0.125, 2.0, 0.9
 
 
-class MacroGrid(Checkpointed):
+class MacroGrid(Stateful):
     """The grid t₀ + k H up to t_end [s]."""
 
-    CHECKPOINTED = ("_struck",)
+    state: float = -inf  #: when the last impact was [s]
 
     def __init__(self, start: float, end: float, macro_step: float) -> None:
         self._start, self._end = start, end
         self.size = macro_step  #: H [s]
-        self._struck = -inf  #: when the last impact was [s]
 
     def next(self, time: float, kink: float = inf) -> tuple[float, float]:
         """Return when the step from ``time`` should end, and its size [s] (exactly H where it is a whole one).
@@ -39,7 +38,7 @@ class MacroGrid(Checkpointed):
         impact.
         """
         H = self.size
-        if time == self._struck:
+        if time == self.state:
             size = _AFTER_IMPACT * H
             if time + size < self._end:
                 return (time + size, size) if kink >= time + size + _SHORT_REMAINDER * H else (kink, kink - time)
@@ -58,10 +57,18 @@ class MacroGrid(Checkpointed):
 
         It has changed velocities, and ends that have met may part again soon.
         """
-        self._struck = time
+        self.state = time
 
 
-class AdaptiveSteps(Checkpointed):
+class Rung(Memory):
+    """Where sizes that follow an error are."""
+
+    number: int = _FIRST * _PER_OCTAVE  #: k of the size
+    just_rejected: bool = False
+    rejections: int = 0
+
+
+class AdaptiveSteps(Stateful):
     """Sizes that keep the error of each step at its tolerance.
 
     The error of a step of size H goes as H^order, so the next one is 0.9 (tolerance/error)^(1/order) times as long,
@@ -74,18 +81,16 @@ class AdaptiveSteps(Checkpointed):
         The run [s].
     """
 
-    CHECKPOINTED = ("_rung", "_just_rejected", "rejections")
+    state: Rung
 
     def __init__(self, start: float, end: float) -> None:
         self._end, self._length = end, end - start
-        self._rung = _FIRST * _PER_OCTAVE
-        self._just_rejected = self._cut = False
-        self.rejections = 0
+        self.state, self._cut = Rung(), False
 
     @property
     def size(self) -> float:
         """H [s] of a whole step from here."""
-        return self._length * float(2.0 ** (-self._rung / _PER_OCTAVE))
+        return self._length * float(2.0 ** (-self.state.number / _PER_OCTAVE))
 
     def next(self, time: float, kink: float = inf) -> tuple[float, float]:
         """The time at which the step from ``time`` should end, and its size; ``kink`` as of `MacroGrid`."""
@@ -106,17 +111,17 @@ class AdaptiveSteps(Checkpointed):
         StepTooShort
             If it does not hold and there is no shorter one.
         """
-        factor = _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
+        state, factor = self.state, _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
         if error <= 1.0:
-            wanted = size * min(factor, 1.0 if self._just_rejected else _GROW)
+            wanted = size * min(factor, 1.0 if state.just_rejected else _GROW)
             if not (self._cut and wanted < self.size):
-                self._rung = self._rung_below(wanted)
-            self._just_rejected = False
+                state.number = self._rung_below(wanted)
+            state.just_rejected = False
             return True
-        self.rejections += 1
-        self._just_rejected = True
-        self._rung = max(self._rung + 1, self._rung_below(size * max(factor, _SHRINK)))
-        if self._rung > _SHORTEST * _PER_OCTAVE:
+        state.rejections += 1
+        state.just_rejected = True
+        state.number = max(state.number + 1, self._rung_below(size * max(factor, _SHRINK)))
+        if state.number > _SHORTEST * _PER_OCTAVE:
             raise StepTooShort(size)
         return False
 

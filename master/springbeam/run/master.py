@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..bodies.checkpointed import Checkpointed
 from ..bodies.gate import admit
 from ..bodies.protocol import NO_FORCE, BeamBody, Body, BodyFailed, Ends, StepRefused
+from ..bodies.stateful import RunState, Stateful
 from ..contact.laws import stiffest
 from ..contact.phases import Impact, Joint, Phase, Transitions
 from ..coupling.protocol import NotConverged, Step
@@ -29,7 +29,7 @@ from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from ..scene.automatic import with_scheme_chosen
 from ..scene.resolution import CONTACT_STEPS, force_window, not_resolved, peak_force_doubt
-from .crowd import SIMULTANEOUS, Crowd
+from .crowd import SIMULTANEOUS, count_crowd
 from .detection import Detector
 from .ledger import Balance
 from .local_error import LocalError
@@ -38,7 +38,7 @@ from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
 from .neglect import Past, neglected
 from .observed import NOT_SHOWN, observed
 from .outcome import OVERFLOW, RunStopped, raised_here
-from .stepping import Pair
+from .stepping import Pair, State
 
 #: A load that jumps or bends within this fraction of H has done so.
 _SAME_TIME = 1e-9
@@ -51,7 +51,7 @@ _NOT_RECEIVED = (0.0, 0.0)
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
 
 
-class Master(Checkpointed):
+class Master(Stateful):
     """One run of a scene with given bodies, a step at a time.
 
     Parameters
@@ -68,21 +68,7 @@ class Master(Checkpointed):
     Raises SceneError if the scene cannot be run with these bodies.
     """
 
-    CHECKPOINTED = (
-        "_pair",
-        "state",
-        "_steps",
-        "_error",
-        "_transitions",
-        "_begun",
-        "_energy_at_start",
-        "_last_opening",
-        "_crowd",
-        "macro_steps",
-        "_halvings",
-        "_shapes_left",
-        "_next_shape",
-    )
+    state: State
 
     def __init__(
         self, scene: Scene, start_time: float, beam: Body | None, spring: Body | None, recorder: Recorder
@@ -107,23 +93,19 @@ class Master(Checkpointed):
             self._fastest,
             self._pair.equilibrium,
         )
-        self._begun, self._energy_at_start = False, 0.0
-        self._last_opening = -float("inf")
-        self._crowd = Crowd(start_time)
-        self.macro_steps = self._halvings = 0
         self._balance = Balance(scene, self._pair)
         self._log = Log(scene, recorder, self._balance)
         recorder.fetch = self.hand_over
         self._told = BEAM_TELLS * self._pair.upper.tells + SPRING_TELLS * self._pair.lower.tells
         self._pictured = beam if isinstance(beam, BeamBody) else None
-        self._shapes_left, self._next_shape = _SHAPES_AFTER_CONTACT, start_time
+        self.state.shapes_left, self.state.next_shape = _SHAPES_AFTER_CONTACT, start_time
         length = scene.time.t_end - start_time or 1.0  # 0 where contact is at t_end: the one shape is that of the start
         self._shape_every = length / _SHAPES_OVER_RUN
 
     @property
     def done(self) -> bool:
         """Whether the run has reached t_end."""
-        return self._begun and self.state.time >= self._scene.time.t_end
+        return self.state.begun and self.state.time >= self._scene.time.t_end
 
     def _fastest(self) -> float:
         """The largest speed of an end so far [m/s]."""
@@ -135,7 +117,7 @@ class Master(Checkpointed):
         Raises RunStopped; what was computed up to its time is with the recorder.
         """
         try:
-            if not self._begun:
+            if not self.state.begun:
                 self._begin()
             if not self.done:
                 self._step()
@@ -154,9 +136,34 @@ class Master(Checkpointed):
         """Give the recorder the records that it does not have yet; see `Log.hand_over`."""
         self._log.hand_over(self._steps.size)
 
+    def run_state(self) -> RunState:
+        """Return the state of every part; with the scene and the records so far, the run goes on from it."""
+        return {name: part.save() for name, part in self._parts().items()}
+
+    def go_on(self, saved: RunState) -> None:
+        """Continue where an equal run has returned `run_state`. Raises ValueError if it was another."""
+        parts = self._parts()
+        if saved.keys() != parts.keys():
+            raise ValueError(f"a state of {', '.join(saved)}, not of {', '.join(parts)}")
+        for name, part in parts.items():
+            part.restore(saved[name])
+
     def catch_up(self) -> None:
-        """Take note of the records that the recorder has of a run that was restored."""
+        """Take note of the records that the recorder has of a run that goes on."""
         self._log.catch_up()
+
+    def _parts(self) -> dict[str, Stateful]:
+        pair = self._pair
+        parts = {
+            "run": self,
+            "steps": self._steps,
+            "error": self._error,
+            "transitions": self._transitions,
+            "coupling": pair.joined,
+            "beam": pair.beam,
+            "spring": pair.spring,
+        }
+        return {name: part for name, part in parts.items() if part is not None}
 
     def _step(self) -> None:
         state, steps, pair = self.state, self._steps, self._pair
@@ -166,13 +173,13 @@ class Master(Checkpointed):
         whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
         end = target if whole else state.time + step.size
         if step.size < steps.size:
-            self._crowd.count(end, step.size, steps.size)
+            count_crowd(state, end, step.size, steps.size)
         if step.size > 0.0:
             if self._error is not None:
                 self._error.accept(step)
             pair.joined.accept(step)
             state.accept(step, end)
-            self.macro_steps += 1
+            state.macro_steps += 1
             if pair.opens_softly:
                 self._note_soft_contact(step)
             elif pair.joined.decides:
@@ -211,7 +218,7 @@ class Master(Checkpointed):
                     residual = refused.residual if isinstance(refused, NotConverged) else None
                     raise RunStopped(cause, state.time, residual) from refused
                 halvings += 1
-                self._halvings += 1
+                state.halvings += 1
                 size *= 0.5
 
     def _holds(self, step: Step, local_error: LocalError, refused: str) -> bool:
@@ -238,14 +245,14 @@ class Master(Checkpointed):
         step = Step(state.time, 0.0, NO_FORCE, NO_FORCE, start, start)
         # The ledger starts with the bodies as they arrive, before an impact.
         arriving = np.frombuffer(self._packed(step, start), STEP)
-        self._energy_at_start = float(ledger(self._scene, arriving)["e_total"][0])
+        state.energy_at_start = float(ledger(self._scene, arriving)["e_total"][0])
         if self._error is not None:
-            self._error.note(abs(self._energy_at_start))
+            self._error.note(abs(state.energy_at_start))
         if self._in_contact(start):
             pair.mark()
             self._act(EventKind.IMPACT if pair.joinable else EventKind.STOP_IMPACT, step)
         self._record(step, pair.ends())
-        self._begun = True
+        state.begun = True
 
     def _in_contact(self, start: Ends) -> bool:
         """Is the tip on the spring top (or the stop), moving down or at rest?"""
@@ -261,9 +268,9 @@ class Master(Checkpointed):
         """The event at the end of ``step`` happens."""
         state, pair = self.state, self._pair
         if kind.opens:
-            self._last_opening = state.time
+            state.last_opening = state.time
         if kind is EventKind.IMPACT:
-            state.reclosed = state.time - self._last_opening <= SIMULTANEOUS * self._steps.size
+            state.reclosed = state.time - state.last_opening <= SIMULTANEOUS * self._steps.size
         ends = pair.ends()
         meets = kind in (EventKind.IMPACT, EventKind.SEPARATION)  # at Ψ, where it means something else
         tolerance = self._detector.simultaneity_tolerance(ends) if meets else self._detector.tolerance(ends)
@@ -310,8 +317,8 @@ class Master(Checkpointed):
             state.fastest = speed
         self._log.records.append(self._packed(step, ends))
         if self._pictured is not None:
-            early = self._shapes_left > 0 and state.phase.joint is not Joint.FREE
-            if early or state.time >= self._next_shape:
+            early = state.shapes_left > 0 and state.phase.joint is not Joint.FREE
+            if early or state.time >= state.next_shape:
                 self._shape(self._pictured, early)
 
     def _packed(self, step: Step, ends: Ends) -> bytes:
@@ -328,16 +335,17 @@ class Master(Checkpointed):
         return packed(
             *(state.time, size, *before[0], *before[1], *contact, *foundation),
             *(u, v, y, z, state.phase.number, self._log.events, state.smoothed, booked.law_force),
-            *(*of_upper, *of_lower, *booked[1:], state.lost, *received, self._energy_at_start),
+            *(*of_upper, *of_lower, *booked[1:], state.lost, *received, state.energy_at_start),
             *(pair.upper.felt() if self._told & BEAM_TELLS else _NOTHING_FELT),
             self._told,
         )
 
     def _shape(self, beam: BeamBody, early: bool) -> None:
-        time = self.state.time
-        self._shapes_left -= early
-        if time >= self._next_shape:
-            self._next_shape += self._shape_every * ((time - self._next_shape) // self._shape_every + 1.0)
+        state, every = self.state, self._shape_every
+        time = state.time
+        state.shapes_left -= early
+        if time >= state.next_shape:
+            state.next_shape += every * ((time - state.next_shape) // every + 1.0)
         self._log.show(time, beam.shape())
 
     # -- what it amounts to -------------------------------------------------------------------------------------------
@@ -375,8 +383,8 @@ class Master(Checkpointed):
             "time": float(steps["time"][-1]) if len(steps) else self.state.time,
             "macro_steps": made,
             "events": len(events),
-            "halved_steps": self._halvings,
-            **({"rejected_steps": self._steps.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
+            "halved_steps": self.state.halvings,
+            **({"rejected_steps": self._steps.state.rejections} if isinstance(self._steps, AdaptiveSteps) else {}),
             **of_coupling,
             **balance.summary,
             "resolved": unresolved is None and not balance.changed,

@@ -82,7 +82,7 @@ class Simulation:
         if not isinstance(recorder, FileRecorder):
             raise TypeError("a run goes on in the directory of its results")
         try:
-            self._master.restore(start.simulation)
+            self._master.go_on(start.state)
         except ValueError as error:
             path = recorder.directory.checkpoint
             raise CheckpointRefused(f"{path}: written by another version: {error}") from error
@@ -137,7 +137,7 @@ class Simulation:
             while not master.done:
                 master.step()
                 if progress is not None:
-                    progress(master.state.time, master.state.phase.name, master.macro_steps)
+                    progress(master.state.time, master.state.phase.name, master.state.macro_steps)
                 if checkpoints is not None:
                     checkpoints.take_when_due(master)
         return self._end({"status": "done"})

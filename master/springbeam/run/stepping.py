@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from math import inf
+
+import msgspec
 
 from ..bodies import force
-from ..bodies.checkpointed import Checkpointed
 from ..bodies.elements import RigidWall
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
+from ..bodies.stateful import Memory
 from ..contact.laws import Transmission, law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
@@ -19,22 +21,31 @@ from .loads import Loads
 _REACH_OF_FORCE = 4.0
 
 
-@dataclass
-class State(Checkpointed):
-    """Where the run is, and what of the last steps the next one needs."""
+class State(Memory):
+    """Where the run is, and what of the steps so far the next one needs."""
 
     time: float
-    phase: Phase = field(default_factory=Phase)
+    phase: Phase = Phase()
     contact: Force = NO_FORCE  #: C of the last step, continued
     last_size: float = 0.0  #: of the last step [s]
     foundation: Force = NO_FORCE  #: N of the last step, continued
     smoothed: float = 0.0  #: mean of C's two limits at the start of the last step [N]
     steps_in_phase: int = 0
     #: (middle, C, N) of the last two steps of this phase.
-    middles: list[tuple[float, float, float]] = field(default_factory=list)
+    middles: list[tuple[float, float, float]] = msgspec.field(default_factory=list)
     reclosed: bool = False  #: the contact had opened and closed at once: its next step does not open it again
     lost: float = 0.0  #: by events so far [J]
     fastest: float = 0.0  #: the largest speed of an end at a row so far [m/s]
+    begun: bool = False  #: whether the row of the start is made
+    energy_at_start: float = 0.0  #: before an impact there [J]
+    last_opening: float = -inf  #: when tied ends were last let go [s]
+    #: Steps cut by events at once, and within one macro step: how many, and since when [s].
+    at_once: tuple[int, float] = (0, -inf)
+    in_step: tuple[int, float] = (0, -inf)
+    macro_steps: int = 0
+    halvings: int = 0  #: of steps that were refused
+    shapes_left: int = 0  #: of the beam, to be kept after first contact
+    next_shape: float = 0.0  #: when the next of those over the run is due [s]
 
     def accept(self, step: Step, time: float) -> None:
         """The step that ends at ``time`` is made."""
@@ -71,7 +82,7 @@ class State(Checkpointed):
 _ABSENT = RigidWall(0.0)
 
 
-class Pair(Checkpointed):
+class Pair:
     """Both bodies of a scene, one of them possibly missing, and what couples them in each phase.
 
     Parameters
@@ -81,8 +92,6 @@ class Pair(Checkpointed):
     beam, spring
         The bodies; ``None`` where the scene has none.
     """
-
-    CHECKPOINTED = ("beam", "spring", "_held", "joined")
 
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self.beam, self.spring = beam, spring
