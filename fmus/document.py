@@ -15,7 +15,7 @@ STYLE = (
     "table{border-collapse:collapse;width:100%}td,th{border:1px solid #ccc;padding:.2em .5em;text-align:left;"
     "vertical-align:top}code{white-space:nowrap}"
 )
-HEADINGS = {"parameter": "Parameters", "input": "Inputs", "output": "Outputs", "local": "Shape"}
+HEADINGS = {"parameter": "Parameters", "input": "Inputs", "output": "Outputs", "local": "Shape", "independent": "Time"}
 
 
 def row(variable: ET.Element) -> str:

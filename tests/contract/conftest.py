@@ -11,6 +11,7 @@ OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 CO_SIMULATION = 1
 
 Logger = ct.CFUNCTYPE(None, ct.c_void_p, ct.c_char_p, ct.c_int, ct.c_char_p, ct.c_char_p)
+Logger3 = ct.CFUNCTYPE(None, ct.c_void_p, ct.c_int, ct.c_char_p, ct.c_char_p)
 
 
 class Callbacks(ct.Structure):
@@ -35,35 +36,51 @@ MOVING = {
     "beam": {**SOFT, "n_elements": 12, "alpha_b": 1e-3, "initial_velocity_slope": -1.0},
     "spring": {**HILL, "damping": 0.1, "displacement": 0.5, "velocity": -1.0},
 }
+#: What FMI 2.0 calls functions of FMI 3.0; tests know all by their names in FMI 3.0, without the prefix.
+IN_FMI2 = {"FMUState": "FMUstate", "Deserialize": "DeSerialize", "Float64": "Real", "Int32": "Integer"}
+IN_FMI2 |= {"GetOutputDerivatives": "GetRealOutputDerivatives"}
 
 
 class Fmu:
     """A loaded FMU: description, library, and what the tests need to know of it."""
 
     def __init__(self, path, folder):
-        self.path, self.folder, self.name = path, folder, path.stem
+        self.path, self.folder = path, folder
         fmpy.extract(str(path), unzipdir=str(folder))
         self.description = fmpy.read_model_description(str(path))
-        identifier = self.description.coSimulation.modelIdentifier
-        self.binary = folder / "binaries" / "linux64" / f"{identifier}.so"
+        self.version = self.description.fmiVersion
+        #: Of the twins: "beam" or "spring".
+        self.name = self.description.coSimulation.modelIdentifier
+        platform = "linux64" if self.version == "2.0" else "x86_64-linux"
+        self.binary = folder / "binaries" / platform / f"{self.name}.so"
         self.library = ct.CDLL(str(self.binary))
-        self.library.fmi2Instantiate.restype = ct.c_void_p
         self.variables = {v.name: v for v in self.description.modelVariables}
-        self.outputs = [name for name in self.named("output") if self.variables[name].type == "Real"]
+        self.outputs = [name for name in self.named("output") if self.variables[name].type in ("Real", "Float64")]
         self.instances = []
         self.parameters = MOVING[self.name]
         self.force, self.impulse, self.displacement, self.velocity = ENDS[self.name]
 
+    def spelt(self, function):
+        """Return what this version calls a function."""
+        if self.version == "3.0":
+            return f"fmi3{function}"
+        for name, before in IN_FMI2.items():
+            function = function.replace(name, before)
+        return f"fmi2{function}"
+
+    def function(self, name):
+        return getattr(self.library, self.spelt(name))
+
     def named(self, causality):
-        """The variables of a causality."""
-        return [name for name, v in self.variables.items() if v.causality == causality]
+        """The variables of a causality, but for the derivatives that are inputs in FMI 3.0."""
+        return [n for n, v in self.variables.items() if v.causality == causality and not n.startswith("der(")]
 
     def references(self, *names):
         """The value references, as C takes them."""
         return (ct.c_uint * len(names))(*[self.variables[name].valueReference for name in names])
 
     def instance(self, **options):
-        made = Instance(self, **options)
+        made = {"2.0": Instance, "3.0": Instance3}[self.version](self, **options)
         self.instances.append(made)
         return made
 
@@ -77,31 +94,46 @@ class Fmu:
 
 
 class Instance:
-    """One instance; keeps the messages it sends."""
+    """One instance of FMI 2.0; keeps the messages it sends."""
 
     def __init__(
         self,
         fmu,
         name=b"test",
-        kind=CO_SIMULATION,
         guid=None,
         resources=None,
         callbacks=True,
         logging=False,
+        **options,
     ):
         self.fmu = fmu
         self.messages = []
+        identity = fmu.description.guid.encode() if guid is None else guid
+        self.component = ct.c_void_p(self._instantiate(name, identity, resources, callbacks, logging, **options))
+
+    def _instantiate(
+        self,
+        name,
+        identity,
+        resources,
+        callbacks,
+        logging,
+        kind=CO_SIMULATION,
+    ):
         self._logger = Logger(self._log)
         struct = Callbacks(self._logger, None, None, None, None)
         pointer = ct.byref(struct) if callbacks else None
-        identity = fmu.description.guid.encode() if guid is None else guid
-        made = fmu.library.fmi2Instantiate(name, kind, identity, resources, pointer, 0, int(logging))
-        self.component = ct.c_void_p(made)
+        instantiate = self.fmu.library.fmi2Instantiate
+        instantiate.restype = ct.c_void_p
+        made = instantiate(name, kind, identity, resources, pointer, 0, int(logging))
         # The FMU must have copied the struct.
         ct.memset(ct.byref(struct), 0xFF, ct.sizeof(struct))
+        return made
 
     def _log(self, environment, name, status, category, message):
         self.messages.append((status, category.decode(), message.decode()))
+
+    BOOLEAN = ct.c_int
 
     @property
     def message(self):
@@ -109,39 +141,51 @@ class Instance:
         return self.messages[-1][2] if self.messages else ""
 
     def call(self, function, *arguments):
-        return int(getattr(self.fmu.library, function)(self.component, *arguments))
+        return int(self.fmu.function(function)(self.component, *arguments))
+
+    def access(self, function, references, n, values):
+        """Get or set values of ``n`` variables."""
+        return self.call(function, references, ct.c_size_t(n), values)
 
     def free(self):
         if self.component:
-            self.fmu.library.fmi2FreeInstance(self.component)
+            self.fmu.function("FreeInstance")(self.component)
             self.component = ct.c_void_p()
 
+    def _experiment(self, start, stop, tolerance):
+        known = tolerance is not None, ct.c_double(tolerance or 0.0)
+        end = stop is not None, ct.c_double(stop or 0.0)
+        return [*known, ct.c_double(start), *end]
+
+    def try_enter(self, start=0.0, stop=None, tolerance=None):
+        """Say when the run starts and ends, and enter initialization mode."""
+        status = self.setup(start, stop, tolerance)
+        return status if status != OK else self.call("EnterInitializationMode")
+
     def setup(self, start=0.0, stop=None, tolerance=None):
-        known = int(tolerance is not None), ct.c_double(tolerance or 0.0)
-        end = int(stop is not None), ct.c_double(stop or 0.0)
-        return self.call("fmi2SetupExperiment", *known, ct.c_double(start), *end)
+        return self.call("SetupExperiment", *self._experiment(start, stop, tolerance))
 
     def enter(self, start_time=0.0, stop_time=None, tolerance=None, **values):
         """Enter initialization mode, with values of parameters and inputs."""
-        assert self.setup(start_time, stop_time, tolerance) == OK, self.message
         for name, value in values.items():
             self.set(name, value)
-        assert self.call("fmi2EnterInitializationMode") == OK, self.message
+        assert self.try_enter(start_time, stop_time, tolerance) == OK, self.message
         return self
 
     def start(self, **values):
         """Enter initialization mode and leave it."""
         self.enter(**values)
-        assert self.call("fmi2ExitInitializationMode") == OK, self.message
+        assert self.call("ExitInitializationMode") == OK, self.message
         return self
 
     def try_set(self, name, value):
         variable = self.fmu.variables[name]
         reference = self.fmu.references(name)
-        if variable.type == "Real":
-            return self.call("fmi2SetReal", reference, 1, (ct.c_double * 1)(value))
-        function = "fmi2SetBoolean" if variable.type == "Boolean" else "fmi2SetInteger"
-        return self.call(function, reference, 1, (ct.c_int * 1)(int(value)))
+        if variable.type in ("Real", "Float64"):
+            return self.access("SetFloat64", reference, 1, (ct.c_double * 1)(value))
+        if variable.type == "Boolean":
+            return self.access("SetBoolean", reference, 1, (self.BOOLEAN * 1)(int(value)))
+        return self.access("SetInt32", reference, 1, (ct.c_int * 1)(int(value)))
 
     def set(self, name, value):
         assert self.try_set(name, value) == OK, self.message
@@ -149,12 +193,12 @@ class Instance:
     def get(self, *names):
         """Real values: one, or a list."""
         values = (ct.c_double * len(names))(*[math.nan] * len(names))
-        assert self.call("fmi2GetReal", self.fmu.references(*names), len(names), values) == OK, self.message
+        assert self.access("GetFloat64", self.fmu.references(*names), len(names), values) == OK, self.message
         return values[0] if len(names) == 1 else list(values)
 
     def integer(self, name):
         value = (ct.c_int * 1)()
-        assert self.call("fmi2GetInteger", self.fmu.references(name), 1, value) == OK, self.message
+        assert self.access("GetInt32", self.fmu.references(name), 1, value) == OK, self.message
         return int(value[0])
 
     def outputs(self):
@@ -164,51 +208,123 @@ class Instance:
     def derive(self, name, order, value):
         """Set an input's derivative."""
         reference = self.fmu.references(name)
-        return self.call("fmi2SetRealInputDerivatives", reference, 1, (ct.c_int * 1)(order), (ct.c_double * 1)(value))
+        return self.call("SetRealInputDerivatives", reference, 1, (ct.c_int * 1)(order), (ct.c_double * 1)(value))
 
     def derivative(self, name, order=1):
         reference = self.fmu.references(name)
         value = (ct.c_double * 1)(math.nan)
-        return self.call("fmi2GetRealOutputDerivatives", reference, 1, (ct.c_int * 1)(order), value), value[0]
+        return self.call("GetOutputDerivatives", reference, ct.c_size_t(1), (ct.c_int * 1)(order), value), value[0]
 
     def partials(self, outputs, name):
         """Return the status, and the derivatives of the outputs by an input or, before the start, by a parameter."""
         values = (ct.c_double * len(outputs))(*[math.nan] * len(outputs))
         unknown, known, one = self.fmu.references(*outputs), self.fmu.references(name), (ct.c_double * 1)(1.0)
         arguments = (unknown, ct.c_size_t(len(outputs)), known, ct.c_size_t(1), one, values)
-        return self.call("fmi2GetDirectionalDerivative", *arguments), list(values)
+        return self.call("GetDirectionalDerivative", *arguments), list(values)
 
     def try_step(self, time, size):
-        return self.call("fmi2DoStep", ct.c_double(time), ct.c_double(size), 0)
+        return self.call("DoStep", ct.c_double(time), ct.c_double(size), 0)
+
+    def reached(self):
+        """How far the last step came."""
+        reached = ct.c_double()
+        assert self.call("GetRealStatus", 2, ct.byref(reached)) == OK
+        return reached.value
 
     def step(self, time, size):
         assert self.try_step(time, size) == OK, self.message
 
     def state(self):
         token = ct.c_void_p()
-        assert self.call("fmi2GetFMUstate", ct.byref(token)) == OK, self.message
+        assert self.call("GetFMUState", ct.byref(token)) == OK, self.message
         return token
 
     def restore(self, token):
-        assert self.call("fmi2SetFMUstate", token) == OK, self.message
+        assert self.call("SetFMUState", token) == OK, self.message
 
     def serialized(self):
         token, size = self.state(), ct.c_size_t()
-        assert self.call("fmi2SerializedFMUstateSize", token, ct.byref(size)) == OK
+        assert self.call("SerializedFMUStateSize", token, ct.byref(size)) == OK
         buffer = ct.create_string_buffer(size.value)
-        assert self.call("fmi2SerializeFMUstate", token, buffer, size) == OK
-        assert self.call("fmi2FreeFMUstate", ct.byref(token)) == OK
+        assert self.call("SerializeFMUState", token, buffer, size) == OK
+        assert self.call("FreeFMUState", ct.byref(token)) == OK
         return buffer.raw
 
     def try_deserialize(self, blob):
         token = ct.c_void_p()
-        status = self.call("fmi2DeSerializeFMUstate", blob, ct.c_size_t(len(blob)), ct.byref(token))
+        status = self.call("DeserializeFMUState", blob, ct.c_size_t(len(blob)), ct.byref(token))
         return status, token
 
     def deserialized(self, blob):
         status, token = self.try_deserialize(blob)
         assert status == OK, self.message
         return token
+
+
+class Instance3(Instance):
+    """One instance of FMI 3.0."""
+
+    BOOLEAN = ct.c_bool
+
+    def _instantiate(
+        self,
+        name,
+        identity,
+        resources,
+        callbacks,
+        logging,
+        events=False,
+        early=False,
+    ):
+        self._logger = Logger3(self._log3)
+        self.event, self.end, self.early = ct.c_bool(), ct.c_bool(), ct.c_bool()
+        self.last = ct.c_double()
+        instantiate = self.fmu.library.fmi3InstantiateCoSimulation
+        instantiate.restype = ct.c_void_p
+        logger = self._logger if callbacks else None
+        return instantiate(
+            *(name, identity, resources, False, logging, events, early, None, ct.c_size_t(0), None, logger, None)
+        )
+
+    def _log3(self, environment, status, category, message):
+        self.messages.append((status, category.decode(), message.decode()))
+
+    def access(self, function, references, n, values):
+        return self.call(function, references, ct.c_size_t(n), values, ct.c_size_t(n))
+
+    def try_enter(self, start=0.0, stop=None, tolerance=None):
+        return self.call("EnterInitializationMode", *self._experiment(start, stop, tolerance))
+
+    def get(self, *names):
+        """Real values, elements of arrays by index: one, or a list."""
+        found = {}
+        for array in {name if name in self.fmu.variables else name.split("[")[0] for name in names}:
+            n = math.prod(self.fmu.variables[array].shape or ())
+            values, size, one = (ct.c_double * n)(*[math.nan] * n), ct.c_size_t(n), ct.c_size_t(1)
+            assert self.call("GetFloat64", self.fmu.references(array), one, values, size) == OK, self.message
+            found |= {array: values[0]} | {f"{array}[{i}]": value for i, value in enumerate(values, 1)}
+        return found[names[0]] if len(names) == 1 else [found[name] for name in names]
+
+    def derive(self, name, order, value):
+        return self.try_set(f"der({name}{'' if order == 1 else f',{order}'})", value)
+
+    def derivative(self, name, order=1):
+        reference, one = self.fmu.references(name), ct.c_size_t(1)
+        value = (ct.c_double * 1)(math.nan)
+        return self.call("GetOutputDerivatives", reference, one, (ct.c_int * 1)(order), value, one), value[0]
+
+    def partials(self, outputs, name):
+        values = (ct.c_double * len(outputs))(*[math.nan] * len(outputs))
+        unknown, known, seed = self.fmu.references(*outputs), self.fmu.references(name), (ct.c_double * 1)(1.0)
+        n, one = ct.c_size_t(len(outputs)), ct.c_size_t(1)
+        return self.call("GetDirectionalDerivative", unknown, n, known, one, seed, one, values, n), list(values)
+
+    def try_step(self, time, size):
+        told = [ct.byref(value) for value in (self.event, self.end, self.early, self.last)]
+        return self.call("DoStep", ct.c_double(time), ct.c_double(size), False, *told)
+
+    def reached(self):
+        return self.last.value
 
 
 @pytest.fixture
@@ -222,14 +338,25 @@ def folder(fmu_folder, tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def fmus(fmu_folder, tmp_path_factory):
-    return {name: Fmu(fmu_folder / f"{name}.fmu", tmp_path_factory.mktemp(name)) for name in ENDS}
+    """Both FMUs by their names, in each version of FMI."""
+    files = {"2.0": "", "3.0": "3"}
+    return {
+        version: {n: Fmu(fmu_folder / f"{n}{end}.fmu", tmp_path_factory.mktemp(n + end)) for n in ENDS}
+        for version, end in files.items()
+    }
+
+
+@pytest.fixture(params=["2.0", "3.0"])
+def version(request):
+    """Each version of FMI in turn; a test that is about one of them is parametrised by that."""
+    return str(request.param)
 
 
 @pytest.fixture
-def loaded(fmus):
+def loaded(fmus, version):
     """Both FMUs; the instances that the test makes are freed after it."""
-    yield fmus
-    for fmu in fmus.values():
+    yield fmus[version]
+    for fmu in fmus[version].values():
         for instance in fmu.instances:
             instance.free()
         fmu.instances.clear()

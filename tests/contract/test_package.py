@@ -1,11 +1,13 @@
 """What is in the .fmu files, and what their binaries need and show."""
 
+import ctypes as ct
 import re
 import subprocess
 import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
@@ -20,9 +22,10 @@ def output(*command):
 
 
 def test_static_model_is_the_packed_one_and_fmpy_reports_nothing(case, tmp_path):
-    # The description printed from the table, before there is a binary. Only the list of sources is added to it.
+    # The description printed from the table, before there is a binary. Only a list of sources is added to it.
     printed = tmp_path / "modelDescription.xml"
-    printed.write_text(output(str(ROOT / "build" / "fmus" / f"describe_{case.name}"), "2"), encoding="utf-8")
+    describe = str(ROOT / "build" / "fmus" / f"describe_{case.name}")
+    printed.write_text(output(describe, case.version[0]), encoding="utf-8")
     assert validate_fmu(str(tmp_path)) == []
     packed = (case.folder / "modelDescription.xml").read_text(encoding="utf-8")
     without_list = re.sub(r">\n    <SourceFiles>.*</CoSimulation>", "/>", packed, flags=re.DOTALL)
@@ -33,7 +36,8 @@ def test_sources_that_are_named_are_packed(case):
     # That they compile is for tests/interop/test_compile.py. Without the source of SUNDIALS the spring's are not named.
     sources = case.folder / "sources"
     own = {p.name for p in sources.rglob("*.cpp")}
-    assert own >= {f"{case.name}_fmu.cpp", "fmi2_slave.cpp", "instance.cpp", f"{case.name}.cpp"}
+    surface = f"fmi{case.version[0]}_slave.cpp"
+    assert own >= {f"{case.name}_fmu.cpp", surface, "instance.cpp", f"{case.name}.cpp"}
     named = [n for b in case.description.buildConfigurations for s in b.sourceFileSets for n in s.sourceFiles]
     assert {Path(n).name for n in named if n.endswith(".cpp")} == (own if named else set())
     assert [n for n in named if not (sources / n).is_file()] == []
@@ -43,8 +47,11 @@ def test_sources_that_are_named_are_packed(case):
 
 def test_capabilities_are_declared(case):
     declared = case.description.coSimulation
-    named = ("HandleVariableCommunicationStepSize", "InterpolateInputs", "GetAndSetFMUstate", "SerializeFMUstate")
-    assert all(getattr(declared, f"can{name}") for name in (*named, "NotUseMemoryManagementFunctions"))
+    assert declared.hasEventMode == (case.version == "3.0")
+    named = ("HandleVariableCommunicationStepSize", "GetAndSetFMUstate", "SerializeFMUstate")
+    only2 = ("InterpolateInputs", "NotUseMemoryManagementFunctions")
+    can = {name for name in (*named, *only2) if getattr(declared, f"can{name}")}
+    assert can == {*named, *(only2 if case.version == "2.0" else ())}
     assert (declared.canBeInstantiatedOnlyOncePerProcess, declared.maxOutputDerivativeOrder) == (False, 1)
 
 
@@ -55,11 +62,15 @@ def test_binary_needs_only_libc_and_libm_and_binds_its_own_symbols_first(case):
     assert "SYMBOLIC" in dynamic
 
 
-def test_binary_shows_the_fmi2_functions_and_nothing_else(case):
+def test_binary_shows_the_functions_of_its_version_and_nothing_else(case):
     symbols = {line.split()[-1] for line in output("nm", "-D", "--defined-only", str(case.binary)).splitlines()}
-    assert {s for s in symbols if not s.startswith("fmi2")} == set()
-    # FMI 2.0.4: 25 common functions and 9 of co-simulation (fmi2GetStatus and its four typed forms are 5 of them).
-    assert len(symbols) == 34
+    header = Path(fmpy.__file__).parent / "c-code" / f"fmi{case.version[0]}FunctionTypes.h"
+    declared = set(re.findall(r"\b(fmi[23]\w+)TYPE\b", header.read_text(encoding="utf-8")))
+    if case.version == "3.0":
+        assert symbols == declared  # FMPy looks for those of other interfaces, too
+    else:
+        # FMI 2.0.4: 25 common functions and 9 of co-simulation (fmi2GetStatus and its four typed forms are 5 of them).
+        assert (symbols <= declared, len(symbols)) == (True, 34)
 
 
 def test_binary_names_no_folder_of_the_build_machine(case):
@@ -140,11 +151,36 @@ def test_variables_of_the_agreed_contract_are_there(case):
         causality, unit, *names = line.split()
         for name in names:
             stem, *ends = re.split(r"[\[:\]]+", name.rstrip("]"))
-            for one in [f"{stem}[{i}]" for i in range(*map(int, ends))] if ends else [name]:
+            elements = [f"{stem}[{i}]" for i in range(*map(int, ends))] if ends else [name]
+            if stem in case.variables and ends:  # one array, in FMI 3.0
+                assert case.variables[stem].shape == (len(elements),)
+                elements = [stem]
+            for one in elements:
                 variable = case.variables[one]
                 assert (one, variable.causality, variable.unit or "-") == (one, causality, unit)
     if case.name == "spring":
         assert {case.variables[n].initial for n in ("displacement", "velocity")} == {"exact"}
+
+
+@pytest.mark.parametrize("version", ["3.0"])
+def test_the_shape_is_four_arrays_and_inputs_have_derivatives(beam, spring):
+    arrays = {name: variable.shape for name, variable in beam.variables.items() if variable.shape}
+    assert arrays == dict.fromkeys(("deflection", "rotation", "bending_moment", "shear_force"), (21,))
+    for fmu in (beam, spring):
+        for name in fmu.named("input"):
+            first, second = fmu.variables.get(f"der({name})"), fmu.variables.get(f"der({name},2)")
+            if fmu.variables[name].variability == "discrete":
+                assert first is second is None
+            else:
+                assert (first.derivative.name, second.derivative.name) == (name, first.name)
+    k = beam.moving()
+    array, inside = beam.references("deflection"), beam.references("deflection")
+    inside[0] += 1
+    assert k.access("GetFloat64", array, 1, (ct.c_double * 1)()) == 3
+    assert "nValues = 1, but the variables have 21" in k.message
+    k = beam.moving()
+    assert k.access("GetFloat64", inside, 1, (ct.c_double * 1)()) == 3
+    assert "it is within an array" in k.message
 
 
 def test_binary_loads_on_systems_since_glibc_2_14(case):
@@ -194,8 +230,10 @@ def test_outputs_fit_a_plot_of_all_of_them(case):
     assert len(create_plotly_figure(result, names=names).data) == len(names)
     assert case.name == "spring" or np.ptp(result["tip_displacement"]) > 0.1  # a first try shows a motion
     if case.name == "beam":
-        shape = simulate_fmu(str(case.path), output=["tip_displacement", "deflection[21]", "rotation[21]"])
-        assert shape["deflection[21]"] == pytest.approx(shape["tip_displacement"], rel=1e-12, abs=1e-15)
+        at_tip = "deflection[21]" if case.version == "2.0" else "deflection"
+        shape = simulate_fmu(str(case.path), output=["tip_displacement", at_tip])
+        deflection = shape[at_tip].reshape(len(shape), -1)[:, -1]
+        assert deflection == pytest.approx(shape["tip_displacement"], rel=1e-12, abs=1e-15)
 
 
 def test_documentation_names_every_variable(case):
@@ -204,4 +242,5 @@ def test_documentation_names_every_variable(case):
     licenses = case.folder / "documentation" / "licenses"
     assert "BSD 3-Clause" in (licenses / "springbeam.txt").read_text(encoding="utf-8")
     assert "SUNDIALS" in (licenses / "third-party.txt").read_text(encoding="utf-8")
-    assert (case.folder / "model.png").read_bytes().startswith(b"\x89PNG")
+    icon = "model.png" if case.version == "2.0" else "terminalsAndIcons/icon.png"
+    assert (case.folder / icon).read_bytes().startswith(b"\x89PNG")

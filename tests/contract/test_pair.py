@@ -44,7 +44,7 @@ class Pair:
         self.spring.enter(**{**SPRING, **of_spring})
         self.exchange()
         for k in (self.beam, self.spring):
-            assert k.call("fmi2ExitInitializationMode") == 0
+            assert k.call("ExitInitializationMode") == 0
         return self
 
     def exchange(self):

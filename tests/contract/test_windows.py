@@ -46,6 +46,7 @@ def wine_prefix(tmp_path_factory):
     return tmp_path_factory.mktemp("wine") / "prefix"
 
 
+@pytest.mark.parametrize("version", ["2.0"])
 def test_c_host(case, linux_host):
     result = rows(run(linux_host, case.binary, *arguments(case)))
     repeated = [row for row in result if row[0] == "100"]
@@ -53,6 +54,7 @@ def test_c_host(case, linux_host):
     assert repeated[:4] == repeated[4:]
 
 
+@pytest.mark.parametrize("version", ["2.0"])
 def test_windows_binary_under_wine(case, linux_host, wine_prefix, tmp_path):
     with zipfile.ZipFile(case.path) as archive:
         name = f"binaries/win64/{case.name}.dll"
