@@ -258,6 +258,15 @@ class OwnBody(FmuBody):
             vars(body).update(as_made, _key=key, _as_made=as_made)
         return body
 
+    def energies(self) -> Energies:
+        motion, told, pending, before = self.state
+        kinetic, potential, dissipated, *load = told[4:] if pending == 0.0 else self._stored()
+        if not load:  # the spring has none but its external force
+            of_loads = -self._constants["external_force"] * motion.displacement
+        else:
+            of_loads = -load[0] if self._bears_loads else load[0]
+        return _energies_of(Energies, (kinetic, potential, before + dissipated, of_loads))
+
     def _guarded(self, call: Callable[[], None]) -> None:
         try:
             call()
@@ -336,10 +345,6 @@ class FmuBeam(OwnBody, BeamBody):
         shape = load.shape or [1.0]
         return [(f"distributed_load_{i}" if i else "distributed_load", s) for i, s in enumerate(shape) if s != 0.0]
 
-    def energies(self) -> Energies:
-        kinetic, strain, dissipated, load = self._stored()
-        return _energies_of(Energies, (kinetic, strain, dissipated, -load if self._bears_loads else load))
-
     def felt(self) -> Felt:
         return Felt(*self._felt.get())
 
@@ -386,11 +391,6 @@ class FmuSpring(OwnBody, EndLoaded):
     def expect_loads(self, loads: Sequence[Load]) -> None:
         FmuBody.expect_loads(self, loads)
         EndLoaded.expect_loads(self, loads)
-
-    def energies(self) -> Energies:
-        kinetic, potential, dissipated, *work = self._stored()
-        load = -work[0] if work else -self._spring.external_force * self.state.motion.displacement
-        return _energies_of(Energies, (kinetic, potential, self.state.dissipated + dissipated, load))
 
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)

@@ -115,9 +115,11 @@ class EventFunctions:
 
     def samples(self, phase: Phase, ends: Ends) -> list[Sample]:
         """f, ḟ of each function of ``phase``."""
-        functions = self.of(phase)
-        if ends != self._ends:
-            self._ends, self._samples = ends, [function(ends) for _, function in functions]
+        if phase is not self._phase or ends != self._ends:
+            functions = self.of(phase)
+            self._ends, self._samples = ends, []
+            for _, function in functions:
+                self._samples.append(function(ends))
         return self._samples
 
     def _built(self, phase: Phase) -> list[tuple[EventKind, EventFunction]]:

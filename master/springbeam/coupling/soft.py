@@ -97,9 +97,7 @@ class SoftSolver(Booked, StepSolver):
             return []
         return [(step.size * neglected / (6.0 * scales.reduced_mass * scales.speed), self.degree + 2)]
 
-    def no_contact(self, gap: Vector, a: Vector, size: float, start: Ends) -> bool:
-        if any(a):
-            return False
+    def no_contact(self, gap: Vector, size: float, start: Ends) -> bool:
         tip, low = start
         return not any(self._projection.force(low.displacement - tip.displacement, size, list(map(neg, gap))))
 

@@ -79,8 +79,8 @@ class StepSolver(Coupling):
         self._expected = expected
         self.state = Responses()
 
-    def no_contact(self, gap: Vector, a: Vector, size: float, start: Ends) -> bool:
-        """Return whether nothing acts between the bodies under ``a``, nor should; parameters as of `aim`."""
+    def no_contact(self, gap: Vector, size: float, start: Ends) -> bool:
+        """Return whether nothing should act where nothing acts between the bodies; parameters as of `aim`."""
         return False
 
     def aim(self, gap: Vector, a: Vector, descent: Matrix, size: float, start: Ends) -> Aim:
@@ -110,7 +110,7 @@ class StepSolver(Coupling):
         lower_end = lower.advance(time, size, acting)
         r_lower = conditions(lower_end, size)
         gap = list(map(sub, r_upper, r_lower))
-        if self.no_contact(gap, a, size, start):
+        if not any(a) and self.no_contact(gap, size, start):
             return step_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
         B, descent, measured = remembered = self.state.of_size.get(size, _UNKNOWN)
         predicted = B is None  # whether the upper body is elsewhere than at its end under ``a``
