@@ -138,7 +138,13 @@ def test_a_seated_tip_that_is_off_its_stop_for_less_than_a_step_is_seen():
 
 @pytest.mark.parametrize(
     ("scheme", "degree", "lowest", "highest"),
-    [("energy", 1, 3.0, 4.5), ("energy", 2, 4.5, 7.0), ("hermite", 1, 3.5, 5.0), ("hermite", 2, 5.0, 7.0)],
+    [
+        ("energy", 0, 1.5, 3.0),
+        ("energy", 1, 3.0, 4.5),
+        ("energy", 2, 4.5, 7.0),
+        ("hermite", 1, 3.5, 5.0),
+        ("hermite", 2, 5.0, 7.0),
+    ],
 )
 def test_times_of_separation_have_the_order_of_the_motion(scheme, degree, lowest, highest):
     """C itself has order degree + 1 at the ends of a step, and carries the image of the mismatch with `energy`; errors

@@ -158,7 +158,8 @@ class Transitions(Stateful):
         if kind is EventKind.RETIE:
             return kind, Phase(Joint.TIED), Impact()
         if kind is EventKind.UNSEATED:
-            return kind, Phase(phase.joint), Impact()
+            tied = phase.joint is not Joint.FREE and not self._law.soft
+            return kind, Phase(phase.joint), self._part(phase, tip, low) if tied else Impact()
         assert kind is EventKind.SEPARATION
         if self._tip_mass == 0.0 and low.velocity < 0.0 and self._at_equilibrium(low, tolerance):
             return EventKind.RETIE, Phase(Joint.TIED), Impact()  # C vanishes at Ψ, where they are tied again
@@ -235,16 +236,16 @@ class Transitions(Stateful):
         tip_mass = 0.0 if v is None else self._tip_mass or 0.0
         return common_velocity(v or 0.0, z or 0.0, tip_mass, self._mass or 0.0)
 
-    def _part(self, opened: Phase, tip: Motion, low: Motion) -> Impact:
-        """Ends that a tie lets go have one velocity; where a scheme has let theirs differ, they take that first.
+    def _part(self, held: Phase, tip: Motion, low: Motion) -> Impact:
+        """Ends that a tie or the foundation lets go have one velocity; where a scheme has let it differ, they take it.
 
         Unless they part by so much that it is no error but a vibration that the macro step does not follow. A lower end
-        that the foundation holds stays at rest.
+        that the foundation holds in the phase ``held`` is at rest.
         """
         parting = tip.velocity - low.velocity
         if self._tip_mass is None or parting == 0.0 or parting > VIBRATION * self._fastest():
             return Impact()
-        if self._mass is None or opened.seated:
+        if self._mass is None or held.seated:
             on_beam, loss = rebound(tip.velocity, self._tip_mass, restitution=0.0)
             return Impact(on_beam, of_foundation=on_beam, energy_loss=loss)
         return meeting("inelastic", tip.velocity, low.velocity, self._tip_mass, self._mass)

@@ -1,12 +1,12 @@
 """Events told by forces: a force that can only push is about to pull, so that ends part or a seat is left.
 
 The step is cut to where the force vanishes. A force of degree 1 or 2 tells by its own polynomial; the constant of
-degree 0 belongs to the middle of its step and alternates, so that the means of neighbouring steps tell.
+degree 0 belongs to the middle of its step, so that the line through the last two middles tells. What the scheme adds
+to turn a mismatch of the ends' velocities round is left out in both.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -45,11 +45,21 @@ class Separation:
         push = self._pushing(state.phase)
         if push is None:
             return None
-        _, slope, bend = push.force(step)
-        apart_under_loads = state.phase.joint is Joint.FREE and (slope, bend) != (0.0, 0.0)
-        if self._pair.coupling(state.phase).degree == 0 and not apart_under_loads:
-            return self._by_means(state, step, push, macro_step)
-        return self._by_polynomial(state, step, push, macro_step)
+        coupling, f = self._pair.coupling(state.phase), self._without_mismatch(state, step, push)
+        by_line = coupling.degree == 0 and (state.phase.joint is not Joint.FREE or f[1:] == (0.0, 0.0))
+        if by_line:
+            middle = state.time + 0.5 * step.size, force.mean(f, step.size)
+            f, state.pushed = _line(state.pushed, middle, state.time), middle
+        if f[0] < 0.0:
+            # The sign at the start may be a false alarm: it is one if the ends, let go, close.
+            if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, push.event):
+                return self.no_step(step), push.event
+            step = self._pair.repeated(state, step)
+        falling = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
+        if not falling:
+            return None
+        zero = falling[0] if by_line else self._sharpened(falling[0], coupling.sharpest, state, step, push, macro_step)
+        return self._pair.attempt(state, zero, step.start), push.event
 
     def no_step(self, step: Step) -> Step:
         """Return no step at all, the bodies back at the mark."""
@@ -65,18 +75,11 @@ class Separation:
             return Push(EventKind.SEPARATION, lambda step: step.contact)
         return None
 
-    def _by_polynomial(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, EventKind] | None:
-        f = self._without_mismatch(state, step, push)
-        falling = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
-        if f[0] < 0.0:
-            # The sign at the start may be a false alarm: it is one if the ends, let go, close.
-            if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, push.event):
-                return self.no_step(step), push.event
-            step = self._pair.repeated(state, step)
-        if not falling:
-            return None
-        # The force is not equally good all over a step: the zero is brought to where it is best, and then stepped to.
-        zero, best = falling[0], self._pair.coupling(state.phase).sharpest
+    def _sharpened(self, zero: float, best: float, state: State, step: Step, push: Push, macro_step: float) -> float:
+        """Return where the force of a step vanishes, near ``zero`` [s]; it is the most accurate at the share ``best``.
+
+        Trial steps bring the zero there.
+        """
         room = self._pair.loads.next_kink(state.time + self._no_time * macro_step) - state.time
         for _ in range(_MAX_LOOKS):
             size = min(max(zero / best, _SHORTEST_LOOK * macro_step), room)
@@ -86,7 +89,7 @@ class Separation:
             if not 0.0 < zero + change < step.size or abs(change) <= 1e-12 * macro_step:
                 break
             zero += change
-        return self._pair.attempt(state, zero, step.start), push.event
+        return zero
 
     def _without_mismatch(self, state: State, step: Step, push: Push) -> Force:
         """The force that pushes, without what the scheme adds to the contact's."""
@@ -97,22 +100,6 @@ class Separation:
             f[1] + contact[1] - step.contact[1],
             f[2] + contact[2] - step.contact[2],
         )
-
-    def _by_means(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, EventKind] | None:
-        c = force.mean(push.force(step), step.size)
-        if not state.middles:
-            if c < 0.0 and not state.reclosed and self._opens(state, step, push.event):
-                return self.no_step(step), push.event
-            return None
-        points = [(t, n if push.event is EventKind.UNSEATED else f) for t, f, n in state.middles]
-        zero = _zero_of_means([*points, (state.time + 0.5 * step.size, c)], state.time)
-        if zero is None or (zero >= step.size and points[-1][1] + c > 0.0):
-            return None
-        if zero <= self._no_time * macro_step:
-            return self.no_step(step), push.event
-        if zero >= step.size:
-            return self._pair.repeated(state, step), push.event
-        return self._pair.attempt(state, zero, step.start), push.event
 
     def _opens(self, state: State, step: Step, event: EventKind) -> bool:
         """Do the ends part if they are let go for the step, or early in it, to meet again before its end?
@@ -133,19 +120,8 @@ class Separation:
         return height(pair.attempt(state, early, step.start, let_go).end)[0] > drift * early
 
 
-def _zero_of_means(points: list[tuple[float, float]], start: float) -> float | None:
-    """Return when the force vanishes, after ``start`` [s], by the line through its last two means; ``None`` if not.
-
-    ``points`` are (middle [s], force [N]) of two or three steps, the last one that which begins at ``start``. The line
-    also tells of zeros past the last mean.
-    """
-    means = [(0.5 * (t0 + t1), 0.5 * (f0 + f1)) for (t0, f0), (t1, f1) in itertools.pairwise(points)]
-    time, mean = means[-1]
-    if len(means) == 2:
-        before, higher = means[0]
-        if mean <= 0.0 < higher:
-            return before + (time - before) * higher / (higher - mean) - start
-        if higher > mean > 0.0:
-            return time + (time - before) * mean / (higher - mean) - start
-        return 0.0 if mean < 0.0 else None
-    return 0.0 if mean <= 0.0 and points[-1][1] < 0.0 else None
+def _line(before: tuple[float, float] | None, middle: tuple[float, float], start: float) -> Force:
+    """Return the line through two (time [s], force [N]) as a force from ``start`` on; constant unless it falls."""
+    time, value = middle
+    slope = 0.0 if before is None else min((value - before[1]) / (time - before[0]), 0.0)
+    return (value - slope * (time - start), slope, 0.0)

@@ -31,8 +31,8 @@ class State(Memory):
     foundation: Force = NO_FORCE  #: N of the last step, continued
     smoothed: float = 0.0  #: mean of C's two limits at the start of the last step [N]
     steps_in_phase: int = 0
-    #: (middle, C, N) of the last two steps of this phase.
-    middles: list[tuple[float, float, float]] = msgspec.field(default_factory=list)
+    #: Middle [s] of the last step, at degree 0, and the force that could only push [N]; none in another phase.
+    pushed: tuple[float, float] | None = None
     reclosed: bool = False  #: the contact had opened and closed at once: its next step does not open it again
     lost: float = 0.0  #: by events so far [J]
     fastest: float = 0.0  #: the largest speed of an end at a row so far [m/s]
@@ -50,8 +50,6 @@ class State(Memory):
     def accept(self, step: Step, time: float) -> None:
         """The step that ends at ``time`` is made."""
         _, size, contact, foundation, _, _ = step
-        bearing = 0.0 if foundation is NO_FORCE else force.mean(foundation, size)
-        self.middles = [*self.middles[-1:], (self.time + 0.5 * size, contact[0], bearing)]
         self.time, self.last_size = time, size
         # At the macro point between two steps both forces are wrong by nearly the same, one up, one down.
         self.smoothed = 0.5 * (contact[0] + self.contact[0]) if self.steps_in_phase else contact[0]
@@ -71,7 +69,7 @@ class State(Memory):
             return
         self.phase = phase
         self.steps_in_phase = 0
-        self.middles.clear()
+        self.pushed = None
         if phase.joint is Joint.FREE:
             self.contact = NO_FORCE
         if not phase.seated:
