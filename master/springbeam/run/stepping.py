@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from math import inf
 
-import msgspec
-
 from ..bodies import force
 from ..bodies.elements import RigidWall
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
