@@ -78,7 +78,7 @@ def test_slopes_are_those_of_the_force(law, degree, shape):
     """Central differences, second order in 1e-5 of the penetration; the correction along p̃′ is not differentiated."""
     projection = Projection(law, degree)
     start, x = numbers(shape, degree)
-    slope = np.array(projection.slope(start, SIZE, x))
+    slope = np.array(projection.slope(start, SIZE, x, projection.force(start, SIZE, x)))
     for j in range(degree + 1):
         ends = []
         for sign in (1.0, -1.0):

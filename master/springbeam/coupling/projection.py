@@ -103,11 +103,11 @@ class Projection:
             raise OverflowError
         return a[: self.degree + 1]
 
-    def slope(self, start: float, size: float, x: Vector) -> Matrix:
-        """Return ∂a/∂x [N/m] of `force`; where p keeps its size, with F′ of its mean."""
+    def slope(self, start: float, size: float, x: Vector, a: Vector) -> Matrix:
+        """Return ∂a/∂x [N/m] of `force`, which is ``a``; where p keeps its size, with F′ of its mean."""
         law = self.law
         if self._is_quotient and _changes(start, x[0]):
-            return [[(law.force(x[0]) - self.force(start, size, x)[0]) / (x[0] - start)]]
+            return [[(law.force(x[0]) - a[0]) / (x[0] - start)]]
         mean = x[1] if self.degree else (start + 2.0 * x[0]) / 3.0  # at degree 0, weighted by ∂p̃/∂x
         steady = not law.one_sided or min(start, x[0], mean) > _STEADY * max(start, x[0], mean)
         if steady and not self._damped:

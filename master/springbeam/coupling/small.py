@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import isfinite
-from operator import mul
+from operator import mul, sub
 
 import numpy as np
 
@@ -29,6 +29,13 @@ def transposed(rows: Iterable[Iterable[float]]) -> Matrix:
     return [list(column) for column in zip(*rows, strict=True)]
 
 
+def less(A: Matrix, B: Matrix) -> Matrix:
+    """Return A − B."""
+    if len(A) == 1:
+        return [[A[0][0] - B[0][0]]]
+    return [list(map(sub, *rows)) for rows in zip(A, B, strict=True)]
+
+
 def inverse(A: Matrix) -> Matrix:
     """Return A⁻¹ of one to three unknowns by its minors, in a tenth of numpy's time.
 
@@ -51,6 +58,8 @@ def inverse(A: Matrix) -> Matrix:
         determinant = a * first + b * second + c * third
     if determinant == 0.0 or not isfinite(determinant):
         raise np.linalg.LinAlgError
+    if len(A) == 1:
+        return [[1.0 / determinant]]
     return [[minor / determinant for minor in row] for row in minors]
 
 

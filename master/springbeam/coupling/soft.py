@@ -21,7 +21,7 @@ from ..contact.laws import SoftLaw
 from . import energy
 from .projection import Booked, penetration
 from .protocol import ErrorEstimate, NotConverged, Scales, Step
-from .small import Matrix, Vector, inverse, times
+from .small import Matrix, Vector, inverse, less, times
 from .solver import Aim, Responses, StepSolver
 
 _MAX_NEWTON, _MAX_DAMPING = 60, 8
@@ -128,10 +128,11 @@ class SoftSolver(Booked, StepSolver):
         numpy.linalg.LinAlgError.
         """
         force, under_a = self._projection.force, x
-        missing = list(map(sub, a, force(start, size, x)))  # −f
+        of_law = force(start, size, x)
+        missing = list(map(sub, a, of_law))  # −f
         guessed = flexibility is not None
         if flexibility is None:
-            flexibility = self._flexibility(start, size, x, descent)
+            flexibility = self._flexibility(start, size, x, of_law, descent)
         change = times(flexibility, missing)
         length = max(map(abs, change))
         for _ in range(_MAX_NEWTON):
@@ -157,16 +158,15 @@ class SoftSolver(Booked, StepSolver):
                 felt = times(descent, following)
                 return list(map(add, x, following)), [c + m + d for c, m, d in zip(of_law, missing, felt, strict=True)]
             if slow:
-                flexibility, guessed = self._flexibility(start, size, x, descent), False
+                flexibility, guessed = self._flexibility(start, size, x, of_law, descent), False
                 following = times(flexibility, missing)
                 left = max(map(abs, following))
             change, length = following, left
         return None
 
-    def _flexibility(self, start: float, size: float, x: Vector, descent: Matrix) -> Matrix:
-        """Return (E + A′)⁻¹ [m/N]."""
-        slope = self._projection.slope(start, size, x)
-        return inverse([list(map(sub, row, line)) for row, line in zip(slope, descent, strict=True)])
+    def _flexibility(self, start: float, size: float, x: Vector, of_law: Vector, descent: Matrix) -> Matrix:
+        """Return (E + A′)⁻¹ [m/N], where the law's force is ``of_law``."""
+        return inverse(less(self._projection.slope(start, size, x, of_law), descent))
 
     def _stiffened(
         self, start: float, size: float, x: Vector, a: Vector, descent: Matrix
@@ -177,7 +177,7 @@ class SoftSolver(Booked, StepSolver):
         """
         x = list(map(sub, x, times(inverse(descent), a)))
         a = [0.0] * len(a)
-        slope = self._projection.slope(start, size, x)
+        slope = self._projection.slope(start, size, x, self._projection.force(start, size, x))
         gain = max(abs(value) for row in slope for value in row) / max(abs(e) for row in descent for e in row)
         softness = min(1.0, 1.0 / gain) if gain > 0.0 else 1.0
         while True:

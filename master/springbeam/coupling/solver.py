@@ -22,7 +22,7 @@ import numpy as np
 from ..bodies import force
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force, Motion
 from .protocol import Conditions, Counts, Coupling, NotConverged, Step, step_of
-from .small import Matrix, Vector, broyden, inverse, secant, times, transposed
+from .small import Matrix, Vector, broyden, inverse, less, secant, times, transposed
 
 _log = logging.getLogger(__name__)
 
@@ -242,6 +242,6 @@ class StepSolver(Coupling):
 def _descent(B: Matrix, S: Matrix) -> Matrix:
     """Return −(B − S)⁻¹, from residuals to Newton's steps. Raises NotConverged if there is none."""
     try:
-        return inverse([list(map(sub, *rows)) for rows in zip(S, B, strict=True)])
+        return inverse(less(S, B))
     except np.linalg.LinAlgError:
         raise NotConverged(float("nan"), 0) from None
