@@ -19,10 +19,6 @@ SCENES = {
 }
 #: Columns that a picture must get along with.
 ODD_COLUMNS = {
-    "no motion": dict.fromkeys(("u_tip", "y", "v_tip", "z", "gap"), np.zeros(400)),
-    "no force nor residual": dict.fromkeys(
-        ("energy_residual", "contact_force", "contact_force_smoothed"), np.zeros(400)
-    ),
     "no energy": dict.fromkeys(("e_beam", "e_spring", "e_total"), np.zeros(400)),
     "nothing": {name: np.zeros(400) for name in columns_of(PAIR) if name not in ("time", "phase")},
     "negative": {"e_spring": np.linspace(-1.0, 1.0, 400)},

@@ -1,6 +1,7 @@
 """The animation: its frames are the recorded ones, it plays as long as asked, and it says why it cannot be made."""
 
 import subprocess
+from dataclasses import replace
 from itertools import pairwise
 
 import matplotlib
@@ -22,8 +23,10 @@ def picture_of(run):
         return animation._Picture(run, frames_of(run))
 
 
-def test_each_frame_is_a_recorded_one():
+def test_each_frame_is_a_recorded_one_and_says_if_the_motion_is_not_resolved():
     run = a_trajectory()
+    titles = [ax.get_title("right") for ax in picture_of(replace(run, summary={"resolved": False})).figure.axes]
+    assert titles == [NOT_RESOLVED, *[""] * (len(titles) - 1)]
     shown, motion = picture_of(run), frames_of(run)
     for frame in (0, 123, 399):
         shown.show(frame)
@@ -50,14 +53,6 @@ def test_a_gif_plays_as_long_as_asked(tmp_path, recwarn, scene):
     assert sum(durations) == 500
     assert all(np.any(a != b) for a, b in pairwise(images))
     assert [str(warning.message) for warning in recwarn] == []
-
-
-@pytest.mark.parametrize("resolved", [True, False])
-def test_a_motion_that_is_not_resolved_is_said_to_be(resolved):
-    run = a_trajectory()
-    run.summary["resolved"] = resolved
-    titles = [ax.get_title("right") for ax in picture_of(run).figure.axes]
-    assert titles == ["" if resolved else NOT_RESOLVED, *[""] * (len(titles) - 1)]
 
 
 def test_mp4_holds_every_frame(tmp_path):
@@ -96,8 +91,4 @@ def test_the_command_writes_a_gif_into_the_directory_and_says_where(tmp_path):
     with Image.open(directory / "animation.gif") as gif:
         assert gif.n_frames == 2
     assert "already exists; --force replaces it" in refused("animate", directory, "--seconds", 0.2)
-
-
-def test_a_run_of_one_row_has_nothing_to_animate(tmp_path):
-    a_trajectory(n=1).save(tmp_path / "run")
-    assert "nothing to animate" in refused("animate", tmp_path / "run")
+    assert "nothing to animate" in refused("animate", a_trajectory(n=1).save(tmp_path / "short"))

@@ -63,7 +63,10 @@ API Status fmi2DoStep(void *c, double time, double H, int no_set) {
     Fmu *f = c;
     double *r = f->r, h = H, rate = (r[C] + 1.0) / r[MASS] + r[K] / r[MASS] + 1.0;
     bool begun = ++f->calls > 2, late = time > 1.49;
-    if ((begun && r[LIE] == HANG) || (late && r[LIE] == LATE_HANG)) for (volatile int i = 1; i;) {}
+    if ((begun && r[LIE] == HANG) || (late && r[LIE] == LATE_HANG)) {
+        fputs("hanging\n", stderr);
+        for (volatile int i = 1; i;) {}
+    }
     if ((begun && r[LIE] == CRASH) || (late && r[LIE] == LATE_CRASH)) *(volatile int *)0 = 0;
     if (late && r[LIE] == LATE_EXIT) exit(7);
     if (late && r[LIE] == LATE_ABORT) fputs("nobody expected this\n", stderr), abort();
