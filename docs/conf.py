@@ -11,7 +11,7 @@ myst_heading_anchors = 3
 suppress_warnings = ["myst.xref_missing"]
 
 PAGES = {
-    "How to": "tutorial contact accuracy report loads sweeps scripting own_fmu tools faq",
+    "How to": "tutorial contact accuracy report loads sweeps signals scripting own_fmu tools faq",
     "Reference": "scene commands files api fmu_variables",
     "Theory and measurements": "model coupling stability measured performance paper",
     "Development": "architecture contributing notebook",

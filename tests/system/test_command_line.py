@@ -32,6 +32,7 @@ TABLES = {
     "resume": "cut --no-plots",
     "sweep": "duffing --vary spring.mass=0.5,1 --set time.t_end=1 --scheduler {scheduler} --out varied",
     "compare": "done done --out compared.png",
+    "spectrum": "done --out spectra",
     "report": "done --out page.html",
     "animate": "done --seconds 0.2 --fps 10 --out moving.gif",
     "export": "done",
@@ -120,7 +121,8 @@ def test_the_command_alone_shows_how_to_start():
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in TABLES if name not in ("new", "compare", "report", "animate", "export", "resume")]
+    "name",
+    [name for name in TABLES if name not in ("new", "compare", "spectrum", "report", "animate", "export", "resume")],
 )
 def test_json_is_one_document_and_all_of_stdout(arguments, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)

@@ -49,7 +49,11 @@ else:
 
 MetricOption = Annotated[
     list[str] | None,
-    typer.Option("--metric", metavar="NAME", help="A number of each run; may be repeated. Default: those that fit."),
+    typer.Option(
+        "--metric",
+        metavar="NAME[=FORMULA]",
+        help="A number of each run, or yours as in a='max(a_tip)/g'; may be repeated. Default: those that fit.",
+    ),
 ]
 QuickOption = Annotated[bool, typer.Option("--quick", help="A smaller study, for a first look.")]
 SeedOption = Annotated[

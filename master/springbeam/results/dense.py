@@ -36,6 +36,8 @@ _LINEAR = (
     *("tip_acceleration", "clamp_force", "clamp_moment", "bending_stress"),
     *(f"{body}_{what}" for body in ("beam", "spring") for what in ("potential", "dissipated", "load")),
 )
+#: Columns that are polynomials between rows, whose extremes `extremes` finds.
+MOTION = ("u_tip", "v_tip", "y", "z", "gap")
 #: Steps of which extremes are looked for at once, so that those of a long run need little memory.
 _TOGETHER = 65536
 
@@ -67,7 +69,7 @@ def at(run: Trajectory, times: Any) -> Trajectory:
 def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:
     """Return the lowest and the highest value of the motion on the curve that `at` follows.
 
-    ``name`` is ``u_tip``, ``v_tip``, ``y``, ``z`` or ``gap``; ``steps`` are all records of a run of ``scene``.
+    ``name`` is one of `MOTION`; ``steps`` are all records of a run of ``scene``.
     """
     parts = [steps[f"{part}_after"] for part in (("u_tip", "y") if name == "gap" else (name,))]
     found = Extremes.of_rows(steps["time"], parts[0] - parts[1] if name == "gap" else parts[0])

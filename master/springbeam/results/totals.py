@@ -33,6 +33,9 @@ TOTALS = {
     "contact_force_window": Quantity("window of the peak contact force", "s"),
     "contact_duration": Quantity("longest contact", "s"),
     "contact_duration_total": Quantity("all contacts together", "s"),
+    "number_of_contacts": Quantity("contacts", ""),
+    "bounce_time": Quantity("from the first contact until nothing opens again", "s"),
+    "last_impact_time": Quantity("last impact", "s"),
     "rebound_velocity": Quantity("velocity of the tip when it last leaves", "m/s"),
     "deepest_tip": Quantity("lowest place of the tip", "m"),
     "deepest_tip_time": Quantity("when the tip is lowest", "s"),
@@ -96,7 +99,11 @@ def totals(
         found["loss_stop"] = sum(event.energy_loss for event in events if event.kind.strikes)
     if beam and spring:
         found["loss_impact"] = sum(e.energy_loss for e in events if not e.kind.strikes)
-    return {name: value if name == "stop_strokes" else float(value) for name, value in found.items()}
+    if impacts := [event.time for event in events if event.kind.collision or event.kind.strikes]:
+        found["last_impact_time"] = impacts[-1]
+    return {
+        name: float(value) if name not in TOTALS or TOTALS[name].unit else int(value) for name, value in found.items()
+    }
 
 
 def pace(steps: np.ndarray) -> float:
@@ -147,6 +154,9 @@ def _contact(
         intervals = tip_contacts(events, end, free_at_end=free_at_end)
     lengths = [until - since for since, until in intervals]
     found |= {"contact_duration": max(lengths, default=0.0), "contact_duration_total": sum(lengths)}
+    found["number_of_contacts"] = len(intervals)
+    if intervals and intervals[-1][1] == end and not free_at_end:
+        found["bounce_time"] = intervals[-1][0] - intervals[0][0]
     opened = [until for _, until in intervals if until < end]
     if opened:
         left = [event.v_tip for event in events if event.time == opened[-1] and event.v_tip is not None]

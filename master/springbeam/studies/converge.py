@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from ..scene import Scene, SceneError
 from ..scene.tables import STEP_KEY, TOLERANCE_KEYS
-from .metrics import heading, known
+from .metrics import heading, known, named
 from .study import Findings, Row, Study
 from .tables import number, table
 
@@ -129,7 +129,8 @@ class Converge(Study):
     def quantities(self, records: Mapping[str, Row]) -> list[str]:
         """Return what is compared: what was asked for, or what the scene has."""
         first = next(iter(records.values()))
-        return [name for name in self.metrics if self.metric or first[name] is not None]
+        names = [named(text)[0] for text in self.metrics]
+        return [name for name in names if self.metric or first[name] is not None]
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per run; errors are from the limits of its sequence."""

@@ -1,4 +1,8 @@
-"""What is kept of a run: one number per metric, the same on every machine that runs it, its cost, and its errors."""
+"""What is kept of a run: one number per metric, the same on every machine that runs it, its cost, and its errors.
+
+A metric is named: one of `METRICS`, or one's own, ``NAME=FORMULA`` (of columns and metrics) or
+``NAME=module:function`` (of the run).
+"""
 
 from __future__ import annotations
 
@@ -10,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from ..results.contact_times import contact_time_difference, impulse_difference
-from ..results.dense import extremes
+from ..results.dense import MOTION, extremes
 from ..results.extremes import Extremes
 from ..results.totals import LOSS_NAMES, TOTALS
-from ..results.trajectory import EventKind, Trajectory
+from ..results.trajectory import COLUMNS, TOLD, EventKind, Trajectory
 from ..scene import SceneError
 
 
@@ -24,6 +28,7 @@ class Metric:
     unit: str  #: "" for a count
     words: str
     of: Callable[[Trajectory], float | None]
+    asked: bool = False  #: kept only where it is named
 
     def __call__(self, run: Trajectory) -> float | None:
         return self.of(run)
@@ -56,7 +61,31 @@ def _total(name: str) -> Callable[[Trajectory], float | None]:
     return lambda run: float(run.summary[name]) if name in run.summary else None
 
 
+def _largest(column: str) -> Callable[[Trajectory], float | None]:
+    def of(run: Trajectory) -> float | None:
+        if column not in run.columns:
+            return None
+        if column in MOTION and run.steps is not None:
+            found = extremes(run.scene, run.steps, column)
+            return max(found.highest, -found.lowest)
+        return float(np.abs(run[column]).max())
+
+    return of
+
+
+def _settled(column: str) -> Callable[[Trajectory], float | None]:
+    def of(run: Trajectory) -> float | None:
+        from ..signals.settled import settled
+
+        tail = settled(run)
+        return None if tail is None or column not in run.columns else tail.amplitude(run, column)
+
+    return of
+
+
 _last: Callable[[np.ndarray], float] = itemgetter(-1)
+#: Columns with a unit, whose largest magnitudes are metrics.
+_UNITS = {name: unit for name, (unit, _) in (COLUMNS | TOLD).items() if unit and name != "time"}
 
 METRICS: dict[str, Metric] = {
     "u_tip_min": Metric("m", "lowest place of the tip", _extreme("u_tip", attrgetter("lowest"))),
@@ -75,7 +104,20 @@ METRICS: dict[str, Metric] = {
     "macro_steps": Metric("", "macro steps", _total("macro_steps")),
     **{f"first_{kind}": Metric("s", f"first event {kind}", _first(kind)) for kind in EventKind},
     **{f"number_of_{kind}": Metric("", f"events {kind}", _number(kind)) for kind in EventKind},
+    **{
+        f"max_{name}": Metric(unit, f"largest magnitude of {name}", _largest(name), asked=True)
+        for name, unit in _UNITS.items()
+    },
+    **{
+        f"settled_{name}": Metric(
+            unit, f"half the range of {name} once the driven motion has settled", _settled(name), asked=True
+        )
+        for name, unit in _UNITS.items()
+        if not name.startswith("e_")
+    },
 }
+#: Those that are kept where none is named.
+USUAL = tuple(name for name, metric in METRICS.items() if not metric.asked)
 #: What a picture shows of a sweep that was asked for no metric in particular.
 PRINCIPAL = (
     *("contact_force_max", "contact_impulse", "contact_duration", "rebound_velocity", "deepest_tip", "stop_strokes"),
@@ -84,16 +126,54 @@ PRINCIPAL = (
 
 
 def heading(name: str) -> str:
-    """Return a metric with its unit."""
-    unit = METRICS[name].unit
+    """Return a metric with its unit; one's own has none."""
+    unit = METRICS[name].unit if name in METRICS else ""
     return f"{name} [{unit}]" if unit else name
 
 
+def named(text: str) -> tuple[str, Metric]:
+    """Return the name of a metric, and the metric. Raises SceneError if it is unknown, or one's own is none."""
+    if text in METRICS:
+        return text, METRICS[text]
+    name, separator, what = text.partition("=")
+    name, what = name.strip(), what.strip()
+    if not separator or not name.isidentifier():
+        raise SceneError(
+            f"--metric {text}: unknown; allowed: {', '.join(METRICS)}, and your own, as in "
+            "'shock=max(abs(a_tip))/9.81' or 'shock=module:function'"
+        )
+    if name in METRICS:
+        raise SceneError(f"--metric {text}: {name} is a metric already; give yours another name")
+    return name, Metric("", what, _own(name, what))
+
+
+def _own(name: str, what: str) -> Callable[[Trajectory], float | None]:
+    from ..signals.expressions import Expression, function_of
+
+    function = function_of(what)
+    formula = None if function is not None else Expression(what)
+    if formula is not None:
+        formula.check([*_UNITS, "time", *METRICS, *(name for name in formula.names if name.startswith("load_"))])
+
+    def of(run: Trajectory) -> float | None:
+        def look_up(part: str) -> Any:
+            return run[part] if part in run.columns else METRICS[part](run) if part in METRICS else None
+
+        found = function(run) if function is not None else formula(look_up) if formula is not None else None
+        if found is None:
+            return None
+        if np.size(found) != 1 or not np.isreal(found):
+            raise SceneError(f"--metric {name}={what}: gives {np.size(found)} values; a metric is one number")
+        return float(np.asarray(found, dtype=float).item())
+
+    return of
+
+
 def known(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of metrics as given. Raises SceneError if one is unknown."""
-    for name in names:
-        if name not in METRICS:
-            raise SceneError(f"--metric {name}: unknown; allowed: {', '.join(METRICS)}")
+    """Return the metrics as given. Raises SceneError if one is unknown."""
+    columns = [named(name)[0] for name in names]
+    if doubled := sorted({name for name in columns if columns.count(name) > 1}):
+        raise SceneError(f"--metric {doubled[0]}: given twice")
     return tuple(names)
 
 

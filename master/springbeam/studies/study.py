@@ -40,7 +40,7 @@ from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, load_scene, with_changes
 from ..scene.scene import split_key
 from .accuracy import simulate
-from .metrics import METRICS, costs
+from .metrics import costs, named
 from .tables import write_csv, write_parquet
 
 FILE = "study.jsonl"
@@ -87,7 +87,7 @@ class Study(BaseModel, ABC):
 
     @property
     def metrics(self) -> Sequence[str]:
-        """The numbers that are kept of each run, of `METRICS`."""
+        """The numbers that are kept of each run, as `springbeam.studies.metrics.named` knows them."""
         return ()
 
     @abstractmethod
@@ -100,17 +100,19 @@ class Study(BaseModel, ABC):
         ``status`` is ``done``, ``stopped`` (early) or ``refused`` (bad input), ``error`` says why. Wall times, loading
         included [s], are kept where cases follow one another.
         """
-        row: Row = {"status": "done", "error": "", "warnings": "", **dict.fromkeys(self.metrics)}
+        metrics = dict(map(named, self.metrics))
+        row: Row = {"status": "done", "error": "", "warnings": "", **dict.fromkeys(metrics)}
         began = perf_counter()
         try:
             run = simulate(self.at(case))
+            numbers = {name: metric(run) for name, metric in metrics.items()}
         except SceneError as refused:
             row |= {"status": "refused", "error": str(refused)}
         except RunStopped as stopped:
             row |= {"status": "stopped", "error": str(stopped)}
         else:
             row["warnings"] = "\n".join(run.summary["warnings"])
-            row |= {name: METRICS[name](run) for name in self.metrics} | costs(run)
+            row |= numbers | costs(run)
             row |= self.measured(run, case)
         return row if self.parallel else {**row, "cost_wall_time": perf_counter() - began}
 

@@ -17,8 +17,9 @@ from ..pictures.drawing import BLUE, VERMILLION
 from ..results.trajectory import Trajectory
 from ..scene import Load, Scene, SceneError
 from ..scene.reference import unit_of
+from ..signals.settled import poincare, settled
 from .design import Axis, Sampling, compatible, design, parse_axis
-from .metrics import METRICS, PRINCIPAL, heading, known
+from .metrics import PRINCIPAL, USUAL, heading, known, named
 from .study import Findings, Row, Study
 
 STATUSES = ("done", "stopped", "refused", "lost")
@@ -41,7 +42,7 @@ class Sweep(Study):
     samples: int = 0
     sampling: Sampling = "latin_hypercube"
     seed: int = 0
-    metric: tuple[str, ...] = ()  #: all if empty
+    metric: tuple[str, ...] = ()  #: the usual ones if empty
     stroboscopic: bool = False  #: whether each run is also seen once a period of its drive
 
     @property
@@ -52,7 +53,11 @@ class Sweep(Study):
     @property
     def metrics(self) -> Sequence[str]:
         """Those asked for."""
-        return self.metric or tuple(METRICS)
+        return self.metric or USUAL
+
+    @property
+    def _shown(self) -> Sequence[str]:
+        return [named(text)[0] for text in self.metric] or PRINCIPAL
 
     def cases(self) -> dict[str, Row]:
         """Return the values of the axes. Raises SceneError if a key, a metric or the drive is not there."""
@@ -84,7 +89,7 @@ class Sweep(Study):
         rows, axes, files = self.rows(records), self.axes, []
         words = [any(isinstance(row[axis.name], str) for row in rows) for axis in axes]
         scales = [Scale(axis.name, _labelled(axis), axis.log, word) for axis, word in zip(axes, words, strict=True)]
-        shown = {name: heading(name) for name in self.metric or PRINCIPAL if _varies(column(rows, name))}
+        shown = {name: heading(name) for name in self._shown if _varies(column(rows, name))}
         if shown:
             files.append(directory / "sweep.png")
             multiples(rows, scales, shown, self.scene.title or "sweep").savefig(files[-1], dpi=100)
@@ -110,15 +115,15 @@ def drive(scene: Scene) -> Load:
 
 
 def seen_once_a_period(run: Trajectory) -> Row:
-    """Return `POINTS` and `PEAK` of the last third of a run: of the tip, of the spring top where there is no beam."""
+    """Return `POINTS` and `PEAK` of the last third of a run, or less if it settles later: tip, or spring top."""
     load, column = drive(run.scene), "u_tip" if "u_tip" in run.columns else "y"
     assert load.frequency is not None
     begin, end = float(run.time[0]), float(run.time[-1])
-    late = begin + _TRANSIENT * (end - begin)
-    first, last = np.ceil((late - load.start) * load.frequency), np.floor((end - load.start) * load.frequency)
-    times = load.start + np.arange(first, last + 1.0) / load.frequency
+    tail = settled(run)
+    late = max(begin + _TRANSIENT * (end - begin), begin if tail is None else tail.since)
+    times, points = poincare(run, 1.0 / load.frequency, load.start)
     motion = run[column][run.time >= late]
-    return {POINTS: run.at(np.minimum(times, end))[column].tolist(), PEAK: 0.5 * float(np.ptp(motion))}
+    return {POINTS: points[times >= late, 0].tolist(), PEAK: 0.5 * float(np.ptp(motion))}
 
 
 def _bifurcation(rows: Sequence[Row], scale: Any, path: Path) -> Path:

@@ -1,0 +1,124 @@
+"""Formulas, shock spectra, power spectra and settled motion, beside closed forms and integrals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from runs import a_trajectory
+from scipy.integrate import quad
+
+from springbeam.scene import SceneError
+from springbeam.signals.expressions import Expression, function_of, signal
+from springbeam.signals.shock import shock_spectrum
+
+# -- formulas -----------------------------------------------------------------------------------------------------
+
+
+def test_a_formula_takes_columns_row_by_row():
+    run = a_trajectory()
+    found = signal(run, "sqrt(u_tip**2 + y**2) - 2*abs(z)")
+    assert np.array_equal(found, np.sqrt(run.u_tip**2 + run.y**2) - 2.0 * np.abs(run.z))
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("u_tip +", "not a formula: invalid syntax"),
+        ("speed * 2", "speed is unknown; there are time, u_tip"),
+        ("phase", "phase is unknown"),
+        ("max(u_tip)", "gives no number for each of the 400 rows"),
+        ("1/(time-time)", "is not finite at t = 0.0 s"),
+        ("sqrt(0*u_tip - 1)", "is not finite"),
+        ("u_tip.__class__", "no safe attribute"),
+        ("open('/etc/hostname')", "open is unknown"),
+        ("[u for u in u_tip]", "unknown|not supported"),
+        ("u_tip if time else y", "truth value|ambiguous|If"),
+    ],
+)
+def test_what_is_no_formula_of_columns_is_refused_with_the_reason(text, why):
+    with pytest.raises(SceneError, match=why):
+        signal(a_trajectory(), text)
+
+
+def test_a_formula_whose_part_did_not_happen_has_no_value():
+    assert Expression("2*rebound")({"rebound": None}.get) is None
+    assert Expression("2*rebound")({"rebound": 3.0}.get) == 6.0
+
+
+@pytest.mark.parametrize("text", ["nothing.here:f", "math:nothing", "math:pi"])
+def test_a_function_that_is_not_there_is_refused(text):
+    with pytest.raises(SceneError, match=text):
+        function_of(text)
+
+
+# -- shock response spectra ---------------------------------------------------------------------------------------
+
+#: Half-sine of 100 m/s² in 11 ms.
+PEAK, PULSE = 100.0, 0.011
+
+
+def half_sine_velocity(times):
+    inside = np.clip(times, 0.0, PULSE)
+    return PEAK * PULSE / np.pi * (1.0 - np.cos(np.pi * inside / PULSE))
+
+
+def spectrum(frequencies, quality, step=PULSE / 4000.0):
+    times = step * np.arange(round(1.2 * PULSE / step) + 1)
+    return shock_spectrum(half_sine_velocity(times), step, np.asarray(frequencies), quality)
+
+
+def duhamel(frequency, quality, time):
+    """ẍ at ``time`` by the convolution of the pulse with the impulse response of H."""
+    omega, zeta = 2.0 * np.pi * frequency, 0.5 / quality
+    swing = omega * np.sqrt(1.0 - zeta**2)
+
+    def kernel(t):
+        wave = 2.0 * zeta * omega * np.cos(swing * t) + omega**2 * (1.0 - 2.0 * zeta**2) / swing * np.sin(swing * t)
+        return np.exp(-zeta * omega * t) * wave
+
+    return quad(lambda s: PEAK * np.sin(np.pi * s / PULSE) * kernel(time - s), 0.0, min(time, PULSE), limit=400)[0]
+
+
+@pytest.mark.parametrize("quality", [10.0, 2.0, 50.0])
+@pytest.mark.parametrize("frequency", [15.0, 45.45, 120.0, 400.0])
+def test_the_spectrum_is_that_of_duhamels_integral(frequency, quality):
+    times = np.linspace(0.0, 1.2 * PULSE + 1.0 / frequency, 4001)[1:]
+    coarse = np.array([duhamel(frequency, quality, t) for t in times[::40]])
+    found = spectrum([frequency], quality)
+    fine = [
+        [
+            duhamel(frequency, quality, t)
+            for t in np.linspace(times[::40][at] - 40 * times[0], times[::40][at] + 40 * times[0], 41)
+        ]
+        for at in (coarse.argmax(), coarse.argmin())
+    ]
+    assert found.positive[0] == pytest.approx(max(fine[0]), rel=2e-4)
+    assert found.negative[0] == pytest.approx(-min(fine[1]), rel=2e-3, abs=1e-3 * PEAK)
+    assert found.maximax[0] == max(found.positive[0], found.negative[0])
+
+
+def test_an_undamped_oscillator_answers_a_half_sine_as_the_published_curve_says():
+    """Its residual spectrum is 4 fD cos(π fD)/(1 − 4 (fD)²) of the pulse, and the largest of all is 1.768 at 0.81."""
+    product = np.array([0.05, 0.2, 0.35, 0.45])
+    found = spectrum(product / PULSE, 1e9)
+    residual = 4.0 * product * np.cos(np.pi * product) / (1.0 - 4.0 * product**2)
+    assert found.negative / PEAK == pytest.approx(residual, rel=1e-4)
+    product = np.linspace(0.6, 1.0, 41)
+    curve = spectrum(product / PULSE, 1e9).maximax / PEAK
+    assert curve.max() == pytest.approx(1.768, abs=5e-4)
+    assert product[curve.argmax()] == pytest.approx(0.81, abs=0.011)
+
+
+def test_a_jump_of_velocity_shocks_in_proportion_to_frequency():
+    """Undamped, ẍ = ω Δv sin ωt: the spectrum is ω Δv, and has no limit."""
+    step, jump = 1e-6, 0.3
+    velocity = np.where(np.arange(2000) < 1000, 0.0, jump)
+    frequencies = np.array([100.0, 1000.0, 5000.0])
+    found = shock_spectrum(velocity, step, frequencies, 1e9)
+    assert found.maximax == pytest.approx(2.0 * np.pi * frequencies * jump, rel=2e-4)
+
+
+@pytest.mark.parametrize(("frequency", "quality"), [(0.0, 10.0), (6e5, 10.0), (100.0, 0.5), (100.0, np.inf)])
+def test_what_has_no_spectrum_is_refused(frequency, quality):
+    with pytest.raises(SceneError):
+        shock_spectrum(np.zeros(10), 1e-6, np.array([frequency]), quality)

@@ -1,0 +1,185 @@
+"""Numbers and spectra of runs: beside closed forms of linear oscillators, and by the command."""
+
+from __future__ import annotations
+
+import csv
+import json
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+from commands import printed, refused
+from scenes import scene_from_dict
+
+from springbeam import load_scene, simulate, with_changes
+from springbeam.signals.report import spectra
+from springbeam.signals.settled import settled
+from springbeam.signals.shock import shock_of_run, shock_spectrum
+from springbeam.signals.spectra import power_spectrum
+from springbeam.studies.metrics import METRICS
+from springbeam.studies.study import record_all
+from springbeam.studies.sweep import Sweep
+
+MASS, STIFFNESS, DAMPING, FORCE, DRIVE = 0.2, 800.0, 1.2, 3.0, 7.0
+
+
+def oscillator(t_end=8.0, **load):
+    """A linear oscillator, driven at 7 Hz, that swings at 10.07 Hz by itself."""
+    return scene_from_dict(
+        {
+            "time": {"t_end": t_end},
+            "spring": {"mass": MASS, "linear_stiffness": STIFFNESS, "damping": DAMPING, "initial_velocity": 0.4},
+            "coupling": {"macro_step": 2e-3},
+            "loads": [{"on": "spring", "amplitude": FORCE, "signal": "harmonic", "frequency": DRIVE} | load],
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def driven():
+    return simulate(oscillator())
+
+
+# -- metrics ------------------------------------------------------------------------------------------------------
+
+
+def test_the_settled_amplitude_is_that_of_the_frequency_response(driven):
+    rate = 2.0 * pi * DRIVE
+    exact = FORCE / sqrt((STIFFNESS - MASS * rate**2) ** 2 + (DAMPING * rate) ** 2)
+    found = settled(driven)
+    assert found.multiple == 1
+    assert found.period == pytest.approx(1.0 / DRIVE, rel=1e-12)
+    # The transient e^{−DAMPING t/2 MASS} has fallen to 1 % of the range of the motion.
+    assert 0.5 < found.since < 2.5
+    assert METRICS["settled_y"](driven) == pytest.approx(exact, rel=1e-3)
+    assert METRICS["settled_a_y"](driven) == pytest.approx(exact * rate**2, rel=1e-3)
+    assert METRICS["max_y"](driven) > 1.05 * exact
+
+
+def test_what_is_not_driven_or_too_short_has_not_settled():
+    assert settled(simulate(oscillator(t_end=0.9))) is None
+    assert METRICS["settled_y"](simulate(load_scene("duffing", ["time.t_end=1"]))) is None
+
+
+def test_a_motion_of_twice_the_period_of_its_drive_is_told():
+    found = settled(simulate(load_scene("vibro-impact")))
+    assert found.multiple == 2
+
+
+def test_contacts_are_counted_and_bouncing_ends_with_the_last_closing():
+    """A tip on a soft stop under a load that holds it there: told by the sign of the gap on the dense curve."""
+    scene = load_scene(
+        "vibro-impact", ["time.t_end=0.6", "beam.alpha_b=2e-3", "loads.0.amplitude=8", "loads.0.frequency=0.5"]
+    )
+    run = simulate(with_changes(scene, **{"loads.0": {"signal": "constant", "frequency": None}}))
+    times = np.linspace(run.time[0], run.time[-1], 200_001)
+    touching = run.at(times)["gap"] < 0.0
+    closings = times[1:][touching[1:] & ~touching[:-1]]
+    assert touching[-1]
+    assert run.summary["number_of_contacts"] == len(closings)
+    assert len(closings) > 2
+    assert run.summary["bounce_time"] == pytest.approx(closings[-1] - closings[0], abs=2e-5)
+    assert run.summary["last_impact_time"] == pytest.approx(closings[-1], abs=2e-5)
+
+
+def test_bouncing_has_no_end_where_the_run_ends_apart():
+    run = simulate(load_scene("pulse", ["time.t_end=0.02"]))
+    assert run.phase[-1] == "free"
+    assert "bounce_time" not in run.summary
+
+
+def spread(run):
+    return run.y.max() - run.y.min()
+
+
+def test_a_metric_of_ones_own_is_a_column_of_a_sweep(monkeypatch):
+    monkeypatch.syspath_prepend(__file__.rpartition("/")[0])
+    metrics = ("y_max", "low=min(y)*1e3", "spread=test_signals:spread", "ratio=y_max/max_z", "g=max(abs(a_y))/g")
+    study = Sweep(scene=oscillator(t_end=0.5), vary=("spring.mass=0.1,0.2",), metric=metrics)
+    for row in record_all(study).values():
+        assert row["status"] == "done"
+        assert row["spread"] == pytest.approx(row["y_max"] - row["low"] / 1e3, rel=1e-3)
+        assert row["ratio"] > 0.0
+    run = simulate(oscillator(t_end=0.5))
+    assert row["g"] == pytest.approx(np.abs(run.a_y).max() / 9.80665, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("metric", "why"),
+    [
+        ("speed", "unknown; allowed: u_tip_min"),
+        ("y_max=2*y", "y_max is a metric already"),
+        ("a=2*", "not a formula"),
+        ("a=2*nothing", "nothing is unknown"),
+        ("a=no.module:f", "No module named"),
+    ],
+)
+def test_a_metric_that_cannot_be_is_refused_before_any_run(metric, why, tmp_path):
+    assert why in refused("sweep", "duffing", "--vary", "spring.mass=1,2", "--metric", metric, "--out", tmp_path / "s")
+    assert not (tmp_path / "s").exists()
+
+
+def test_a_formula_that_gives_no_number_spoils_its_row_only():
+    study = Sweep(scene=oscillator(t_end=0.1), vary=("spring.mass=0.1,0.2",), metric=("a=y*2",))
+    for row in record_all(study).values():
+        assert row["status"] == "refused"
+        assert "--metric a=y*2: gives 5" in row["error"]
+
+
+# -- spectra ------------------------------------------------------------------------------------------------------
+
+
+def test_the_power_of_a_settled_oscillator_is_at_its_drive(driven):
+    tail = settled(driven)
+    begin = driven.time[-1] - 35.0 / DRIVE  # whole periods: the line lies on one of the spectrum
+    found = power_spectrum(driven, "y", since=begin)
+    line = int(np.argmin(np.abs(found.frequency - DRIVE)))
+    assert found.highest == pytest.approx(DRIVE, abs=found.frequency[1])
+    assert found.amplitude[line] == pytest.approx(METRICS["settled_y"](driven), rel=2e-3)
+    # Parseval, with the window's share of what is not constant in time.
+    late = driven.at(np.linspace(begin, driven.time[-1], 5000))["y"]
+    assert found.density.sum() * found.frequency[1] == pytest.approx(np.var(late), rel=0.02)
+    assert tail.since < begin
+
+
+def test_the_shock_of_a_stiff_mount_is_that_of_its_base():
+    """Of a mount 80 times as fast as a pulse of 11 ms, in space; relative to the base it hardly moves."""
+    amplitude, pulse, step = 500.0, 0.011, 1e-5
+    scene = with_changes(
+        oscillator(t_end=0.03, on="base", signal="half_sine", frequency=None, amplitude=amplitude, duration=pulse),
+        spring={"mass": 1e-3, "linear_stiffness": 1e-3 * (2.0 * pi * 80.0 / pulse) ** 2, "initial_velocity": 0.0,
+                "damping": 2.0},
+        coupling={"macro_step": 2e-5},
+    )  # fmt: skip
+    frequencies = np.array([20.0, 50.0, 120.0, 300.0])
+    found = shock_of_run(simulate(scene), "spring", frequencies)
+    times = step * np.arange(3001)
+    velocity = amplitude * pulse / pi * (1.0 - np.cos(pi * np.clip(times / pulse, 0.0, 1.0)))
+    expected = shock_spectrum(velocity, step, frequencies)
+    assert found.maximax == pytest.approx(expected.maximax, rel=5e-3)
+    assert found.negative == pytest.approx(expected.negative, rel=5e-2)
+
+
+def test_a_rigid_impact_has_no_peak_acceleration_and_a_soft_one_has():
+    rigid = spectra(simulate(load_scene("soft", ["time.t_end=0.1"])))
+    assert rigid.jumps["tip"] > 0.1
+    assert any("there is no peak acceleration" in words for _, words in rigid.in_words())
+    soft = spectra(simulate(load_scene("pulse", ["time.t_end=0.02"])))
+    assert soft.jumps == {"tip": 0.0, "spring": 0.0}
+    assert not any("no peak acceleration" in words for _, words in soft.in_words())
+
+
+def test_the_command_writes_tables_and_says_what_they_show(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    printed("run", "vibro-impact", "--no-plots", "--quiet", "--out", "shaken")
+    shown = printed("spectrum", "shaken", "--of", "a_tip/g", "--quality", "25")
+    assert "periodic from 0.15" in shown
+    assert "2 of the" in shown
+    told = json.loads(printed("spectrum", "shaken", "--of", "a_tip/g", "--json", "--no-plots"))
+    assert told["settled"]["multiple"] == 2
+    with open("shaken-spectrum/shock-tip.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["maximax"]) for row in rows] == told["shock"]["tip"]["maximax"]
+    assert (tmp_path / "shaken-spectrum" / "spectrum.png").stat().st_size > 10_000
+    assert "speed is unknown" in refused("spectrum", "shaken", "--of", "speed")
+    assert "must be above 0.5" in refused("spectrum", "shaken", "--quality", "0.4")
