@@ -39,7 +39,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 def fmu_folder() -> Path:
     """The folder with the built FMUs."""
     folder = ROOT / "fmus"
-    missing = [name for name in ("beam.fmu", "spring.fmu") if not (folder / name).is_file()]
+    missing = [name for name in ("beam.fmu", "spring.fmu", "beam3.fmu", "spring3.fmu") if not (folder / name).is_file()]
     if missing:
         pytest.fail(f"{', '.join(missing)} not in {folder}: run ./build.sh fmus")
     return folder

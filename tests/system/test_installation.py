@@ -17,13 +17,21 @@ from springbeam.scene.reading import tomllib
 ROOT = Path(__file__).parents[2]
 
 
-def test_doctor_finds_and_loads_both_fmus():
+@pytest.mark.parametrize(
+    ("version", "found"), [("2.0", "{}.fmu +FMI 2.0, .*linux64"), ("3.0", "{}3.fmu +FMI 3.0, .*x86_64-linux")]
+)
+def test_doctor_finds_and_loads_both_fmus(monkeypatch, version, found):
+    monkeypatch.setenv("SPRINGBEAM_FMI", version)
     shown = printed("doctor")
     assert metadata.version("springbeam") in shown
-    assert len(re.findall(r"^(?:beam|spring)\.fmu +loads; binaries for linux64", shown, re.M)) == 2
+    for name in ("beam", "spring"):
+        assert re.search(rf"^{found.format(name)}", shown, re.M)
 
 
 def test_doctor_says_what_is_wrong(monkeypatch, tmp_path):
+    monkeypatch.setenv("SPRINGBEAM_FMI", "4.0")
+    assert command("doctor").stdout.count("SPRINGBEAM_FMI = '4.0': must be 2.0 or 3.0") == 2
+    monkeypatch.delenv("SPRINGBEAM_FMI")
     (tmp_path / "beam.fmu").write_bytes(b"not an archive")
     monkeypatch.setenv("SPRINGBEAM_FMUS", str(tmp_path))
     result = command("doctor")
@@ -45,7 +53,8 @@ def test_a_wheel_brings_the_fmus_and_runs_where_there_is_no_checkout(wheel, tmp_
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         archive.extractall(tmp_path / "site")
-    assert {f"springbeam/fmus/{name}" for name in ("beam.fmu", "spring.fmu", "spring_beam.ssp")} <= names
+    fmus = [f"{name}.fmu" for name in ("beam", "spring", "beam3", "spring3")]
+    assert {f"springbeam/fmus/{name}" for name in (*fmus, "spring_beam.ssp")} <= names
     assert {f"springbeam/scene/shipped/{p.name}" for p in (ROOT / "master/springbeam/scene/shipped").iterdir()} <= names
     script = """
 import sys

@@ -8,19 +8,34 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
+from .protocol import FmuError
+
 #: Largest size of all members of an archive together, and largest number of them.
 MOST_BYTES, MOST_MEMBERS = 1 << 28, 10_000
 _ENCRYPTED = 0x1
+#: What the names of our FMUs end with, by version of FMI.
+_ENDINGS = {"2.0": "", "3.0": "3"}
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def fmu_directory() -> Path:
-    """Return where ``beam.fmu`` and ``spring.fmu`` are: $SPRINGBEAM_FMUS, the installed package, or the checkout."""
+    """Return where our FMUs are: $SPRINGBEAM_FMUS, the installed package, or the checkout."""
     chosen = os.environ.get("SPRINGBEAM_FMUS")
     if chosen:
         return Path(chosen)
     installed = _PACKAGE / "fmus"
     return installed if installed.is_dir() else _PACKAGE.parents[1] / "fmus"
+
+
+def own_fmu(name: str) -> Path:
+    """Return the file of our FMU ``name`` for the version of FMI that $SPRINGBEAM_FMI names, 2.0 (default) or 3.0.
+
+    Raises FmuError for another version.
+    """
+    version = os.environ.get("SPRINGBEAM_FMI") or "2.0"
+    if version not in _ENDINGS:
+        raise FmuError(f"SPRINGBEAM_FMI = {version!r}: must be {' or '.join(_ENDINGS)}")
+    return fmu_directory() / f"{name}{_ENDINGS[version]}.fmu"
 
 
 class UnsafeArchive(ValueError):

@@ -9,7 +9,7 @@ from pathlib import Path
 from ..scene import Beam, Scene, Spring
 from ..scene.partners import ForeignFmu, Partner
 from ..scene.tables import ORDINARY_SCHEMES
-from .archive import fmu_directory
+from .archive import fmu_directory, own_fmu
 from .elements import ELEMENTS
 from .fmu_bodies import FmuBeam, FmuSpring
 from .foreign import Findings
@@ -73,7 +73,7 @@ def findings(scene: Scene) -> dict[str, Findings]:
 
 def fingerprints(scene: Scene) -> dict[str, str]:
     """Return SHA-256 by name of the files that ``scene`` needs: FMUs and tables. Raises FmuError if one is missing."""
-    files = {f"{name}.fmu": fmu_directory() / f"{name}.fmu" for name in scene.fmus}
+    files = {path.name: path for path in map(own_fmu, scene.fmus)}
     files |= {spec.fmu: Path(spec.fmu) for spec in scene.foreign.values()}
     files |= {load.file: Path(load.file) for load in scene.loads if load.file is not None}
     found = {}

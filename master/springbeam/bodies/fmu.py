@@ -7,8 +7,9 @@ import difflib
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
-from ctypes import byref, c_char, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import byref, c_char, c_double, c_size_t, c_uint, c_void_p
 from functools import lru_cache, partial
+from math import prod
 from pathlib import Path
 from struct import Struct
 from types import FrameType
@@ -39,15 +40,18 @@ def _unpacked(path: Path, modified: int) -> tuple[Path, ModelDescription]:
 
 
 class Reals:
-    """Real numbers of an FMU, read and written together; the arguments are converted to C once."""
+    """Real numbers of an FMU, read and written together; the arguments are converted to C once.
 
-    def __init__(self, fmu: Fmu, *names: str) -> None:
-        n = len(names)
+    Each variable has ``size`` values.
+    """
+
+    def __init__(self, fmu: Fmu, *names: str, size: int = 1) -> None:
+        n = len(names) * size
         self._names = ", ".join(names)
         self._fmu = fmu
         self.values: Any = (c_double * n)()  #: as last read or written
         self._unpacked = partial(Struct(f"{n}d").unpack, self.values)
-        self._read, self._write = (fmu.accessor(verb, names, self.values) for verb in ("Get", "Set"))
+        self._read, self._write = (fmu.accessor(verb, names, self.values, size) for verb in ("Get", "Set"))
         if names:
             self.get()  # a wrong reference is found before the run
 
@@ -92,6 +96,7 @@ class Fmu:
         self._functions = functions = self._load()
         self._closed = False
         self.prepared, self.real = functions.prepared, functions.REAL
+        self.version = functions.VERSION  #: of FMI
         self._state = c_void_p()
         self._start = c_void_p()  #: as initialised, if it is kept
         self._worst = 0  #: status of the calls that have failed for good
@@ -162,7 +167,7 @@ class Fmu:
                 *[value.encode() if isinstance(value, str) else value for value in given]
             )
             references = self.references(names, kind)
-            calls.append(self._functions.accessor("Set", kind, references, values))
+            calls.append(self._functions.accessor("Set", kind, references, values, len(names)))
             self._parameters.update((name, (values, i)) for i, name in enumerate(names))
         return calls
 
@@ -192,9 +197,16 @@ class Fmu:
         """Whether every call so far did what it was asked for."""
         return self.usable and not self._refused
 
-    def accessor(self, verb: str, names: Sequence[str], values: Any) -> Call:
-        """Return what gets or sets (``verb``) variables that are real numbers by ``values``, an array of C."""
-        return self._functions.accessor(verb, self.real, self.references(names, self.real), values)
+    def accessor(self, verb: str, names: Sequence[str], values: Any, size: int = 1) -> Call:
+        """Return what gets or sets (``verb``) variables of ``size`` real numbers each by ``values``, an array of C."""
+        references = self.references(names, self.real, size)
+        return self._functions.accessor(verb, self.real, references, values, len(names) * size)
+
+    def array(self, name: str, size: int) -> Reals:
+        """Return all values of an array, of which FMI 2.0 knows the elements only."""
+        if name in self._variables:
+            return Reals(self, name, size=size)
+        return Reals(self, *[f"{name}[{i}]" for i in range(1, size + 1)])
 
     def variable(self, name: str) -> Any:
         """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""
@@ -205,22 +217,19 @@ class Fmu:
             meant = f"; did you mean {close[0]!r}?" if close else ""
             raise FmuError(f"{self.path}: has no variable {name!r}{meant}") from None
 
-    def references(self, names: Sequence[str], kind: str) -> Any:
-        """Return value references of variables of one type, as an array of C. Raises FmuError."""
+    def references(self, names: Sequence[str], kind: str, size: int = 1) -> Any:
+        """Return value references of variables of one type and size, as an array of C. Raises FmuError."""
         for name in names:
             if (variable := self.variable(name)).type != kind:
                 raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, expected {kind}")
-            if variable.shape:
+            if prod(variable.shape or ()) != size:
                 raise FmuError(f"{self.path}: variable {name!r} is an array; only single numbers can be used")
         return (c_uint * len(names))(*[int(self.variable(name).valueReference) for name in names])
 
     def input_derivatives(self, names: Sequence[str], orders: int, values: Any) -> Call:
         """Return what sets derivatives 1 … ``orders`` of inputs over the next step, those of one after another."""
-        n = len(names) * orders
-        each = [name for name in names for _ in range(orders)]
-        number = (c_int * n)(*list(range(1, orders + 1)) * len(names))
-        references = self.references(each, self.real)
-        return self.prepared("SetRealInputDerivatives", references, c_size_t(n), number, values)
+        each = [(name, order) for name in names for order in range(1, orders + 1)]
+        return self._functions.input_derivatives(each, self.references, values)
 
     def keep_start(self) -> None:
         """Remember the present state as the one `return_to_start` sets."""

@@ -7,7 +7,6 @@ from collections.abc import Callable, Hashable, Sequence
 from ctypes import byref, c_double, sizeof
 from functools import partial
 from math import isfinite
-from pathlib import Path
 from struct import Struct
 from typing import Any, ClassVar, NamedTuple, NoReturn
 
@@ -17,7 +16,7 @@ from typing_extensions import Self
 
 from ..scene import Beam, Load, Spring
 from ..scene.statics import SHAPE_POINTS
-from .archive import fmu_directory
+from .archive import own_fmu
 from .end_loaded import EndLoaded
 from .fmu import Fmu, Reals
 from .force import combined
@@ -244,7 +243,7 @@ class OwnBody(FmuBody):
     @classmethod
     def of(cls, *arguments: Any) -> Self:
         """Return a body made of ``arguments``, new or kept; both step to the same bits. Raises FmuError."""
-        path = _path(cls.NAME)
+        path = own_fmu(cls.NAME)
         key = (cls, path, path.stat().st_mtime_ns if path.is_file() else None, arguments)
         body = _kept.pop(key, None)
         if not isinstance(body, cls):
@@ -290,10 +289,6 @@ def release() -> None:
         _kept.popitem()[1].fmu.close()
 
 
-def _path(name: str) -> Path:
-    return fmu_directory() / f"{name}.fmu"
-
-
 class FmuBeam(OwnBody, BeamBody):
     """``beam.fmu`` as a body."""
 
@@ -318,11 +313,11 @@ class FmuBeam(OwnBody, BeamBody):
         parameters["initial_deflection_slope"] = deflection_slope
         parameters["section_height"] = beam.section_height
         parameters |= {f"point_force_position[{k}]": at for k, at in enumerate(self._points, 1)}
-        super().__init__(Fmu(self.NAME, _path(self.NAME), parameters, start_time))
+        super().__init__(Fmu(self.NAME, own_fmu(self.NAME), parameters, start_time))
 
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)
-        self._shape = Reals(fmu, *[f"deflection[{i}]" for i in range(1, len(SHAPE_POINTS) + 1)])
+        self._shape = fmu.array("deflection", len(SHAPE_POINTS))
         self._felt = Reals(fmu, "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
 
     def _mass(self) -> float:
@@ -368,7 +363,7 @@ class FmuSpring(OwnBody, EndLoaded):
         parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
         parameters["displacement"] = spring.equilibrium
         parameters["velocity"] = spring.initial_velocity
-        super().__init__(Fmu(self.NAME, _path(self.NAME), parameters, start_time))
+        super().__init__(Fmu(self.NAME, own_fmu(self.NAME), parameters, start_time))
 
     def _mass(self) -> float:
         return self._spring.mass

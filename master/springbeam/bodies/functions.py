@@ -119,9 +119,15 @@ class Functions:
         )
         return partial(function, c_void_p.from_param(self._instance.value), *fixed)
 
-    def accessor(self, verb: str, kind: str, references: Any, values: Any) -> Call:
+    def accessor(self, verb: str, kind: str, references: Any, values: Any, n_values: int) -> Call:
         """Return what gets or sets (``verb`` "Get", "Set") variables of one kind, by arrays of C."""
         return self.prepared(verb + self.KINDS[kind].function, references, c_size_t(len(references)), values)
+
+    def input_derivatives(
+        self, each: Sequence[tuple[str, int]], references: Callable[[Sequence[str], str], Any], values: Any
+    ) -> Call:
+        """Return what sets derivatives of inputs, by name and order, over the next step."""
+        raise NotImplementedError
 
     def initialising(self, time: c_double, given: Sequence[Call]) -> list[Call]:
         """Return the calls that bring a new instance to its first step at ``time``; ``given`` set its parameters."""
@@ -175,6 +181,13 @@ class Fmi2(Functions):
         )
         return made
 
+    def input_derivatives(
+        self, each: Sequence[tuple[str, int]], references: Callable[[Sequence[str], str], Any], values: Any
+    ) -> Call:
+        n = len(each)
+        names, orders = [name for name, _ in each], (c_int * n)(*[order for _, order in each])
+        return self.prepared("SetRealInputDerivatives", references(names, self.REAL), c_size_t(n), orders, values)
+
     def initialising(self, time: c_double, given: Sequence[Call]) -> list[Call]:
         no, nothing = c_int(0), c_double(0.0)
         set_up = self.prepared("SetupExperiment", no, nothing, time, no, nothing)
@@ -193,7 +206,10 @@ class Fmi2(Functions):
 
 
 class Fmi3(Functions):
-    """FMI 3.0: events stay inside the FMU, and a step goes to its end; inputs are held over a step."""
+    """FMI 3.0: events stay inside the FMU, and a step goes to its end.
+
+    Inputs are held over a step, but for those of our FMUs, whose derivatives are inputs.
+    """
 
     VERSION, PREFIX, FOLDER, REAL = "3.0", "fmi3", platform_tuple, "Float64"
     KINDS: ClassVar = {
@@ -222,9 +238,15 @@ class Fmi3(Functions):
         )
         return made
 
-    def accessor(self, verb: str, kind: str, references: Any, values: Any) -> Call:
+    def accessor(self, verb: str, kind: str, references: Any, values: Any, n_values: int) -> Call:
         n = c_size_t(len(references))
-        return self.prepared(verb + self.KINDS[kind].function, references, n, values, n)
+        return self.prepared(verb + self.KINDS[kind].function, references, n, values, c_size_t(n_values))
+
+    def input_derivatives(
+        self, each: Sequence[tuple[str, int]], references: Callable[[Sequence[str], str], Any], values: Any
+    ) -> Call:
+        names = [f"der({name}{f',{order}' if order > 1 else ''})" for name, order in each]
+        return self.accessor("Set", self.REAL, references(names, self.REAL), values, len(names))
 
     def initialising(self, time: c_double, given: Sequence[Call]) -> list[Call]:
         no, nothing = c_bool(False), c_double(0.0)

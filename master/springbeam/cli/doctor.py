@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import typer
 from rich.text import Text
 
-from ..bodies.archive import fmu_directory
+from ..bodies.archive import own_fmu
 from ..bodies.protocol import FmuError
 from ..scene import Beam, Scene, Spring, load_scene
 from ..scene.partners import kind_of
@@ -59,8 +59,11 @@ def doctor(
         ("ffmpeg", found["ffmpeg"] or "not found: springbeam animate then writes GIFs only, no MP4"),
     ]
     for name, fmu in fmus.items():
-        state = f"loads; binaries for {', '.join(fmu['platforms'])}" if fmu["error"] is None else "FAILED"
-        lines.append((f"{name}.fmu", f"{state}\n{'':<12}{fmu['error'] or fmu['path']}"))
+        state = (
+            f"FMI {fmu['fmi']}, loads; binaries for {', '.join(fmu['platforms'])}" if fmu["error"] is None else "FAILED"
+        )
+        file = fmu["path"].name if fmu["path"] else f"{name}.fmu"
+        lines.append((file, f"{state}\n{'':<12}{fmu['error'] or fmu['path']}"))
     for name, text in lines:
         console_for(silent=as_json).print(Text(f"{name:<12}{text}"), soft_wrap=True)
     if any(fmu["error"] is not None for fmu in fmus.values()):
@@ -104,9 +107,12 @@ def _found() -> dict[str, Any]:
     fmus = {}
     for name, body in (("beam", lambda: FmuBeam(Beam.with_ones(), 0.0, 0.0)),
                        ("spring", lambda: FmuSpring(Spring.with_ones(), 0.0))):  # fmt: skip
-        found: dict[str, Any] = {"path": fmu_directory() / f"{name}.fmu", "platforms": [], "error": None}
+        found: dict[str, Any] = {"path": None, "fmi": None, "platforms": [], "error": None}
         try:
-            body().close()
+            found["path"] = own_fmu(name)
+            made = body()
+            found["fmi"] = made.fmu.version
+            made.close()
             with zipfile.ZipFile(found["path"]) as archive:
                 binaries = {file.split("/")[1] for file in archive.namelist() if file.startswith("binaries/")}
             found["platforms"] = sorted(binaries)
