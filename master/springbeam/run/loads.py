@@ -21,6 +21,8 @@ from ..scene import Load, Scene
 
 #: Which loads act on which body.
 ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
+#: So many lines of a table in a step are data.
+_FINE = 4
 #: A jump closer to an end of a step than this share of it is at that end.
 _SAME = 1e-9
 #: Gauss–Legendre nodes on [−1, 1], and (2k + 1)/2 P_k there times the weights: exact for a cubic times P_2.
@@ -39,6 +41,18 @@ class Signal:
         self.kinks = load.kinks(macro_step)
         #: Lines of a table [s], which is a polynomial between them.
         self._lines = load.start + load.record.x if load.signal == "table" else None
+
+    def next_kink(self, time: float, size: float) -> float:
+        """Return when it next jumps or bends after ``time`` [s] in a way that is worth the end of a step; ∞ if not.
+
+        Lines of a table of which `_FINE` or more lie in a step of ``size`` [s] are data, and no kinks: the step has
+        their projection. But where the table begins and ends the load jumps.
+        """
+        kinks = self.kinks
+        index = bisect_right(kinks, time)
+        if 0 < index < len(kinks) - _FINE and kinks[index + _FINE - 1] < time + size:
+            return kinks[-1]
+        return kinks[index] if index < len(kinks) else inf
 
     def over(self, time: float, size: float) -> Force:
         """Return the projection onto a step of ``size`` [s] from ``time`` [s] on."""
@@ -113,8 +127,8 @@ class Loads:
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self._loads = scene.loads
         self._signals = [Signal(load, scene.coupling.macro_step) for load in scene.loads]
-        #: When loads jump or bend [s], ascending.
-        self.kinks = sorted({kink for signal in self._signals for kink in signal.kinks if kink < scene.time.t_end})
+        self._end = scene.time.t_end
+        self._kinked = [signal for signal in self._signals if signal.kinks]
         self._bodies: list[tuple[Body, list[int]]] = []
         self._last = (-1.0, 0.0)
         for body, places in ((beam, ON_BEAM), (spring, ON_SPRING)):
@@ -132,10 +146,13 @@ class Loads:
             for body, taken in self._bodies:
                 body.set_loads([forces[i] for i in taken])
 
-    def next_kink(self, time: float) -> float:
-        """Return when a load next jumps or bends after ``time`` [s]; ∞ if it does not before the end."""
-        index = bisect_right(self.kinks, time)
-        return self.kinks[index] if index < len(self.kinks) else inf
+    def next_kink(self, time: float, size: float) -> float:
+        """Return when a step of ``size`` [s] from ``time`` [s] on must end; ∞ if loads do not ask for it.
+
+        A step ends where a load jumps or bends (`Signal.next_kink`) before the run does.
+        """
+        kink = min((signal.next_kink(time, size) for signal in self._kinked), default=inf)
+        return kink if kink < self._end else inf
 
     def values(self, time: float) -> tuple[float, ...]:
         """Return the loads at ``time`` [s], each in its unit."""

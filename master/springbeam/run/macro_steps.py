@@ -113,8 +113,9 @@ class AdaptiveSteps(Stateful):
         """
         state, factor = self.state, _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
         if error <= 1.0:
-            wanted = size * min(factor, 1.0 if state.just_rejected else _GROW)
-            if not (self._cut and wanted < self.size):
+            # A step that ended on a kink tells of whole ones by the order, unless it was much shorter.
+            wanted = min(size * factor, self.size * (1.0 if state.just_rejected else _GROW))
+            if not (self._cut and (wanted < self.size or size < _SHORT_REMAINDER * self.size)):
                 state.number = self._rung_below(wanted)
             state.just_rejected = False
             return True

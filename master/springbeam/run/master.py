@@ -167,7 +167,7 @@ class Master(Stateful):
 
     def _step(self) -> None:
         state, steps, pair = self.state, self._steps, self._pair
-        kink = pair.loads.next_kink(state.time + _SAME_TIME * steps.size) if pair.loads.kinks else inf
+        kink = pair.loads.next_kink(state.time + _SAME_TIME * steps.size, steps.size) if pair.loads.any else inf
         target, size = steps.next(state.time, kink)
         step, event = self._advance(size)
         whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
