@@ -75,18 +75,11 @@ class Separation:
             return Push(EventKind.SEPARATION, lambda step: step.contact)
         return None
 
-    def _by_polynomial(self, state: State, step: Step, push: Push, macro_step: float) -> tuple[Step, EventKind] | None:
-        f = self._without_mismatch(state, step, push)
-        falling = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
-        if f[0] < 0.0:
-            # The sign at the start may be a false alarm: it is one if the ends, let go, close.
-            if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, push.event):
-                return self.no_step(step), push.event
-            step = self._pair.repeated(state, step)
-        if not falling:
-            return None
-        # The force is not equally good all over a step: the zero is brought to where it is best, and then stepped to.
-        zero, best = falling[0], self._pair.coupling(state.phase).sharpest
+    def _sharpened(self, zero: float, best: float, state: State, step: Step, push: Push, macro_step: float) -> float:
+        """Return where the force of a step vanishes, near ``zero`` [s]; it is the most accurate at the share ``best``.
+
+        Trial steps bring the zero there.
+        """
         room = self._pair.loads.next_kink(state.time + self._no_time * macro_step, macro_step) - state.time
         for _ in range(_MAX_LOOKS):
             size = min(max(zero / best, _SHORTEST_LOOK * macro_step), room)
