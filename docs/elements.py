@@ -17,7 +17,7 @@ from springbeam import Scene, load_scene, simulate, with_changes
 from springbeam.bodies.fmu_bodies import FmuBeam
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
-from springbeam.studies.verify.beam import clamped_free_frequencies
+from springbeam.studies.verify.alone import clamped_free_frequencies
 
 MESHES: tuple[tuple[int, int, int], ...] = (  # elements, degree, modes
     (1000, 1, 64), (1000, 1, 250), (500, 1, 0), (100, 1, 0), (50, 1, 0), (10, 5, 0),

@@ -19,8 +19,7 @@ from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.force import combined, shifted, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
 from springbeam.coupling.protocol import Step
-from springbeam.monolithic.loads import Loads
-from springbeam.monolithic.semi_discrete import modal_beam
+from springbeam.monolithic.semi_discrete import Loads, modal_beam
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped

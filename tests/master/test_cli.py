@@ -20,7 +20,7 @@ from runs import block
 import springbeam.run.runner
 from springbeam import cli
 from springbeam.cli import common
-from springbeam.cli.compare import results_of
+from springbeam.cli.look import results_of
 from springbeam.results.directory import PICTURES
 from springbeam.results.reading import load_trajectory
 from springbeam.results.steps import STEP

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.image import imread
 from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
 
-from springbeam.pictures import comparison, plots
+from springbeam.pictures import plots, timeline
 from springbeam.pictures.drawing import (
     EVENT_LOOKS,
     NOT_RESOLVED,
@@ -141,11 +141,11 @@ def test_panels_are_painted_with_all_that_they_say():
 def test_what_is_compared_is_drawn_in_the_unit_of_its_axis_and_with_what_strikes_it(tmp_path, monkeypatch):
     """One run is seated, the other struck twice: it has stems, not only a force of zero."""
     figures, drawn = [], []
-    monkeypatch.setattr(comparison.Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
+    monkeypatch.setattr(timeline.Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
     monkeypatch.setattr(Axes, "vlines", lambda ax, time, low, high, **_: drawn.append((ax.get_ylabel(), high)))
     run, zero = a_trajectory(), np.zeros(400)
     strokes = [Event(t, "stop_impact", 0, 0, 0, 0, 0.0, 0.6, 0.0) for t in (0.1, 0.3)]
-    comparison.draw({"one": run, "struck": a_trajectory(events=strokes, foundation_force=zero)}, tmp_path / "a.png")
+    timeline.draw_compared({"one": run, "struck": a_trajectory(events=strokes, foundation_force=zero)}, tmp_path / "a.png")
     units = {"u_tip": "[mm]", "v_tip": "[mm/s]", "contact_force": "[mN]"}
     for ax, (column, unit) in zip(figures[0].axes, units.items(), strict=False):
         assert ax.get_ylabel().endswith(unit)

@@ -11,7 +11,7 @@ from springbeam.contact import laws
 from springbeam.monolithic import event_driven
 from springbeam.monolithic import laws as references
 from springbeam.pictures.panels import forces
-from springbeam.pictures.report.described import described
+from springbeam.pictures.report import described
 from springbeam.run import runner
 from springbeam.scene import SceneError, load_scene, with_changes
 from springbeam.scene import laws as facts

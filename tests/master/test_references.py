@@ -15,7 +15,7 @@ from springbeam.monolithic.semi_discrete import assemble, modal_beam
 from springbeam.scene import Beam, load_scene, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
 from springbeam.studies import exact, verify
-from springbeam.studies.verify.beam import clamped_free_frequencies
+from springbeam.studies.verify.alone import clamped_free_frequencies
 
 
 def linear(**tables):

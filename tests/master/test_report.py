@@ -16,8 +16,7 @@ from runs import EVERY_EVENT, PAIR, SCENES, a_trajectory
 from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS
 from springbeam.pictures.frames import MOST_FRAMES
 from springbeam.pictures.panels import panels
-from springbeam.pictures.report import page, shipped_command
-from springbeam.pictures.report.described import described
+from springbeam.pictures.report import described, page, shipped_command
 from springbeam.results.directory import REPORT
 from springbeam.results.trajectory import Event
 from springbeam.scene import load_scene, scene_from_dict, shipped_scenes, with_changes

@@ -8,8 +8,8 @@ from commands import printed, refused
 
 from springbeam.run.runner import simulate
 from springbeam.scene import load_scene, with_changes
+from springbeam.studies.accuracy import pick_mesh
 from springbeam.studies.converge import Converge, settled
-from springbeam.studies.mesh import pick_mesh
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 

@@ -12,15 +12,15 @@ from scipy.special import airy
 
 from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.bodies.protocol import StepRefused
-from springbeam.cli.verify import report
+from springbeam.cli.checks import report
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.tie import SCHEMES
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
 from springbeam.studies import verify
-from springbeam.studies.verify.beam import _mesh_error, clamped_free_frequencies
+from springbeam.studies.verify.alone import _mesh_error, clamped_free_frequencies
 from springbeam.studies.verify.check import Check, section
-from springbeam.studies.verify.impact import _airy_overshoot
+from springbeam.studies.verify.coupled import _airy_overshoot
 
 
 @pytest.fixture(scope="module")

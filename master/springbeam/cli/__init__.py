@@ -15,7 +15,7 @@ from typing import Annotated
 
 import typer
 
-from . import compare, doctor, predict, report, resume, run, scenes, spectrum, studies, verify
+from . import checks, look, run, scenes, spectrum, studies
 from .common import STOPPED, Command, Group
 
 _WHAT = "A Timoshenko beam that strikes a Duffing spring above a rigid foundation: co-simulation of two FMUs."
@@ -74,10 +74,10 @@ def _common(
 
 _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Scenes": (scenes.scenes, scenes.keys, scenes.new),
-    "Run": (run.run, resume.resume, studies.sweep),
-    "Look": (report.report, report.animate, report.export, compare.compare, spectrum.spectrum),
-    "Choose scheme and accuracy": (predict.predict, studies.tradeoff, studies.converge),
-    "Check": (studies.crosscheck, verify.verify, studies.stability, doctor.doctor),
+    "Run": (run.run, studies.resume, studies.sweep),
+    "Look": (look.report, look.animate, look.export, look.compare, spectrum.spectrum),
+    "Choose scheme and accuracy": (scenes.predict, studies.tradeoff, studies.converge),
+    "Check": (studies.crosscheck, checks.verify, studies.stability, checks.doctor),
 }
 for title, commands in _COMMANDS.items():
     for command in commands:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import suppress
 from math import inf
 from pathlib import Path
@@ -95,16 +96,8 @@ def run(
         if accuracy is not None and not 0.0 < accuracy < 1.0:
             fail(BAD_INPUT, f"--accuracy {accuracy:g}: must be between 0 and 1, as in --accuracy 1e-4")
         what = load_scene(scene, settings or (), accuracy)
-        if checkpoint is not None and what.accuracy is not None:
-            fail(
-                BAD_INPUT,
-                f"--checkpoint {checkpoint:g}: a run with accuracy = {what.accuracy:g} is written when it is done, and "
-                "has nothing to resume before; leave one of the two out",
-            )
-        if interval is not None:
-            _check_interval(interval, what)
-        if mesh and what.accuracy is None:
-            fail(BAD_INPUT, "--mesh: picks a mesh that keeps an accuracy; give one, as in --accuracy 1e-3 --mesh")
+        for option, cause in _amiss(what, mesh, checkpoint, interval):
+            fail(BAD_INPUT, f"{option}: {cause}")
         for line in () if quiet or as_json else implausible(what):
             typer.echo(f"warning: {line}", err=True)
         made = picked(what, mesh)
@@ -126,16 +119,24 @@ def run(
     )
 
 
-def _check_interval(interval: float, scene: Scene) -> None:
-    cause = None
+def _amiss(scene: Scene, mesh: bool, checkpoint: float | None, interval: float | None) -> Iterator[tuple[str, str]]:
+    """Yield the options that the run of ``scene`` cannot have, and why."""
+    asked, apart = f"accuracy = {scene.accuracy or 0.0:g}", "leave one of the two out"
+    if checkpoint is not None and scene.accuracy is not None:
+        why = f"a run with {asked} is written when it is done, and has nothing to resume before; {apart}"
+        yield f"--checkpoint {checkpoint:g}", why
+    if mesh and scene.accuracy is None:
+        yield "--mesh", "picks a mesh that keeps an accuracy; give one, as in --accuracy 1e-3 --mesh"
+    if interval is None:
+        return
+    option = f"--output-interval {interval:g}"
     if not 0.0 < interval < inf:
-        cause = "must be a time above 0 s, as in --output-interval 1e-3"
+        yield option, "must be a time above 0 s, as in --output-interval 1e-3"
     elif scene.contact.algorithm:
-        cause = f'contact.law = "{scene.contact.law}" has no data between its steps; leave one of the two out'
+        yield option, f'contact.law = "{scene.contact.law}" has no data between its steps; {apart}'
     elif scene.time.t_end / interval > _MOST_ROWS:
-        cause = f"more than {_MOST_ROWS:,} rows up to time.t_end = {scene.time.t_end:g} s; take a longer one"
-    if cause is not None:
-        fail(BAD_INPUT, f"--output-interval {interval:g}: {cause}")
+        end = f"time.t_end = {scene.time.t_end:g} s"
+        yield option, f"more than {_MOST_ROWS:,} rows up to {end}; take a longer one"
 
 
 def picked(scene: Scene, mesh: bool = False) -> Trajectory | None:

@@ -1,4 +1,4 @@
-"""The commands that carry out a study: sweep, tradeoff, converge, crosscheck, stability.
+"""The commands that carry out a study: sweep, tradeoff, converge, crosscheck, stability; and resume.
 
 Each is a function that makes the study of its own options. `study_command` adds those that all studies share, `Frame`,
 and carries the study out: where records go, cost, progress, how it stops and goes on.
@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from ..results.directory import ResultsExist
+from ..results.directory import ResultsExist, RunDirectory
 from ..scene import load_scene
 from .common import (
     BAD_INPUT,
@@ -38,7 +38,9 @@ from .common import (
     fail,
     print_json,
     progress_bar,
+    results_directory,
 )
+from .run import carry_out as carry_out_run
 from .run import picked
 from .summary import picked_in_words
 
@@ -335,3 +337,38 @@ def _computed(study: Study, records: Records, console: Console, frame: Frame) ->
     processes = (frame.workers or os.cpu_count() or 1) if study.parallel else 0
     with records, dask_cluster(frame.scheduler) if frame.scheduler else nullcontext() as cluster, bar:
         return record_all(study, records, processes, cluster, report)
+
+
+def resume(
+    directory: Annotated[
+        Path, typer.Argument(metavar="DIR", help="The directory of the run or the study.", show_default=False)
+    ],
+    no_plots: NoPlotsOption = False,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Go on with a run or a study that was killed or stopped.
+
+    A run needs --checkpoint; its results are those of a run that was never stopped, to the last bit. A study (sweep,
+    tradeoff, converge, stability, crosscheck) goes on with the cases that have no record yet.
+
+    Example: springbeam resume results/soft
+    """
+    from ..run.runner import last_checkpoint
+    from ..studies.study import study_in
+
+    with bad_input_reported():
+        study = study_in(directory)
+        start = None if study is not None else last_checkpoint(results_directory(directory))
+    if start is not None:
+        carry_out_run(
+            start.scene,
+            RunDirectory(directory),
+            seconds=start.seconds,
+            start=start,
+            no_plots=no_plots,
+            quiet=quiet,
+            as_json=as_json,
+        )
+    elif study is not None:
+        carry_out(lambda: study, None, Frame(directory, False, no_plots, quiet, as_json))

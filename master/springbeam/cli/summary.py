@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Any
 
@@ -13,7 +13,7 @@ from rich.text import Text
 
 from ..results.directory import RunDirectory
 from ..results.reading import load_events, load_summary
-from ..results.totals import LOSS_NAMES, TOTALS
+from ..results.totals import in_words
 from ..results.trajectory import Event, rounded
 from ..scene import Scene
 
@@ -22,9 +22,8 @@ _FIRST_EVENTS, _LAST_EVENTS = 10, 3
 
 def report(console: Console, directory: RunDirectory, scene: Scene) -> None:
     """Print what a run has come to: its events, totals, residuals and warnings."""
-    summary = load_summary(directory.path)
+    summary, events = load_summary(directory.path), load_events(directory.path)
     console.print(Text(scene.title or "(untitled scene)", style="bold"))
-    events = load_events(directory.path)
     first = list(islice(events, _FIRST_EVENTS))
     kinds = Counter(event.kind for event in first)
     last: deque[Event] = deque(maxlen=_LAST_EVENTS)
@@ -36,26 +35,32 @@ def report(console: Console, directory: RunDirectory, scene: Scene) -> None:
         counts = ", ".join(f"{number} {kind}" for kind, number in kinds.most_common())
         console.print(f"events    {counts}")
         console.print("          (on the tip, of the stop: impulses, upward; lost: energy that the event takes)")
-    for line in _totals_in_words(summary):
+    results = Table.grid(padding=(0, 2))
+    for words, value in in_words(summary):
+        results.add_row(Text(words), Text(value))
+    console.print(results)
+    for line in _lines(summary):
         console.print(Text(line))
+    console.print(Text(f"results   {directory.path}"), soft_wrap=True)
+
+
+def _lines(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Yield how the run was made and how far it can be trusted."""
     if "macro_steps" in summary and "wall_time" in summary:
-        console.print(f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s")
+        yield f"run       {summary['macro_steps']} macro steps in {summary['wall_time']:.3g} s"
     if "coupling" in summary:
-        console.print(Text("coupling  {scheme} {degree}: {because}".format(**summary["coupling"])))
+        yield "coupling  {scheme} {degree}: {because}".format(**summary["coupling"])
     if "max_energy_residual" in summary:
         interface = summary.get("max_interface_residual")
         beside = "" if interface is None else f", of the interface {float(interface):.1e}"
-        console.print(f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}{beside}")
-    if "accuracy" in summary:
-        found = summary["accuracy"]
+        yield f"energy    largest relative residual {float(summary['max_energy_residual']):.1e}{beside}"
+    if (found := summary.get("accuracy")) is not None:
         errors = ", ".join(f"{value:.1e} ({name})" for name, value in found["estimated_errors"].items())
-        console.print(f"accuracy  {picked_in_words(found)}\n          errors at most {errors}")
+        yield f"accuracy  {picked_in_words(found)}\n          errors at most {errors}"
         if "estimated_mesh_error" in found:
             mesh = f"{found['picked']['n_elements']} elements"
-            console.print(f"mesh      {mesh}: error {found['estimated_mesh_error']:.1e} beside the continuous beam")
-    for warning in summary.get("warnings", ()):
-        console.print(Text(f"warning   {warning}"))
-    console.print(Text(f"results   {directory.path}"), soft_wrap=True)
+            yield f"mesh      {mesh}: error {found['estimated_mesh_error']:.1e} beside the continuous beam"
+    yield from (f"warning   {warning}" for warning in summary.get("warnings", ()))
 
 
 def picked_in_words(accuracy: Mapping[str, Any]) -> str:
@@ -84,29 +89,3 @@ def _event_table(first: list[Event], last: list[Event], between: int, scene: Sce
             *(f"{value:.3g}" if value else "" for value in (*impulses, event.energy_loss)),
         )
     return table
-
-
-def _totals_in_words(summary: Mapping[str, Any]) -> list[str]:
-    """Return what the run amounts to (`springbeam.results.totals`), a line per subject."""
-    lines = []
-    if "contact_impulse" in summary:
-        found = {name: f"{summary[name]:.4g} {unit}" for name, (_, unit) in TOTALS.items() if name in summary}
-        over = f"largest mean over {found['contact_force_window']}; pictures show instants, see docs/contact.md"
-        parts = [f"impulse {found['contact_impulse']}", f"peak force {found['contact_force_max']} ({over})"]
-        lines.append(f"contact   {', '.join(parts)}")
-        parts = []
-        if summary.get("contact_duration_total"):
-            parts.append(f"longest {found['contact_duration']}, in all {found['contact_duration_total']}")
-        if "rebound_velocity" in summary:
-            parts.append(f"the tip leaves at {found['rebound_velocity']}")
-        if parts:
-            lines.append(f"          {'; '.join(parts)}")
-    if "deepest_tip" in summary:
-        lines.append(f"tip       deepest at {summary['deepest_tip']:.4g} m, t = {summary['deepest_tip_time']:.4g} s")
-    if "stop_strokes" in summary:
-        strokes = "1 stroke" if summary["stop_strokes"] == 1 else f"{summary['stop_strokes']} strokes"
-        lines.append(f"stop      {strokes}, impulse {summary['foundation_impulse']:.4g} N·s")
-    lost = [f"{summary[name]:.4g} J by {words}" for name, words in LOSS_NAMES.items() if summary.get(name)]
-    if lost:
-        lines.append(f"lost      {', '.join(lost)}")
-    return lines

@@ -22,8 +22,7 @@ import numpy as np
 
 from ..scene import Scene, Spring, Stop
 from .laws import Motion, Phase, law_of
-from .loads import Loads
-from .semi_discrete import ModalBeam
+from .semi_discrete import Loads, ModalBeam
 
 #: What rounding leaves of a sum that is exactly zero, as a share of its terms.
 NOISE = 16.0 * float(np.finfo(float).eps)

@@ -9,15 +9,12 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
 
 from ..results.trajectory import Trajectory
-from .drawing import BLACK, GREY, LEVELS, STONE, VERMILLION, level_side, mark, time_unit
+from .drawing import BLACK, VERMILLION, level_side, mark, time_unit
 from .frames import Frames, Part, Sketch, frames_of, sketches
 from .panels import positions
 from .timeline import STYLE, line_style, paint, shade
@@ -111,7 +108,8 @@ class _Picture:
         self._words = self.figure.text(0.99, 0.985, "", fontsize=9.0, ha="right", va="top", family="monospace")
         if words := mark(trajectory):
             axes[0].set_title(words, fontsize=9.0, loc="right", color=VERMILLION, y=1.0)
-        self._freeze()
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")  # what stands still stays where it is
 
     def show(self, frame: int) -> None:
         frames = self.frames
@@ -122,36 +120,14 @@ class _Picture:
         phase = str(self.trajectory["phase"][frames.row[frame]])
         self._words.set_text(f"t = {time:.4f} {self._clock.name}  {phase:<7}")
 
-    def _freeze(self) -> None:
-        """Make one image of everything that stands still: it is drawn once, not for each frame."""
-        moving: list[Artist] = [line for line, _, _ in self._moving]
-        moving += [self._cursor, self._words]
-        for artist in moving:
-            artist.set_visible(False)
-        canvas = FigureCanvasAgg(self.figure)
-        canvas.draw()  # type: ignore[no-untyped-call]
-        self.figure.set_layout_engine("none")
-        for artist in [*self.figure.texts, *(child for ax in self.figure.axes for child in ax.get_children())]:
-            artist.set_visible(artist in moving)
-        still = np.array(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
-        self.figure.figimage(still, zorder=-1.0)
-
     def _sketch(self, ax: Axes, sketch: Sketch) -> None:
-        for block in sketch.blocks:
-            size = block.right - block.left, block.top - block.bottom
-            ax.add_patch(Rectangle((block.left, block.bottom), *size, color=STONE, lw=0.0))
-        if sketch.rest is None:
-            ax.xaxis.set_visible(False)
-        else:
-            ax.plot(sketch.rest, [0.0, 0.0], color=GREY, lw=0.6, ls=":")
-        for symbol, level in sketch.levels.items():
-            ax.plot(sketch.level_ends, [level, level], **line_style(LEVELS[symbol]))
-            ax.annotate(symbol, (sketch.level_ends[1], level), xytext=(3.0, 0.0), textcoords="offset points",
-                        va=level_side(symbol, sketch.levels))  # fmt: skip
-        for part, x, look in sketch.moving:
-            (line,) = ax.plot(x, np.zeros(len(x)), solid_capstyle="butt", **line_style(look))
-            self._moving.append((line, part, sketch.unit.factor))
-        ax.set_xlim(sketch.x)
-        ax.set_ylim(sketch.y)
-        ax.set_xlabel(f"position along the beam x [{sketch.along.name}]")
-        ax.set_ylabel(f"{sketch.quantity} [{sketch.unit.name}]")
+        labels = [stroke.label for stroke in sketch.strokes if stroke.label]
+        for look, x, y, part, label in sketch.strokes:
+            heights = np.zeros(len(x)) if y is None else y
+            (line,) = ax.plot(x, heights, solid_capstyle="butt", zorder=1.0 + (part is not None), **line_style(look))
+            ax.annotate(label, (x[-1], heights[-1]), xytext=(3.0, 0.0), textcoords="offset points",
+                        va=level_side(label, labels))  # fmt: skip
+            if part is not None:
+                self._moving.append((line, part, sketch.unit.factor))
+        ax.set(xlim=sketch.x, ylim=sketch.y, xlabel=f"position along the beam x [{sketch.along.name}]",
+               ylabel=f"{sketch.quantity} [{sketch.unit.name}]")  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -11,7 +11,10 @@ from ..results.trajectory import Trajectory
 from ..scene.statics import SHAPE_POINTS
 from .drawing import (
     BLUE,
+    GREY,
+    LEVELS,
     POSITIONS,
+    STONE,
     VERMILLION,
     Line,
     Look,
@@ -74,21 +77,14 @@ class Frames:
         return self.foot + float(self.y[frame] - self.foot) * COIL_HEIGHTS
 
 
-class Moving(NamedTuple):
-    """A line that moves up and down: where its corners are along the beam, in the sketch's unit."""
+class Stroke(NamedTuple):
+    """A line of a sketch, in its units; one without heights moves up and down with a part."""
 
-    part: Part
-    x: np.ndarray
     look: Look
-
-
-class Block(NamedTuple):
-    """A rectangle that stands still, in the sketch's units."""
-
-    left: float
-    right: float
-    bottom: float
-    top: float
+    x: np.ndarray
+    y: np.ndarray | None = None
+    part: Part | None = None
+    label: str = ""  #: at its right end
 
 
 @dataclass
@@ -103,11 +99,12 @@ class Sketch:
     height: float  #: [inch]
     x: tuple[float, float]
     y: tuple[float, float]
-    blocks: list[Block] = field(default_factory=list)
-    rest: tuple[float, float] | None = None  #: ends of the line of the undeformed beam
-    levels: dict[str, float] = field(default_factory=dict)  #: heights of Ψ and φ
-    level_ends: tuple[float, float] = (0.0, 0.0)
-    moving: list[Moving] = field(default_factory=list)
+    strokes: list[Stroke]  #: what moves first
+
+    @property
+    def moving(self) -> list[Part]:
+        """The parts that move."""
+        return [stroke.part for stroke in self.strokes if stroke.part is not None]
 
 
 def sketches(trajectory: Trajectory, frames: Frames) -> list[Sketch]:
@@ -138,30 +135,27 @@ def _sketch(
     name: str, heading: str, trajectory: Trajectory, frames: Frames, heights: tuple[float, float], begin: float = -0.02
 ) -> Sketch:
     """Return what there is between ``heights`` [m], from ``begin`` (a part of the beam's length) on."""
-    unit = readable_unit([np.array(heights)], "m")
+    unit, (along, length) = readable_unit([np.array(heights)], "m"), length_along(trajectory.scene)
     low, high = unit.factor * heights[0], unit.factor * heights[1]
-    along, length = length_along(trajectory.scene)
-    sketch = Sketch(name, heading, "height", unit, along, 3.0, (begin * length, 1.12 * length), (low, high))
-    if trajectory.scene.beam is None:
-        sketch.x = (0.5 * length, 1.5 * length)
-    else:
-        sketch.blocks, sketch.rest = [Block(-0.02 * length, 0.0, low, high)], (0.0, length)
-    inside = {symbol: unit.factor * height for symbol, height in frames.levels.items()}
-    sketch.levels = {symbol: height for symbol, height in inside.items() if low <= height <= high}
-    sketch.level_ends = left, right = length * (1.0 - _STOP_WIDTH), length * (1.0 + _STOP_WIDTH)
-    if "φ" in sketch.levels:
-        # Two blocks where a spring stands between them.
-        inner = 1.2 * _COIL_WIDTH * length if frames.y is not None else 0.0
-        for edges in ((left, length - inner), (length + inner, right)):
-            sketch.blocks.append(Block(*edges, low, sketch.levels["φ"]))
+    ends, half, strokes = length * np.array([1.0 - _STOP_WIDTH, 1.0 + _STOP_WIDTH]), _COIL_WIDTH * length, []
     if frames.y is not None:
-        half = _COIL_WIDTH * length
-        ends = np.array([length - 1.6 * half, length + 1.6 * half])
-        sketch.moving.append(Moving("coil", length + half * _COIL_ACROSS, Look(VERMILLION, "spring", Line(1.2))))
-        sketch.moving.append(Moving("top", ends, Look(VERMILLION, "its top y", Line(3.5))))
+        strokes.append(Stroke(Look(VERMILLION, "spring", Line(1.2)), length + half * _COIL_ACROSS, part="coil"))
+        across = length + 1.6 * half * np.array([-1.0, 1.0])
+        strokes.append(Stroke(Look(VERMILLION, "its top y", Line(3.5)), across, part="top"))
     if frames.deflection is not None:
-        sketch.moving.append(Moving("beam", length * SHAPE_POINTS, Look(BLUE, "beam u", Line(3.0))))
-    return sketch
+        strokes.append(Stroke(Look(BLUE, "beam u", Line(3.0)), length * SHAPE_POINTS, part="beam"))
+    begin_at, end_at = begin * length, 1.12 * length
+    if trajectory.scene.beam is None:
+        begin_at, end_at = 0.5 * length, 1.5 * length
+    else:
+        strokes.append(Stroke(Look(STONE, "clamp", Line(7.0)), np.zeros(2), np.array([low, high])))
+        strokes.append(Stroke(Look(GREY, "undeformed", Line(0.6, dashed=True)), np.array([0.0, length]), np.zeros(2)))
+    for symbol, height in ((symbol, unit.factor * height) for symbol, height in frames.levels.items()):
+        if low <= height <= high:
+            if symbol == "φ":
+                strokes.append(Stroke(Look(STONE, "foundation", Line(7.0)), ends, np.full(2, height)))
+            strokes.append(Stroke(LEVELS[symbol], ends, np.full(2, height), label=symbol))
+    return Sketch(name, heading, "height", unit, along, 3.0, (begin_at, end_at), (low, high), strokes)
 
 
 def frames_of(trajectory: Trajectory) -> Frames | None:

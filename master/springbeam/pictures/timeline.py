@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -28,7 +30,7 @@ from .drawing import (
     shaded_phases,
     time_unit,
 )
-from .panels import Curve, Panel
+from .panels import Curve, Panel, compared
 
 _DASHES = (0, (4, 2))
 
@@ -191,3 +193,16 @@ def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
     figure.suptitle(f"{title}\n{scene}" if scene else title, fontsize=10.0, x=0.01, ha="left")
     figure.text(0.99, 0.985, mark(trajectory), fontsize=8.0, weight="bold", color=VERMILLION, ha="right", va="top")
     return figure
+
+
+def draw_compared(runs: Mapping[str, Trajectory], path: Path) -> None:
+    """Draw runs by their names to ``path``, in the panels that any of them has something to show for."""
+    panels = compared(runs)
+    heights = [panel.height for panel in panels]
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 0.6 + sum(heights)), layout="constrained")
+        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        for ax, panel in zip(axes, panels, strict=True):
+            paint(ax, panel, Unit(1.0, "s"))
+            ax.label_outer()
+        figure.savefig(path, dpi=DPI)

@@ -19,7 +19,7 @@ it may then differ, but it cannot agree.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -41,7 +41,16 @@ from ..scene import Scene, with_changes
 from ..scene.automatic import with_scheme_chosen
 from ..scene.resolution import mesh_frequency
 from ..scene.statics import tip_compliance
-from .reference import PERTURBATION, reference_and_perturbed, refuse_without_reference
+from .reference import (
+    PERTURBATION,
+    SHORT,
+    away_from,
+    macro_points,
+    quantities,
+    reference_and_perturbed,
+    refuse_without_reference,
+    sample,
+)
 from .study import Findings, Row, Study
 from .tables import table
 
@@ -57,8 +66,6 @@ _ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 16
 _WINDOW_STEPS = 400
 #: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
 _RESOLVED = {"u_tip": 0.05, "y": 0.05, "v_tip": 0.25, "z": 0.25}
-#: Intervals of contact shorter than this many macro steps are no evidence either way.
-SHORT = 2.0
 #: Factor on what halving the macro step changes.
 _SAFETY = 4.0
 #: Least relative error of a step, where IDA's tolerance is not a looser one.
@@ -123,35 +130,6 @@ class Report:
             return "differs"
         whole = self.scene == self.asked and self.horizon >= self.asked.time.t_end * (1.0 - 1e-12)
         return "agrees" if self.rows and whole else "not comparable"
-
-
-def macro_points(scene: Scene) -> np.ndarray:
-    """Return the times of the macro grid of ``scene`` [s]."""
-    start, H, end = scene.contact_time or 0.0, scene.coupling.H, scene.time.t_end
-    return np.minimum(start + H * np.arange(np.floor((end - start) / H * (1.0 + 1e-9)) + 1.0), end)
-
-
-def away_from(times: np.ndarray, events: Iterable[float], size: float) -> np.ndarray:
-    """Return which of ``times`` are more than `SHORT` and a half macro steps of ``size`` [s] away from all events."""
-    apart = np.abs(times[:, None] - np.array([*events, np.inf]))
-    return np.asarray(np.all(apart > (SHORT + 0.5) * size, axis=1))
-
-
-def quantities(scene: Scene) -> list[str]:
-    """Return the columns that are compared."""
-    wanted = ("u_tip", "v_tip", "e_beam", "y", "z", "e_spring", "contact_force", *TOLD)
-    there = columns_of(scene).keys() - {"bending_stress"}  # which follows from strains: the references have none
-    return [name for name in wanted if name in there]
-
-
-def sample(run: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
-    """Return a quantity at macro points [s]; of the contact force the mean of both limits, the next row's smoothed."""
-    H, rows = run.scene.coupling.H, run.time
-    wanted = times + H * (name == "contact_force")
-    nearest = rows[np.searchsorted(rows, wanted - 1e-9 * H).clip(max=len(rows) - 1)]  # what is known at rows alone
-    wanted = np.where(np.abs(nearest - wanted) <= 1e-9 * H, nearest, wanted)
-    found = run.at(np.minimum(wanted, rows[-1]))[name if name != "contact_force" else "contact_force_smoothed"]
-    return np.where(wanted <= rows[-1], found, np.nan)
 
 
 def compare(scene: Scene) -> Report:

@@ -14,8 +14,7 @@ from ..monolithic import event_driven
 from ..results.contact_times import contact_changes
 from ..results.trajectory import Trajectory
 from ..scene import Scene
-from .crosscheck import SHORT, away_from, macro_points, quantities, sample
-from .reference import refuse_without_reference
+from .reference import SHORT, away_from, macro_points, quantities, refuse_without_reference, sample
 from .study import Findings, Row, Study
 from .tables import table
 

@@ -1,16 +1,20 @@
-"""The monolithic reference of a scene, and how long two solutions can be compared."""
+"""The monolithic reference of a scene, how long two solutions can be compared, and at which points."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 
 from ..monolithic import event_driven
 from ..results.contact_times import contact_changes
-from ..results.trajectory import Trajectory
+from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..scene import Scene, SceneError
 
 #: Relative change of the initial velocity that shows how fast two solutions separate, and how far that may grow.
 PERTURBATION, _GROWTH = 1e-7, 1e4
+#: Intervals of contact shorter than this many macro steps are no evidence either way.
+SHORT = 2.0
 
 
 def refuse_without_reference(scene: Scene) -> None:
@@ -64,3 +68,32 @@ def comparable_until(scene: Scene) -> float:
         if i >= len(others) or others[i].kind != kind or abs(others[i].time - time) > 1e-3 * end:
             return 0.5 * (time + (changes[i - 1].time if i else float(exact.time[0])))
     return end
+
+
+def macro_points(scene: Scene) -> np.ndarray:
+    """Return the times of the macro grid of ``scene`` [s]."""
+    start, H, end = scene.contact_time or 0.0, scene.coupling.H, scene.time.t_end
+    return np.minimum(start + H * np.arange(np.floor((end - start) / H * (1.0 + 1e-9)) + 1.0), end)
+
+
+def away_from(times: np.ndarray, events: Iterable[float], size: float) -> np.ndarray:
+    """Return which of ``times`` are more than `SHORT` and a half macro steps of ``size`` [s] away from all events."""
+    apart = np.abs(times[:, None] - np.array([*events, np.inf]))
+    return np.asarray(np.all(apart > (SHORT + 0.5) * size, axis=1))
+
+
+def quantities(scene: Scene) -> list[str]:
+    """Return the columns that are compared."""
+    wanted = ("u_tip", "v_tip", "e_beam", "y", "z", "e_spring", "contact_force", *TOLD)
+    there = columns_of(scene).keys() - {"bending_stress"}  # which follows from strains: the references have none
+    return [name for name in wanted if name in there]
+
+
+def sample(run: Trajectory, times: np.ndarray, name: str) -> np.ndarray:
+    """Return a quantity at macro points [s]; of the contact force the mean of both limits, the next row's smoothed."""
+    H, rows = run.scene.coupling.H, run.time
+    wanted = times + H * (name == "contact_force")
+    nearest = rows[np.searchsorted(rows, wanted - 1e-9 * H).clip(max=len(rows) - 1)]  # what is known at rows alone
+    wanted = np.where(np.abs(nearest - wanted) <= 1e-9 * H, nearest, wanted)
+    found = run.at(np.minimum(wanted, rows[-1]))[name if name != "contact_force" else "contact_force_smoothed"]
+    return np.where(wanted <= rows[-1], found, np.nan)

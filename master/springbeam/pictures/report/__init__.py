@@ -20,6 +20,9 @@ from plotly.offline import get_plotlyjs
 from ...results.totals import in_words
 from ...results.trajectory import Event, Trajectory, rounded
 from ...scene import Scene, load_scene, shipped_scenes
+from ...scene.automatic import with_scheme_chosen
+from ...scene.partners import kind_of
+from ...scene.statics import bending_stiffness, shear_stiffness
 from ..drawing import (
     ALTERNATES,
     EVENT_LOOKS,
@@ -35,7 +38,6 @@ from ..drawing import (
 )
 from ..frames import COIL_HEIGHTS, Frames, Sketch, frames_of, sketches
 from .charts import Chart, backdrop, charts, moving_chart
-from .described import described
 
 _HERE = Path(__file__).parent
 #: Rows of the table of events.
@@ -175,10 +177,7 @@ def _data(trajectory: Trajectory, drawn: list[Chart], moving: list[Sketch], fram
             "y": frames.y,
             "foot": frames.foot,
             "coil": COIL_HEIGHTS,
-            "parts": {
-                sketch.name: {"factor": sketch.unit.factor, "traces": [part for part, _, _ in sketch.moving]}
-                for sketch in moving
-            },
+            "parts": {sketch.name: {"factor": sketch.unit.factor, "traces": sketch.moving} for sketch in moving},
         }
     return data
 
@@ -196,3 +195,36 @@ def _as_script(data: dict[str, Any] | None) -> str:
     """Return JSON that can stand inside a script element."""
     text = json.dumps(data, default=np.ndarray.tolist, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c")
+
+
+def described(scene: Scene) -> Iterator[tuple[str, str]]:
+    """Return what each part of the scene is, in the order of the drawing from above."""
+    beam, spring, stop, contact = scene.beam, scene.spring, scene.stop, scene.contact
+    if beam is not None:
+        mesh = "no inertia" if beam.fidelity == "quasi_static" else f"{beam.n_elements} elements"
+        if beam.fidelity == "dynamic" and beam.n_modes:
+            mesh += f", {beam.n_modes} modes"
+        mass = beam.density * beam.area * beam.length
+        stiffness = f"EI = {bending_stiffness(beam):.4g} N·m², KAG = {shear_stiffness(beam):.4g} N"
+        yield "beam", f"length {beam.length:.4g} m, mass {mass:.4g} kg, stiffness {stiffness}; {mesh}"
+    if spring is not None:
+        cubic = f", cubic stiffness {spring.cubic_stiffness:.4g} N/m³" if spring.cubic_stiffness else ""
+        stiffness = f"stiffness {spring.linear_stiffness:.4g} N/m{cubic}"
+        yield "spring", f"mass {spring.mass:.4g} kg, {stiffness}, its top at rest at Ψ = {spring.equilibrium:.4g} m"
+    for table, partner in scene.partners.items():
+        yield table, f"another body in its place: {kind_of(partner).replace('_', ' ')}"
+    if scene.coupled:
+        values = {key: getattr(contact, key) for key in contact.facts.takes if key != "impact"}
+        numbers = [f"{key} {value:.4g}" for key, value in values.items() if key != "damping" or value > 0.0]
+        yield "contact", f"{contact.law}: {', '.join([contact.facts.words, *numbers])}"
+    if stop is not None:
+        rebound = "elastic" if scene.elastic_stop else f"restitution {stop.restitution:.4g}"
+        yield "foundation", f"at φ = {stop.position:.4g} m, {rebound}"
+    for i, load in enumerate(scene.loads):
+        what = f"{load.signal.replace('_', '-')} on the {load.on}, {load.peak:.4g} {load.unit}"
+        yield f"load_{i}", what + (f", {load.frequency:.4g} Hz" if load.frequency else "")
+    H = scene.coupling.macro_step
+    length = "macro steps that follow from tolerances" if H is None else f"macro step {H:.4g} s"
+    ran, picked = with_scheme_chosen(scene)
+    scheme = f"{ran.coupling.scheme} of degree {ran.coupling.degree}" + ("" if picked is None else ", picked by auto")
+    yield "steps", f"{scheme}, {length}, to {scene.time.t_end:.4g} s"

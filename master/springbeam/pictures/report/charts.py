@@ -15,7 +15,6 @@ from ..drawing import (
     GREY,
     LEVELS,
     MANY_EVENTS,
-    STONE,
     Look,
     Marker,
     event_marks,
@@ -131,26 +130,15 @@ def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
     """Draw a sketch at the first frame; the page's script moves it."""
     figure = go.Figure(layout=_layout(_height_of(sketch.height)))
     figure.update_layout(hovermode="closest", margin_r=30, showlegend=len(sketch.moving) > 1)
-    figure.update_xaxes(
-        range=list(sketch.x), title_text=f"position along the beam x [{sketch.along.name}]",
-        visible=sketch.rest is not None,
-    )  # fmt: skip
+    figure.update_xaxes(range=list(sketch.x), title_text=f"position along the beam x [{sketch.along.name}]")
     figure.update_yaxes(range=list(sketch.y), title_text=f"{sketch.quantity} [{sketch.unit.name}]", zeroline=False)
-    for block in sketch.blocks:
-        corners = {"x0": block.left, "x1": block.right, "y0": block.bottom, "y1": block.top}
-        figure.add_shape(type="rect", **corners, line={"width": 0.0}, fillcolor=STONE, layer="below")
-    if sketch.rest is not None:
-        dotted = {"color": GREY, "width": 1.0, "dash": "dot"}
-        figure.add_shape(type="line", x0=sketch.rest[0], x1=sketch.rest[1], y0=0.0, y1=0.0, line=dotted)
-    begin, end = sketch.level_ends
-    for symbol, level in sketch.levels.items():
-        figure.add_shape(type="line", x0=begin, x1=end, y0=level, y1=level, line=_line_style(LEVELS[symbol]))
-        figure.add_annotation(x=end, y=level, text=symbol, showarrow=False, xanchor="left", xshift=3)
-    for part, x, look in sketch.moving:
+    for look, x, y, part, label in sketch.strokes:
+        shown = part in ("beam", "top")
         figure.add_scatter(
-            x=x, y=sketch.unit.factor * frames.heights(part, 0), mode="lines", meta=part, name=look.words,
-            line=_line_style(look), hoverinfo="skip" if part == "coil" else None,
-            hovertemplate=None if part == "coil" else f"%{{y:.6g}} {sketch.unit.name}",
+            x=x, y=sketch.unit.factor * frames.heights(part, 0) if part is not None else y, mode="lines+text",
+            text=["", label] if label else None, textposition="middle right", cliponaxis=False, meta=part,
+            name=look.words, line=_line_style(look), showlegend=part is not None, hoverinfo=None if shown else "skip",
+            hovertemplate=f"%{{y:.6g}} {sketch.unit.name}" if shown else None,
         )  # fmt: skip
     return Chart(sketch.name, sketch.heading, figure)
 

@@ -82,7 +82,7 @@
   function show(k) {
     slider.value = k;
     for (const [name, move] of Object.entries(motion.parts)) {
-      Plotly.restyle(name, { y: move.traces.map((part) => heights(part, move, k)) });
+      Plotly.restyle(name, { y: move.traces.map((part) => heights(part, move, k)) }, [...move.traces.keys()]);
     }
     shown = page.unit.factor * motion.time[k];
     cursors.forEach(place);

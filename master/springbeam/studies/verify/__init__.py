@@ -8,20 +8,19 @@ A new exact solution is a function in one of the modules beside this one, made a
 
 from __future__ import annotations
 
-from .beam import (
+from .alone import (
     all_lost,
     bar_frequencies,
     beam_energy,
+    duffing,
+    escape,
     frequencies,
     mesh_convergence,
     static_deflection,
     stiff_frequency,
 )
-from .coupling import added_mass, energy_scheme, two_masses
-from .impact import bar_impact
+from .coupled import added_mass, bar_impact, energy_scheme, moving_base, pulse, resonance, slow_ramp, two_masses
 from .laws import compliant_impact, damped_link, hunt_crossley, linked_masses, tied_masses
-from .loads import moving_base, pulse, resonance, slow_ramp
-from .spring import duffing, escape
 
 #: In the order of the table. Each raises FmuError if an FMU cannot be found, loaded or initialised.
 SECTIONS = (

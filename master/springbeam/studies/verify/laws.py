@@ -17,8 +17,8 @@ from ...results.trajectory import Trajectory
 from ...run.runner import simulate
 from ...scene import Scene
 from .. import exact
+from .alone import IDA, ida_error
 from .check import Check, section
-from .spring import IDA, ida_error
 
 #: The masses that meet [kg], and λ_nc between them [N/m^q].
 _TIP, _TOP, _STIFFNESS = 0.5, 2.0, 1e4

@@ -1,0 +1,315 @@
+"""Both FMUs coupled: ordinary exchanges, energy kept by `energy`, a bar on a stop, loads that vary; SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from itertools import product
+from math import cos, nan, pi, sin, sqrt
+from typing import Any
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.linalg import expm
+from scipy.special import ai_zeros, itairy, j0, spherical_jn
+
+from ...bodies.fmu import Reals
+from ...bodies.fmu_bodies import FmuBeam, FmuSpring
+from ...bodies.protocol import NO_FORCE
+from ...run.runner import simulate
+from ...scene import Beam, Coupling, Scene, Spring, Time, load_scene, scene_from_dict, with_changes
+from .alone import IDA, clamped_free_frequencies, free_end, ida_error, transfer_rate
+from .check import EPS, UNIT_FORCE, Check, section
+
+
+@section("Coupling: two masses, held exchange, ρ ≈ 1 + cπ²H²")
+def two_masses() -> Iterator[Check]:
+    """m = 1, 1; k = 4π², 16π² (between them), 4π²: spectral radius ρ ≈ 1 + cπ²H² of held exchanges, exact subsystems.
+
+    Eigenfrequencies 2π and 6π. A held input arrives H/2 late on average (one step late: 3H/2; computed with the new
+    value: H/2 early); a delay τ of a stiffness k is a damping −kτ, and the mode (1, −1) grows by what it then gains.
+    """
+    k_own, k_between = 4.0 * pi**2, 16.0 * pi**2
+    sizes = (1e-3, 5e-4)
+    by_force = Spring.with_ones(linear_stiffness=k_own)
+    by_displacement = Spring.with_ones(linear_stiffness=k_own + k_between)
+    with closing(FmuSpring(by_force, 0.0)) as f, closing(FmuSpring(by_displacement, 0.0)) as d:
+        load = Reals(d.fmu, "external_force")
+
+        def linked(y: float, z: float, stretch: float, size: float) -> tuple[float, float]:
+            f.restart(0.0, y, z)
+            f.advance(0.0, size, (-k_between * stretch, 0.0, 0.0))
+            return f.motion()[:2]
+
+        def beside(y: float, z: float, other: float, size: float) -> tuple[float, float]:
+            d.restart(0.0, y, z)
+            load.set([k_between * other])
+            d.advance(0.0, size, NO_FORCE)
+            return d.motion()[:2]
+
+        # From displacement and velocity of both, and the first one's displacement a step ago, to the same at the end.
+        names = ("force–displ. Jacobi", "… one step late", "… Gauss–Seidel", "displ.–displ. Jacobi", "… Gauss–Seidel")
+        steps: tuple[Callable[..., tuple[float, ...]], ...] = (
+            lambda H, y1, z1, y2, z2, _: (*linked(y1, z1, y2 - y1, H), *beside(y2, z2, y1, H), y1),
+            lambda H, y1, z1, y2, z2, ago: (*linked(y1, z1, y2 - ago, H), *beside(y2, z2, y1, H), y1),
+            lambda H, y1, z1, y2, z2, _: (*(first := linked(y1, z1, y2 - y1, H)), *beside(y2, z2, first[0], H), y1),
+            lambda H, y1, z1, y2, z2, _: (*beside(y1, z1, y2, H), *beside(y2, z2, y1, H), y1),
+            lambda H, y1, z1, y2, z2, _: (*(first := beside(y1, z1, y2, H)), *beside(y2, z2, first[0], H), y1),
+        )
+        w = 6.0 * pi
+        truncation = k_between / pi**2 * (w * sizes[0]) ** 4
+        solver = ida_error(w * sizes[1]) / (pi * sizes[1]) ** 2 * 4.0 / 3.0
+        reason = "H = 1e-3 and 5e-4 s extrapolated to 0: k/π²·(6πH)⁴ left; and IDA's ωH·ε^(5/6) over π²H²"
+        for name, step, exact in zip(names, steps, (6.0, 10.0, 2.0, 4.0, 0.0), strict=True):
+            c = []
+            for size in sizes:
+                columns = np.array([step(size, *unit) for unit in np.eye(5)])
+                radius = float(np.abs(np.linalg.eigvals(columns.T)).max())
+                c.append((radius - 1.0) / (pi * size) ** 2)
+            yield Check(f"{name}: c", exact, (4.0 * c[1] - c[0]) / 3.0, truncation + solver, reason)
+
+
+@section("Coupling: gain of the tie by displacement exchange")
+def added_mass() -> Iterator[Check]:
+    """Fixed-point gain of the tie by displacement exchange: beam ∂u/∂C over spring −∂y/∂C, C held over a step H.
+
+    Beam as a bar (θ kept at rest by a huge ρI), no echo before 2L/c: u = C H/Z, Z = √(KAG·ρA), on a spring that
+    answers as a free mass: gain 2m/(ZH). A half-infinite P1 mesh has the tip compliance 1/(s Z √(1 + (s h/c)²/12)) in
+    the Laplace domain, so with ω_c = √12 c/h
+
+        u(H) = C/Z ∫₀ᴴ (H − σ) ω_c J₀(ω_c σ) dσ:    H/Z for ω_c H ≫ 1,    √3 H²/(ρA h) for ω_c H ≪ 1.
+    """
+    n, m, inertia = 100, 1.0, 1e8
+    cutoff = sqrt(12.0) * n
+    beam, spring = (
+        Beam.with_ones(n_elements=n, second_moment_of_area=inertia),
+        Spring.with_ones(mass=m, linear_stiffness=0.0),
+    )
+
+    def gain(size: float) -> float:
+        with closing(FmuBeam(beam, 0.0, 0.0)) as upper, closing(FmuSpring(spring, 0.0)) as lower:
+            upper.advance(0.0, size, UNIT_FORCE)
+            lower.advance(0.0, size, UNIT_FORCE)
+            return -upper.motion().displacement / lower.motion().displacement
+
+    def mesh_gain(size: float) -> float:
+        value, _ = quad(lambda s: (size - s) * cutoff * j0(cutoff * s), 0.0, size, limit=1000, epsabs=1e-13)
+        return float(2.0 * m / size**2 * value)
+
+    ripples = "ripples of the P1 mesh around the bar: √(2/π)(ω_c H)^(−3/2), next order 2/(ω_c H)"
+    for size in (0.1, 0.5):
+        x, exact = cutoff * size, 2.0 * m / size
+        bound = exact * sqrt(2.0 / pi) * x**-1.5 * (1.0 + 2.0 / x)
+        yield Check(f"2m/(ZH), H = {size:g} s", exact, gain(size), bound, ripples)
+    limit = 2.0 * sqrt(3.0) * m * n
+    size = 1e-6
+    bound = limit * ((cutoff * size) ** 2 / 24.0 + (2 * n) ** 2 * EPS)
+    reason = "J₀'s next term, (ω_c H)²/24; rounding ε N², N = 2n"
+    yield Check("H → 0: 2√3 m/(ρA h)", limit, gain(size), bound, reason)
+    for size in (0.01, 0.1):
+        exact = mesh_gain(size)
+        bound = exact * (size**2 / inertia + (2 * n) ** 2 * EPS)
+        reason = "θ moves all the same, KAG H²/ρI; rounding ε N², N = 2n"
+        yield Check(f"P1 mesh, H = {size:g} s", exact, gain(size), bound, reason)
+
+
+#: κ [N] and H [s].
+_TIED = ((1.0, 0.01), (1e4, 1e-3), (1e4, 0.1))
+
+
+@section("Coupling: energy scheme, tied, undamped", *((*pair, degree) for pair, degree in product(_TIED, (0, 1, 2))))
+def energy_scheme(kappa: float, size: float, degree: int) -> Iterator[Check]:
+    """Beam and nonlinear spring, tied and undamped: the `energy` scheme keeps the energy, whatever H.
+
+    A constant load pulls the spring down from rest, so that the pair swings below Ψ and stays tied.
+    """
+    steps, n = 100, 50
+    reason = "relative drift in 100 steps: coupling.tolerance of each step's work, at most twice the energy; and " + IDA
+    spring = Spring.with_ones(linear_stiffness=3.0, cubic_stiffness=100.0, external_force=-0.1 * kappa)
+    scene = Scene(
+        time=Time(t_end=steps * size),
+        beam=Beam.with_ones(young_modulus=kappa, shear_modulus=kappa, n_elements=n),
+        spring=spring,
+        coupling=Coupling(scheme="energy", degree=degree, macro_step=size),
+    )
+    run = simulate(scene)
+    stiffness = spring.linear_stiffness + 3.0 * spring.cubic_stiffness * float(np.abs(run["y"]).max()) ** 2
+    solver = ida_error(sqrt(stiffness / spring.mass) * steps * size)
+    tied = bool(np.all(run["phase"] == "tied"))
+    drift = float(run.summary["max_energy_residual"]) if tied else nan
+    name = f"degree {degree}, ω_max H = {sqrt(12.0 * kappa) * n * size:.0f}"
+    yield Check(name, 0.0, drift, 2.0 * steps * scene.coupling.tolerance + solver, reason)
+
+
+@section("Impact: elastic bar on a rigid stop", (100,), (200,))
+def bar_impact(n: int) -> Iterator[Check]:
+    """Elastic bar on a rigid stop: u_tt = u_xx, u(0) = 0, u⁰ = x/2, u_t⁰ = 0, tip stopped at 0 (scene `bar-impact`).
+
+    d'Alembert: period 3; approach 0–1 with tip speed −1/2, contact 1–2 with force 1/2 and impulse 1/2, release 2–3;
+    energy 1/8. (EI → ∞ keeps θ = 0, so that the Timoshenko beam is this bar.)
+
+    P1 elements disperse, ω ≈ k (1 + k²h²/24): after the time t a front is an integrated Airy function of the width
+    (t h²/8)^⅓, which overshoots; and the tip, let go, moves in ripples of the relative size √(2/π)(ω_c t)^(−3/2),
+    ω_c = √12/h (see `added_mass`). The tip's own mass is stopped at once, and its energy lost.
+    """
+    h = 1.0 / n
+    scene = with_changes(load_scene("bar-impact"), beam={"n_elements": n}, coupling={"macro_step": 0.5 * h})
+    run = simulate(scene)
+    begins = [event.time for event in run.events if event.kind == "seated"]
+    ends = [event.time for event in run.events if event.kind == "separation"]
+    begin, end = (begins[0], ends[-1]) if begins and ends else (nan, nan)
+    time, force, tip = run["time"], run["foundation_force"], run["u_tip"]
+    impulse = float(force[1:] @ np.diff(time)) + sum(event.impulse_foundation for event in run.events)
+    held = (time > begin) & (time < end) & (run["phase"] == "seated")
+
+    x = sqrt(12.0) * n  # ω_c t at contact
+    ripples = sqrt(2.0 / pi) * x**-1.5 * (1.0 + 2.0 / x)
+    front = {t: (t * h * h / 8.0) ** (1.0 / 3.0) for t in (2.0, 3.0)}
+    duration = front[2.0] + scene.coupling.H + ripples
+    energy_of_tip = 0.5 * h / (2.0 * sqrt(3.0)) * (0.5 * _airy_overshoot()) ** 2
+
+    returning = "P1 spreads the returning front to the Airy width (t h²/8)^⅓, t = 2, seen to H"
+    rows = (
+        ("contact begins [s]", 1.0, begin, ripples, "P1 ripples of the tip √(2/π)(ω_c t)^(−3/2), ω_c = √12/h"),
+        ("contact ends [s]", 2.0, end, duration, returning),
+        ("contact lasts [s]", 1.0, end - begin, duration + ripples, returning),
+        ("impulse [N·s]", 0.5, impulse, 0.5 * duration, "force 1/2 for the error of the duration"),
+        (
+            "u_tip in contact [m]",
+            0.0,
+            float(np.abs(tip[held]).max()) if held.any() else nan,
+            scene.coupling.tolerance,
+            "coupling.tolerance of the motion in a step, which is < 1 m",
+        ),
+        ("u_tip(3) [m]", 0.5, float(tip[-1]), front[3.0], "velocity turns by 1 m/s over the Airy width at t = 3"),
+        (
+            "energy at t = 3 [J]",
+            0.125,
+            float(run["e_beam"][-1]),
+            energy_of_tip,
+            "kinetic energy of the mass h/2√3 that the tip stops with: speed 1/2 times Airy's overshoot 1.27",
+        ),
+    )
+    for row in rows:
+        yield Check(f"n = {n}: {row[0]}", *row[1:])
+
+
+def _airy_overshoot() -> float:
+    """Return the largest value of a dispersed unit step, ∫ Ai from Ai's first zero to ∞: 1.274."""
+    return float(1.0 / 3.0 + itairy(-ai_zeros(1)[0][0])[2])
+
+
+_N = 2 * 2 * 8  #: unknowns of the beam
+
+
+def _loaded(t_end: float, macro_step: float, loads: list[dict[str, Any]], **bodies: Any) -> Scene:
+    tables = {name: body.model_dump(exclude_none=True) for name, body in bodies.items()}
+    coupling = {"macro_step": macro_step, "degree": 2}
+    return scene_from_dict({**tables, "time": {"t_end": t_end}, "coupling": coupling, "loads": loads})
+
+
+def _beam(**changes: Any) -> Any:
+    return Beam.with_ones(n_elements=2, element_degree=8, approach="elastic", **changes)
+
+
+@section("Loads: a damped beam driven at its tip, amplitude and phase", (0.8,), (1.0,), (2.5,))
+def resonance(factor: float) -> Iterator[Check]:
+    """Amplitude and phase of the tip under a tip force of 1 N at ``factor`` ω₁, after the transient.
+
+    Exact, of the beam itself: a transfer matrix with EI and KAG times 1 + iωα_b.
+    """
+    alpha, per_period = 0.4, 64
+    first = clamped_free_frequencies()[0]
+    w = factor * first
+    H = 2.0 * pi / w / per_period
+    # The slowest transient, e^{−α_b ω₁² t/2}, is below rounding of the amplitude.
+    periods = int(40.0 / (0.5 * alpha * first**2) * w / (2.0 * pi)) + 1
+    drive = {"on": "tip", "signal": "harmonic", "frequency": w / (2.0 * pi)}
+    run = simulate(_loaded(periods * per_period * H, H, [drive], beam=_beam(alpha_b=alpha)))
+    last = slice(-per_period, None)
+    found = 2j * np.mean(run.u_tip[last] * np.exp(-1j * w * run.time[last]))
+    exact = _tip_receptance(w, alpha)
+    left_out = 14.0 * float(spherical_jn(3, 0.5 * w * H)) * 4.0 / 3.0
+    reason = "what a polynomial of degree 2 leaves of the sine, 7 j₃(ωH/2) each way, on the static compliance 4/3"
+    yield Check(f"{factor:g} ω₁: amplitude [m]", abs(exact), abs(found), left_out, reason)
+    angles = float(np.angle(exact)), float(np.angle(found))
+    yield Check(f"{factor:g} ω₁: phase [rad]", *angles, left_out / abs(exact), reason)
+
+
+def _tip_receptance(w: float, alpha: float) -> complex:
+    """Return u(L)/C [m/N] at ``w`` [rad/s]: M = 0 and Q = C at the tip."""
+    across = expm(transfer_rate(w, 1.0 / (1.0 + 1j * w * alpha)))
+    start = np.linalg.solve(free_end(across), [0.0, 1.0])
+    return complex(across[2, [1, 3]] @ start)
+
+
+@section("Loads: half-sine pulse on an oscillator")
+def pulse() -> Iterator[Check]:
+    """Undamped spring, m = 1, k = 4π², under a half-sine pulse of F = 3 N and T = 0.3 s that begins off the macro grid.
+
+    y = F/k (sin Ωt − r sin ωt)/(1 − r²) with Ω = π/T and r = Ω/ω; then it swings freely.
+    """
+    stiffness, force, duration, start = 4.0 * pi**2, 3.0, 0.3, 0.0123
+    w, rate = sqrt(stiffness), pi / duration
+    r, scale = rate / w, force / stiffness
+    y = -scale * r * sin(w * duration) / (1.0 - r * r)
+    z = scale * rate * (-1.0 - cos(w * duration)) / (1.0 - r * r)
+    shock = {"on": "spring", "signal": "half_sine", "amplitude": force, "start": start, "duration": duration}
+    run = simulate(_loaded(start + duration + 1.25, 0.01, [shock], spring=Spring.with_ones(linear_stiffness=stiffness)))
+    at = int(np.argmin(np.abs(run.time - start - duration)))
+    bound = 1e-9 * scale
+    reason = "IDA's tolerance, 1e-12 a step; the pulse loses 7 j₃(ΩH/2)² < 1e-9 of itself"
+    later = (y * cos(1.25 * w) + z / w * sin(1.25 * w), z * cos(1.25 * w) - y * w * sin(1.25 * w))
+    worked = 0.5 * (z * z + stiffness * y * y)
+    yield Check("y at its end [m]", y, float(run.y[at]), bound, reason)
+    yield Check("ẏ at its end [m/s]", z, float(run.z[at]), bound * w, reason)
+    yield Check("y 1.25 s later [m]", later[0], float(run.y[-1]), bound, reason)
+    yield Check("work on the spring [J]", worked, -float(run.e_load[-1]), bound * force, reason)
+
+
+_RAMPS: tuple[tuple[str, dict[str, Any], float], ...] = (
+    *(
+        (
+            f"(x/L)^{i}",
+            {"on": "beam", "shape": [0.0] * i + [1.0]},
+            (3.0 / (i + 3) - 1.0 / (i + 4)) / 6.0 + 1.0 / (i + 2),
+        )
+        for i in range(4)
+    ),
+    *((f"point, {a:g} L", {"on": "beam", "at": a}, a * a * (3.0 - a) / 6.0 + a) for a in (0.3, 0.75)),
+    ("tip", {"on": "tip"}, 4.0 / 3.0),
+    ("base", {"on": "base"}, -(1.0 / 8.0 + 1.0 / 2.0)),
+)
+
+
+@section("Loads: static limit of a slow ramp, EI = KAG = L = 1", *_RAMPS)
+def slow_ramp(name: str, load: dict[str, Any], exact: float) -> Iterator[Check]:
+    """Static deflection of the tip after each kind of load on the beam has risen to 1 and its vibration has died out.
+
+    ∫ f (ξ²(3 − ξ)/6EI + ξ/KAG) dx, exact on any mesh that holds the static shape of a tip force.
+    """
+    ramp = {**load, "signal": "ramp", "duration": 3.0}
+    run = simulate(_loaded(200.0, 1.0, [ramp], beam=_beam(alpha_b=1.0)))
+    yield Check(
+        f"{name}: u_tip [m]", exact, float(run.u_tip[-1]), _N**2 * EPS, "rounding: ε N², N unknowns of the beam"
+    )
+
+
+@section("Loads: a moving base and the equivalent loads")
+def moving_base() -> Iterator[Check]:
+    """A base that accelerates by a(t) is the load −ρA a(t) on the beam and −m a(t) on the spring, through an impact."""
+    beam = Beam.with_ones(density=2.0, area=1.5, n_elements=6, young_modulus=100.0, initial_velocity_slope=-1.0)
+    signal = {"signal": "harmonic", "frequency": 12.0, "amplitude": 5.0}
+    spring = Spring.with_ones(mass=0.7, linear_stiffness=3.0)
+    equivalent = [
+        {**signal, "on": "beam", "amplitude": -5.0 * 2.0 * 1.5},
+        {**signal, "on": "spring", "amplitude": -5.0 * 0.7},
+    ]
+    runs = [
+        simulate(_loaded(0.2, 1e-3, loads, beam=beam, spring=spring))
+        for loads in ([{**signal, "on": "base"}], equivalent)
+    ]
+    reason = "rounding of the modes and IDA's tolerance, 200 steps"
+    for column in ("u_tip", "y", "z"):
+        by_base, by_loads = (float(run[column][-1]) for run in runs)
+        yield Check(f"{column}(0.2 s)", by_loads, by_base, 200 * 1e-12, reason)
