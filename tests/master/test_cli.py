@@ -199,12 +199,11 @@ def test_progress_is_for_terminals(here, monkeypatch, terminal, options):
 
 def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch):
     """Keys that are alike are left out; a result that one run lacks is told nevertheless."""
-    forces = iter((3.0, None))
+    peaks = iter(({"contact_force_max": 3.0, "contact_force_window": 1e-3}, {}))
 
     def run(scene, recorder, *args, **kwargs):
         fake_run(scene, recorder)
-        force = next(forces)
-        recorder.finish({**SUMMARY, "rebound_velocity": 2, **({} if force is None else {"contact_force_max": force})})
+        recorder.finish({**SUMMARY, "rebound_velocity": 2, **next(peaks)})
 
     monkeypatch.setattr(springbeam.run.runner, "run", run)
     printed("run", "soft", "--no-plots", "--out", "a")
@@ -212,7 +211,8 @@ def test_runs_are_compared_by_the_keys_and_results_that_differ(here, monkeypatch
     found = json.loads(printed("compare", "a", "b", "--out", "p.png", "--json"))
     assert found["keys"] == {"spring.mass": [1.0, 2.5]}
     assert found["results"] == {
-        "contact_force_max [N]": [3.0, None], "rebound_velocity [m/s]": [2, 2], "warnings": [0, 0]
+        "contact_force_max [N]": [3.0, None], "contact_force_window [s]": [1e-3, None],
+        "rebound_velocity [m/s]": [2, 2], "warnings": [0, 0],
     }  # fmt: skip
     assert Path("p.png").stat().st_size > 10_000
     assert "spring.mass" in printed("compare", "a", "b", "--no-plots")

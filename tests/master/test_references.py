@@ -157,14 +157,14 @@ LAWS = [verify.compliant_impact, verify.hunt_crossley, verify.linked_masses, ver
 )
 def test_the_reference_meets_the_exact_solutions_of_a_run(section, share, monkeypatch):
     """The bounds of laws are errors of a coupling and of IDA, of which the reference has neither."""
-    for module in (verify.laws, verify.loads):
+    for module in (verify.laws, verify.coupled):
         monkeypatch.setattr(module, "simulate", event_driven.simulate)
     for check in section():
         assert abs(check.error or 0.0) <= share * check.bound, check
 
 
 def test_the_reference_of_a_bar_on_a_stop_approaches_the_exact_impact(monkeypatch):
-    monkeypatch.setattr(verify.impact, "simulate", event_driven.simulate)
+    monkeypatch.setattr(verify.coupled, "simulate", event_driven.simulate)
     assert [check.quantity for check in verify.bar_impact.solution(10) if not check.passed] == []
 
 
