@@ -145,7 +145,8 @@ def test_what_is_compared_is_drawn_in_the_unit_of_its_axis_and_with_what_strikes
     monkeypatch.setattr(Axes, "vlines", lambda ax, time, low, high, **_: drawn.append((ax.get_ylabel(), high)))
     run, zero = a_trajectory(), np.zeros(400)
     strokes = [Event(t, "stop_impact", 0, 0, 0, 0, 0.0, 0.6, 0.0) for t in (0.1, 0.3)]
-    timeline.draw_compared({"one": run, "struck": a_trajectory(events=strokes, foundation_force=zero)}, tmp_path / "a.png")
+    struck = a_trajectory(events=strokes, foundation_force=zero)
+    timeline.draw_compared({"one": run, "struck": struck}, tmp_path / "a.png")
     units = {"u_tip": "[mm]", "v_tip": "[mm/s]", "contact_force": "[mN]"}
     for ax, (column, unit) in zip(figures[0].axes, units.items(), strict=False):
         assert ax.get_ylabel().endswith(unit)

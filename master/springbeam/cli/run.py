@@ -144,8 +144,7 @@ def picked(scene: Scene, mesh: bool = False) -> Trajectory | None:
     if scene.accuracy is None:
         return None
     from ..run.outcome import RunStopped
-    from ..studies.accuracy import pick
-    from ..studies.mesh import pick_mesh
+    from ..studies.accuracy import pick, pick_mesh
     from .watchdog import watched
 
     try:
