@@ -1,5 +1,6 @@
 """What a scene lacks costs nothing: no FMU, no call into one, no event function. Counts, not times."""
 
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from springbeam.bodies.functions import Functions
 from springbeam.contact.events import EventFunctions
 from springbeam.contact.laws import law_of
 from springbeam.contact.phases import Joint, Phase
+from springbeam.run.runner import Simulation
 from springbeam.scene import shipped_scenes
 
 SET_SLOPES = "fmi2SetRealInputDerivatives"
@@ -136,3 +138,28 @@ def test_event_functions_are_those_of_the_bodies_that_are_there(what):
     # A phase has only what can end it, and on the foundation only what can leave it.
     assert all(len(functions.of(phase)) <= 2 for phase in PHASES)
     assert all(kind != "stop_impact" for phase in PHASES if phase.seated for kind, _ in functions.of(phase))
+
+
+def test_a_tied_step_passes_at_most_40_functions_in_12_files():
+    """The walk of docs/architecture.md; what happens now and then, as a shape that is kept, is not in a usual step."""
+    passed: list[set[tuple[str, str, int]]] = []
+
+    def note(frame, event, _):
+        if event == "call" and "springbeam" in Path(frame.f_code.co_filename).parts:
+            passed[-1].add((frame.f_code.co_filename, frame.f_code.co_name, frame.f_code.co_firstlineno))
+
+    with Simulation(load_scene("soft")) as simulation:
+        master = simulation._master
+        while master.state.phase.joint is not Joint.TIED or master.state.shapes_left:
+            master.step()
+        for _ in range(20):
+            passed.append(set())
+            sys.setprofile(note)
+            try:
+                master.step()
+            finally:
+                sys.setprofile(None)
+        assert master.state.phase.joint is Joint.TIED
+    usual = sorted(passed, key=len)[len(passed) // 2]
+    assert 20 < len(usual) <= 40, sorted(usual)
+    assert len({file for file, *_ in usual}) <= 12

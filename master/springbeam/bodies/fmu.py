@@ -50,15 +50,15 @@ class Reals:
         self._names = ", ".join(names)
         self._fmu = fmu
         self.values: Any = (c_double * n)()  #: as last read or written
-        self._unpacked = partial(Struct(f"{n}d").unpack, self.values)
-        self._read, self._write = (fmu.accessor(verb, names, self.values, size) for verb in ("Get", "Set"))
+        self.unpacked = partial(Struct(f"{n}d").unpack, self.values)
+        self.read, self._write = (fmu.accessor(verb, names, self.values, size) for verb in ("Get", "Set"))
         if names:
             self.get()  # a wrong reference is found before the run
 
     def get(self) -> tuple[float, ...]:
-        if (status := self._read()) > WARNING:
+        if (status := self.read()) > WARNING:
             raise self._fmu.failed(status, f"cannot read {self._names}")
-        return self._unpacked()
+        return self.unpacked()
 
     def set(self, values: Sequence[float]) -> None:
         self.values[:] = values

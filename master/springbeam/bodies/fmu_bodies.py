@@ -20,7 +20,7 @@ from .archive import own_fmu
 from .end_loaded import EndLoaded
 from .fmu import Fmu, Reals
 from .force import combined
-from .functions import WARNING
+from .functions import WARNING, Call
 from .protocol import NO_FORCE, BeamBody, Body, Energies, Felt, FmuError, Force, Motion, StepRefused
 
 #: The numbers by which the beam FMU knows its alternatives.
@@ -37,9 +37,10 @@ class FmuState(NamedTuple):
     dissipated: float = 0.0  #: before the FMU was last started again [J]
 
 
-#: ``Motion(*values)``, ``Energies(*values)`` and ``FmuState(*values)`` in a third of the time.
+#: ``Motion(*values)`` and its like in a third of the time.
 _motion_of: Callable[[type[Motion], tuple[float, ...]], Motion] = tuple.__new__
 _energies_of: Callable[[type[Energies], tuple[float, ...]], Energies] = tuple.__new__
+_felt_of: Callable[[type[Felt], tuple[float, ...]], Felt] = tuple.__new__
 _state_of: Callable[[type[FmuState], tuple[Motion, tuple[float, ...], float, float]], FmuState] = tuple.__new__
 
 
@@ -90,10 +91,12 @@ class FmuBody(Body):
     def _prepare_outputs(self) -> None:
         """Prepare the one call that reads motion and energies."""
         self._outputs = (*self._MOTION, *self._ENERGIES)
-        Reals(self.fmu, *self._outputs)  # a wrong reference is found before the run
-        values: Any = (c_double * len(self._outputs))()
-        self._get = self.fmu.accessor("Get", self._outputs, values)
-        self._unpack = partial(Struct(f"{len(values)}d").unpack, values)
+        self._get, self._unpack = self._reader(self._outputs)
+
+    def _reader(self, names: Sequence[str]) -> tuple[Call, Callable[[], tuple[float, ...]]]:
+        """Return the call that reads outputs and what then returns them; a wrong reference is found at once."""
+        reals = Reals(self.fmu, *names)
+        return reals.read, reals.unpacked
 
     def expect_loads(self, loads: Sequence[Load]) -> None:
         #: By input of the FMU: what is added to it by a unit of which load.
@@ -257,6 +260,16 @@ class OwnBody(FmuBody):
             vars(body).update(as_made, _key=key, _as_made=as_made)
         return body
 
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
+        if not isfinite(c + dc + ddc + n + dn + ddn):
+            self._refuse(contact, foundation)
+        if len(self._FORCES) == 1:  # nothing but the other body presses its end
+            self._write(time, size, c, *values, dc, ddc, *slopes)
+        else:
+            self._write(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes)
+        return self._step(dc != 0.0 or ddc != 0.0 or dn != 0.0 or ddn != 0.0 or any(slopes))
+
     def energies(self) -> Energies:
         motion, told, pending, before = self.state
         kinetic, potential, dissipated, *load = told[4:] if pending == 0.0 else self._stored()
@@ -318,17 +331,11 @@ class FmuBeam(OwnBody, BeamBody):
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)
         self._shape = fmu.array("deflection", len(SHAPE_POINTS))
-        self._felt = Reals(fmu, "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
+        names = ("tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
+        self._get_felt, self._unpack_felt = self._reader(names)
 
     def _mass(self) -> float:
         return Reals(self.fmu, "tip_mass").get()[0]
-
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        (c, dc, ddc), (values, slopes) = contact, self._loads
-        if not isfinite(c + dc + ddc):
-            self._refuse(contact)
-        self._write(time, size, c, *values, dc, ddc, *slopes)
-        return self._step(dc != 0.0 or ddc != 0.0 or any(slopes))
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         if load.on == "tip":
@@ -341,7 +348,9 @@ class FmuBeam(OwnBody, BeamBody):
         return [(f"distributed_load_{i}" if i else "distributed_load", s) for i, s in enumerate(shape) if s != 0.0]
 
     def felt(self) -> Felt:
-        return Felt(*self._felt.get())
+        if (status := self._get_felt()) > WARNING:
+            raise self.fmu.failed(status, "cannot read tip_acceleration, clamp_force, clamp_moment, max_bending_stress")
+        return _felt_of(Felt, self._unpack_felt())
 
     def shape(self) -> np.ndarray:
         """Return the deflection [m] at `SHAPE_POINTS`, shape (21,)."""
@@ -372,13 +381,6 @@ class FmuSpring(OwnBody, EndLoaded):
         spring, y = self._spring, displacement
         static = spring.linear_stiffness * y + spring.cubic_stiffness * y**3 - spring.external_force
         return static + spring.damping * velocity
-
-    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        (c, dc, ddc), (n, dn, ddn), (values, slopes) = contact, foundation, self._loads
-        if not isfinite(c + dc + ddc + n + dn + ddn):
-            self._refuse(contact, foundation)
-        self._write(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes)
-        return self._step(dc != 0.0 or ddc != 0.0 or dn != 0.0 or ddn != 0.0 or any(slopes))
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
         return [("base_acceleration" if load.on == "base" else "external_force", 1.0)]

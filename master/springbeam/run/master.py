@@ -194,7 +194,7 @@ class Master(Stateful):
         """The next step and the event it ends on, the bodies left at its end."""
         state, pair = self.state, self._pair
         pair.mark()
-        start = pair.ends()
+        start = state.ends
         halvings, cause = 0, ""
         while True:
             try:
@@ -312,6 +312,7 @@ class Master(Stateful):
     def _record(self, step: Step, ends: Ends) -> None:
         """Leave the record of ``step`` with the ``ends`` after its event, and now and then the beam's shape."""
         state, (tip, low) = self.state, ends
+        state.ends = ends
         speed = max(tip[1], -tip[1], low[1], -low[1])
         if speed > state.fastest:
             state.fastest = speed

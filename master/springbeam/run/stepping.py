@@ -23,6 +23,7 @@ class State(Memory):
     """Where the run is, and what of the steps so far the next one needs."""
 
     time: float
+    ends: Ends  #: after the last event
     phase: Phase = Phase()
     contact: Force = NO_FORCE  #: C of the last step, continued
     last_size: float = 0.0  #: of the last step [s]
@@ -54,12 +55,6 @@ class State(Memory):
         self.contact = force.shifted(contact, size)
         self.foundation = force.shifted(foundation, size)
         self.steps_in_phase += 1
-
-    def guess(self, size: float) -> Force:
-        """C over a step of ``size`` [s], as far as the last step tells; none between ends that are apart."""
-        if self.phase.joint is Joint.FREE:
-            return NO_FORCE
-        return self.contact if size <= _REACH_OF_FORCE * self.last_size else (self.contact[0], 0.0, 0.0)
 
     def enter(self, phase: Phase) -> None:
         """Another phase begins: what was known of the forces holds no longer."""
@@ -123,12 +118,12 @@ class Pair:
 
     def initial_state(self, time: float) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start."""
+        tip, low = ends = self.ends()
         if not self.law.soft:
-            return State(time)
-        tip, low = self.ends()
+            return State(time, ends)
         at_start = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
         phase = Phase(Joint.TIED) if self.law.lasting else Phase()
-        return State(time, phase, (at_start, 0.0, 0.0), smoothed=at_start)
+        return State(time, ends, phase, (at_start, 0.0, 0.0), smoothed=at_start)
 
     def coupling(self, phase: Phase) -> Coupling:
         """What couples the bodies in ``phase``: a soft law acts wherever the ends are."""
@@ -153,7 +148,11 @@ class Pair:
         held = self._held if phase.seated else None
         if self.loads.any:
             self.loads.act(state.time, size)
-        coupling, guess = self.coupling(phase), state.guess(size)
+        coupling, guess = self.joined, state.contact  # as far as the last step tells
+        if phase.joint is Joint.FREE:
+            coupling, guess = self._uncoupled, NO_FORCE
+        elif size > _REACH_OF_FORCE * state.last_size:
+            guess = (guess[0], 0.0, 0.0)
         step = coupling.solve(self.upper, held or self.lower, state.time, size, start, guess)
         self._last = step = step if held is None else self._with_foundation(step)
         return step
