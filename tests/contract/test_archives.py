@@ -1,4 +1,4 @@
-"""Archives made to do harm: refused by name before anything of them is unpacked."""
+"""Archives made to do harm: refused before anything of them is unpacked, or harmless when it is."""
 
 import stat
 import zipfile
@@ -17,81 +17,51 @@ def named(name):
     return info
 
 
-def add(name, content=b"evil"):
-    return lambda file: file.writestr(named(name), content)
+EVIL = (
+    *("../evil", "resources/../../evil", "binaries/../evil", "..", "/tmp/evil", "//host/share/evil", "C:/evil"),
+    *("modelDescription.xml:hidden", "..\\evil", "C:\\evil", "evil\n", "binaries//evil", "./evil"),
+)
 
 
-def twice(first, second):
-    def write(file):
-        file.writestr(named(first), b"good")
-        file.writestr(named(second), b"evil")
-
-    return write
-
-
-def special(kind):
-    def write(file):
-        info = ZipInfo("resources/link")
-        info.external_attr = (kind | 0o777) << 16
-        file.writestr(info, b"/etc")
-
-    return write
-
-
-def bomb(file):
-    file.writestr("resources/zeros", bytes(5_000_000), zipfile.ZIP_DEFLATED)
-
-
-EVIL = {
-    "above": (add("../evil"), "member '../evil' leads out of the folder"),
-    "above, from within": (add("resources/../../evil"), "member 'resources/../../evil' leads out of the folder"),
-    "up and back": (add("binaries/../evil"), "leads out of the folder"),
-    "the folder above": (add(".."), "leads out of the folder"),
-    "absolute": (add("/tmp/evil"), "member '/tmp/evil' has an absolute name"),
-    "another host": (add("//host/share/evil"), "has an absolute name"),
-    "drive": (add("C:/evil"), "member 'C:/evil' has a drive letter"),
-    "stream": (add("modelDescription.xml:hidden"), "has a drive letter or a colon"),
-    "backslash": (add("..\\evil"), "has a backslash"),
-    "drive and backslash": (add("C:\\evil"), "has a backslash"),
-    "control character": (add("evil\n"), "cannot be printed"),
-    "nothing between": (add("binaries//evil"), "has an empty part"),
-    "here": (add("./evil"), "has an empty part"),
-    "symbolic link": (special(stat.S_IFLNK), "member 'resources/link' is a symbolic link"),
-    "device": (special(stat.S_IFCHR), "is a special file"),
-    "pipe": (special(stat.S_IFIFO), "is a special file"),
-    "twice": (twice("evil", "evil"), "member 'evil' is there twice"),
-    "twice but for case": (twice("evil", "EVIL"), "member 'EVIL' is there twice"),
-    "file and folder": (twice("evil", "evil/evil"), "member 'evil' is both a file and a folder"),
-    "bomb": (bomb, "5000000 of 'resources/zeros'"),
-}  # fmt: skip
-
-
-@pytest.fixture
-def small(monkeypatch):
-    monkeypatch.setattr(archive, "MOST_BYTES", 4_000_000)
-
-
-@pytest.mark.filterwarnings("ignore:Duplicate name")
-@pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("name", EVIL)
 def test_refused_by_name_and_nothing_is_unpacked(tmp_path, name):
-    write, cause = EVIL[name]
     folder = tmp_path / "outer" / "inner"
     folder.mkdir(parents=True)
     with ZipFile(tmp_path / "evil.fmu", "w") as file:
         file.writestr("modelDescription.xml", b"<x/>")
-        write(file)
+        file.writestr(named(name), b"evil")
     with pytest.raises(UnsafeArchive) as refusal:
         unpack(tmp_path / "evil.fmu", folder)
-    assert cause in str(refusal.value)
+    assert f"member {name!r} is no plain name" in str(refusal.value)
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["evil.fmu", "inner", "outer"]
+
+
+@pytest.mark.parametrize("kind", [stat.S_IFLNK, stat.S_IFCHR, stat.S_IFIFO])
+def test_links_and_devices_become_files(tmp_path, kind):
+    info = ZipInfo("resources/link")
+    info.external_attr = (kind | 0o777) << 16
+    with ZipFile(tmp_path / "evil.fmu", "w") as file:
+        file.writestr(info, b"/etc")
+    unpack(tmp_path / "evil.fmu", tmp_path / "in")
+    found = tmp_path / "in" / "resources" / "link"
+    assert stat.S_ISREG(found.lstat().st_mode)
+    assert found.read_bytes() == b"/etc"
+
+
+def test_a_bomb_is_not_unpacked(tmp_path, monkeypatch):
+    monkeypatch.setattr(archive, "MOST_BYTES", 4_000_000)
+    with ZipFile(tmp_path / "bomb.fmu", "w") as file:
+        file.writestr("resources/zeros", bytes(5_000_000), zipfile.ZIP_DEFLATED)
+    with pytest.raises(UnsafeArchive, match="1 members of 5000000 bytes"):
+        unpack(tmp_path / "bomb.fmu", tmp_path / "in")
+    assert not (tmp_path / "in").exists()
 
 
 def test_too_many_members(tmp_path):
     with ZipFile(tmp_path / "many.fmu", "w") as file:
         for i in range(archive.MOST_MEMBERS + 1):
             file.writestr(ZipInfo(str(i)), b"")
-    with pytest.raises(UnsafeArchive, match="10001 members, more than 10000"):
+    with pytest.raises(UnsafeArchive, match="10001 members of 0 bytes"):
         unpack(tmp_path / "many.fmu", tmp_path / "in")
 
 
@@ -120,6 +90,6 @@ def test_our_own_are_unpacked_to_the_last_byte(fmu_folder, tmp_path, name):
 def test_the_command_names_file_and_member(folder):
     with ZipFile(folder / "spring.fmu", "a") as file:
         file.writestr(named("../../evil"), b"evil")
-    said = f"error: {folder / 'spring.fmu'}: not a usable FMU: member '../../evil' leads"
+    said = f"error: {folder / 'spring.fmu'}: not a usable FMU: member '../../evil' is no plain name"
     assert refused("run", "soft", "--out", folder / "out").startswith(said)
     assert not (folder / "out").exists()
