@@ -1,4 +1,4 @@
-"""Critical macro steps: measured by the FMUs as predicted by the spectral radius (docs/stability.md has the table).
+"""Critical macro steps: measured by the FMUs as predicted by the spectral radius (docs/stability.md has predictions).
 
 The FMUs are coupled by the solvers of a run, without events: the linear closed contact is stepped until its growth
 shows. A closed contact of law `compliance` with exponent 1 is a `link`, which also pulls: as that it is measured.
