@@ -250,18 +250,17 @@ _SPRINGS = ((3.0, -0.2, 0.5), (3.0, -0.2, 1.0), (150.0, 67.0, 0.5), (150.0, 67.0
 
 @section("Spring: Duffing (k1, k2, A), from rest", *_SPRINGS)
 def duffing(k1: float, k2: float, amplitude: float) -> Iterator[Check]:
-    """Undamped Duffing spring, m = 1, from rest at A: its period, and where it is after one (`exact.Duffing`)."""
+    """Undamped Duffing spring, m = 1, from rest at A: where it is, at rest again, after one period (`exact.Duffing`).
+
+    A period that is off by δT leaves it with ẏ = (k1 A + k2 A³) δT.
+    """
     period = Duffing(k1, k2, amplitude).period
     spring = Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=amplitude)
-    name = f"({k1:g}, {k2:g}, {amplitude:g})"
-    relative = ida_error(2.0 * pi)
-    with closing(FmuSpring(spring, 0.0)) as body:
-        first, second = _falling_zeros(body, period / 18.5, 2)
+    name, relative = f"({k1:g}, {k2:g}, {amplitude:g})", ida_error(2.0 * pi)
     with closing(FmuSpring(spring, 0.0)) as body:
         for step in range(20):
             body.advance(step * period / 20.0, period / 20.0, NO_FORCE)
         back = body.motion()
-    yield Check(f"{name}: period [s]", period, second - first, relative * period, IDA)
     yield Check(f"{name}: y(T) [m]", amplitude, back.displacement, relative * amplitude, IDA)
     yield Check(f"{name}: ẏ(T) [m/s]", 0.0, back.velocity, relative * amplitude * 2.0 * pi / period, IDA)
 
@@ -300,28 +299,6 @@ def escape() -> Iterator[Check]:
 def ida_error(radians: float) -> float:
     """Return the relative error that IDA's tolerance ε, the default of scenes, leaves over an angle ωT: `IDA`."""
     return float(radians * Spring.with_ones().relative_tolerance ** (5.0 / 6.0))
-
-
-def _falling_zeros(body: FmuSpring, size: float, count: int) -> list[float]:
-    """Return the first times [s] at which y falls through 0, found by repeating the step with other sizes."""
-    time, zeros = 0.0, list[float]()
-    while len(zeros) < count:
-        body.mark()
-        before, start = body.motion().displacement, time
-
-        def displacement(tau: float, before: float = before, start: float = start) -> float:
-            if tau == 0.0:
-                return before
-            body.rewind()
-            body.advance(start, tau, NO_FORCE)
-            return float(body.motion().displacement)
-
-        after = displacement(size)
-        if before > 0.0 >= after:
-            zeros.append(time + float(brentq(displacement, 0.0, size, xtol=1e-16)))
-            displacement(size)
-        time += size
-    return zeros
 
 
 def _threshold(runs: Callable[[float], bool], low: float, high: float, width: float) -> float:
