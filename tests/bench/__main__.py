@@ -3,14 +3,11 @@
 The rows of groups that are not named stay as they are in the page.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import platform
 import re
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
 
 # Before numpy is imported. Its threads spin while they have nothing to do, in processor time that is anybody's.
@@ -20,12 +17,12 @@ import against_scipy
 import fmus
 import master
 import sweeps
-from rows import Effort, Row
+from measure import Effort
 
 sys.path.append(str(Path(__file__).parents[2] / "docs"))
 from pages import table, write_section
 
-GROUPS: dict[str, Callable[[Effort], Iterator[Row]]] = {
+GROUPS = {
     "beam": fmus.beam,
     "spring": fmus.spring,
     "master": master.master,
@@ -38,17 +35,17 @@ PAGE = "performance.md"
 HEAD = ("what", "goal", "measured: median (smallest – largest)", "met", "beside it")
 
 
-def cells(row: Row) -> tuple[str, ...]:
+def cells(row):
     met = {True: "yes", False: "**no**", None: "–"}[row.met]
     return row.what, row.goal or "–", row.measured, met, row.against
 
 
-def machine() -> str:
+def machine():
     model = re.search(r"^model name\s*:\s*(.*)$", Path("/proc/cpuinfo").read_text(), re.M)
     return f"{model[1] if model else platform.processor()}, {os.cpu_count()} cores, Python {platform.python_version()}"
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(prog="./build.sh bench", description="Measure, and write docs/performance.md.")
     parser.add_argument("group", nargs="*", help=f"what to measure: {', '.join(GROUPS)}; default all")
     parser.add_argument("--quick", action="store_true", help="only see that everything runs; nothing is written")

@@ -4,20 +4,16 @@ Both give y at the same 401 times, and are judged at all of them: ours between i
 counted, on either side: FMUs that are loaded, modes that are known.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from measure import compare, timed
-from rows import Effort, Row, ratio_row
+from measure import compare, ratio_row, timed
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.scene import Scene
-from springbeam.studies.rivals import Rival, Solved
+from springbeam.studies.rivals import Rival
 
 #: Ours: macro steps, and tolerances of the coupling and of IDA; the force is quadratic.
 STEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192)
@@ -39,7 +35,7 @@ class Candidate:
     error: float
 
     @property
-    def setting(self) -> str:
+    def setting(self):
         coupling, spring = self.scene.coupling, self.scene.spring
         assert spring is not None
         return (
@@ -48,7 +44,7 @@ class Candidate:
         )
 
 
-def accuracy(effort: Effort) -> Iterator[Row]:
+def accuracy(effort):
     methods = list(RIVALS)[:1] if effort.quick else list(RIVALS)
     for n in (10,) if effort.quick else (50, 200):
         soft = with_changes(load_scene("soft"), beam={"n_elements": n}, time={"t_end": UNTIL})
@@ -60,7 +56,7 @@ def accuracy(effort: Effort) -> Iterator[Row]:
             for scheme in ("energy", "hermite")
         ]
         rival = Rival(soft)
-        theirs: list[tuple[float, float, str, float]] = []
+        theirs = []
         for method in methods:
             for rtol in RIVALS[method]:
                 error = float(np.abs(_solved(rival, method, rtol, scale).columns["y"] - exact).max())
@@ -85,7 +81,7 @@ def accuracy(effort: Effort) -> Iterator[Row]:
         methods = list(dict.fromkeys(m for seconds, _, m, _ in theirs if seconds <= _HOPELESS * best))
 
 
-def _candidate(soft: Scene, exact: np.ndarray, scheme: str, steps: int, tolerance: float, ida: float) -> Candidate:
+def _candidate(soft, exact, scheme, steps, tolerance, ida):
     scene = with_changes(
         soft,
         coupling={"scheme": scheme, "degree": 2, "macro_step": UNTIL / steps, "tolerance": tolerance},
@@ -95,7 +91,7 @@ def _candidate(soft: Scene, exact: np.ndarray, scheme: str, steps: int, toleranc
     return Candidate(scene, min(_ours(scene) for _ in range(3)), error)
 
 
-def _cheapest(families: list[list[Candidate]], target: float) -> Candidate:
+def _cheapest(families, target):
     """Return the cheapest that is within the target together with all finer ones of its family: not by luck."""
     kept = []
     for family in families:
@@ -104,22 +100,22 @@ def _cheapest(families: list[list[Candidate]], target: float) -> Candidate:
     return min(kept, key=lambda candidate: candidate.seconds)
 
 
-def _ours(scene: Scene) -> float:
+def _ours(scene):
     run = simulate(scene)
     return float(run.summary["wall_time"]) + timed(lambda: run.at(TIMES))
 
 
-def _whole(scene: Scene) -> float:
+def _whole(scene):
     return timed(lambda: simulate(scene).at(TIMES))
 
 
-def _solved(rival: Rival, method: str, rtol: float, scale: float) -> Solved:
+def _solved(rival, method, rtol, scale):
     return rival.solve(method, rtol, 1e-3 * rtol * scale, TIMES)
 
 
-def _seconds(rival: Rival, method: str, rtol: float, scale: float) -> float:
+def _seconds(rival, method, rtol, scale):
     return _solved(rival, method, rtol, scale).seconds
 
 
-def _whole_of_scipy(soft: Scene, method: str, rtol: float, scale: float) -> float:
+def _whole_of_scipy(soft, method, rtol, scale):
     return timed(lambda: _solved(Rival(soft), method, rtol, scale))

@@ -1,18 +1,13 @@
 """The FMUs and their numerics, beside the least work that a step needs."""
 
-from __future__ import annotations
-
 import json
 import statistics
 import subprocess
-from collections.abc import Iterator
 from math import log10
 from pathlib import Path
-from typing import Any
 
 import scipy.sparse.linalg as spla
-from measure import Times, compare, timed
-from rows import Effort, Row, below, ratio_row, shown
+from measure import Row, Times, below, compare, ratio_row, shown, timed
 
 from springbeam import load_scene
 from springbeam.bodies.fmu_bodies import FmuBeam
@@ -21,7 +16,7 @@ from springbeam.monolithic.semi_discrete import assemble
 PROGRAMS = Path(__file__).parents[2] / "build" / "tests" / "bench"
 
 
-def program(name: str, effort: Effort) -> dict[str, Any]:
+def program(name, effort):
     """What ``build/tests/bench/NAME`` prints, by the names of its lines."""
     arguments = ["--quick"] if effort.quick else []
     output = subprocess.run([str(PROGRAMS / name), *arguments], stdout=subprocess.PIPE, text=True, check=True).stdout
@@ -29,11 +24,11 @@ def program(name: str, effort: Effort) -> dict[str, Any]:
     return {line["name"] + (f" {line['modes']}" if "modes" in line else ""): line for line in lines}
 
 
-def _of(line: dict[str, Any]) -> Times:
+def _of(line):
     return Times(line["ours"], line["rival"])
 
 
-def beam(effort: Effort) -> Iterator[Row]:
+def beam(effort):
     found = program("beam_bench", effort)
     bare = "one solve with the factors, one product, by Eigen (SimplicialLDLT, natural order)"
     yield ratio_row("beam step, generalized-α, 1000 elements", _of(found["generalized_alpha"]), 1.5, bare)
@@ -64,15 +59,15 @@ def beam(effort: Effort) -> Iterator[Row]:
             )
 
 
-def _exponents(n: list[float], values: list[float]) -> list[float]:
+def _exponents(n, values):
     return [log10(b / a) / log10(m / k) for a, b, k, m in zip(values, values[1:], n, n[1:], strict=False)]
 
 
-def _size(size: float) -> str:
+def _size(size):
     return f"{size / 1e6:.2g} MB"
 
 
-def _initialisation(effort: Effort) -> Iterator[Row]:
+def _initialisation(effort):
     """Beside ARPACK's shift-invert Lanczos of scipy for as many modes of the same matrices."""
     paper = load_scene("paper-fig2").beam
     assert paper is not None
@@ -81,13 +76,13 @@ def _initialisation(effort: Effort) -> Iterator[Row]:
             continue
         one = paper.model_copy(update={"n_elements": n, "n_modes": 64})
 
-        def ours(one: Any = one) -> float:
-            made: list[FmuBeam] = []
+        def ours(one=one):
+            made = []
             seconds = timed(lambda: made.append(FmuBeam(one, 0.0, 0.0)))
             made[0].close()
             return seconds
 
-        def arpack(one: Any = one) -> float:
+        def arpack(one=one):
             d = assemble(one)
             return timed(lambda: spla.eigsh(d.K.tocsc(), 64, d.M.tocsc(), sigma=0.0))
 
@@ -97,7 +92,7 @@ def _initialisation(effort: Effort) -> Iterator[Row]:
         yield below(f"initialisation of beam.fmu, {n} elements, 64 modes", scaled, goal, unit, rival)
 
 
-def spring(effort: Effort) -> Iterator[Row]:
+def spring(effort):
     found = program("spring_bench", effort)
     bare = "IDA restarted on (y, z, ∫y, ∫∫y), same tolerances"
     for name, what in (

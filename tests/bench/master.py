@@ -1,18 +1,13 @@
 """The master: what a macro step costs outside the FMUs, where that goes, and the paper's scene."""
 
-from __future__ import annotations
-
 import statistics
-from collections.abc import Callable, Iterator
 from ctypes import c_size_t
 from time import process_time, thread_time
-from typing import Any
 
 import printed
 from against_scipy import UNTIL
 from fmus import program
-from measure import Times, compare, median_and_spread, timed
-from rows import Effort, Row, below, ratio_row, shown
+from measure import Row, Times, below, compare, median_and_spread, ratio_row, shown, timed
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies.factory import load_bodies
@@ -20,9 +15,7 @@ from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
 from springbeam.bodies.functions import Functions
 from springbeam.monolithic import algorithm1
 from springbeam.results.recording import MemoryRecorder
-from springbeam.results.trajectory import Trajectory
 from springbeam.run.master import Master
-from springbeam.scene import Scene
 
 #: The calls of a macro step; those before the first one are set-up.
 STEPPING = ("DoStep", "GetReal", "SetReal", "SetRealInputDerivatives", "GetFMUState", "SetFMUState")
@@ -31,19 +24,19 @@ STEPPING = ("DoStep", "GetReal", "SetReal", "SetRealInputDerivatives", "GetFMUSt
 class Inside:
     """Time spent in `STEPPING` calls while it is in force; what ctypes needs for a call is not part of it."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.seconds, self.calls = 0.0, 0
         self._prepared = Functions.prepared
 
-    def __enter__(self) -> Inside:
+    def __enter__(self):
         inside, prepared = self, self._prepared
 
-        def timed_call(self: Functions, name: str, *arguments: Any) -> Callable[[], int]:
+        def timed_call(self, name, *arguments):
             function = prepared(self, name, *arguments)
             if name not in STEPPING:
                 return function
 
-            def call() -> int:
+            def call():
                 began = thread_time()
                 status = function()
                 inside.seconds += thread_time() - began
@@ -52,17 +45,17 @@ class Inside:
 
             return call
 
-        Functions.prepared = timed_call  # type: ignore[method-assign]
+        Functions.prepared = timed_call
         return self
 
-    def __exit__(self, *_: object) -> None:
-        Functions.prepared = self._prepared  # type: ignore[method-assign]
+    def __exit__(self, *_):
+        Functions.prepared = self._prepared
 
 
-def nothing(times: int = 20_000) -> float:
+def nothing(times=20_000):
     """Seconds that `Inside` sees of a call that does nothing."""
     with Inside() as inside:
-        body = FmuSpring(load_scene("soft").spring, 0.0)  # type: ignore[arg-type]
+        body = FmuSpring(load_scene("soft").spring, 0.0)
         call = body.fmu.prepared("GetReal", None, c_size_t(0), None)
         inside.seconds, inside.calls = 0.0, 0
         for _ in range(times):
@@ -71,11 +64,11 @@ def nothing(times: int = 20_000) -> float:
     return inside.seconds / times
 
 
-def tied_phase(scene: Scene) -> tuple[float, int]:
+def tied_phase(scene):
     """Seconds and macro steps of the first tied phase of `soft`, up to the foundation, in a run of the whole scene."""
-    clock: list[float] = []
+    clock = []
 
-    def progress(time: float, phase: str, macro_steps: int) -> None:
+    def progress(time, phase, macro_steps):
         if time < UNTIL:
             clock.append(thread_time())
 
@@ -83,7 +76,7 @@ def tied_phase(scene: Scene) -> tuple[float, int]:
     return clock[-1] - clock[0], len(clock) - 1
 
 
-def whole_call(effort: Effort) -> Row:
+def whole_call(effort):
     """What a call of `simulate` takes beside its solution, in a process that has run the scene before."""
     scene = with_changes(load_scene("soft"), time={"t_end": 0.0712}, coupling={"macro_step": 0.0712 / 6})
     simulate(scene)
@@ -97,7 +90,7 @@ def whole_call(effort: Effort) -> Row:
     return ratio_row("`soft` to 0.0712 s in 6 macro steps: a whole call", times, 4.0, "its solution, `wall_time`")
 
 
-def master(effort: Effort) -> Iterator[Row]:
+def master(effort):
     yield whole_call(effort)
     empty = nothing()
     for H, scheme, degree in ((2.5e-4, "energy", 0), (1e-3, "energy", 0), (1e-3, "energy", 2), (1e-3, "hermite", 2)):
@@ -119,7 +112,7 @@ def master(effort: Effort) -> Iterator[Row]:
             return
 
 
-def profile(effort: Effort) -> Iterator[Row]:
+def profile(effort):
     """Parts of a macro step, each repeated by itself in the middle of the first tied phase of `soft`."""
     scene = load_scene("soft")
     beam, spring = load_bodies(scene, 0.0)
@@ -136,16 +129,16 @@ def profile(effort: Effort) -> Iterator[Row]:
     end = pair.ends()
     master._next_shape, master._shapes_left = float("inf"), 0
 
-    def recorded(number: int) -> None:
+    def recorded(number):
         for _ in range(number):
             master._record(step, end)
         master.hand_over()
 
-    def stepped(body: FmuBeam | FmuSpring) -> None:
+    def stepped(body):
         body.rewind()
         body.advance(state.time, H, step.contact)
 
-    parts: dict[str, Callable[[], object]] = {
+    parts = {
         "both bodies marked": pair.mark,
         "a step attempted: 2 doSteps of each body, and the contact force": lambda: pair.attempt(state, H, start),
         "of it, the beam set back and stepped": lambda: stepped(beam),
@@ -160,26 +153,26 @@ def profile(effort: Effort) -> Iterator[Row]:
     calls = 10 if effort.quick else 2000
     pair.rewind()  # which is where bodies are marked
     for what, part in parts.items():
-        seconds = [timed(lambda part=part: [part() for _ in range(calls)]) / calls for _ in range(effort.rounds)]  # type: ignore[misc]
+        seconds = [timed(lambda part=part: [part() for _ in range(calls)]) / calls for _ in range(effort.rounds)]
         step = pair.attempt(state, H, start)  # with the bodies at the end of the step that is looked at
         yield Row(what, "", f"{median_and_spread([1e6 * s for s in seconds])} µs")
     for body in (beam, spring):
         body.close()
 
 
-def paper(effort: Effort) -> Iterator[Row]:
+def paper(effort):
     scene = with_changes(load_scene("paper-fig2"), contact={"law": "paper", "impact": "rest"})
     if effort.quick:
         scene = with_changes(scene, time={"t_end": 0.54})
     steps = 0
 
-    def ours() -> float:
+    def ours():
         nonlocal steps
         summary = simulate(scene).summary
         steps = int(summary["macro_steps"])
         return float(summary["wall_time"])
 
-    def theirs(run: Trajectory) -> float:
+    def theirs(run):
         return float(run.summary["newton"]["time_per_step"]) * (len(run) - 1)
 
     as_printed = compare(ours, lambda: theirs(printed.simulate(scene)), min(effort.rounds, 3))

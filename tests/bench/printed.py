@@ -4,35 +4,31 @@
 is nonlinear at the tip alone.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from springbeam.monolithic import algorithm1
-from springbeam.results.trajectory import Trajectory
-from springbeam.scene import Scene
 
 
-def simulate(scene: Scene) -> Trajectory:
+def simulate(scene):
     """Run Algorithm 1 as printed; arguments are the defaults of `springbeam.monolithic.algorithm1.simulate`."""
     return _AsPrinted(scene, "equation", 1e-12).run()
 
 
 class _AsPrinted(algorithm1._Algorithm):
-    def __init__(self, *arguments: object) -> None:
-        super().__init__(*arguments)  # type: ignore[arg-type]
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
         last = self.A.shape[0] - 1
         self.inner, self.column = self.A[:-1, :-1], self.A[:-1, [-1]].toarray().ravel()
         self.at_tip = sp.csc_array(([1.0], ([last], [last])), shape=self.A.shape)
 
-    def _tip(self, q: np.ndarray, v: np.ndarray, stiffness: float) -> tuple[float, np.ndarray]:
+    def _tip(self, q, v, stiffness):
         h, x = self.h, q.copy()
         known = self._right_side(q, v)
         before = self._compliance(q[-1], stiffness)[0]
 
-        def equation(w: float) -> tuple[float, float]:
+        def equation(w):
             """Newton's step on all unknowns, told by that of the tip."""
             x[-1] = w
             force, slope = self._compliance(w, stiffness)
@@ -44,6 +40,6 @@ class _AsPrinted(algorithm1._Algorithm):
 
         return self._newton(equation, float(q[-1]), "beam"), known
 
-    def _beam(self, known: np.ndarray, u: float) -> tuple[np.ndarray, float]:
+    def _beam(self, known, u):
         x = np.append(spla.spsolve(self.inner, known[:-1] - self.column * u), u)
         return x, float((self.A @ x - known)[-1] / (2.0 * self.h**2))

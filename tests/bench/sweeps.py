@@ -1,19 +1,15 @@
 """Sweeps beside a pool of as many processes that are handed the same runs: cores × the speed of single runs."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import statistics
 import tempfile
-from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from time import perf_counter
 
-from measure import compare, timed
-from rows import Effort, Row, ratio_row, shown
+from measure import compare, ratio_row, shown, timed
 
 from springbeam import load_scene, with_changes
 from springbeam.studies.study import Records, record_all
@@ -23,27 +19,27 @@ from springbeam.studies.sweep import Sweep
 SIZES = ((0.6, 12), (0.02, 120))
 
 
-def plan(t_end: float, runs: int) -> Sweep:
+def plan(t_end, runs):
     scene = with_changes(load_scene("soft"), time={"t_end": t_end})
     return Sweep(scene=scene, vary=(f"spring.mass=0.5:2:{runs}",))
 
 
-def recorded(todo: Sweep, pool: ProcessPoolExecutor) -> float:
+def recorded(todo, pool):
     with tempfile.TemporaryDirectory() as folder, Records(todo, Path(folder)) as records:
         return timed(lambda: record_all(todo, records, cluster=pool), perf_counter)
 
 
-def in_a_pool(todo: Sweep, pool: ProcessPoolExecutor) -> float:
+def in_a_pool(todo, pool):
     return timed(lambda: list(pool.map(todo.record, todo.cases().values())), perf_counter)
 
 
-def warm(workers: int) -> ProcessPoolExecutor:
+def warm(workers):
     """Return a pool of one thread a process."""
     os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
     return ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
 
 
-def throughput(effort: Effort) -> Iterator[Row]:
+def throughput(effort):
     """Time sweeps whose workers are warm."""
     for workers in (1,) if effort.quick else (1, 2):
         with warm(workers) as pool:

@@ -1,7 +1,5 @@
 """The benchmarks run (`./build.sh bench` measures); how fast anything is is no test."""
 
-from __future__ import annotations
-
 import importlib
 import runpy
 import sys
@@ -17,9 +15,7 @@ PAGE = HERE.parents[1] / "docs" / "performance.md"
 
 
 @pytest.mark.parametrize("group", ["beam", "spring", "master", "profile", "paper", "accuracy", "sweep"])
-def test_every_group_runs(
-    group: str, fmu_folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_group_runs(group, fmu_folder, monkeypatch, capsys):
     if group in ("beam", "spring", "paper") and not (HERE.parents[1] / "build/tests/bench/beam_bench").exists():
         pytest.skip("the C++ benchmarks are not built: ./build.sh bench")
     before = PAGE.read_bytes()
@@ -32,7 +28,7 @@ def test_every_group_runs(
     assert PAGE.read_bytes() == before
 
 
-def test_algorithm_1_as_printed_has_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_algorithm_1_as_printed_has_the_same_numbers(monkeypatch):
     monkeypatch.syspath_prepend(HERE)
     printed = importlib.import_module("printed")
     scene = with_changes(

@@ -3,14 +3,9 @@
 `./build.sh browser` installs what is needed; without it these tests are skipped, with the reason.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +13,6 @@ from commands import printed
 
 from springbeam.results.directory import REPORT
 from springbeam.results.reading import load_trajectory
-from springbeam.results.trajectory import Trajectory
 from springbeam.scene import shipped_scenes
 
 DESKTOP, PHONE = {"width": 1200, "height": 900}, {"width": 390, "height": 800}
@@ -27,7 +21,7 @@ T_END = {"soft": 0.3, "duffing": 4.0, "bar-impact": 2.2}
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
+def browser():
     remedy = "./build.sh browser installs what these tests need"
     playwright = pytest.importorskip("playwright.sync_api", reason=f"playwright is not installed; {remedy}")
     names = (os.environ.get("CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome")
@@ -41,11 +35,11 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="session")
-def folder(tmp_path_factory: pytest.TempPathFactory, fmu_folder: Path) -> Path:
+def folder(tmp_path_factory, fmu_folder):
     return tmp_path_factory.mktemp("runs")
 
 
-def run_and_report(folder: Path, scene: str) -> Path:
+def run_and_report(folder, scene):
     """The directory of a run of ``scene`` with its report; made once."""
     directory = folder / scene
     if not directory.exists():
@@ -58,26 +52,26 @@ def run_and_report(folder: Path, scene: str) -> Path:
 class Shown:
     """A report in a page of the browser, with everything it asked for and complained of."""
 
-    def __init__(self, browser: Any, directory: Path, size: dict[str, int] = DESKTOP) -> None:
-        self.trajectory: Trajectory = load_trajectory(directory)
+    def __init__(self, browser, directory, size=DESKTOP):
+        self.trajectory = load_trajectory(directory)
         self.url = (directory / REPORT).as_uri()
         self.page = browser.new_page(viewport=size)
-        self.requests: list[str] = []
-        self.complaints: list[str] = []
+        self.requests = []
+        self.complaints = []
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on("console", lambda message: self.complaints.append(message.text))
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.goto(self.url)
         self.data = json.loads(self.page.locator("#data").inner_text())
 
-    def path(self, part: str) -> str:
+    def path(self, part):
         """The path that is drawn of a part of the motion, of the beam where it is enlarged."""
         parts = self.data["motion"]["parts"]
         chart = "motion-beam" if part == "beam" and "motion-beam" in parts else "motion"
         index = parts[chart]["traces"].index(part)
         return str(self.page.locator(f"#{chart} .scatterlayer .js-line").nth(index).get_attribute("d"))
 
-    def height_of_end(self, part: str) -> float:
+    def height_of_end(self, part):
         """Where a part's path ends [m], from its pixels and the axis."""
         pixel = float(self.path(part).replace("L", " ").replace("M", " ").split()[-1].split(",")[1])
         low, high, length = self.page.evaluate(
@@ -85,15 +79,15 @@ class Shown:
         )
         return float((high + (low - high) * pixel / length) / self.data["motion"]["parts"]["motion"]["factor"])
 
-    def set_slider(self, frame: int) -> None:
+    def set_slider(self, frame):
         self.page.locator("#slider").fill(str(frame))
 
-    def frame(self) -> int:
+    def frame(self):
         return int(self.page.locator("#slider").input_value())
 
 
 @pytest.fixture
-def soft(browser: Any, folder: Path) -> Iterator[Shown]:
+def soft(browser, folder):
     shown = Shown(browser, run_and_report(folder, "soft"))
     yield shown
     assert shown.complaints == []
@@ -101,7 +95,7 @@ def soft(browser: Any, folder: Path) -> Iterator[Shown]:
 
 
 @pytest.mark.parametrize("scene", shipped_scenes())
-def test_every_shipped_scene_loads_alone_and_moves(browser: Any, folder: Path, scene: str) -> None:
+def test_every_shipped_scene_loads_alone_and_moves(browser, folder, scene):
     shown = Shown(browser, run_and_report(folder, scene))
     frames = len(shown.data["motion"]["time"])
     for part in shown.data["motion"]["parts"]["motion"]["traces"]:
@@ -122,8 +116,8 @@ def test_every_shipped_scene_loads_alone_and_moves(browser: Any, folder: Path, s
     shown.page.close()
 
 
-def test_bodies_are_drawn_where_the_run_has_them(soft: Shown) -> None:
-    times, shapes = soft.trajectory.shapes  # type: ignore[misc]
+def test_bodies_are_drawn_where_the_run_has_them(soft):
+    times, shapes = soft.trajectory.shapes
     before = soft.path("beam")
     for frame in (10, 200, len(times) - 1):
         soft.set_slider(frame)
@@ -137,7 +131,7 @@ def test_bodies_are_drawn_where_the_run_has_them(soft: Shown) -> None:
         assert str(soft.trajectory.phase[row]) in reading
 
 
-def test_play_goes_on_and_pauses(soft: Shown) -> None:
+def test_play_goes_on_and_pauses(soft):
     button = soft.page.locator("#play")
     button.click()
     soft.page.wait_for_function("Number(document.getElementById('slider').value) > 3")
@@ -148,7 +142,7 @@ def test_play_goes_on_and_pauses(soft: Shown) -> None:
     assert soft.frame() == paused
 
 
-def test_play_ends_with_the_run(soft: Shown) -> None:
+def test_play_ends_with_the_run(soft):
     last = len(soft.data["motion"]["time"]) - 1
     soft.set_slider(last - 3)
     soft.page.locator("#play").click()
@@ -156,7 +150,7 @@ def test_play_ends_with_the_run(soft: Shown) -> None:
     soft.page.wait_for_function("document.getElementById('play').getAttribute('aria-label') === 'Play'")
 
 
-def test_arrow_keys_and_events_set_the_time(soft: Shown) -> None:
+def test_arrow_keys_and_events_set_the_time(soft):
     soft.page.locator("#slider").focus()
     soft.page.keyboard.press("ArrowRight")
     assert soft.frame() == 1
@@ -166,7 +160,7 @@ def test_arrow_keys_and_events_set_the_time(soft: Shown) -> None:
     assert soft.frame() == int(np.searchsorted(times, event.time, side="right")) - 1
 
 
-def test_a_click_into_a_chart_sets_the_time_of_all(soft: Shown) -> None:
+def test_a_click_into_a_chart_sets_the_time_of_all(soft):
     chart = soft.page.locator("#gap .nsewdrag")
     chart.scroll_into_view_if_needed()
     area = chart.bounding_box()
@@ -186,7 +180,7 @@ def test_a_click_into_a_chart_sets_the_time_of_all(soft: Shown) -> None:
         assert cursor["height"] == pytest.approx(plot["height"], abs=1.0)
 
 
-def test_zooming_one_time_axis_zooms_all(soft: Shown) -> None:
+def test_zooming_one_time_axis_zooms_all(soft):
     ranges = "() => [...document.querySelectorAll('#over-time .chart')].map(c => c.layout.xaxis.range)"
     assert len({tuple(r) for r in soft.page.evaluate(ranges)}) == 1
     soft.page.evaluate("Plotly.relayout('gap', {'xaxis.range': [0.05, 0.1]})")
@@ -195,7 +189,7 @@ def test_zooming_one_time_axis_zooms_all(soft: Shown) -> None:
     soft.page.wait_for_function(f"({ranges})().every(r => r[0] === 0 && r[1] === 0.3)")
 
 
-def test_in_print_everything_fits_the_paper_and_controls_are_gone(soft: Shown, tmp_path: Path) -> None:
+def test_in_print_everything_fits_the_paper_and_controls_are_gone(soft, tmp_path):
     widths = "() => [...document.querySelectorAll('.chart')].map(c => c._fullLayout.width)"
     wide = soft.page.evaluate(widths)
     soft.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")

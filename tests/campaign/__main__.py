@@ -4,13 +4,10 @@ Every verdict is a line of the results file as soon as it is known, and a scene 
 --write the table goes into docs/accuracy.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
 import sys
-from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
@@ -20,7 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported: 
 
 import numpy as np
 from draw import KINDS
-from judge import WAYS, Verdict, from_dict, judge
+from judge import WAYS, from_dict, judge
 
 sys.path.append(str(Path(__file__).parents[2] / "docs"))
 from pages import table, write_section
@@ -28,13 +25,13 @@ from pages import table, write_section
 HEAD = ("", "well-conditioned", "wrong, told", "wrong, untold (above 2)", "right, told", "stopped, refused", "doSteps")
 
 
-def read(path: Path) -> list[Verdict]:
+def read(path):
     if not path.exists():
         return []
     return [from_dict(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
-def row(name: str, group: list[Verdict]) -> list[str]:
+def row(name, group):
     judged = [v for v in group if v.judged]
     wrong = [v for v in judged if v.factor > 1.0]
     silent = [v for v in wrong if v.silent]
@@ -44,7 +41,7 @@ def row(name: str, group: list[Verdict]) -> list[str]:
     return [name, *map(str, (len(judged), *counts, sum(v.told for v in judged) - counts[0], len(failed))), calls]
 
 
-def lines(verdicts: list[Verdict]) -> list[str]:
+def lines(verdicts):
     """Return the table: a line for each way, and for each kind of scene at fixed steps."""
     fixed = [v for v in verdicts if "accuracy" not in v.way]
     rows = [row(way, [v for v in verdicts if v.way == way]) for way in WAYS]
@@ -52,7 +49,7 @@ def lines(verdicts: list[Verdict]) -> list[str]:
     return table(HEAD, [cells for cells in rows if any(cell not in ("0", "0 (0)", "–") for cell in cells[1:])])
 
 
-def worst(verdicts: Iterable[Verdict]) -> list[str]:
+def worst(verdicts):
     silent = sorted((v for v in verdicts if v.silent), key=lambda v: -v.factor)
     return [
         f"{v.seed}/{v.number} {v.kind}, {v.way}: {v.factor:.1f} times (u_tip {v.u_tip:.1e}, y {v.y:.1e}, times "
@@ -61,7 +58,7 @@ def worst(verdicts: Iterable[Verdict]) -> list[str]:
     ]
 
 
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(prog="./build.sh campaign", description=__doc__.splitlines()[0])
     parser.add_argument("--seed", type=int, default=1, help="other seeds draw other scenes")
     parser.add_argument("--scenes", type=int, default=20, help="how many of them")
@@ -72,7 +69,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="write the table into docs/accuracy.md")
     options = parser.parse_args()
     known = {(v.seed, v.number, v.way) for v in read(options.results)}
-    todo: list[tuple[int, list[str]]] = []
+    todo = []
     for number in range(options.scenes):
         ways = [w for w in options.way or WAYS if (options.seed, number, w) not in known]
         if ways and options.kind in (None, KINDS[number % len(KINDS)]):

@@ -1,13 +1,10 @@
 """Random scenes of all kinds, by a seed and a number."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
-from typing import Any
 
 import numpy as np
 
-from springbeam.scene import Beam, Scene, scene_from_dict
+from springbeam.scene import Beam, scene_from_dict
 from springbeam.scene.resolution import slowest_frequency
 from springbeam.scene.statics import tip_compliance, tip_inertia
 
@@ -27,21 +24,21 @@ KINDS = (
 )
 
 
-def drawn(seed: int, number: int) -> Scene:
+def drawn(seed, number):
     """Draw scene ``number`` of ``seed``. Motions are as large as the tip's speed and the lowest frequency make them.
 
     Its macro step is a hundredth of the shortest one of the bodies' own periods.
     """
     random, kind = np.random.default_rng([seed, number]), KINDS[number % len(KINDS)]
 
-    def between(low: float, high: float) -> float:
+    def between(low, high):
         """Draw a number, evenly over the decades."""
         return float(f"{np.exp(random.uniform(np.log(low), np.log(high))):.4g}")
 
-    def some(probability: float, value: float) -> float:
+    def some(probability, value):
         return value if random.random() < probability else 0.0
 
-    def signed(value: float) -> float:
+    def signed(value):
         return value if random.random() < 0.5 else -value
 
     restitution = 1.0 if random.random() < 0.5 else between(0.2, 0.95)
@@ -65,7 +62,7 @@ def drawn(seed: int, number: int) -> Scene:
     length, speed = between(0.2, 2.0), between(0.1, 3.0)
     thickness = length / between(3.0, 20.0)
     young, elements = between(1e5, 2e11), int(random.integers(5, 31))
-    form: dict[str, Any] = {
+    form = {
         "density": between(900.0, 8000.0), "area": thickness**2, "second_moment_of_area": thickness**4 / 12.0,
         "young_modulus": young, "shear_modulus": young / 2.6, "shear_coefficient": 5.0 / 6.0, "length": length,
         "n_elements": elements, "initial_velocity_slope": -speed / length, "reduced_integration": True,

@@ -1,9 +1,6 @@
 """One scene, run in each way, beside the event-driven reference."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 from draw import KINDS, drawn
@@ -13,13 +10,13 @@ from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_time_difference
 from springbeam.results.trajectory import Trajectory
 from springbeam.run.outcome import RunStopped
-from springbeam.scene import Scene, SceneError
+from springbeam.scene import SceneError
 from springbeam.scene.resolution import peak_force_doubt
 from springbeam.scene.suspicions import suspicions
 from springbeam.studies.metrics import errors
 
 #: Ways to run a scene: an accuracy, or [coupling] at the scene's own macro step, or that over ``finer``.
-WAYS: dict[str, dict[str, Any]] = {
+WAYS = {
     "--accuracy 1e-3": {"accuracy": 1e-3},
     "--accuracy 1e-4": {"accuracy": 1e-4},
     "energy 0": {"scheme": "energy", "degree": 0},
@@ -56,36 +53,36 @@ class Verdict:
     why: str = ""
 
     @property
-    def kind(self) -> str:
+    def kind(self):
         return KINDS[self.number % len(KINDS)]
 
     @property
-    def bound(self) -> float:
+    def bound(self):
         return float(WAYS[self.way].get("accuracy", FIXED))
 
     @property
-    def factor(self) -> float:
+    def factor(self):
         """Error over what it may be."""
         motion = max(self.u_tip, self.y)
         return max(motion, self.time, self.impulse) / self.bound if "accuracy" in self.way else motion / self.bound
 
     @property
-    def judged(self) -> bool:
+    def judged(self):
         return self.outcome == "done" and self.condition <= WELL_CONDITIONED
 
     @property
-    def silent(self) -> bool:
+    def silent(self):
         return self.judged and self.factor > 1.0 and not self.told
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self):
         return asdict(self)
 
 
-def from_dict(values: dict[str, Any]) -> Verdict:
+def from_dict(values):
     return Verdict(**{field.name: values[field.name] for field in fields(Verdict)})
 
 
-def judge(seed: int, number: int, ways: list[str]) -> list[Verdict]:
+def judge(seed, number, ways):
     """Run scene ``number`` of ``seed`` in each of ``ways``."""
     scene = drawn(seed, number)
     runs = {way: _run(scene, way) for way in ways}
@@ -106,13 +103,13 @@ def judge(seed: int, number: int, ways: list[str]) -> list[Verdict]:
     return [*found, *(_verdict(seed, number, way, run, reference, condition) for way, run in done.items())]
 
 
-def _times(way: str, run: Trajectory) -> np.ndarray:
+def _times(way, run):
     """Return when ``run`` is judged: with an accuracy between its rows too, since that is about the curve."""
     rows = run.time[:: len(run) // ROWS + 1]
     return np.append(rows, np.linspace(run.time[0], run.time[-1], POINTS)) if "accuracy" in WAYS[way] else rows
 
 
-def _run(scene: Scene, way: str) -> Trajectory | Exception:
+def _run(scene, way):
     settings = WAYS[way]
     try:
         if "accuracy" in settings:
@@ -124,12 +121,12 @@ def _run(scene: Scene, way: str) -> Trajectory | Exception:
         return failed
 
 
-def _failure(failed: Exception) -> tuple[str, float, bool, float, float, float, float, int, str]:
+def _failure(failed):
     outcome = "refused" if isinstance(failed, SceneError) else "stopped"
     return outcome, 0.0, True, 0.0, 0.0, 0.0, 0.0, 0, str(failed)
 
 
-def _verdict(seed: int, number: int, way: str, run: Trajectory, reference: Trajectory, condition: float) -> Verdict:
+def _verdict(seed, number, way, run, reference, condition):
     span = float(run.time[-1] - run.time[0])
     picked = run.summary.get("accuracy")
     promised = WAYS[way].get("accuracy")
@@ -149,7 +146,7 @@ def _verdict(seed: int, number: int, way: str, run: Trajectory, reference: Traje
     )  # fmt: skip
 
 
-def _condition(scene: Scene, span: float) -> float:
+def _condition(scene, span):
     """Return how many times larger than that of a stiffness the change of the motion or of a time is.
 
     By runs with short steps, since it need not be exact.
@@ -158,7 +155,7 @@ def _condition(scene: Scene, span: float) -> float:
     sharp = {"scheme": "energy", "degree": 2, "macro_step": scene.coupling.H / 4.0}
     stiffness, worst = getattr(getattr(scene, body), key), 0.0
 
-    def run(share: float) -> Trajectory:
+    def run(share):
         return simulate(with_changes(scene, coupling=sharp, **{body: {key: stiffness * (1.0 + share)}}))
 
     exact = run(0.0)

@@ -1,12 +1,9 @@
 """Where the importers are and how they are called, and what has to come out of them."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
@@ -25,7 +22,7 @@ CONNECTIONS = [
     ("beam.tip_velocity_forecast", "spring.tip_velocity_forecast"),
     ("spring.reaction", "beam.tip_force"),
 ]
-KINDS: dict[str, Callable[[str], float | int | bool]] = {"Real": float, "Integer": int, "Boolean": "true".__eq__}
+KINDS = {"Real": float, "Integer": int, "Boolean": "true".__eq__}
 #: Those of spring_beam.ssp.
 PARAMETERS = {
     parameter.get("name", ""): KINDS[value.tag.split("}")[1]](value.get("value", ""))
@@ -40,7 +37,7 @@ CACHE = Path(
 )
 
 
-def installed(name: str) -> Path:
+def installed(name):
     """The importer's folder; skips the test if it is not there."""
     folder = CACHE / name
     if not (folder / ".installed").is_file():
@@ -48,7 +45,7 @@ def installed(name: str) -> Path:
     return folder
 
 
-def run(*command: str | Path, cwd: Path | None = None, env: dict[str, str] | None = None) -> str:
+def run(*command, cwd=None, env=None):
     """What the command printed; it must succeed."""
     done = subprocess.run(
         [str(c) for c in command],
@@ -68,9 +65,7 @@ class System:
     ``reference``, ``of_master``: y of the pair at 1, 2, … 400 ms by the event-driven solver and by `springbeam run`.
     """
 
-    def __init__(
-        self, name: str, fmu_folder: Path, scratch: Path, reference: np.ndarray, of_master: np.ndarray
-    ) -> None:
+    def __init__(self, name, fmu_folder, scratch, reference, of_master):
         self.output = SYSTEMS[name]
         names = ["beam", "spring"] if name == "pair" else [name]
         self.fmus = {n: str(fmu_folder / f"{n}.fmu") for n in names}
@@ -80,7 +75,7 @@ class System:
             self.parameters["spring.velocity"] = -1.0
         self._scratch, self._reference, self._of_master = scratch, reference, of_master
 
-    def in_python(self, importer: str, **environment: str) -> np.ndarray:
+    def in_python(self, importer, **environment):
         """Return the rows of ``run_IMPORTER.py``, run by the importer's own Python."""
         job = {"size": SIZE, "end": END, "fmus": self.fmus, "parameters": self.parameters}
         job |= {"connections": self.connections, "outputs": [self.output]}
@@ -88,7 +83,7 @@ class System:
         output = run(python, HERE / f"run_{importer}.py", json.dumps(job), env=environment)
         return np.array(json.loads(output.split("ROWS ")[1]))[:, 1]
 
-    def check(self, rows: np.ndarray, within: float = 0.0) -> None:
+    def check(self, rows, within=0.0):
         """The rows are those of the same calls by hand, to the last bit unless ``within`` says otherwise [m].
 
         Those of the pair are as near to the event-driven solution as `springbeam run` with H = 1 ms, and near to that.
@@ -102,7 +97,7 @@ class System:
             assert error < 1.1 * np.abs(self._of_master - self._reference).max()
             assert difference < 4e-5  # the first step, whose tip is foreseen by its mean velocity over two
 
-    def by_hand(self) -> np.ndarray:
+    def by_hand(self):
         """Return the output at every step: FMUs stepped, and exchanged by hand the way these importers do."""
         slaves = {}
         for name, path in self.fmus.items():
@@ -112,17 +107,17 @@ class System:
             slave.setupExperiment(startTime=0.0)
             slaves[name] = slave, {v.name: v for v in description.modelVariables}
 
-        def get(path: str) -> float:
+        def get(path):
             slave, variables = slaves[path.split(".")[0]]
             return float(slave.getReal([variables[path.split(".")[1]].valueReference])[0])
 
-        def put(path: str, value: float | int | bool) -> None:
+        def put(path, value):
             slave, variables = slaves[path.split(".")[0]]
             variable = variables[path.split(".")[1]]
             kind = {"Real": slave.setReal, "Integer": slave.setInteger, "Boolean": slave.setBoolean}[variable.type]
             kind([variable.valueReference], [value])
 
-        def exchange() -> None:
+        def exchange():
             values = [get(start) for start, _ in self.connections]
             for (_, target), value in zip(self.connections, values, strict=True):
                 put(target, value)

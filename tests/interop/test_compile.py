@@ -1,7 +1,5 @@
 """Binaries that FMPy compiles from what is packed in sources/ do the same as those that are shipped."""
 
-from __future__ import annotations
-
 import os
 import sys
 import zipfile
@@ -16,7 +14,7 @@ pytestmark = pytest.mark.slow
 
 SOFT_BEAM = {"young_modulus": 100.0, "shear_modulus": 100.0, "initial_velocity_slope": -1.0, "alpha_b": 1e-3}
 SOFT_SPRING = {"linear_stiffness": 3.0, "cubic_stiffness": -0.2, "damping": 0.1, "velocity": -1.0}
-RUNS: dict[str, list[dict[str, float]]] = {
+RUNS = {
     "beam": [SOFT_BEAM, {**SOFT_BEAM, "integrator": 2}],
     "spring": [
         {**SOFT_SPRING, "stop_enabled": True, "stop_position": -0.015, "restitution": 0.5},
@@ -26,7 +24,7 @@ RUNS: dict[str, list[dict[str, float]]] = {
 
 
 @pytest.mark.parametrize("model", ["beam", "spring"])
-def test_compiled_from_its_own_sources_it_gives_the_same_bits(fmu_folder: Path, tmp_path: Path, model: str) -> None:
+def test_compiled_from_its_own_sources_it_gives_the_same_bits(fmu_folder, tmp_path, model):
     shipped, compiled = fmu_folder / f"{model}.fmu", tmp_path / f"{model}.fmu"
     description = fmpy.read_model_description(str(shipped))
     if not description.buildConfigurations:

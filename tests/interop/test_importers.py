@@ -3,19 +3,16 @@
 `./build.sh interop` installs them into a cache folder; those that are not there are skipped, with the reason.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import fmpy
 import numpy as np
 import pytest
-from importers import END, HERE, SIZE, SYSTEMS, System, installed, run
+from importers import END, HERE, SIZE, SYSTEMS, installed, run
 
 each_system = pytest.mark.parametrize("system", SYSTEMS, indirect=True)
 each_model = pytest.mark.parametrize("model", ["beam", "spring"])
@@ -23,19 +20,19 @@ each_model = pytest.mark.parametrize("model", ["beam", "spring"])
 
 @each_model
 @pytest.mark.parametrize("rules", ["static", "rules"])
-def test_vdmcheck_finds_nothing(fmu_folder: Path, model: str, rules: str) -> None:
+def test_vdmcheck_finds_nothing(fmu_folder, model, rules):
     folder = next((installed("vdmcheck") / rules).iterdir())
     output = run("bash", folder / "VDMCheck2.sh", fmu_folder / f"{model}.fmu", cwd=folder)
     assert output.strip() == "No errors found."
 
 
 @each_model
-def test_fmpy_accepts_it_from_its_command_line(fmu_folder: Path, model: str) -> None:
+def test_fmpy_accepts_it_from_its_command_line(fmu_folder, model):
     assert "No problems found" in run(sys.executable, "-m", "fmpy", "validate", fmu_folder / f"{model}.fmu")
 
 
 @each_model
-def test_fmutool_finds_nothing(fmu_folder: Path, model: str) -> None:
+def test_fmutool_finds_nothing(fmu_folder, model):
     tool = installed("fmucontainer") / "venv/bin/fmutool"
     done = subprocess.run([tool, "-input", fmu_folder / f"{model}.fmu", "-check"], capture_output=True, text=True)
     report = done.stdout + done.stderr
@@ -46,27 +43,27 @@ def test_fmutool_finds_nothing(fmu_folder: Path, model: str) -> None:
     assert "ERROR" not in report
 
 
-def test_pair_by_hand_in_fmpy(system: System) -> None:
+def test_pair_by_hand_in_fmpy(system):
     system.check(system.by_hand())
 
 
 @each_system
-def test_libcosim(system: System) -> None:
+def test_libcosim(system):
     system.check(system.in_python("libcosim"), within=1e-12)  # its times are whole nanoseconds
 
 
 @each_system
-def test_ecos(system: System) -> None:
+def test_ecos(system):
     system.check(system.in_python("ecos", LD_LIBRARY_PATH=str(installed("ecos") / "venv/lib")))
 
 
-def test_pair_in_maestro(system: System, tmp_path: Path) -> None:
+def test_pair_in_maestro(system, tmp_path):
     classpath = (installed("maestro") / "classpath").read_text()
 
-    def path(name: str) -> str:
+    def path(name):
         return "{" + name.split(".")[0] + "}." + name
 
-    model: dict[str, Any] = {
+    model = {
         "fmus": {"{" + name + "}": Path(file).as_uri() for name, file in system.fmus.items()},
         "connections": {path(start): [path(end)] for start, end in system.connections},
         "parameters": {path(name): value for name, value in system.parameters.items()},
@@ -95,7 +92,7 @@ def test_pair_in_maestro(system: System, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("model", "output"), [("beam", "tip_displacement"), ("spring", "displacement")])
-def test_single_fmu_in_fmi_sim(fmu_folder: Path, tmp_path: Path, model: str, output: str) -> None:
+def test_single_fmu_in_fmi_sim(fmu_folder, tmp_path, model, output):
     tool = installed("fmi-sim") / "bin/fmi-sim"
     name, value = {"beam": ("initial_velocity_slope", -1.0), "spring": ("displacement", 0.5)}[model]
     result = tmp_path / "out.csv"
@@ -118,7 +115,7 @@ def test_single_fmu_in_fmi_sim(fmu_folder: Path, tmp_path: Path, model: str, out
 
 
 @pytest.fixture(scope="module")
-def java(tmp_path_factory: pytest.TempPathFactory) -> str:
+def java(tmp_path_factory):
     """The class path of the importers and of our callers, compiled."""
     libraries = (installed("java") / "classpath").read_text().strip()
     classes = tmp_path_factory.mktemp("classes")
@@ -128,7 +125,7 @@ def java(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @each_system
 @pytest.mark.parametrize("importer", ["fmi4j", "javafmi"])
-def test_java(system: System, java: str, importer: str) -> None:
+def test_java(system, java, importer):
     # Half-way each state goes through its serialised bytes.
     values = {**system.fmus, **system.parameters}
     output = run(
@@ -144,11 +141,11 @@ def test_java(system: System, java: str, importer: str) -> None:
 
 
 @each_system
-def test_fmucontainer(system: System, tmp_path: Path) -> None:
+def test_fmucontainer(system, tmp_path):
     # It makes one FMU of several; its own binary then is the importer of ours.
     tool = installed("fmucontainer") / "venv/bin/fmucontainer"
 
-    def cells(path: str) -> str:
+    def cells(path):
         name, variable = path.split(".")
         return f"{name}.fmu;{variable}"
 
@@ -164,5 +161,5 @@ def test_fmucontainer(system: System, tmp_path: Path) -> None:
         cwd=tmp_path,
     )
     container = str(tmp_path / "container.fmu")
-    result: Any = fmpy.simulate_fmu(container, stop_time=END, output_interval=SIZE, output=["y"], validate=False)
+    result = fmpy.simulate_fmu(container, stop_time=END, output_interval=SIZE, output=["y"], validate=False)
     system.check(result["y"][1:])

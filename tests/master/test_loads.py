@@ -152,46 +152,6 @@ def test_a_base_that_falls_faster_than_the_spring_lifts_it_off_the_foundation():
     assert run.summary["max_energy_residual"] < 1e-11
 
 
-@pytest.mark.parametrize(("degree", "jump"), [(0, 0.5), (1, 0.1762)])
-def test_a_tied_pair_leaves_the_foundation_by_the_loads_until_then(degree, jump):
-    """A harmonic base lifts it; N changes by 2 N in a macro step. A load that jumps right after has no part in it."""
-    base = {"on": "base", "signal": "harmonic", "frequency": 6.0, "amplitude": -8.0}
-    beam = {"n_elements": 4, "young_modulus": 400.0, "shear_modulus": 400.0, "initial_velocity_slope": -0.5}
-    scene = scene_from_dict({
-        "time": {"t_end": 0.18},
-        "beam": {**beam, "alpha_b": 0.01},
-        "spring": {"linear_stiffness": 3.0, "external_force": -5.0},
-        "stop": {"position": -0.01, "restitution": 0.0},
-        "coupling": {"macro_step": 1e-3, "degree": degree},
-        "loads": [base, {"on": "spring", "signal": "step", "start": jump, "amplitude": 5.0}],
-    })  # fmt: skip
-    found, exact = simulate(scene).events[:3], event_driven.simulate(scene).events[:3]
-    assert [event.kind for event in found] == ["impact", "seated", "unseated"]
-    assert [event.time for event in found] == pytest.approx([event.time for event in exact], abs=1e-6)
-
-
-@pytest.mark.parametrize("law", [("compliance", 1.0), ("compliance", 1.5), ("link", 1.0)])
-def test_an_elastic_stop_is_a_stop_with_a_law(law):
-    """A sudden tip force, C between the tip and φ, and no spring: beside the reference, which locates the contact."""
-    table = {
-        "time": {"t_end": 0.25},
-        "beam": {"young_modulus": 100.0, "shear_modulus": 100.0, "n_elements": 4, "approach": "elastic"},
-        "stop": {"position": -0.01},
-        "contact": {"law": law[0], "stiffness": 400.0, "exponent": law[1], "damping": 0.1},
-        "coupling": {"macro_step": 5e-4, "degree": 2},
-        "loads": [{"on": "tip", "amplitude": -3.0}, {"on": "base", "signal": "harmonic", "frequency": 5.0}],
-    }
-    scene = scene_from_dict(table)
-    run = simulate(scene)
-    exact = event_driven.simulate(scene, sample_times=run.time)
-    assert scene.fmus == ("beam",)
-    assert [event.kind for event in run.events] == [event.kind for event in exact.events]
-    assert bool(run.events) == (law[0] == "compliance")
-    assert np.abs(run.u_tip - exact.u_tip).max() < 1e-9
-    assert run.summary["max_energy_residual"] < 1e-11
-    assert np.abs(run.contact_force).max() > 1.0
-
-
 def test_the_reference_integrates_loads_as_scipy_does(monkeypatch):
     run = integrated_anew(soft(*SIGNALS, t_end=0.06), monkeypatch, 0.06)
     assert np.abs(run.energy_residual).max() < 1e-11 * run.e_beam.max()

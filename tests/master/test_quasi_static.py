@@ -54,37 +54,6 @@ def test_locking_is_the_stiffness_of_the_mesh_over_that_of_the_beam(degree):
 # -- the body -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("alpha", [0.0, 0.03, 5.0])
-@pytest.mark.parametrize("degree", [0, 1, 2])
-def test_the_work_of_the_force_is_accounted_for_exactly(alpha, degree):
-    """∫C ẇ = Δ(strain energy + load potential) + dissipated, with ∫C ẇ from the integrals that the coupling uses."""
-    beam, rng = body(alpha, degree), np.random.default_rng(1)
-    for size in (1e-3, 0.1, 7.0):
-        coefficients = rng.normal(size=3) * (np.arange(3) <= degree)
-        force = (coefficients[0], coefficients[1] / size, coefficients[2] / size**2)
-        before, u0 = sum(beam.energies()), beam.motion().displacement
-        beam.advance(0.0, size, force)
-        u1, _, once, twice = beam.motion()
-        end = force[0] + size * (force[1] + 0.5 * size * force[2])
-        work = end * u1 - force[0] * u0 - force[1] * once - force[2] * (size * once - twice)
-        assert sum(beam.energies()) - before == pytest.approx(work, abs=1e-13 * (abs(u0) + abs(u1) + 1.0) * 10.0)
-        assert beam.energies().kinetic == 0.0
-
-
-@pytest.mark.parametrize("alpha", [1e-3, 0.2, 4.0])
-def test_let_go_it_relaxes_exponentially(alpha):
-    beam, rest = body(alpha), statics.tip_load_deflection(BEAM)
-    w0, size = 0.1 - rest, 0.5
-    beam.release()
-    assert beam.motion().velocity == pytest.approx(-w0 / alpha, rel=1e-14)
-    beam.advance_alone(0.0, size)
-    w, v, once, twice = w0 * np.exp(-size / alpha), -w0 / alpha * np.exp(-size / alpha), 0.0, 0.0
-    once = rest * size + alpha * (w0 - w)
-    twice = 0.5 * rest * size**2 + alpha * (w0 * size - alpha * (w0 - w))
-    assert beam.motion() == pytest.approx((rest + w, v, once, twice), rel=1e-12)
-    assert beam.energies().dissipated == pytest.approx(0.5 * STIFFNESS * (w0**2 - w**2), rel=1e-12)
-
-
 # -- the pair -------------------------------------------------------------------------------------------------------
 
 

@@ -169,40 +169,6 @@ def test_a_tolerance_takes_the_place_of_the_macro_step_and_back():
     assert scene_from_dict({**load_pair(), "coupling": {}}).coupling.H == 0.004  # without either
 
 
-def test_a_step_and_a_tolerance_at_once_are_refused():
-    """The first of the two was dropped without a word."""
-    both = {"macro_step": 1e-3, "relative_tolerance": 1e-4}
-    for ordered in (both, dict(reversed(both.items()))):
-        with pytest.raises(SceneError, match="macro_step, relative_tolerance: give the steps one way"):
-            with_changes(load_scene("soft"), coupling=ordered)
-        with pytest.raises(SceneError, match=r"--set coupling\.macro_step=0\.001: .* give the steps one way"):
-            load_scene("soft", [f"coupling.{key}={value}" for key, value in ordered.items()])
-
-
-@pytest.mark.parametrize(
-    ("override", "fragments"),
-    [
-        ("time.=1", ["TABLE.KEY=VALUE"]),
-        (".t_end=1", ["TABLE.KEY=VALUE"]),
-        ("", ["TABLE.KEY=VALUE"]),
-        ("title.x=1", ["[title]: not a table; tables: time"]),
-        ("time.end=1", ["[time] end", "t_end"]),
-        ("time.t_end=", ['[time] t_end = ""', "finite number"]),
-        ("time.t_end=nan", ["t_end = nan", "finite number"]),
-        ("beam.n_elements=1e2", ["n_elements = 100.0", "whole number"]),
-        ("beam.n_elements.x=1", ["[beam] n_elements.x", "unknown key"]),
-        ("contact.law=glue", ['law = "glue"', '"transmission"']),
-        ("time.t_end=1\n[stop]\nposition=-1", ["t_end", "finite number"]),
-    ],
-)
-def test_bad_overrides(override, fragments):
-    """More of them, as a user meets them, are in tests/system/test_command_line.py."""
-    with pytest.raises(SceneError) as refusal:
-        load_scene("soft", [override])
-    for fragment in fragments:
-        assert fragment in str(refusal.value)
-
-
 def outcome(data):
     try:
         return scene_from_dict(data)

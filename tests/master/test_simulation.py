@@ -1,20 +1,16 @@
 """The master on exact bodies: events against the event-driven reference, refused steps, the ledger."""
 
-from functools import lru_cache
-from pathlib import Path
-
 import numpy as np
 import pytest
 from bodies import DuffingBody, Upper, simulate, stopping
 from references import dips
 from scenes import kinds, scene_from_dict
 
-from springbeam.bodies.protocol import NO_FORCE, StepRefused
+from springbeam.bodies.protocol import NO_FORCE
 from springbeam.monolithic import event_driven
 from springbeam.results.steps import STEP
 from springbeam.run.ledger import bounds, errors
 from springbeam.scene import load_scene, with_changes
-from springbeam.scene.reading import tomllib
 
 
 def soft(n=6, **tables):
@@ -25,37 +21,7 @@ def soft(n=6, **tables):
     return with_changes(load_scene("soft"), **{**tables, "coupling": {**coupling, **tables.get("coupling", {})}})
 
 
-def reference(scene):
-    return _reference(with_changes(scene, coupling={"scheme": "energy", "degree": 0}))
-
-
-@lru_cache(maxsize=8)
-def _reference(scene):
-    return event_driven.simulate(scene)
-
-
-def error(trajectory, exact, column):
-    """Largest error on the macro grid after the start, relative to the largest value."""
-    _, ours, theirs = np.intersect1d(np.round(trajectory.time, 12), np.round(exact.time, 12), return_indices=True)
-    assert len(ours) > 0.9 * trajectory.scene.time.t_end / trajectory.scene.coupling.macro_step
-    difference = (trajectory[column][ours] - exact[column][theirs])[1:]
-    return float(np.abs(difference).max() / np.abs(exact[column]).max())
-
-
 # -- against the reference ------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("changes", [{}, {"stop": {"restitution": 0.3}}, {"beam": {"distributed_load": 1.0}}])
-def test_hermite_has_the_events_of_the_reference(changes):
-    """Same sequence; times and velocities to 1e-7: order 6 with ω_max·H = 0.2."""
-    scene = soft(**changes)
-    ours, theirs = simulate(scene).events, event_driven.simulate(scene).events
-    assert [e.kind for e in ours] == [e.kind for e in theirs]
-    assert len(ours) >= 3
-    for a, b in zip(ours, theirs, strict=True):
-        assert a.time == pytest.approx(b.time, abs=1e-7)
-        assert (a.z, a.v_tip) == pytest.approx((b.z, b.v_tip), abs=1e-6)
-        assert a.energy_loss == pytest.approx(b.energy_loss, abs=1e-7)
 
 
 @pytest.mark.parametrize(("degree", "order"), [(0, 2.0), (2, 3.0)])
@@ -130,54 +96,17 @@ def test_a_damped_contact_that_opens_fast_pushes_only(degree):
     law = {"law": "compliance", "stiffness": 1e4, "exponent": 1.5, "damping": 20.0}
     coupling = {"scheme": "energy", "degree": degree, "macro_step": 2.5e-4}
     scene = soft(4, contact=law, stop=None, beam={"initial_velocity_slope": -2.0}, coupling=coupling)
-    run, exact = simulate(scene), reference(scene)
+    run = simulate(scene)
+    exact = event_driven.simulate(scene, sample_times=np.unique(run.time))
     touches = run.gap < 0.0
     assert (20.0 * run.velocity_mismatch[touches]).max() > 1.0
     assert run.contact_force.min() >= (-1e-12 if degree == 0 else -1e-3)
-    assert max(error(run, exact, name) for name in ("u_tip", "y")) < 1e-3
+    for name in ("u_tip", "y"):
+        apart = run[name] - exact[name][np.searchsorted(exact.time, run.time)]
+        assert np.abs(apart).max() < 1e-3 * np.abs(exact[name]).max()
 
 
 SOFT_LAW = {"law": "compliance", "exponent": 1.5}
-SCENES = tomllib.loads(Path(__file__).with_name("simulation.toml").read_text(encoding="utf-8"))
-
-
-def named(name, size, scheme, degree):
-    return scene_from_dict({**SCENES[name], "coupling": {"scheme": scheme, "degree": degree, "macro_step": size}})
-
-
-@pytest.mark.parametrize(("degree", "bound"), [(1, 5e-4), (2, 1e-6)])
-def test_a_contact_that_ends_at_once_does_not_stick(degree, bound):
-    """A second meeting above Ψ: it separates by itself. A contact that stuck would be wrong by the displacement
-    itself; left is O(H²) of the mismatched velocities at degree 1, O(H⁴) at degree 2."""
-    scene = named("ends at once", 5e-4, "energy", degree)
-    trajectory, exact = simulate(scene), reference(scene)
-    assert kinds(trajectory)[:4] == kinds(exact)[:4] == ["impact", "release", "impact", "separation"]
-    assert max(error(trajectory, exact, q) for q in ("u_tip", "y")) < bound
-
-
-@pytest.mark.parametrize("scheme", ["energy", "hermite"])
-def test_a_spring_leaves_the_foundation_and_is_seated_again_when_the_reference_says(scheme):
-    """Bounces die out (e = 0.3), N vanishes, bounces die out again: a false re-seat would hold y at φ for good."""
-    scene = named("seated twice", 1e-3, scheme, 2)
-    trajectory, exact = simulate(scene), reference(scene)
-    assert max(error(trajectory, exact, q) for q in ("u_tip", "y")) < 1e-8
-    for kind in ("seated", "unseated"):
-        ours, theirs = ([e.time for e in t.events if e.kind == kind] for t in (trajectory, exact))
-        assert len(theirs) == 2
-        assert ours[0] == pytest.approx(theirs[0], abs=2e-6)
-        # Rebounds below 1e-8 of the fastest are not followed: at the second time both last bounces are within that.
-        assert min(abs(t - theirs[1]) for t in ours) < 1e-6
-
-
-@pytest.mark.parametrize(("size", "bound"), [(5e-4, 5e-4), (2.5e-4, 2e-3)])
-def test_an_inelastic_foundation_is_left_at_once(size, bound):
-    """e = 0 with a load that lifts: seated and unseated at one time, and the motion after it is that of the reference.
-    Degree 0 errs by O(H²) in the velocities handed to each event, with a sign that depends on the grid."""
-    scene = named("left at once", size, "energy", 0)
-    trajectory, exact = simulate(scene), reference(scene)
-    assert kinds(trajectory)[:4] == kinds(exact)[:4] == ["impact", "seated", "unseated", "release"]
-    assert [e.time for e in trajectory.events[:4]] == pytest.approx([e.time for e in exact.events[:4]], abs=1e-6)
-    assert max(error(trajectory, exact, q) for q in ("u_tip", "y")) < bound
 
 
 @pytest.mark.parametrize(("e", "size"), [(0.5, 1e-3), (0.97, 10.0), (0.985, 1.0)])
@@ -267,54 +196,6 @@ def wrapped(**overrides):
         return beam, spring
 
     return wrap
-
-
-def test_refused_steps_are_halved():
-    """Nothing above 0.3 ms is accepted between 20 and 25 ms: quarters of H = 1 ms there, the motion as before."""
-
-    def advance(own, time, size, *forces):
-        if 0.02 <= time < 0.0249 and size > 3e-4:
-            raise StepRefused("too long")
-        return own(time, size, *forces)
-
-    scene = soft(time={"t_end": 0.05})
-    halved, exact = simulate(scene, wrapped(advance=advance)), reference(scene)
-    steps = np.diff(halved.time)
-    refused = (halved.time[:-1] >= 0.02) & (halved.time[:-1] < 0.0249)
-    assert steps[refused].max() <= 3e-4
-    assert steps[~refused].max() == pytest.approx(1e-3, rel=1e-9)
-    assert halved.summary["halved_steps"] >= 2 * 5
-    assert error(halved, exact, "y") < 1e-9
-    assert halved.time[-1] == 0.05
-
-
-def test_a_step_that_is_always_refused_stops_the_run_with_cause_and_time():
-    """20 halvings, then RunStopped; what was computed before is kept, and is what it would have been."""
-
-    def advance(own, time, size, *forces):
-        if time + size > 0.0205:
-            raise StepRefused("the spring is broken")
-        return own(time, size, *forces)
-
-    scene = soft(time={"t_end": 0.05})
-    (stopped, cause), whole = stopping(scene, wrapped(advance=advance)), simulate(scene)
-    assert cause.cause == "the spring is broken"
-    # Halving reaches the limit to H/2²⁰.
-    assert cause.time == pytest.approx(0.0205, abs=2e-9)
-    assert stopped.time[-1] == cause.time
-    assert f"{cause.time:.9g}" in str(cause)
-    assert np.array_equal(stopped.y[:20], whole.y[:20])
-
-
-def test_a_value_that_is_not_finite_stops_the_run():
-    def energies(own):
-        values = own()
-        return values if values.kinetic < 2e-3 else values._replace(kinetic=float("nan"))
-
-    stopped, cause = stopping(soft(), wrapped(energies=energies))
-    assert "e_spring" in cause.cause
-    assert stopped.time[-1] < cause.time <= 0.3
-    assert np.isfinite(stopped.e_total).all()
 
 
 @pytest.mark.parametrize(("stiffness", "exponent"), [(1e308, 1.0), (1e4, 100.0)])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from springbeam.contact.laws import stiffest
-from springbeam.results.extremes import Extremes
 from springbeam.results.steps import STEP
 from springbeam.results.totals import shortest_contact, totals
 from springbeam.results.trajectory import Event, EventKind
@@ -70,28 +69,6 @@ def test_a_window_need_not_begin_or_end_at_a_row(ends, window):
     """C = 12 t (1 − t) again: the best window has ½ as its middle, wherever the steps end."""
     steps = steps_with(lambda t: (12.0 * t * (1.0 - t), 12.0 - 24.0 * t, -24.0), ends)
     assert found(steps, window=window)["contact_force_max"] == pytest.approx(3.0 - window**2, rel=1e-12)
-
-
-@pytest.mark.parametrize("window", [3e-3, 0.1])
-def test_no_window_has_a_larger_mean(window):
-    """The force jumps from step to step; windows are shorter and longer than these."""
-    rng = np.random.default_rng(4)
-    ends = np.cumsum(np.append(0.0, rng.uniform(5e-3, 2e-2, 60)))
-    pieces = [np.polynomial.Polynomial([c, dc, 0.5 * ddc]) for c, dc, ddc in rng.normal(size=(60, 3)) * [1, 1e2, 1e4]]
-    table = dict(zip(ends.tolist(), pieces, strict=False))
-    steps = steps_with(lambda t: tuple(table[t].deriv(k)(0.0) if k else table[t](0.0) for k in range(3)), ends)
-    most = found(steps, window=window)["contact_force_max"]
-    total = np.cumsum([0.0, *(piece.integ()(size) for piece, size in zip(pieces, np.diff(ends), strict=True))])
-
-    def until(t):
-        row = np.searchsorted(ends, t, side="right").clip(max=60) - 1
-        return np.array([total[i] + pieces[i].integ()(x) for i, x in zip(row, t - ends[row], strict=True)])
-
-    begins = np.concatenate([np.linspace(0.0, ends[-1] - window, 20001), ends, ends - window])
-    begins = begins[(begins >= 0.0) & (begins <= ends[-1] - window)]
-    means = (until(begins + window) - until(begins)) / window
-    assert means.max() <= most * (1.0 + 1e-12)
-    assert means.max() == pytest.approx(most, rel=1e-4)
 
 
 def test_durations_and_rebound():
@@ -162,26 +139,6 @@ def moving(ends, path):
         return once(b), once.integ(lbnd=a)(b)
 
     return steps_with(lambda t: (0.0, 0.0, 0.0), ends, path, path.deriv(), integrals)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_extremes_are_those_of_a_fine_grid(seed):
-    """Extremes of 40 quintics with coefficients of any size, and of constant and straight ones."""
-    random = np.random.default_rng(seed)
-    powers = random.normal(size=(6, 40)) * 10.0 ** random.uniform(-3.0, 1.0, (6, 40))
-    powers[1:, :5] = powers[2:, 5:10] = 0.0
-    start, size = np.arange(40.0), np.full(40, 0.5)
-    share = np.linspace(0.0, 1.0, 4001)
-    grid = np.polynomial.polynomial.polyval(share, powers)
-    rows = Extremes.of_rows(start, powers[0])
-    low, low_time, high, high_time = rows.beside(powers, start, size)
-    scale = np.abs(grid).max()
-    assert grid.min() - 1e-5 * scale <= low <= grid.min() + 1e-14 * scale
-    assert grid.max() - 1e-14 * scale <= high <= grid.max() + 1e-5 * scale
-    for value, time in ((low, low_time), (high, high_time)):
-        step = int(time)
-        there = np.polynomial.polynomial.polyval((time - step) / 0.5, powers[:, step])
-        assert there == pytest.approx(value, abs=1e-13 * scale)
 
 
 def test_the_window_is_a_fiftieth_of_the_slowest_period():

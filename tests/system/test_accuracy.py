@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
-from commands import printed, refused
+from commands import printed
 from scenes import completed, scene_from_dict
 
 from springbeam.monolithic import event_driven
@@ -23,10 +23,7 @@ from springbeam.scene.statics import tip_load_deflection
 from springbeam.studies import accuracy as search
 from springbeam.studies.accuracy import differences, simulate
 from springbeam.studies.crosscheck import compare
-from springbeam.studies.metrics import METRICS
 from springbeam.studies.orders import Orders
-from springbeam.studies.sweep import Sweep
-from springbeam.studies.tradeoff import Tradeoff
 
 sys.path.append(str(Path(__file__).parents[1] / "campaign"))
 import judge
@@ -271,20 +268,6 @@ def test_a_run_may_be_shorter_than_the_default_macro_step(law, tmp_path):
         load_scene(path)
 
 
-@pytest.mark.parametrize("scheme", ["hermite", "jacobi"])
-def test_what_it_replaces_need_not_fit(scheme):
-    """A scheme that the integrator or the law does not take, a tolerance of IDA's: the accuracy picks its own."""
-    tables = {**STIFF_ON_SOFT, "time": {"t_end": 0.05}, "accuracy": 1e-2}
-    if scheme == "hermite":
-        tables["beam"] = {**tables["beam"], "integrator": "generalized_alpha"}
-    else:
-        tables["contact"] = {"law": "compliance"}
-    tables["spring"] = {**tables["spring"], "absolute_tolerance": 1e-2}
-    run = simulate(scene_from_dict({**tables, "coupling": {"scheme": scheme, "degree": 1}}))
-    assert run.scene.spring.absolute_tolerance < 1e-14
-    assert (run.scene.coupling.scheme, run.scene.coupling.degree) == ("energy", 0 if scheme == "hermite" else 2)
-
-
 # -- a scene that asks for an accuracy, in the studies ---------------------------------------------------------------
 
 ASKING = {
@@ -329,38 +312,6 @@ def test_orders_are_those_of_the_scheme_that_was_picked(asking, tmp_path):
     assert 4.5 <= tip["order_H"] <= 7.0
 
 
-def test_each_run_of_a_sweep_picks_its_own():
-    scene = scene_from_dict({**STIFF_ON_SOFT, "accuracy": 1e-3})
-    found = Sweep(scene=scene, vary=(), metric=("y_min", "macro_steps")).record({})
-    expected = simulate(scene)
-    assert found["status"] == "done"
-    assert (found["y_min"], found["macro_steps"]) == (METRICS["y_min"](expected), expected.summary["macro_steps"])
-
-
-def test_tradeoff_leaves_the_accuracy_out_and_says_so(asking):
-    """Each configuration once had the name of one and the settings that were picked."""
-    study = Tradeoff.of(load_scene(asking), repeats=1)
-    assert study.remarks == ("accuracy = 0.0001 is left out: each configuration has its own scheme and steps",)
-    cases = [case for case in study.cases().values() if case["family"] == "energy 0"]
-    calls = [study.record(case)["cost_macro_steps"] for case in cases]
-    assert len(set(calls)) == len(calls) == 4
-
-
-@pytest.mark.parametrize("key", ["scheme", "degree", "macro_step", "relative_tolerance", "tolerance"])
-def test_what_it_picks_cannot_be_given_beside_it(key, asking):
-    value = {"scheme": "hermite", "degree": 1}.get(key, 1e-3)
-    scene = load_scene(asking)
-    with pytest.raises(SceneError, match=rf"\[coupling\] {key}: accuracy = 0\.0001 picks"):
-        with_changes(scene, coupling={key: value})
-    changed = with_changes(scene, accuracy=None, coupling={"degree": 1, key: value})
-    assert (changed.accuracy, getattr(changed.coupling, key)) == (None, value)
-    for arguments in ([str(asking)], ["soft", "--accuracy", "1e-4"]):
-        setting = f"coupling.{key}={value}"
-        assert f"--set {setting}: [coupling] {key}: accuracy = 0.0001 picks" in refused(
-            "run", *arguments, "--set", setting
-        )
-
-
 def test_command(tmp_path):
     out = tmp_path / "out"
     arguments = ["run", "soft", "--set", "beam.n_elements=6", "--set", "time.t_end=0.06", "--accuracy", "1e-4"]
@@ -375,4 +326,3 @@ def test_command(tmp_path):
         np.testing.assert_array_equal(written[name], again[name])
     assert written.events == again.events
     np.testing.assert_array_equal(written.shapes[1], again.shapes[1])
-    refused(*arguments[:-1], "2", "--out", tmp_path / "no")

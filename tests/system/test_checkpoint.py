@@ -180,17 +180,6 @@ def test_another_fmu_is_refused(interrupted, tmp_path, fmu_folder, monkeypatch, 
         springbeam.resume(interrupted)
 
 
-def test_checkpoints_of_a_run_that_picks_its_accuracy_are_refused(tmp_path, monkeypatch):
-    """They were left out without a word; `springbeam resume` found none."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "asking.toml").write_text(
-        "accuracy = 1e-3\n[time]\nt_end = 0.1\n[spring]\nmass = 1.0\nlinear_stiffness = 1.0\n"
-    )
-    for arguments in (["soft", "--accuracy", "1e-3"], ["asking.toml"]):
-        assert "--checkpoint 0: a run with accuracy = 0.001" in refused("run", *arguments, "--checkpoint", "0")
-        assert not (tmp_path / "results").exists()
-
-
 # -- atomic ---------------------------------------------------------------------------------------------------------
 
 
@@ -369,14 +358,3 @@ def test_a_run_without_room_ends_with_3_and_goes_on_where_there_is(tmp_path, lon
     assert (long / "steps.bin").read_bytes().startswith(cut)
     printed("resume", tmp_path / "run", "--no-plots", "-q")
     assert written(tmp_path / "run") == written(long)
-
-
-@pytest.mark.skipif(os.name == "nt", reason="no locks")
-def test_a_run_that_still_runs_is_left_alone(interrupted):
-    checkpoint = runner.last_checkpoint(interrupted)
-    with FileRecorder(SCENE, RunDirectory(interrupted)) as running:
-        running.restore(checkpoint.results)
-        before = files(interrupted)
-        for line in (["resume", interrupted], ["run", "soft", "--out", interrupted, "--force"]):
-            assert "another process is writing to it" in refused(*line)
-        assert files(interrupted) == before

@@ -74,12 +74,3 @@ def test_an_accuracy_with_the_mesh_is_kept_beside_a_mesh_that_is_much_finer():
 def test_a_mesh_that_cannot_keep_the_accuracy_says_how_far_it_comes(tmp_path):
     accurate = ["--set=time.t_end=0.3", "--accuracy", "1e-2", "--mesh"]
     assert "400 elements still leave some 2." in refused("run", "soft", *accurate, "--out", tmp_path / "found")
-
-
-@pytest.mark.parametrize(("arguments", "words"), [
-    (["duffing"], "[beam]: the scene has no mesh to refine"),
-    (["soft", "--metric", "weight"], "--metric weight: unknown"),
-])  # fmt: skip
-def test_what_cannot_be_refined_is_one_error(tmp_path, arguments, words):
-    assert words in refused("converge", *arguments, "--out", tmp_path / "found")
-    assert not (tmp_path / "found").exists()

@@ -1,7 +1,6 @@
 """What `pip install` and `springbeam doctor` promise."""
 
 import os
-import re
 import subprocess
 import sys
 import zipfile
@@ -9,7 +8,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from commands import HANGS, command, printed
+from commands import HANGS, command
 from packaging.requirements import Requirement
 
 from springbeam.scene.reading import tomllib

@@ -5,7 +5,7 @@ import pytest
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.bodies import fmu, fmu_bodies
-from springbeam.bodies.fmu_bodies import FmuSpring, release
+from springbeam.bodies.fmu_bodies import release
 
 SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3}, time={"t_end": 0.25})
 PULSE = {"on": "tip", "signal": "half_sine", "start": 0.01, "duration": 0.05, "amplitude": 3.0}
@@ -68,17 +68,6 @@ def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
     release()
     assert len(closed) == len(springs)
     assert not any(one.usable for one in closed)
-
-
-def test_two_bodies_at_once_are_two_instances(made):
-    spring = load_scene("duffing").spring
-    one, other = FmuSpring.of(spring, 0.0), FmuSpring.of(spring, 0.0)
-    one.advance(0.0, 0.1, (1.0, 0.0, 0.0))
-    assert other.motion().velocity == 0.0
-    one.close()
-    other.close()
-    assert FmuSpring.of(spring, 0.0).motion() == other.motion()
-    assert len(made) == 2
 
 
 def test_a_body_whose_calls_fail_is_not_kept(made, monkeypatch):

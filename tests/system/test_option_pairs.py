@@ -10,12 +10,11 @@ from commands import Interrupt, command
 from scenes import completed
 
 from springbeam.cli.run import _ProgressBar
-from springbeam.results.directory import PICTURES
 from springbeam.results.reading import load_trajectory
 from springbeam.run.ledger import bounds
 from springbeam.scene import with_changes
 
-pytestmark = pytest.mark.usefixtures("fmu_folder", "unpainted")
+pytestmark = pytest.mark.usefixtures("fmu_folder")
 
 #: Meets the spring at once and the foundation at 0.07 s.
 SCENE = {
@@ -29,7 +28,6 @@ SCENE = {
 OPTIONS = {
     "accuracy": "--accuracy 1e-2",
     "resume": "--checkpoint 0",  # and the run is interrupted
-    "pictures": "",
     "json": "--json",
     "interval": "--output-interval 1e-3",
     "macro step": "coupling.macro_step=7e-4",
@@ -69,7 +67,7 @@ def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
     settings = [word for word in words if "=" in word]
     arguments = ["run", "scene.toml", "--out", "run", *(f"--set={word}" for word in settings)]
     arguments += [word for word in words if "=" not in word and word.removeprefix("no-") not in left_out]
-    output = ["--no-plots"] * ("pictures" not in pair) + ["--json"] * ("json" in pair)
+    output = ["--no-plots"] + ["--json"] * ("json" in pair)
     if "resume" in pair:
         interrupt = Interrupt(6)
         monkeypatch.setattr(_ProgressBar, "__call__", lambda *_: interrupt())
@@ -100,9 +98,7 @@ def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
         )
         assert run.summary["max_energy_residual"] <= bounds(as_run)[0] or said
     files = {"trajectory.csv", "events.csv", "steps.bin", "summary.json", *(["shapes.csv"] if beam else [])}
-    pictures = {"c_positions.png", "e_gap_and_energy.png"} if "pictures" in pair else set()
-    found = {path.name for path in Path("run").iterdir()}
-    assert files | pictures <= found <= files | set(PICTURES)
+    assert {path.name for path in Path("run").iterdir()} == files
 
 
 @pytest.mark.parametrize("name", OPTIONS)

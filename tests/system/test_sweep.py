@@ -51,33 +51,6 @@ def test_an_axis(text, values):
     assert [type(v) for v in axis.values] == [type(v) for v in values]
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("spring.mass", "TABLE.KEY=VALUES"),
-        ("mass=1:2:3", "TABLE.KEY=VALUES"),
-        ("spring.mass=", "TABLE.KEY=VALUES"),
-        ("spring.mas=1,2", "did you mean mass"),
-        ("sprang.mass=1,2", "did you mean spring"),
-        ("spring.mass=1:2:1", "COUNT of at least 2"),
-        ("spring.mass=1:1:4", "LOW and HIGH different"),
-        ("spring.mass=0:1:4:log", "greater than 0"),
-        ("spring.mass=1:2:3:4", "LOW:HIGH:COUNT"),
-        ("spring.mass=a:b:3", "LOW:HIGH:COUNT"),
-        ("spring.mass=1:inf:3", "LOW:HIGH:COUNT"),
-        ("coupling.scheme=energy,2", "2 is no value of scheme"),
-        ("beam.reduced_integration=true,2", "2 is no value of reduced_integration"),
-        ("spring.mass=1,true", "True is no value of mass"),
-        ("spring.mass=1979-05-27,2", "is no value of mass"),
-        (f"beam.n_elements=2,{2**53 + 1}", "is no value of n_elements"),
-    ],
-)
-def test_a_wrong_axis_is_named(text, words):
-    with pytest.raises(SceneError, match=words) as error:
-        parse_axis(text)
-    assert text in str(error.value)
-
-
 @pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize("tolerance", ["relative_tolerance", "absolute_tolerance"])
 def test_a_macro_step_beside_a_tolerance_is_refused_with_both_named(tolerance, order):

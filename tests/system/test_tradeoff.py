@@ -8,7 +8,7 @@ import pytest
 from commands import HANGS, printed
 
 from springbeam.monolithic import event_driven
-from springbeam.scene import SceneError, load_scene, with_changes
+from springbeam.scene import load_scene, with_changes
 from springbeam.studies import tradeoff
 from springbeam.studies.metrics import errors, motion_errors, worst
 from springbeam.studies.rivals import Rival
@@ -84,15 +84,6 @@ def test_the_reference_has_no_error_and_a_shifted_one_has():
     missed = run.events.pop()
     assert missed.kind == "stop_impact"
     assert errors(run, exact, 1e-3)["error_event_time"] == pytest.approx(0.1 - missed.time)  # to the end of the run
-
-
-@pytest.mark.parametrize(
-    ("tables", "word"),
-    [({"contact": {"law": "paper"}}, "Algorithm 1"), ({"contact": {"impact": "rest"}}, "no reference has it")],
-)
-def test_a_scene_without_a_reference_is_refused(tables, word):
-    with pytest.raises(SceneError, match=word):
-        Tradeoff.of(with_changes(load_scene("soft"), **tables))
 
 
 ENERGY = {"energy 0", "energy 1", "energy 2", "energy 2, IDA 1e-04"}
