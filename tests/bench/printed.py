@@ -4,7 +4,8 @@
 is nonlinear at the tip alone.
 """
 
-import numpy as np
+from functools import partial
+
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
@@ -17,29 +18,29 @@ def simulate(scene):
 
 
 class _AsPrinted(algorithm1._Algorithm):
-    def __init__(self, *arguments):
-        super().__init__(*arguments)
+    def _set_step(self, h):
+        super()._set_step(h)
+        d, alpha = self.discrete, self.beam.alpha_b
+        self.A = (4.0 * d.M + (h**2 + 2.0 * alpha * h) * d.K).tocsc()
         last = self.A.shape[0] - 1
-        self.inner, self.column = self.A[:-1, :-1], self.A[:-1, [-1]].toarray().ravel()
         self.at_tip = sp.csc_array(([1.0], ([last], [last])), shape=self.A.shape)
+        self.solve = partial(spla.spsolve, self.A)
 
-    def _tip(self, q, v, stiffness):
-        h, x = self.h, q.copy()
-        known = self._right_side(q, v)
-        before = self._compliance(q[-1], stiffness)[0]
+    def _newton(self, f, guess, solve):
+        """Make Newton's steps of (62) on all unknowns, told by that of the tip."""
+        if solve != "beam":
+            return super()._newton(f, guess, solve)
+        before, h, M = self.rows[-1], self.h, self.discrete.M
+        known, x = self.B @ before.q + 4.0 * h * (M @ before.v) + 2.0 * h**2 * self.load, before.q.copy()
+        at_start = self._compliance(before.q[-1], self.stiffness)[0]
 
         def equation(w):
-            """Newton's step on all unknowns, told by that of the tip."""
             x[-1] = w
-            force, slope = self._compliance(w, stiffness)
+            force, slope = self._compliance(w, self.stiffness)
             residual = self.A @ x - known
-            residual[-1] -= h**2 * (force + before)
+            residual[-1] -= h**2 * (force + at_start)
             change = spla.spsolve(self.A - h**2 * slope * self.at_tip, residual)
             x[:-1] -= change[:-1]
             return float(change[-1]), 1.0
 
-        return self._newton(equation, float(q[-1]), "beam"), known
-
-    def _beam(self, known, u):
-        x = np.append(spla.spsolve(self.inner, known[:-1] - self.column * u), u)
-        return x, float((self.A @ x - known)[-1] / (2.0 * self.h**2))
+        return super()._newton(equation, guess, solve)

@@ -1,6 +1,7 @@
 """What `pip install` and `springbeam doctor` promise."""
 
 import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -8,7 +9,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from commands import HANGS, command
+from commands import HANGS, command, printed
 from packaging.requirements import Requirement
 
 from springbeam.scene.reading import tomllib
