@@ -1,11 +1,13 @@
 """Rules for several keys together: scenes that cannot be run although each value is allowed.
 
-Each rule yields lines ``[table] key = value: reason and remedy``; ``at("table.key")`` writes a key with its value.
+Most are a line of the table `_RULES`: when it is broken, and what is said then, where ``{table.key}`` stands for a key
+with its value. Those that need numbers yield such lines; there ``at("table.key")`` writes a key with its value.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterator
 from functools import partial
 
@@ -29,7 +31,8 @@ At = Callable[[str], str]
 def impossible(scene: Scene) -> list[str]:
     """Return why ``scene`` cannot be run, as lines ``[table] key = value: reason and remedy``; empty if it can."""
     try:
-        found = [line for check in _CHECKS for line in check(scene, partial(at, scene))]
+        found = [_said(scene, text) for broken, text in _RULES if broken(scene)]
+        found += [line for check in _CHECKS for line in check(scene, partial(at, scene))]
         if not found:
             beam = scene.beam
             if beam is not None and not 0.0 < min(quantities := _beam_quantities(beam)) <= max(quantities) < math.inf:
@@ -56,25 +59,6 @@ def _beam_quantities(beam: Beam) -> tuple[float, ...]:
     inertia = (beam.density * beam.area, beam.density * beam.second_moment_of_area)
     speeds = tuple(k / m if m > 0.0 else math.inf for k, m in zip(stiffness, reversed(inertia), strict=True))
     return (*stiffness, *inertia, *speeds, tip_compliance(beam))
-
-
-def _bodies(scene: Scene, at: At) -> Iterator[str]:
-    upper, lower, stop, top = scene.upper, scene.lower, scene.stop, scene.top_at_start
-    if upper is None and lower is None:
-        yield "no body: a scene needs [beam], [spring] or both"
-    if stop is not None and top is not None and stop.position >= top.value:
-        yield f"{at('stop.position')}: the foundation must lie below {at(top.key)}"
-    if isinstance(upper, RigidWall) and (lower is None or isinstance(lower, RigidWall)):
-        yield f"{at('beam.element')}: nothing moves in this scene; give it a body in [spring]"
-    elif isinstance(lower, RigidWall) and upper is None:
-        yield f"{at('spring.element')}: nothing moves in this scene; give it a body in [beam]"
-    elif isinstance(lower, RigidWall) and stop is not None:
-        yield f"{at('spring.element')}: leave [stop] out"
-    elif isinstance(lower, RigidWall) and scene.contact.facts.strikes and scene.contact.impact == "tip":
-        yield (
-            f"{at('contact.impact')}: gives the lower body the velocity of the tip, and {at('spring.element')} cannot "
-            'move; use impact = "inelastic"'
-        )
 
 
 def _partners_fit(scene: Scene, at: At) -> Iterator[str]:
@@ -171,21 +155,11 @@ def _nothing_moves_before(scene: Scene, at: At) -> Iterator[str]:
             )
 
 
-def _ends_can_be_joined(scene: Scene, at: At) -> Iterator[str]:
-    contact, tip, top = scene.contact, scene.tip_at_start, scene.top_at_start
-    if contact.damping > 0.0 and "damping" not in contact.facts.takes:
-        others = laws_that(lambda law: "damping" in law.takes)
-        yield f'{at("contact.damping")}: law = "{contact.law}" has none; use 0.0, {others}'
-    if not contact.lasting:
-        return
-    for table in ("beam", "spring"):
-        if scene.under(table) is None and not scene.elastic_stop:
-            yield f"{at('contact.law')}: joins a [beam] and a [spring]; this scene has no [{table}]"
-    if contact.soft and contact.stiffness == contact.damping == 0.0:
-        yield f"{at('contact.stiffness')}: {at('contact.law')} needs a stiffness or a damping greater than 0"
-    if contact.rigid and contact.impact != "inelastic":
-        yield f'{at("contact.impact")}: law = "{contact.law}" gives both ends one velocity; use "inelastic"'
-    if contact.soft or tip is None or top is None:
+def _heights_fit(scene: Scene, at: At) -> Iterator[str]:
+    contact, tip, top, stop = scene.contact, scene.tip_at_start, scene.top_at_start, scene.stop
+    if stop is not None and top is not None and stop.position >= top.value:
+        yield f"{at('stop.position')}: the foundation must lie below {at(top.key)}"
+    if not (contact.lasting and contact.rigid) or tip is None or top is None:
         return
     if not math.isclose(tip.value, top.value, rel_tol=1e-12):
         yield (
@@ -194,107 +168,20 @@ def _ends_can_be_joined(scene: Scene, at: At) -> Iterator[str]:
         )
 
 
-def _law_applies(scene: Scene, at: At) -> Iterator[str]:
-    beam, contact, scheme = scene.beam, scene.contact, scene.coupling.scheme
-    law = at("contact.law")
-    if contact.algorithm:
-        for table in ("beam", "spring", "stop"):
-            if scene.under(table) is None:
-                yield f"{law}: Algorithm 1 needs a [{table}]"
-        if beam is not None and beam.integrator == "generalized_alpha" and beam.rho_inf != 1.0:
-            yield f"{at('beam.rho_inf')}: {law} is the midpoint rule, rho_inf = 1"
-    if contact.facts.opens and contact.stiffness == 0.0:
-        yield (
-            f'{at("contact.stiffness")}: with law = "{contact.law}" nothing would hold the bodies apart; it must be '
-            "greater than 0"
-        )
-    if scene.elastic_stop and scene.stop is not None and scene.stop.restitution != 1.0:
-        yield (
-            f"{at('stop.restitution')}: {law} makes the stop elastic; leave restitution out, and give its loss by "
-            "[contact] damping"
-        )
-    if scheme in ORDINARY_SCHEMES and not contact.soft:
-        yield (
-            f"{at('coupling.scheme')}: needs [contact] law = {laws_that(lambda law: law.soft)}; "
-            f'use scheme = "energy" or "hermite" with law = "{contact.law}"'
-        )
-    if scheme == "hermite" and contact.soft:
-        yield (
-            f'{at("coupling.scheme")}: needs a rigid law; with {law} use scheme = "energy", "gauss_seidel" or "jacobi"'
-        )
-    if scheme == "hermite" and contact.impact == "rest" and contact.facts.strikes and scene.joins:
-        yield (
-            f"{at('coupling.scheme')}: gives both ends one velocity, but {at('contact.impact')} leaves two; "
-            'use scheme = "energy" or impact = "inelastic"'
-        )
-
-
-def _inertia_needed(scene: Scene, at: At) -> Iterator[str]:
-    beam, contact = scene.beam, scene.contact
-    if beam is None or not scene.massless:
-        return
-    name, law = at("beam.fidelity"), at("contact.law")
-    if scene.lower is None:
-        yield f'{name}: a beam without inertia needs a [spring]; use fidelity = "dynamic"'
-    if contact.soft and scene.coupling.feedback != "beam_drives":
-        remedy = 'law = "transmission", fidelity = "dynamic", or neglect the force on the beam: [coupling] '
-        remedy = 'law = "tie" or fidelity = "dynamic"' if contact.lasting else f'{remedy}feedback = "beam_drives"'
-        yield f"{name}: the tip between the beam and {law} would have no inertia; use {remedy}"
-    if contact.algorithm:
-        yield f'{name}: {law} integrates the beam by (62); use fidelity = "dynamic"'
-    if contact.facts.strikes and contact.impact == "tip":
-        yield (
-            f"{name}: {at('contact.impact')} gives the spring the velocity of the tip, which without inertia has none "
-            'of its own; use impact = "inelastic"'
-        )
-    if scene.coupling.scheme == "hermite":
-        yield (
-            f"{name}: {at('coupling.scheme')} sets the velocity of the tip, which without inertia is the spring's; "
-            'use scheme = "energy"'
-        )
-    if beam.approach == "elastic" and beam.initial_velocity_slope != 0.0:
-        yield (
-            f'{at("beam.initial_velocity_slope")}: without inertia, and approach = "elastic", nothing carries a '
-            'velocity; use 0.0, or fidelity = "dynamic"'
-        )
-    if beam.approach == "elastic" and beam.alpha_b == 0.0 and beam.initial_deflection_slope != 0.0:
-        yield (
-            f"{at('beam.initial_deflection_slope')}: without inertia and damping the beam starts in its static "
-            'deflection; use 0.0, approach = "undeformed", or alpha_b > 0'
-        )
-
-
 def _feedback_negligible(scene: Scene, at: At) -> Iterator[str]:
-    beam, spring, contact, coupling = scene.beam, scene.spring, scene.contact, scene.coupling
-    if coupling.feedback == "two_way":
-        return
-    name = at("coupling.feedback")
-    if not scene.joins:
-        yield f'{name}: there is one body only; use "two_way"'
-    if beam is None or spring is None:
-        return
-    if not contact.facts.opens or coupling.scheme not in ("energy", "auto"):
-        laws = laws_that(lambda law: law.opens)
-        yield f'{name}: needs [contact] law = {laws} and [coupling] scheme = "energy"; use "two_way" otherwise'
-    if contact.damping > 0.0:
-        yield f'{name}: its error is unknown for a damped contact; use [contact] damping = 0.0 or "two_way"'
-    if coupling.feedback == "spring_drives" and (spring.cubic_stiffness != 0.0 or spring.linear_stiffness <= 0.0):
-        yield (
-            f"{name}: its error is known only for a linear spring; linear_stiffness must be greater than 0 "
-            'and cubic_stiffness 0.0, or use "two_way"'
-        )
-        return
+    contact, coupling = scene.contact, scene.coupling
     # A contact of depth p has V = 2 λ p, whatever p.
     share = 4.0 * contact.stiffness / (scene.driver_stiffness or math.inf)
     if contact.exponent == 1.0 and "exponent" in contact.facts.takes and share > coupling.feedback_tolerance:
         yield (
-            f"{name}: neglects up to 4·stiffness/(stiffness of the driving end) = {share:.2g} of the penetration; "
-            f'allowed is feedback_tolerance = {coupling.feedback_tolerance:g}. Use "two_way", or allow more'
+            f"{at('coupling.feedback')}: neglects up to 4·stiffness/(stiffness of the driving end) = {share:.2g} of "
+            f"the penetration; allowed is feedback_tolerance = {coupling.feedback_tolerance:g}. "
+            'Use "two_way", or allow more'
         )
 
 
 def _coupling_resolves(scene: Scene, at: At) -> Iterator[str]:
-    beam, coupling, H, t_end = scene.beam, scene.coupling, scene.coupling.macro_step, scene.time.t_end
+    coupling, H, t_end = scene.coupling, scene.coupling.macro_step, scene.time.t_end
     if scene.accuracy is not None:
         return  # it picks scheme, degree and steps that go together
     if H is None:
@@ -314,12 +201,6 @@ def _coupling_resolves(scene: Scene, at: At) -> Iterator[str]:
             f"{at('coupling.macro_step')}: {at('time.t_end')} would take {t_end / H:.1e} macro steps; at most "
             f"{MOST_MACRO_STEPS:.0e} are allowed"
         )
-    if beam is not None and beam.integrator == "generalized_alpha":
-        remedy = f'{at("beam.integrator")} sees only the mean of the contact force; use "modal"'
-        if coupling.scheme == "hermite":
-            yield f'{at("coupling.scheme")}: {remedy}, or scheme = "energy"'
-        elif coupling.degree > 0:
-            yield f"{at('coupling.degree')}: {remedy}, or degree = 0"
 
 
 def _loads_act(scene: Scene, at: At) -> Iterator[str]:
@@ -343,16 +224,186 @@ def _loads_act(scene: Scene, at: At) -> Iterator[str]:
             yield f"{on}: {at('contact.law')} is Algorithm 1, which knows constant loads only; take another law"
 
 
+def _one_way(scene: Scene) -> bool:
+    """Return whether one of our own bodies drives the other."""
+    return scene.coupling.feedback != "two_way" and scene.beam is not None and scene.spring is not None
+
+
+def _wall_below(scene: Scene) -> bool:
+    return isinstance(scene.lower, RigidWall)
+
+
+def _averages(scene: Scene) -> bool:
+    """Return whether our beam's integrator sees only the mean of a force over a step that the scene asks for."""
+    return scene.accuracy is None and scene.beam is not None and scene.beam.integrator == "generalized_alpha"
+
+
+def _let_go(scene: Scene) -> bool:
+    """Return whether our beam has no inertia and is let go at the start."""
+    return scene.beam is not None and scene.massless and scene.beam.approach == "elastic"
+
+
+#: When a scene breaks a rule, and what is said then.
+_RULES: tuple[tuple[Callable[[Scene], bool], str], ...] = (
+    # Bodies
+    (lambda s: s.upper is None and s.lower is None, "no body: a scene needs [beam], [spring] or both"),
+    (
+        lambda s: isinstance(s.upper, RigidWall) and (s.lower is None or _wall_below(s)),
+        "{beam.element}: nothing moves in this scene; give it a body in [spring]",
+    ),
+    (
+        lambda s: _wall_below(s) and s.upper is None,
+        "{spring.element}: nothing moves in this scene; give it a body in [beam]",
+    ),
+    (lambda s: _wall_below(s) and s.upper is not None and s.stop is not None, "{spring.element}: leave [stop] out"),
+    (
+        lambda s: _wall_below(s) and s.contact.facts.strikes and s.contact.impact == "tip",
+        "{contact.impact}: gives the lower body the velocity of the tip, and {spring.element} cannot move; "
+        'use impact = "inelastic"',
+    ),
+    # Laws
+    (
+        lambda s: s.contact.damping > 0.0 and "damping" not in s.contact.facts.takes,
+        f"{{contact.damping}}: {{contact.law}} has none; use 0.0, {laws_that(lambda law: 'damping' in law.takes)}",
+    ),
+    *(
+        (
+            lambda s, table=table: s.contact.lasting and s.under(table) is None and not s.elastic_stop,
+            f"{{contact.law}}: joins a [beam] and a [spring]; this scene has no [{table}]",
+        )
+        for table in ("beam", "spring")
+    ),
+    (
+        lambda s: s.contact.lasting and s.contact.soft and s.contact.stiffness == s.contact.damping == 0.0,
+        "{contact.stiffness}: {contact.law} needs a stiffness or a damping greater than 0",
+    ),
+    (
+        lambda s: s.contact.lasting and s.contact.rigid and s.contact.impact != "inelastic",
+        '{contact.impact}: {contact.law} gives both ends one velocity; use "inelastic"',
+    ),
+    *(
+        (
+            lambda s, table=table: s.contact.algorithm and s.under(table) is None,
+            f"{{contact.law}}: Algorithm 1 needs a [{table}]",
+        )
+        for table in ("beam", "spring", "stop")
+    ),
+    (
+        lambda s: s.contact.algorithm and s.beam is not None and s.beam.damped_numerically,
+        "{beam.rho_inf}: {contact.law} is the midpoint rule, rho_inf = 1",
+    ),
+    (
+        lambda s: s.contact.facts.opens and s.contact.stiffness == 0.0,
+        "{contact.stiffness}: with {contact.law} nothing would hold the bodies apart; it must be greater than 0",
+    ),
+    (
+        lambda s: s.elastic_stop and s.stop is not None and s.stop.restitution != 1.0,
+        "{stop.restitution}: {contact.law} makes the stop elastic; leave restitution out, and give its loss by "
+        "[contact] damping",
+    ),
+    # Schemes
+    (
+        lambda s: s.coupling.scheme in ORDINARY_SCHEMES and not s.contact.soft,
+        f"{{coupling.scheme}}: needs [contact] law = {laws_that(lambda law: law.soft)}; "
+        'use scheme = "energy" or "hermite" with {contact.law}',
+    ),
+    (
+        lambda s: s.coupling.scheme == "hermite" and s.contact.soft,
+        '{coupling.scheme}: needs a rigid law; with {contact.law} use scheme = "energy", "gauss_seidel" or "jacobi"',
+    ),
+    (
+        lambda s: s.coupling.scheme == "hermite" and s.contact.impact == "rest" and s.contact.facts.strikes and s.joins,
+        "{coupling.scheme}: gives both ends one velocity, but {contact.impact} leaves two; "
+        'use scheme = "energy" or impact = "inelastic"',
+    ),
+    (
+        lambda s: _averages(s) and s.coupling.scheme == "hermite",
+        '{coupling.scheme}: {beam.integrator} sees only the mean of the contact force; use "modal", or '
+        'scheme = "energy"',
+    ),
+    (
+        lambda s: _averages(s) and s.coupling.scheme != "hermite" and s.coupling.degree > 0,
+        '{coupling.degree}: {beam.integrator} sees only the mean of the contact force; use "modal", or degree = 0',
+    ),
+    # A beam without inertia
+    (
+        lambda s: s.massless and s.lower is None,
+        '{beam.fidelity}: a beam without inertia needs a [spring]; use fidelity = "dynamic"',
+    ),
+    (
+        lambda s: s.massless and s.contact.soft and s.contact.lasting and s.coupling.feedback != "beam_drives",
+        "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
+        'law = "tie" or fidelity = "dynamic"',
+    ),
+    (
+        lambda s: s.massless and s.contact.facts.opens and s.coupling.feedback != "beam_drives",
+        "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
+        'law = "transmission", fidelity = "dynamic", or neglect the force on the beam: [coupling] '
+        'feedback = "beam_drives"',
+    ),
+    (
+        lambda s: s.massless and s.contact.algorithm,
+        '{beam.fidelity}: {contact.law} integrates the beam by (62); use fidelity = "dynamic"',
+    ),
+    (
+        lambda s: s.massless and s.contact.facts.strikes and s.contact.impact == "tip",
+        "{beam.fidelity}: {contact.impact} gives the spring the velocity of the tip, which without inertia has none "
+        'of its own; use impact = "inelastic"',
+    ),
+    (
+        lambda s: s.massless and s.coupling.scheme == "hermite",
+        "{beam.fidelity}: {coupling.scheme} sets the velocity of the tip, which without inertia is the spring's; "
+        'use scheme = "energy"',
+    ),
+    (
+        lambda s: _let_go(s) and s.beam is not None and s.beam.initial_velocity_slope != 0.0,
+        '{beam.initial_velocity_slope}: without inertia, and approach = "elastic", nothing carries a velocity; '
+        'use 0.0, or fidelity = "dynamic"',
+    ),
+    (
+        lambda s: (
+            _let_go(s) and s.beam is not None and s.beam.alpha_b == 0.0 and s.beam.initial_deflection_slope != 0.0
+        ),
+        "{beam.initial_deflection_slope}: without inertia and damping the beam starts in its static deflection; "
+        'use 0.0, approach = "undeformed", or alpha_b > 0',
+    ),
+    # One-way coupling
+    (
+        lambda s: s.coupling.feedback != "two_way" and not s.joins,
+        '{coupling.feedback}: there is one body only; use "two_way"',
+    ),
+    (
+        lambda s: _one_way(s) and (not s.contact.facts.opens or s.coupling.scheme not in ("energy", "auto")),
+        f"{{coupling.feedback}}: needs [contact] law = {laws_that(lambda law: law.opens)} and [coupling] "
+        'scheme = "energy"; use "two_way" otherwise',
+    ),
+    (
+        lambda s: _one_way(s) and s.contact.damping > 0.0,
+        '{coupling.feedback}: its error is unknown for a damped contact; use [contact] damping = 0.0 or "two_way"',
+    ),
+    (
+        lambda s: (
+            _one_way(s)
+            and s.coupling.feedback == "spring_drives"
+            and s.spring is not None
+            and (s.spring.cubic_stiffness != 0.0 or s.spring.linear_stiffness <= 0.0)
+        ),
+        "{coupling.feedback}: its error is known only for a linear spring; linear_stiffness must be greater than 0 "
+        'and cubic_stiffness 0.0, or use "two_way"',
+    ),
+)
 _CHECKS = (
-    _bodies,
+    _heights_fit,
     _partners_fit,
     _spring_holds,
     _tip_arrives,
     _nothing_moves_before,
-    _ends_can_be_joined,
-    _law_applies,
-    _inertia_needed,
     _feedback_negligible,
     _coupling_resolves,
     _loads_act,
 )
+
+
+def _said(scene: Scene, text: str) -> str:
+    """Return ``text`` with keys and values in place of ``{table.key}``."""
+    return re.sub(r"\{(\w+\.\w+)\}", lambda found: at(scene, found[1]), text)
