@@ -3,7 +3,6 @@
 import pytest
 
 from springbeam.bodies.protocol import Motion
-from springbeam.contact.laws import Transmission
 from springbeam.contact.phases import (
     Impact,
     Joint,
@@ -75,9 +74,7 @@ def test_foundation_reverses_each_end_by_itself(z, v, e):
 @pytest.mark.parametrize(("speed", "joint"), [(0.3, Joint.TOUCH), (0.0, Joint.TIED), (-0.3, Joint.TIED)])
 def test_a_meeting_at_the_equilibrium_is_told_by_the_velocity(y, speed, joint):
     """Within rounding of Ψ: tied while rising it would be released at once, and meet again, for ever."""
-    transitions = Transitions(
-        load_scene("soft"), Transmission(), tip_mass=0.01, mass=1.0, fastest=lambda: 0.3, equilibrium=0.0
-    )
+    transitions = Transitions(load_scene("soft"), None, tip_mass=0.01, mass=1.0, fastest=lambda: 0.3, equilibrium=0.0)
     end = Motion(y, speed, 0.0, 0.0)
     _, phase, impact = transitions.after(EventKind("impact"), Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)
     assert phase.joint is joint
@@ -89,7 +86,7 @@ def test_a_meeting_at_the_equilibrium_is_told_by_the_velocity(y, speed, joint):
 def test_ends_that_are_let_go_have_one_velocity_but_where_they_vibrate(kind, v, one_velocity):
     """Parting by 20 % of the largest speed, here 1 m/s, and more is no error of the scheme."""
     z, tip_mass, mass = 0.5, 0.01, 1.0
-    transitions = Transitions(load_scene("soft"), Transmission(), tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
+    transitions = Transitions(load_scene("soft"), None, tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, z, 0.0, 0.0)
     _, phase, impact = transitions.after(kind, Phase(Joint.TIED), ends, 0.0, ends, -1.0, 1e-17)
     assert phase.joint is Joint.FREE
@@ -109,7 +106,7 @@ def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(
     A tip that leaves tied to the top with another velocity would strike the foundation at once, or fly higher.
     """
     tip_mass, held = 0.01, Phase(Joint.TIED if mass is None else Joint.TOUCH, seated=True)
-    transitions = Transitions(load_scene("soft"), Transmission(), tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
+    transitions = Transitions(load_scene("soft"), None, tip_mass, mass, fastest=lambda: 1.0, equilibrium=0.0)
     ends = Motion(0.0, v, 0.0, 0.0), Motion(0.0, 0.0, 0.0, 0.0)
     found, phase, impact = transitions.after(EventKind(kind), held, ends, 0.0, ends, -1.0, 1e-17)
     opened = Phase(Joint.TOUCH) if kind == "unseated" else Phase(Joint.FREE, seated=mass is not None)
@@ -123,7 +120,7 @@ def test_a_tip_that_the_foundation_lets_go_leaves_at_rest_but_where_it_vibrates(
 def struck_at(z, restitution, fastest=1.0):
     """The kind, the phase and the impact as a top strikes the foundation at ``z``, after an impact at ``fastest``."""
     scene = with_changes(load_scene("soft"), stop={"restitution": restitution})
-    transitions = Transitions(scene, Transmission(), 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
+    transitions = Transitions(scene, None, 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
     for speed in (-fastest, z):
         end = Motion(scene.stop.position, speed, 0.0, 0.0)
         found = transitions.after(EventKind("stop_impact"), Phase(), (end, end), 0.0, (end, end), 0.0, 1e-17)

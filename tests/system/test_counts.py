@@ -133,7 +133,7 @@ EVENTS = {
 def test_event_functions_are_those_of_the_bodies_that_are_there(what):
     changes, expected = EVENTS[what]
     scene = with_changes(load_scene("soft"), **changes)
-    functions = EventFunctions(scene, law_of(scene.contact), tip_share=0.5, equilibrium=0.0)
+    functions = EventFunctions(scene, law_of(scene), tip_share=0.5, equilibrium=0.0)
     assert {kind for phase in PHASES for kind, _ in functions.of(phase)} == expected
     # A phase has only what can end it, and on the foundation only what can leave it.
     assert all(len(functions.of(phase)) <= 2 for phase in PHASES)

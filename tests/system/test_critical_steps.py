@@ -46,7 +46,7 @@ def linear_scene(law, stiffness, scheme, degree, H=LARGE_STEP):
 def growth(scene, most=MOST_STEPS):
     """The factor by which amplitudes grow per macro step, of the second half of the steps up to `GROWN`."""
     H, soft = scene.coupling.H, not scene.contact.rigid
-    coupling, guess = coupling_of(scene, law_of(scene.contact)), NO_FORCE
+    coupling, guess = coupling_of(scene, law_of(scene)), NO_FORCE
     beam, top = load_bodies(scene, 0.0)
 
     def energy():

@@ -18,7 +18,7 @@ from ..results.paths import Means, Sample
 from ..results.trajectory import EventKind
 from ..scene import Beam, Scene, Spring
 from ..scene.statics import tip_compliance, tip_load_deflection
-from .laws import Law
+from .laws import SoftLaw
 from .phases import Joint, Phase, spring_force
 
 _EPS = float(np.finfo(float).eps)
@@ -98,10 +98,10 @@ class EventFunctions:
     Ψ, the height below which the ends are tied [m].
     """
 
-    def __init__(self, scene: Scene, law: Law, tip_share: float, equilibrium: float) -> None:
+    def __init__(self, scene: Scene, law: SoftLaw | None, tip_share: float, equilibrium: float) -> None:
         self._scene, self._tip_share, self._equilibrium = scene, tip_share, equilibrium
-        self._ties = scene.joins and not law.soft
-        self._meets = self._ties and not law.lasting
+        self._ties = scene.joins and law is None
+        self._meets = self._ties and not scene.contact.lasting
         self._phase: Phase | None = None
         self._functions: list[tuple[EventKind, EventFunction]] = []
         #: The ends last asked for, and the samples there: a step starts where the one before has ended.

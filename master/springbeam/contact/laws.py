@@ -15,39 +15,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Protocol
+from typing import ClassVar, Protocol
 
 from ..scene import Contact, Scene
 from ..scene.linearised import contact_energy
 
 
-class RigidLaw:
-    """The ends move together while they are joined; the force is a reaction."""
-
-    soft: ClassVar[Literal[False]] = False
-    #: Whether the ends are joined for good: they never meet, let go or open.
-    lasting: ClassVar[bool] = False
-
-
-class Transmission(RigidLaw):
-    """Winkler's assumption made consistent: tied below Ψ, unilateral contact above, free after it opens."""
-
-
-class Tie(RigidLaw):
-    """A bolted joint: u_tip = y for good, whatever the sign of C."""
-
-    lasting = True
-
-
-class Algorithm(RigidLaw):
-    """Algorithm 1 of Ahn & Tate, which is a coupling: it decides in each step what touches."""
-
-
 class SoftLaw(Protocol):
     """A contact force that is a function of the penetration and its rate."""
 
-    soft: ClassVar[Literal[True]]
-    lasting: ClassVar[bool]
     #: Whether F vanishes for p ≤ 0; if not, F is linear.
     one_sided: ClassVar[bool]
 
@@ -86,8 +62,6 @@ class Compliance:
     exponent: float
     damping: float = 0.0
 
-    soft: ClassVar[Literal[True]] = True
-    lasting: ClassVar[bool] = False
     one_sided: ClassVar[bool] = True
 
     @property
@@ -127,8 +101,6 @@ class Link:
     stiffness: float
     damping: float = 0.0
 
-    soft: ClassVar[Literal[True]] = True
-    lasting: ClassVar[bool] = True
     one_sided: ClassVar[bool] = False
 
     @property
@@ -148,21 +120,16 @@ class Link:
         return self.damping * rate, 0.0, self.damping
 
 
-Law = RigidLaw | SoftLaw
-
-#: How a scene's table ``[contact]`` names the laws.
-LAWS: dict[str, Callable[[Contact], Law]] = {
-    "transmission": lambda contact: Transmission(),
-    "tie": lambda contact: Tie(),
+#: How a scene's table ``[contact]`` names the soft laws.
+LAWS: dict[str, Callable[[Contact], SoftLaw]] = {
     "compliance": lambda contact: Compliance(contact.stiffness, contact.exponent, contact.damping),
     "link": lambda contact: Link(contact.stiffness, contact.damping),
-    "paper": lambda contact: Algorithm(),
 }
 
 
-def law_of(contact: Contact) -> Law:
-    """Return the law that ``contact`` names."""
-    return LAWS[contact.law](contact)
+def law_of(scene: Scene) -> SoftLaw | None:
+    """Return the soft law that acts in ``scene``; ``None`` where its law is rigid, or nothing meets."""
+    return LAWS[scene.contact.law](scene.contact) if scene.coupled and scene.contact.soft else None
 
 
 def stiffest(scene: Scene) -> float:
@@ -170,8 +137,8 @@ def stiffest(scene: Scene) -> float:
 
     A law that is not one-sided is linear: how deep it goes does not matter.
     """
-    law = law_of(scene.contact) if scene.coupled else Transmission()
-    if not law.soft:
+    law = law_of(scene)
+    if law is None:
         return 0.0
     return law.slope(depth(law, contact_energy(scene)) if law.one_sided else 0.0)
 

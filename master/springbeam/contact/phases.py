@@ -17,7 +17,7 @@ from ..results.trajectory import EventKind
 from ..scene import Scene, Spring
 from ..scene.resolution import VIBRATION
 from ..scene.statics import tip_compliance, tip_load_deflection
-from .laws import Law
+from .laws import SoftLaw
 
 #: A rebound slower than this fraction of the fastest foundation impact so far ends seated (e < 1 only); slower than the
 #: second, if it would also rise no higher than positions can be told apart.
@@ -122,7 +122,7 @@ class Transitions(Stateful):
     def __init__(
         self,
         scene: Scene,
-        law: Law,
+        law: SoftLaw | None,
         tip_mass: float | None,
         mass: float | None,
         fastest: Callable[[], float],
@@ -158,7 +158,7 @@ class Transitions(Stateful):
         if kind is EventKind.RETIE:
             return kind, Phase(Joint.TIED), Impact()
         if kind is EventKind.UNSEATED:
-            tied = phase.joint is not Joint.FREE and not self._law.soft
+            tied = phase.joint is not Joint.FREE and self._law is None
             return kind, Phase(phase.joint), self._part(phase, tip, low) if tied else Impact()
         assert kind is EventKind.SEPARATION
         if self._tip_mass == 0.0 and low.velocity < 0.0 and self._at_equilibrium(low, tolerance):
@@ -171,7 +171,7 @@ class Transitions(Stateful):
         assert self._mass is not None
         impact = meeting(self._scene.contact.impact, tip.velocity, low.velocity, self._tip_mass, self._mass)
         common = low.velocity + impact.on_spring / self._mass
-        if self._law.lasting:
+        if self._scene.contact.lasting:
             tied = True
         elif self._at_equilibrium(low, tolerance):
             tied = common < 0.0 or (common == 0.0 and not self._rises_from_rest())
@@ -204,7 +204,7 @@ class Transitions(Stateful):
         """The lower end reaches the foundation: it rebounds, or stays when the rebound has died out."""
         assert self._scene.stop is not None
         e = self._scene.stop.restitution
-        tied = self._tip_mass is not None and phase.joint is not Joint.FREE and not self._law.soft
+        tied = self._tip_mass is not None and phase.joint is not Joint.FREE and self._law is None
         v, z = self._striking(ends, tied)
         speed = max(abs(w) for w in (z, v) if w is not None)
         self.state = max(self.state, speed)

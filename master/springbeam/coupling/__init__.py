@@ -10,7 +10,7 @@ and `scene`.
 
 from __future__ import annotations
 
-from ..contact.laws import Law
+from ..contact.laws import SoftLaw
 from ..scene import Scene
 from ..scene.statics import tip_reach
 from ..scene.tables import ORDINARY_SCHEMES
@@ -22,12 +22,12 @@ from .soft import SoftSolver
 from .tie import Tie
 
 
-def coupling_of(scene: Scene, law: Law) -> Coupling:
-    """Return what couples the bodies of ``scene`` while ``law`` acts between them."""
+def coupling_of(scene: Scene, law: SoftLaw | None) -> Coupling:
+    """Return what couples the bodies of ``scene`` while ``law`` acts between them, or a tie if there is none."""
     asked = scene.coupling
     if scene.contact.algorithm:
         return Algorithm1(scene)
-    if not law.soft:
+    if law is None:
         expected = 0.0 if scene.beam is None else tip_reach(scene.beam)
         # An exchange of values is for soft laws; a tip alone rests on its foundation by the default scheme.
         scheme = "energy" if asked.scheme in ORDINARY_SCHEMES else asked.scheme

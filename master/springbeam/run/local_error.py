@@ -60,7 +60,7 @@ class LocalError(Stateful):
         tolerance = self._relative + self._absolute / span
         coupling = pair.coupling(state.phase)
         scales = Scales(span, speed, self.state.energy, pair.reduced_mass(Phase()))
-        tied = not pair.law.soft and state.phase.joint is not Joint.FREE
+        tied = pair.law is None and state.phase.joint is not Joint.FREE
         curve = self._curve(cubic, ranges, max(self._relative, _SEEN) if tied else self._relative)
         told = coupling.local_errors(step, scales)
         return max(curve, *((error / tolerance, order) for error, order in told)) if told else curve

@@ -257,11 +257,16 @@ class Master(Stateful):
     def _in_contact(self, start: Ends) -> bool:
         """Is the tip on the spring top (or the stop), moving down or at rest?"""
         pair = self._pair
-        if pair.beam is None or pair.law.soft or pair.joined.decides or (pair.spring is None and pair.stop is None):
+        if (
+            pair.beam is None
+            or pair.law is not None
+            or pair.joined.decides
+            or (pair.spring is None and pair.stop is None)
+        ):
             return False
         tip, low = start
         tolerance = self._detector.tolerance(start) + 1e-12 * abs(low.displacement)
-        parting = tip.velocity - low.velocity > 0.0 and not pair.law.lasting
+        parting = tip.velocity - low.velocity > 0.0 and not pair.lasting
         return abs(tip.displacement - low.displacement) <= tolerance and not parting
 
     def _act(self, kind: EventKind, step: Step) -> None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..contact.laws import SoftLaw
 from ..contact.phases import Phase
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.paths import Path
@@ -42,11 +43,11 @@ def observed(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event
         return Observed()
     v, z = steps["v_tip_after"], steps["z_after"]
     speed, apart = float(np.abs([v, z]).max()), np.abs(v - z)
-    if pair.law.soft:
-        frequency, number = _of_soft_contact(pair, steps, float(apart.max()), speed)
+    if pair.law is not None:
+        frequency, number = _of_soft_contact(pair, pair.law, steps, float(apart.max()), speed)
         return Observed(speed, contact_frequency=frequency, contact_steps=number)
     hidden = False
-    if pair.joinable and not pair.law.lasting:
+    if pair.joinable and not pair.lasting:
         hidden = bool((normal_compliance(scene, steps["u_tip_after"], steps[:1]) > MOST_SHOWN).any())
     at_events = _mismatch_at_events(scene, pair, steps, events)
     return Observed(speed, float(apart[joined(steps)].max(initial=0.0)), at_events, hidden=hidden)
@@ -78,14 +79,14 @@ def _mismatch_at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Seq
     return sqrt(float(energy.max(initial=0.0)) / scale)
 
 
-def _of_soft_contact(pair: Pair, steps: np.ndarray, relative_speed: float, speed: float) -> tuple[float, int]:
+def _of_soft_contact(
+    pair: Pair, law: SoftLaw, steps: np.ndarray, relative_speed: float, speed: float
+) -> tuple[float, int]:
     """Return the frequency at the deepest penetration, also inside steps, and the number of steps with a force.
 
     A law that never opens is linear: how deep does not matter. A link whose ends move as one does not swing, however
     stiff.
     """
-    law = pair.law
-    assert law.soft
     forces = [steps[name] for name in ("contact_force", "contact_force_rate", "contact_force_rate_2")]
     touching = np.flatnonzero((steps["size"] > 0.0) & np.any(forces, axis=0))
     depth = (steps["y"] - steps["u_tip"])[touching]
@@ -103,7 +104,7 @@ def _of_soft_contact(pair: Pair, steps: np.ndarray, relative_speed: float, speed
         )
         inside = path.lowest_inside()
         deepest = max(deepest, 0.0 if inside is None else -float(path.at(inside)))
-    if law.lasting and relative_speed <= VIBRATION * speed:
+    if pair.lasting and relative_speed <= VIBRATION * speed:
         return 0.0, len(touching)
     inverse_mass = sum(1.0 / body.mass for body in (pair.upper, pair.lower) if body.mass > 0.0)
     return sqrt(law.slope(deepest) * inverse_mass), len(touching)

@@ -71,7 +71,7 @@ class Separation:
             return Push(
                 EventKind.SEPARATION if self._pair.spring is None else EventKind.UNSEATED, lambda step: step.foundation
             )
-        if phase.joint is Joint.TOUCH and not self._pair.law.soft and not self._pair.upper.massless:
+        if phase.joint is Joint.TOUCH and self._pair.law is None and not self._pair.upper.massless:
             return Push(EventKind.SEPARATION, lambda step: step.contact)
         return None
 

@@ -8,7 +8,7 @@ from ..bodies import force
 from ..bodies.elements import RigidWall
 from ..bodies.protocol import NO_FORCE, Body, Ends, Force
 from ..bodies.stateful import Memory
-from ..contact.laws import Transmission, law_of
+from ..contact.laws import law_of
 from ..contact.phases import Joint, Phase
 from ..coupling import coupling_of
 from ..coupling.protocol import Coupling, Step, Uncoupled
@@ -105,13 +105,15 @@ class Pair:
         self._last: Step | None = None  #: at whose end the bodies are
         #: Whether a law acts between the tip and what lies below it, the spring top or an elastic stop.
         self.joinable = beam is not None and (spring is not None or scene.elastic_stop)
-        #: Between these; a tip alone is tied to the foundation while it rests there.
-        self.law = law_of(scene.contact) if self.joinable else Transmission()
+        #: The soft law between these; a rigid one has no force of its own, and ties the ends while they are joined.
+        self.law = law_of(scene) if self.joinable else None
+        #: Whether they are joined for good.
+        self.lasting = self.joinable and scene.contact.lasting
         #: Whether contact opens and closes inside steps, without an event that ends them.
-        self.opens_softly = self.law.soft and not self.law.lasting
+        self.opens_softly = self.law is not None and not self.lasting
         #: What couples the bodies where the law acts, and where the ends are apart.
         self.joined = coupling_of(scene, self.law)
-        self._uncoupled = self.joined if self.law.soft or self.joined.decides else Uncoupled()
+        self._uncoupled = self.joined if self.law or self.joined.decides else Uncoupled()
         #: Whether a step can be repeated with another size.
         self.divides = self.repeatable and all(body.abilities.any_size for body in self.bodies)
         self.divides &= not self.joined.decides
@@ -119,10 +121,10 @@ class Pair:
     def initial_state(self, time: float) -> State:
         """Return the state before anything happens; ends that a soft law joins for good are joined from the start."""
         tip, low = ends = self.ends()
-        if not self.law.soft:
+        if self.law is None:
             return State(time, ends)
         at_start = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
-        phase = Phase(Joint.TIED) if self.law.lasting else Phase()
+        phase = Phase(Joint.TIED) if self.lasting else Phase()
         return State(time, ends, phase, (at_start, 0.0, 0.0), smoothed=at_start)
 
     def coupling(self, phase: Phase) -> Coupling:

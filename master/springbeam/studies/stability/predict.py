@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.laws import Transmission, depth, law_of
+from ...contact.laws import depth, law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene, suspicions
 from ...scene.automatic import Choice, choice
@@ -200,8 +200,8 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
         low = LinearBody(
             np.array([spring_stiffness(scene) / m]), np.array([scene.spring.damping / m]), np.array([m**-0.5])
         )
-    law = law_of(scene.contact) if scene.coupled else Transmission()
-    if not law.soft:
+    law = law_of(scene)
+    if law is None:
         return LinearPair(beam, low)
     depth_reached = depth(law, contact_energy(scene)) if law.one_sided else 0.0
     return LinearPair(beam, low, law.slope(depth_reached), law.resistance(depth_reached, 0.0)[2] if law.damped else 0.0)
