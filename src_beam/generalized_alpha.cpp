@@ -267,7 +267,8 @@ class GeneralizedAlphaBeam final : public Beam {
     if (!free_.holds(h, loads, q, v)) {
       free_.size = 0.0;
       rhs_ = (0.5 * h / mu_) * load_of(loads);
-      mesh_.add_products(1.0, v, -0.5 * h, q, rhs_);
+      mesh_.add_mass_times(1.0, v.data(), rhs_.data());
+      mesh_.add_stiffness_times(-0.5 * h, q.data(), rhs_.data());
       solve(S, free_.w);
       free_.q = q;
       free_.v = v;
@@ -298,7 +299,8 @@ class GeneralizedAlphaBeam final : public Beam {
     rhs_ = load_of(seen) / mu_;
     rhs_[mesh_.tip_index()] += value(c, f * h) / mu_;
     w_ = alpha_ * (v + (f * (1.0 - gamma_) * h) * a) + q + (f * h) * (v + ((0.5 - beta_) * h) * a);
-    mesh_.add_products(-alpha_m_, a, -1.0, w_, rhs_);
+    mesh_.add_mass_times(-alpha_m_, a.data(), rhs_.data());
+    mesh_.add_stiffness_times(-1.0, w_.data(), rhs_.data());
     solve(S, a_);
     q_ = q + h * (v + h * ((0.5 - beta_) * a + beta_ * a_));
     v_ = v + h * ((1.0 - gamma_) * a + gamma_ * a_);
@@ -349,7 +351,8 @@ class GeneralizedAlphaBeam final : public Beam {
   /// x = S⁻¹ rhs_ with one step of iterative refinement.
   void solve(const StepMatrix& S, VectorXd& x) {
     solve_once(S, x);
-    mesh_.add_products(-S.mass, x, -S.stiffness, x, rhs_);
+    mesh_.add_mass_times(-S.mass, x.data(), rhs_.data());
+    mesh_.add_stiffness_times(-S.stiffness, x.data(), rhs_.data());
     solve_once(S, correction_);
     x += correction_;
   }

@@ -11,7 +11,8 @@
 // F̄ the mean of F over the step (for ρ∞ < 1 F is taken at t + (1−α_f)h). Then E₁ − E₀ = F̄ᵀ(q₁ − q₀) − h α_b wᵀK w holds
 // to rounding, whatever happened to F or v between the steps. One step of iterative refinement, with K applied element
 // by element, makes that rounding relative to the strain energy instead of to ‖K‖‖w‖² (1e-13 instead of 1e-7 at EI =
-// KAG = 3.6e10, n = 1000).
+// KAG = 3.6e10, n = 1000). Where S is well conditioned it keeps out a drift: the rounding of the factors is the same at
+// every step (2e-14 instead of 4e-12 of the energy in 20,000 steps at EI = KAG = 100, n = 200, h = 1e-4).
 //
 // For ρ∞ < 1 the stored a₀ lacks what happened since the last step: a jump of C or f_b, an impulse that changed the
 // damping force, or at the start everything. Left out, it would cost the order: an error h (½−α_f) Δa in v.

@@ -1,7 +1,6 @@
 #include "modes.hpp"
 
 #include <Spectra/SymGEigsShiftSolver.h>
-#include <Spectra/Util/Version.h>
 #include <Eigen/Cholesky>
 #include <Eigen/SVD>
 
@@ -42,55 +41,6 @@ struct Operator {
   void perform_op(const double* x, double* y) const { times(x, y); }
 };
 
-}  // namespace
-}  // namespace beam
-
-#if SPECTRA_MAJOR_VERSION == 1 && SPECTRA_MINOR_VERSION == 0
-namespace Spectra {
-
-/// Spectra repeats its orthogonalisation until no scalar product exceeds ε‖f‖, which N terms cannot resolve: their
-/// rounding is of the order √N ε. It then always stops after five vain passes, 4 of 5 seconds with 10⁵ elements.
-/// Here scalar products below √N ε‖f‖ count as zero. Elsewhere as in the original; without it, only slower.
-template <>
-class ArnoldiOp<double, SymGEigsShiftInvertOp<beam::Operator, beam::Operator>, beam::Operator> {
- public:
-  using ShiftInvert = SymGEigsShiftInvertOp<beam::Operator, beam::Operator>;
-
-  ArnoldiOp(const ShiftInvert& op, const beam::Operator& mass) : op_(op), mass_(mass), My_(op.rows()) {}
-
-  Eigen::Index rows() const { return op_.rows(); }
-  void perform_op(const double* x, double* y) const { op_.perform_op(x, y); }
-
-  template <typename X, typename Y>
-  double inner_product(const X& x, const Y& y) const {
-    mass_.perform_op(y.data(), My_.data());
-    return x.dot(My_);
-  }
-
-  template <typename X>
-  double norm(const X& x) const {
-    return std::sqrt(inner_product<X, X>(x, x));
-  }
-
-  template <typename X, typename Y>
-  void trans_product(const X& x, const Y& y, Eigen::Ref<Eigen::VectorXd> products) const {
-    const double threshold = std::sqrt(static_cast<double>(rows())) * std::numeric_limits<double>::epsilon() * norm(y);
-    products.noalias() = x.transpose() * My_;
-    products = (products.array().abs() > threshold).select(products, 0.0);
-  }
-
- private:
-  const ShiftInvert& op_;
-  const beam::Operator& mass_;
-  mutable Eigen::VectorXd My_;
-};
-
-}  // namespace Spectra
-#endif
-
-namespace beam {
-namespace {
-
 constexpr const char* remedy = "; keep fewer n_modes, or use the integrator generalized_alpha";
 
 /// Lowest modes by implicitly restarted Lanczos on K⁻¹M, M-orthonormal columns.
@@ -105,7 +55,10 @@ MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
                          mesh.flexibility_times(x, y);
                          Eigen::Map<VectorXd>(y, mesh.size()) *= factor;
                        }};
-  Operator mass{mesh.size(), [&mesh](const double* x, double* y) { mesh.mass_times(x, y); }};
+  Operator mass{mesh.size(), [&mesh](const double* x, double* y) {
+                  std::fill(y, y + mesh.size(), 0.0);
+                  mesh.add_mass_times(1.0, x, y);
+                }};
   const Index subspace = std::min(mesh.size(), std::max(2 * count, count + 20));
   Spectra::SymGEigsShiftSolver<Operator, Operator, Spectra::GEigsMode::ShiftInvert> solver(flexibility, mass, count,
                                                                                            subspace, 0.0);
@@ -161,8 +114,8 @@ void augment(const Timoshenko& mesh, VectorXd shape, MatrixXd& basis, Index& col
 /// remain: frequencies that differ by orders of magnitude keep their digits.
 VectorXd rayleigh_ritz(const Timoshenko& mesh, const MatrixXd& Z, MatrixXd& W) {
   const Index m = Z.cols();
-  MatrixXd work(mesh.size(), m);
-  for (Index k = 0; k < m; ++k) mesh.mass_times(Z.col(k).data(), work.col(k).data());
+  MatrixXd work = MatrixXd::Zero(mesh.size(), m);
+  for (Index k = 0; k < m; ++k) mesh.add_mass_times(1.0, Z.col(k).data(), work.col(k).data());
   const MatrixXd mass = Z.transpose() * work;
   VectorXd scale(m);
   for (Index k = 0; k < m; ++k) {
@@ -200,7 +153,7 @@ Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
   VectorXd y(size);
   for (Index k = 0; k < count; ++k) {
     const double omega2 = mesh.stiffness_norm2(basis.col(k)) / mesh.mass_norm2(basis.col(k));
-    y = mesh.flexibility_times(mesh.mass_times(VectorXd(basis.col(k))));
+    y = mesh.flexibility_times(mesh.mass_times(basis.col(k)));
     const double residual = std::sqrt(mesh.stiffness_norm2(basis.col(k) - omega2 * y) / omega2);
     if (!(residual <= residual_tolerance)) {
       throw std::runtime_error("beam: mode " + std::to_string(k + 1) + " of " + std::to_string(count) + " (" +

@@ -61,21 +61,28 @@ class Timoshenko {
   Eigen::Index tip_index() const { return size() - 1; }           ///< of u(L) in q
   Eigen::Index tip_rotation_index() const { return size() - 2; }  ///< of θ̃(L) in q
 
-  /// y = M x; x and y of size() doubles, not overlapping.
-  void mass_times(const double* x, double* y) const;
-  /// y = K x, element by element; x and y not overlapping.
-  void stiffness_times(const double* x, double* y) const;
-  /// y += a M x + c K z, element by element; y does not overlap x or z. One pass over the beam for linear elements.
-  void add_products(double a, const Eigen::VectorXd& x, double c, const Eigen::VectorXd& z, Eigen::VectorXd& y) const;
+  // Element by element; x and y of size() doubles, not overlapping.
+  void add_mass_times(double a, const double* x, double* y) const;       ///< y += a M x
+  void add_stiffness_times(double c, const double* x, double* y) const;  ///< y += c K x
   /// y = K⁻¹ x in O(n p), see above; x and y not overlapping.
   void flexibility_times(const double* x, double* y) const;
   /// √(h/(2j+1)) (√b_j κ_j, √s γ_j) of all elements, interleaved: its squared norm is xᵀKx.
   void weighted_strains(const double* x, double* strains) const;
 
-  Eigen::VectorXd mass_times(const Eigen::VectorXd& x) const { return product(&Timoshenko::mass_times, x); }
-  Eigen::VectorXd stiffness_times(const Eigen::VectorXd& x) const { return product(&Timoshenko::stiffness_times, x); }
+  Eigen::VectorXd mass_times(const Eigen::VectorXd& x) const {
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(size());
+    add_mass_times(1.0, x.data(), y.data());
+    return y;
+  }
+  Eigen::VectorXd stiffness_times(const Eigen::VectorXd& x) const {
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(size());
+    add_stiffness_times(1.0, x.data(), y.data());
+    return y;
+  }
   Eigen::VectorXd flexibility_times(const Eigen::VectorXd& x) const {
-    return product(&Timoshenko::flexibility_times, x);
+    Eigen::VectorXd y(size());
+    flexibility_times(x.data(), y.data());
+    return y;
   }
   Eigen::VectorXd mass_solve(const Eigen::VectorXd& x) const;  ///< M⁻¹ x
 
@@ -101,14 +108,8 @@ class Timoshenko {
   void sample_scaled_rotation(const double* q, double* values) const { sample(q, 0, values); }
 
  private:
-  using Times = void (Timoshenko::*)(const double* x, double* y) const;
-  Eigen::VectorXd product(Times times, const Eigen::VectorXd& x) const {
-    Eigen::VectorXd y(size());
-    (this->*times)(x.data(), y.data());
-    return y;
-  }
   struct Strains;
-  struct Field;
+  using Legendre = std::array<double, max_element_degree + 1>;  ///< by degree
   /// Calls use(p). Known to the compiler, the degree of linear elements makes products three times as fast.
   using Linear = std::integral_constant<Eigen::Index, 1>;
   template <typename Use>
@@ -118,24 +119,29 @@ class Timoshenko {
   template <typename Degree>
   Strains strains(Degree p, const double* x, Eigen::Index first) const;
   template <typename Degree>
-  Field field(Degree p, const double* x, Eigen::Index first) const;
-  double legendre_sum(const Field& v, double xi) const;
-  void add_linear_products(double a, const double* x, double c, const double* z, double* y) const;
+  void stress(Degree p, double c, Strains& s) const;  ///< strains become c times their stresses
+  template <typename Degree>
+  void add_stresses(Degree p, const Strains& s, double* y, Eigen::Index first) const;
+  template <typename Degree>
+  static Legendre coefficients(Degree p, const double* x, Eigen::Index first);  ///< of one field in an element
+  template <typename Degree>
+  static void add_moments(Degree p, const Legendre& moment, double* y, Eigen::Index first);
+  template <typename Degree>
+  double mass_weight(Degree p, Eigen::Index j) const {
+    return (j < p ? h_ : h_ * top_) / static_cast<double>(2 * j + 1);
+  }
+  Legendre legendre(double xi) const;  ///< P_0, …, P_p at ξ
+  double sum(const Legendre& c, const Legendre& P) const;
   double bending_stiffness(Eigen::Index p, Eigen::Index j) const { return j + 1 < p ? b_ : b_top_; }
-  template <typename Entry>
-  Eigen::SparseMatrix<double> assemble(const Entry& entry) const;
+  Eigen::SparseMatrix<double> assemble(const Eigen::MatrixXd& element) const;
   void sample(const double* q, int field, double* values) const;
-  using ShapeFunctions = std::array<double, max_element_degree + 1>;
-  ShapeFunctions shape_functions(double part) const;
-  Eigen::VectorXd distributed_load(std::size_t power) const;
-  Eigen::VectorXd point_force(double position) const;
-  Eigen::VectorXd hat_load() const;
+  double position(std::size_t shape) const {  ///< x/L of a point force or the tip load
+    return shape == Loads::tip ? 1.0 : point_force_position_[shape - Loads::point];
+  }
 
   Eigen::Index n_, p_;
-  double h_;    // element length [m]
-  double top_;  // how often the top coefficient counts in the mass: 1, or 2 if it is averaged
-  // ∫f² of the linear part is end_ (ratio_ (l² + r²) + 2lr).
-  double end_, ratio_;
+  double h_;      // element length [m]
+  double top_;    // how often the top coefficient counts in the mass: 1, or 2 if it is averaged
   double mu_;     // ρA [kg/m]
   double r_;      // √(I/A) [m]
   double b_;      // bending stiffness per ρI, b_j [m²/s²]
