@@ -27,49 +27,6 @@ SUNDIALS_FOLDERS = ("ida", "sundials", "nvector/serial", "sunmatrix/dense", "sun
 SUNDIALS_FOLDERS += ("sunnonlinsol/newton",)
 # Fortran, MPI and other bindings; the profiler is only needed when asked for.
 SUNDIALS_WITHOUT = re.compile(r"^f|_(futils|xbraid|profiler|mpi_errors|bbdpre)\.c$")
-SUNDIALS_HAS = {
-    "SUNDIALS_C_COMPILER_HAS_MATH_PRECISIONS",
-    "SUNDIALS_C_COMPILER_HAS_ISINF_ISNAN",
-    "SUNDIALS_C_COMPILER_HAS_INLINE",
-    "SUNDIALS_C_COMPILER_HAS_SNPRINTF_AND_VA_COPY",
-}
-# Hidden: inside a tool that has its own SUNDIALS the names must not meet.
-SUNDIALS_EXPORT = """\
-#ifndef SUNDIALS_EXPORT_H
-#define SUNDIALS_EXPORT_H
-#ifdef __GNUC__
-#define SUNDIALS_EXPORT __attribute__((visibility("hidden")))
-#else
-#define SUNDIALS_EXPORT
-#endif
-#define SUNDIALS_NO_EXPORT SUNDIALS_EXPORT
-#define SUNDIALS_DEPRECATED
-#define SUNDIALS_DEPRECATED_EXPORT SUNDIALS_EXPORT
-#define SUNDIALS_DEPRECATED_NO_EXPORT SUNDIALS_EXPORT
-#endif
-"""
-
-
-def sundials_config(source: Path) -> str:
-    """sundials_config.h as SUNDIALS' own configuration writes it for a plain C compiler: doubles, nothing optional."""
-    cmake = (source / "CMakeLists.txt").read_text(encoding="utf-8")
-    parts = dict(re.findall(r'set\(PACKAGE_VERSION_(MAJOR|MINOR|PATCH) "(\d+)"', cmake))
-    values = {f"PACKAGE_VERSION_{name}": value for name, value in parts.items()}
-    values |= {
-        "PACKAGE_VERSION": ".".join(parts[name] for name in ("MAJOR", "MINOR", "PATCH")),
-        "PRECISION_LEVEL": "#define SUNDIALS_DOUBLE_PRECISION 1",
-        "INDEX_TYPE": "#define SUNDIALS_INT64_T 1",
-        "SUNDIALS_CINDEX_TYPE": "int64_t",
-        "SUNDIALS_LOGGING_LEVEL": "0",
-    }
-    text = (source / "include/sundials/sundials_config.in").read_text(encoding="utf-8")
-    text = re.sub(r"#cmakedefine01 (\w+)", r"#define \1 0", text)
-    text = re.sub(
-        r"#cmakedefine (\w+).*",
-        lambda m: f"#define {m[1]}" if m[1] in SUNDIALS_HAS else f"/* #undef {m[1]} */",
-        text,
-    )
-    return re.sub(r"@(\w+)@", lambda m: values.get(m[1], ""), text)
 
 
 class Gathered:
@@ -112,7 +69,6 @@ def _normal(place: str) -> str:
 def gather(arguments: argparse.Namespace) -> None:
     headers = [(prefix, Path(folder)) for prefix, _, folder in (h.partition("=") for h in arguments.headers)]
     units = {file.resolve().relative_to(PROJECT).as_posix(): file for file in arguments.files}
-    written: dict[str, str] = {}
     licences: dict[str, Path] = {}
     if arguments.sundials:
         source = arguments.sundials
@@ -123,7 +79,6 @@ def gather(arguments: argparse.Namespace) -> None:
             for file in sorted((source / "src" / folder).glob("*.c")):
                 if not SUNDIALS_WITHOUT.search(file.name):
                     units[f"sundials_src/{folder}/{file.name}"] = file
-        written = {"sundials/sundials_config.h": sundials_config(source), "sundials/sundials_export.h": SUNDIALS_EXPORT}
         licences = {f"sundials/{name}": source / name for name in ("LICENSE", "NOTICE")}
     gathered = Gathered(headers)
     for place, file in units.items():
@@ -136,8 +91,6 @@ def gather(arguments: argparse.Namespace) -> None:
         target = out / "sources" / place
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(file.read_bytes())
-    for place, text in written.items():
-        (out / "sources" / place).write_text(text, encoding="utf-8")
     read = " ".join(str(file).replace(" ", r"\ ") for file in files.values())
     (out / "list.d").write_text(f"{out / 'list'}: {read}\n", encoding="utf-8")
     names = "" if arguments.without else "".join(f"{place}\n" for place in units)

@@ -3,10 +3,34 @@
 # is slower where it was built without optimisation, as Debian's.
 set(SPRINGBEAM_SUNDIALS_SOURCE "$ENV{SPRINGBEAM_SUNDIALS_SOURCE}" CACHE PATH "source of SUNDIALS 6 or 7")
 
+# configure_sundials(OUT) writes into OUT the two headers that SUNDIALS' own configuration would, for a plain C compiler:
+# doubles, nothing optional. Symbols are hidden: inside a tool that has its own SUNDIALS the names must not meet.
+function(configure_sundials out)
+  file(STRINGS ${SPRINGBEAM_SUNDIALS_SOURCE}/CMakeLists.txt lines REGEX "^set\\(PACKAGE_VERSION_[A-Z]+ +\"[0-9]+\"")
+  foreach(line IN LISTS lines)
+    string(REGEX MATCH "(PACKAGE_VERSION_[A-Z]+) +\"([0-9]+)\"" found "${line}")
+    set(${CMAKE_MATCH_1} ${CMAKE_MATCH_2})
+  endforeach()
+  set(PACKAGE_VERSION ${PACKAGE_VERSION_MAJOR}.${PACKAGE_VERSION_MINOR}.${PACKAGE_VERSION_PATCH})
+  set(PRECISION_LEVEL "#define SUNDIALS_DOUBLE_PRECISION 1")
+  set(INDEX_TYPE "#define SUNDIALS_INT64_T 1")
+  set(SUNDIALS_CINDEX_TYPE int64_t)
+  set(SUNDIALS_LOGGING_LEVEL 0)
+  foreach(feature IN ITEMS MATH_PRECISIONS ISINF_ISNAN INLINE SNPRINTF_AND_VA_COPY)
+    set(SUNDIALS_C_COMPILER_HAS_${feature} 1)
+  endforeach()
+  configure_file(${SPRINGBEAM_SUNDIALS_SOURCE}/include/sundials/sundials_config.in ${out}/sundials_config.h @ONLY)
+  configure_file(${CMAKE_CURRENT_FUNCTION_LIST_DIR}/sundials_export.h ${out}/sundials_export.h COPYONLY)
+endfunction()
+
 if(SPRINGBEAM_SUNDIALS_SOURCE)
   set(gathered ${PROJECT_BINARY_DIR}/sundials)
+  set(configured ${gathered}/configured)
+  configure_sundials(${configured}/sundials)
+  set(sundials_headers --headers sundials/sundials_config.h=${configured} --headers
+    sundials/sundials_export.h=${configured})
   execute_process(COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_LIST_DIR}/sources.py ${gathered}
-    --sundials ${SPRINGBEAM_SUNDIALS_SOURCE} RESULT_VARIABLE failed)
+    --sundials ${SPRINGBEAM_SUNDIALS_SOURCE} ${sundials_headers} RESULT_VARIABLE failed)
   if(failed)
     message(FATAL_ERROR "SPRINGBEAM_SUNDIALS_SOURCE = ${SPRINGBEAM_SUNDIALS_SOURCE} is no source of SUNDIALS 6 or 7")
   endif()

@@ -8,13 +8,11 @@
 #include <stdexcept>
 #include <string>
 
-#include "../fmus/common/text.hpp"
 #include "generalized_alpha.hpp"
 #include "modal_beam.hpp"
+#include "text.hpp"
 
 namespace beam {
-
-using common::number;
 
 namespace {
 

@@ -8,11 +8,13 @@
 #include <memory>
 #include <vector>
 
-#include "../fmus/common/polynomial.hpp"
-
 namespace beam {
 
-using common::Polynomial;
+/// A quantity that is quadratic in time over a step, p(τ) = p₀ + p₁τ + p₂τ²/2.
+using Polynomial = std::array<double, 3>;
+inline double value(const Polynomial& p, double t) { return p[0] + t * (p[1] + t * p[2] / 2); }
+/// Over 0 … t.
+inline double mean(const Polynomial& p, double t) { return p[0] + t * (p[1] / 2 + t * p[2] / 6); }
 
 enum class Integrator { modal = 1, generalized_alpha = 2 };
 enum class MassMatrix { consistent = 1, averaged = 2 };

@@ -59,11 +59,10 @@ class ModalBeam final : public Beam {
     bound(modes_.moment);
     bound(omega2_.matrix());
     bound(damping_.matrix());
-    update_tip();
   }
 
-  double tip_displacement() const override { return displacement_; }
-  double tip_velocity() const override { return velocity_; }
+  double tip_displacement() const override { return (tip_ * eta_).sum(); }
+  double tip_velocity() const override { return (tip_ * v_).sum(); }
   Response response(Order order, const Loads::Values& loads_rate, double tip_force_rate) const override {
     const ArrayXd now = acceleration();
     if (order == Order::value) return respond(now, now_.loads, now_.tip_force);
@@ -74,7 +73,6 @@ class ModalBeam final : public Beam {
     unbooked_.size = 0.0;
     eta_ = modal_force(now_.loads, now_.tip_force) / omega2_;
     v_.setZero();
-    update_tip();
   }
   double tip_rotation_rate() const override { return modes_.tip_rotation.dot(v_.matrix()); }
   double kinetic_power() const override { return (v_ * acceleration()).sum(); }
@@ -138,7 +136,6 @@ class ModalBeam final : public Beam {
     now_.integral_2 = integral(1);
     eta_.swap(eta_next_);
     v_.swap(v_next_);
-    update_tip();
     if (damped_ || loaded) unbooked_ = {size, varying, loaded, load_varies};
     return (v_.square() + omega2_ * eta_.square()).sum();
   }
@@ -147,13 +144,9 @@ class ModalBeam final : public Beam {
     unbooked_.size = 0.0;
     eta_.swap(eta_next_);
     v_.swap(v_next_);
-    update_tip();
   }
 
-  void strike(double impulse) override {
-    v_ += impulse * tip_;
-    update_tip();
-  }
+  void strike(double impulse) override { v_ += impulse * tip_; }
 
   void save_motion(double* numbers) const override {
     Eigen::Map<ArrayXd>(numbers, eta_.size()) = eta_;
@@ -164,7 +157,6 @@ class ModalBeam final : public Beam {
     unbooked_.size = 0.0;
     eta_ = Eigen::Map<const ArrayXd>(numbers, eta_.size());
     v_ = Eigen::Map<const ArrayXd>(numbers + eta_.size(), eta_.size());
-    update_tip();
   }
 
   void make_coefficients(double h, Coefficients& k) const {
@@ -256,11 +248,6 @@ class ModalBeam final : public Beam {
     return sum;
   }
 
-  void update_tip() {
-    displacement_ = (tip_ * eta_).sum();
-    velocity_ = (tip_ * v_).sum();
-  }
-
   const Coefficients& coefficients(double size) const {
     return coefficients_.get(size, [this](double h, Coefficients& value) { make_coefficients(h, value); });
   }
@@ -271,8 +258,7 @@ class ModalBeam final : public Beam {
   ArrayXd damping_;  // α_b ω² [1/s]
   bool damped_;
 
-  ArrayXd eta_, v_;                             // state: modal displacement [m √kg] and velocity
-  double displacement_ = 0.0, velocity_ = 0.0;  // of the tip
+  ArrayXd eta_, v_;  // state: modal displacement [m √kg] and velocity
 
   // Work space; after a step all of it is that of its start.
   ArrayXd eta_next_, v_next_, r_;

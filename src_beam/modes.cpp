@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "../fmus/common/text.hpp"
+#include "text.hpp"
 
 namespace beam {
 namespace {
@@ -157,9 +157,8 @@ Modes compute_modes(const Timoshenko& mesh, const Parameters& p) {
     const double residual = std::sqrt(mesh.stiffness_norm2(basis.col(k) - omega2 * y) / omega2);
     if (!(residual <= residual_tolerance)) {
       throw std::runtime_error("beam: mode " + std::to_string(k + 1) + " of " + std::to_string(count) + " (" +
-                               common::number(std::sqrt(omega2)) + " rad/s) did not converge: its residual is " +
-                               common::number(residual) + ", allowed is " + common::number(residual_tolerance) +
-                               remedy);
+                               number(std::sqrt(omega2)) + " rad/s) did not converge: its residual is " +
+                               number(residual) + ", allowed is " + number(residual_tolerance) + remedy);
     }
     modes.residual = std::max(modes.residual, residual);
   }

@@ -77,7 +77,7 @@ class Flight final : public ImplicitSystem {
   void launch(const Expansion& motion, const Pace& pace, const Tolerances& tolerances, const Opening& opening);
 
   double contact_depth(double rise, double s) const;
-  double contact_rate(double slope, double s) const { return slope - common::rate(loads_.tip, s); }  ///< both d/ds
+  double contact_rate(double slope, double s) const { return slope - spring::rate(loads_.tip, s); }  ///< both d/ds
 
   const Motion& motion_;
   const Parameters& parameters_;

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "../fmus/common/text.hpp"
 #include "flat.hpp"
+#include "text.hpp"
 
 namespace spring {
 
@@ -15,7 +15,7 @@ HeldContact::HeldContact(const Compliance& law, double mass, double size, const 
     : law_(law), yielding_(size * size / 2 / mass), size_(size), response_(response) {
   if (!(response[0] > 0.0)) {
     throw std::invalid_argument(
-        "spring: tip_response = " + common::number(response[0]) +
+        "spring: tip_response = " + number(response[0]) +
         ": must be > 0 where communication_step > 0; it is an output of the beam with the same one");
   }
 }

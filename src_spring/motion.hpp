@@ -19,7 +19,7 @@ struct Loads {
 
   static Loads from(const Parameters& parameters, const Inputs& inputs);
   Loads from_time(double t) const { return {shifted(force, t), shifted(tip, t)}; }
-  Loads scaled(double size) const { return {common::scaled(force, size), common::scaled(tip, size)}; }
+  Loads scaled(double size) const { return {spring::scaled(force, size), spring::scaled(tip, size)}; }
 };
 
 /// A motion near a segment's start: Taylor coefficients in s = τ/H of y, of y², of the depth y − u_tip and of the

@@ -4,11 +4,9 @@
 #include <limits>
 #include <stdexcept>
 
-#include "../fmus/common/text.hpp"
+#include "text.hpp"
 
 namespace spring {
-
-using common::number;
 
 double Parameters::hilltop() const {
   return linear_stiffness > 0.0 && cubic_stiffness < 0.0 ? std::sqrt(linear_stiffness / -cubic_stiffness)

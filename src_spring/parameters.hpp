@@ -2,11 +2,9 @@
 // and inputs are finite: whoever takes them from outside has checked that.
 #pragma once
 
-#include "../fmus/common/polynomial.hpp"
+#include "polynomial.hpp"
 
 namespace spring {
-
-using common::Polynomial;
 
 enum class ContactLaw { external = 1, normal_compliance = 2 };
 

@@ -4,13 +4,11 @@
 #include <cmath>
 #include <limits>
 
-#include "../fmus/common/text.hpp"
 #include "flat.hpp"
 #include "rest.hpp"
+#include "text.hpp"
 
 namespace spring {
-
-using common::number;
 
 namespace {
 

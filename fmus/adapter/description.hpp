@@ -6,12 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "../common/text.hpp"
 #include "table.hpp"
+#include "text.hpp"
 
 namespace fmi {
-
-using common::number;
 
 /// `source_files`: names in sources/, empty if the FMU carries none.
 void describe2(std::ostream& out, const std::vector<std::string>& source_files);

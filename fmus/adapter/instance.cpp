@@ -5,11 +5,9 @@
 #include <limits>
 #include <stdexcept>
 
-#include "../common/text.hpp"
 #include "references3.hpp"
+#include "text.hpp"
 namespace fmi {
-
-using common::number;
 
 namespace {
 
@@ -319,7 +317,7 @@ void Instance::restore(Snapshot& s) {
   }
   progress.built = progress.built && s.progress.built && progress.tolerance == s.progress.tolerance &&
                    (settings_ == s.settings || *settings_ == *s.settings);
-  settings_ = s.settings;
+  if (settings_ != s.settings) settings_ = s.settings;
   for (const std::size_t i : used_) values_[i] = s.inputs[i];
   progress.tolerance = s.progress.tolerance;
   if (s.progress.built) {

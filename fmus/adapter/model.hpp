@@ -1,17 +1,17 @@
 // What the adapter asks of a model: built from parameters, stepped, saved and restored. No FMI types.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "../common/polynomial.hpp"
-
 namespace fmi {
 
-using common::Polynomial;
+/// A quantity that is quadratic in time over a step: its value and its first two time derivatives at the start.
+using Polynomial = std::array<double, 3>;
 /// In place of a derivative that the importer has not set.
 inline constexpr double unset = std::numeric_limits<double>::quiet_NaN();
 

@@ -7,7 +7,7 @@
 #include <initializer_list>
 #include <stdexcept>
 
-#include "../common/text.hpp"
+#include "text.hpp"
 
 namespace fmi {
 namespace {
@@ -58,7 +58,7 @@ void serialize(const Snapshot& s, const std::string& guid, char* bytes) {
   header.count = values.size();
   const std::size_t payload = values.size() * sizeof(double);
   std::memcpy(bytes + sizeof header, values.data(), payload);
-  header.checksum = common::hash(bytes + sizeof header, payload);
+  header.checksum = hash(bytes + sizeof header, payload);
   std::memcpy(bytes, &header, sizeof header);
 }
 
@@ -79,7 +79,7 @@ Snapshot deserialize(const char* bytes, std::size_t size, const std::string& gui
     refuse(std::to_string(size) + " bytes, its header announces " +
            std::to_string(sizeof header + header.count * sizeof(double)));
   }
-  if (common::hash(bytes + sizeof header, payload) != header.checksum) refuse("the checksum is wrong");
+  if (hash(bytes + sizeof header, payload) != header.checksum) refuse("the checksum is wrong");
 
   const std::size_t inputs_begin = fixed_count + n_settings, numerics_begin = inputs_begin + 3 * n_inputs;
   if (header.count < numerics_begin) refuse("its parts do not add up");

@@ -15,7 +15,7 @@
 #include "../../src_spring/parameters.hpp"
 #include "../../src_spring/spring.hpp"
 #include "../adapter/table.hpp"
-#include "../common/text.hpp"
+#include "../adapter/text.hpp"
 
 namespace {
 
@@ -64,8 +64,8 @@ struct SpringModel final : fmi::Model {
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
     const bool goes_on = held && size > rounding * held->size();
     if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
-      throw fmi::Discarded("a step of " + common::number(size) + " s, but communication_step = " +
-                           common::number(held->size()) + " s: steps must have that size, or the parameter be 0");
+      throw fmi::Discarded("a step of " + fmi::number(size) + " s, but communication_step = " +
+                           fmi::number(held->size()) + " s: steps must have that size, or the parameter be 0");
     }
     if (!has_force()) throw fmi::Discarded(no_force());
     std::vector<double> before;
@@ -238,7 +238,7 @@ struct SpringModel final : fmi::Model {
       if (held && held->missed(kind) >= most)
         tell(static_cast<unsigned>(kind),
              "the tip was not where it was foreseen in " + std::to_string(held->missed(kind)) + " steps, by up to " +
-                 common::number(held->farthest()) + " m, so the contact gains or loses energy. " + remedies[kind]);
+                 fmi::number(held->farthest()) + " m, so the contact gains or loses energy. " + remedies[kind]);
     }
     if (held) return;
     const bool law = parameters.compliant(), ahead = parameters.communication_step > 0.0 || forecast[0] != 0.0;

@@ -209,7 +209,7 @@ TEST(Motion, ExcessAccelerationIsTheDifference) {
   const Motion motion(p);
   constexpr double H = 0.2;
   Loads loads;
-  loads.force = common::scaled({1.0, -2.0, 3.0}, H);
+  loads.force = scaled({1.0, -2.0, 3.0}, H);
   const Series y = expanded(motion, 0.15, 0.5, loads, H, false, 0.0);
   for (const int order : {0, 2, 4, max_order}) {
     const Taylor R(y, order);

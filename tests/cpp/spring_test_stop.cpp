@@ -174,8 +174,8 @@ TEST(SpringStop, AGrazingImpactWithinOneStepCounts) {
   }
 }
 
-// y = (τ − a)²(τ − b)² − δ comes down on the stop twice, near a and b: in one step the first is seen, too. From there it
-// rises above the second.
+// y = (τ − a)²(τ − b)² − δ comes down on the stop twice, near a and b: in one step the first is seen, too. From there
+// it rises above the second.
 TEST(SpringStop, TheFirstOfTwoGrazingImpactsCounts) {
   const double dip = 1e-6, b = 0.8;
   for (const double a : {0.05, 0.1, 0.2, 0.3}) {

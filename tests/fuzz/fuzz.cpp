@@ -35,10 +35,10 @@
 #include <thread>
 #include <vector>
 
-#include "../common/text.hpp"
 #include "description.hpp"
 #include "fmi2Functions.h"
 #include "table.hpp"
+#include "text.hpp"
 
 namespace {
 
@@ -937,7 +937,7 @@ class Episode {
       const std::size_t at = random_.chance(0.4) ? random_.below(std::min<std::size_t>(n, 7)) : random_.below(n);
       std::memcpy(&blob[header + at * sizeof value], &value, sizeof value);
     }
-    const std::uint64_t hash = common::hash(&blob[header], blob.size() - header);
+    const std::uint64_t hash = fmi::hash(&blob[header], blob.size() - header);
     std::memcpy(&blob[checksum_at], &hash, sizeof hash);
   }
 

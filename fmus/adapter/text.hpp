@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-namespace common {
+namespace fmi {
 
 /// The shortest decimal that reads back as the same double.
 inline std::string number(double value) {
@@ -20,4 +20,4 @@ inline std::uint64_t hash(const char* bytes, std::size_t size, std::uint64_t see
   return seed;
 }
 
-}  // namespace common
+}  // namespace fmi

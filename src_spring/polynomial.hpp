@@ -4,10 +4,9 @@
 
 #include <array>
 
-namespace common {
+namespace spring {
 
-/// A type of its own, so that the functions below are found beside it.
-struct Polynomial : std::array<double, 3> {};
+using Polynomial = std::array<double, 3>;
 
 inline double value(const Polynomial& p, double t) { return p[0] + t * (p[1] + t * p[2] / 2); }
 inline double rate(const Polynomial& p, double t) { return p[1] + t * p[2]; }
@@ -23,4 +22,4 @@ inline Polynomial scaled(const Polynomial& p, double h) { return {p[0], h * p[1]
 /// p with time counted from `t`.
 inline Polynomial shifted(const Polynomial& p, double t) { return {value(p, t), rate(p, t), p[2]}; }
 
-}  // namespace common
+}  // namespace spring
