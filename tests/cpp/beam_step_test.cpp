@@ -20,6 +20,7 @@ using testing::every_load;
 using testing::general_beam;
 using testing::mechanical_energy;
 using testing::Noise;
+using testing::shifted;
 using testing::unit_beam;
 using testing::with_integrator;
 

@@ -11,6 +11,9 @@
 
 namespace beam::testing {
 
+/// p with time counted from `t`.
+inline Polynomial shifted(const Polynomial& p, double t) { return {value(p, t), p[1] + t * p[2], p[2]}; }
+
 /// κ = EI = KAG, everything else 1: section 6 of the paper.
 inline Parameters unit_beam(int n_elements, double kappa = 1.0) {
   Parameters p;

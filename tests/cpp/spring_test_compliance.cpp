@@ -202,7 +202,7 @@ TEST(SpringCompliance, DampingNeverPulls) {
   p.compliance_damping = chi;
   p.linear_stiffness = k;
   p.displacement = 0.02;
-  const Polynomial tip{0.0, 0.3, 40.0};  // δ̇ = −1/χ soon after the start
+  const spring::Polynomial tip{0.0, 0.3, 40.0};  // δ̇ = −1/χ soon after the start
   Inputs inputs;
   inputs.tip_displacement = tip;
   long double y = p.displacement, z = 0.0, lost = 0.0;
