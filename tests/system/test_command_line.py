@@ -33,6 +33,7 @@ TABLES = {
     "sweep": "duffing --vary spring.mass=0.5,1 --set time.t_end=1 --scheduler {scheduler} --out varied",
     "compare": "done done --out compared.png",
     "spectrum": "done --out spectra",
+    "fit": "duffing curve.csv --vary spring.linear_stiffness=3.1 --set time.t_end=1 --out fitted",
     "report": "done --out page.html",
     "animate": "done --seconds 0.2 --fps 10 --out moving.gif",
     "export": "done",
@@ -51,6 +52,7 @@ def place(tmp_path_factory):
     with pytest.MonkeyPatch.context() as there:
         there.chdir(tmp_path_factory.mktemp("place"))
         printed("run", "soft", "--no-plots", "--out", "done")
+        Path("curve.csv").write_text("time,y\n0.1,0.49\n0.5,0.32\n0.9,0.01\n", encoding="utf-8")
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(_ProgressBar, "__call__", Interrupt(40))
             assert command("run", "soft", "--checkpoint", "1000", "--no-plots", "--out", "cut").exit_code == 3
@@ -122,7 +124,11 @@ def test_the_command_alone_shows_how_to_start():
 
 @pytest.mark.parametrize(
     "name",
-    [name for name in TABLES if name not in ("new", "compare", "spectrum", "report", "animate", "export", "resume")],
+    [
+        name
+        for name in TABLES
+        if name not in ("new", "compare", "spectrum", "fit", "report", "animate", "export", "resume")
+    ],
 )
 def test_json_is_one_document_and_all_of_stdout(arguments, tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)

@@ -75,7 +75,7 @@ def _common(
 _COMMANDS: dict[str, tuple[Callable[..., None], ...]] = {
     "Scenes": (scenes.scenes, scenes.keys, scenes.new),
     "Run": (run.run, studies.resume, studies.sweep),
-    "Look": (look.report, look.animate, look.export, look.compare, spectrum.spectrum),
+    "Look": (look.report, look.animate, look.export, look.compare, spectrum.spectrum, studies.fit),
     "Choose scheme and accuracy": (scenes.predict, studies.tradeoff, studies.converge),
     "Check": (studies.crosscheck, checks.verify, studies.stability, checks.doctor),
 }

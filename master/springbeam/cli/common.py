@@ -58,6 +58,13 @@ SettingsOption = Annotated[
     ),
 ]
 RunArgument = Annotated[Path, typer.Argument(metavar="DIR", help="Directory with the results of springbeam run.")]
+MeasuredArgument = Annotated[
+    Path, typer.Argument(metavar="FILE", help="Measured columns: time first, names with [units] in the first line.")
+]
+MapOption = Annotated[
+    list[str] | None,
+    typer.Option("--map", metavar="NAME=COLUMN", help="Which column or formula of a run a measured one is."),
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document, and nothing else, on stdout.")]
 QuietOption = Annotated[
     bool, typer.Option("--quiet", "-q", help="No progress bar and no tables; print only the path of the results.")

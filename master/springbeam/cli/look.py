@@ -20,6 +20,7 @@ from .common import (
     BAD_INPUT,
     ForceOption,
     JsonOption,
+    MapOption,
     NoPlotsOption,
     QuietOption,
     RunArgument,
@@ -121,7 +122,15 @@ _SAME_WINDOW = 1e-9
 
 
 def compare(
-    runs: Annotated[list[Path], typer.Argument(metavar="DIR…", help="Directories of two runs or more.")],
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="DIR…", help="Directories of two runs or more; or of one, and a file of measurements."),
+    ],
+    names: MapOption = None,
+    shift: Annotated[
+        float | None,
+        typer.Option("--shift", metavar="SECONDS", help="Move the measurement's clock. Default: by correlation."),
+    ] = None,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Where the picture goes.")] = Path(
         "results/comparison.png"
     ),
@@ -131,10 +140,19 @@ def compare(
 ) -> None:
     """Compare runs: the keys that differ, the results that matter, and their motions and forces in one picture.
 
+    Beside a file of measurements: how far the run is from them.
+
     Example: springbeam compare results/soft results/light
     """
     if len(runs) < 2:
-        fail(BAD_INPUT, "one run; compare takes two or more")
+        fail(BAD_INPUT, "one run; compare takes two or more, or a file of measurements beside it")
+    if runs[-1].is_file():
+        if len(runs) > 2:
+            fail(BAD_INPUT, f"{runs[-1]}: is a file of measurements, which is laid beside one run")
+        _beside_measured(runs[0], runs[1], names or [], shift, None if no_plots else out, quiet=quiet, as_json=as_json)
+        return
+    if names or shift is not None:
+        fail(BAD_INPUT, "--map, --shift: belong to a file of measurements, and there is none")
     with bad_input_reported():
         trajectories = [load_trajectory(results_directory(run)) for run in runs]
         names = [str(run) for run in runs]
@@ -153,6 +171,40 @@ def compare(
     for title, found in (("keys that differ", keys), ("results", results)):
         console.print(table(("", *names), _rows(found), title))
     if drawn:
+        console.print(Text(f"picture   {out}"), soft_wrap=True)
+
+
+def _beside_measured(
+    directory: Path, file: Path, names: list[str], shift: float | None, out: Path | None, *, quiet: bool, as_json: bool
+) -> None:
+    """Show how far a run is from measured curves."""
+    from ..signals.measured import model, read_measured, residuals, time_shift
+    from ..studies.fit import mapping
+
+    with bad_input_reported():
+        run = load_trajectory(results_directory(directory))
+        measured = read_measured(file, run.scene, mapping(names))
+        moved = time_shift(run, measured) if shift is None else shift
+        found = residuals(run, measured, moved)
+        if out is not None:
+            from ..pictures.spectra import draw_measured
+
+            out.parent.mkdir(parents=True, exist_ok=True)
+            covered, curves = model(run, measured, moved)
+            pairs = {name: (curve, measured.values[name][covered]) for name, curve in curves.items()}
+            draw_measured(measured.time[covered] + moved, pairs, out)
+    if as_json:
+        print_json({"shift": moved, "residuals": [row._asdict() for row in found], "picture": out})
+    elif quiet and out is not None:
+        typer.echo(out)
+    console = console_for(silent=quiet or as_json)
+    rows = [
+        (row.signal, str(row.points), f"{row.rms:.4g}", f"{row.relative:.2%}", f"{row.largest:.4g}", f"{row.at:.6g}")
+        for row in found
+    ]
+    console.print(table(("curve", "points", "rms", "of its spread", "largest", "at t [s]"), rows))
+    console.print(f"shift     {moved:.6g} s" + (", found by correlation" if shift is None else ""))
+    if out is not None:
         console.print(Text(f"picture   {out}"), soft_wrap=True)
 
 

@@ -27,6 +27,8 @@ from .common import (
     STOPPED,
     ForceOption,
     JsonOption,
+    MapOption,
+    MeasuredArgument,
     NoPlotsOption,
     QuietOption,
     SceneArgument,
@@ -152,6 +154,34 @@ def sweep(
         metric=tuple(metric or ()),
         stroboscopic=stroboscopic,
     )
+
+
+@study_command()
+def fit(
+    scene: SceneArgument,
+    measured: MeasuredArgument,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="KEY=GUESS",
+            help="A key to find, or shift, by which the measurement's clock moves [s]; may be repeated.",
+            autocompletion=complete_key,
+        ),
+    ] = None,
+    names: MapOption = None,
+    shift: Annotated[
+        float, typer.Option("--shift", metavar="SECONDS", help="Move the clock of the measurement by this.")
+    ] = 0.0,
+    settings: SettingsOption = None,
+) -> Study:
+    """Find keys of a scene by measured curves, with confidence intervals. Exit code 1 if the data does not tell.
+
+    Example: springbeam fit soft measured.csv --vary spring.linear_stiffness=3 --vary spring.damping=0.1
+    """
+    from ..studies.fit import Fit
+
+    return Fit.of(load_scene(scene, settings or ()), measured, vary or (), names or (), shift)
 
 
 @study_command()

@@ -1,4 +1,4 @@
-"""Spectra in one picture: shock, power, and the points of a driven motion."""
+"""Spectra in one picture: shock, power, and the points of a driven motion; and a run beside what was measured."""
 
 from __future__ import annotations
 
@@ -59,4 +59,18 @@ def draw(
             ax.set(xlabel="position once a period of the drive [m]", ylabel="velocity [m/s]")
             ax.grid(alpha=0.3)
         figure.suptitle(title)
+        figure.savefig(path, dpi=DPI)
+
+
+def draw_measured(time: np.ndarray, curves: Mapping[str, tuple[np.ndarray, np.ndarray]], path: Path) -> None:
+    """Draw what a run gives beside what was measured, by name, at ``time`` [s]; shapes (n,)."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(WIDTH, 0.6 + 2.0 * len(curves)), layout="constrained")
+        axes = figure.subplots(len(curves), 1, sharex=True, squeeze=False)[:, 0]
+        for ax, (name, (ours, theirs)) in zip(axes, curves.items(), strict=True):
+            ax.plot(time, theirs, ".", color=BLACK, markersize=2.5, label="measured")
+            ax.plot(time, ours, color=BLUE, label="run")
+            ax.set_ylabel(name)
+            ax.legend()
+        axes[-1].set_xlabel("time t [s]")
         figure.savefig(path, dpi=DPI)

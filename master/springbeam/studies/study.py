@@ -52,6 +52,7 @@ _STUDIES = {
     "stability": ".stability.grid:Grid",
     "crosscheck": ".crosscheck:Crosscheck",
     "orders": ".orders:Orders",
+    "fit": ".fit:Fit",
 }
 #: Columns of a case and of its record, by name.
 Row = dict[str, Any]

@@ -1,0 +1,205 @@
+"""Measured data: a file of columns, read into the units of a run, and laid beside it.
+
+The first line names the columns, each with its unit in brackets, as ``time [ms], acceleration [g]``; the first column
+is the time. Columns without a unit are in that of the run. Pint knows the units; ``g`` of an acceleration is standard
+gravity.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+from math import isfinite, nan
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.signal import correlate, correlation_lags
+
+from ..results.trajectory import Trajectory, columns_of
+from ..scene import Scene, SceneError
+from .expressions import GRAVITY, Expression, signal
+
+#: Most samples of a correlation.
+_MOST = 200_000
+_NAME = re.compile(r"\s*(.*?)\s*(?:\[(.*)\])?\s*")
+
+
+class Measured(NamedTuple):
+    """Measured curves: each belongs to a column of a run, or to a formula of columns."""
+
+    time: np.ndarray  #: [s], shape (n,)
+    values: dict[str, np.ndarray]  #: by column or formula, in its unit, shapes (n,)
+
+
+class Residual(NamedTuple):
+    """How far a run is from a measured curve, where both are known."""
+
+    signal: str
+    points: int
+    rms: float  #: in the unit of the signal
+    relative: float  #: over the standard deviation of what was measured
+    largest: float
+    at: float  #: [s], in the time of the run
+
+
+def read_measured(path: str | Path, scene: Scene, names: Mapping[str, str] | None = None) -> Measured:
+    """Read a file of measurements.
+
+    Parameters
+    ----------
+    path
+        Of the file; its separator is a comma, a semicolon or a tab, and lines that begin with # are skipped.
+    scene
+        Says which columns a run has, and their units.
+    names
+        The column or formula of a run by that of the file, e.g. ``{"CH1": "a_tip + load_0"}``. Without any, columns
+        that are called as those of a run belong to these. Others are left out.
+
+    Raises SceneError, which names file, line and column, and what would be allowed.
+    """
+    path, units = Path(path), columns_of(scene)
+    header, cells = _table(path)
+    there = [name for name, _ in header[1:]]
+    if wrong := [name for name in names or () if name not in there]:
+        raise SceneError(f"--map {wrong[0]}: {path} has the columns {', '.join(there)}")
+    wanted = names or {name: name for name in there if name in units and name != "phase"}
+    if not wanted:
+        raise SceneError(
+            f"{path}: no column is called as one of the run ({', '.join(units)}); --map NAME=COLUMN says which is which"
+        )
+    time = _factor(header[0][1] or "s", "s", f"{path}: column {header[0][0]}") * _numbers(path, header, cells, 0)
+    if not (np.diff(time) > 0.0).all():
+        row = int(np.argmin(np.diff(time) > 0.0))
+        raise SceneError(f"{path}: {time[row + 1]!s} s comes after {time[row]!s} s; times must increase")
+    values = {}
+    for name, what in wanted.items():
+        Expression(what).check(column for column in units if column != "phase")
+        k = 1 + there.index(name)
+        unit, factor = header[k][1], 1.0
+        if unit:
+            own = units[what] if what in units else _unit_of(what, units)
+            factor = _factor(unit, own, f"{path}: column {name}, which is {what}")
+        values[what] = factor * _numbers(path, header, cells, k)
+    return Measured(time, values)
+
+
+def _unit_of(formula: str, units: Mapping[str, str]) -> str:
+    """Return the unit of a formula whose columns all have the same one. Raises SceneError for another."""
+    found = {units[name] for name in Expression(formula).names}
+    if len(found) != 1:
+        raise SceneError(f"{formula}: takes columns of several units; give the measured column without a unit")
+    return found.pop()
+
+
+def _table(path: Path) -> tuple[list[tuple[str, str]], list[tuple[int, list[str]]]]:
+    """Return names and units of the columns, and the cells of each line with its number."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
+    kept = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+    if len(kept) < 3:
+        raise SceneError(f"{path}: {len(kept)} lines; there must be names of columns and two lines of numbers at least")
+    separator = max(",;\t", key=kept[0][1].count)
+    header = [(m[1], m[2] or "") for cell in next(csv.reader([kept[0][1]], delimiter=separator))
+              if (m := _NAME.fullmatch(cell)) is not None]  # fmt: skip
+    rows = [(number, line.split(separator)) for number, line in kept[1:]]
+    for number, cells in rows:
+        if len(cells) != len(header):
+            raise SceneError(f"{path}: line {number}: {len(cells)} columns; the first line names {len(header)}")
+    return header, rows
+
+
+def _numbers(path: Path, header: list[tuple[str, str]], rows: list[tuple[int, list[str]]], column: int) -> np.ndarray:
+    """Return the numbers of a column."""
+    found = []
+    for number, cells in rows:
+        try:
+            value = float(cells[column])
+        except ValueError:
+            value = nan
+        if not isfinite(value):
+            cell = cells[column].strip()[:40]
+            raise SceneError(f"{path}: line {number}, column {header[column][0]}: {cell!r} is not a finite number")
+        found.append(value)
+    return np.array(found)
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    from pint import UnitRegistry  # takes a second: only for who has units to convert
+
+    return UnitRegistry()
+
+
+def _factor(unit: str, wanted: str, where: str) -> float:
+    """Return what a value in ``unit`` is multiplied by to have it in ``wanted``. Raises SceneError."""
+    if unit == wanted:
+        return 1.0
+    if (unit, wanted) == ("g", "m/s²"):
+        return GRAVITY
+    from pint.errors import PintError
+
+    try:
+        return float(_registry().Quantity(1.0, unit.replace("·", "*")).to(wanted.replace("·", "*")).magnitude)
+    except (PintError, ValueError, AssertionError) as error:
+        raise SceneError(f"{where}: [{unit}] is no unit of what a run has in {wanted}: {error}") from error
+
+
+def time_shift(run: Trajectory, measured: Measured) -> float:
+    """Return by how much [s] the clock of the measurement is to be moved onward, so that its curves fit the run.
+
+    Where the mean square between them is least, found by correlation at equal steps and then refined. Half of the
+    shorter record takes part at least.
+    """
+    begin, end = float(run.time[0]), float(run.time[-1])
+    first, last = float(measured.time[0]), float(measured.time[-1])
+    step = max(float(np.median(np.diff(measured.time))), (end - begin + last - first) / _MOST)
+    ours, theirs = np.arange(begin, end, step), np.arange(first, last, step)
+    found, total = run.at(ours), np.zeros(len(ours) + len(theirs) - 1)
+    one, other = np.ones(len(ours)), np.ones(len(theirs))
+    common = np.maximum(correlate(one, other), 1.0)
+    for what, values in measured.values.items():
+        a, b = signal(found, what), np.interp(theirs, measured.time, values)
+        square = correlate(a**2, other) - 2.0 * correlate(a, b) + correlate(one, b**2)
+        total = total + square / common / (float(np.var(b)) or 1.0)
+    total = np.where(common >= 0.5 * min(len(ours), len(theirs)), total, np.inf)
+    lag = int(correlation_lags(len(ours), len(theirs))[int(np.argmin(total))])
+    coarse = begin + lag * step - first
+
+    def misfit(shift: float) -> float:
+        return sum(residual.relative**2 for residual in residuals(run, measured, shift))
+
+    fine = minimize_scalar(
+        misfit, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": 1e-6 * step}
+    )
+    return float(fine.x)
+
+
+def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return which points of the measurement the run covers, shape (n,), and its curves at these."""
+    times = measured.time + shift
+    covered = (times >= run.time[0]) & (times <= run.time[-1])
+    if covered.sum() < 2:
+        raise SceneError(
+            f"the run is known from {run.time[0]:g} s to {run.time[-1]:g} s, the measurement from {times[0]:g} s to "
+            f"{times[-1]:g} s: they have no times in common"
+        )
+    found = run.at(times[covered])
+    return covered, {what: signal(found, what) for what in measured.values}
+
+
+def residuals(run: Trajectory, measured: Measured, shift: float = 0.0) -> list[Residual]:
+    """Return how far the run is from each measured curve; the clock of the measurement is moved by ``shift`` [s]."""
+    covered, curves = model(run, measured, shift)
+    times, found = measured.time[covered] + shift, []
+    for what, curve in curves.items():
+        off = curve - measured.values[what][covered]
+        rms, at = float(np.sqrt(np.mean(off**2))), int(np.argmax(np.abs(off)))
+        scale = float(np.std(measured.values[what][covered])) or 1.0
+        found.append(Residual(what, len(off), rms, rms / scale, float(abs(off[at])), float(times[at])))
+    return found

@@ -1,0 +1,249 @@
+"""Find keys of a scene by measured curves: least squares over runs, with confidence intervals.
+
+The unknowns are logarithms of the keys over their guesses, so that a key keeps its sign. Curves of different units are
+weighed by their spread, and then by what is left of each. An interval holds if what is left is noise that has the same
+size along a curve and does not remember its past.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from rich.text import Text
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from ..run.outcome import RunStopped
+from ..scene import Scene, SceneError, key_kind, with_changes
+from ..scene.scene import split_key
+from ..signals.measured import Measured, model, read_measured
+from .accuracy import simulate
+from .study import Findings, Row, Study
+from .tables import table
+
+_CASE = "fit"
+#: The unknown that moves the clock of the measurement [s], beside keys.
+SHIFT = "shift"
+#: Relative steps of the derivatives, and where the search ends.
+_STEP, _TOLERANCE = 1e-4, 1e-12
+#: Share of a residual that a run which cannot be made counts, so that the search turns back.
+_REFUSED = 1e3
+#: A combination of keys that changes the curves less than this, beside the others, is not determined by them.
+_UNDETERMINED = 1e-5
+_CONFIDENCE = 0.95
+
+
+class Fit(Study):
+    """Keys that make runs of a scene agree with a measurement."""
+
+    kind: ClassVar[str] = "fit"
+
+    scene: Scene
+    file: str  #: path of the measurement
+    digest: str  #: of its content
+    vary: tuple[str, ...]  #: KEY=GUESS
+    names: tuple[str, ...] = ()  #: NAME=COLUMN
+    shift: float = 0.0  #: by which the clock of the measurement is moved [s]
+
+    @classmethod
+    def of(cls, scene: Scene, path: Path, vary: Sequence[str], names: Sequence[str] = (), shift: float = 0.0) -> Fit:
+        """Return the study of a file. Raises SceneError if it cannot be read."""
+        try:
+            digest = sha256(path.read_bytes()).hexdigest()
+        except OSError as error:
+            raise SceneError(f"{path}: {error.strerror}") from error
+        return cls(
+            scene=scene, file=str(path), digest=digest, vary=tuple(vary), names=tuple(names), shift=shift
+        )  # fmt: skip
+
+    def cases(self) -> dict[str, Row]:
+        """Return the one search. Raises SceneError for keys, guesses or columns that are not there."""
+        changed(self.scene, self.guesses())
+        self.data()
+        return {_CASE: {}}
+
+    def guesses(self) -> dict[str, float]:
+        """Return the keys and where the search begins."""
+        if not self.vary:
+            raise SceneError("--vary: nothing varies; give at least one KEY=GUESS, as in spring.linear_stiffness=800")
+        found: dict[str, float] = {}
+        for text in self.vary:
+            name, _, value = text.partition("=")
+            name, key = name.strip(), split_key(name)
+            try:
+                guess = float(value)
+            except ValueError:
+                raise SceneError(f"--vary {text}: must be KEY=GUESS, as in spring.linear_stiffness=800") from None
+            if key is None and name != SHIFT:
+                raise SceneError(f"--vary {text}: {name} is no key; a key is TABLE.KEY, or {SHIFT}")
+            if key is not None and key_kind(*key) is not float:
+                raise SceneError(f"--vary {text}: {name} takes no real numbers, and cannot be fitted")
+            if guess == 0.0 and name != SHIFT:
+                raise SceneError(f"--vary {text}: a guess has the sign and roughly the size of the value; 0 has none")
+            if name in found:
+                raise SceneError(f"--vary {name}: given twice")
+            found[name] = guess
+        return found
+
+    def data(self) -> Measured:
+        """Return the measured curves."""
+        return read_measured(self.file, self.scene, mapping(self.names))
+
+    def cost(self) -> str:
+        """Say what is run."""
+        return f"some {10 * (2 * len(self.vary) + 1)} runs"
+
+    def record(self, case: Row) -> Row:
+        """Return the values found, their intervals, and every run on the way."""
+        search = _Search(self.scene, self.data(), self.guesses(), self.shift)
+        return search.found()
+
+    def rows(self, records: Mapping[str, Row]) -> list[Row]:
+        """Return a row per run: the keys, and the root mean square of what is left of each curve."""
+        return list(records[_CASE]["runs"])
+
+    def findings(self, records: Mapping[str, Row]) -> Findings:
+        """Show the values with their intervals, or which of them the data does not determine."""
+        record = records[_CASE]
+        keys = [
+            (row["key"], f"{row['value']:.8g}", f"{row['low']:.6g}", f"{row['high']:.6g}") for row in record["keys"]
+        ]
+        left = [(name, f"{rms:.4g}", f"{share:.2%}") for name, (rms, share) in record["left"].items()]
+        shown: list[Any] = [
+            table(("key", "value", "95 % from", "to"), keys),
+            table(("curve", "left, rms", "of its spread"), left),
+            Text(f"{len(record['runs'])} runs; {record['message']}"),
+        ]
+        shown += [Text(f"not determined: {why}", style="bold red") for why in record["undetermined"]]
+        return Findings({name: record[name] for name in ("keys", "left", "undetermined")}, shown,
+                        1 if record["undetermined"] else 0)  # fmt: skip
+
+
+def changed(scene: Scene, values: Mapping[str, float]) -> Scene:
+    """Return ``scene`` with the keys that ``values`` has. Raises SceneError if it cannot be run."""
+    tables: dict[str, dict[str, float]] = {}
+    for name, value in values.items():
+        if (key := split_key(name)) is not None:
+            tables.setdefault(key[0], {})[key[1]] = value
+    return with_changes(scene, **tables)
+
+
+def mapping(names: Sequence[str]) -> dict[str, str]:
+    """Return what ``NAME=COLUMN`` say. Raises SceneError for anything else."""
+    found = {}
+    for text in names:
+        name, separator, column = text.partition("=")
+        if not separator or not name.strip() or not column.strip():
+            raise SceneError(f"--map {text}: must be NAME=COLUMN, as in CH1=a_tip")
+        found[name.strip()] = column.strip()
+    return found
+
+
+class _Search:
+    """One search; ``runs`` are the rows of the runs that it has made."""
+
+    def __init__(self, scene: Scene, data: Measured, guesses: Mapping[str, float], shift: float) -> None:
+        self._scene, self._data, self._guesses, self._shift = scene, data, guesses, shift
+        self._spread = {name: float(np.std(values)) or 1.0 for name, values in data.values.items()}
+        self._weights = {name: 1.0 / spread for name, spread in self._spread.items()}
+        self._duration = float(data.time[-1] - data.time[0])
+        self._size = 0
+        self.runs: list[Row] = []
+
+    def values(self, unknowns: np.ndarray) -> dict[str, float]:
+        """Return the keys at ``unknowns``."""
+        return {
+            name: guess + x * self._duration if name == SHIFT else guess * float(np.exp(x))
+            for (name, guess), x in zip(self._guesses.items(), unknowns.tolist(), strict=True)
+        }
+
+    def left(self, unknowns: np.ndarray) -> np.ndarray:
+        """Return what is left of the curves, weighed."""
+        values = self.values(unknowns)
+        shift = values.get(SHIFT, self._shift)
+        try:
+            run = simulate(changed(self._scene, values))
+            covered, curves = model(run, self._data, shift)
+        except (RunStopped, SceneError) as refused:
+            if not self._size:
+                raise SceneError(f"the guess cannot be run: {refused}") from refused
+            self.runs.append({**values, "error": str(refused)})
+            return np.full(self._size, _REFUSED)
+        off = {name: curve - self._data.values[name][covered] for name, curve in curves.items()}
+        parts = []
+        for name, part in off.items():
+            whole = np.zeros(len(covered))  # the same number of points whatever the shift
+            whole[covered] = self._weights[name] * part
+            parts.append(whole)
+        self.runs.append({
+            **values, **{f"left_{name}": float(np.sqrt(np.mean(part**2))) for name, part in off.items()}, "error": ""
+        })  # fmt: skip
+        self._points = int(covered.sum()) * len(off)
+        found = np.concatenate(parts)
+        self._size = len(found)
+        return found
+
+    def found(self) -> Row:
+        """Search, and judge what was found."""
+        start = np.zeros(len(self._guesses))
+        result = self._least(start)
+        if len(self._weights) > 1:  # a second time, each curve weighed by what is left of it
+            self._weights = {
+                name: 1.0 / max(self.runs_left(result.x)[name], 1e-9 * spread) for name, spread in self._spread.items()
+            }
+            result = self._least(result.x)
+        left = self.runs_left(result.x)
+        keys, undetermined = self._judged(result)
+        return {
+            "keys": keys,
+            "undetermined": undetermined,
+            "left": {name: (rms, rms / self._spread[name]) for name, rms in left.items()},
+            "message": str(result.message).rstrip("."),
+            "runs": self.runs,
+        }
+
+    def _least(self, start: np.ndarray) -> Any:
+        return least_squares(
+            self.left, start, jac="3-point", diff_step=_STEP, xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=_TOLERANCE,
+            x_scale=1.0, max_nfev=60,
+        )  # fmt: skip
+
+    def runs_left(self, unknowns: np.ndarray) -> dict[str, float]:
+        """Return the root mean square of what is left of each curve, in its unit."""
+        self.left(unknowns)
+        return {name: self.runs[-1][f"left_{name}"] for name in self._data.values}
+
+    def _judged(self, result: Any) -> tuple[list[Row], list[str]]:
+        """Return the keys with their intervals, and what the data does not determine."""
+        names, values = list(self._guesses), self.values(result.x)
+        lengths = np.linalg.norm(result.jac, axis=0)
+        undetermined = [f"{name} does not change the curves" for name, size in zip(names, lengths, strict=True)
+                        if size <= _UNDETERMINED * float(lengths.max(initial=0.0)) or size == 0.0]  # fmt: skip
+        freedom = self._points - len(names)
+        if undetermined or freedom <= 0:
+            if freedom <= 0:
+                undetermined.append(f"{self._points} points for {len(names)} keys")
+            return [{"key": name, "value": values[name], "low": None, "high": None} for name in names], undetermined
+        _, sizes, directions = np.linalg.svd(result.jac / lengths, full_matrices=False)
+        if sizes[-1] < _UNDETERMINED * sizes[0]:
+            shares = np.abs(directions[-1])
+            together = [name for name, share in zip(names, shares, strict=True) if share > 0.1 * shares.max()]
+            undetermined.append(f"{' and '.join(together)} change the curves in the same way: fix one of them")
+        inverse = directions.T / np.maximum(sizes, 1e-300)
+        deviation = np.sqrt(2.0 * result.cost / freedom * (inverse**2).sum(axis=1)) / lengths
+        half = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, freedom)) * deviation
+        keys = []
+        for name, x, width in zip(names, result.x.tolist(), half.tolist(), strict=True):
+            if name == SHIFT:
+                low, high = (self._guesses[name] + (x + side * width) * self._duration for side in (-1.0, 1.0))
+            else:
+                wide = min(width, 700.0)
+                low, high = sorted(values[name] * float(np.exp(side * wide)) for side in (-1.0, 1.0))
+                if width > np.log(2.0):
+                    undetermined.append(f"{name} may be anything from {low:.3g} to {high:.3g}")
+            keys.append({"key": name, "value": values[name], "low": low, "high": high})
+        return keys, undetermined
