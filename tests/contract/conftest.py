@@ -251,7 +251,7 @@ class Instance:
         return buffer.raw
 
     def try_deserialize(self, blob):
-        token = ct.c_void_p()
+        token = ct.c_void_p(0xDEADBEEF)  # an output only (FMI 2.0.4): JavaFMI passes what is not initialised
         status = self.call("DeserializeFMUState", blob, ct.c_size_t(len(blob)), ct.byref(token))
         return status, token
 
