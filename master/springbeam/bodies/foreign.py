@@ -207,13 +207,10 @@ class ForeignBody(FmuBody, EndLoaded):
 
     def energies(self) -> Energies:
         if not self.abilities.energies:
-            return self.exchanged()
+            return Energies(0.0, self.state.received, 0.0, 0.0)
         told = iter(self._stored())
         energies = Energies(*(0.0 if name is None else next(told) for name in self._spec.named(self._spec.ENERGIES)))
         return energies._replace(load_potential=energies.load_potential - self.state.load_work)
-
-    def exchanged(self) -> Energies:
-        return Energies(0.0, self.state.received, 0.0, 0.0)
 
     def holding_force(self, displacement: float, velocity: float) -> float:
         """Return the force that holds the end where it now rests, found by trial steps.

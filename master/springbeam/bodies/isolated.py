@@ -238,12 +238,13 @@ class IsolatedBody(EndLoaded):
 
     def energies(self) -> Energies:
         if not self.abilities.energies:
-            return self.exchanged()
+            return Energies(0.0, self.received, 0.0, 0.0)
         energies: Energies = self._ask("telling its energies", "energies")
         return energies
 
-    def exchanged(self) -> Energies:
-        return Energies(0.0, self.state[1], 0.0, 0.0)
+    @property
+    def received(self) -> float:  # type: ignore[override]
+        return self.state[1]
 
     def apply_impulse(self, impulse: float) -> None:
         self._ask("taking an impulse", "apply_impulse", impulse)

@@ -83,6 +83,8 @@ class Body(Stateful):
 
     #: Where its state cannot be saved, a step is made once, by the schemes that never repeat one.
     abilities = Abilities()
+    #: Work that the end of a foreign body has received so far [J]: the coupling is judged by it.
+    received: float = 0.0
 
     def take_place(self, *, upper: bool) -> None:
         """Learn, before the run, whether it is the upper body; one that fits in either place needs to know."""
@@ -115,10 +117,6 @@ class Body(Stateful):
     def felt(self) -> Felt:
         """Return what a beam that `tells` feels, asked once a step."""
         raise NotImplementedError(f"{type(self).__name__} has no felt, and says that it tells")
-
-    def exchanged(self) -> Energies:
-        """Return the energies by which the coupling is judged, of a foreign body the work that it has received."""
-        return self.energies()
 
     def apply_impulse(self, impulse: float) -> None:
         """Change the velocity of the end at once by an upward impulse [N·s].

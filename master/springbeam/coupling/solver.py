@@ -51,7 +51,6 @@ class Responses(Counts):
     """What a solver remembers."""
 
     of_size: dict[float, Response] = msgspec.field(default_factory=dict)  #: by size [s], the last used at the end
-    last_size: float = 0.0  #: [s]
     reach: float = 0.0  #: largest displacement of an end under a force found [m]
 
 
@@ -189,22 +188,15 @@ class StepSolver(Coupling):
         state.reach = max(state.reach, u, -u, y, -y)
         if lower.mass == inf:
             descent, measured = remembered[1:]
-        if B is not remembered[0] or descent is not remembered[1]:
-            state.of_size[size] = (B, descent, measured)
-        if size != state.last_size:
-            self._used_last(size)
+        state.of_size.pop(size, None)
+        state.of_size[size] = (B, descent, measured)
+        if len(state.of_size) > SIZES_REMEMBERED:  # the one that was used least recently is forgotten
+            del state.of_size[next(iter(state.of_size))]
         return step_of(Step, (time, size, acting, NO_FORCE, start, (upper_end, lower_end)))
 
     def _noise(self, tolerance: float) -> float:
         """Return up to which residual [m] an iteration that stagnates may have met the bodies' own rounding."""
         return max(_NOISE * tolerance, _ROUNDING * self._expected)
-
-    def _used_last(self, size: float) -> None:
-        """Forget the size that was used least recently, if there are too many."""
-        of_size, self.state.last_size = self.state.of_size, size
-        of_size[size] = of_size.pop(size)
-        if len(of_size) > SIZES_REMEMBERED:
-            del of_size[next(iter(of_size))]
 
     def _free_response(self, lower: Body, size: float) -> Matrix:
         if lower.mass == inf:

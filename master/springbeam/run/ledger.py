@@ -33,6 +33,10 @@ def bounds(scene: Scene) -> tuple[float, float]:
     return min(max(EXACT, _TOLERANCES * tolerance), APPROXIMATE), APPROXIMATE
 
 
+#: A record that is wrong, how many before it or with it are kept, and the cause that stops the run there.
+Wrong = tuple[int, int, str]
+
+
 class Errors(NamedTuple):
     """By how much the energy is off at each of some records."""
 
@@ -68,26 +72,21 @@ class Balance:
         self._untold = any(type(body).energies is Body.energies and body.mass < inf for body in pair.bodies)
         if self._untold or pair.joined.decides:
             self._warns = self._stops = inf
-        self._first, self._scale = np.empty(0), 0.0
+        self._scale = 0.0  #: the largest energy so far [J]
 
-    def first_wrong(self, steps: np.ndarray) -> tuple[int, float] | None:
-        """Return at which of the next records of the run, shape (n,), too much of the energy has changed.
-
-        Beside its number, its share of the energy is returned; ``None`` if there is none.
-        """
-        if not self._first.size:
-            self._first = steps[:1].copy()
-        found = errors(self._scene, steps, self._first, self._scale, of_interface=True)
+    def check(self, steps: np.ndarray, first: np.ndarray) -> Wrong | None:
+        """Return at which of the next records too much of the energy has changed; parameters as of `errors`."""
+        found = errors(self._scene, steps, first, self._scale, of_interface=True)
         self._scale = float(found.scale[-1])
         wrong = self._wrong(found) > self._stops
         row = int(np.argmax(wrong))
-        return (row, float(abs(found.share[row]))) if wrong[row] else None
+        return (row, row + 1, self._cause(float(abs(found.share[row])), steps)) if wrong[row] else None
 
     def _wrong(self, found: Errors) -> np.ndarray:
         """Return the share of the energy that has changed; what numerical damping takes is not an error."""
         return found.share if self._numerically_damped else np.abs(found.share)
 
-    def report(self, steps: np.ndarray, macro_step: float) -> Report:
+    def report(self, steps: np.ndarray) -> Report:
         """Return what all records of the run, shape (n,), say of its energy."""
         if not len(steps):
             return Report({"max_energy_residual": 0.0, "max_energy_residual_joule": 0.0}, [], False)
@@ -106,7 +105,7 @@ class Balance:
         if self._untold:
             warnings.append("a body reports no energies, so the energy balance is not checked")
         elif of_judged > self._warns:
-            warnings.append(self.cause(of_judged, macro_step))
+            warnings.append(self._cause(of_judged, steps))
         elif of_own > self._warns:
             warnings.append(
                 f"the energies that the FMUs tell are off by {100.0 * of_own:.2g} %, by their own "
@@ -114,14 +113,15 @@ class Balance:
             )
         return Report(summary, warnings, bool(self._wrong(judged).max() > self._warns))
 
-    def cause(self, share: float, macro_step: float) -> str:
+    def _cause(self, share: float, steps: np.ndarray) -> str:
         """Return in words why a ``share`` of the energy has changed, and what would help."""
         coupling, beam = self._scene.coupling, self._scene.beam
         causes, remedies = [], []
         if not self._pair.joined.energy_exact:
             causes.append(f"{coupling.scheme} of degree {coupling.degree}")
             or_else = ", or coupling.scheme = 'energy'" if self._pair.repeatable else ""
-            remedies.append(f"the macro step {macro_step:g} s is too large for it; take a smaller one{or_else}")
+            H = coupling.macro_step or steps["size"].max()
+            remedies.append(f"the macro step {H:g} s is too large for it; take a smaller one{or_else}")
         if self._numerically_damped:
             assert beam is not None
             causes.append(f"beam.rho_inf = {beam.rho_inf:g}")

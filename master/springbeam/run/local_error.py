@@ -12,6 +12,8 @@ from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Scales, Step
 from ..results.paths import Path
 from ..scene import Scene
+from .macro_steps import AdaptiveSteps
+from .outcome import RunStopped
 from .stepping import Pair, State
 
 #: Joined, the cubic through a step's ends is only looked at for events; it is within this fraction of the motion.
@@ -36,8 +38,8 @@ class LocalError(Stateful):
 
     state: Reach
 
-    def __init__(self, scene: Scene, pair: Pair) -> None:
-        self._scene, self._pair = scene, pair
+    def __init__(self, scene: Scene, pair: Pair, steps: AdaptiveSteps) -> None:
+        self._scene, self._pair, self._steps = scene, pair, steps
         self._relative = scene.coupling.relative_tolerance or 0.0
         self._absolute = scene.coupling.absolute_tolerance or 0.0
         at_start = [end.displacement for end in pair.ends()]
@@ -48,7 +50,20 @@ class LocalError(Stateful):
         if energy > self.state.energy:
             self.state.energy = energy
 
-    def estimate(self, state: State, step: Step) -> tuple[float, int]:
+    def holds(self, state: State, step: Step, refused: str) -> bool:
+        """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set.
+
+        ``refused`` says why longer ones were, or nothing. Raises RunStopped if there is no shorter one.
+        """
+        error, order = self._estimate(state, step)
+        if self._steps.judge(step.size, error, order):
+            return True
+        if self._steps.too_short:
+            short = f"the error stays above the tolerance, down to a macro step of {step.size:.3g} s, where it is"
+            raise RunStopped(refused or f"{short} {error:.3g} of it", step.time)
+        return False
+
+    def _estimate(self, state: State, step: Step) -> tuple[float, int]:
         """The step's error, 1 is the tolerance, and the order in which it falls with the size of the step."""
         pair, size = self._pair, step.size
         lowest, highest, speed = self._extremes(step)

@@ -104,13 +104,7 @@ class AdaptiveSteps(Stateful):
         """Do nothing: error estimates tell how long steps may be."""
 
     def judge(self, size: float, error: float, order: int) -> bool:
-        """Whether a step of ``size`` [s] with ``error`` (1 is the tolerance) holds; `size` is then that of the next.
-
-        Raises
-        ------
-        StepTooShort
-            If it does not hold and there is no shorter one.
-        """
+        """Whether a step of ``size`` [s] with ``error`` (1 is the tolerance) holds; `size` is then that of the next."""
         state, factor = self.state, _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
         if error <= 1.0:
             # A step that ended on a kink tells of whole ones by the order, unless it was much shorter.
@@ -122,16 +116,12 @@ class AdaptiveSteps(Stateful):
         state.rejections += 1
         state.just_rejected = True
         state.number = max(state.number + 1, self._rung_below(size * max(factor, _SHRINK)))
-        if state.number > _SHORTEST * _PER_OCTAVE:
-            raise StepTooShort(size)
         return False
+
+    @property
+    def too_short(self) -> bool:
+        """Whether no step is short enough."""
+        return self.state.number > _SHORTEST * _PER_OCTAVE
 
     def _rung_below(self, size: float) -> int:
         return max(_LONGEST * _PER_OCTAVE, ceil(_PER_OCTAVE * log2(self._length / size) - _SAME))
-
-
-class StepTooShort(RuntimeError):
-    """The error estimate stays above the tolerance however short the step."""
-
-    def __init__(self, size: float) -> None:
-        super().__init__(f"the error stays above the tolerance, down to a macro step of {size:.3g} s")

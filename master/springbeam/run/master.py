@@ -34,8 +34,8 @@ from .detection import Detector
 from .ledger import Balance
 from .local_error import LocalError
 from .log import TOGETHER, Log
-from .macro_steps import AdaptiveSteps, MacroGrid, StepTooShort
-from .neglect import Past, neglected
+from .macro_steps import AdaptiveSteps, MacroGrid
+from .neglect import Neglect, Past, neglected
 from .observed import NOT_SHOWN, observed
 from .outcome import OVERFLOW, RunStopped, raised_here
 from .stepping import Pair, State
@@ -45,8 +45,6 @@ _SAME_TIME = 1e-9
 #: A step that is refused is halved this often before the run stops.
 _MAX_HALVINGS = 20
 _NOTHING_FELT = (0.0, 0.0, 0.0, 0.0)
-#: Work that bodies have received which tell their own energies [J].
-_NOT_RECEIVED = (0.0, 0.0)
 #: Steps after first contact whose beam shape is kept, and shapes kept evenly over the run.
 _SHAPES_AFTER_CONTACT, _SHAPES_OVER_RUN = 20, 400
 
@@ -79,11 +77,12 @@ class Master(Stateful):
         self._pair = Pair(scene, beam, spring)
         self.state = self._pair.initial_state(start_time)
         self._steps: MacroGrid | AdaptiveSteps
+        self._error = None
         if scene.coupling.adaptive:
             self._steps = AdaptiveSteps(start_time, scene.time.t_end)
+            self._error = LocalError(scene, self._pair, self._steps)
         else:
             self._steps = MacroGrid(start_time, scene.time.t_end, scene.coupling.H)
-        self._error = LocalError(scene, self._pair) if scene.coupling.adaptive else None
         self._detector = Detector(scene, self._pair, self._steps, self._fastest)
         self._transitions = Transitions(
             scene,
@@ -94,7 +93,10 @@ class Master(Stateful):
             self._pair.equilibrium,
         )
         self._balance = Balance(scene, self._pair)
-        self._log = Log(scene, recorder, self._balance)
+        checks = [self._balance.check]
+        if scene.driver_stiffness is not None:
+            checks.append(Neglect(scene.coupling, scene.driver_stiffness).check)
+        self._log = Log(scene, recorder, *checks)
         recorder.fetch = self.hand_over
         self._told = BEAM_TELLS * self._pair.upper.tells + SPRING_TELLS * self._pair.lower.tells
         self._pictured = beam if isinstance(beam, BeamBody) else None
@@ -134,7 +136,7 @@ class Master(Stateful):
 
     def hand_over(self) -> None:
         """Give the recorder the records that it does not have yet; see `Log.hand_over`."""
-        self._log.hand_over(self._steps.size)
+        self._log.hand_over()
 
     def run_state(self) -> RunState:
         """Return the state of every part; with the scene and the records so far, the run goes on from it."""
@@ -204,7 +206,7 @@ class Master(Stateful):
                 if at_start is not None:
                     return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
                 step = pair.attempt(state, size, start)
-                if self._error is None or self._holds(step, self._error, cause):
+                if self._error is None or self._error.holds(state, step, cause):
                     return self._detector.first_event(state, step)
                 pair.rewind()
                 size = self._steps.size
@@ -220,19 +222,6 @@ class Master(Stateful):
                 halvings += 1
                 state.halvings += 1
                 size *= 0.5
-
-    def _holds(self, step: Step, local_error: LocalError, refused: str) -> bool:
-        """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set.
-
-        ``refused`` says why longer ones were, or nothing: none that is too short for its tolerance hides that.
-        """
-        assert isinstance(self._steps, AdaptiveSteps)
-        error, order = local_error.estimate(self.state, step)
-        try:
-            return self._steps.judge(step.size, error, order)
-        except StepTooShort as too_short:
-            cause = refused or f"{too_short}, where it is {error:.3g} of it"
-            raise RunStopped(cause, step.time) from too_short
 
     # -- events -----------------------------------------------------------------------------------------------------
 
@@ -334,14 +323,21 @@ class Master(Stateful):
             contact, foundation = state.contact, state.foundation
         (u, v, _, _), (y, z, _, _) = ends
         of_upper, of_lower, booked = pair.upper.energies(), pair.lower.energies(), pair.joined.booking(ends)
-        received = pair.received() if pair.foreign else _NOT_RECEIVED
         if self._error is not None:
             energies = abs(of_upper.kinetic + of_upper.potential) + abs(of_lower.kinetic + of_lower.potential)
             self._error.note(energies + booked.stored)
         return packed(
             *(state.time, size, *before[0], *before[1], *contact, *foundation),
             *(u, v, y, z, state.phase.number, self._log.events, state.smoothed, booked.law_force),
-            *(*of_upper, *of_lower, *booked[1:], state.lost, *received, state.energy_at_start),
+            *(
+                *of_upper,
+                *of_lower,
+                *booked[1:],
+                state.lost,
+                pair.upper.received,
+                pair.lower.received,
+                state.energy_at_start,
+            ),
             *(pair.upper.felt() if self._told & BEAM_TELLS else _NOTHING_FELT),
             self._told,
         )
@@ -363,7 +359,7 @@ class Master(Stateful):
         events = list(islice(self._recorder.events(), known))
         made, joined = int(np.count_nonzero(np.diff(steps["time"]))), self._pair.joined
         inside = steps[:0] if joined.decides else steps  # what tells of the motion inside steps
-        balance, seen = self._balance.report(steps, H), observed(scene, self._pair, inside, events)
+        balance, seen = self._balance.report(steps), observed(scene, self._pair, inside, events)
         free_at_end = not are_joined(inside[-1:]).any()
         of_coupling, warned = joined.report(made)
         warnings = [*balance.warnings, *warned]

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..results.steps import force
+from ..scene import Coupling
+from .ledger import Wrong
 
 
 class Past(NamedTuple):
@@ -43,3 +45,25 @@ def neglected(steps: np.ndarray, stiffness: float, past: Past) -> Neglected:
     share = np.divide(motion, deepest, out=np.zeros_like(motion), where=deepest > 0.0)
     last = float(end[made][-1]) if made.any() else past.force
     return Neglected(motion, share, Past(float(variation[-1]), last, float(deepest[-1])))
+
+
+class Neglect:
+    """Stops a run whose one-way ``coupling`` may neglect too much; ``stiffness`` is that of the driving end [N/m]."""
+
+    def __init__(self, coupling: Coupling, stiffness: float) -> None:
+        self._coupling, self._stiffness, self._past = coupling, stiffness, Past()
+
+    def check(self, steps: np.ndarray, first: np.ndarray) -> Wrong | None:
+        """Return at which of the next records too much may have been neglected."""
+        allowed = self._coupling.feedback_tolerance
+        motion, share, self._past = neglected(steps, self._stiffness, self._past)
+        row = int(np.argmax(share > allowed))
+        if not share[row] > allowed:
+            return None
+        return (
+            row,
+            row + 1,
+            f"coupling.feedback = {self._coupling.feedback!r} may by now neglect {motion[row]:.3g} m of the driving "
+            f"end's motion, {share[row]:.2g} of the largest penetration; allowed is coupling.feedback_tolerance = "
+            f"{allowed:g}. Take 'two_way', or allow more",
+        )

@@ -95,8 +95,6 @@ class Pair:
         self.bodies: list[Body] = [body for body in (beam, spring) if body is not None]
         for body in self.bodies:
             body.take_place(upper=body is beam)
-        #: Whether the upper and the lower body are FMUs that others made; empty if none is.
-        self.foreign = tuple(table in scene.foreign for table in ("beam", "spring")) if scene.foreign else ()
         self.repeatable = all(body.abilities.state for body in self.bodies)
         #: Ψ: where the ends of a rigid law are tied below [m].
         self.equilibrium = scene.spring.equilibrium if scene.spring is not None else self.lower.motion().displacement
@@ -194,11 +192,6 @@ class Pair:
     def ends(self) -> Ends:
         """(tip, lower end); the one that is missing is at rest at 0."""
         return self._tip(), self._low()
-
-    def received(self) -> tuple[float, float]:
-        """Return the work that the bodies have received if they are foreign FMUs [J], 0 of others."""
-        upper, lower = self.foreign
-        return (self.upper.exchanged().potential if upper else 0.0, self.lower.exchanged().potential if lower else 0.0)
 
     def end_force(self, state: State, step: Step) -> float:
         """C at the end of the step as well as the degree tells; exactly, where the tip has no mass [N]."""
