@@ -95,7 +95,7 @@ def test_pictures_report_and_messages_call_it_what_it_is():
     assert legends["compliance_force"] == "of the bumper k p₊ + h p₊³"
     assert dict(described(run.scene))["contact"] == "stiffening: a bumper that stiffens, stiffness 300"
     with pytest.raises(
-        SceneError, match=r'damping = 1.0: law = "stiffening" has none; use 0.0, "compliance" or "link"'
+        SceneError, match=r'damping = 1.0: \[contact\] law = "stiffening" has none; use 0.0, "compliance" or "link"'
     ):
         with_changes(bumper(), contact={"damping": 1.0})
     with pytest.raises(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from ..scene import Scene
 from ..scene.tables import ORDINARY_SCHEMES
@@ -29,78 +28,61 @@ class Abilities:
         return min(2 if self.any_size else self.integrals, self.slopes)
 
 
-class Need(NamedTuple):
-    """What a scene needs of a body."""
-
-    asked: str  #: the key that asks for it, with its value
-    has: bool
-    lacks: str  #: what is missing
-    instead: str  #: what would work
-
-
-_STATE = "its state cannot be saved (canGetAndSetFMUstate = false)"
-_SIZES = "its steps have one size (canHandleVariableCommunicationStepSize = false)"
+#: What is said of a body that lacks a capability.
+_LACKS = {
+    "state": "its state cannot be saved (canGetAndSetFMUstate = false)",
+    "any_size": "its steps have one size (canHandleVariableCommunicationStepSize = false)",
+    "velocity": "it has no velocity",
+    "integrals": "it has not integral and integral_2",
+    "impulse": "it has no impulse, or of a body of your own no apply_impulse",
+}
 _SLOPES = "its input takes no derivatives (canInterpolateInputs = false; FMI 3.0 has none)"
-_VELOCITY, _INTEGRALS = "it has no velocity", "it has not integral and integral_2"
-_IMPULSE = "it has no impulse, or of a body of your own no apply_impulse"
-
-
+_TO_BE_STRUCK = ("state", "any_size", "velocity", "impulse")
 #: A share of a step that is rounding.
 _SAME = 1e-9
 
 
-def needs(scene: Scene, body: Abilities) -> Iterator[Need]:
-    """Yield all that ``scene`` needs of a body."""
+def _lacking(scene: Scene, body: Abilities) -> Iterator[tuple[str, str, str]]:
+    """Yield what ``scene`` asks for and ``body`` cannot do: the key, what is missing, and what would work."""
     coupling, contact = scene.coupling, scene.contact
     scheme, degree = f'[coupling] scheme = "{coupling.scheme}"', f"[coupling] degree = {coupling.degree}"
     ordinary = coupling.scheme in ORDINARY_SCHEMES
-    if not ordinary:
-        exchanged = (
-            'use scheme = "jacobi" or "gauss_seidel" with [contact] law = "link" or "compliance", without [stop]'
-        )
-        yield Need(scheme, body.state, _STATE, exchanged)
-    if coupling.scheme == "hermite":
-        yield Need(scheme, body.velocity, _VELOCITY, 'use scheme = "energy"')
-    if coupling.degree > 0:
-        lower = f"use degree = {body.slopes if ordinary else body.degree}"
-        slopes = _SLOPES if body.slopes == 0 else f"its input takes derivatives of order {body.slopes} at most"
-        yield Need(degree, body.slopes >= coupling.degree, slopes, lower)
-        if not ordinary:
-            missing = f"{_INTEGRALS}, and {_SIZES}"
-            yield Need(degree, body.any_size or body.integrals >= coupling.degree, missing, lower)
-    if ordinary:
-        changing = {degree: coupling.degree > 0, f"[contact] damping = {contact.damping}": contact.damping > 0.0}
-        for asked in (asked for asked, is_so in changing.items() if is_so):
-            yield Need(asked, body.velocity, _VELOCITY, 'leave it out, or use scheme = "energy"')
-    struck = {f'[contact] law = "{contact.law}"': scene.joins and contact.facts.strikes}
-    struck |= {"[stop]": scene.stop is not None}
-    for asked in (asked for asked, is_so in struck.items() if is_so):
-        instead = "leave it out" if asked == "[stop]" else 'use "compliance", "link" or "tie"'
-        yield Need(asked, body.state, _STATE, instead)
-        yield Need(asked, body.any_size, _SIZES, instead)
-        yield Need(asked, body.velocity, _VELOCITY, instead)
-        yield Need(asked, body.impulse, _IMPULSE, instead)
-    if coupling.adaptive:
-        asked = "[coupling] relative_tolerance, absolute_tolerance"
-        yield Need(asked, body.any_size, _SIZES, "use macro_step")
-        yield Need(asked, body.velocity, _VELOCITY, "use macro_step")
-        yield Need(asked, body.integrals == 2, _INTEGRALS, "use macro_step")
-    elif not body.any_size:
+    exchanged = 'use scheme = "jacobi" or "gauss_seidel" with [contact] law = "link" or "compliance", without [stop]'
+    left_out, softer = 'leave it out, or use scheme = "energy"', 'use "compliance", "link" or "tie"'
+    tolerances, law = "[coupling] relative_tolerance, absolute_tolerance", f'[contact] law = "{contact.law}"'
+    for is_so, asked, abilities, instead in (
+        (not ordinary, scheme, ("state",), exchanged),
+        (coupling.scheme == "hermite", scheme, ("velocity",), 'use scheme = "energy"'),
+        (ordinary and coupling.degree > 0, degree, ("velocity",), left_out),
+        (ordinary and contact.damping > 0.0, f"[contact] damping = {contact.damping}", ("velocity",), left_out),
+        (scene.joins and contact.facts.strikes, law, _TO_BE_STRUCK, softer),
+        (scene.stop is not None, "[stop]", _TO_BE_STRUCK, "leave it out"),
+        (coupling.adaptive, tolerances, ("any_size", "velocity", "integrals"), "use macro_step"),
+    ):
+        for ability in abilities if is_so else ():
+            if not getattr(body, ability) or (ability == "integrals" and body.integrals < 2):
+                yield asked, _LACKS[ability], instead
+    lower = f"use degree = {body.slopes if ordinary else body.degree}"
+    if coupling.degree > body.slopes:
+        yield degree, f"its input takes derivatives of order {body.slopes} at most" if body.slopes else _SLOPES, lower
+    if not ordinary and not body.any_size and coupling.degree > body.integrals:
+        yield degree, f"{_LACKS['integrals']}, and {_LACKS['any_size']}", lower
+    if not coupling.adaptive and not body.any_size:
         H, multiple = scene.coupling.H, f"use a multiple of {scene.coupling.H:g}"
-        yield Need(f"[time] t_end = {scene.time.t_end}", scene.equal_steps[1] == 0.0, _SIZES, multiple)
+        if scene.equal_steps[1] != 0.0:
+            yield f"[time] t_end = {scene.time.t_end}", _LACKS["any_size"], multiple
         for number, load in enumerate(scene.loads):
             steps = [(kink - (scene.contact_time or 0.0)) / H for kink in load.kinks(H) if kink < scene.time.t_end]
-            whole = all(step < 0.0 or abs(step - round(step)) <= _SAME for step in steps)
-            yield Need(f"[loads.{number}]: a step ends where it jumps or bends", whole, _SIZES, multiple)
+            if any(step >= 0.0 and abs(step - round(step)) > _SAME for step in steps):
+                yield f"[loads.{number}]: a step ends where it jumps or bends", _LACKS["any_size"], multiple
 
 
 def refusals(scene: Scene, abilities: Mapping[str, Abilities]) -> list[str]:
     """Return why ``scene`` cannot be run with bodies of these ``abilities``, by table, each with a remedy."""
     return [
-        f"{need.asked}: the body in [{table}] cannot do that, {need.lacks}; {need.instead}"
+        f"{asked}: the body in [{table}] cannot do that, {lacks}; {instead}"
         for table, body in abilities.items()
-        for need in needs(scene, body)
-        if not need.has
+        for asked, lacks, instead in _lacking(scene, body)
     ]
 
 
