@@ -19,7 +19,7 @@ from .partners import ForeignFmu, PointMass, RigidWall
 from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
 from .suspicions import suspicions
-from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Spring
+from .tables import DEFAULT_STEP, ORDINARY_SCHEMES, TOLERANCE_KEYS, Beam, Contact, Spring
 
 #: More are a mistyped macro step: two weeks at a microsecond a step.
 MOST_MACRO_STEPS = 1e12
@@ -262,6 +262,13 @@ _RULES: tuple[tuple[Callable[[Scene], bool], str], ...] = (
         'use impact = "inelastic"',
     ),
     # Laws
+    *(
+        (
+            lambda s, key=key: key in s.contact.facts.needs and key not in s.contact.model_fields_set,
+            f"[contact] {key}: missing; {{contact.law}} needs it",
+        )
+        for key in Contact.model_fields
+    ),
     (
         lambda s: s.contact.damping > 0.0 and "damping" not in s.contact.facts.takes,
         f"{{contact.damping}}: {{contact.law}} has none; use 0.0, {laws_that(lambda law: 'damping' in law.takes)}",
@@ -302,6 +309,18 @@ _RULES: tuple[tuple[Callable[[Scene], bool], str], ...] = (
         "[contact] damping",
     ),
     # Schemes
+    (
+        lambda s: s.coupling.scheme == "hermite" and s.coupling.degree == 0,
+        "{coupling.degree}: {coupling.scheme} needs degree 1 or 2",
+    ),
+    (
+        lambda s: s.coupling.scheme == "auto" and s.coupling.degree > 0,
+        "{coupling.degree}: {coupling.scheme} picks the degree; leave it out",
+    ),
+    (
+        lambda s: s.coupling.scheme in ORDINARY_SCHEMES and s.coupling.degree > 1,
+        "{coupling.degree}: {coupling.scheme} extrapolates with degree 0 or 1",
+    ),
     (
         lambda s: s.coupling.scheme in ORDINARY_SCHEMES and not s.contact.soft,
         f"{{coupling.scheme}}: needs [contact] law = {laws_that(lambda law: law.soft)}; "

@@ -312,13 +312,6 @@ class Contact(Table):
             raise ValueError(f'law = "{law}": must be {choices(LAWS)}')
         return law
 
-    @model_validator(mode="after")
-    def _law_is_complete(self) -> Contact:
-        missing = [name for name in self.facts.needs if name not in self.model_fields_set]
-        if missing:
-            raise ValueError("\n".join(f'{name}: missing; law = "{self.law}" needs it' for name in missing))
-        return self
-
     @property
     def facts(self) -> LawFacts:
         """What the law is."""
@@ -399,13 +392,3 @@ class Coupling(Table):
         if self.macro_step is None:
             raise SceneError("[coupling] macro_step: needed here; this scene gives tolerances instead")
         return self.macro_step
-
-    @model_validator(mode="after")
-    def _degree_of_scheme(self) -> Coupling:
-        if self.scheme == "hermite" and self.degree == 0:
-            raise ValueError('degree = 0: scheme = "hermite" needs degree 1 or 2')
-        if self.scheme == "auto" and self.degree > 0:
-            raise ValueError(f'degree = {self.degree}: scheme = "auto" picks the degree; leave it out')
-        if self.scheme in ORDINARY_SCHEMES and self.degree > 1:
-            raise ValueError(f'degree = {self.degree}: scheme = "{self.scheme}" extrapolates with degree 0 or 1')
-        return self
