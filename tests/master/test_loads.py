@@ -26,6 +26,16 @@ SIGNALS = {
     "pulse": {"on": "tip", "signal": "half_sine", "start": 0.0103, "duration": 0.02, "amplitude": 3.0},
     "step": {"on": "beam", "at": 0.37, "signal": "step", "start": 0.02, "duration": 0.0123, "amplitude": -2.0},
     "ramp": {"on": "beam", "shape": [1.0, -2.0, 0.5, 0.3], "signal": "ramp", "start": 0.004, "duration": 0.01},
+    "chirp": {
+        "on": "tip",
+        "signal": "chirp",
+        "frequency": 70.0,
+        "frequency_end": 20.0,
+        "start": 0.01,
+        "duration": 0.04,
+    },
+    "sawtooth": {"on": "spring", "signal": "sawtooth", "start": 0.0103, "duration": 0.02, "amplitude": 3.0},
+    "trapezoid": {"on": "tip", "signal": "trapezoid", "start": 0.01, "duration": 0.02, "rise": 0.003, "amplitude": 3.0},
     "linear": {"on": "spring", "signal": "table", "file": "record.csv", "start": 0.002},
     "cubic": {"on": "tip", "signal": "table", "file": "record.csv", "interpolation": "cubic"},
 }
@@ -77,6 +87,47 @@ def test_where_a_load_jumps_its_value_is_that_after_the_jump(signal):
     assert at_start == pytest.approx({"harmonic": 3.0 * np.sin(1.0), "half_sine": 0.0, "step": 3.0}[signal])
 
 
+def test_pulses_have_the_shapes_and_the_velocity_changes_of_their_names():
+    """Peak, where it is, and ∫ a dt: 2/π, 1/2 and 1 − rise/duration of peak times duration."""
+    common = {"on": "base", "amplitude": 100.0, "start": 0.002, "duration": 0.01}
+    times = 0.002 + np.linspace(0.0, 0.01, 100_001)[:-1]
+    for signal, more, peak, share in (
+        ("half_sine", {}, 0.007, 2.0 / np.pi),
+        ("sawtooth", {}, 0.012, 0.5),
+        ("trapezoid", {"rise": 0.001}, None, 0.9),
+        ("trapezoid", {"rise": 0.005}, 0.007, 0.5),
+    ):
+        load = Load(signal=signal, **more, **common)
+        values = load.value(times)
+        assert values.max() == pytest.approx(100.0, rel=1e-4)
+        assert peak is None or times[values.argmax()] == pytest.approx(peak, abs=2e-7)
+        assert 1e-7 * values.sum() == pytest.approx(100.0 * 0.01 * share, rel=1e-4)
+        assert load.value([0.001999, 0.0120001]) == pytest.approx([0.0, 0.0])
+
+
+def test_a_chirp_turns_from_one_frequency_to_the_other():
+    load = Load(**SIGNALS["chirp"])
+    turns = np.array([0.25, 0.5, 0.75, 1.0, 1.5])
+    # 70 τ − (70 − 20)/(2 · 0.04) τ² turns have been made after τ.
+    tau = (70.0 - np.sqrt(70.0**2 - 4.0 * 625.0 * turns)) / 1250.0
+    assert load.value(0.01 + tau) == pytest.approx([1.0, 0.0, -1.0, 0.0, 0.0], abs=1e-12)
+    assert load.value([0.0099, 0.0501]) == pytest.approx([0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("keys", "why"),
+    [
+        ({"signal": "chirp", "frequency": 3.0, "duration": 1.0}, "frequency_end: missing"),
+        ({"signal": "trapezoid", "duration": 1.0}, "rise: missing"),
+        ({"signal": "trapezoid", "duration": 1.0, "rise": 0.6}, "must be at most half"),
+        ({"signal": "sawtooth", "duration": 1.0, "rise": 0.1}, "plays no part"),
+    ],
+)
+def test_a_signal_with_wrong_keys_is_refused(keys, why):
+    with pytest.raises(ValueError, match=why):
+        Load(on="tip", **keys)
+
+
 ORDERS = [("energy", 0, 4, 2), ("energy", 1, 4, 2), ("energy", 2, 6, 4), ("hermite", 1, 4, 4), ("hermite", 2, 6, 6)]
 
 
@@ -84,7 +135,8 @@ ORDERS = [("energy", 0, 4, 2), ("energy", 1, 4, 2), ("energy", 2, 6, 4), ("hermi
     ("names", "scheme", "degree", "displacement", "velocity"),
     [(("harmonic", "cubic", "linear", "constant"), *row) for row in ORDERS]
     # Steps of another size, as before a jump, cost degree 0 the order 4 that it has on a regular grid.
-    + [(("pulse", "ramp", "step", "burst"), *row) for row in ORDERS[1:]],
+    + [(("pulse", "ramp", "step", "burst"), *row) for row in ORDERS[1:]]
+    + [(("chirp", "sawtooth", "trapezoid"), *ORDERS[2])],
 )
 def test_the_schemes_keep_their_orders_under_loads(names, scheme, degree, displacement, velocity):
     """Tied, before any event; bounded from both sides where rounding is not reached."""
@@ -108,7 +160,7 @@ def test_the_ledger_closes_under_all_kinds_of_loads(scheme, degree, law):
     run = simulate(with_changes(scene, beam={"alpha_b": 1e-3}, spring={"damping": 0.3}))
     assert run.summary["max_energy_residual"] < 1e-11
     assert np.ptp(run.e_load) > 1e-3 * run.e_total[0]
-    assert run["load_1"] == pytest.approx(5.0 * np.sin(24.0 * np.pi * run.time + 0.3))
+    assert run[f"load_{list(SIGNALS).index('harmonic')}"] == pytest.approx(5.0 * np.sin(24.0 * np.pi * run.time + 0.3))
 
 
 def test_steps_end_where_a_load_jumps_or_bends_and_none_is_a_sliver():

@@ -13,6 +13,7 @@ from scenes import scene_from_dict
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.signals.report import spectra
+from springbeam.signals.response import responses
 from springbeam.signals.settled import settled
 from springbeam.signals.shock import shock_of_run, shock_spectrum
 from springbeam.signals.spectra import power_spectrum
@@ -126,6 +127,48 @@ def test_a_formula_that_gives_no_number_spoils_its_row_only():
         assert "--metric a=y*2: gives 5" in row["error"]
 
 
+def pulsed(**more):
+    """The oscillator without damping, on a base that a pulse accelerates."""
+    pulse = {"on": "base", "amplitude": 100.0, "duration": 0.01, "frequency": None, **more}
+    return with_changes(oscillator(t_end=0.3, **pulse), spring={"damping": 0.0, "initial_velocity": 0.0})
+
+
+@pytest.mark.parametrize(("signal", "more"), [("half_sine", {}), ("sawtooth", {}), ("trapezoid", {"rise": 1e-3})])
+def test_the_damage_boundary_of_an_oscillator_is_that_of_its_shock_spectrum(signal, more, tmp_path):
+    """The critical peak is limit over the spectrum of a pulse of peak 1; a short one counts by its velocity change."""
+    limit, durations = 80.0, (0.004, 0.03, 0.1)
+    vary = ("loads.0.amplitude=50,200,2000", f"loads.0.duration={','.join(map(str, durations))}")
+    study = Sweep(
+        scene=pulsed(signal=signal, **more), vary=vary, metric=("a=max(abs(a_y+load_0))",), boundary=f"a={limit}"
+    )
+    records = record_all(study)
+    found = study.findings(records).document["boundary"]
+    rate = sqrt(STIFFNESS / MASS)
+    for critical, duration in zip(found, durations, strict=True):
+        load = study.scene.loads[0].model_copy(update={"duration": duration, "amplitude": 1.0})
+        step = duration / 4000.0
+        base = np.concatenate([[0.0], step * np.cumsum(load.value((np.arange(8000) + 0.5) * step))])
+        spectrum = shock_spectrum(base, step, rate / (2.0 * pi), 1e9)
+        assert critical["duration"] == duration
+        assert critical["velocity_change"] == pytest.approx(critical["peak"] * base[-1], rel=1e-6)
+        assert critical["peak"] == pytest.approx(limit / spectrum.maximax[0], rel=3e-3)
+    assert found[0]["velocity_change"] == pytest.approx(limit / rate, rel=0.01)
+    files = study.write(records, tmp_path, pictures=True)
+    assert {file.name for file in files} >= {"sweep-boundary.csv", "sweep-boundary.png"}
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        (["--vary", "spring.mass=1,2", "--boundary", "y_max=1"], "of one pulse"),
+        (["--vary", "loads.0.amplitude=1,2", "--vary", "loads.0.duration=1,2", "--boundary", "y_max"], "METRIC=LIMIT"),
+        (["--vary", "loads.0.amplitude=1,2", "--vary", "loads.0.duration=1,2", "--boundary", "speed=2"], "unknown"),
+    ],
+)
+def test_a_boundary_of_anything_but_a_pulse_is_refused(line, why):
+    assert why in refused("sweep", "pulse", *line)
+
+
 # -- spectra ------------------------------------------------------------------------------------------------------
 
 
@@ -167,6 +210,35 @@ def test_a_rigid_impact_has_no_peak_acceleration_and_a_soft_one_has():
     soft = spectra(simulate(load_scene("pulse", ["time.t_end=0.02"])))
     assert soft.jumps == {"tip": 0.0, "spring": 0.0}
     assert not any("no peak acceleration" in words for _, words in soft.in_words())
+
+
+def swept(first, last, seconds, cubic=0.0, **spring):
+    """The oscillator under a chirp up and one down, which goes on in phase."""
+    common = {"on": "spring", "amplitude": 0.3, "signal": "chirp", "duration": seconds}
+    turned = np.pi * (first + last) * seconds  # by the first
+    loads = [
+        {**common, "frequency": first, "frequency_end": last},
+        {**common, "frequency": last, "frequency_end": first, "start": seconds, "phase": float(turned % (2.0 * pi))},
+    ]
+    scene = with_changes(oscillator(t_end=2.0 * seconds), loads=loads, spring={"cubic_stiffness": cubic, **spring})
+    return simulate(scene)
+
+
+def test_a_slow_sweep_of_a_linear_oscillator_is_its_frequency_response():
+    run = swept(6.0, 8.5, 60.0, initial_velocity=0.0)
+    for found in responses(run, "y"):
+        rate = 2.0 * pi * found.frequency
+        exact = 0.3 / np.sqrt((STIFFNESS - MASS * rate**2) ** 2 + (DAMPING * rate) ** 2)
+        late = slice(20, None)  # the second begins as the first has ended; the first from rest
+        assert found.amplitude[late] == pytest.approx(exact[late], rel=0.02)
+    assert responses(run, "y")[1].frequency[0] > responses(run, "y")[1].frequency[-1]
+
+
+def test_up_and_down_are_different_motions_of_a_hardening_spring():
+    up, down = responses(swept(9.0, 16.0, 40.0, cubic=5e7, initial_velocity=0.0), "y")
+    high = np.interp(12.0, up.frequency, up.amplitude)
+    low = np.interp(12.0, down.frequency[::-1], down.amplitude[::-1])
+    assert high > 2.0 * low
 
 
 def test_the_command_writes_tables_and_says_what_they_show(tmp_path, monkeypatch):

@@ -71,6 +71,14 @@ def spectrum(
             name = what if what.isidentifier() else str(number)
             rows = [dict(zip(power._fields, map(float, row), strict=True)) for row in zip(*power, strict=True)]
             files.append(write_csv(directory / f"power-{name}.csv", rows))
+        for what, chirps in found.responses.items():
+            for chirp in chirps:
+                name = f"response-{what if what.isidentifier() else 'formula'}-load-{chirp.load}.csv"
+                rows = [
+                    {"frequency": float(f), "amplitude": float(a)}
+                    for f, a in zip(chirp.frequency, chirp.amplitude, strict=True)
+                ]
+                files.append(write_csv(directory / name, rows))
         if found.points is not None:
             rows = [
                 {"time": float(t), "position": float(x), "velocity": float(v)}
@@ -84,7 +92,12 @@ def spectrum(
             shocks = {f"shock at the {end}": (s.frequency, s.maximax) for end, s in found.shock.items()}
             powers = {f"power of {what}": (p.frequency[1:], p.density[1:]) for what, p in found.power.items()}
             points = None if found.points is None else found.points[1]
-            draw(shocks, powers, points, trajectory.scene.title or str(run), files[-1])
+            swept = {
+                f"{what} to load {chirp.load}": (chirp.frequency, chirp.amplitude)
+                for what, several in found.responses.items()
+                for chirp in several
+            }
+            draw(shocks, powers, swept, points, trajectory.scene.title or str(run), files[-1])
     if as_json:
         print_json(
             {

@@ -138,6 +138,14 @@ def sweep(
             help="Keep the positions once a period of the harmonic load in the last third of each run, and draw them.",
         ),
     ] = False,
+    boundary: Annotated[
+        str,
+        typer.Option(
+            "--boundary",
+            metavar="METRIC=LIMIT",
+            help="Over amplitude and duration of a pulse: the damage boundary, where the metric reaches its limit.",
+        ),
+    ] = "",
 ) -> Study:
     """Run a scene over many values of its keys, on all cores or a Dask cluster; one row per run.
 
@@ -153,6 +161,7 @@ def sweep(
         seed=seed,
         metric=tuple(metric or ()),
         stroboscopic=stroboscopic,
+        boundary=boundary,
     )
 
 

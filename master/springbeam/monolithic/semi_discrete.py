@@ -329,13 +329,14 @@ def _kinks(load: Load) -> list[float]:
         return list(load.start + load.record.x)
     if load.signal == "constant":
         return []
-    return [load.start, load.start + (load.duration or 0.0)]
+    duration, rise = load.duration or 0.0, load.rise or 0.0
+    return [load.start, load.start + rise, load.start + duration - rise, load.start + duration]
 
 
 def _rate(load: Load) -> float:
-    """Return the rate of the load [rad/s]; a table, a step and a ramp are polynomials between kinks."""
-    if load.signal == "harmonic":
-        return 2.0 * np.pi * (load.frequency or 0.0)
+    """Return the largest rate of the load [rad/s]; what is no wave is a polynomial between kinks."""
+    if load.signal in ("harmonic", "chirp"):
+        return 2.0 * np.pi * max(load.frequency or 0.0, load.frequency_end or 0.0)
     return np.pi / (load.duration or np.inf) if load.signal == "half_sine" else 0.0
 
 

@@ -20,6 +20,7 @@ _FLOOR = 1e-12
 def draw(
     shock: Mapping[str, tuple[np.ndarray, np.ndarray]],
     power: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    responses: Mapping[str, tuple[np.ndarray, np.ndarray]],
     points: np.ndarray | None,
     title: str,
     path: Path,
@@ -28,12 +29,12 @@ def draw(
 
     Parameters
     ----------
-    shock, power
-        Frequencies [Hz] and values by name, shapes (n,); accelerations [m/s²], and power densities.
+    shock, power, responses
+        Frequencies [Hz] and values by name, shapes (n,): accelerations [m/s²], power densities, half ranges.
     points
         Position [m] and velocity [m/s] once a period, shape (n, 2).
     """
-    parts = [bool(shock), bool(power), points is not None]
+    parts = [bool(shock), bool(power), bool(responses), points is not None]
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(WIDTH, 0.6 + 2.4 * sum(parts)), layout="constrained")
         axes = iter(figure.subplots(sum(parts), 1, squeeze=False)[:, 0])
@@ -51,6 +52,13 @@ def draw(
                     label=name,
                 )
             ax.set(xlabel="frequency [Hz]", ylabel=quantity)
+            ax.legend()
+            ax.grid(alpha=0.3)
+        if responses:
+            ax = next(axes)
+            for k, (name, (frequency, values)) in enumerate(responses.items()):
+                ax.plot(frequency, values, color=_COLOURS[k % len(_COLOURS)], label=name)
+            ax.set(xlabel="frequency of the chirp [Hz]", ylabel="half the range [unit]")
             ax.legend()
             ax.grid(alpha=0.3)
         if points is not None:

@@ -23,12 +23,21 @@ from ..scene import Load, Scene
 ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
 #: So many lines of a table in a step are data.
 _FINE = 4
+#: Points of a quadrature, and one more for each radian that a signal without a closed form turns.
+_POINTS = 8
 #: A jump closer to an end of a step than this share of it is at that end.
 _SAME = 1e-9
 #: Gauss–Legendre nodes on [−1, 1], and (2k + 1)/2 P_k there times the weights: exact for a cubic times P_2.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _VALUES = np.polynomial.legendre.legvander(_NODES, 2)
 _NORMS = np.array([0.5, 1.5, 2.5])
+
+
+@lru_cache(maxsize=64)
+def _quadrature(points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return Gauss nodes in [−1, 1], and what takes values there to the three Legendre coefficients."""
+    nodes, weights = np.polynomial.legendre.leggauss(points)
+    return nodes, _NORMS[:, None] * np.polynomial.legendre.legvander(nodes, 2).T * weights
 
 
 class Signal:
@@ -75,18 +84,17 @@ class Signal:
         """Return the three Legendre coefficients over a piece without a jump inside."""
         load, middle = self._load, start + 0.5 * size
         elapsed = middle - load.start
-        if load.signal == "ramp":
-            assert load.duration is not None
-            if 0.0 < elapsed < load.duration:
-                return (load.amplitude * elapsed / load.duration, 0.5 * load.amplitude * size / load.duration, 0.0)
-        elif load.signal != "constant" and not load.start <= middle < self._end:
+        if load.signal != "constant" and not load.start <= middle < self._end:
             return (0.0, 0.0, 0.0)
         if load.signal == "harmonic":
             return _wave(load.amplitude, load.rate, elapsed, load.phase, size)
         if load.signal == "half_sine":
             assert load.duration is not None
             return _wave(load.amplitude, pi / load.duration, elapsed, 0.0, size)
-        return (float(load.value(middle)), 0.0, 0.0)
+        if load.signal in ("constant", "step") or (load.signal == "ramp" and elapsed >= (load.duration or 0.0)):
+            return (float(load.value(middle)), 0.0, 0.0)
+        nodes, projection = _quadrature(_POINTS + int(load.rate * size))
+        return list(projection @ load.value(middle + 0.5 * size * nodes))
 
     def _of_table(self, lines: np.ndarray, start: float, size: float) -> Sequence[float]:
         """Return the coefficients by the pieces between ``lines`` [s], each a polynomial of degree 3 at most."""

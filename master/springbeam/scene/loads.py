@@ -23,12 +23,15 @@ if TYPE_CHECKING:
 _TAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "constant": ((), ()),
     "harmonic": (("frequency",), ("phase", "start", "duration")),
+    "chirp": (("frequency", "frequency_end", "duration"), ("phase", "start")),
     "half_sine": (("duration",), ("start",)),
+    "sawtooth": (("duration",), ("start",)),
+    "trapezoid": (("duration", "rise"), ("start",)),
     "step": ((), ("start", "duration")),
     "ramp": (("duration",), ("start",)),
     "table": (("file",), ("interpolation", "start")),
 }
-_OF_SIGNALS = ("frequency", "phase", "start", "duration", "file", "interpolation")
+_OF_SIGNALS = ("frequency", "frequency_end", "phase", "start", "duration", "rise", "file", "interpolation")
 #: A straight table ends steps at its lines unless they are closer than this share of the macro step on average.
 _CLOSE = 0.25
 #: Most different places of point forces on a beam.
@@ -46,16 +49,25 @@ class Load(Table):
     )
     at: float | None = key("–", "on the beam: a point force at this fraction of L", None, gt=0.0, le=1.0)
     amplitude: float = key("N/m, N or m/s²", "amplitude of the signal; upward is positive", 1.0)
-    signal: Literal["constant", "harmonic", "half_sine", "step", "ramp", "table"] = key(
-        "–", "value over time", "constant"
+    signal: Literal["constant", "harmonic", "chirp", "half_sine", "sawtooth", "trapezoid", "step", "ramp", "table"] = (
+        key("–", "value over time; sawtooth has its peak at the end", "constant")
     )
-    frequency: float | None = key("Hz", "frequency of harmonic", None, gt=0.0, otherwise="needed with harmonic")
-    phase: float = key("rad", "phase of harmonic at its start", 0.0)
+    frequency: float | None = key(
+        "Hz", "frequency of harmonic, of chirp at its start", None, gt=0.0, otherwise="needed with harmonic and chirp"
+    )
+    frequency_end: float | None = key(
+        "Hz", "frequency of chirp at its end; between, it changes evenly in time", None, gt=0.0,
+        otherwise="needed with chirp",
+    )  # fmt: skip
+    phase: float = key("rad", "phase of harmonic or chirp at its start", 0.0)
     start: float = key("s", "time before which the load is 0; time 0 of a table", 0.0)
     duration: float | None = key(
         "s", "length of the pulse, or of the rise", None, gt=0.0,
-        otherwise="for ever; needed with half_sine and ramp",
+        otherwise="for ever; needed with chirp, half_sine, sawtooth, trapezoid and ramp",
     )  # fmt: skip
+    rise: float | None = key(
+        "s", "how long a trapezoid rises, and falls", None, gt=0.0, otherwise="needed with trapezoid"
+    )
     file: str | None = key("–", "file of a table, relative to that of the scene", None, otherwise="needed with table")
     interpolation: Literal["linear", "cubic"] = key("–", "between the lines of a table", "linear")
 
@@ -77,6 +89,8 @@ class Load(Table):
                 raise ValueError(f'{name} = {getattr(self, name)!r}: is for on = "beam", this load is on = "{self.on}"')
         if self.shape is not None and self.at is not None:
             raise ValueError(f"at = {self.at}: a load has a shape or acts at a point; leave one of the two out")
+        if self.rise is not None and self.duration is not None and self.rise > 0.5 * self.duration:
+            raise ValueError(f"rise = {self.rise}: must be at most half of duration = {self.duration}")
         if self.signal == "table":
             _ = self.record  # refuses what is no table
         return self
@@ -110,7 +124,7 @@ class Load(Table):
     @property
     def rate(self) -> float:
         """Rate of an oscillation that goes on and on [rad/s], 0 for any other signal."""
-        return 0.0 if self.frequency is None else 2.0 * np.pi * self.frequency
+        return 2.0 * np.pi * max(self.frequency or 0.0, self.frequency_end or 0.0)
 
     def is_finer_than(self, macro_step: float | None) -> bool:
         """Return whether the lines of a straight table are too close for steps of ``macro_step`` [s] to end on them."""
@@ -127,7 +141,10 @@ class Load(Table):
             times = self.start + self.record.x
             only_ends = self.interpolation == "cubic" or self.is_finer_than(macro_step)
             return [float(time) for time in (times[[0, -1]] if only_ends else times)]
-        return [self.start] if self.duration is None else [self.start, self.start + self.duration]
+        if self.duration is None:
+            return [self.start]
+        bends = [] if self.rise is None else [self.rise, self.duration - self.rise]
+        return [self.start + since for since in (0.0, *bends, self.duration)]
 
     @property
     def record(self) -> PPoly:
@@ -153,10 +170,16 @@ class Load(Table):
             return self.amplitude * np.clip(t / duration, 0.0, 1.0)
         wave = np.ones_like(t)
         if self.signal == "harmonic":
-            assert self.frequency is not None
-            wave = np.sin(2.0 * np.pi * self.frequency * t + self.phase)
+            wave = np.sin(self.rate * t + self.phase)
+        elif self.signal == "chirp":
+            first, last = self.frequency or 0.0, self.frequency_end or 0.0
+            wave = np.sin(2.0 * np.pi * (first + 0.5 * (last - first) * t / duration) * t + self.phase)
         elif self.signal == "half_sine":
             wave = np.sin(np.pi / duration * t)
+        elif self.signal == "sawtooth":
+            wave = t / duration
+        elif self.signal == "trapezoid":
+            wave = np.clip(np.minimum(t, duration - t) / (self.rise or inf), 0.0, 1.0)
         return np.where((t >= 0.0) & (t < duration), self.amplitude * wave, 0.0)
 
 

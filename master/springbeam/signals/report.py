@@ -9,6 +9,7 @@ import numpy as np
 
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
+from .response import Response, responses
 from .settled import Settled, drive_of, poincare, settled
 from .shock import VELOCITIES, ShockSpectrum, largest_jump, shock_of_run
 from .spectra import PowerSpectrum, power_spectrum
@@ -26,6 +27,7 @@ class Spectra:
     shock: Mapping[str, ShockSpectrum]  #: by the end, "tip" or "spring"
     jumps: Mapping[str, float]  #: largest jump of each end's velocity [m/s]
     power: Mapping[str, PowerSpectrum]
+    responses: Mapping[str, list[Response]]  #: to each chirp
     points: tuple[np.ndarray, np.ndarray] | None  #: `poincare` once a period of the drive
     settled: Settled | None
     driven: bool
@@ -43,6 +45,12 @@ class Spectra:
         for what, power in self.power.items():
             line = power.frequency[1]
             yield f"power of {what}", f"highest at {power.highest:.5g} Hz, lines {line:.3g} Hz apart"
+        for what, chirps in self.responses.items():
+            for chirp in chirps:
+                at = int(np.argmax(chirp.amplitude))
+                way = "up" if chirp.frequency[-1] > chirp.frequency[0] else "down"
+                largest = f"largest half range {chirp.amplitude[at]:.4g} at {chirp.frequency[at]:.5g} Hz"
+                yield f"{what} to load {chirp.load}", f"{largest}, on the way {way}"
         if self.settled is not None:
             of = "the drive's" if self.settled.multiple == 1 else f"{self.settled.multiple} of the drive's"
             yield "motion", f"periodic from {self.settled.since:.6g} s on, period {self.settled.period:.6g} s, {of}"
@@ -93,4 +101,5 @@ def spectra(
     if drive is not None and drive.frequency is not None:
         points = poincare(run, 1.0 / drive.frequency, drive.start)
     power = {what: power_spectrum(run, what, begin, segments) for what in wanted}
-    return Spectra(shock, jumps, power, points, tail, drive is not None, quality)
+    chirps = {what: found for what in wanted if (found := responses(run, what))}
+    return Spectra(shock, jumps, power, chirps, points, tail, drive is not None, quality)

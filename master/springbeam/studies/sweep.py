@@ -18,9 +18,11 @@ from ..results.trajectory import Trajectory
 from ..scene import Load, Scene, SceneError
 from ..scene.reference import unit_of
 from ..signals.settled import poincare, settled
+from .boundary import Critical, Limit, boundary, draw_boundary, in_words, limit_of, pulse_axes
 from .design import Axis, Sampling, compatible, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, heading, known, named
 from .study import Findings, Row, Study
+from .tables import write_csv
 
 STATUSES = ("done", "stopped", "refused", "lost")
 #: What is kept of each run of a driven scene: positions at equal phase [m], and half the range of the motion [m].
@@ -44,6 +46,7 @@ class Sweep(Study):
     seed: int = 0
     metric: tuple[str, ...] = ()  #: the usual ones if empty
     stroboscopic: bool = False  #: whether each run is also seen once a period of its drive
+    boundary: str = ""  #: METRIC=LIMIT, where the sweep is over a pulse and its damage boundary is wanted
 
     @property
     def axes(self) -> tuple[Axis, ...]:
@@ -53,7 +56,16 @@ class Sweep(Study):
     @property
     def metrics(self) -> Sequence[str]:
         """Those asked for."""
-        return self.metric or USUAL
+        asked = self.metric or USUAL
+        return (*asked, self._limit.metric) if self.boundary and self._limit.metric not in self._columns else asked
+
+    @property
+    def _columns(self) -> list[str]:
+        return [named(text)[0] for text in self.metric or USUAL]
+
+    @property
+    def _limit(self) -> Limit:
+        return limit_of(self.boundary, self._columns)
 
     @property
     def _shown(self) -> Sequence[str]:
@@ -66,6 +78,8 @@ class Sweep(Study):
         compatible(self.scene, axes)
         if self.stroboscopic:
             drive(self.scene)
+        if self.boundary:
+            pulse_axes(self.scene, axes)
         values = design(axes, self.samples, self.seed, self.sampling)
         names = [axis.name for axis in axes]
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
@@ -80,7 +94,23 @@ class Sweep(Study):
         lines = [f"runs      {', '.join(f'{counts[status]} {status}' for status in STATUSES if counts[status])}"]
         if first := next((record["error"] for record in records.values() if record["error"]), None):
             lines.append(f"error     {first}, the first of them")
-        return Findings({"runs": {status: counts[status] for status in STATUSES}}, [Text(line) for line in lines])
+        document: dict[str, Any] = {"runs": {status: counts[status] for status in STATUSES}}
+        if self.boundary:
+            document["boundary"] = [critical._asdict() for critical in self._critical(records)]
+            lines += in_words(self._critical(records), self.boundary)
+        return Findings(document, [Text(line) for line in lines])
+
+    def _critical(self, records: Mapping[str, Row]) -> list[Critical]:
+        return boundary(*pulse_axes(self.scene, self.axes), self.rows(records), self._limit)
+
+    def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
+        """Write the table, the damage boundary if it is wanted, and with ``pictures`` these."""
+        files = super().write(records, directory, pictures=pictures)
+        if self.boundary and (found := self._critical(records)):
+            files.append(write_csv(directory / "sweep-boundary.csv", [critical._asdict() for critical in found]))
+            if pictures:
+                files.append(draw_boundary(found, self.boundary, directory / "sweep-boundary.png"))
+        return files
 
     def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
         """Draw what of the metrics the axes change; of a driven scene the bifurcation diagram."""
