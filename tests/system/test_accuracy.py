@@ -22,8 +22,8 @@ from springbeam.scene.reading import tomllib
 from springbeam.scene.statics import tip_load_deflection
 from springbeam.studies import accuracy as search
 from springbeam.studies.accuracy import differences, simulate
-from springbeam.studies.crosscheck import compare
-from springbeam.studies.orders import Orders
+from springbeam.studies.comparison import compare
+from springbeam.studies.crosscheck import Orders
 
 sys.path.append(str(Path(__file__).parents[1] / "campaign"))
 import judge

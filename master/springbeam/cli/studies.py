@@ -257,8 +257,7 @@ def crosscheck(
 
     Example: springbeam crosscheck soft --set coupling.scheme=hermite --set coupling.degree=2 --orders
     """
-    from ..studies.crosscheck import Crosscheck
-    from ..studies.orders import Orders
+    from ..studies.crosscheck import Crosscheck, Orders
 
     what = load_scene(scene, settings or ())
     made = picked(what)

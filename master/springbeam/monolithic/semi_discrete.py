@@ -204,7 +204,7 @@ def modal_beam(beam: Beam) -> ModalBeam:
     u = x, θ = 0, whatever the loads and starts are; Rayleigh–Ritz in it.
     """
     discrete = assemble(beam)
-    space = _augmented_space(discrete, beam) if 0 < beam.n_modes < discrete.size else np.eye(discrete.size)
+    space = _augmented_space(discrete, beam) if beam.modes_kept < discrete.size else np.eye(discrete.size)
     omega, basis = _rayleigh_ritz(discrete, space)
     load = beam.distributed_load * discrete.uniform_load + beam.tip_load_coefficient * discrete.hat_load
     return ModalBeam(

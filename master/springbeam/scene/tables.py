@@ -232,8 +232,8 @@ class Beam(Table):
 
     @property
     def modes_kept(self) -> int:
-        """Number of modes that take part, all of the mesh if the scene names none."""
-        return self.n_modes or self.unknowns
+        """Number of modes that take part: all of the mesh if the scene names none, or the integrator has no modes."""
+        return self.n_modes if self.n_modes and self.integrator == "modal" else self.unknowns
 
     @model_validator(mode="after")
     def _modes_exist(self) -> Beam:

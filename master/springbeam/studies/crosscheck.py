@@ -1,304 +1,48 @@
-"""Compare the co-simulation with the monolithic reference of its law, and judge the differences by bounds.
-
-The bound of a quantity at time t is
-
-    4 · max over [t₀, t] of |q_H − q_{H/2}|   +   (ε_IDA · steps + rounding) · growth · scale of q:
-
-what halving the macro step changes is an upper estimate of the discretisation error for any order ≥ 1 (twice the
-difference at order 1), doubled again because events mix orders; the second term is the tolerance of the spring's
-integrator in every step and the rounding of the beam's modes, grown as fast as the reference grows a perturbation; so
-is what a one-way coupling neglects, since the reference is two-way.
-Nothing in it knows the reference, so a wrong sign, mass or law, which converges to something else, fails.
-
-The verdict is about the run that was asked for. Nonsmooth trajectories separate: comparable is what comes before the
-first change of contact that the macro step, or a tiny perturbation of the reference, moves to another place in the
-order of events. A run that is not resolved at its own macro step is compared with smaller ones, as far as that goes;
-it may then differ, but it cannot agree.
-"""
+"""``springbeam crosscheck``: a run beside the reference of its law, and the orders of smaller steps."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar
 
 import matplotlib
 import numpy as np
 from rich.text import Text
 
-from ..monolithic import algorithm1
+from ..monolithic import event_driven
 from ..pictures import drawing
 from ..pictures.drawing import BLACK, POSITIONS, Line, Look, present
 from ..pictures.panels import Curve, Panel
 from ..pictures.timeline import DPI, STYLE, timeline
-from ..results.contact_times import ContactChange, contact_changes
-from ..results.trajectory import TOLD, Event, Trajectory, columns_of
-from ..run.outcome import RunStopped
-from ..run.runner import simulate
-from ..scene import Scene, with_changes
-from ..scene.automatic import with_scheme_chosen
-from ..scene.resolution import mesh_frequency
-from ..scene.statics import tip_compliance
-from .reference import (
-    PERTURBATION,
+from ..results.contact_times import contact_changes
+from ..results.trajectory import Event, Trajectory, columns_of
+from ..scene import Scene
+from .comparison import (
     SHORT,
+    Verdict,
     away_from,
+    compare,
     macro_points,
     quantities,
-    reference_and_perturbed,
     refuse_without_reference,
     sample,
 )
 from .study import Findings, Row, Study
 from .tables import table
 
-Verdict = Literal["agrees", "differs", "not comparable"]
 #: Exit codes of the command.
 CODES: dict[Verdict, int] = {"agrees": 0, "differs": 1, "not comparable": 4}
 _CASE = "comparison"
 #: What is told of a compared quantity; the errors at all times are for the picture.
 _TOLD = ("quantity", "error", "at", "l2", "bound", "passed")
-#: A scene whose comparable window is shorter than this many macro steps is resolved further, 4 times at a go.
-_ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 16
-#: Macro steps of a window that had to be resolved further.
-_WINDOW_STEPS = 400
-#: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
-_RESOLVED = {"u_tip": 0.05, "y": 0.05, "v_tip": 0.25, "z": 0.25}
-#: Factor on what halving the macro step changes.
-_SAFETY = 4.0
-#: Least relative error of a step, where IDA's tolerance is not a looser one.
-_LEAST = 1e-12
 _COLOURS = (
     *(drawing.BLUE, drawing.SKY, drawing.VERMILLION, drawing.ORANGE, drawing.GREEN, drawing.PURPLE, drawing.GREY),
 )
-
-
-class Quantity(NamedTuple):
-    """One compared quantity."""
-
-    quantity: str
-    error: float  #: max norm, in the quantity's unit; where the bound is broken, the furthest out of it
-    at: float  #: where it occurred [s]
-    l2: float  #: root mean square over the window
-    bound: float  #: at that time
-    passed: bool
-    times: np.ndarray  #: of the compared rows [s]
-    errors: np.ndarray
-    bounds: np.ndarray
-
-    @classmethod
-    def judged(cls, name: str, times: np.ndarray, error: np.ndarray, bound: np.ndarray) -> Quantity:
-        """Judge the errors of a quantity at ``times`` [s]."""
-        worst, top = int(np.argmax(error / bound)), int(np.argmax(error))
-        at = worst if error[worst] > bound[worst] else top
-        return cls(
-            name, float(error[at]), float(times[at]), float(np.sqrt(np.mean(error**2))), float(bound[at]),
-            bool(np.all(error <= bound)), times, error, bound,
-        )  # fmt: skip
-
-
-class Change(NamedTuple):
-    """One compared change of contact."""
-
-    kind: str
-    time: float | None  #: ``None`` if the co-simulation lacks it
-    reference: float
-    bound: float
-    passed: bool
-
-
-@dataclass
-class Report:
-    """What `compare` found."""
-
-    asked: Scene
-    scene: Scene  #: as compared: the macro step and t_end may be finer and shorter than asked
-    reference: Trajectory | None = None
-    trajectory: Trajectory | None = None
-    horizon: float = 0.0  #: comparable up to here [s]
-    growth: float = 1.0  #: of a perturbation of the reference up to the horizon
-    rows: list[Quantity] = field(default_factory=list)
-    events: list[Change] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def verdict(self) -> Verdict:
-        """Judge the run that was asked for."""
-        if not (all(row.passed for row in self.rows) and all(change.passed for change in self.events)):
-            return "differs"
-        whole = self.scene == self.asked and self.horizon >= self.asked.time.t_end * (1.0 - 1e-12)
-        return "agrees" if self.rows and whole else "not comparable"
-
-
-def compare(scene: Scene) -> Report:
-    """Run ``scene`` and the reference of its law and compare them.
-
-    Raises
-    ------
-    SceneError
-        If the reference is not defined for the scene (law `transmission` with ``contact.impact = "rest"``).
-    RunStopped, ReferenceFailure
-        If either stops early.
-    """
-    if scene.contact.algorithm:
-        return _compare_paper(scene)
-    refuse_without_reference(scene)
-    asked, note, failure, start = scene, "", None, scene.contact_time or 0.0
-    for _ in range(_MAX_REFINEMENTS):
-        size = scene.coupling.H
-        try:
-            runs = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
-            horizon = _same_story_until(*runs)
-            if horizon - start >= min(_ENOUGH_STEPS * size, 0.5 * (scene.time.t_end - start)):
-                break
-        except RunStopped as stopped:  # a finer step may get through
-            failure = stopped
-        size /= _REFINEMENT
-        t_end = min(asked.time.t_end, start + _WINDOW_STEPS * size)
-        scene = with_changes(scene, time={"t_end": t_end}, coupling={"macro_step": size})
-        note = (
-            f"At the scene's own macro step, {asked.coupling.H:g} s, the motion is not resolved: halving it "
-            f"changes the motion from the first contact on. Compared instead: {size:.3g} s, up to {t_end:.9g} s."
-        )
-    else:
-        if failure is not None:
-            raise failure
-        return Report(asked, asked, notes=[f"{note} Nothing could be compared at any macro step"])
-    report = Report(asked, scene, trajectory=runs[0], horizon=horizon, notes=[note] if note else [])
-    _compare_with_reference(report, *runs)
-    return report
-
-
-def _compare_paper(scene: Scene) -> Report:
-    """Compare law `paper` through the FMUs with Algorithm 1 as one system, which differs by the midpoint rule alone.
-
-    With a = (ωh)² one midpoint step and the exact flow differ in the displacement by y a²/12 and h z a/12. Algorithm 1
-    restarts the spring at every step, so this does not add up to a frequency shift; a stiffness 1/3 larger changes the
-    step by y a/6 and h z a/12, at least as much, and running Algorithm 1 with it shows what IDA may change.
-    """
-    assert scene.spring is not None
-    stiffer = {name: 4.0 / 3.0 * getattr(scene.spring, name) for name in ("linear_stiffness", "cubic_stiffness")}
-    reference, ours = algorithm1.simulate(scene), simulate(scene)
-    moved = algorithm1.simulate(with_changes(scene, spring=stiffer))
-    n = min(len(reference), len(ours), len(moved))
-    report = Report(scene, scene, reference, ours, float(ours.time[n - 1]))
-    for name in ("u_tip", "y", "z", "v_tip", "contact_force", "e_beam", "e_spring"):
-        q, exact, other = (run[name][:n] for run in (ours, reference, moved))
-        floor = _step_error(scene) * np.arange(1, n + 1) * (float(np.abs(exact).max()) or 1.0)
-        bound = _SAFETY * np.maximum.accumulate(np.abs(other - exact)) + floor
-        report.rows.append(Quantity.judged(name, ours.time[:n], np.abs(q - exact), bound))
-    report.notes.append(
-        "bounds from Algorithm 1 with 4/3 of its stiffness: as much as the midpoint rule changes a step of "
-        f"{scene.coupling.H:g} s"
-    )
-    return report
-
-
-def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
-    """Return the time [s] up to which a run and that at half its macro step tell the same story.
-
-    That is the same events, a run that does not call itself unresolved, and displacements and velocities, away from
-    events, that halving hardly changes.
-    """
-    times, size = macro_points(coarse.scene), coarse.scene.coupling.H
-    if not coarse.summary["resolved"]:
-        return float(times[0])
-    changes, others = (contact_changes(run, SHORT * size) for run in (coarse, fine))
-    horizon = _agree_until(changes, others, float(times[0]), float(coarse.time[-1]))
-    away = away_from(times, (event.time for run in (coarse, fine) for event in run.events), size)
-    for name in present(coarse, _RESOLVED):
-        values, finer = (run.at(times)[name] for run in (coarse, fine))
-        allowed = _RESOLVED[name] * np.abs(values - values[0]).max()
-        differ = away & (np.abs(values - finer) > allowed)
-        if differ[1:].any():
-            horizon = min(horizon, float(times[1:][differ[1:]][0]) - size)
-    return horizon
-
-
-def _compare_with_reference(report: Report, coarse: Trajectory, fine: Trajectory) -> None:
-    """Judge ``coarse``, the run of the report, by bounds from ``fine``, at half its macro step."""
-    scene, times, size = report.scene, macro_points(report.scene), report.scene.coupling.H
-    reference, perturbed = reference_and_perturbed(scene, times)
-    report.reference = reference
-    changes = [contact_changes(run, SHORT * size) for run in (coarse, fine, reference, perturbed)]
-    stable = _agree_until(changes[2], changes[3], float(times[0]), float(coarse.time[-1]))
-    report.horizon = min(report.horizon, stable)
-    before = times <= report.horizon
-    # A jump at slightly different times is an event error, judged there.
-    jumps = [event.time for run in (coarse, reference) for event in run.events]
-    away = away_from(times, jumps + [kink for load in scene.loads for kink in load.kinks(size)], size)
-    neglected = coarse.summary.get("neglected_share", 0.0)
-    for name in quantities(scene):
-        ours, halved = (sample(run, times, name) for run in (coarse, fine))
-        exact, moved = reference[name], perturbed[name]
-        good = before & np.isfinite(ours) & np.isfinite(halved) & (away | (name in POSITIONS))
-        if good.sum() < 2:
-            continue
-        scale = float(np.abs(exact[good]).max()) or 1.0
-        floor = _step_error(scene) * (np.arange(len(times)) + 1.0) + _SAFETY * (_rounding(scene, name) + neglected)
-        grown = np.abs(moved - exact)[good] / (PERTURBATION * scale)
-        growth = np.maximum(1.0, np.maximum.accumulate(grown))
-        report.growth = max(report.growth, float(growth[-1]))
-        bound = _SAFETY * np.maximum.accumulate(np.abs(ours - halved)[good]) + (floor[good] * growth * scale)
-        report.rows.append(Quantity.judged(name, times[good], np.abs(ours - exact)[good], bound))
-    if not report.rows:
-        report.notes.append(
-            f"Nothing could be compared: another change of contact comes first, from t = {report.horizon:.9g} s on, if "
-            "the initial velocity changes a little; begin with another velocity, or at a distance"
-        )
-    _compare_events(report, *changes[:3])
-
-
-def _step_error(scene: Scene) -> float:
-    """Return the relative error that the spring's integrator may make in a step."""
-    return _LEAST if scene.spring is None else max(_LEAST, scene.spring.relative_tolerance)
-
-
-def _rounding(scene: Scene, name: str) -> float:
-    """Return the relative rounding of the beam's slow motion beside its fastest modes, estimated.
-
-    It is ε √(λ_max/λ₁), of accelerations and of forces inside, which follow from these, ε λ_max/λ₁.
-    """
-    beam = scene.beam
-    if beam is None:
-        return 0.0
-    slowest = 2.0 / np.sqrt(beam.density * beam.area * beam.length * tip_compliance(beam))
-    ratio = max(1.0, mesh_frequency(beam) / slowest)
-    return float(np.finfo(float).eps * ratio ** (2 if name in TOLD else 1))
-
-
-def _agree_until(first: list[ContactChange], second: list[ContactChange], start: float, t_end: float) -> float:
-    """Return the time [s] before the first change that the other run does not have in the same place of the order."""
-    before = start
-    for a, b in itertools.zip_longest(first, second):
-        soonest = min(change.time for change in (a, b) if change is not None)
-        if a is None or b is None or a.kind != b.kind or abs(a.time - b.time) > 0.1 * (soonest - before) > 0.0:
-            return before + 0.9 * (soonest - before)
-        before = a.time
-    return t_end
-
-
-def _compare_events(
-    report: Report, coarse: list[ContactChange], fine: list[ContactChange], reference: list[ContactChange]
-) -> None:
-    scene, size, start = report.scene, report.scene.coupling.H, report.scene.contact_time or 0.0
-    by_means = with_scheme_chosen(scene)[0].coupling.degree == 0
-    moved = 0.0
-    for i, (kind, time) in enumerate(change for change in reference if change.time <= report.horizon):
-        if i >= len(coarse) or coarse[i].kind != kind:
-            report.events.append(Change(kind, None, time, 0.0, False))
-            return
-        ours = coarse[i].time
-        if i < len(fine):
-            moved = max(moved, abs(ours - fine[i].time))
-        steps = (time - start) / size + 1.0
-        # The unit of time in which the state changes as a whole is what the events so far have taken.
-        bound = _SAFETY * moved + _step_error(scene) * steps * report.growth * max(time - start, size)
-        if kind in ("opens", "leaves") and by_means:
-            bound += 0.5 * size  # a force known by its means tells no better when it vanishes
-        report.events.append(Change(kind, ours, time, bound, abs(ours - time) <= bound))
+#: How often the macro step is halved; once less if quick.
+_HALVINGS = 3
 
 
 class Crosscheck(Study):
@@ -423,3 +167,85 @@ def _contact(row: Mapping[str, Any]) -> tuple[str, ...]:
     time, exact = row["time"], row["reference"]
     ours, error = ("none", "") if time is None else (f"{time:.10f}", f"{time - exact:.1e}")
     return row["kind"], ours, f"{exact:.10f}", error, f"{row['bound']:.1e}", _ok(row)
+
+
+class Orders(Study):
+    """A scene at H, H/2, H/4, … beside the event-driven reference.
+
+    Errors of displacement, velocity and contact force are in the max norm, at the macro points that all runs share and
+    two macro steps away from the events.
+    """
+
+    kind: ClassVar[str] = "orders"
+
+    scene: Scene
+
+    def cases(self) -> dict[str, Row]:
+        """Return the macro steps. Raises SceneError if there is no reference to converge to."""
+        refuse_without_reference(self.scene)
+        H, halvings = self.scene.coupling.H, range(_HALVINGS + 1 - self.quick)
+        return {f"H/{2**k}" if k else "H": {"coupling.macro_step": H / 2**k} for k in halvings}
+
+    @cached_property
+    def reference(self) -> Trajectory:
+        """The solution at the macro points."""
+        return event_driven.simulate(self.scene, sample_times=macro_points(self.scene))
+
+    def measured(self, run: Trajectory, case: Row) -> Row:
+        """Return ``stretches``: the largest errors between two changes of contact each."""
+        reference, times, H = self.reference, macro_points(self.scene), self.scene.coupling.H
+        names = [name for name in quantities(self.scene) if name not in ("e_beam", "e_spring")]
+        off = {name: np.abs(sample(run, times, name) - reference[name]) for name in names}
+        changes = [change.time for change in contact_changes(reference, SHORT * H)]
+        stretches = []
+        for begin, end in itertools.pairwise([times[0], *changes, self.scene.time.t_end]):
+            inside = np.flatnonzero((times > begin) & (times < end) & away_from(times, (begin, end), H))
+            if len(inside) >= 4:
+                phase = reference.phase[inside[len(inside) // 2]]
+                stretch = {"phase": phase, "begin": begin, "end": end}
+                for name in (name for name in names if (name, phase) != ("contact_force", "free")):
+                    known = off[name][inside]
+                    stretch[f"error_{name}"] = float(np.nanmax(known)) if np.isfinite(known).any() else None
+                stretches.append(stretch)
+        return {"stretches": stretches}
+
+    def rows(self, records: Mapping[str, Row]) -> list[Row]:
+        """Return a row per stretch and quantity: the errors at all steps, and the orders between neighbours."""
+        steps, several = list(records), [record.get("stretches", ()) for record in records.values()]
+        found = []
+        for stretches in zip(*several, strict=True):
+            first = stretches[0]
+            for name in (key for key in first if key.startswith("error_")):
+                errors = [stretch[name] for stretch in stretches]
+                row = {**{key: first[key] for key in ("phase", "begin", "end")}, "quantity": name.partition("_")[2]}
+                row |= {f"error_{step}": error for step, error in zip(steps, errors, strict=True)}
+                for step, (a, b) in zip(steps, itertools.pairwise(errors), strict=False):
+                    row[f"order_{step}"] = float(np.log2(a / b)) if a and b else None
+                found.append(row)
+        return found
+
+    def findings(self, records: Mapping[str, Row]) -> Findings:
+        """Show the errors and the orders."""
+        rows, steps = self.rows(records), list(records)
+        cells = [
+            (row["phase"], f"{row['begin']:.4f}", row["quantity"],
+             *("" if row[f"error_{step}"] is None else f"{row[f'error_{step}']:.1e}" for step in steps),
+             " ".join("–" if row[f"order_{step}"] is None else f"{row[f'order_{step}']:.1f}" for step in steps[:-1]))
+            for row in rows
+        ]  # fmt: skip
+        names = ("phase", "from [s]", "quantity", *steps, "orders")
+        return Findings({"orders": rows}, [table(names, cells, "largest errors", words=("from [s]", "quantity"))])
+
+    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+        """Draw errors over the macro step, a panel a stretch."""
+        from .picture import Point, curves
+
+        steps = {name: case["coupling.macro_step"] for name, case in self.cases().items()}
+        points = [
+            Point(f"{row['phase']} from {row['begin']:.4g} s", row["quantity"], H, row[f"error_{step}"])
+            for row in self.rows(records)
+            for step, H in steps.items()
+        ]
+        title = f"{self.scene.title}: largest errors"
+        curves(points, title, "macro step [s]", "unit of the quantity").savefig(directory / "orders.png", dpi=110)
+        return [directory / "orders.png"]

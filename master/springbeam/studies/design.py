@@ -1,4 +1,4 @@
-"""The keys that a sweep varies, as ``TABLE.KEY=VALUES``, and the values that they take."""
+"""What studies vary: keys, as ``TABLE.KEY=VALUES``, with the values that they take, and couplings."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ from ..scene import Scene, SceneError, key_kind, parse_value
 from ..scene.scene import split_key
 from ..scene.tables import PICKED_BY_ACCURACY, STEP_KEY, TOLERANCE_KEYS
 
+#: The couplings that studies run: scheme and degree, of rigid and of soft laws.
+RIGID = (("energy", 0), ("energy", 1), ("energy", 2), ("hermite", 1), ("hermite", 2))
+SOFT = (*RIGID[:3], ("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1))
 Sampling = Literal["random", "latin_hypercube"]
 #: A mistyped count, not a sweep.
 MOST_RUNS = 10_000_000

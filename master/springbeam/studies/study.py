@@ -51,7 +51,7 @@ _STUDIES = {
     "converge": ".converge:Converge",
     "stability": ".stability.grid:Grid",
     "crosscheck": ".crosscheck:Crosscheck",
-    "orders": ".orders:Orders",
+    "orders": ".crosscheck:Orders",
     "fit": ".fit:Fit",
 }
 #: Columns of a case and of its record, by name.

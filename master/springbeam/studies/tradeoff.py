@@ -25,10 +25,10 @@ from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import mesh_frequency, slowest_frequency
 from ..scene.tables import ALL_MODES_UP_TO
+from .comparison import comparable_until, refuse_without_reference
+from .design import RIGID, SOFT
 from .metrics import costs, errors, motion_errors, worst
-from .reference import comparable_until, refuse_without_reference
 from .rivals import TOLERANCES, Rival
-from .schemes import RIGID, SOFT
 from .study import Findings, Row, Study
 from .tables import number, table
 

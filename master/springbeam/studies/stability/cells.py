@@ -13,8 +13,7 @@ import numpy as np
 
 from ...scene import Beam
 from ...scene.laws import LAWS
-from ..design import Axis, design
-from ..schemes import RIGID, SOFT
+from ..design import RIGID, SOFT, Axis, design
 
 #: Radians of the spring's own motion in one macro step, and in a cell: IDA takes some hundred steps for each.
 _MOST_PHASE_PER_STEP, _MOST_PHASE = 30.0, 1000.0

@@ -31,8 +31,8 @@ from ...run.outcome import RunStopped
 from ...run.runner import run
 from ...scene import SceneError, scene_from_dict
 from ...scene.automatic import with_scheme_chosen
+from ..comparison import PERTURBATION, initial_speed, refuse_without_reference
 from ..metrics import motion_errors, worst
-from ..reference import PERTURBATION, initial_speed, refuse_without_reference
 from .cells import scene_dict
 
 #: In the order in which pictures and tables show them; the last must stay empty.

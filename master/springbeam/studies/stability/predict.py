@@ -19,7 +19,7 @@ from ...scene.automatic import Choice, choice
 from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from ...scene.resolution import STABLE
 from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
-from ..schemes import RIGID, SOFT
+from ..design import RIGID, SOFT
 from .linear import LinearBody, LinearPair, spectral_radius
 
 #: A coupling is called unstable where its spectral radius exceeds 1 by more than this: e-fold growth in 1000 steps.
@@ -97,7 +97,7 @@ def predict(scene: Scene) -> Prediction:
         kept = min(beam.modes_kept, len(modal.omega))
         if truncated:
             notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
-        if beam.integrator == "generalized_alpha":
+        if scene.beam.integrator == "generalized_alpha":
             notes.append("predicted for exact modes; generalized_alpha with rho_inf = 1 adds no energy of its own")
     of_the_paper = scene.contact.algorithm
     pair = None if modal is None or of_the_paper else linear_pair(scene, modal)
@@ -175,10 +175,9 @@ def _estimates(scene: Scene) -> Estimates:
 
 
 def _reduced(beam: Beam) -> tuple[Beam, bool]:
-    kept = beam.modes_kept if beam.integrator == "modal" else beam.unknowns
-    if kept <= MOST_MODES:
+    if beam.modes_kept <= MOST_MODES:
         return beam, False
-    return beam.model_copy(update={"n_modes": MOST_MODES}), True
+    return beam.model_copy(update={"n_modes": MOST_MODES, "integrator": "modal"}), True
 
 
 # -- the linearised scene -------------------------------------------------------------------------------------------
