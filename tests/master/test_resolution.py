@@ -1,5 +1,7 @@
 """Whether a macro step resolves the motion: frequencies beside the mesh's, and the criterion from both sides."""
 
+from math import factorial
+
 import numpy as np
 import pytest
 from scenes import scene_from_dict
@@ -10,13 +12,14 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import shipped_scenes
 from springbeam.scene.resolution import (
     CONTACT_STEPS,
-    CONTACT_TURN,
     LATE,
     MISMATCH,
+    MISMATCH_IF_SHORT,
     STABLE,
     WAVE_LAG,
     fastest_frequency,
     impact_frequency,
+    lateness,
     modes_below,
     not_resolved,
     peak_force_doubt,
@@ -63,20 +66,27 @@ def test_one_radian_of_the_slowest_oscillation_is_the_limit(turn, resolved):
     assert (not_resolved(scene_from_dict(lone), 0.0) is None) is resolved
 
 
+@pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
-def test_the_limits_of_the_mismatch_and_of_the_shortest_contact(share, resolved):
-    limit = share * MISMATCH
-    assert (not_resolved(PAIR, limit) is None) is resolved
-    lasted = CONTACT_STEPS * PAIR.coupling.H / share
-    assert (not_resolved(PAIR, 0.0, shortest_contact=lasted) is None) is resolved
+def test_the_limits_of_the_mismatch_and_of_the_shortest_contact(degree, share, resolved):
+    """The force of a step that ends a short contact is right as long as the ends agree."""
+    scene = with_changes(PAIR, coupling={"degree": degree})
+    assert (not_resolved(scene, share * MISMATCH[degree]) is None) is resolved
+    lasted = CONTACT_STEPS[degree] * PAIR.coupling.H / share
+    assert (not_resolved(scene, 1.01 * MISMATCH_IF_SHORT, shortest_contact=lasted) is None) is resolved
+    assert not_resolved(scene, 0.99 * MISMATCH_IF_SHORT, shortest_contact=lasted) is None
+    agreeing = {"coupling": {"scheme": "hermite", "degree": 2}}, {"beam": {"fidelity": "quasi_static"}}
+    for given in (with_changes(PAIR, **tables) for tables in agreeing):
+        lasted = CONTACT_STEPS[given.coupling.degree] * PAIR.coupling.H / share
+        assert (not_resolved(given, 0.0, shortest_contact=lasted) is None) is resolved
 
 
 def test_velocities_that_differ_matter_where_the_ends_part_or_strike():
-    """`soft`, degree 0, 2 ms: tied, the velocities differ by 0.4 of 1 m/s, which hardly moves the ends; later the pair
+    """`soft`, degree 0, 4 ms: tied, the velocities differ by 0.15 of 1 m/s, which hardly moves the ends; later the pair
     strikes the foundation and parts."""
-    coarse = with_changes(PAIR, coupling={"degree": 0, "macro_step": 2e-3})
+    coarse = with_changes(PAIR, coupling={"degree": 0, "macro_step": 4e-3})
     run, whole = (simulate(with_changes(coarse, time={"t_end": t_end})) for t_end in (0.06, 0.6))
-    assert run.summary["max_velocity_mismatch"] > 0.4
+    assert run.summary["max_velocity_mismatch"] > 0.15
     assert [event.kind for event in run.events] == ["impact"]
     assert run.summary["resolved"] is True
     exact = event_driven.simulate(run.scene, sample_times=run.time)
@@ -86,10 +96,10 @@ def test_velocities_that_differ_matter_where_the_ends_part_or_strike():
 
 
 def test_a_contact_shorter_than_a_macro_step_is_said():
-    told = not_resolved(PAIR, 0.0, shortest_contact=0.9 * PAIR.coupling.H)
+    told = not_resolved(PAIR, 0.015, shortest_contact=0.9 * PAIR.coupling.H)
     assert told is not None
     assert "a contact lasts 0.9 macro steps only" in told
-    assert not_resolved(PAIR, 0.0, shortest_contact=3.0 * PAIR.coupling.H) is None
+    assert not_resolved(PAIR, 0.015, shortest_contact=3.0 * PAIR.coupling.H) is None
 
 
 def test_a_soft_contact_within_a_macro_step_is_lost_to_an_exchange_alone():
@@ -110,8 +120,8 @@ def test_what_creeps_or_has_no_inertia_has_nothing_to_resolve():
 
 
 def test_the_step_that_is_named_resolves_the_motion():
-    """`soft`, energy 0: at 2 ms the tie is left with 60 % of the speed; the warning's H and mode count cure it."""
-    coarse = simulate(with_changes(PAIR, coupling={"macro_step": 2e-3}))
+    """`soft`, energy 0, at 4 ms, 1.7 % off: the warning's H and mode count cure it."""
+    coarse = simulate(with_changes(PAIR, coupling={"macro_step": 4e-3}))
     assert coarse.summary["resolved"] is False
     (warning,) = coarse.summary["warnings"]
     named = float(warning.split("macro_step <= ")[1].split()[0])
@@ -119,7 +129,7 @@ def test_the_step_that_is_named_resolves_the_motion():
     assert named == pytest.approx(1.0 / modal_beam(PAIR.beam).omega[-1], rel=0.1)
     for changes in (
         {"coupling": {"macro_step": named}},
-        {"coupling": {"macro_step": 2e-3}, "beam": {"n_modes": modes}},
+        {"coupling": {"macro_step": 4e-3}, "beam": {"n_modes": modes}},
     ):
         cured = simulate(with_changes(PAIR, **changes))
         assert cured.summary["resolved"] is True, changes
@@ -155,25 +165,27 @@ STIFF = with_changes(
 )
 
 
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("contacts", [1, 5])
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
-def test_the_limit_of_a_contact_depends_on_the_degree(degree, share, resolved):
+def test_a_contact_that_comes_late_is_said(degree, contacts, share, resolved):
+    """A body that crosses its way twice a second is then off by as much; each contact amplifies that."""
+    late = share * LATE[degree] / 2.0 / contacts
     scene = with_changes(STIFF, coupling={"degree": degree})
-    turn = share * CONTACT_TURN[degree]
-    lost = not_resolved(scene, 0.0, contact_frequency=turn / 1e-3, contact_steps=1)
+    lost = not_resolved(scene, 0.0, contact_frequency=1e3, late=late, contacts=contacts, pace=2.0)
     assert (lost is None) is resolved
 
 
-@pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
-def test_what_steps_of_degree_0_turn_a_contact_too_little_adds_up(share, resolved):
-    """1000 steps of 1 ms that turn it by x make it late by x²/12 s; a body that crosses its way twice a second is
-    then off by x²/6 of it. At degree 1 it is not."""
-    for strokes in (False, True):
-        turn = share * (6.0 * LATE[strokes]) ** 0.5
-        reached = {"contact_frequency": turn / 1e-3, "contact_steps": 1000, "pace": 2.0, "strokes": strokes}
-        for degree, said in ((0, not resolved), (1, False)):
-            scene = with_changes(STIFF, coupling={"degree": degree})
-            assert (not_resolved(scene, 0.0, **reached) is not None) is said
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_a_step_makes_a_contact_late_as_gauss_collocation_does(degree):
+    """Its step is the diagonal Padé quotient of exp(ix), whose phase falls short of x by this, to leading order."""
+    x, s = 0.3, degree + 1
+    numerator = sum(
+        factorial(2 * s - k) * factorial(s) / (factorial(2 * s) * factorial(k) * factorial(s - k)) * (1j * x) ** k
+        for k in range(s + 1)
+    )
+    exact = 1.0 - 2.0 * np.angle(numerator) / x
+    assert lateness(with_changes(STIFF, coupling={"degree": degree}), x) == pytest.approx(exact, rel=0.02)
 
 
 @pytest.mark.parametrize(("share", "resolved"), [(0.99, True), (1.01, False)])
@@ -192,7 +204,7 @@ def test_steps_of_the_midpoint_rule_may_lag_behind_what_an_impact_sets_off(share
         waves = impact_frequency(with_changes(PAIR, beam=midpoint).beam)
         said(waves, WAVE_LAG, {"beam": {"integrator": "modal"}}, beam=midpoint)
     together = ((3.0 + 1.0 / tip_compliance(PAIR.beam)) / PAIR.spring.mass) ** 0.5
-    said(together, LATE[False], {"coupling": {"degree": 2}}, beam={"fidelity": "quasi_static"})
+    said(together, LATE[1], {"coupling": {"degree": 2}}, beam={"fidelity": "quasi_static"})
 
 
 @pytest.mark.parametrize(("size", "degree"), [(1e-3, 0), (1e-3, 2), (7.8125e-4, 2)])
@@ -204,10 +216,7 @@ def test_a_contact_that_is_not_resolved_is_said(size, degree):
     assert "tip and lower end turn" in warning
     named = float(warning.split("macro_step <= ")[1].split()[0])
     omega = np.sqrt(1e8 * (modal_beam(STIFF.beam).inverse_tip_mass + 1.0))
-    if degree == 0:
-        assert named < 0.6 / omega  # by what all steps make it late
-    else:
-        assert named == pytest.approx(CONTACT_TURN[degree] / omega, rel=0.15)
+    assert (0.02, 0.2, 1.0)[degree] < named * omega < (0.6, 0.8, 2.5)[degree]  # by what all steps make it late
 
 
 def test_the_step_that_is_named_resolves_the_contact():

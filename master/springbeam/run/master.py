@@ -363,15 +363,15 @@ class Master(Stateful):
         free_at_end = not are_joined(inside[-1:]).any()
         of_coupling, warned = joined.report(made)
         warnings = [*balance.warnings, *warned]
-        shortest = shortest_contact(inside, events, CONTACT_STEPS * H, free_at_end=free_at_end)
+        shortest = shortest_contact(inside, events, CONTACT_STEPS[scene.coupling.degree] * H, free_at_end=free_at_end)
         unresolved = not_resolved(
             scene,
             seen.mismatch_at_events,
             shortest_contact=shortest,
             contact_frequency=seen.contact_frequency,
-            contact_steps=seen.contact_steps,
+            late=seen.late,
+            contacts=seen.contacts,
             pace=pace(inside),
-            strokes=any(event.kind.strikes for event in events),
         )
         warnings += filter(None, [unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
         neglect = {}

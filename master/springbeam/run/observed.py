@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
+from math import inf, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +13,10 @@ from ..contact.phases import Phase
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.paths import Path
 from ..results.steps import joined
-from ..results.trajectory import Event
+from ..results.trajectory import Event, EventKind
 from ..scene import Scene
-from ..scene.resolution import VIBRATION
-from .ledger import errors
+from ..scene.resolution import VIBRATION, lateness, slowest_frequency
+from ..scene.statics import tip_inertia
 from .stepping import Pair
 
 #: Warning of a run in which a force was too large for its column.
@@ -24,6 +24,8 @@ NOT_SHOWN = (
     f"compliance_force is larger than {MOST_SHOWN:g} N at times and is written as that, tie_reaction with it; "
     "the motion does not depend on either. A smaller contact.stiffness or contact.exponent keeps them in range"
 )
+#: A stroke on the foundation, which reverses the velocities, amplifies what is late as so many contacts.
+_OF_STROKE = 2
 
 
 class Observed(NamedTuple):
@@ -31,9 +33,10 @@ class Observed(NamedTuple):
 
     speed: float = 0.0  #: the largest of an end [m/s]
     mismatch: float = 0.0  #: |v_tip − z| of ends that a rigid law joins [m/s]
-    mismatch_at_events: float = 0.0  #: the same where joined ends part or strike: √ of its energy over the largest
+    mismatch_at_events: float = 0.0  #: impulse μ |v_tip − z| where they part or strike, over the momentum
     contact_frequency: float = 0.0  #: √(k (1/m_tip + 1/m)) of a soft contact at its stiffest [rad/s]
-    contact_steps: int = 0  #: with a force of a soft law
+    late: float = 0.0  #: by which the steps make a soft contact late, all together [s]
+    contacts: int = 1  #: how many, with the strokes, `_OF_STROKE` times; those within a macro step are one
     hidden: bool = False  #: whether a compliance force was too large for its column
 
 
@@ -43,26 +46,33 @@ def observed(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event
         return Observed()
     v, z = steps["v_tip_after"], steps["z_after"]
     speed, apart = float(np.abs([v, z]).max()), np.abs(v - z)
+    met = [event for event in events if event.kind.strikes or event.kind is EventKind.IMPACT]
+    apart_in_time = np.diff([event.time for event in met], prepend=-np.inf) > (scene.coupling.macro_step or 0.0)
+    contacts = int(apart_in_time @ [_OF_STROKE if event.kind.strikes else 1 for event in met]) if met else 1
     if pair.law is not None:
-        frequency, number = _of_soft_contact(pair, pair.law, steps, float(apart.max()), speed)
-        return Observed(speed, contact_frequency=frequency, contact_steps=number)
+        # A link whose ends move as one does not swing, however stiff.
+        swings = not pair.lasting or float(apart.max()) > VIBRATION * speed
+        frequency, late = _of_soft_contact(scene, pair, pair.law, steps) if swings else (0.0, 0.0)
+        return Observed(speed, contact_frequency=frequency, late=late, contacts=contacts)
     hidden = False
     if pair.joinable and not pair.lasting:
         hidden = bool((normal_compliance(scene, steps["u_tip_after"], steps[:1]) > MOST_SHOWN).any())
     at_events = _mismatch_at_events(scene, pair, steps, events)
-    return Observed(speed, float(apart[joined(steps)].max(initial=0.0)), at_events, hidden=hidden)
+    return Observed(speed, float(apart[joined(steps)].max(initial=0.0)), at_events, contacts=contacts, hidden=hidden)
 
 
 def _mismatch_at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float:
-    """Return the largest |v_tip − z| of joined ends as they part or strike the foundation, as √ of its energy.
+    """Return the largest impulse μ |v_tip − z| by which joined ends disagree as they part or strike the foundation.
 
-    That is over the largest energy of the run. Strikes less than a macro step after another one are left out, and what
-    happens at the start of a phase: they may be as slow as one likes.
+    It is over the momentum of the body that it would change the most. Either end of the last step counts: the mismatch
+    alternates, and where the step is cut it may be small by chance. Strikes less than a macro step after another one
+    are left out, and what happens at the start of a phase: they may be as slow as one likes.
     """
-    scale = float(errors(scene, steps, steps[:1], 0.0, of_interface=False).scale[-1])
     strikes = np.array([event.kind.strikes for event in events], bool)
-    counted = np.flatnonzero(strikes | np.array([event.kind.opens for event in events], bool))
-    if scale == 0.0 or not counted.size:
+    let_go = [event.kind.opens or event.kind is EventKind.UNSEATED for event in events]
+    counted = np.flatnonzero(strikes | np.array(let_go, bool))
+    free, held = pair.reduced_mass(Phase()), pair.reduced_mass(Phase(seated=True))
+    if held == 0.0 or not counted.size:
         return 0.0
     H = scene.coupling.macro_step or float(steps["size"].max())
     row = np.searchsorted(steps["events"], counted + 1.0)
@@ -74,25 +84,34 @@ def _mismatch_at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Seq
     entered = np.diff(steps["phase"], prepend=steps["phase"][0]) != 0.0
     since = np.maximum.accumulate(np.where(entered, made, 0))
     row, before = (found[late & joined(steps)[before] & (made[row] > since[before])] for found in (row, before))
-    mass = np.where(steps["phase"][before] < 3.0, pair.reduced_mass(Phase()), pair.reduced_mass(Phase(seated=True)))
-    energy = 0.5 * mass * (steps["v_tip"][row] - steps["z"][row]) ** 2
-    return sqrt(float(energy.max(initial=0.0)) / scale)
+    apart = np.abs([steps["v_tip"][row] - steps["z"][row], steps["v_tip_after"][before] - steps["z_after"][before]])
+    seated = steps["phase"][before] >= 3.0
+    impulse = np.where(seated, held, free) * apart.max(axis=0, initial=0.0)
+    of_tip, of_lower = (over.max(initial=0.0) for over in (impulse, impulse[~seated]))
+    tip, lower = _momenta(scene, pair, steps)
+    return max(float(of_tip / tip) if of_tip else 0.0, float(of_lower / lower) if of_lower else 0.0)
 
 
-def _of_soft_contact(
-    pair: Pair, law: SoftLaw, steps: np.ndarray, relative_speed: float, speed: float
-) -> tuple[float, int]:
-    """Return the frequency at the deepest penetration, also inside steps, and the number of steps with a force.
+def _momenta(scene: Scene, pair: Pair, steps: np.ndarray) -> tuple[float, float]:
+    """Return the largest momenta of the upper and of the lower body [kg·m/s], without waves that a beam carries."""
+    upper, lower = pair.upper.mass * np.abs(steps["v_tip_after"]).max(), np.abs(steps["z_after"]).max()
+    if scene.beam is not None:
+        quarter = min(2.0 / slowest_frequency(scene.beam), scene.duration or inf)
+        upper = max(upper, tip_inertia(scene.beam) * np.ptp(steps["u_tip"]) / quarter)
+    return float(upper), float(pair.lower.mass * lower) if lower else 0.0
 
-    A law that never opens is linear: how deep does not matter. A link whose ends move as one does not swing, however
-    stiff.
+
+def _of_soft_contact(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray) -> tuple[float, float]:
+    """Return the frequency at the deepest penetration, also inside steps, and `Observed.late`.
+
+    A law that never opens is linear: how deep does not matter.
     """
     forces = [steps[name] for name in ("contact_force", "contact_force_rate", "contact_force_rate_2")]
     touching = np.flatnonzero((steps["size"] > 0.0) & np.any(forces, axis=0))
-    depth = (steps["y"] - steps["u_tip"])[touching]
-    deepest = float(depth.max(initial=0.0))
-    for row in touching[depth <= 0.0] if pair.opens_softly else ():
-        before, step = steps[row - 1], steps[row]
+    at_end = steps["y"] - steps["u_tip"]
+    depth = np.maximum(at_end, np.append(0.0, at_end[:-1]))[touching]
+    for i in np.flatnonzero(depth <= 0.0) if pair.opens_softly else ():
+        before, step = steps[touching[i] - 1], steps[touching[i]]
         path = Path.through(
             (before["u_tip_after"] - before["y_after"], before["v_tip_after"] - before["z_after"]),
             (step["u_tip"] - step["y"], step["v_tip"] - step["z"]),
@@ -103,8 +122,8 @@ def _of_soft_contact(
             ),
         )
         inside = path.lowest_inside()
-        deepest = max(deepest, 0.0 if inside is None else -float(path.at(inside)))
-    if pair.lasting and relative_speed <= VIBRATION * speed:
-        return 0.0, len(touching)
+        depth[i] = 0.0 if inside is None else -path.at(inside)
     inverse_mass = sum(1.0 / body.mass for body in (pair.upper, pair.lower) if body.mass > 0.0)
-    return sqrt(law.slope(deepest) * inverse_mass), len(touching)
+    turns = np.sqrt([inverse_mass * law.slope(p) for p in depth]) * steps["size"][touching]
+    late = sum(size * lateness(scene, turn) for size, turn in zip(steps["size"][touching], turns, strict=True))
+    return sqrt(law.slope(float(depth.max(initial=0.0))) * inverse_mass), float(late)

@@ -16,13 +16,12 @@ from .tables import ORDINARY_SCHEMES, Beam
 
 #: Largest angle [rad] that the slowest oscillation may turn in a macro step: 2π steps a period.
 TURN = 1.0
-#: Largest angle [rad] that a soft contact may turn in a macro step, where its force is of degree 1, 2 in time: at 2, it
-#: lasts π/2 steps (docs/coupling.md has the errors).
-CONTACT_TURN = {1: 1.0, 2: 2.0}
-#: Share of its way that an end may move in the time by which all steps of degree 0 together make the contact late; one
-#: that turns it by x makes it late by x²/12 of itself, as the midpoint rule does. The second limit holds where
-#: strokes on the foundation amplify that.
-LATE = (0.05, 0.005)
+#: By degree d of the force: a step that turns a contact by x rad makes it late by x^(2d + 2) over this of itself, as a
+#: Gauss collocation of d + 1 stages would (for d = 0 the midpoint rule).
+COLLOCATION = (12.0, 720.0, 100800.0)
+#: Share of its way that an end may move, by degree, in the time by which all steps together make the contact late,
+#: times the number of contacts, each of which amplifies that (docs/accuracy.md has what it misses).
+LATE = (0.1, 0.05, 0.01)
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
@@ -30,11 +29,12 @@ STABLE = 3.0
 WAVE_LAG = 1.0
 #: ω α_b above which waves die out within two periods and need no resolution.
 DIES_OUT = 0.15
-#: Velocity mismatch of joined ends as they part or strike the foundation, in the norm of the energy, above which the
-#: motion is called unresolved (docs/accuracy.md has what it misses).
-MISMATCH = 0.0125
-#: Macro steps that a contact must last, or a rest on the foundation: one polynomial of the force ends a shorter one.
-CONTACT_STEPS = 1.0
+#: Impulse by which joined ends disagree as they part or strike the foundation, over the momentum of a body, above which
+#: the motion is called unresolved, by degree; and where a contact is short (docs/accuracy.md has what they miss).
+MISMATCH, MISMATCH_IF_SHORT = {0: 0.015, 1: 0.015, 2: 0.03}, 0.01
+#: Macro steps by degree below which a contact is short, or a rest on the foundation: the forces of one step tell when
+#: it ends, at degree 0 those of two.
+CONTACT_STEPS = {0: 2.0, 1: 1.0, 2: 1.0}
 #: Velocity mismatch above which it is a vibration and no error.
 VIBRATION = 0.2
 #: Periods of the fastest wave of the mesh that a window must hold for the mean of a rigid force to be settled to 5 %.
@@ -49,9 +49,9 @@ def not_resolved(
     *,
     shortest_contact: float = inf,
     contact_frequency: float = 0.0,
-    contact_steps: float = 0.0,
+    late: float = 0.0,
+    contacts: int = 1,
     pace: float = 0.0,
-    strokes: bool = False,
 ) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
 
@@ -60,19 +60,19 @@ def not_resolved(
     scene
         The scene as run.
     mismatch
-        The largest difference w of the joined ends' velocities as they part or strike the foundation, √(μ w²/2E) with
-        their reduced mass μ and the largest energy E.
+        The largest difference w of the joined ends' velocities as they part or strike the foundation, as impulse μ w of
+        their reduced mass over the momentum of the body that it would change the most.
     shortest_contact
         How long the shortest contact, or rest on the foundation, has lasted [s]; of a soft law it counts where the
         force is exchanged once per macro step.
     contact_frequency
         Of tip and lower end on a soft contact law at the deepest penetration reached [rad/s], 0 without one.
-    contact_steps
-        Steps with a contact force of a soft law.
+    late
+        By which the steps make a soft contact late, all together [s].
+    contacts
+        How many there are, with twice the strokes on the foundation.
     pace
         The largest speed of an end over how far it moves [1/s], of the faster end.
-    strokes
-        Whether the foundation was struck.
     """
     H = scene.coupling.macro_step
     if H is not None:  # steps that follow from tolerances are judged by their error
@@ -84,42 +84,55 @@ def not_resolved(
                     f"{_rounded_down(TURN / omega)} resolves it{else_}"
                 )
         if scene.massless and scene.contact.rigid:  # the ends are one oscillator, in its steps as in a soft contact's
-            contact_frequency, contact_steps = joined_frequency(scene), scene.duration / H
-        lost = _contact_lost(scene, contact_frequency, H, contact_steps, pace / LATE[strokes])
+            contact_frequency = joined_frequency(scene)
+            late = scene.duration * lateness(scene, contact_frequency * H)
+        lost = _contact_lost(scene, contact_frequency, H, late * pace * contacts)
         if lost := lost or _unstable(scene, H) or _waves_lag(scene, H):
             return lost
-    if mismatch > MISMATCH:
+    if mismatch > MISMATCH[scene.coupling.degree]:
         return (
             f"not resolved: the joined ends' velocities differ where they part or strike the foundation, by up to "
-            f"{100.0 * mismatch:.2g} % of the motion, as √ of the energies; what they do then depends on it. "
+            f"{100.0 * mismatch:.2g} % of the momentum of a body; what they do then depends on it. "
             f"{_remedy(scene)}"
         )
     held = scene.contact.rigid or scene.coupling.scheme in ORDINARY_SCHEMES  # a force that does not see the contact end
-    if H is not None and held and shortest_contact < CONTACT_STEPS * H:
+    tells = scene.coupling.scheme == "energy" and not scene.massless  # whether the mismatch says how good the force is
+    short = CONTACT_STEPS[scene.coupling.degree]
+    if H is not None and held and shortest_contact < short * H and not (tells and mismatch <= MISMATCH_IF_SHORT):
         return (
-            f"not resolved: a contact lasts {shortest_contact / H:.2g} macro steps only, so that one polynomial of the "
-            f"force decides when it ends, and with it what follows; coupling.macro_step <= "
-            f"{_rounded_down(shortest_contact / CONTACT_STEPS)} resolves it"
+            f"not resolved: a contact lasts {shortest_contact / H:.2g} macro steps only, so that the force of one or "
+            "two steps decides when it ends, and with it what follows; coupling.macro_step <= "
+            f"{_rounded_down(shortest_contact / short)} resolves it"
         )
     return None
 
 
-def _contact_lost(scene: Scene, omega: float, H: float, steps: float, pace: float) -> str | None:
-    """Return in words why ``steps`` of H [s] do not follow a contact of ``omega`` [rad/s]; ``None`` if they do.
+def lateness(scene: Scene, turn: float) -> float:
+    """Return by which share of itself a step that turns a contact by ``turn`` [rad] makes it late."""
+    degree = _force_degree(scene)
+    return turn ** (2 * degree + 2) / COLLOCATION[degree]
 
-    Those of degree 0 may make it late by 1/``pace`` [s].
+
+def _force_degree(scene: Scene) -> int:
+    """Return the degree of a contact force that is as accurate as its degree allows; exchanges are no better than 0."""
+    return scene.coupling.degree if scene.coupling.scheme == "energy" else 0
+
+
+def _contact_lost(scene: Scene, omega: float, H: float, moved: float) -> str | None:
+    """Return in words why steps of H [s] do not follow a contact of ``omega`` [rad/s]; ``None`` if they do.
+
+    ``moved`` is the share of its way that an end moves while it is late.
     """
-    projected = scene.coupling.scheme == "energy"
-    degree = scene.coupling.degree if projected else 0
-    late = steps * H * (omega * H) ** 2 / 12.0  # [s], of all steps of degree 0: it falls with the square of their size
-    excess = sqrt(late * pace) if degree == 0 else omega * H / CONTACT_TURN[degree]
-    if steps == 0 or excess <= 1.0:
+    projected, degree = scene.coupling.scheme == "energy", _force_degree(scene)
+    limit = LATE[max(degree, scene.massless)]  # there, all that moves is late
+    excess = (moved / limit) ** (0.5 / (degree + 1))
+    if excess <= 1.0:
         return None
-    raises = projected and degree < max(CONTACT_TURN) and (scene.beam is None or scene.beam.integrator == "modal")
+    raises = projected and degree + 1 < len(LATE) and (scene.beam is None or scene.beam.integrator == "modal")
     higher = ", a higher coupling.degree allows longer ones" if raises else ""
     where = "together" if scene.massless else "on the contact law at its deepest penetration"
     return (
-        f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step, {steps * omega * H:.2g} rad in all,"
+        f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step"
         f" {where}. Velocities, forces and times of contact are samples of a "
         f"faster motion; coupling.macro_step <= {_rounded_down(H / excess)} resolves it{higher}"
     )

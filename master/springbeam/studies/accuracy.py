@@ -23,12 +23,14 @@ from ..run.ledger import CHANGED
 from ..run.outcome import Progress, RunStopped
 from ..scene import Scene, SceneError, with_changes
 from ..scene.automatic import choice
-from ..scene.resolution import CONTACT_TURN, STABLE, TURN, joined_frequency, lasting_frequency, slow_oscillations
+from ..scene.resolution import STABLE, TURN, joined_frequency, lasting_frequency, slow_oscillations
 from ..scene.tables import ALL_MODES_UP_TO
 from .stability.predict import contact_frequency
 
 #: Fewest and most macro steps of a run.
 _FEWEST, _MOST = 8.0, 50_000
+#: Angle that a soft contact may turn in a macro step of degree 2 [rad].
+_CONTACT_TURN = 2.0
 #: Runs in a row that may stop early: one with half the macro step may not.
 _MOST_STOPPED = 6
 #: An estimate of the error is to be so many times smaller than the accuracy.
@@ -158,9 +160,9 @@ def _first(scene: Scene) -> float:
     rates = [omega / TURN for _, omega, _ in slow_oscillations(scene)]
     if scene.beam is not None and not scene.partners:
         if scene.coupled and not scene.contact.rigid:
-            rates.append(contact_frequency(scene) / CONTACT_TURN[2])
+            rates.append(contact_frequency(scene) / _CONTACT_TURN)
         elif scene.massless:
-            rates.append(joined_frequency(scene) / CONTACT_TURN[2])
+            rates.append(joined_frequency(scene) / _CONTACT_TURN)
         elif scene.coupled or scene.stop is not None:
             rates.append(lasting_frequency(scene.beam) / STABLE)
     return max(_FEWEST, math.ceil(0.5 * max(rates, default=0.0) * scene.duration))

@@ -1,0 +1,72 @@
+"""What the records of a run show of its resolution, with made-up records of two masses."""
+
+import numpy as np
+import pytest
+from bodies import DuffingBody, Upper
+
+from springbeam.contact.phases import Joint, Phase
+from springbeam.results.steps import STEP
+from springbeam.results.trajectory import Event, EventKind
+from springbeam.run.observed import observed
+from springbeam.run.stepping import Pair
+from springbeam.scene import load_scene, with_changes
+
+#: Of 2 kg above and 1 kg below; the tip of the records rests, so that no motion of a beam adds to its momentum.
+TIP, TOP, H = 2.0, 1.0, 1e-3
+SCENE = with_changes(load_scene("soft"), coupling={"macro_step": H})
+
+
+def pair(**contact):
+    scene = with_changes(SCENE, contact=contact)
+    return scene, Pair(scene, Upper(TIP), DuffingBody(TOP))
+
+
+def records(phase, **columns):
+    """Steps of H in ``phase``, whose last one ends on an event; ``columns`` are those before and after it."""
+    number = len(next(iter(columns.values())))
+    steps = np.zeros(number, STEP)
+    steps["time"], steps["size"] = H * np.arange(number), np.where(np.arange(number), H, 0.0)
+    steps["phase"], steps["events"][-1] = phase.number, 1.0
+    steps["phase"][-1] = Phase(Joint.FREE).number
+    for name, values in columns.items():
+        steps[name] = steps[f"{name}_after"] = values
+    return steps
+
+
+def test_ends_move_with_both_masses_unless_the_lower_one_is_held():
+    _, both = pair()
+    assert both.reduced_mass(Phase(Joint.TIED)) == pytest.approx(TIP * TOP / (TIP + TOP), rel=1e-15)
+    assert both.reduced_mass(Phase(Joint.TIED, seated=True)) == TIP
+
+
+@pytest.mark.parametrize("kind", ["separation", "release", "stop_impact", "seated"])
+@pytest.mark.parametrize(("before", "at"), [(-0.3, 0.1), (0.0, 0.3)])
+def test_the_impulse_of_a_mismatch_is_over_the_momentum_of_the_body_it_changes_more(kind, before, at):
+    """2/3 kg times 0.3 m/s, at the event or a step before: it alternates. The top has 0.4 kg·m/s, the tip 1."""
+    steps = records(Phase(Joint.TIED), v_tip=[0.0, 0.5, 0.4 + before, 0.4 + at], z=[0.0, 0.4, 0.4, 0.4])
+    seen = observed(*pair(), steps, [Event(3 * H, EventKind(kind))])
+    assert seen.mismatch_at_events == pytest.approx(0.2 / 0.4, rel=1e-12)
+
+
+def test_on_the_foundation_a_mismatch_is_the_tips_alone():
+    steps = records(Phase(Joint.TIED, seated=True), v_tip=[0.5, 0.0, -0.1, 0.3], z=[0.0] * 4)
+    seen = observed(*pair(), steps, [Event(3 * H, EventKind.UNSEATED)])
+    assert seen.mismatch_at_events == pytest.approx(0.3 / 0.5, rel=1e-12)
+
+
+def test_a_contact_is_late_by_each_steps_own_penetration():
+    """x²/12 of each step, x² = 2 λ p (1/2 + 1) H² of the deeper of its ends."""
+    stiffness, depth = 3.0, [0.0, 0.1, 0.2, -0.1]
+    steps = records(Phase(), z=np.ones(4))
+    steps["y"], steps["contact_force"] = depth, 1.0
+    seen = observed(*pair(law="compliance", stiffness=stiffness, exponent=2.0), steps, [])
+    assert seen.late == pytest.approx(2.0 * stiffness * (0.1 + 0.2 + 0.2) * 1.5 * H**3 / 12.0, rel=1e-12)
+    assert seen.contact_frequency == pytest.approx(np.sqrt(2.0 * stiffness * 0.2 * 1.5), rel=1e-12)
+
+
+def test_contacts_and_strokes_within_a_macro_step_are_one_and_strokes_count_twice():
+    kinds = [(0.0, "impact"), (1.0, "separation"), (5.0, "stop_impact"), (5.5, "stop_impact"), (5.9, "seated")]
+    steps = records(Phase(), z=np.ones(9))
+    steps["events"] = len(kinds)
+    seen = observed(*pair(), steps, [Event(H * t, EventKind(kind)) for t, kind in kinds])
+    assert seen.contacts == 3
