@@ -31,31 +31,51 @@ class Spring::Step {
         parameters_(spring.parameters_),
         state_(spring.state_),
         size_(size),
-        loads_(loads) {}
+        loads_(loads),
+        meeting_(state_.meeting != 0.0 && std::abs(state_.y - loads.tip[0]) <= tolerance()) {}
 
-  State run() {
+  Reached run(bool to_event) {
     state_.integral = state_.integral_2 = state_.stop_force = state_.stop_impulse = 0.0;
+    state_.meeting = 0.0;
     double last = -1.0;  // event's time
-    for (long stalled = 0; remaining() > 0.0; ++segments_) {
+    for (long stalled = 0; remaining() > 0.0 && !(to_event && ends()); ++segments_) {
       stalled = t_ > last ? 0 : stalled + 1;
       last = t_;
       if (stalled == most_stalled)
         throw StepFailure("spring: " + std::to_string(most_stalled) + " contact events at once, " + number(t_) +
                               " s after the step's start",
                           t_);
-      now_ = loads_.from_time(t_);
-      depth_ = !parameters_.compliant() ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
-      if (parameters_.stop_enabled) land();
+      arrive();
+      happened_ = false;
       if (state_.seated != 0.0)
         stay();
       else
         fly();
     }
-    state_.stop_force = held_ / size_;
-    return state_;
+    const Reached reached{remaining() > 0.0 ? t_ : size_, to_event && ends()};
+    state_.stop_force = held_ / reached.size;
+    if (reached.event && meeting_) state_.meeting = 1.0;
+    return reached;
   }
 
+  /// Where the segment at t_ starts, with what happens there.
+  void arrive() {
+    now_ = loads_.from_time(t_);
+    depth_ = !parameters_.compliant() ? -1.0 : meeting_ ? 0.0 : state_.y - now_.tip[0];
+    if (parameters_.stop_enabled) land();
+  }
+
+  const State& state() const { return state_; }
+
  private:
+  /// Whether an event lies at t_, later than the start by more than rounding.
+  bool ends() const { return happened_ && t_ > 4.0 * epsilon * size_ && start_ + t_ > start_; }
+
+  /// To which y is known [m].
+  double tolerance() const {
+    return parameters_.relative_tolerance * std::abs(state_.y) + parameters_.absolute_tolerance;
+  }
+
   /// What is left, or 0 where that is rounding.
   double remaining() const {
     const double left = size_ - t_;
@@ -82,8 +102,7 @@ class Spring::Step {
     if (before < 0.0) {
       const double pull = std::max(N[0], 0.0) / parameters_.mass;  // −ÿ
       const double rebound = -parameters_.restitution * before;
-      const double tolerance = parameters_.relative_tolerance * std::abs(state_.y) + parameters_.absolute_tolerance;
-      const bool dies_out = pressed && rebound * rebound <= 2.0 * pull * tolerance;
+      const bool dies_out = pressed && rebound * rebound <= 2.0 * pull * tolerance();
       state_.z = dies_out ? 0.0 : rebound;
       state_.impacts += 1.0;
       state_.last_impact = start_ + t_;
@@ -100,7 +119,7 @@ class Spring::Step {
     state_.dissipated += rest.dissipated;
     held_ += rest.impulse;
     t_ = rest.released ? t_ + rest.size : size_;
-    released_ = rest.released;
+    released_ = happened_ = rest.released;
     if (released_) state_.seated = 0.0;
     meeting_ = false;
   }
@@ -122,7 +141,8 @@ class Spring::Step {
       state_.y = event == Flight::Event::stop ? parameters_.stop_position : std::max(y, parameters_.stop_position);
     released_ = false;
     meeting_ = event == Flight::Event::contact;
-    if (event != Flight::Event::none) ++events_;
+    happened_ = event != Flight::Event::none;
+    if (happened_) ++events_;
   }
 
   Flight::Reached attempt(const Start& start) {
@@ -163,32 +183,43 @@ class Spring::Step {
   long events_ = 0;
   Loads now_;              ///< loads_ from t_ on
   double depth_ = -1.0;    ///< y − u_tip at t_
-  bool meeting_ = false;   ///< tip and top are at a contact event: y = u_tip
+  bool meeting_;           ///< tip and top are at a contact event: y = u_tip
   double held_ = 0.0;      ///< ∫N while seated
   bool released_ = false;  ///< has just left the foundation, N = 0
+  bool happened_ = false;  ///< the last segment ended at an event
 };
 
 Spring::Spring(const Parameters& p)
     : parameters_((check(p), p)), motion_(p), flight_(motion_, parameters_), state_{p.displacement, p.velocity} {}
 
-void Spring::step(double size, const Inputs& inputs, double time) {
+Spring::Reached Spring::step_to_event(double size, const Inputs& inputs, double time, bool to_event) {
   if (size < smallest_step)
     throw StepFailure("spring: a step of " + number(size) + " s is too small, its square underflows; use a step size " +
                           "of at least " + number(smallest_step) + " s",
                       0.0);
   const Loads loads = Loads::from(parameters_, inputs);
   const State before = state_;
-  state_ = Step(*this, time, size, loads).run();
-  see(loads, size, true);
+  Step step(*this, time, size, loads);
+  const Reached reached = step.run(to_event);
+  state_ = step.state();
+  const double done = reached.size;
+  see(loads, done, true);
   // Impacts turn the velocity around, y goes on: the step's integrals know the work through all of its events.
-  state_.load_work += work(load_of(parameters_, inputs), size, state_.y - before.y, state_.integral - before.y * size,
-                           state_.integral_2 - before.y * size * size / 2);
+  state_.load_work += work(load_of(parameters_, inputs), done, state_.y - before.y, state_.integral - before.y * done,
+                           state_.integral_2 - before.y * done * done / 2);
   if (!finite()) {
     state_ = before;
     throw StepFailure("spring: the motion leaves the range of floating-point numbers in a step of " + number(size) +
                           " s; use a smaller step size or smaller inputs",
                       0.0);
   }
+  return reached;
+}
+
+void Spring::strike(double time) {
+  Step step(*this, time, 0.0, {{state_.force, 0.0, 0.0}, tip()});
+  step.arrive();
+  state_ = step.state();
 }
 
 bool Spring::finite() const {

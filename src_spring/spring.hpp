@@ -36,7 +36,18 @@ class Spring {
   /// Advance by `size` [s] > 0, finite, from `time`. The work is bounded: a step that spans too much of the motion is
   /// refused.
   /// @throws StepFailure (state unchanged)
-  void step(double size, const Inputs& inputs, double time = 0.0);
+  void step(double size, const Inputs& inputs, double time = 0.0) { step_to_event(size, inputs, time, false); }
+
+  /// How far a step came [s], and whether it ended at an event.
+  struct Reached {
+    double size;
+    bool event;
+  };
+  /// The same step, if `to_event` only to the first event after its start: contact begins or ends, the top meets the
+  /// foundation or leaves it. What happens there is due in strike() or at the start of the next step.
+  Reached step_to_event(double size, const Inputs& inputs, double time, bool to_event);
+  /// At the foundation inside: rebound, or come to rest, at `time`, under the inputs as observed.
+  void strike(double time);
 
   /// Take `inputs` as acting at the present instant, for acceleration(), reaction() and contact_energy() before the
   /// first step or after an input has jumped. The motion does not depend on it. `extrapolated`: see there.
@@ -93,6 +104,7 @@ class Spring {
     double impacts = 0.0, last_impact = -1.0;
     double extrapolated = 0.0;  ///< 1: by a step, not observed
     double steps = 0.0;         ///< IDA's, since the start
+    double meeting = 0.0;       ///< 1: the last step ended early where contact begins or ends
   };
   class Step;
   void see(const Loads& loads, double t, bool extrapolated);

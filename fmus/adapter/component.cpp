@@ -10,11 +10,11 @@ void Component::enter(Phase phase, const char* event) {
   note(event);
 }
 
-bool Component::step(const char* function, double time, double size, bool to_event) {
-  const bool whole = instance.step(time, size, to_event);
+Model::Reached Component::step(const char* function, double time, double size, bool to_event) {
+  const Model::Reached reached = instance.step(time, size, to_event);
   const std::string warning = instance.take_warning();
   if (!warning.empty()) log(Status::warning, "logStatusWarning", std::string(function) + ": " + warning);
-  return whole;
+  return reached;
 }
 
 bool Component::set_debugging(const char* function, bool on, std::size_t n, const char* const categories[]) {

@@ -53,9 +53,9 @@ class Component {
   void note(const char* event) const { log(Status::ok, "logEvents", event); }
   /// Enters a phase, which is told as `event`.
   void enter(Phase phase, const char* event);
-  /// Returns whether the step came to its end, and does not only stop at an event. The model's warning is told, no
-  /// more: the step is done, and some masters stop at any status but OK.
-  bool step(const char* function, double time, double size, bool to_event = false);
+  /// A step of the instance. The model's warning is told, no more: the step is done, and some masters stop at any
+  /// status but OK.
+  Model::Reached step(const char* function, double time, double size, bool to_event = false);
   /// No category: all of them. Returns whether all of them exist; a warning names each that does not.
   bool set_debugging(const char* function, bool on, std::size_t n, const char* const categories[]);
 

@@ -195,23 +195,20 @@ fmi3Status fmi3Reset(fmi3Instance c) { return to3(fmi::reset(c, __func__)); }
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean, fmi3Boolean* eventHandlingNeeded, fmi3Boolean* terminateSimulation,
                       fmi3Boolean* earlyReturn, fmi3Float64* lastSuccessfulTime) {
-  const fmi3Status status = call(c, __func__, fmi::step_complete, [&](Slave& k) {
+  return call(c, __func__, fmi::step_complete, [&](Slave& k) {
     require(eventHandlingNeeded, "eventHandlingNeeded");
     require(terminateSimulation, "terminateSimulation");
     require(earlyReturn, "earlyReturn");
     require(lastSuccessfulTime, "lastSuccessfulTime");
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = fmi3False;
     *lastSuccessfulTime = k.instance.progress.time;
-    const bool whole = k.step("fmi3DoStep", currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
+    const auto [size, event] =
+        k.step("fmi3DoStep", currentCommunicationPoint, communicationStepSize, k.early_return_allowed);
     *lastSuccessfulTime = k.instance.progress.time;
-    *earlyReturn = !whole;
-    if (whole) return;
-    if (k.event_mode_used)
-      *eventHandlingNeeded = fmi3True;
-    else
-      k.instance.update();
+    *earlyReturn = size != communicationStepSize;
+    *eventHandlingNeeded = event && k.event_mode_used;
+    if (event && !k.event_mode_used) k.instance.update();
   });
-  return status;
 }
 
 // Values

@@ -251,7 +251,7 @@ double Instance::difference(const Variable& of, unsigned known) {
   return finite(of, (above - below) / (high - low));
 }
 
-bool Instance::step(double time, double size, bool to_event) {
+Model::Reached Instance::step(double time, double size, bool to_event) {
   if (!std::isfinite(time)) throw std::invalid_argument("currentCommunicationPoint = " + number(time));
   if (!std::isfinite(size) || size <= 0.0) {
     throw std::invalid_argument("communicationStepSize = " + number(size) + ": must be finite and > 0");
@@ -268,7 +268,7 @@ bool Instance::step(double time, double size, bool to_event) {
                                 " goes past the stop time " + number(progress.stop_time));
   }
   ensure_built();
-  double reached = size;
+  Model::Reached reached{};
   try {
     reached = model_->step(time, size, to_event);
   } catch (const Discarded&) {
@@ -276,8 +276,8 @@ bool Instance::step(double time, double size, bool to_event) {
     throw;
   }
   settle(true);
-  progress.time = time + reached;
-  return reached == size;
+  progress.time = time + reached.size;
+  return reached;
 }
 
 void Instance::update() {

@@ -36,9 +36,8 @@ class Instance {
   /// (references3.hpp) or, before the start, by a parameter.
   double partial_derivative(unsigned unknown, unsigned known);
 
-  /// Returns whether the step came to its end; Model::step says what else it can come to.
   /// @throws Discarded
-  bool step(double time, double size, bool to_event);
+  Model::Reached step(double time, double size, bool to_event);
   void update();  ///< see Model::update
   /// What the model has to say after a step; empty if nothing.
   std::string take_warning() { return std::exchange(model_->warning, {}); }

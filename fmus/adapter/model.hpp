@@ -36,10 +36,15 @@ class Model {
   /// inputs are still start values.
   virtual void observe(bool initial) = 0;
 
-  /// Called for each step, the inputs having been set; returns how far it came. Only `to_event` lets it end early,
-  /// where something happens: update() is due then.
+  /// How far a step came [s], and whether something happens there.
+  struct Reached {
+    double size;
+    bool event;
+  };
+  /// Called for each step, the inputs having been set. Only `to_event` lets it end early, where something happens, and
+  /// say so: update() is due then.
   /// @throws Discarded
-  virtual double step(double time, double size, bool to_event) = 0;
+  virtual Reached step(double time, double size, bool to_event) = 0;
 
   /// Called in event mode: what happens at this instant, impulses and impacts, happens now and not in the next step.
   virtual void update(double time) = 0;

@@ -60,7 +60,7 @@ struct BeamModel final : fmi::Model {
     if (forecasts() && (resting || beam->loads() != before)) look_ahead();
   }
 
-  double step(double, double size, bool) override {
+  Reached step(double, double size, bool) override {
     std::vector<double> before;
     if (tip_impulse != 0.0 || forecasts()) beam->save(before);
     try {
@@ -73,7 +73,7 @@ struct BeamModel final : fmi::Model {
     }
     resting = false;
     look_again();
-    return size;
+    return {size, false};
   }
 
   void update(double) override {

@@ -60,7 +60,7 @@ struct SpringModel final : fmi::Model {
     look();
   }
 
-  double step(double time, double size, bool) override {
+  Reached step(double time, double size, bool to_event) override {
     // Tools that add up their times end with a step that is nothing but rounding: the force is held over it too.
     const bool goes_on = held && size > rounding * held->size();
     if (goes_on && std::abs(size - held->size()) > rounding * held->size()) {
@@ -72,9 +72,12 @@ struct SpringModel final : fmi::Model {
     if (impulse != 0.0 || held) save(before);
     spring::Inputs present = acting();
     present.tip_displacement = tip();
+    Reached reached{};
     try {
       if (impulse != 0.0) spring->apply_impulse(impulse);
-      spring->step(size, present, time);
+      // A held force asks for steps of one size.
+      const Spring::Reached came = spring->step_to_event(size, present, time, to_event && !held);
+      reached = {came.size, came.event};
       if (goes_on) held->advance(message(), spring->displacement(), trial());
       if (!has_force()) throw spring::StepFailure(no_force(), 0.0);
     } catch (const spring::StepFailure& e) {
@@ -83,12 +86,12 @@ struct SpringModel final : fmi::Model {
     }
     if (held) look();
     check_wiring();
-    return size;
+    return reached;
   }
 
-  void update(double) override {
-    if (impulse == 0.0) return;
-    spring->apply_impulse(impulse);
+  void update(double time) override {
+    if (impulse != 0.0) spring->apply_impulse(impulse);
+    if (parameters.stop_enabled) spring->strike(time);
     look();
   }
 
@@ -305,6 +308,7 @@ fmi::Table fmi::make_table() {
   t.stop_time = 0.6;
   t.step_size = 1e-3;
   t.tolerance = 1e-6;  // for the tool's own use: what it hands on never loosens relative_tolerance
+  t.ends_steps_early = true;
   t.choices.push_back({"ContactLaw",
                        "where the contact force comes from",
                        {"external, the input contact_force",

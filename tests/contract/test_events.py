@@ -1,0 +1,196 @@
+"""Steps of the spring that end at an event (FMI 3.0: early return and event mode)."""
+
+import ctypes as ct
+import math
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+
+from springbeam import load_scene, simulate
+from springbeam.scene import with_changes
+
+OK, ERROR = 0, 3
+#: A top that falls on its foundation: y = -t - t² meets -0.1 at FALL with the velocity -1 - 2 FALL, and loses half.
+FALLING = {"linear_stiffness": 0.0, "gravity": 2.0, "velocity": -1.0, "stop_enabled": True, "stop_position": -0.1}
+FALLING |= {"restitution": 0.5}
+FALL = (math.sqrt(1.4) - 1.0) / 2.0
+
+pytestmark = pytest.mark.parametrize("version", ["3.0"])
+
+
+def told(k):
+    return k.early.value, k.event.value, k.end.value
+
+
+def handle(k):
+    """Event mode."""
+    flags = [ct.byref(ct.c_bool(True)) for _ in range(5)]
+    assert k.call("EnterEventMode") == OK, k.message
+    assert k.call("UpdateDiscreteStates", *flags, ct.byref(ct.c_double())) == OK, k.message
+    assert k.call("EnterStepMode") == OK, k.message
+
+
+def started(fmu, events=True, early=True, **values):
+    k = fmu.instance(events=events, early=early).start(**values)
+    if events:
+        assert k.call("EnterStepMode") == OK
+    return k
+
+
+def test_a_step_ends_at_an_impact_and_event_mode_applies_the_impulse(spring):
+    k = started(spring, **FALLING)
+    k.step(0.0, 0.2)
+    assert told(k) == (True, True, False)
+    assert k.reached() == pytest.approx(FALL, rel=1e-12)
+    before = -1.0 - 2.0 * FALL
+    assert k.get("displacement", "velocity") == pytest.approx([-0.1, before], rel=1e-12)
+    assert k.integer("number_of_impacts") == 0
+    token = k.state()
+    handle(k)
+    assert k.get("displacement", "velocity", "last_impact_time") == pytest.approx(
+        [-0.1, -0.5 * before, FALL], rel=1e-12
+    )
+    assert k.integer("number_of_impacts") == 1
+    assert k.get("impact_loss") == pytest.approx(0.375 * before**2, rel=1e-12)
+    rows = []
+    for again in (False, True):
+        if again:  # the event that is due belongs to the state
+            k.restore(token)
+            handle(k)
+        k.step(FALL, 0.05)
+        assert told(k) == (False, False, False)
+        rows.append(k.outputs())
+    assert rows[0] == rows[1]
+
+
+def test_without_event_mode_the_impulse_is_applied_where_the_step_ends(spring):
+    k, twin = started(spring, events=False, **FALLING), started(spring, **FALLING)
+    for one in (k, twin):
+        one.step(0.0, 0.2)
+    handle(twin)
+    assert told(k) == (True, False, False)
+    assert k.outputs() == twin.outputs()
+
+
+@pytest.mark.parametrize("events", [True, False])
+def test_where_early_return_is_forbidden_steps_are_those_of_fmi_2(spring, fmus, events):
+    k, old = started(spring, events=events, early=False, **FALLING), fmus["2.0"]["spring"].running(**FALLING)
+    for i in range(10):
+        for one in (k, old):
+            one.step(0.2 * i, 0.2)
+        assert told(k) == (False, False, False)
+        assert k.outputs() == old.outputs()
+    assert k.integer("number_of_impacts") > 3
+
+
+def test_impacts_that_die_out_are_a_few_events_and_end_at_rest(spring):
+    """Each is told once: as many events as impacts, and at last a release by a force that lifts the top."""
+    k, time, events = started(spring, **FALLING), 0.0, 0
+    while time < 2.0:
+        k.step(time, 2.0 - time)
+        time = k.reached()
+        if k.event.value:
+            events += 1
+            handle(k)
+    impacts = k.integer("number_of_impacts")
+    assert (events, k.get("velocity")) == (impacts, 0.0)
+    assert 5 < impacts < 50
+    assert k.derive("external_force", 1, 4.0) == OK  # more than m g = 2 after 0.5 s
+    k.step(time, 1.0)
+    assert told(k) == (True, True, False)
+    assert k.reached() == pytest.approx(time + 0.5, rel=1e-12)
+    handle(k)
+    k.set("external_force", 2.1)
+    k.step(k.reached(), 0.3)
+    assert told(k) == (False, False, False)
+    assert k.get("displacement") == pytest.approx(-0.1 + 0.1 * 0.3**2 / 2, rel=1e-9)
+
+
+def test_a_held_force_asks_for_whole_steps(spring):
+    values = {"contact_law": 2, "communication_step": 0.2, "tip_response": 1e-3, "tip_displacement": 10.0}
+    k = started(spring, **FALLING, **values)
+    k.step(0.0, 0.2)
+    assert told(k) == (False, False, False)
+    assert k.integer("number_of_impacts") > 0
+
+
+def test_fmpy_handles_the_event(spring):
+    """Two rows at the impact, before and after it, where steps may end early."""
+    names = ["velocity", "number_of_impacts"]
+    runs = {
+        early: simulate_fmu(
+            str(spring.path), stop_time=0.2, output_interval=0.05, start_values=FALLING, output=names,
+            use_event_mode=True, early_return_allowed=early,
+        )
+        for early in (True, False)
+    }  # fmt: skip
+    at = np.flatnonzero(np.isclose(runs[True]["time"], FALL, rtol=1e-12))
+    assert len(at) == 2
+    before, after = runs[True][at]
+    assert after["velocity"] == pytest.approx(-0.5 * before["velocity"], rel=1e-12)
+    assert (before["number_of_impacts"], after["number_of_impacts"]) == (0, 1)
+    assert len(runs[True]) == len(runs[False]) + 2 * runs[True]["number_of_impacts"][-1]
+    assert runs[True]["velocity"][-1] == pytest.approx(runs[False]["velocity"][-1], rel=1e-10)
+
+
+def events_of_the_pair(beam, spring, size, end):
+    """Times of the events of scene `soft` with the law inside, in steps of ``size``.
+
+    The spring sees the tip as a parabola through its position at both ends of the step, which is therefore repeated,
+    and the beam the contact force as a line.
+    """
+    scene = load_scene("soft")
+    law = {
+        "contact_law": 2,
+        "compliance_stiffness": scene.contact.stiffness,
+        "compliance_exponent": scene.contact.exponent,
+    }
+    stop = {"stop_enabled": True, "stop_position": scene.stop.position}
+    same = {name: getattr(scene.spring, name) for name in ("mass", "linear_stiffness", "cubic_stiffness")}
+    body = ("young_modulus", "shear_modulus", "n_elements", "initial_velocity_slope")
+    upper = beam.running(**{name: getattr(scene.beam, name) for name in body})
+    lower = started(spring, **same, **law, **stop)
+    time, found = 0.0, []
+    while time < end - 1e-9:
+        tokens = [(k, k.state()) for k in (upper, lower)]
+        (u, v), force = upper.get("tip_displacement", "tip_velocity"), lower.get("reaction")
+        bend, change = upper.get("tip_acceleration"), math.inf
+        while abs(change) > 1e-15:
+            lower.set("tip_displacement", u)
+            assert lower.derive("tip_displacement", 1, v) == lower.derive("tip_displacement", 2, bend) == OK
+            lower.step(time, min(size, end - time))
+            done = lower.reached() - time
+            upper.set("tip_force", force)
+            assert upper.derive("tip_force", 1, (lower.get("reaction") - force) / done) == OK
+            upper.step(time, done)
+            through = 2.0 * (upper.get("tip_displacement") - u - v * done) / done**2
+            change, bend = (through - bend) * done**2 / 2.0, through
+            if abs(change) > 1e-15:
+                for k, token in tokens:
+                    k.restore(token)
+        for k, token in tokens:
+            assert k.call("FreeFMUState", ct.byref(token)) == OK
+        time = lower.reached()
+        if lower.event.value:
+            found.append(time)
+            handle(lower)
+    return np.array(found)
+
+
+def test_events_are_at_the_times_of_the_masters_run(beam, spring):
+    """Separation, an impact on the foundation and contact in scene `soft` with a law inside, to 1e-9 s.
+
+    Both runs have errors of order H²: compared are their limits, from two step sizes each.
+    """
+    end = 0.46
+    soft = with_changes(load_scene("soft"), contact={"law": "compliance"}, time={"t_end": end})
+    masters = [
+        np.array([event.time for event in simulate(with_changes(soft, coupling={"macro_step": size})).events])
+        for size in (1.25e-4, 6.25e-5)
+    ]
+    ours = [events_of_the_pair(beam, spring, size, end) for size in (2.5e-4, 1.25e-4)]
+    limits = [fine + (fine - coarse) / 3.0 for coarse, fine in (masters, ours)]
+    assert len(limits[1]) == 3
+    # The pair begins in contact, which the master books as its first event.
+    assert limits[1] == pytest.approx(limits[0][1:], rel=0.0, abs=1e-9)
