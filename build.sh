@@ -155,7 +155,7 @@ case $command in
     build
     failed=
     say "C++ tests"
-    $venv/bin/ctest --test-dir build --output-on-failure || failed="C++ tests"
+    $venv/bin/ctest --test-dir build --output-on-failure --parallel "${JOBS:-$(nproc)}" || failed="C++ tests"
     say "Python tests"
     $python -m pytest -n auto --dist worksteal -m "not slow" "$@" || failed="${failed:+$failed and }Python tests"
     [ -z "$failed" ] || die "failed: $failed"
