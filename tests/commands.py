@@ -1,13 +1,10 @@
 """The command in this process, one that is interrupted, and what it has written: for tests of several folders."""
 
-from __future__ import annotations
-
 from functools import cache
-from pathlib import Path
 
 import typer
 from typer import testing
-from typer.testing import CliRunner, Result
+from typer.testing import CliRunner
 
 from springbeam.cli import app
 
@@ -21,19 +18,19 @@ HANGS = 3600.0
 PLAIN = {"COLUMNS": "80", "TERMINAL_WIDTH": None, "FORCE_COLOR": None, "PY_COLORS": None, "GITHUB_ACTIONS": None}
 
 
-def command(*arguments: object) -> Result:
+def command(*arguments):
     """Return what ``springbeam ARGUMENTS`` printed and its exit code."""
     return CliRunner(env=PLAIN).invoke(app, [str(argument) for argument in arguments], prog_name="springbeam")
 
 
-def printed(*arguments: object) -> str:
+def printed(*arguments):
     """Return what ``springbeam ARGUMENTS`` prints; it must end well and complain of nothing."""
     result = command(*arguments)
     assert (result.exit_code, result.stderr) == (0, ""), f"{result.output}\n{result.exception!r}"
     return result.stdout
 
 
-def refused(*arguments: object) -> str:
+def refused(*arguments):
     """Return the error of ``springbeam ARGUMENTS``, which must be bad input: exit code 2 and nothing printed."""
     result = command(*arguments)
     assert (result.exit_code, result.stdout) == (2, ""), result.output
@@ -41,7 +38,7 @@ def refused(*arguments: object) -> str:
     return result.stderr
 
 
-def written(directory: Path) -> dict[str, bytes]:
+def written(directory):
     """Return the files to which a run appends: those of one that goes on are, to the last byte, those of the whole."""
     return {path.name: path.read_bytes() for path in directory.iterdir() if path.suffix in (".csv", ".bin")}
 
@@ -49,10 +46,10 @@ def written(directory: Path) -> dict[str, bytes]:
 class Interrupt:
     """Ctrl-C at the call of this number."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, number):
         self.left = number
 
-    def __call__(self, *_: object) -> None:
+    def __call__(self, *_):
         self.left -= 1
         if self.left == 0:
             raise KeyboardInterrupt

@@ -1,13 +1,9 @@
 """Fixtures for all tests."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 # Before numpy is imported, and for the processes that tests start. The matrices are small, and tests run on all cores:
 # more threads of OpenBLAS only wait for each other, and spin meanwhile.
@@ -36,7 +32,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
-def fmu_folder() -> Path:
+def fmu_folder():
     """The folder with the built FMUs."""
     folder = ROOT / "fmus"
     missing = [name for name in ("beam.fmu", "spring.fmu", "beam3.fmu", "spring3.fmu") if not (folder / name).is_file()]
@@ -46,7 +42,7 @@ def fmu_folder() -> Path:
 
 
 @pytest.fixture
-def none_kept() -> Iterator[None]:
+def none_kept():
     """No body of an FMU is kept from an earlier test, nor for a later one."""
     release()
     yield
@@ -54,14 +50,14 @@ def none_kept() -> Iterator[None]:
 
 
 @pytest.fixture
-def unpainted(monkeypatch: pytest.MonkeyPatch) -> None:
+def unpainted(monkeypatch):
     """Pictures are composed and their files made, but nothing is painted: that is most of the time a command takes.
 
     tests/master/test_plots.py and the tests of each study look at pictures.
     """
     paint = Figure.savefig
 
-    def save(figure: Figure, file: Any, **options: Any) -> None:
+    def save(figure, file, **options):
         if isinstance(file, Path):
             file.touch()
         else:  # the frames of an animation
@@ -79,7 +75,7 @@ COMPLIANCE = springbeam.with_changes(
 
 
 @pytest.fixture(scope="session")
-def reference() -> np.ndarray:
+def reference():
     """y at 1, 2, … 400 ms of that scene by the event-driven solver."""
     times = np.arange(1, 401) * 1e-3
     solution = event_driven.simulate(COMPLIANCE, sample_times=times)
@@ -87,7 +83,7 @@ def reference() -> np.ndarray:
 
 
 @pytest.fixture(scope="session")
-def master_run() -> dict[float, np.ndarray]:
+def master_run():
     """y at 1, 2, … 400 ms of that scene by `springbeam run`, per macro step."""
     runs = {}
     for size in (1e-3, 5e-4):

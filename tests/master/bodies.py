@@ -3,20 +3,20 @@
 A beam has the modes of `springbeam.monolithic`; the steps share nothing with it nor with the FMUs, so that the coupling
 is tested by itself:
 
-* `ModalBody`: a linear body in its modes, each stepped by its matrix exponential;
+* `ModalBody`: a linear body in its modes, each stepped by its exact response to a polynomial;
 * `DuffingBody`: m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series of order 22.
 """
 
-from functools import reduce
+from functools import cache, partial, reduce
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.polynomial import polyint, polymul, polyval
-from scipy.linalg import expm
 
+from springbeam.bodies.end_loaded import EndLoaded
 from springbeam.bodies.factory import load_bodies
-from springbeam.bodies.force import combined, shifted, work_on
+from springbeam.bodies.force import shifted, work_on
 from springbeam.bodies.protocol import NO_FORCE, BeamBody, Body, Energies, Force, Motion
 from springbeam.coupling.protocol import Step
 from springbeam.monolithic.semi_discrete import Loads, modal_beam
@@ -24,6 +24,7 @@ from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 from springbeam.run.outcome import RunStopped
 from springbeam.scene import Beam
+from springbeam.studies.stability.linear import impulse_integrals
 
 
 class Double(Body):
@@ -63,9 +64,9 @@ class ModalBody(Double, BeamBody):
         self.omega, self.b = np.asarray(omega, float), np.asarray(b, float)
         self.a, self.v = np.array(a, float), np.array(v, float)
         self.f = np.broadcast_to(np.asarray(f, float), self.omega.shape)
-        self.alpha, self._sampler = alpha, sampler
+        self._damping, self._sampler = alpha * self.omega**2, sampler
+        self._responses = cache(partial(impulse_integrals, self.omega**2, self._damping))
         self.mass = 1.0 / float(self.b @ self.b)
-        self._maps = {}
         self._load = np.zeros((3, len(self.omega)))
         self.patterns = []  #: what a unit of each load is in the modes
 
@@ -77,45 +78,29 @@ class ModalBody(Double, BeamBody):
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
         self.steps += 1
-        p = np.outer(contact, self.b) + self._load
-        p[0] += self.f
-        before, (f, df, ddf) = self.a, self._load
-        i1, i2 = self._step(size, p)
-        # By parts, as `springbeam.bodies.force.work_on`.
-        once, twice = i1 - before * size, i2 - before * (0.5 * size * size)
-        ends = f + size * (df + 0.5 * size * ddf)
-        self._work += float(ends @ (self.a - before) - df @ once - ddf @ (size * once - twice))
-        self._integrals = (float(self.b @ i1), float(self.b @ i2))
-        return self.motion()
+        a, v, S = self.a, self.v, self._responses(size)
+        f = np.outer(contact, self.b) + self._load
+        f[0] += self.f
+        stored = sum(self.energies()[:2])
 
-    def _step(self, h, p):
-        """State per mode (ωa, ȧ, p, ṗ, p̈, ∫a, ∫∫a); dissipation by W(2h) = W(h) + E(h)ᵀW(h)E(h)."""
-        if h not in self._maps:
-            r = len(self.omega)
-            A = np.zeros((r, 7, 7))
-            A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = self.omega, -self.omega, -self.alpha * self.omega**2
-            A[:, 1, 2] = A[:, 2, 3] = A[:, 3, 4] = 1.0
-            A[:, 5, 0] = 1.0 / self.omega
-            A[:, 6, 5] = 1.0
-            doublings = max(0, int(np.ceil(np.log2(h * np.abs(A).sum(axis=2).max()))) - 1)
-            small = h / 2**doublings
-            E, W = expm(A * small), np.zeros((r, 7, 7))
-            nodes, weights = np.polynomial.legendre.leggauss(12)
-            for x, w in zip(nodes, weights, strict=True) if self.alpha else ():
-                rate = expm(A * (0.5 * (x + 1.0) * small))[:, 1, :]
-                W += 0.5 * w * small * rate[:, :, None] * rate[:, None, :]
-            W *= self.alpha * self.omega[:, None, None] ** 2
-            for _ in range(doublings):
-                W = W + np.swapaxes(E, 1, 2) @ W @ E
-                E = E @ E
-            self._maps[h] = (E, W)
-        E, W = self._maps[h]
-        zero = np.zeros_like(self.a)
-        x = np.stack([self.omega * self.a, self.v, *p, zero, zero], axis=1)
-        self._dissipated += float(np.einsum("ri,rij,rj", x, W, x))
-        x = np.einsum("rij,rj->ri", E, x)
-        self.a, self.v = x[:, 0] / self.omega, x[:, 1]
-        return x[:, 5], x[:, 6]
+        def integral(k):
+            """Return the k-fold one of a."""
+            return (S[k] + self._damping * S[k + 1]) * a + S[k + 1] * v + (f * S[k + 2 : k + 5]).sum(axis=0)
+
+        self.a, i1, i2 = map(integral, range(3))
+        self.v = S[0] * v - self.omega**2 * S[1] * a + (f * S[1:4]).sum(axis=0)
+        self._integrals = (float(self.b @ i1), float(self.b @ i2))
+        once, twice = i1 - a * size, i2 - a * (0.5 * size * size)
+
+        def work(force):
+            """Return that of a force on all modes, by parts as `springbeam.bodies.force.work_on`."""
+            end = force[0] + size * (force[1] + 0.5 * size * force[2])
+            return float(end @ (self.a - a) - force[1] @ once - force[2] @ (size * once - twice))
+
+        self._work += work(self._load)
+        if self._damping.any():
+            self._dissipated += work(f) - (sum(self.energies()[:2]) - stored)
+        return self.motion()
 
     def motion(self):
         return Motion(float(self.b @ self.a), float(self.b @ self.v), *self._integrals)
@@ -149,7 +134,7 @@ def unit_beam(n, stiffness=100.0, slope=-1.0):
 _ORDER = 22
 
 
-class DuffingBody(Double):
+class DuffingBody(Double, EndLoaded):
     """m ÿ + α ẏ + k1 y + k2 y³ = −C + N + f_s by Taylor series in steps short enough for rounding."""
 
     CHANGES = (*Double.CHANGES, "y", "z")
@@ -158,20 +143,10 @@ class DuffingBody(Double):
         super().__init__()
         self.mass, self.k1, self.k2, self.damping, self.external = mass, k1, k2, damping, external
         self.y, self.z = float(y), float(z)
-        self._load = NO_FORCE
-
-    def expect_loads(self, loads):
-        self._shares = [-self.mass if load.on == "base" else 1.0 for load in loads]
-
-    def set_loads(self, forces):
-        self._load = combined(self._shares, forces)
-
-    def load_on_end(self):
-        return self._load
 
     def advance(self, time, size, contact, foundation=NO_FORCE):
         self.steps += 1
-        force = tuple(n - p + f for n, p, f in zip(foundation, contact, self._load, strict=True))
+        force = tuple(n - p + f for n, p, f in zip(foundation, contact, self._on_end, strict=True))
         start = self.motion()
         i1 = i2 = done = 0.0
         while done < size:
@@ -190,7 +165,7 @@ class DuffingBody(Double):
             i1 += _value(once, h)
             self.y, self.z = _value(y, h), _value(z, h)
         self._integrals = (i1, i2)
-        self._work += work_on(self._load, start, self.motion(), size)
+        self._work += work_on(self._on_end, start, self.motion(), size)
         return self.motion()
 
     def _series(self, f0, f1, f2):

@@ -17,11 +17,6 @@ BEAM = Beam.with_ones(
     density=2.0, area=0.5, second_moment_of_area=0.3, young_modulus=30.0, shear_modulus=50.0, shear_coefficient=0.8,
     length=1.3, n_elements=4, distributed_load=-1.5, tip_load_coefficient=4.0,
 )  # fmt: skip
-STIFFNESS = 1.0 / statics.tip_compliance(BEAM)
-
-
-def body(alpha=0.0, degree=0, tip=0.1):
-    return QuasiStaticBeam(BEAM.model_copy(update={"alpha_b": alpha}), degree, tip, 0.0)
 
 
 # -- statics --------------------------------------------------------------------------------------------------------
@@ -35,6 +30,8 @@ def test_statics_are_those_of_a_mesh_that_holds_them():
     assert statics.tip_compliance(BEAM) == pytest.approx(by_force[d.tip], rel=1e-12)
     assert statics.tip_load_deflection(BEAM) == pytest.approx(by_load[d.tip], rel=1e-12)
     assert statics.load_energy(BEAM) == pytest.approx(load @ by_load, rel=1e-12)
+    at_rest = QuasiStaticBeam(BEAM, 0, statics.tip_load_deflection(BEAM), 0.0).energies()
+    assert at_rest.potential == pytest.approx(0.5 * load @ by_load, rel=1e-12)
     sampler = d.deflection_sampler()
     np.testing.assert_allclose(statics.tip_force_shape(BEAM, SHAPE_POINTS), sampler @ by_force, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(statics.load_shape(BEAM, SHAPE_POINTS), sampler @ by_load, rtol=1e-11, atol=1e-15)
@@ -49,9 +46,6 @@ def test_locking_is_the_stiffness_of_the_mesh_over_that_of_the_beam(degree):
     d = assemble(beam)
     ratio = statics.tip_compliance(beam) / spsolve(d.K, d.tip_vector)[d.tip]
     assert statics.locking(beam) == pytest.approx(ratio, rel=1e-11)
-
-
-# -- the body -------------------------------------------------------------------------------------------------------
 
 
 # -- the pair -------------------------------------------------------------------------------------------------------

@@ -1,7 +1,5 @@
 """Formulas, shock spectra, power spectra and settled motion, beside closed forms and integrals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from runs import a_trajectory

@@ -159,3 +159,5 @@ def test_a_peak_may_be_where_the_run_begins():
     """C = 1 − t and no row at 0.2 s: over a window of 0.2 s the mean from the start on is 0.9 N."""
     steps = steps_with(lambda t: (1.0 - t, -1.0, 0.0), np.linspace(0.0, 1.0, 8))
     assert found(steps, window=0.2)["contact_force_max"] == pytest.approx(0.9, rel=1e-13)
+    struck = found(steps, Event(0.0, "impact", impulse_contact=0.05), window=0.2)
+    assert struck["contact_force_max"] == pytest.approx(0.9 + 0.05 / 0.2, rel=1e-13)

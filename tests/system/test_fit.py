@@ -1,7 +1,5 @@
 """Measured data beside a run, and keys found by them: on data made with known keys, shifts and noise."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

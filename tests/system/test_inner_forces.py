@@ -1,7 +1,5 @@
 """Accelerations, clamp forces and stresses of a run: of the reference, of statics, and of the spring's equation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Numbers and spectra of runs: beside closed forms of linear oscillators, and by the command."""
 
-from __future__ import annotations
-
 import csv
 import json
 from math import pi, sqrt
