@@ -10,6 +10,7 @@ from pydantic import BaseModel
 
 from springbeam.bodies.factory import load_bodies
 from springbeam.contact.phases import Phase
+from springbeam.coupling.soft import SoftSolver
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 from springbeam.scene import load_scene, with_changes
@@ -149,6 +150,7 @@ SET_ANEW = {
     # Follows from the records of the recorder.
     *("Balance._first", "Balance._scale", "Log._first", "Log._past", "Log.events", "Log._records", "Log._events"),
     "Log._shapes",
+    "RigidWall.state",
     # In what the body saves.
     "Fmu.steps",
     "Fmu.rewinds",
@@ -158,21 +160,22 @@ SET_ANEW = {
 }
 
 
-def attributes(part, seen):
-    """(name, whether it is remembered, value) of everything that ``part`` consists of."""
+def attributes(part, kept, seen):
+    """(name, whether it is remembered, value) of everything that ``part`` consists of; ``kept`` saves its state."""
     seen[id(part)] = part
     for name, value in vars(part).items():
         ours = type(value).__module__.startswith("springbeam.") and hasattr(value, "__dict__")
         if ours and name != "state" and not isinstance(value, (Phase, Enum)):
             if id(value) not in seen and not isinstance(value, (BaseModel, MemoryRecorder)):
-                yield from attributes(value, seen)
+                yield from attributes(value, kept, seen)
         else:
-            yield f"{type(part).__name__}.{name}", name == "state", value
+            yield f"{type(part).__name__}.{name}", name == "state" and part in kept, value
 
 
-def snapshot(part):
-    found = []
-    for name, remembered, value in attributes(part, {}):
+def snapshot(simulation):
+    found, kept = [], list(simulation._parts().values())
+    kept += [part._simpler for part in kept if isinstance(part, SoftSolver)]  # in the state of the other one
+    for name, remembered, value in attributes(simulation, kept, {}):
         with suppress(TypeError, AttributeError, ValueError, pickle.PicklingError):  # functions, what belongs to C
             found.append((name, remembered, pickle.dumps(value)))
     return found

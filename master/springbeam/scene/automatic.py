@@ -5,9 +5,11 @@ The choice depends on the scene alone (``docs/coupling.md``, "The scheme that fi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from .linearised import spring_frequency
+from .messages import filled
 from .reading import with_changes
 from .resolution import STABLE, TURN, mesh_frequency, slowest_frequency
 from .scene import Scene
@@ -21,34 +23,37 @@ class Choice(NamedTuple):
     because: str
 
 
+#: What decides before the frequencies do, the first that holds: whether it does, scheme and degree, and the reason.
+_DECIDED: tuple[tuple[Callable[[Scene], bool], str, int, str], ...] = (
+    (lambda s: s.contact.algorithm, "energy", 0, "{contact.law}"),
+    (lambda s: s.beam is None, "energy", 0, "one body"),
+    (lambda s: s.beam is not None and s.beam.integrator != "modal", "energy", 0, "{beam.integrator}"),
+    (lambda s: s.massless, "energy", 2, "{beam.fidelity}"),
+    (lambda s: not s.contact.rigid, "energy", 2, "{contact.law}"),
+    (lambda s: s.contact.impact == "rest" and s.spring is not None, "energy", 2, "{contact.impact}"),
+    (lambda s: s.coupling.adaptive, "hermite", 2, "the steps follow from tolerances"),
+)
+
+
 def choice(scene: Scene) -> Choice:
     """Return the scheme and degree that fit ``scene``, whatever it asks for."""
-    beam, coupling = scene.beam, scene.coupling
-    if scene.contact.algorithm:
-        return Choice("energy", 0, f'contact.law = "{scene.contact.law}"')
     if scene.partners:
         return Choice("energy", _highest_degree(scene), "a body that is not our own")
-    if beam is None:
-        return Choice("energy", 0, "one body")
-    if beam.integrator != "modal":
-        return Choice("energy", 0, f'beam.integrator = "{beam.integrator}"')
-    if beam.fidelity == "quasi_static":
-        return Choice("energy", 2, 'beam.fidelity = "quasi_static"')
-    if not scene.contact.rigid:
-        return Choice("energy", 2, f'contact.law = "{scene.contact.law}"')
-    if scene.contact.impact == "rest" and scene.spring is not None:
-        return Choice("energy", 2, 'contact.impact = "rest"')
-    if coupling.macro_step is None:
-        return Choice("hermite", 2, "the steps follow from tolerances")
-    H = coupling.macro_step
+    for decides, scheme, degree, because in _DECIDED:
+        if decides(scene):
+            return Choice(scheme, degree, filled(scene, because))
+    beam, H = scene.beam, scene.coupling.H
+    assert beam is not None
     fastest = max(mesh_frequency(beam), 0.0 if scene.spring is None else spring_frequency(scene))
     bound = f"the whole mesh's ω_max H = {fastest * H:.3g}"
     if fastest * H <= STABLE:
         return Choice("hermite", 2, f"{bound} <= {STABLE:g}")
-    slowest = slowest_frequency(beam)
-    if slowest * H <= TURN:
-        return Choice("energy", 2, f"{bound} > {STABLE:g}")
-    return Choice("energy", 0, f"ω₁H = {slowest * H:.3g} > {TURN:g}")
+    turn = slowest_frequency(beam) * H
+    return (
+        Choice("energy", 2, f"{bound} > {STABLE:g}")
+        if turn <= TURN
+        else Choice("energy", 0, f"ω₁H = {turn:.3g} > {TURN:g}")
+    )
 
 
 def _highest_degree(scene: Scene) -> int:

@@ -49,6 +49,11 @@ def at(scene: Scene, place: str) -> str:
     return f"[{table}] {key} = {toml_of(getattr(content, key))}"
 
 
+def filled(scene: Scene, text: str) -> str:
+    """Return ``text`` with keys and their values in place of ``{table.key}``."""
+    return re.sub(r"\{(\w+\.\w+)\}", lambda found: at(scene, found[1]), text)
+
+
 def _alternatives(annotation: Any) -> tuple[Any, ...]:
     """Return the types that an annotation allows, None last."""
     return get_args(annotation) if get_origin(annotation) in (Union, UnionType) else (annotation,)

@@ -7,14 +7,13 @@ with its value. Those that need numbers yield such lines; there ``at("table.key"
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterator
 from functools import partial
 
 from .laws import laws_that
 from .linearised import largest_load, spring_energy, well_depth
 from .loads import MOST_POINTS
-from .messages import at
+from .messages import at, filled
 from .partners import ForeignFmu, PointMass, RigidWall
 from .scene import Scene
 from .statics import bending_stiffness, shear_stiffness, tip_compliance
@@ -31,7 +30,7 @@ At = Callable[[str], str]
 def impossible(scene: Scene) -> list[str]:
     """Return why ``scene`` cannot be run, as lines ``[table] key = value: reason and remedy``; empty if it can."""
     try:
-        found = [_said(scene, text) for broken, text in _RULES if broken(scene)]
+        found = [filled(scene, text) for broken, text in _RULES if broken(scene)]
         found += [line for check in _CHECKS for line in check(scene, partial(at, scene))]
         if not found:
             beam = scene.beam
@@ -421,8 +420,3 @@ _CHECKS = (
     _coupling_resolves,
     _loads_act,
 )
-
-
-def _said(scene: Scene, text: str) -> str:
-    """Return ``text`` with keys and values in place of ``{table.key}``."""
-    return re.sub(r"\{(\w+\.\w+)\}", lambda found: at(scene, found[1]), text)
