@@ -35,24 +35,14 @@ constexpr std::size_t least_order = 4;  ///< of R, where the motion is resolved 
 
 enum Unknown { q, p, A, B, e, unknowns };
 
-std::vector<Crossing> crossings(const Parameters& parameters) {
-  const int distances = (parameters.compliant() ? 1 : 0) + (parameters.stop_enabled ? 1 : 0);
-  std::vector<Crossing> all;
-  for (int i = 0; i < distances; ++i) all.insert(all.end(), {Crossing::falling, Crossing::rising});
-  return all;
-}
-
 }  // namespace
 
 Flight::Flight(const Motion& motion, const Parameters& parameters)
     : motion_(motion),
       parameters_(parameters),
-      contact_(parameters.compliant() ? 0 : -1),
-      stop_(!parameters.stop_enabled ? -1
-            : parameters.compliant() ? 2
-                                     : 0),
+      distances_{parameters.stop_enabled, parameters.compliant()},
       part_(part_length(parameters)),
-      solver_(unknowns, crossings(parameters)) {}
+      solver_(unknowns) {}
 
 Flight::Reached Flight::run(const Start& start) {
   start_ = start;
@@ -68,13 +58,7 @@ Flight::Reached Flight::run(const Start& start) {
   const Opening opening = open(motion, pace, tolerances);
   launch(motion, pace, tolerances, opening);
 
-  Event event = Event::none;
-  while (event == Event::none && solver_.advance() == IdaSolver::Outcome::event) {
-    if (stop_ >= 0 && solver_.fell(stop_))
-      event = Event::stop;
-    else if (contact_ >= 0 && solver_.fell(contact_))
-      event = Event::contact;
-  }
+  const auto event = static_cast<Event>(solver_.advance());
   const double H = size_, s = solver_.s(), y = displacement();
   if (event == Event::none && parameters_.stop_enabled && start.gap + (y - start.y) < -tolerances.y)
     throw IdaError("the top passed the stop unnoticed");
@@ -92,7 +76,7 @@ void Flight::begin(double size) {
   loads_ = start_.loads.scaled(size);
 }
 
-/// Finds out, too, whether the top touches the tip, and how the distances begin.
+/// Finds out, too, whether the top touches the tip.
 Expansion Flight::expand() {
   Expansion motion(start_.y, start_.z, start_.depth, loads_, size_);
   const auto extend = [&] {
@@ -100,17 +84,12 @@ Expansion Flight::expand() {
   };
   touching_ = false;
   extend();
-  if (parameters_.compliant() && Watch::direction(motion.depth) > 0.0) {
+  if (parameters_.compliant() && direction(motion.depth) > 0.0) {
     touching_ = true;
     motion = Expansion(start_.y, start_.z, start_.depth, loads_, size_);
     extend();
   }
   if (start_.released) motion.y[2] = 0.0;
-  Series depth = motion.depth, gap = motion.y;
-  for (double& coefficient : depth) coefficient *= touching_ ? 1.0 : -1.0;
-  contact_watch_ = Watch(depth);
-  gap[0] = start_.gap;
-  if (stop_ >= 0) stop_watch_ = Watch(gap);
   return motion;
 }
 
@@ -199,7 +178,8 @@ bool Flight::within_reach(const Expansion& motion) const {
     for (std::size_t k = 1; k <= motion.highest; ++k) way += std::abs(c[k]);
     return 1.01 * way >= std::abs(distance);
   };
-  return (stop_ >= 0 && travels(motion.y, start_.gap)) || (contact_ >= 0 && travels(motion.depth, start_.depth));
+  return (parameters_.stop_enabled && travels(motion.y, start_.gap)) ||
+         (parameters_.compliant() && travels(motion.depth, start_.depth));
 }
 
 void Flight::launch(const Expansion& motion, const Pace& pace, const Tolerances& tolerances, const Opening& opening) {
@@ -264,17 +244,12 @@ void Flight::jacobian(double s, double c, const double* Y, const double*, double
   at(e, p) = -2.0 * motion_.damping() * slope / H - contact.dissipation_by_rate;
 }
 
-void Flight::events(double s, const double* Y, double* g) const noexcept {
+Distance Flight::distance(int which, double s, const double* Y) const noexcept {
   const double rise = R_.rise(s) + Y[q], slope = R_.rate(s) + Y[p];
-  if (stop_ >= 0) {
-    g[stop_] = stop_watch_.distance(start_.gap + rise, s);
-    g[stop_ + 1] = stop_watch_.rate(slope, s);
-  }
-  if (contact_ >= 0) {
-    const double sign = touching_ ? 1.0 : -1.0;
-    g[contact_] = contact_watch_.distance(sign * contact_depth(rise, s), s);
-    g[contact_ + 1] = contact_watch_.rate(sign * contact_rate(slope, s), s);
-  }
+  if (!distances_[which]) return {1.0, 1.0};
+  if (static_cast<Event>(which) == Event::stop) return {start_.gap + rise, slope};
+  const double sign = touching_ ? 1.0 : -1.0;
+  return {sign * contact_depth(rise, s), sign * contact_rate(slope, s)};
 }
 
 }  // namespace spring

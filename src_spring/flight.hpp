@@ -7,15 +7,12 @@
 // cancellation (motion.hpp). q, p, A, B are lengths; ∫y = ∫R + H A and ∫∫y = ∫∫R + H² B. All unknowns are under error
 // control, see Tolerances in flight.cpp.
 //
-// Events: [stop] y − φ falls to 0; [contact] y − u_tip changes sign. A rate that rises through 0 marks a minimum of a
-// distance, so that one that dips below 0 between two internal steps is noticed. See watch.hpp for those that start at
-// 0.
+// Events: [stop] y − φ falls to 0; [contact] y − u_tip changes sign.
 #pragma once
 
 #include "ida_solver.hpp"
 #include "motion.hpp"
 #include "taylor.hpp"
-#include "watch.hpp"
 
 namespace spring {
 
@@ -34,7 +31,7 @@ class Flight final : public ImplicitSystem {
  public:
   Flight(const Motion& motion, const Parameters& parameters);
 
-  enum class Event { none, stop, contact };
+  enum class Event { none = -1, stop, contact };
   /// At the end of run(): motion, ∫y and ∫∫y since the start, what was dissipated [J].
   struct Reached {
     Event event;
@@ -50,7 +47,7 @@ class Flight final : public ImplicitSystem {
 
   bool residual(double s, const double* Y, const double* Yp, double* F) const noexcept override;
   void jacobian(double s, double c, const double* Y, const double* Yp, double* J) const noexcept override;
-  void events(double s, const double* Y, double* g) const noexcept override;
+  Distance distance(int which, double s, const double* Y) const noexcept override;
 
  private:
   /// How fast and how far the motion goes.
@@ -81,14 +78,13 @@ class Flight final : public ImplicitSystem {
 
   const Motion& motion_;
   const Parameters& parameters_;
-  const int contact_, stop_;  ///< event functions, −1 if there are none. A distance is followed by its rate
-  const double part_;         ///< longest H × rate of an oscillation
+  const std::array<bool, distances> distances_;  ///< which there are
+  const double part_;                            ///< longest H × rate of an oscillation
   IdaSolver solver_;
   Start start_{};
   double size_ = 0.0;  ///< H
   Loads loads_;        ///< over s
   bool touching_ = false;
-  Watch contact_watch_, stop_watch_;
   Taylor R_;
   Motion::Remainder remainder_;
   Series contact_taylor_{}, dissipation_taylor_{};  ///< contact force and its loss d_R, as far as R accounts for them

@@ -4,7 +4,7 @@
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -20,7 +20,6 @@ namespace {
 static_assert(sizeof(sunrealtype) == sizeof(double), "SUNDIALS must be built in double precision");
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-constexpr double root_bracket = 400.0 * epsilon;  ///< IDA's is 100 ε (s + h), s and h ≤ 1
 constexpr int max_order = 5;
 // Newton's remainder, relative to the tolerance: small, or it is noise in the error estimate (IDA's default, 0.33,
 // costs more steps than it saves iterations).
@@ -61,20 +60,6 @@ int IdaSolver::jacobian(double s, double c, N_Vector Y, N_Vector Yp, N_Vector, S
   return 0;
 }
 
-int IdaSolver::events(double s, N_Vector Y, N_Vector, double* g, void* solver) {
-  const std::vector<Crossing>& crossings = static_cast<const IdaSolver*>(solver)->crossings_;
-  static_cast<const IdaSolver*>(solver)->system_->events(s, N_VGetArrayPointer(Y), g);
-  for (std::size_t i = 0; i < crossings.size(); ++i) {
-    if (std::isnan(g[i])) return 1;  // IDA would search for its root without end
-    // A rate of the power law may be infinite at a start; only its sign matters.
-    if (std::isinf(g[i])) g[i] = std::copysign(1e100, g[i]);
-    // An exact zero counts as not yet crossed: IDA would switch the event function off, and keep it off after
-    // IDAReInit. Not the smallest double: IDA multiplies values to compare signs.
-    if (g[i] == 0.0) g[i] = -static_cast<int>(crossings[i]) * 1e-100;
-  }
-  return 0;
-}
-
 IdaSolver::Vector IdaSolver::new_vector() const {
   Vector vector;
   own(vector, N_VNew_Serial(n_, context_.get()));
@@ -82,8 +67,7 @@ IdaSolver::Vector IdaSolver::new_vector() const {
   return vector;
 }
 
-IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings)
-    : n_(unknowns), crossings_(crossings), occurred_(crossings.size()), event_values_(crossings.size()) {
+IdaSolver::IdaSolver(int unknowns) : n_(unknowns) {
   SUNContext context = nullptr;
   if (SUNContext_Create(SUN_COMM_NULL, &context) != 0) throw std::bad_alloc();
   context_.reset(context);
@@ -109,13 +93,6 @@ IdaSolver::IdaSolver(int unknowns, const std::vector<Crossing>& crossings)
   check(IDASetMinStep(ida, 1e-20), "IDASetMinStep");  // a motion without end would end in ever smaller steps
   check(IDASetMaxErrTestFails(ida, max_error_failures), "IDASetMaxErrTestFails");
   check(IDASetNonlinConvCoef(ida, newton_share), "IDASetNonlinConvCoef");
-  if (crossings.empty()) return;
-  check(IDARootInit(ida, static_cast<int>(crossings.size()), events), "IDARootInit");
-  std::vector<int> directions(crossings.size());
-  std::transform(crossings.begin(), crossings.end(), directions.begin(),
-                 [](Crossing c) { return static_cast<int>(c); });
-  check(IDASetRootDirection(ida, directions.data()), "IDASetRootDirection");
-  check(IDASetNoInactiveRootWarn(ida), "IDASetNoInactiveRootWarn");
 }
 
 void IdaSolver::start(const ImplicitSystem& system, double relative_tolerance, double first_step, long most_steps) {
@@ -123,50 +100,59 @@ void IdaSolver::start(const ImplicitSystem& system, double relative_tolerance, d
   system_ = &system;
   most_steps_ = most_steps;
   s_ = 0.0;
+  N_VScale(1.0, Y0_.get(), Y_.get());
   check(IDAReInit(ida, 0.0, Y0_.get(), Yp0_.get()), "IDAReInit");
   check(IDASVtolerances(ida, relative_tolerance, tolerance_.get()), "IDASVtolerances");
   check(IDASetInitStep(ida, first_step), "IDASetInitStep");
   check(IDASetStopTime(ida, 1.0), "IDASetStopTime");
 }
 
-IdaSolver::Outcome IdaSolver::advance() {
-  void* const ida = ida_.get();
-  // IDA counts from event to event.
-  const long left = most_steps_ - steps();
-  if (left <= 0) throw TooMuchWork();
-  check(IDASetMaxNumSteps(ida, left), "IDASetMaxNumSteps");
-  const int code = IDASolve(ida, 1.0, &s_, Y_.get(), Yp_.get(), IDA_NORMAL);
-  if (code == IDA_TOO_MUCH_WORK) throw TooMuchWork();
-  if (code == IDA_REP_RES_ERR || code == IDA_FIRST_RES_FAIL || code == IDA_RTFUNC_FAIL)
-    fail("values leave the range of floating-point numbers", code);
-  check(code, "IDASolve");
-  if (code != IDA_ROOT_RETURN) return Outcome::finished;
-  check(IDAGetRootInfo(ida, occurred_.data()), "IDAGetRootInfo");
-  return Outcome::event;
+int IdaSolver::advance() {
+  std::array<double, distances> rates;  // at the last step's start
+  for (int i = 0; i < distances; ++i) rates[i] = distance(i).rate;
+  while (s_ < 1.0) {
+    if (steps() >= most_steps_) throw TooMuchWork();
+    const int code = IDASolve(ida_.get(), 1.0, &s_, Y_.get(), Yp_.get(), IDA_ONE_STEP);
+    if (code == IDA_REP_RES_ERR || code == IDA_FIRST_RES_FAIL)
+      fail("values leave the range of floating-point numbers", code);
+    check(code, "IDASolve");
+    const double end = s_, start = last_step_start();
+    double first = end;
+    int fallen = -1;
+    for (int i = 0; i < distances; ++i) {
+      const auto [value, rate] = distance(i);
+      const bool turned = rates[i] <= 0.0 && rate > 0.0;
+      rates[i] = rate;
+      if (!(value < 0.0)) {
+        if (!turned) continue;
+        last_before(start, end, [&] { return distance(i).rate > 0.0; });
+      }
+      if (distance(i).value < 0.0) {
+        const double passed = last_before(start, s_, [&] { return distance(i).value < 0.0; });
+        if (fallen < 0 || passed < first) {
+          first = passed;
+          fallen = i;
+        }
+      }
+      interpolate(end);
+    }
+    if (fallen < 0) continue;
+    interpolate(first);
+    return fallen;
+  }
+  return -1;
 }
 
-bool IdaSolver::fell(int distance) {
-  const bool passed = occurred(distance);
-  if (!passed && (!occurred(distance + 1) || event_value(distance) >= 0.0)) return false;
-  // IDA's own bracket is 100 ulp wide: narrow it, on the same interpolant.
-  const double first = last_step_start();
-  double below = s(), above = first;
-  if (passed) {
-    interpolate(std::max(first, below - root_bracket));
-    if (event_value(distance) > 0.0) above = s();
-  }
-  while (below - above > 2.0 * epsilon) {
-    const double middle = above + (below - above) / 2;
+/// Goes to the last s from `low` on, to rounding, before past() holds, which it does at `high`.
+template <class Past>
+double IdaSolver::last_before(double low, double high, const Past& past) {
+  while (high - low > 2.0 * epsilon) {
+    const double middle = low + (high - low) / 2;
     interpolate(middle);
-    (event_value(distance) < 0.0 ? below : above) = middle;
+    (past() ? high : low) = middle;
   }
-  interpolate(above);
-  return true;
-}
-
-double IdaSolver::event_value(int event) {
-  system_->events(s_, value(), event_values_.data());
-  return event_values_[static_cast<std::size_t>(event)];
+  interpolate(low);
+  return low;
 }
 
 double IdaSolver::last_step_start() const {

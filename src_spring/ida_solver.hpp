@@ -10,11 +10,16 @@
 #include <memory>
 #include <stdexcept>
 #include <type_traits>
-#include <vector>
 
 namespace spring {
 
-/// F(s, Y, Y') = 0 with its Jacobian J = ∂F/∂Y + c ∂F/∂Y' and event functions g.
+/// A distance whose fall through 0 is an event, and its rate d/ds.
+struct Distance {
+  double value, rate;
+};
+inline constexpr int distances = 2;  ///< of a system, at most
+
+/// F(s, Y, Y') = 0 with its Jacobian J = ∂F/∂Y + c ∂F/∂Y' and distances.
 class ImplicitSystem {
  public:
   virtual ~ImplicitSystem() = default;
@@ -22,7 +27,8 @@ class ImplicitSystem {
   virtual bool residual(double s, const double* Y, const double* Yp, double* F) const noexcept = 0;
   /// Column-major, n × n, zero on entry.
   virtual void jacobian(double s, double c, const double* Y, const double* Yp, double* J) const noexcept = 0;
-  virtual void events(double s, const double* Y, double* g) const noexcept = 0;
+  /// {1, 1} for one that is not there.
+  virtual Distance distance(int which, double s, const double* Y) const noexcept = 0;
 };
 
 /// IDA gave up; the message names the flag.
@@ -37,13 +43,9 @@ class TooMuchWork : public IdaError {
   TooMuchWork() : IdaError("it spans too much of the motion") {}
 };
 
-/// Which sign changes of an event function count.
-enum class Crossing { falling = -1, rising = 1 };
-
 class IdaSolver {
  public:
-  /// `crossings`: one entry per event function.
-  IdaSolver(int unknowns, const std::vector<Crossing>& crossings);
+  explicit IdaSolver(int unknowns);
   IdaSolver(const IdaSolver&) = delete;  // IDA knows where this is
   IdaSolver& operator=(const IdaSolver&) = delete;
 
@@ -55,18 +57,13 @@ class IdaSolver {
   /// Start afresh at s = 0, for at most `most_steps` internal steps. `system` must stay alive until the last advance().
   void start(const ImplicitSystem& system, double relative_tolerance, double first_step, long most_steps);
 
-  enum class Outcome { finished, event };
-  /// Go on to s = 1 or to the next event, whichever comes first. @throws IdaError
-  Outcome advance();
+  /// Go on to s = 1, or to where a distance falls through 0, whichever comes first: also where it is below 0 for a part
+  /// of an internal step only, about a minimum. Returns which; −1: none. @throws IdaError
+  int advance();
 
   double s() const { return s_; }                                       ///< reached
   const double* value() const { return N_VGetArrayPointer(Y_.get()); }  ///< Y(s)
-  /// After Outcome::event.
-  bool occurred(int event) const { return occurred_[static_cast<std::size_t>(event)] != 0; }
-  /// After Outcome::event, for a distance among the event functions, followed by its rate: the distance passed 0, or is
-  /// found below 0 at its minimum; s() and value() are then moved back to where it passed 0.
-  bool fell(int distance);
-  long steps() const;  ///< internal steps since start()
+  long steps() const;                                                   ///< internal steps since start()
 
  private:
   template <class Handle, void (*destroy)(Handle)>
@@ -83,17 +80,15 @@ class IdaSolver {
   static int residual(double s, N_Vector Y, N_Vector Yp, N_Vector F, void* solver);
   static int jacobian(double s, double c, N_Vector Y, N_Vector Yp, N_Vector F, SUNMatrix J, void* solver, N_Vector,
                       N_Vector, N_Vector);
-  static int events(double s, N_Vector Y, N_Vector Yp, double* g, void* solver);
 
   Vector new_vector() const;
-  double event_value(int event);
+  Distance distance(int which) const { return system_->distance(which, s_, value()); }
+  template <class Past>
+  double last_before(double low, double high, const Past& past);
   double last_step_start() const;
   void interpolate(double s);
 
   int n_;
-  std::vector<Crossing> crossings_;
-  std::vector<int> occurred_;
-  std::vector<double> event_values_;
   const ImplicitSystem* system_ = nullptr;
   double s_ = 0.0;
   long most_steps_ = 0;

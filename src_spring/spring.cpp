@@ -84,7 +84,7 @@ class Spring::Step {
 
   bool touching() const {
     const auto& u = now_.tip;
-    return parameters_.compliant() && Watch::direction({depth_, state_.z - u[1], -u[2] / 2}) > 0.0;
+    return parameters_.compliant() && direction<3>({depth_, state_.z - u[1], -u[2] / 2}) > 0.0;
   }
 
   /// At the foundation: rebound, or come to rest, or leave.
@@ -97,7 +97,7 @@ class Spring::Step {
       return;
     }
     const auto N = spring_.motion_.holding_force(state_.y, now_, touching(), depth_);
-    const bool pressed = Watch::direction({N[0], N[1], N[2] / 2}) >= 0.0;
+    const bool pressed = direction<3>({N[0], N[1], N[2] / 2}) >= 0.0;
     const double before = state_.z;
     if (before < 0.0) {
       const double pull = std::max(N[0], 0.0) / parameters_.mass;  // −ÿ

@@ -28,6 +28,14 @@ double sum_of_powers(const std::array<double, n>& c, double s, int first, int la
   return sum;
 }
 
+/// Sign of the first coefficient that is not 0: where what starts so goes from s = 0 on.
+template <std::size_t n>
+double direction(const std::array<double, n>& series) {
+  for (const double c : series)
+    if (c != 0.0) return c > 0.0 ? 1.0 : -1.0;
+  return 0.0;
+}
+
 class Taylor {
  public:
   Taylor() = default;

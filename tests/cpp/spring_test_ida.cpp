@@ -16,7 +16,7 @@ using spring_test::epsilon;
 
 namespace {
 
-/// Y₀' = Y₁, Y₁' = −ω² Y₀: cosine; event functions Y₀ − level and its rate.
+/// Y₀' = Y₁, Y₁' = −ω² Y₀: cosine; its distance to a level.
 class Cosine final : public ImplicitSystem {
  public:
   Cosine(double omega, double level) : omega_(omega), level_(level) {}
@@ -30,9 +30,8 @@ class Cosine final : public ImplicitSystem {
     J[2] = -1.0;
     J[1] = omega_ * omega_;
   }
-  void events(double, const double* Y, double* g) const noexcept override {
-    g[0] = Y[0] - level_;
-    g[1] = Y[1];
+  Distance distance(int which, double, const double* Y) const noexcept override {
+    return which == 0 ? Distance{Y[0] - level_, Y[1]} : Distance{1.0, 1.0};
   }
 
  private:
@@ -47,8 +46,6 @@ void start_cosine(IdaSolver& solver, const Cosine& system, double omega) {
   solver.absolute_tolerance()[1] = 1e-13 * omega;
   solver.start(system, 1e-13, 1e-7, 100000);
 }
-
-const std::vector<Crossing> distance_and_rate{Crossing::falling, Crossing::rising};
 
 /// ∂F/∂Y + c ∂F/∂Y' by central differences.
 template <std::size_t n>
@@ -91,15 +88,13 @@ Parameters nonlinear() {
 
 }  // namespace
 
-// cos ωs falls through the level at s = arccos(level)/ω. IDA's own bracket is 100 ulp; ours ends at an ulp, and then
-// the solution's error, asked to be 1e-13 per internal step, is what is left.
+// cos ωs falls through the level at s = arccos(level)/ω. The search ends at an ulp, and then the solution's error,
+// asked to be 1e-13 per internal step, is what is left.
 TEST(IdaSolver, EventWhereADistanceFalls) {
   const Cosine system(3.0, 0.4);
-  IdaSolver solver(2, distance_and_rate);
+  IdaSolver solver(2);
   start_cosine(solver, system, 3.0);
-  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
-  EXPECT_TRUE(solver.occurred(0));
-  EXPECT_TRUE(solver.fell(0));
+  ASSERT_EQ(solver.advance(), 0);
   EXPECT_NEAR(solver.s(), std::acos(0.4) / 3.0, 1e-11);
   EXPECT_NEAR(solver.value()[0], 0.4, 4 * epsilon);
 }
@@ -107,66 +102,57 @@ TEST(IdaSolver, EventWhereADistanceFalls) {
 // The lowest point of cos ωs is 1e-9 below the level for 1.4e-5 of s; internal steps are a hundred times longer.
 TEST(IdaSolver, DistanceThatDipsWithinOneInternalStep) {
   const Cosine system(6.0, -1.0 + 1e-9);
-  IdaSolver solver(2, distance_and_rate);
+  IdaSolver solver(2);
   start_cosine(solver, system, 6.0);
-  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
-  EXPECT_TRUE(solver.fell(0));
+  ASSERT_EQ(solver.advance(), 0);
   EXPECT_NEAR(solver.s(), (3.14159265358979323846 - std::sqrt(2e-9)) / 6.0, 1e-7);
   EXPECT_LT(solver.s(), 3.14159265358979323846 / 6.0);
 }
 
-// Above the level at its lowest: the rate is an event, but no fall; then on to the end.
+// Above the level at its lowest: no fall, on to the end.
 TEST(IdaSolver, MinimumAboveTheLevelIsNoFall) {
   const Cosine system(6.0, -1.0 - 1e-9);
-  IdaSolver solver(2, distance_and_rate);
+  IdaSolver solver(2);
   start_cosine(solver, system, 6.0);
-  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
-  EXPECT_FALSE(solver.fell(0));
-  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::finished);
+  ASSERT_EQ(solver.advance(), -1);
   EXPECT_EQ(solver.s(), 1.0);
   EXPECT_NEAR(solver.value()[0], std::cos(6.0), 2e-10);  // 1e-13 in each of some 1000 steps
 }
 
-// Event functions that are exactly 0 at a start, or hit 0 exactly in IDA's search, were lost once.
+// A distance and its rate that are 0 at the start: it falls there.
 TEST(IdaSolver, ExactZerosDoNotSwitchEventsOff) {
   const Cosine at_start(3.0, 1.0);  // distance and rate are 0 at s = 0
-  IdaSolver solver(2, distance_and_rate);
+  IdaSolver solver(2);
   start_cosine(solver, at_start, 3.0);
-  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
+  ASSERT_EQ(solver.advance(), 0);
   EXPECT_LT(solver.s(), 1e-6);
   const Cosine system(3.0, 0.5);
   solver.start(system, 1e-13, 1e-7, 100000);
-  ASSERT_EQ(solver.advance(), IdaSolver::Outcome::event);
-  EXPECT_TRUE(solver.fell(0));
+  ASSERT_EQ(solver.advance(), 0);
   EXPECT_NEAR(solver.s(), 3.14159265358979323846 / 9.0, 1e-11);
 }
 
-// The steps allowed are those since start(), also where events interrupt them.
+// The steps allowed are those since start().
 TEST(IdaSolver, StepsAreCountedFromTheStart) {
-  const Cosine system(60.0, -2.0);  // its rate rises through 0 some ten times, the level is never reached
-  IdaSolver solver(2, distance_and_rate);
+  const Cosine system(60.0, -2.0);  // the level is never reached
+  IdaSolver solver(2);
   start_cosine(solver, system, 60.0);
-  const auto finish = [&solver] {
-    long events = 0;
-    while (solver.advance() == IdaSolver::Outcome::event) ++events;
-    return events;
-  };
-  EXPECT_GE(finish(), 9);
+  EXPECT_EQ(solver.advance(), -1);
   const long needed = solver.steps();
   solver.start(system, 1e-13, 1e-7, needed);
-  EXPECT_NO_THROW(finish());
+  EXPECT_NO_THROW(solver.advance());
   solver.start(system, 1e-13, 1e-7, needed - 1);
-  EXPECT_THROW(finish(), TooMuchWork);
+  EXPECT_THROW(solver.advance(), TooMuchWork);
 }
 
 TEST(IdaSolver, FailureCarriesIdasFlag) {
   class Nowhere final : public ImplicitSystem {
     bool residual(double, const double*, const double*, double*) const noexcept override { return false; }
     void jacobian(double, double, const double*, const double*, double*) const noexcept override {}
-    void events(double, const double*, double*) const noexcept override {}
+    Distance distance(int, double, const double*) const noexcept override { return {1.0, 1.0}; }
   };
   const Nowhere system;
-  IdaSolver solver(1, {});
+  IdaSolver solver(1);
   solver.start(system, 1e-6, 1e-3, 100000);
   try {
     solver.advance();

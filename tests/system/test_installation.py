@@ -50,6 +50,8 @@ def wheel():
 
 def test_a_wheel_brings_the_fmus_and_runs_where_there_is_no_checkout(wheel, tmp_path):
     assert wheel.name.startswith(f"springbeam-{metadata.version('springbeam')}-py3-none-")
+    if os.uname()[::4] == ("Linux", "x86_64"):
+        assert wheel.stem.endswith("-manylinux_2_17_x86_64")  # as auditwheel says of its binaries
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         archive.extractall(tmp_path / "site")
