@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from .laws import LawFacts, laws_that
+from .laws import laws_that
 from .messages import at
 from .scene import Scene, table_of
 from .tables import ORDINARY_SCHEMES
@@ -23,17 +23,13 @@ class Effect(NamedTuple):
     where: str
 
 
-def _of_law(key: str, *, shown: bool = False) -> Effect:
+def _of_law(key: str) -> Effect:
     """Return where ``key`` of ``[contact]`` counts, or a column shows it."""
-
-    def has(law: LawFacts) -> bool:
-        return key in law.takes or (shown and key in law.shows)
-
-    def counts(scene: Scene) -> bool:
-        facts = scene.contact.facts
-        return scene.coupled and has(facts) and (scene.joins or facts.soft)
-
-    return Effect((f"contact.{key}",), counts, f"it counts between two bodies with law = {laws_that(has)}")
+    return Effect(
+        (f"contact.{key}",),
+        lambda scene: scene.coupled and scene.contact.facts.has(key) and (scene.joins or scene.contact.soft),
+        f"it counts between two bodies with law = {laws_that(lambda law: law.has(key))}",
+    )
 
 
 def _dynamic(scene: Scene) -> bool:
@@ -76,9 +72,7 @@ def effects() -> tuple[Effect, ...]:
             "Algorithm 1 has no loss on the foundation",
         ),
         Effect(("contact.law",), lambda scene: scene.coupled, "it counts between two bodies, or a beam and a stop"),
-        _of_law("impact"),
-        _of_law("stiffness", shown=True),
-        _of_law("exponent", shown=True),
+        *map(_of_law, ("impact", "stiffness", "exponent")),
         Effect(
             ("contact.force_window",),
             lambda scene: (

@@ -30,6 +30,10 @@ class LawFacts(NamedTuple):
     #: What it does, in a few words.
     words: str = ""
 
+    def has(self, key: str) -> bool:
+        """Return whether the motion or a column depends on ``key`` of ``[contact]``."""
+        return key in (*self.takes, *self.shows)
+
     @property
     def soft(self) -> bool:
         """Whether C is a function of the penetration and its rate."""
