@@ -67,7 +67,7 @@ def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
     assert len(closed) == len(springs) - fmu_bodies._MOST_KEPT
     release()
     assert len(closed) == len(springs)
-    assert not any(one.usable for one in closed)
+    assert not any(one.faultless for one in closed)
 
 
 def test_a_body_whose_calls_fail_is_not_kept(made, monkeypatch):

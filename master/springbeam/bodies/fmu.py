@@ -188,14 +188,9 @@ class Fmu:
         self.moved = True
 
     @property
-    def usable(self) -> bool:
-        """Whether no call has failed for good."""
-        return not self._closed and self._worst <= WARNING
-
-    @property
     def faultless(self) -> bool:
         """Whether every call so far did what it was asked for."""
-        return self.usable and not self._refused
+        return not self._closed and self._worst <= WARNING and not self._refused
 
     def accessor(self, verb: str, names: Sequence[str], values: Any, size: int = 1) -> Call:
         """Return what gets or sets (``verb``) variables of ``size`` real numbers each by ``values``, an array of C."""

@@ -389,23 +389,6 @@ class FmuSpring(OwnBody, EndLoaded):
         FmuBody.expect_loads(self, loads)
         EndLoaded.expect_loads(self, loads)
 
-    def _prepare(self, fmu: Fmu) -> None:
-        super()._prepare(fmu)
-        self._internal_steps = Reals(fmu, "internal_steps")
-
-    @property
-    def internal_steps(self) -> int:
-        """Steps that IDA took on the way here; those of steps that were taken back are not among them.
-
-        Raises FmuError if the FMU has failed, or fails to tell.
-        """
-        if not self.fmu.usable:
-            raise FmuError(f"{self.fmu.path}: has failed")
-        steps = self._internal_steps.get()[0]
-        if not isfinite(steps):
-            raise FmuError(f"{self.fmu.path}: internal_steps = {steps}")
-        return round(steps)
-
     def restart(self, time: float, displacement: float, velocity: float, dissipated: float = 0.0) -> None:
         """Start again from y [m] and z [m/s], by the exact start values of the FMU."""
         self.fmu.reset(time, {"displacement": displacement, "velocity": velocity})

@@ -11,9 +11,9 @@ from typing import Any
 
 from .. import __version__
 from ..bodies.factory import findings, fingerprints, load_bodies
-from ..bodies.fmu_bodies import FmuBody, FmuSpring
+from ..bodies.fmu_bodies import FmuBody
 from ..bodies.isolated import IsolatedBody
-from ..bodies.protocol import Body, FmuError
+from ..bodies.protocol import Body
 from ..results.directory import RunDirectory
 from ..results.file_recorder import FileRecorder
 from ..results.reading import load_summary, load_trajectory
@@ -339,7 +339,4 @@ def _calls(**bodies: Body | None) -> dict[str, int]:
         if isinstance(body, (FmuBody, IsolatedBody)):
             counts[f"{name}_steps"] = body.steps
             counts[f"{name}_rollbacks"] = body.rewinds
-        if isinstance(body, FmuSpring):
-            with suppress(FmuError):  # why it fails to tell is the cause that the run stopped for
-                counts["spring_internal_steps"] = body.internal_steps
     return counts
