@@ -129,9 +129,6 @@ def test_what_can_hardly_be_meant_is_told_before_the_run(here):
     assert command(*arguments, "--quiet").stderr == ""
 
 
-# -- bad input: exit code 2, nothing written (mistakes in the command line: tests/system/test_command_line.py) ------
-
-
 # -- stopped early: exit code 3, what was computed is there -------------------------------------------------------
 
 

@@ -42,27 +42,27 @@ LOADS = [
 
 
 @pytest.mark.parametrize(
-    ("t_end", "degree", "loads", "beam"),
+    ("degree", "loads", "beam"),
     [
-        (0.1, 0, [], {"n_elements": 2, "element_degree": 6}),
-        (0.1, 0, [], {"n_elements": 6, "element_degree": 2, "reduced_integration": True, "tip_load_coefficient": -6.0}),
-        (0.1, 0, [], {"n_elements": 12, "mass_matrix": "averaged"}),
-        (0.1, 0, [], {"n_elements": 6, "n_modes": 2, "integrator": "generalized_alpha"}),  # which keeps all modes
-        (0.1, 0, [], {"n_elements": 4, "element_degree": 3, "n_modes": 6, "mass_matrix": "averaged", "alpha_b": 1e-3}),
-        (0.1, 0, [], {"n_elements": 30, "element_degree": 10, "n_modes": 8, "distributed_load": -2.0, "alpha_b": 1e-3}),
-        (0.2, 0, LOADS, {}),
-        (0.2, 2, LOADS, {"n_elements": 6, "element_degree": 3, "n_modes": 8, "mass_matrix": "averaged"}),
+        (0, [], {"n_elements": 2, "element_degree": 6}),
+        (0, [], {"n_elements": 6, "element_degree": 2, "reduced_integration": True, "tip_load_coefficient": -6.0}),
+        (0, [], {"n_elements": 12, "mass_matrix": "averaged"}),
+        (0, [], {"n_elements": 6, "n_modes": 2, "integrator": "generalized_alpha"}),  # which keeps all modes
+        (0, [], {"n_elements": 4, "element_degree": 3, "n_modes": 6, "mass_matrix": "averaged", "alpha_b": 1e-3}),
+        (0, [], {"n_elements": 30, "element_degree": 10, "n_modes": 8, "distributed_load": -2.0, "alpha_b": 1e-3}),
+        (0, LOADS, {}),
+        (2, LOADS, {"n_elements": 6, "element_degree": 3, "n_modes": 8, "mass_matrix": "averaged"}),
     ],
 )
-def test_any_elements_and_loads_pass(t_end, degree, loads, beam):
+def test_any_elements_and_loads_pass(degree, loads, beam):
     """The reference assembles another basis (Lagrange, by quadrature) of the same space.
 
     It takes loads on a mesh of its own and samples their signals.
     """
     coupling = {"macro_step": 5e-4, "degree": degree}
-    report = compare(with_changes(SOFT, time={"t_end": t_end}, coupling=coupling, beam=beam, loads=loads))
+    report = compare(with_changes(SOFT, time={"t_end": 0.1}, coupling=coupling, beam=beam, loads=loads))
     assert report.verdict == "agrees", report.rows
-    assert report.horizon == pytest.approx(t_end)
+    assert report.horizon == pytest.approx(0.1)
 
 
 def test_what_cannot_be_compared_has_not_agreed(tmp_path):

@@ -91,9 +91,6 @@ def test_either_version_of_fmi_gives_the_same_bits(changes, monkeypatch):
         assert one.tobytes() == other.tobytes()
 
 
-# -- other parameter sets against the reference ---------------------------------------------------------------------
-
-
 # -- the command ----------------------------------------------------------------------------------------------------
 
 
