@@ -93,10 +93,8 @@ Status guard(void* c, const char* function, unsigned legal, const Body& body) no
       return Status::discard;
     } catch (const std::exception& e) {
       return component.fail(function, e.what());
-    } catch (...) {
-      return component.fail(function, "unknown exception");
     }
-  } catch (...) {  // out of memory while reporting
+  } catch (...) {  // out of memory while reporting, or what is no std::exception
     phase = error;
     return Status::error;
   }
