@@ -14,7 +14,6 @@ from springbeam.bodies.archive import UnsafeArchive, unpack
 from springbeam.bodies.factory import load_bodies
 from springbeam.bodies.protocol import FmuError
 
-Files = dict[str, bytes]
 XML = "modelDescription.xml"
 BINARY = "binaries/linux64/beam.so"
 

@@ -31,9 +31,6 @@ from springbeam.results.steps import BEAM_TELLS, PHASE_NAMES, SPRING_TELLS, STEP
 from springbeam.results.trajectory import COLUMNS, EVENT_COLUMNS, TOLD, Event, columns_of
 from springbeam.scene import SceneError, with_changes
 
-#: Its first impacts, for a run that is computed.
-SHORT = with_changes(PAIR, time={"t_end": 0.1}, beam={"n_elements": 8})
-
 
 def filed(path, *blocks, scene=PAIR):
     recorder = FileRecorder(scene, RunDirectory.create(path))

@@ -31,7 +31,7 @@ sys.path.append(str(Path(__file__).parents[1] / "campaign"))
 import judge
 
 SCENES = tomllib.loads(Path(__file__).with_name("accuracy.toml").read_text(encoding="utf-8"))
-STIFF_ON_SOFT, WITH_STOP = SCENES["stiff on soft"], SCENES["with stop"]
+STIFF_ON_SOFT = SCENES["stiff on soft"]
 
 
 def errors(found):
