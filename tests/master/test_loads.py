@@ -64,9 +64,9 @@ def soft(*loads, t_end=0.07, **coupling):
 def test_the_projection_is_that_of_the_signal(name, start, size):
     """The moments against 1, s, s² are those of the signal, by quadrature between all points where it is not smooth."""
     load = Load(**SIGNALS[name])
-    f = Signal(load, 1e-3).over(start, size)
+    f = Signal(load).over(start, size)
     edges = np.unique(
-        np.clip([*RECORD[:, 0] + load.start, *Signal(load, None).kinks, start, start + size], start, start + size)
+        np.clip([*RECORD[:, 0] + load.start, *Signal(load).kinks, start, start + size], start, start + size)
     )
     for power in range(3):
         exact = 0.0
@@ -168,7 +168,7 @@ def test_steps_end_where_a_load_jumps_or_bends_and_none_is_a_sliver():
     scene = with_changes(soft("step", "linear", "burst", t_end=0.06, macro_step=1e-3), stop=None)
     scene = with_changes(scene, beam={"approach": "elastic"}, spring={"equilibrium": -1.0})
     run = simulate(scene)
-    kinks = [kink for load in scene.loads for kink in Signal(load, 1e-3).kinks if kink < 0.06]
+    kinks = [kink for load in scene.loads for kink in Signal(load).kinks if kink < 0.06]
     assert len(kinks) == 30
     assert all(np.abs(run.time - kink).min() <= 4e-18 for kink in kinks)
     assert not run.events

@@ -72,7 +72,8 @@ def _lacking(scene: Scene, body: Abilities) -> Iterator[tuple[str, str, str]]:
         if scene.equal_steps[1] != 0.0:
             yield f"[time] t_end = {scene.time.t_end}", _LACKS["any_size"], multiple
         for number, load in enumerate(scene.loads):
-            steps = [(kink - (scene.contact_time or 0.0)) / H for kink in load.kinks(H) if kink < scene.time.t_end]
+            kinks = [] if load.is_finer_than(H) else load.kinks
+            steps = [(kink - (scene.contact_time or 0.0)) / H for kink in kinks if kink < scene.time.t_end]
             if any(step >= 0.0 and abs(step - round(step)) > _SAME for step in steps):
                 yield f"[loads.{number}]: a step ends where it jumps or bends", _LACKS["any_size"], multiple
 

@@ -18,11 +18,10 @@ import numpy as np
 from ..bodies import force
 from ..bodies.protocol import NO_FORCE, Body, Force
 from ..scene import Load, Scene
+from ..scene.loads import LINES_IN_STEP
 
 #: Which loads act on which body.
 ON_BEAM, ON_SPRING = ("beam", "tip", "base"), ("spring", "base")
-#: So many lines of a table in a step are data.
-_FINE = 4
 #: Points of a quadrature, and one more for each radian that a signal without a closed form turns.
 _POINTS = 8
 #: A jump closer to an end of a step than this share of it is at that end.
@@ -43,23 +42,23 @@ def _quadrature(points: int) -> tuple[np.ndarray, np.ndarray]:
 class Signal:
     """One load over the steps of a run."""
 
-    def __init__(self, load: Load, macro_step: float | None) -> None:
+    def __init__(self, load: Load) -> None:
         self._load = load
         self._end = load.end
         #: When the load jumps or bends and a step ends [s].
-        self.kinks = load.kinks(macro_step)
+        self.kinks = load.kinks
         #: Lines of a table [s], which is a polynomial between them.
         self._lines = load.start + load.record.x if load.signal == "table" else None
 
     def next_kink(self, time: float, size: float) -> float:
         """Return when it next jumps or bends after ``time`` [s] in a way that is worth the end of a step; ∞ if not.
 
-        Lines of a table of which `_FINE` or more lie in a step of ``size`` [s] are data, and no kinks: the step has
-        their projection. But where the table begins and ends the load jumps.
+        Lines of a table of which `LINES_IN_STEP` or more lie in a step of ``size`` [s] are data, and no kinks: the step
+        has their projection. But where the table begins and ends the load jumps.
         """
         kinks = self.kinks
         index = bisect_right(kinks, time)
-        if 0 < index < len(kinks) - _FINE and kinks[index + _FINE - 1] < time + size:
+        if 0 < index < len(kinks) - LINES_IN_STEP and kinks[index + LINES_IN_STEP - 1] < time + size:
             return kinks[-1]
         return kinks[index] if index < len(kinks) else inf
 
@@ -134,7 +133,7 @@ class Loads:
 
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
         self._loads = scene.loads
-        self._signals = [Signal(load, scene.coupling.macro_step) for load in scene.loads]
+        self._signals = [Signal(load) for load in scene.loads]
         self._end = scene.time.t_end
         self._kinked = [signal for signal in self._signals if signal.kinks]
         self._bodies: list[tuple[Body, list[int]]] = []

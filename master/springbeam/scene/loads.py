@@ -32,8 +32,8 @@ _TAKES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "table": (("file",), ("interpolation", "start")),
 }
 _OF_SIGNALS = ("frequency", "frequency_end", "phase", "start", "duration", "rise", "file", "interpolation")
-#: A straight table ends steps at its lines unless they are closer than this share of the macro step on average.
-_CLOSE = 0.25
+#: So many lines of a table in a step are data, and no kinks that are worth the end of one.
+LINES_IN_STEP = 4
 #: Most different places of point forces on a beam.
 MOST_POINTS = 4
 
@@ -131,16 +131,16 @@ class Load(Table):
         if self.signal != "table" or self.interpolation == "cubic" or macro_step is None:
             return False
         times = self.record.x
-        return bool(times[-1] - times[0] < _CLOSE * macro_step * (len(times) - 1))
+        return bool(LINES_IN_STEP * (times[-1] - times[0]) < macro_step * (len(times) - 1))
 
-    def kinks(self, macro_step: float | None) -> list[float]:
-        """Return when it jumps or bends [s]; points of a table that is finer than the macro step are left out."""
+    @property
+    def kinks(self) -> list[float]:
+        """Times at which it jumps or bends [s], ascending; all lines of a straight table."""
         if self.signal == "constant":
             return []
         if self.signal == "table":
             times = self.start + self.record.x
-            only_ends = self.interpolation == "cubic" or self.is_finer_than(macro_step)
-            return [float(time) for time in (times[[0, -1]] if only_ends else times)]
+            return list((times[[0, -1]] if self.interpolation == "cubic" else times).tolist())
         if self.duration is None:
             return [self.start]
         bends = [] if self.rise is None else [self.rise, self.duration - self.rise]

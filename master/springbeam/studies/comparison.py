@@ -202,7 +202,9 @@ def _compare_with_reference(report: Report, coarse: Trajectory, fine: Trajectory
     before = times <= report.horizon
     # A jump at slightly different times is an event error, judged there.
     jumps = [event.time for run in (coarse, reference) for event in run.events]
-    away = away_from(times, jumps + [kink for load in scene.loads for kink in load.kinks(size)], size)
+    away = away_from(
+        times, jumps + [kink for load in scene.loads if not load.is_finer_than(size) for kink in load.kinks], size
+    )
     neglected = coarse.summary.get("neglected_share", 0.0)
     for name in quantities(scene):
         ours, halved = (sample(run, times, name) for run in (coarse, fine))
