@@ -56,7 +56,7 @@ def test_a_wheel_brings_the_fmus_and_runs_where_there_is_no_checkout(wheel, tmp_
         names = set(archive.namelist())
         archive.extractall(tmp_path / "site")
     fmus = [f"{name}.fmu" for name in ("beam", "spring", "beam3", "spring3")]
-    assert {f"springbeam/fmus/{name}" for name in (*fmus, "spring_beam.ssp")} <= names
+    assert {f"springbeam/fmus/{name}" for name in (*fmus, "spring_beam.ssp", "spring_beam3.ssp")} <= names
     assert {f"springbeam/scene/shipped/{p.name}" for p in (ROOT / "master/springbeam/scene/shipped").iterdir()} <= names
     script = """
 import sys
