@@ -12,7 +12,7 @@ suppress_warnings = ["myst.xref_missing"]
 
 PAGES = {
     "How to": "tutorial contact accuracy report loads sweeps signals scripting own_fmu tools faq",
-    "Reference": "scene commands files api fmu_variables",
+    "Reference": "scene commands files api fmu_variables glossary",
     "Theory and measurements": "model coupling stability measured performance paper",
     "Development": "architecture contributing notebook",
 }

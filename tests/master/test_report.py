@@ -107,15 +107,16 @@ DRAWN = {"u_tip", "y", "v_tip", "z", "contact_force", "contact_force_smoothed", 
 
 
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
-def test_curves_are_the_columns_bit_for_bit(scene):
+def test_curves_are_the_columns_bit_for_bit_in_single_precision(scene):
     run = a_trajectory(scene, events=EVERY_EVENT)
     found = curves(shown(run).data)
     drawn = [(panel, curve) for panel in panels(run) for curve in panel.curves]
     for panel, curve in drawn:
         assert ("stackgroup" in found[curve.name]) == curve.stacked
         if curve.name in run.columns and curve.name != "energy_residual":
-            assert np.array_equal(array(found[curve.name]["x"]), run.time)
-            assert np.array_equal(array(found[curve.name]["y"]), panel.unit.factor * run[curve.name])
+            for axis, values in (("x", run.time), ("y", panel.unit.factor * run[curve.name])):
+                drawn_values = array(found[curve.name][axis])
+                assert np.array_equal(drawn_values, values.astype(drawn_values.dtype))
     assert {curve.name for _, curve in drawn} >= DRAWN & run.columns.keys()
 
 
@@ -129,7 +130,8 @@ def test_a_long_run_is_thinned_without_losing_an_extreme_and_the_page_says_so():
         curve = array(curves(found.data)[name]["y"])
         assert len(curve) <= 4 * PIXEL_COLUMNS * 6  # stacked curves share the rows of all
         factor = 1.0 if name == "gap" else 1e3
-        assert (curve.min(), curve.max()) == (factor * run[name].min(), factor * run[name].max())
+        ends = factor * np.array([run[name].min(), run[name].max()])
+        assert [curve.min(), curve.max()] == ends.astype(curve.dtype).tolist()
     assert re.search("Drawn from 100000 rows.*thinned", found["about"])
     assert "thinned" not in shown()["about"]
     assert len(found.data["motion"]["time"]) <= MOST_FRAMES
@@ -145,7 +147,7 @@ def test_events_are_marked_when_they_happened():
         assert look.words in found["events"]
         assert f"{look.words} (1)" in found["over-time"]
     for name, size in (("impulse_contact", 0.1), ("impulse_foundation", 0.2)):
-        assert array(curves(found.data)[name]["y"]).tolist() == [size] * len(EVERY_EVENT)
+        assert array(curves(found.data)[name]["y"]).tolist() == [np.float32(size)] * len(EVERY_EVENT)
 
 
 def test_a_cascade_of_impacts_is_one_line_that_opens():
@@ -183,9 +185,34 @@ def test_frames_are_the_recorded_shapes_with_the_spring_of_the_same_time():
     sparse = dataclasses.replace(run, shapes=(times, run.shapes[1][::3]))
     motion = shown(sparse).data["motion"]
     assert "motion-beam" not in motion["parts"]
-    assert motion["time"] == times.tolist()
-    assert motion["deflection"] == sparse.shapes[1].tolist()
-    assert motion["y"] == run.y[::3].tolist()
+    assert motion["time"] == pytest.approx(times, rel=1e-8)
+    assert np.array(motion["deflection"]) == pytest.approx(sparse.shapes[1], rel=1e-8)
+    assert motion["y"] == pytest.approx(run.y[::3], rel=1e-8)
+
+
+def test_a_curve_of_few_digits_keeps_them_and_one_that_is_too_large_its_size():
+    fine, large = 0.5 + 1e-9 * np.sin(np.arange(400.0)), np.linspace(-1e300, 1e300, 400)
+    found = curves(shown(a_trajectory(y=fine, e_beam=large)).data)
+    for name, values in (("y", fine), ("e_beam", large)):
+        assert array(found[name]["y"]).dtype == np.float64
+        assert np.ptp(array(found[name]["y"])) == pytest.approx(np.ptp(values) * 10.0 ** round(
+            np.log10(np.ptp(array(found[name]["y"])) / np.ptp(values))), rel=1e-6)  # fmt: skip
+
+
+def test_a_page_is_small_and_explains_its_words():
+    text = page(a_trajectory(n=20_000, events=EVERY_EVENT))
+    assert len(text) < 2_000_000
+    words = Page(text)["glossary"]
+    assert all(name.replace("_", " ") in words for name in ("tied", "free", "stop_impact", "foundation", "window"))
+    assert "seated" in words
+    assert "touch" not in Page(page(a_trajectory()))["glossary"]
+
+
+def test_the_window_of_the_peak_force_is_drawn():
+    told = {"contact_force_max": 8.0, "contact_force_window": 0.02, "contact_force_max_time": 0.1}
+    curve = curves(shown(**told).data)["contact_force_max"]
+    assert array(curve["x"]) == pytest.approx([0.1, 0.12], rel=1e-6)
+    assert array(curve["y"])[0] / array(curve["y"])[1] == 1.0
 
 
 def test_a_contact_lost_in_the_motion_is_drawn_once_more_enlarged():

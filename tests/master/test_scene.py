@@ -12,6 +12,7 @@ from scenes import scene_from_dict
 import springbeam
 from springbeam.scene import Beam, Scene, SceneError, load_scene, reference, shipped_scenes, suspicions, with_changes
 from springbeam.scene.partners import PARTNERS
+from springbeam.scene.suspicions import implausible
 
 
 def changed(**tables):
@@ -289,3 +290,17 @@ def test_bodies_without_any_scale_are_dimensionless():
     units = (beam.density, beam.length, beam.area, beam.second_moment_of_area, beam.shear_coefficient)
     assert {*units, spring.mass, spring.linear_stiffness} == {1.0}
     assert scene.model_dump(exclude_unset=True)["beam"] == given
+
+
+def test_a_scene_with_all_lengths_in_mm_is_named():
+    """A beam of 500 x 20 x 5 mm beside 0.2 g: as metres it has 3.9e8 kg. In metres nothing is said."""
+    mm = {"length": 500.0, "width": 20.0, "height": 5.0}
+    scenes = [
+        with_changes(load_scene("steel-bumper"), beam={name: scale * value for name, value in mm.items()},
+                     spring={"mass": 2e-4}, stop=None)
+        for scale in (1.0, 1e-3)
+    ]  # fmt: skip
+    said = list(implausible(scenes[0]))
+    (found,) = [line for line in said if "lengths are in m" in line]
+    assert "3.92e+08 kg beside a spring's mass of 0.0002 kg; in mm it would be 0.5 m long, of 0.393 kg" in found
+    assert list(implausible(scenes[1])) == []

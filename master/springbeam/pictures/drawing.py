@@ -61,6 +61,21 @@ EVENT_LOOKS = {
     EventKind.UNSEATED: Look(GREY, "unseated", marker=Marker("▶", ">", "triangle-right")),
 }
 assert (tuple(PHASE_LOOKS), tuple(EVENT_LOOKS)) == (PHASES, tuple(EventKind))
+#: What phases, events and other words of a report mean.
+GLOSSARY = {
+    "free": "phase: no force acts between the tip and what lies below it",
+    "tied": "phase: tip and spring top move as one, whatever the sign of the force; with the law transmission below Ψ",
+    "touch": "phase: the ends are in contact, which can push and not pull",
+    "seated": "phase: the lower end rests on the foundation; as an event, it strikes it and stays there",
+    "impact": "event: tip and spring top meet; ends that a rigid law joins get one velocity at once",
+    "stop_impact": "event: the lower end strikes the foundation and rebounds",
+    "release": "event: tied ends rise through Ψ; from then on the contact can only push",
+    "retie": "event: the ends go below Ψ together and are tied again",
+    "separation": "event: the ends part",
+    "unseated": "event: the lower end leaves the foundation",
+    "foundation": "the rigid stop below, at the height φ; [stop] in a scene file",
+    "window": "how long a force is averaged before its largest value is told; an instant's force means little",
+}
 #: More events than this are not drawn through all panels.
 MANY_EVENTS = 60
 
@@ -73,7 +88,7 @@ VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)", Line(1.5)), "z": Look(VERMILLIO
 ACCELERATIONS = {"a_tip": Look(BLUE, "tip", Line(1.4)), "a_y": Look(VERMILLION, "spring top", Line(0.8))}
 CLAMP = {"clamp_force": Look(BLUE, "on the beam, upward"), "clamp_moment": Look(BLUE, "on the beam, counter-clockwise")}
 FORCES = {
-    "contact_force": Look(SKY, "contact C, as applied", Line(0.7)),
+    "contact_force": Look(ORANGE, "contact C, as applied", Line(0.7)),
     "contact_force_smoothed": Look(BLUE, "contact C, smoothed", Line(1.2)),
     "compliance_force": Look(GREEN, "of the law", Line(1.0, dashed=True)),  # in the words of the law: `panels.forces`
     "foundation_force": Look(BLACK, "foundation N", Line(0.9)),

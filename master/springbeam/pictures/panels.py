@@ -143,7 +143,14 @@ def forces(trajectory: Trajectory) -> Panel:
     looks = FORCES | {"compliance_force": FORCES["compliance_force"]._replace(words=words)}
     seen, remarks = _seen(trajectory, looks, "N")
     remarks += _peak_in_words(trajectory)
-    return _lines(trajectory, "forces", "Forces", seen, "force", "N", remarks, height=2.0)
+    panel = _lines(trajectory, "forces", "Forces", seen, "force", "N", remarks, height=2.0)
+    summary = trajectory.summary
+    if "contact_force_max_time" in summary and "contact_force" in seen:
+        begin, peak = float(summary["contact_force_max_time"]), float(summary["contact_force_max"])
+        window = np.array([begin, begin + float(summary["contact_force_window"])])
+        look = Look(VERMILLION, "largest mean, over its window", Line(2.2))
+        panel.curves.append(Curve("contact_force_max", look, window, np.array([peak, peak])))
+    return panel
 
 
 def loads(trajectory: Trajectory) -> list[Panel]:

@@ -31,6 +31,7 @@ TOTALS = {
     "contact_impulse": Quantity("impulse of the contact, ∫ C dt and impacts", "N·s"),
     "contact_force_max": Quantity("peak contact force, mean over the window", "N"),
     "contact_force_window": Quantity("window of the peak contact force", "s"),
+    "contact_force_max_time": Quantity("when that window begins", "s"),
     "contact_duration": Quantity("longest contact", "s"),
     "contact_duration_total": Quantity("all contacts together", "s"),
     "number_of_contacts": Quantity("contacts", ""),
@@ -51,7 +52,7 @@ LOSS_NAMES = {
     "loss_stop": "impacts on the stop",
 }
 #: Numbers of `TOTALS` that say something only beside others.
-_BESIDE = ("contact_force_window", "deepest_tip_time")
+_BESIDE = ("contact_force_window", "contact_force_max_time", "deepest_tip_time")
 
 
 def in_words(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -140,10 +141,12 @@ def _contact(
     scene: Scene, steps: np.ndarray, events: list[Event], window: float, free_at_end: bool
 ) -> dict[str, float | int]:
     before, after = _cumulative(steps, events)
+    largest, since = _largest_mean(steps, before, after, window)
     found: dict[str, float | int] = {
         "contact_impulse": after[-1],
-        "contact_force_max": _largest_mean(steps, before, after, window),
+        "contact_force_max": largest,
         "contact_force_window": window,
+        "contact_force_max_time": since,
     }
     if scene.contact.lasting and scene.coupled:
         return found
@@ -175,8 +178,8 @@ def _cumulative(steps: np.ndarray, events: list[Event]) -> tuple[np.ndarray, np.
     return after - at_events, after
 
 
-def _largest_mean(steps: np.ndarray, before: np.ndarray, after: np.ndarray, window: float) -> float:
-    """Return the largest mean of C [N] over windows of ``window`` [s], wherever they begin.
+def _largest_mean(steps: np.ndarray, before: np.ndarray, after: np.ndarray, window: float) -> tuple[float, float]:
+    """Return the largest mean of C [N] over windows of ``window`` [s], wherever they begin, and when that begins [s].
 
     An impulse at the edge of a window belongs to it if that makes the mean larger.
     """
@@ -187,7 +190,10 @@ def _largest_mean(steps: np.ndarray, before: np.ndarray, after: np.ndarray, wind
     edges = np.union1d(time, time - window)
     since = edges[:-1] + _equal_at_both_edges(steps, edges, window)
     inside = _impulse_until(steps, time, after, since + window) - _impulse_until(steps, time, after, since)
-    return max(0.0, *(float(found.max(initial=0.0)) for found in (ending, beginning, inside))) / window
+    impulses = np.concatenate([ending, beginning, inside])
+    at = int(np.argmax(impulses))
+    begins = np.concatenate([time - window, time, since])
+    return max(0.0, float(impulses[at])) / window, max(float(begins[at]), float(time[0]))
 
 
 def _equal_at_both_edges(steps: np.ndarray, edges: np.ndarray, window: float) -> np.ndarray:

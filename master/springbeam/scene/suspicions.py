@@ -18,6 +18,8 @@ _YOUNG_OVER_SHEAR = (0.5, 200.0)
 _SLENDERNESS = (3.0, 3e4)
 #: Lowest frequency [Hz] of anything that a macroscopic beam is.
 _FREQUENCIES = (1e-2, 1e7)
+#: Mass of the beam over that of the spring, or the other way round.
+_MASS_RATIO = 1e6
 #: Speed of the tip over that of sound in the beam, about its largest strain: no solid stays elastic beyond.
 _MOST_STRAIN = 0.05
 
@@ -111,6 +113,11 @@ def implausible(scene: Scene) -> Iterator[str]:
     period = 2.0 * math.pi * math.sqrt(tip_compliance(beam) * tip_inertia(beam))
     if beam.fidelity == "dynamic" and not _FREQUENCIES[0] <= (frequency := 1.0 / period) <= _FREQUENCIES[1]:
         yield f"[beam]: its lowest frequency is {frequency:.2g} Hz; check length, section, density and young_modulus"
+    mass, spring = beam.density * beam.area * beam.length, scene.spring
+    if spring is not None and not 1.0 / _MASS_RATIO <= mass / spring.mass <= _MASS_RATIO:
+        long = f"a beam {beam.length:g} m long of {mass:.3g} kg beside a spring's mass of {spring.mass:.3g} kg"
+        milli = beam.length >= 10.0 and f"; in mm it would be {1e-3 * beam.length:g} m long, of {1e-9 * mass:.3g} kg"
+        yield f"[beam] length = {beam.length:g}: {long}{milli or ''}; lengths are in m"
     speed = abs(beam.initial_velocity_slope) * beam.length
     sound = math.sqrt(E / rho)
     if speed > _MOST_STRAIN * sound:

@@ -15,7 +15,6 @@ from typing import Any
 import jinja2
 import numpy as np
 import tomli_w
-from plotly.offline import get_plotlyjs
 
 from ...results.totals import in_words
 from ...results.trajectory import Event, Trajectory, rounded
@@ -27,6 +26,7 @@ from ..drawing import (
     ALTERNATES,
     EVENT_LOOKS,
     FORCES,
+    GLOSSARY,
     POSITIONS,
     alternating,
     event_marks,
@@ -99,7 +99,8 @@ def page(trajectory: Trajectory) -> str:
         toml=tomli_w.dumps(scene.model_dump(exclude_none=True)),
         command=shipped_command(scene),
         data=_as_script(_data(trajectory, [*moving, *over_time], shown, frames) if over_time else None),
-        plotly=get_plotlyjs(),
+        glossary=list(_glossary(trajectory)),
+        plotly=(_HERE / "plotly-basic.min.js").read_text(encoding="utf-8"),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
         style=(_HERE / "page.css").read_text(encoding="utf-8"),
     )
@@ -142,6 +143,14 @@ def _folded(events: list[Event]) -> Iterator[list[Event]]:
     for _, some in groupby(events, key=lambda event: event.kind):
         same = list(some)
         yield from [same] if len(same) >= _CASCADE else ([event] for event in same)
+
+
+def _glossary(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
+    """Yield the words of phases and events that the page shows, and what they mean."""
+    events = {event.kind for event in trajectory.events}
+    for name, meaning in GLOSSARY.items():
+        if name in events or name in trajectory["phase"] or name in ("foundation", "window"):
+            yield name.replace("_", " "), meaning
 
 
 def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
@@ -191,9 +200,16 @@ def _readings(trajectory: Trajectory, frames: Frames) -> Iterator[dict[str, Any]
             yield {"words": looks[name].words, "values": values, "factor": readable.factor, "unit": readable.name}
 
 
+def _short(values: np.ndarray) -> Any:
+    """Return numbers as the JSON of a page has them: nine digits are more than a screen shows."""
+    return [_short(row) for row in values] if values.ndim > 1 else [
+        float(f"{value:.9g}") if isinstance(value, float) else value for value in values.tolist()
+    ]  # fmt: skip
+
+
 def _as_script(data: dict[str, Any] | None) -> str:
     """Return JSON that can stand inside a script element."""
-    text = json.dumps(data, default=np.ndarray.tolist, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    text = json.dumps(data, default=_short, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c")
 
 
@@ -222,7 +238,9 @@ def described(scene: Scene) -> Iterator[tuple[str, str]]:
         yield "foundation", f"at φ = {stop.position:.4g} m, {rebound}"
     for i, load in enumerate(scene.loads):
         what = f"{load.signal.replace('_', '-')} on the {load.on}, {load.peak:.4g} {load.unit}"
-        yield f"load_{i}", what + (f", {load.frequency:.4g} Hz" if load.frequency else "")
+        what += f", {load.frequency:.4g} Hz" if load.frequency else ""
+        what += f" to {load.frequency_end:.4g} Hz" if load.frequency_end else ""
+        yield f"load_{i}", what + (f", in {load.duration:.4g} s" if load.duration else "")
     H = scene.coupling.macro_step
     length = "macro steps that follow from tolerances" if H is None else f"macro step {H:.4g} s"
     ran, picked = with_scheme_chosen(scene)

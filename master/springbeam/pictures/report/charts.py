@@ -25,6 +25,10 @@ from ..frames import Frames, Sketch
 from ..panels import Curve, Panel, panels
 
 _GRID = "#E3E3E3"
+#: Numbers of single precision are smaller, and larger than its inverse.
+_LARGEST = 1e37
+#: A curve that varies by less than this share of its values keeps its double precision.
+_FINE = 1e-3
 #: Pixels of the page for a point of the pictures.
 _PIXELS = 1.8
 #: Pixels of a chart's height: for each inch of its picture, and for what stands around it.
@@ -78,8 +82,8 @@ def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
     clock, factor = time_unit(trajectory).factor, panel.unit.factor
     for curve in panel.curves:
         figure.add_scatter(
-            x=clock * curve.time,
-            y=factor * curve.values,
+            x=_single(clock * curve.time),
+            y=_single(factor * curve.values),
             name=curve.look.words,
             meta=curve.name,
             hovertemplate=f"%{{y:.6g}} {panel.unit.name}",
@@ -141,6 +145,16 @@ def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
             hovertemplate=f"%{{y:.6g}} {sketch.unit.name}" if shown else None,
         )  # fmt: skip
     return Chart(sketch.name, sketch.heading, figure)
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    """Return ``values`` in single precision, which is finer than any screen, unless it lacks the room or the digits."""
+    sizes = np.abs(values[values != 0.0])
+    if not sizes.size or (
+        sizes.max() < _LARGEST and sizes.min() > 1.0 / _LARGEST and np.ptp(values) > _FINE * sizes.max()
+    ):
+        return values.astype(np.float32)
+    return values
 
 
 def _height_of(inches: float) -> int:
