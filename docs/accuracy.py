@@ -7,10 +7,7 @@ tables into docs/accuracy.md, between the lines that name the study.
 
 from __future__ import annotations
 
-import shutil
 import sys
-import tempfile
-from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
 
@@ -91,9 +88,7 @@ def main(names: list[str]) -> None:
         study = Tradeoff.of(scene, window.until)
         records = record_all(study)
         rows, remarks = study.rows(records), study.notes(records)
-        with tempfile.TemporaryDirectory() as folder:
-            (picture,) = study.draw(records, Path(folder))
-            shutil.copy(picture, IMAGES / f"tradeoff-{name}.png")
+        study.draw(records)["tradeoff"].savefig(IMAGES / f"tradeoff-{name}.png", dpi=110)
         shrink(IMAGES / f"tradeoff-{name}.png")
         notes = [f"* {note}" for note in remarks]
         lines = [*choices(rows), "", *side_by_side(rows, study.scene), *([""] if notes else []), *notes]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import groupby
-from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
 from rich.text import Text
@@ -18,7 +17,7 @@ from scipy.optimize import brentq
 from ..scene import Scene, SceneError
 from ..scene.tables import STEP_KEY, TOLERANCE_KEYS
 from .metrics import heading, known, named
-from .study import Findings, Row, Study
+from .study import Findings, Pictures, Row, Study
 from .tables import number, table
 
 #: Quantities that are compared unless others are asked for, those that a scene has.
@@ -165,7 +164,7 @@ class Converge(Study):
         )
         return Findings(document, shown)
 
-    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+    def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw how far each quantity is from its limit over the size of the mesh, a panel a sequence."""
         from .picture import Point, curves
 
@@ -177,9 +176,7 @@ class Converge(Study):
                     points.append(Point(f"more {row['refined']}", heading(name), row["unknowns"], share))
         points = [point for point in points if point.y > _ROUNDING]
         title = f"{self.scene.title}: convergence with the mesh"
-        figure = curves(points, title, "unknowns of the beam", "distance from the limit, relative")
-        figure.savefig(directory / "converge.png", dpi=110)
-        return [directory / "converge.png"]
+        return {"converge": curves(points, title, "unknowns of the beam", "distance from the limit, relative")}
 
 
 def _modes_kept(scene: Scene) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from functools import cached_property
-from pathlib import Path
 from typing import Any, ClassVar
 
 import matplotlib
@@ -16,7 +15,7 @@ from ..monolithic import event_driven
 from ..pictures import drawing
 from ..pictures.drawing import BLACK, POSITIONS, Line, Look, present
 from ..pictures.panels import Curve, Panel
-from ..pictures.timeline import DPI, STYLE, timeline
+from ..pictures.timeline import STYLE, timeline
 from ..results.contact_times import contact_changes
 from ..results.trajectory import Event, Trajectory, columns_of
 from ..scene import Scene
@@ -30,7 +29,7 @@ from .comparison import (
     refuse_without_reference,
     sample,
 )
-from .study import Findings, Row, Study
+from .study import Findings, Pictures, Row, Study
 from .tables import table
 
 #: Exit codes of the command.
@@ -117,23 +116,21 @@ class Crosscheck(Study):
         told = {name: record[name] for name in ("verdict", "horizon", "growth", "events", "notes", "scene")}
         return Findings({**told, "quantities": self.rows(records)}, shown, CODES[verdict])
 
-    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+    def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw both motions, and every error below its bound."""
         record = records[_CASE]
         if not record["quantities"]:
-            return []
+            return {}
         run, reference = (
             {name: np.array(values) for name, values in record[which].items()} for which in ("motion", "reference")
         )
         trajectory = Trajectory(self.scene, run, [Event(**mark) for mark in record["marks"]])
-        path = directory / "crosscheck.png"
         with matplotlib.rc_context(STYLE):
             shown = [_positions(run, reference), _errors(record["quantities"])]
             figure = timeline(trajectory, "Co-simulation and reference", shown)
             horizon = drawing.time_unit(trajectory).factor * record["horizon"]
             figure.axes[1].axvline(horizon, color=BLACK, lw=0.8, ls="--")
-            figure.savefig(path, dpi=DPI)
-        return [path]
+        return {"crosscheck": figure}
 
 
 def _positions(run: Mapping[str, np.ndarray], reference: Mapping[str, np.ndarray]) -> Panel:
@@ -236,7 +233,7 @@ class Orders(Study):
         names = ("phase", "from [s]", "quantity", *steps, "orders")
         return Findings({"orders": rows}, [table(names, cells, "largest errors", words=("from [s]", "quantity"))])
 
-    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+    def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw errors over the macro step, a panel a stretch."""
         from .picture import Point, curves
 
@@ -247,5 +244,4 @@ class Orders(Study):
             for step, H in steps.items()
         ]
         title = f"{self.scene.title}: largest errors"
-        curves(points, title, "macro step [s]", "unit of the quantity").savefig(directory / "orders.png", dpi=110)
-        return [directory / "orders.png"]
+        return {"orders": curves(points, title, "macro step [s]", "unit of the quantity")}

@@ -56,6 +56,8 @@ _STUDIES = {
 }
 #: Columns of a case and of its record, by name.
 Row = dict[str, Any]
+#: Pictures by the names of their files, figures of matplotlib.
+Pictures = dict[str, Any]
 #: ``report(record)``, called for each record that is new.
 Report = Callable[[Row], None]
 #: Cases under way: on a cluster, and for each process here.
@@ -151,15 +153,18 @@ class Study(BaseModel, ABC):
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Judge the records, which come in the order of the cases."""
 
-    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
-        """Draw pictures into ``directory``; return their files."""
-        return []
+    def draw(self, records: Mapping[str, Row]) -> Pictures:
+        """Return pictures by the names of their files."""
+        return {}
 
     def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
         """Write the table, and with ``pictures`` these, into ``directory``; return the files."""
         rows, path = self.rows(records), directory / self.kind
         files = [write_csv(path.with_suffix(".csv"), rows), write_parquet(path.with_suffix(".parquet"), rows)]
-        return files + (self.draw(records, directory) if pictures else [])
+        for name, figure in (self.draw(records) if pictures else {}).items():
+            files.append(directory / f"{name}.png")
+            figure.savefig(files[-1], dpi=110)
+        return files
 
     def cost(self) -> str:
         """Say how much there is to compute."""

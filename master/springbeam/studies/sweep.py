@@ -21,7 +21,7 @@ from ..signals.settled import poincare, settled
 from .boundary import Critical, Limit, boundary, draw_boundary, in_words, limit_of, pulse_axes
 from .design import Axis, Sampling, compatible, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, heading, known, named
-from .study import Findings, Row, Study
+from .study import Findings, Pictures, Row, Study
 from .tables import write_csv
 
 STATUSES = ("done", "stopped", "refused", "lost")
@@ -112,20 +112,19 @@ class Sweep(Study):
                 files.append(draw_boundary(found, self.boundary, directory / "sweep-boundary.png"))
         return files
 
-    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+    def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw what of the metrics the axes change; of a driven scene the bifurcation diagram."""
         from .picture import Scale, column, multiples
 
-        rows, axes, files = self.rows(records), self.axes, []
+        rows, axes, figures = self.rows(records), self.axes, Pictures()
         words = [any(isinstance(row[axis.name], str) for row in rows) for axis in axes]
         scales = [Scale(axis.name, _labelled(axis), axis.log, word) for axis, word in zip(axes, words, strict=True)]
         shown = {name: heading(name) for name in self._shown if _varies(column(rows, name))}
         if shown:
-            files.append(directory / "sweep.png")
-            multiples(rows, scales, shown, self.scene.title or "sweep").savefig(files[-1], dpi=100)
+            figures["sweep"] = multiples(rows, scales, shown, self.scene.title or "sweep")
         if self.stroboscopic and len(axes) == 1 and not words[0]:
-            files.append(_bifurcation(rows, scales[0], directory / "sweep-bifurcation.png"))
-        return files
+            figures["sweep-bifurcation"] = _bifurcation(rows, scales[0])
+        return figures
 
 
 def rows(directory: str | Path) -> dict[str, list[Any]]:
@@ -156,8 +155,8 @@ def seen_once_a_period(run: Trajectory) -> Row:
     return {POINTS: points[times >= late, 0].tolist(), PEAK: 0.5 * float(np.ptp(motion))}
 
 
-def _bifurcation(rows: Sequence[Row], scale: Any, path: Path) -> Path:
-    """Draw positions at equal phase, and the peak response, over the axis of ``scale``."""
+def _bifurcation(rows: Sequence[Row], scale: Any) -> Any:
+    """Return a picture of positions at equal phase, and the peak response, over the axis of ``scale``."""
     from .picture import column, panels
 
     figure, (upper, lower) = panels(2, 1, (7.0, 3.5), "")
@@ -171,8 +170,7 @@ def _bifurcation(rows: Sequence[Row], scale: Any, path: Path) -> Path:
         scale.mark(ax.xaxis, at, all_of_them=False)
         ax.set_ylabel(what)
         ax.grid(alpha=0.3)
-    figure.savefig(path, dpi=100)
-    return path
+    return figure
 
 
 def _varies(values: np.ndarray) -> bool:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from pathlib import Path
 from time import perf_counter
 from typing import Any, ClassVar
 
@@ -29,7 +28,7 @@ from .comparison import comparable_until, refuse_without_reference
 from .design import RIGID, SOFT
 from .metrics import costs, errors, motion_errors, worst
 from .rivals import TOLERANCES, Rival
-from .study import Findings, Row, Study
+from .study import Findings, Pictures, Row, Study
 from .tables import number, table
 
 #: A run that takes longer than this is given up, and finer ones of its family are not begun [s]; quick: ten times less.
@@ -115,15 +114,11 @@ class Tradeoff(Study):
         return f"{what}; finer ones of a kind are left out after one that takes too long"
 
     def skipped(self, case: Row, records: Mapping[str, Row]) -> Row | None:
-        """Leave out what a coarser one of the family was too slow for, needless timings, and what none can judge."""
+        """Leave out what a coarser one of the family was too slow for, and needless timings."""
         first = records.get(_name(case, 0))
         if case["pass"]:
             again = first is not None and first["status"] == "done" and first["cost_wall_time"] <= _TIMED_ONCE
             return None if again else {"status": "skipped", "error": "timed once"}
-        if case["finer"]:
-            for record in records.values():
-                if record["status"] == "not judged":
-                    return record
         limit = 0.1 * _LIMIT if self.quick else _LIMIT
         family = (_name(other, 0) for other in self.configurations if other["family"] == case["family"])
         slow = next((name for name in family if records.get(name, {}).get("cost_wall_time", 0.0) > limit), None)
@@ -244,7 +239,7 @@ class Tradeoff(Study):
             found.append("not run: scipy, since a quasi-static beam has no equation of motion to hand to it")
         return found
 
-    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+    def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw the work–precision diagrams: error over time, over doStep calls, and the model's over its size."""
         from .picture import Point, curves
 
@@ -262,8 +257,7 @@ class Tradeoff(Study):
         front = pareto(rows)
         figure.axes[0].plot([row["cost_wall_time"] for row in front], list(map(worst, front)), color="black",
                             linewidth=6.0, alpha=0.15, zorder=0)  # fmt: skip
-        figure.savefig(directory / "tradeoff.png", dpi=110)
-        return [directory / "tradeoff.png"]
+        return {"tradeoff": figure}
 
 
 def pareto(rows: Iterable[Row]) -> list[Row]:

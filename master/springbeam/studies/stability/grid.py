@@ -19,7 +19,7 @@ from rich.text import Text
 
 from ...pictures.drawing import BLACK, BLUE, GREEN, ORANGE, SKY, STONE
 from ...scene import SceneError
-from ..study import Findings, Row, Study
+from ..study import Findings, Pictures, Row, Study
 from ..tables import table
 from .cells import COUPLINGS, SLICES, sampled_cells, scene_dict, slice_cells
 from .outcome import CLASSES, Outcome, run_cell
@@ -97,14 +97,14 @@ class Grid(Study):
                 (directory / _file(name)).write_text(tomli_w.dumps(scene_dict(cells[name])), encoding="utf-8")
         return super().write(records, directory, pictures=pictures)
 
-    def draw(self, records: Mapping[str, Row], directory: Path) -> list[Path]:
+    def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw maps of the slices: the class of each cell, and its energy residual."""
         import matplotlib
         from matplotlib.colors import ListedColormap, LogNorm
 
         from ..picture import Scale, cells, column, panels
 
-        rows, paths = self.rows(records), []
+        rows, figures = self.rows(records), Pictures()
         slices = [s for s in SLICES if any(row["slice"] == s.name for row in rows)]
         looks: dict[str, dict[str, Any]] = {
             "classes": {"cmap": ListedColormap(_COLOURS), "vmin": -0.5, "vmax": len(CLASSES) - 0.5},
@@ -125,9 +125,8 @@ class Grid(Study):
                 bar.set_ticks(range(len(CLASSES)), labels=CLASSES)
             else:
                 bar.set_label("largest energy residual / largest energy so far (grey: refused)")
-            paths.append(directory / f"stability-{what}.png")
-            figure.savefig(paths[-1], dpi=100)
-        return paths
+            figures[f"stability-{what}"] = figure
+        return figures
 
     def _classes(self, records: Mapping[str, Row]) -> Table:
         """Return a row per coupling, with the largest residual of the runs that were done."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ...contact.laws import depth, law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
@@ -236,18 +237,14 @@ def critical_step(
     if scheme == "energy":
         return None
     start, usual = _SEARCH[scheme]
-    factor = usual if factor is None else factor
     fast, slow = _frequencies(pair)
-    H = start / fast
+
+    def excess(size: float) -> float:
+        return spectral_radius(pair, scheme, degree, size) - 1.0 - threshold
+
+    H, factor = start / fast, usual if factor is None else factor
     while H * slow <= 10.0:
-        if spectral_radius(pair, scheme, degree, H) > 1.0 + threshold:
-            low, high = H / factor, H
-            while high - low > 1e-3 * high:
-                middle = 0.5 * (low + high)
-                if spectral_radius(pair, scheme, degree, middle) > 1.0 + threshold:
-                    high = middle
-                else:
-                    low = middle
-            return high
+        if excess(H) > 0.0:
+            return float(brentq(excess, H / factor, H, xtol=1e-6 * H, rtol=4e-4)) * 1.0005  # where it is unstable
         H *= factor
     return None
