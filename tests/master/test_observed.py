@@ -54,6 +54,17 @@ def test_on_the_foundation_a_mismatch_is_the_tips_alone():
     assert seen.mismatch_at_events == pytest.approx(0.3 / 0.5, rel=1e-12)
 
 
+@pytest.mark.parametrize(("later", "mismatch"), [(0.4, 0.1), (1.4, 0.5)])
+def test_a_stroke_within_a_macro_step_of_another_is_not_counted(later, mismatch):
+    """The rebounds that die out are as slow as one likes, and what the scheme leaves the ends is not."""
+    steps = records(Phase(Joint.TIED), v_tip=[0.0, 0.5, 0.4, 0.5, 0.9], z=[0.0, 0.4, 0.4, 0.4, 0.4])
+    steps["events"][-2:], steps["phase"][-1] = (1.0, 2.0), steps["phase"][0]
+    steps["time"][-1] = steps["time"][-2] + later * H
+    strokes = [Event(float(time), EventKind.STOP_IMPACT) for time in steps["time"][-2:]]
+    seen = observed(*pair(), steps, strokes)
+    assert seen.mismatch_at_events == pytest.approx(2.0 / 3.0 * mismatch / 0.4, rel=1e-12)
+
+
 def test_a_contact_is_late_by_each_steps_own_penetration():
     """x²/12 of each step, x² = 2 λ p (1/2 + 1) H² of the deeper of its ends."""
     stiffness, depth = 3.0, [0.0, 0.1, 0.2, -0.1]
