@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.polynomial import Legendre, Polynomial
+from numpy.polynomial import Legendre
 
 from springbeam.bodies import force
 
@@ -44,31 +44,6 @@ def test_shifted_is_the_same_polynomial():
         [force.value(f, tau + size) for tau in (-0.25, 0.1)], rel=1e-14
     )
     assert force.legendre(force.shifted(g, -size), size, 2) == pytest.approx([0.7, -2.3, 1.9], rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("inside", "outside"),
-    [((), ()), ((), (-0.3,)), ((), (-0.3, 1.7)), ((0.2,), ()), ((0.2,), (-0.3,)), ((0.2,), (1.7,)), ((0.2, 0.9), ())],
-)
-def test_sign_changes_are_the_roots_inside(inside, outside):
-    size = 0.01
-    roots = [size * x for x in (*inside, *outside)]
-    c = (3.0 * Polynomial.fromroots(roots)).coef if roots else np.array([3.0])
-    f = tuple(float(x) for x in (np.append(c, (0.0, 0.0))[:3] * (1.0, 1.0, 2.0)))
-    expected = sorted(r.real for r in np.roots(c[::-1]) if abs(r.imag) < 1e-12 and 0.0 < r.real < size)
-    assert len(expected) == len(inside)
-    assert force.sign_changes(f, size) == pytest.approx(expected, rel=1e-13)
-
-
-def test_sign_changes_near_the_start_do_not_cancel():
-    """Roots 1e-12 and 1: the naive quadratic formula leaves four digits of the small one."""
-    assert force.sign_changes((1e-12, -(1.0 + 1e-12), 2.0), 2.0) == pytest.approx([1e-12, 1.0], rel=1e-15)
-
-
-@pytest.mark.parametrize("f", [(1.0, 0.0, 0.0), (1.0, -2.0, 2.0), (1.0, -2.0, 4.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
-def test_no_sign_change_where_the_force_only_touches_zero(f):
-    """Constant; double root; complex roots; a root at the start itself."""
-    assert force.sign_changes(f, 5.0) == []
 
 
 @pytest.mark.parametrize("size", [1e-4, 0.5])

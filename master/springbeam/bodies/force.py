@@ -44,20 +44,6 @@ def work_on(force: Force, start: Motion, end: Motion, size: float) -> float:
     return value(force, size) * (end.displacement - w0) - force[1] * once - force[2] * (size * once - twice)
 
 
-def sign_changes(force: Force, size: float) -> list[float]:
-    """Return where C passes through zero inside the step, ascending."""
-    c, b, a = force[0], force[1], 0.5 * force[2]
-    if a == 0.0:
-        roots = [-c / b] if b != 0.0 else []
-    else:
-        discriminant = b * b - 4.0 * a * c
-        if discriminant <= 0.0:
-            return []
-        q = -0.5 * (b + (discriminant**0.5 if b >= 0.0 else -(discriminant**0.5)))
-        roots = [q / a, c / q] if q != 0.0 else []
-    return sorted(tau for tau in roots if 0.0 < tau < size)
-
-
 def shifted(force: Force, tau: float) -> Force:
     """Return the polynomial in the time from τ on."""
     if force[1] == 0.0 == force[2]:

@@ -21,10 +21,9 @@ from operator import sub
 
 import numpy as np
 
-from ..bodies.force import sign_changes
 from ..bodies.protocol import Ends
 from ..contact.laws import SoftLaw
-from ..results.paths import last
+from ..results.polynomials import sign_changes
 from . import energy
 from .protocol import Booking, Counts, Coupling, Step
 from .small import Matrix, Vector, transposed
@@ -173,7 +172,7 @@ class Projection:
         if low > _OFF_ZERO * high:
             return self._few if low > _STEADY * high else _MANY
         rule: list[tuple[float, float]] = []
-        for left, right in pairwise([-1.0, *_zeros_inside(path), 1.0]):
+        for left, right in pairwise([-1.0, *sign_changes(path, -1.0, 1.0), 1.0]):
             if _at(path, 0.5 * (left + right))[0] > 0.0:
                 length = right - left
                 rule += [(left + length * t, length * weight) for t, weight in _GRADED]
@@ -207,23 +206,6 @@ def _at(path: _Path, s: float, size: float = 2.0) -> tuple[float, float]:
     """Return p̃ [m] and its rate over a step of ``size`` [m/s]."""
     b0, b1, b2, b3 = path
     return b0 + s * (b1 + s * (b2 + s * b3)), 2.0 / size * (b1 + s * (2.0 * b2 + 3.0 * b3 * s))
-
-
-def _zeros_inside(path: _Path) -> list[float]:
-    """Return the zeros in (−1, 1) of ``path`` where its sign changes, ascending."""
-    found = []
-    _, b1, b2, b3 = path
-    rate = (b1 - 2.0 * b2 + 3.0 * b3, 2.0 * b2 - 6.0 * b3, 6.0 * b3)  # dp̃/ds and its derivatives at s = −1
-    turns = [tau - 1.0 for tau in sign_changes(rate, 2.0)]
-    for low, high in pairwise([-1.0, *turns, 1.0]):
-        if _at(path, low)[0] * _at(path, high)[0] < 0.0:
-            found.append(_zero(path, low, high))
-    return found
-
-
-def _zero(path: _Path, low: float, high: float) -> float:
-    negative = _at(path, low)[0] < 0.0
-    return last(lambda s: (_at(path, s)[0] < 0.0) is negative, low, high)[1]
 
 
 def penetration(step: Step, degree: int) -> tuple[float, Vector]:

@@ -7,9 +7,9 @@ the step is resolved.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import pairwise
 from typing import NamedTuple
+
+from .polynomials import derivative, sign_changes, value
 
 #: f and ḟ at one time.
 Sample = tuple[float, float]
@@ -18,19 +18,6 @@ Means = tuple[float, float]
 
 #: Largest values in (0, 1) of s²(1 − s)² and of s²(1 − s)²(2s − 1).
 _EVEN, _ODD = 1.0 / 16.0, 0.0178885438
-#: Points at which a minimum is looked for, and bisections to a place.
-_POINTS, _BISECTIONS = 16, 40
-
-
-def last(holds: Callable[[float], bool], low: float, high: float) -> tuple[float, float]:
-    """Return by bisection between which two numbers ``holds``, true at ``low`` and false at ``high``, ends to be so.
-
-    They are apart by 2^−40 of the bracket.
-    """
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low, high
 
 
 class Path(NamedTuple):
@@ -66,34 +53,25 @@ class Path(NamedTuple):
         return max(abs(mean), abs(mean - self.odd / 210.0))
 
     def at(self, s: float) -> float:
-        a0, a1, a2, a3, a4, a5 = self.powers
-        return a0 + s * (a1 + s * (a2 + s * (a3 + s * (a4 + s * a5))))
+        return value(self.powers, s)
 
     def slope(self, s: float) -> float:
         """df/ds."""
-        _, a1, a2, a3, a4, a5 = self.powers
-        return a1 + s * (2.0 * a2 + s * (3.0 * a3 + s * (4.0 * a4 + s * (5.0 * a5))))
+        return value(derivative(self.powers), s)
 
     def falls_through_zero(self, until: float = 1.0) -> float:
-        """Return s in [0, until] where f, not below zero at the start but at ``until``, falls through it, by bisection.
+        """Return s in [0, until] where f, not below zero at the start but at ``until``, last falls through it.
 
         A path that starts on zero and rises falls later; one that only falls, at once.
         """
-        low, high = last(lambda s: self.at(s) >= 0.0, 0.0, until)
-        return high if low > 0.0 else 0.0
+        return max(sign_changes(self.powers, 0.0, until), default=0.0)
 
     def rises_through_zero(self, since: float) -> float:
-        """Return s in [since, 1] where f, below zero at ``since``, not at the end, rises through it, by bisection."""
-        return last(lambda s: self.at(s) < 0.0, since, 1.0)[1]
+        """Return s in [since, 1] where f, below zero at ``since``, not at the end, first rises through it."""
+        return min(sign_changes(self.powers, since, 1.0), default=1.0)
 
     def lowest_inside(self) -> float | None:
         """Return s in (0, 1) of the lowest minimum, ``None`` if there is none inside."""
-        best: float | None = None
-        slopes = [self.slope(i / _POINTS) for i in range(_POINTS + 1)]
-        for i, (before, after) in enumerate(pairwise(slopes)):
-            if not before < 0.0 <= after:
-                continue
-            high = last(lambda s: self.slope(s) < 0.0, i / _POINTS, (i + 1) / _POINTS)[1]
-            if best is None or self.at(high) < self.at(best):
-                best = high
-        return best if best is None or 0.0 < best < 1.0 else None
+        slopes = derivative(self.powers)
+        bends = derivative(slopes)
+        return min((s for s in sign_changes(slopes, 0.0, 1.0) if value(bends, s) > 0.0), key=self.at, default=None)

@@ -15,6 +15,7 @@ from ..bodies.protocol import Force
 from ..contact.events import EventFunction, Height, gap
 from ..contact.phases import Joint, Phase
 from ..coupling.protocol import Step
+from ..results.polynomials import sign_changes
 from ..results.trajectory import EventKind
 from .stepping import Pair, State
 
@@ -52,10 +53,10 @@ class Separation:
             f, state.pushed = _line(state.pushed, middle, state.time), middle
         if f[0] < 0.0:
             # The sign at the start may be a false alarm: it is one if the ends, let go, close.
-            if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, push.event):
+            if self._opens(state, step, push.event):
                 return self.no_step(step), push.event
             step = self._pair.repeated(state, step)
-        falling = [tau for tau in force.sign_changes(f, step.size) if f[1] + tau * f[2] < 0.0]
+        falling = [tau for tau in sign_changes((f[0], f[1], 0.5 * f[2]), 0.0, step.size) if f[1] + tau * f[2] < 0.0]
         if not falling:
             return None
         zero = falling[0] if by_line else self._sharpened(falling[0], coupling.sharpest, state, step, push, macro_step)

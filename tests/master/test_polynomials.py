@@ -1,0 +1,48 @@
+"""Where polynomials change their sign: their roots, to rounding."""
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from springbeam.results.polynomials import derivative, sign_changes, value
+
+INSIDE = [(), (0.2,), (0.2, 0.9), (1e-9, 0.5, 1.0 - 1e-9), (0.1, 0.11, 0.5, 0.7, 0.9)]
+OUTSIDE = [(), (-0.3,), (1.7,), (-0.3, 1.7)]
+
+
+@pytest.mark.parametrize("outside", OUTSIDE)
+@pytest.mark.parametrize("inside", INSIDE)
+@pytest.mark.parametrize("size", [1.0, 0.01])
+def test_sign_changes_are_the_roots_inside(size, inside, outside):
+    """A root is known to the rounding of the terms' sum over the slope there."""
+    p = Polynomial([3.0])
+    for x in (*inside, *outside):
+        p *= Polynomial((-size * x, 1.0))
+    found = sign_changes(p.coef.tolist(), 0.0, size)
+    assert len(found) == len(inside)
+    for x, root in zip(found, inside, strict=True):
+        rounding = 1e-15 * Polynomial(np.abs(p.coef))(size * root)
+        assert x == pytest.approx(size * root, abs=rounding / abs(p.deriv()(size * root)), rel=1e-15)
+
+
+def test_sign_changes_near_the_start_do_not_cancel():
+    """Roots 1e-12 and 1: the naive quadratic formula leaves four digits of the small one."""
+    assert sign_changes((1e-12, -(1.0 + 1e-12), 1.0), 0.0, 2.0) == pytest.approx([1e-12, 1.0], rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "p", [(1.0,), (1.0, -2.0, 1.0), (1.0, -2.0, 2.0), (0.0, 1.0), (0.0, 0.0, 1.0), (0.0,), (-5.0, 1.0)]
+)
+def test_no_sign_change_where_a_polynomial_only_touches_zero(p):
+    """Constant; double root; complex roots; roots at the ends themselves."""
+    assert sign_changes(p, 0.0, 5.0) == []
+
+
+def test_values_too_small_to_be_multiplied_have_signs():
+    assert sign_changes((1e-300, -4e-300), 0.0, 1.0) == [0.25]
+
+
+def test_value_and_derivative_are_those_of_numpy():
+    p = Polynomial((0.3, 1.0, -4.0, 1.5, 2.0, 1.0))
+    assert value(p.coef.tolist(), 0.7) == pytest.approx(p(0.7), rel=1e-14)
+    assert derivative(p.coef.tolist()) == pytest.approx(p.deriv().coef, rel=1e-15)
