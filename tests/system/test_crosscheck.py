@@ -3,13 +3,14 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 import tomli_w
 from commands import command, printed
 from rich.console import Console
 
-from springbeam import load_scene, with_changes
-from springbeam.monolithic import event_driven
+from springbeam import load_scene, simulate, with_changes
+from springbeam.monolithic import algorithm1, event_driven
 from springbeam.studies.comparison import compare
 from springbeam.studies.crosscheck import Crosscheck
 
@@ -197,6 +198,31 @@ def test_algorithm_1_begins_in_contact_where_an_elastic_approach_begins_at_the_s
     report = compare(with_changes(SOFT, beam=beam, spring=spring, **paper))
     assert report.reference.phase[0] == "tied"
     assert report.verdict == "agrees", report.rows
+
+
+@pytest.mark.parametrize("stop", [-0.015, -1e-4])
+def test_algorithm_1_decides_as_its_reference_does_and_says_what_it_injects(stop):
+    """In all its columns, up to a last step of 0.3 h on the foundation or off it.
+
+    The midpoint rule and the exact flow differ by (ωh)²/12 = 6e-6 of a step's motion, over 6 steps; 2e-4 is allowed.
+    """
+    beam = {"young_modulus": 1e3, "shear_modulus": 1e3, "n_elements": 4, "approach": "elastic"}
+    beam |= {"initial_velocity_slope": -0.1}
+    spring = {"mass": 100.0, "linear_stiffness": 7e3, "cubic_stiffness": 0.0}
+    contact = {"law": "paper", "stiffness": 500.0, "exponent": 1.0, "impact": "tip"}
+    steps = {"coupling": {"macro_step": 1e-3}, "time": {"t_end": 5.3e-3}}
+    scene = with_changes(SOFT, beam=beam, spring=spring, contact=contact, stop={"position": stop}, **steps)
+    run, reference = simulate(scene), algorithm1.simulate(scene)
+    assert list(run.phase) == list(reference.phase)
+    assert set(run.phase) == {"tied", "seated"}
+    assert [event.kind for event in run.events] == [event.kind for event in reference.events]
+    for name in ("u_tip", "v_tip", "y", "z", "contact_force", "compliance_force", "foundation_force", "e_beam"):
+        largest = np.abs(reference[name]).max()
+        assert run[name] == pytest.approx(reference[name], abs=2e-4 * largest, rel=0.0), name
+    assert np.array_equal(run.contact_force_smoothed, run.contact_force)
+    for body in ("beam", "spring"):
+        injected = reference[f"e_injected_{body}"][-1]
+        assert run.summary[f"injected_into_{body}"] == pytest.approx(injected, rel=2e-4)
 
 
 def test_a_reference_that_fails_is_one_error(tmp_path):
