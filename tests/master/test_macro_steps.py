@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
 from springbeam.coupling.hermite import gap_inside
 from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid
@@ -89,12 +90,15 @@ def test_an_error_that_no_step_is_short_enough_for_ends():
 
 
 @pytest.mark.parametrize("degree", [1, 2])
-def test_the_moment_inside_is_that_of_the_gap(degree):
-    """g = τ²(H − τ) (1 + τ): ∫g/H, and ∫(2τ/H − 1) g/H, by Gauss points."""
-    H = 0.2
+def test_the_moment_inside_and_the_work_on_it_are_those_of_the_gap(degree):
+    """g = τ²(H − τ) (1 + τ): ∫g/H, and ∫(2τ/H − 1) g/H, and ∫C ġ, by Gauss points."""
+    H, c = 0.2, (5.0, -7.0, 11.0)
     g = np.polynomial.Polynomial((0.0, 0.0, H, -1.0)) * np.polynomial.Polynomial((1.0, 1.0))
     x, weights = np.polynomial.legendre.leggauss(8)
-    expected = 0.5 * float(weights @ (g(0.5 * H * (x + 1.0)) * x ** (degree - 1)))
+    tau = 0.5 * H * (x + 1.0)
+    expected = 0.5 * float(weights @ (g(tau) * x ** (degree - 1)))
+    work = 0.5 * H * float(weights @ (force.value(c, tau) * g.deriv()(tau)))
     once, twice = g.integ(), g.integ().integ()
     end = Motion(g(H), g.deriv()(H), once(H), twice(H))
     assert gap_inside(end, H, degree) == pytest.approx(abs(expected), rel=1e-12)
+    assert force.work(c, end, H) == pytest.approx(work, rel=1e-12)
