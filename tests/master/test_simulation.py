@@ -107,6 +107,16 @@ def test_a_damped_contact_that_opens_fast_pushes_only(degree):
         assert np.abs(apart).max() < 1e-3 * np.abs(exact[name]).max()
 
 
+def test_the_step_after_a_collision_is_short():
+    """Ends that have just met, or struck the foundation, may part soon; another event at that time settles it."""
+    run = simulate(soft(coupling={"scheme": "energy", "degree": 0}))
+    last = {event.time: event.kind for event in run.events}
+    assert {"impact", "stop_impact", "release", "separation"} == set(last.values())
+    for time, kind in last.items():
+        size = run.time[run.time > time][0] - time
+        assert (abs(size - 1.25e-4) < 1e-10) == (kind in ("impact", "stop_impact"))
+
+
 SOFT_LAW = {"law": "compliance", "exponent": 1.5}
 
 
