@@ -12,7 +12,8 @@ from rich.console import Console
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import algorithm1, event_driven
 from springbeam.studies.comparison import compare
-from springbeam.studies.crosscheck import Crosscheck
+from springbeam.studies.crosscheck import Crosscheck, Orders
+from springbeam.studies.study import record_all
 
 SOFT = load_scene("soft")
 
@@ -230,3 +231,13 @@ def test_a_reference_that_fails_is_one_error(tmp_path):
     result = command("crosscheck", "soft", *(f"--set={change}" for change in changes), "--out", tmp_path / "out")
     assert result.exit_code == 3
     assert result.stderr.startswith("error: Newton's method for the predicted position does not converge at t = 0.0")
+
+
+def test_orders_are_those_of_the_scheme():
+    """hermite of degree 2: displacement 6, velocity 6, and the force 4, if the means of its limits are compared."""
+    coupling = {"macro_step": 2e-3, "scheme": "hermite", "degree": 2}
+    study = Orders(scene=with_changes(SOFT, time={"t_end": 0.07}, coupling=coupling), quick=True)
+    orders = {row["quantity"]: row["order_H/2"] for row in study.rows(record_all(study))}
+    assert orders["y"] == pytest.approx(6.0, abs=0.5)
+    assert orders["z"] == pytest.approx(6.0, abs=0.4)
+    assert orders["contact_force"] == pytest.approx(4.0, abs=0.4)
