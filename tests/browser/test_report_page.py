@@ -116,6 +116,15 @@ def test_every_shipped_scene_loads_alone_and_moves(browser, folder, scene):
     shown.page.close()
 
 
+@pytest.mark.parametrize("size", [{"width": 1440, "height": 900}, {"width": 390, "height": 844}], ids=str)
+@pytest.mark.parametrize("scene", ["soft", "paper-fig2"])
+def test_the_slider_is_in_sight_at_once_also_below_warnings(browser, folder, scene, size):
+    shown = Shown(browser, run_and_report(folder, scene), size)
+    box = shown.page.locator("#slider").bounding_box()
+    assert 0.0 <= box["y"] <= size["height"] - box["height"]
+    shown.page.close()
+
+
 def test_bodies_are_drawn_where_the_run_has_them(soft):
     times, shapes = soft.trajectory.shapes
     before = soft.path("beam")
