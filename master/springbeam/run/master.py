@@ -29,7 +29,7 @@ from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from ..scene.automatic import with_scheme_chosen
 from ..scene.resolution import CONTACT_STEPS, force_window, not_resolved, peak_force_doubt
-from .crowd import count_crowd
+from .crowd import SIMULTANEOUS, count_crowd
 from .detection import Detector
 from .ledger import Balance
 from .local_error import LocalError
@@ -261,6 +261,10 @@ class Master(Stateful):
     def _act(self, kind: EventKind, step: Step) -> None:
         """The event at the end of ``step`` happens."""
         state, pair = self.state, self._pair
+        if kind.opens:
+            state.last_opening = state.time
+        if kind is EventKind.IMPACT:
+            state.reclosed = state.time - state.last_opening <= SIMULTANEOUS * self._steps.size
         ends = pair.ends()
         meets = kind in (EventKind.IMPACT, EventKind.SEPARATION)  # at Ψ, where it means something else
         tolerance = self._detector.simultaneity_tolerance(ends) if meets else self._detector.tolerance(ends)

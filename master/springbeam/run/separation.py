@@ -53,7 +53,7 @@ class Separation:
             f, state.pushed = _line(state.pushed, middle, state.time), middle
         if f[0] < 0.0:
             # The sign at the start may be a false alarm: it is one if the ends, let go, close.
-            if self._opens(state, step, push.event):
+            if not (state.reclosed and state.steps_in_phase == 0) and self._opens(state, step, push.event):
                 return self.no_step(step), push.event
             step = self._pair.repeated(state, step)
         falling = [tau for tau in sign_changes((f[0], f[1], 0.5 * f[2]), 0.0, step.size) if f[1] + tau * f[2] < 0.0]
