@@ -16,7 +16,7 @@ usage() {
 ./build.sh browser                 install playwright and Chromium and look at the report in it
 ./build.sh docs                    make the pages of docs/ into a site, build/site/index.html
 ./build.sh wheel                   build a source archive, and from that a wheel, into dist/, and test the wheel
-./build.sh fuzz [SEED]             a million random calls of each FMU under sanitizers (about 10 minutes)
+./build.sh fuzz [SEED]             a million random calls of each FMU under sanitizers (about 10 minutes for each version of FMI)
 ./build.sh lint                    formatters, linters and type checker
 
 Set-up makes .venv here and installs Python packages into it; as root it also installs the system packages that are
@@ -227,19 +227,20 @@ print(*(name for name in extra if has[name]))')
     ls -l fmus/*.fmu fmus/*.ssp
     ;;
   fuzz)
-    build fuzz_beam fuzz_spring
+    build fuzz_beam fuzz_spring fuzz_beam3 fuzz_spring3
     seed=${1:-$(date +%s)}
     failed=
     sanitized() { # NAME SANITIZERS: the fuzzers in build/NAME
       $venv/bin/cmake -S . -B build/$1 -G Ninja -DCMAKE_MAKE_PROGRAM="$PWD/$venv/bin/ninja" \
         -DPython3_EXECUTABLE="$PWD/$python" -DSPRINGBEAM_SANITIZE="$2" >/dev/null || die "CMake stopped, see above"
-      $venv/bin/ninja -C build/$1 ${JOBS:+-j "$JOBS"} --quiet fuzz_beam fuzz_spring >&2 || die "the build stopped, see above"
+      $venv/bin/ninja -C build/$1 ${JOBS:+-j "$JOBS"} --quiet \
+        fuzz_beam fuzz_spring fuzz_beam3 fuzz_spring3 >&2 || die "the build stopped, see above"
     }
     get_sundials || true
     say "building with sanitizers"
     sanitized memory address,undefined,float-cast-overflow
     sanitized thread thread
-    for body in beam spring; do
+    for body in beam spring beam3 spring3; do
       say "$body: 8 threads (seed $seed)"
       build/thread/tests/fuzz/fuzz_$body threads "$seed" || failed=1
       say "$body: a million calls (seed $seed)"
