@@ -348,6 +348,7 @@ def swapped(old, new):
         ),
         ("steps.bin", lambda content: bytes(reversed(content)), r"steps\.bin: "),
         ("steps.bin", lambda content: content[8:], r"steps\.bin: not records of steps"),
+        ("steps.bin", lambda content: content[52_800:] + content[:52_800], r"steps\.bin: not records of steps"),
         (
             "events.csv",
             lambda content: b"\n".join(content.split(b"\n")[:-3]) + b"\n",

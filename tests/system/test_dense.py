@@ -79,6 +79,9 @@ def test_rows_are_themselves_and_between_them_every_column_holds(changes):
         joined = (middles.phase == "tied") | (middles.phase == "touch")
         if run.scene.contact.rigid:
             assert np.abs(middles.gap[joined]).max() < 1e-12
+            begin = run.steps[np.flatnonzero(run.steps["size"] > 0.0) - 1]
+            mismatch = 0.5 * (begin["v_tip_after"] - begin["z_after"] + steps["v_tip"] - steps["z"])
+            assert (middles.v_tip - middles.z)[joined] == pytest.approx(mismatch[joined], abs=1e-12)
     # Just before an event it has not happened yet.
     for event in run.events:
         if event.energy_loss > 1e-6 and event.time > run.time[0]:

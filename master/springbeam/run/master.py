@@ -216,7 +216,8 @@ class Master(Stateful):
                 if pair.repeatable:
                     pair.rewind()
                 cause = OVERFLOW if isinstance(refused, OverflowError) else str(refused)
-                if halvings == _MAX_HALVINGS or not pair.divides:
+                nothing = state.time + 0.5 * size == state.time  # a step that rounding of the time swallows
+                if halvings == _MAX_HALVINGS or nothing or not pair.divides:
                     residual = refused.residual if isinstance(refused, NotConverged) else None
                     raise RunStopped(cause, state.time, residual) from refused
                 halvings += 1
