@@ -28,6 +28,7 @@ void HeldContact::begin(const TipMessage& seen, bool initial, double y, const To
   now_.tip = now_.first.displacement;
   now_.depth = y - now_.tip;
   now_.said_next = free_of_first();
+  now_.force = 0.0;  // where the search starts: the force follows what is seen, not what was seen before it
   send(untold_ ? 0.0 : solve(now_.depth, free_of_first(), top), free_of_first());
 }
 

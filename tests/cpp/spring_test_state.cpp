@@ -137,7 +137,7 @@ TEST(SpringState, AStateOfAnotherLengthOrWithAnImpossibleNumberIsRefused) {
   EXPECT_THROW(s.restore(forged), std::invalid_argument);
   for (const double steps : {-1.0, 1e20}) {
     forged = before;
-    forged.back() = steps;
+    forged[forged.size() - 2] = steps;
     EXPECT_THROW(s.restore(forged), std::invalid_argument);
   }
   EXPECT_EQ(saved(s), before);
