@@ -13,9 +13,9 @@ namespace spring {
 namespace {
 
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
-/// In one step, counted in internal steps of IDA: thousands of periods of the spring. A step that needs more is
+/// In one step, counted in internal steps of IDA: some two thousand periods of the spring. A step that needs more is
 /// refused, so that no call lasts longer than a second or two. To start a segment costs as much as some steps.
-constexpr long most_work = 1'000'000, work_of_start = 3;
+constexpr long most_work = 250'000, work_of_start = 3;
 constexpr long most_stalled = 100;  ///< events without progress
 constexpr double smallest_step = 1e-100;
 constexpr double far = 1e9;  ///< as many hilltops away, nothing brings a top back

@@ -170,7 +170,7 @@ struct SpringModel final : fmi::Model {
   }
 
  private:
-  static constexpr std::int64_t most_trial_work = 1'000'000;  ///< of IDA's steps for one force, as for one step
+  static constexpr std::int64_t most_trial_work = 250'000;  ///< of IDA's steps for one force, as for one step
   static constexpr double rounding = 1e-6;                    ///< of communication_step
   struct Misses {
     HeldContact::Miss kind;
