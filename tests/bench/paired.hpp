@@ -80,10 +80,11 @@ class Fmu {
       const auto i = static_cast<unsigned>(fmi::table().index(name));
       instance_.set(i, fmi::table().variables[i].type, value);
     }
-    instance_.exit_initialization();
+    instance_.ensure_built();
+    instance_.progress.phase = fmi::step_complete;
     instance_.save(start_);
   }
-  void step(double H) { instance_.step(instance_.progress.time, H); }
+  void step(double H) { instance_.step(instance_.progress.time, H, false); }
   /// The step from the start.
   void repeat(double H) {
     instance_.restore(start_);
