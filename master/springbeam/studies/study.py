@@ -10,7 +10,7 @@
 * A case whose record is there is not computed again. A study with all records is shown at once.
 * Table (``KIND.parquet``, ``KIND.csv``), pictures and what is shown are made from the records alone.
 
-`record_all` computes, `Records` is the file, `cli/studies.py` the frame that all commands share.
+`record_all` computes, `Records` is the file, `cli/frame.py` what all commands share.
 """
 
 from __future__ import annotations
