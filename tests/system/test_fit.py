@@ -160,7 +160,7 @@ def test_intervals_hold_what_is_right_in_most_cases(tmp_path):
 
 @pytest.mark.slow
 def test_intervals_hold_what_is_right_in_95_of_100(tmp_path):
-    """Of 100 cases that hold with 95 %, 90 … 99 do with 98 %."""
+    """Intervals of 95 % hold in 90 … 99 of 100 cases, with a probability of 98 %."""
     assert all(90 <= hits <= 99 for hits in covered(range(100), tmp_path).values())
 
 

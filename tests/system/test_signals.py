@@ -157,7 +157,7 @@ def test_the_power_of_a_settled_oscillator_is_at_its_drive(driven):
 
 
 def test_the_shock_of_a_stiff_mount_is_that_of_its_base():
-    """Of a mount 80 times as fast as a pulse of 11 ms, in space; relative to the base it hardly moves."""
+    """A mount 80 times as fast as a pulse of 11 ms moves with its base: absolute motion, the relative one is small."""
     amplitude, pulse, step = 500.0, 0.011, 1e-5
     scene = with_changes(
         oscillator(t_end=0.03, on="base", signal="half_sine", frequency=None, amplitude=amplitude, duration=pulse),
