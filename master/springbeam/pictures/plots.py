@@ -1,4 +1,4 @@
-"""Pictures of a run, after the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5.
+"""Pictures of a run: the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5, and loads with accelerations and the clamp.
 
 Besides colours, lines differ in width or dashes and events in shape, so that the pictures survive a black-and-white
 printer.
