@@ -262,16 +262,16 @@ class Master(Stateful):
     def _act(self, kind: EventKind, step: Step) -> None:
         """The event at the end of ``step`` happens."""
         state, pair = self.state, self._pair
-        if kind.opens:
-            state.last_opening = state.time
-        if kind is EventKind.IMPACT:
-            state.reclosed = state.time - state.last_opening <= SIMULTANEOUS * self._steps.size
         ends = pair.ends()
         meets = kind in (EventKind.IMPACT, EventKind.SEPARATION)  # at Ψ, where it means something else
         tolerance = self._detector.simultaneity_tolerance(ends) if meets else self._detector.tolerance(ends)
         kind, phase, impact = self._transitions.after(
             kind, state.phase, step.start, step.size, ends, pair.end_force(state, step), tolerance
         )
+        if kind.opens or kind is EventKind.UNSEATED:
+            state.last_opening = state.time
+        if kind in (EventKind.IMPACT, EventKind.SEATED):
+            state.reclosed = state.time - state.last_opening <= SIMULTANEOUS * self._steps.size
         # Another event at the time of an impact settles what that has begun.
         self._steps.struck(state.time if kind.collision and pair.divides else -inf)
         pair.apply_impulses(impact.on_beam, impact.on_spring)

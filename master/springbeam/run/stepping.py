@@ -32,12 +32,12 @@ class State(Memory):
     steps_in_phase: int = 0
     #: Middle [s] of the last step, at degree 0, and the force that could only push [N]; none in another phase.
     pushed: tuple[float, float] | None = None
-    reclosed: bool = False  #: the contact had opened and closed at once: its next step does not open it again
+    reclosed: bool = False  #: contact or rest had opened and closed at once: its next step does not open it again
     lost: float = 0.0  #: by events so far [J]
     fastest: float = 0.0  #: the largest speed of an end at a row so far [m/s]
     begun: bool = False  #: whether the row of the start is made
     energy_at_start: float = 0.0  #: before an impact there [J]
-    last_opening: float = -inf  #: when tied ends were last let go [s]
+    last_opening: float = -inf  #: when a contact or a rest was last let go [s]
     #: Steps cut by events at once, and within one macro step: how many, and since when [s].
     at_once: tuple[int, float] = (0, -inf)
     in_step: tuple[int, float] = (0, -inf)
