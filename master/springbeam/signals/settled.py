@@ -40,7 +40,7 @@ def drive_of(run: Trajectory) -> Load | None:
 def poincare(run: Trajectory, period: float, start: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the motion once a ``period`` [s], from ``start`` [s] on: times (n,), and position and velocity (n, 2).
 
-    Of the tip, or of the spring's top where there is no beam.
+    The point is the tip, or the spring's top where there is no beam.
     """
     names = ("u_tip", "v_tip") if "u_tip" in run.columns else ("y", "z")
     first = np.ceil((run.time[0] - start) / period - 1e-9)
@@ -54,7 +54,7 @@ def settled(run: Trajectory) -> Settled | None:
     """Return the settled part of a driven run, ``None`` if it is not driven, or has not settled.
 
     It has settled where its points once a period of the drive lie within 1 % of the range of position and velocity
-    of its last ones, in turn, for 8 periods of the motion at least. That of a chaotic motion never do.
+    of its last ones, in turn, for 8 periods of the motion at least. Those of a chaotic motion never do.
     """
     drive = drive_of(run)
     if drive is None or drive.frequency is None or run.steps is None:
