@@ -94,8 +94,7 @@ import socket, sys
 sockets = []
 
 def audit(event, arguments):
-    within = event == "socket.__new__" and arguments[1] == socket.AF_UNIX  # the pair that wakes the watchdog
-    if event.startswith("socket.") and not within:
+    if event.startswith("socket."):
         sockets.append(event)
 
 sys.addaudithook(audit)

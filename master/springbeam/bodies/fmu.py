@@ -12,7 +12,6 @@ from functools import lru_cache, partial
 from math import prod
 from pathlib import Path
 from struct import Struct
-from types import FrameType
 from typing import Any, NoReturn
 
 from fmpy.model_description import ModelDescription, read_model_description
@@ -308,34 +307,3 @@ class Fmu:
     def _cause(self, otherwise: Exception | str) -> str:
         messages, self._messages = self._messages, []
         return messages[-1] if messages else str(otherwise)
-
-
-#: What a method may be waiting for.
-_CALLED_BY = {
-    "_load": "fmi2Instantiate",
-    "initialise": "initialisation",
-    "_step": "setting inputs or fmi2DoStep",
-    "get": "fmi2GetReal",
-    "_tell": "fmi2GetReal",
-    "set": "fmi2SetReal",
-    "mark": "fmi2GetFMUstate",
-    "rewind": "fmi2SetFMUstate",
-    "close": "fmi2FreeInstance",
-}
-
-
-def call_under_way(frame: FrameType | None) -> str:
-    """Say which FMU a thread is calling, and the time at which its last step began; else the line it is in.
-
-    ``frame`` is the innermost one of the thread. Found there when it is asked for, the call costs a run nothing.
-    """
-    innermost = frame
-    while frame is not None:
-        owner = frame.f_locals.get("self")
-        fmu = owner._fmu if isinstance(owner, Reals) else getattr(owner, "fmu", owner)
-        if isinstance(fmu, Fmu):
-            function = _CALLED_BY.get(frame.f_code.co_name, frame.f_code.co_name)
-            clock = getattr(fmu, "clock", None)  # none while it is being loaded
-            return f"{function} of {fmu.path.name}" + ("" if clock is None else f" at t = {clock[0]:.9g} s")
-        frame = frame.f_back
-    return "the program" if innermost is None else f"{innermost.f_code.co_filename}, line {innermost.f_lineno},"

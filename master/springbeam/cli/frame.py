@@ -89,17 +89,14 @@ def carry_out(make: Callable[[], Study], scene: str | None, frame: Frame) -> Non
     ``make`` returns the study, and may raise what bad input raises. The directory is ``out``, else
     ``results/SCENE-KIND``, or with -2, -3, … behind it where another study is.
     """
-    from .watchdog import watched
-
     console = console_for(silent=frame.quiet or frame.as_json)
     with bad_input_reported():
         study = make()
         study.cases()
         records = _opened(study, study.kind if scene is None else f"{Path(scene).stem}-{study.kind}", frame)
         directory = records.path.parent
-        with _going_on(records, len(study.cases())) as cut_short:
-            with watched(cut_short):
-                computed = _computed(study, records, console, frame)
+        with _going_on(records, len(study.cases())):
+            computed = _computed(study, records, console, frame)
             files = study.write(computed, directory, pictures=not frame.no_plots)
         found = study.findings(computed)
     if frame.as_json:
@@ -128,27 +125,22 @@ def _opened(study: Study, default: str, frame: Frame) -> Records:
 
 
 @contextmanager
-def _going_on(records: Records, total: int) -> Iterator[Callable[[str], str]]:
-    """Where the study stops, end the command with the cause and how it goes on; yield what says that of a cause."""
+def _going_on(records: Records, total: int) -> Iterator[None]:
+    """Where the study stops, end the command with the cause and how it goes on."""
     from ..monolithic.hybrid_system import ReferenceFailure
     from ..run.outcome import RunStopped
 
     directory = records.path.parent
 
-    def cut_short(cause: str) -> str:
-        if not records.by_name:
-            return cause
-        there = f"{len(records.by_name)} of {total} records are in {directory}"
-        return f"{cause}; {there}; springbeam resume {directory} goes on"
-
     try:
-        yield cut_short
+        yield
     except ConnectionError as error:
         fail(BAD_INPUT, str(error))
     except (KeyboardInterrupt, RunStopped, ReferenceFailure, OSError) as error:
         if isinstance(error, OSError) and not records.by_name:
             raise
-        fail(STOPPED, cut_short(cause_of(error, directory)))
+        there = f"; {len(records.by_name)} of {total} records are in {directory}; springbeam resume {directory} goes on"
+        fail(STOPPED, cause_of(error, directory) + there * bool(records.by_name))
 
 
 def _computed(study: Study, records: Records, console: Console, frame: Frame) -> dict[str, Row]:

@@ -145,11 +145,9 @@ def picked(scene: Scene, mesh: bool = False) -> Trajectory | None:
         return None
     from ..run.outcome import RunStopped
     from ..studies.accuracy import pick, pick_mesh
-    from .watchdog import watched
 
     try:
-        with watched(lambda cause: f"a pilot run for accuracy = {scene.accuracy:g}: {cause}"):
-            return pick_mesh(scene) if mesh else pick(scene)
+        return pick_mesh(scene) if mesh else pick(scene)
     except RunStopped as stopped:
         fail(STOPPED, f"a pilot run for accuracy = {scene.accuracy:g} {stopped}")
 
@@ -218,33 +216,10 @@ def _run_into(
     """
     from ..run.outcome import RunStopped
     from ..run.runner import run as run_scene
-    from .watchdog import watched
 
     t_end = recorder.scene.time.t_end
 
-    def ended(status: str, cause: str) -> str:
-        """Close the results of a run that ends early; return why, how far it came, and how it can go on."""
-        reached = 0.0 if recorder.time is None else recorder.time
-        if not recorder.finished:
-            with suppress(OSError):  # on a full disk: the rows that fit are there, and the cause is reported
-                recorder.finish({"status": status, "cause": cause, "time": reached})
-        there = f"what was computed is in {recorder.directory.path}"
-        if recorder.directory.checkpoint.exists():
-            there += f"; springbeam resume {recorder.directory.path} goes on from the last checkpoint"
-        elif seconds is None and made is None:
-            there += "; a run begun with --checkpoint SECONDS can go on after it has ended early"
-        return f"{cause} (reached t = {reached:.9g} s of {t_end:g} s); {there}"
-
-    def last_words(cause: str) -> str:
-        progress.__exit__()
-        with suppress(RunStopped, OSError):
-            recorder.fetch()
-        if recorder.begun:
-            return ended("interrupted", cause)
-        recorder.directory.discard()
-        return cause
-
-    with recorder, _ProgressBar(t_end, quiet=quiet) as progress, watched(last_words):
+    with recorder, _ProgressBar(t_end, quiet=quiet) as progress:
         try:
             if made is not None:
                 recorder.write(made)
@@ -254,10 +229,20 @@ def _run_into(
         except (RunStopped, OSError, FmuError, KeyboardInterrupt) as error:
             if not recorder.begun and not isinstance(error, RunStopped):
                 raise
-            cause = cause_of(error, recorder.directory.path)
-            if isinstance(error, KeyboardInterrupt):
-                return ended("interrupted", cause)
-            return f"the run stopped early: {ended('stopped', cause)}"
+            directory, cause = recorder.directory, cause_of(error, recorder.directory.path)
+            interrupted = isinstance(error, KeyboardInterrupt)
+            reached = 0.0 if recorder.time is None else recorder.time
+            if not recorder.finished:
+                with suppress(OSError):  # on a full disk: the rows that fit are there, and the cause is reported
+                    status = "interrupted" if interrupted else "stopped"
+                    recorder.finish({"status": status, "cause": cause, "time": reached})
+            how = "; a run begun with --checkpoint SECONDS can go on after it has ended early"
+            if directory.checkpoint.exists():
+                how = f"; springbeam resume {directory.path} goes on from the last checkpoint"
+            elif seconds is not None or made is not None:
+                how = ""
+            what = cause if interrupted else f"the run stopped early: {cause}"
+            return f"{what} (reached t = {reached:.9g} s of {t_end:g} s); what was computed is in {directory.path}{how}"
 
 
 class _ProgressBar:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,8 +28,6 @@ class Recorder(ABC):
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        #: Makes the run hand over the steps that it still has; for whoever ends a run that cannot end itself.
-        self.fetch: Callable[[], None] = lambda: None
 
     @abstractmethod
     def keep(self, steps: np.ndarray, events: Sequence[Event], shapes: np.ndarray) -> None:

@@ -97,7 +97,6 @@ class Master(Stateful):
         if scene.driver_stiffness is not None:
             checks.append(Neglect(scene.coupling, scene.driver_stiffness).check)
         self._log = Log(scene, recorder, *checks)
-        recorder.fetch = self.hand_over
         self._told = BEAM_TELLS * self._pair.upper.tells + SPRING_TELLS * self._pair.lower.tells
         self._pictured = beam if isinstance(beam, BeamBody) else None
         self.state.shapes_left, self.state.next_shape = _SHAPES_AFTER_CONTACT, start_time
