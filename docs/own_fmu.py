@@ -110,7 +110,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         by_python(folder)
-        names = {key: oscillator.ALL[key] for key in ("force", "displacement", "velocity")}
+        names = {key: oscillator.ALL[key] for key in ("force", "displacement", "velocity", "integral", "integral_2")}
         plain = {**names, "fmu": str(oscillator.made(folder / "plain.fmu", state=False, slopes=False))}
         exact = {**names, "fmu": str(oscillator.made(folder / "exact.fmu"))}
         point = {"element": "point_mass", "mass": 2.0, "velocity": -0.5}

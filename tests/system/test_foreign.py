@@ -27,11 +27,7 @@ from springbeam.scene import scene_from_dict
 M1, M2, K, C, V = 2.0, 3.0, 40.0, 0.2, -0.3
 STIFFNESS, DAMPING = 50.0, 0.1
 #: Names that a scene may leave out, each with what stands on it.
-WITHOUT = {
-    "nothing": (),
-    "integrals": ("integral", "integral_2"),
-    "integrals, velocity, impulse": ("integral", "integral_2", "velocity", "impulse"),
-}
+WITHOUT = {"nothing": (), "velocity, impulse": ("velocity", "impulse")}
 #: What an FMU does after 1.5 s, and the cause that is told.
 LATE = {
     "late crash": "crashed (SIGSEGV) in its step at t = 1.5",
@@ -104,7 +100,7 @@ TIE = {"law": "tie", "stiffness": 1e4, "damping": 0.0}
 
 @pytest.mark.parametrize("without", WITHOUT)
 def test_link_and_tie_are_exact_and_keep_the_interface_energy(fmu, without):
-    """Moments that are not told come from substeps; an end that takes no impulse starts as fast as the other."""
+    """An end that takes no impulse starts as fast as the other."""
     spring = dict.fromkeys((*WITHOUT[without], *ENERGIES))
     assert error(simulate(pair(fmu(), spring=spring)), linked) < 1e-9
     start = 0.2 if "impulse" in spring else 0.0
@@ -112,6 +108,16 @@ def test_link_and_tie_are_exact_and_keep_the_interface_energy(fmu, without):
     run = simulate(pair(fmu(), spring=spring, beam={"velocity": start or V}, contact=TIE))
     assert error(run, tied, *([start] if start else [])) < 1e-12
     assert run.summary["warnings"] == []
+
+
+def test_without_integrals_the_force_has_degree_0(fmu):
+    """The run is that of the element, whose moments no condition needs; more is refused."""
+    spring = {"integral": None, "integral_2": None}
+    run, exact = (simulate(pair(fmu(), spring=s, contact=TIE, coupling={"degree": 0})) for s in (spring, ELEMENT))
+    assert np.abs(run.y - exact.y).max() < 1e-13
+    for scheme, degree, may_be in (("energy", 1, 0), ("hermite", 2, 0)):
+        with pytest.raises(SceneError, match=f"degree = {degree}: .* integral and integral_2; use degree = {may_be}"):
+            simulate(pair(fmu(), spring=spring, contact=TIE, coupling={"scheme": scheme, "degree": degree}))
 
 
 BEAM_NAMES = {
@@ -129,6 +135,8 @@ SPRING_NAMES = {
     "force": "contact_force",
     "displacement": "displacement",
     "velocity": "velocity",
+    "integral": "displacement_integral",
+    "integral_2": "displacement_integral_2",
     "impulse": "impulse",
     "kinetic_energy": "kinetic_energy",
     "potential_energy": "potential_energy",
@@ -136,7 +144,7 @@ SPRING_NAMES = {
 
 
 def test_our_own_fmus_named_as_foreign_ones_give_our_own_run(fmu_folder):
-    """Three events of `soft`, with masses that are measured, and moments of the spring by substeps of IDA (1e-12)."""
+    """Three events of `soft`, with masses that are measured."""
     soft = with_changes(load_scene("soft"), time={"t_end": 0.15}, coupling={"degree": 2, "macro_step": 1e-3})
     own, data = simulate(soft), soft.model_dump(exclude_none=True)
     left_out = ("approach", "approach_speed", "fidelity", "integrator", "mass_matrix", "initial_velocity")
@@ -397,7 +405,7 @@ def test_events_are_those_of_the_element_and_a_run_goes_on_to_the_same_bits(fmu,
         "contact": {"law": "transmission", "damping": 0.0},
         "coupling": {"macro_step": 0.01},
     }
-    below = {"integral": None, "integral_2": None, "parameters": {"m": M2, "k": 400.0, "c": C}}
+    below = {"parameters": {"m": M2, "k": 400.0, "c": C}}
     scene = pair(fmu(), spring=below, **tables)
     run, exact = simulate(scene), simulate(pair(fmu(), spring={**ELEMENT, "stiffness": 400.0}, **tables))
     assert kinds(run) == kinds(exact)

@@ -22,11 +22,6 @@ class Abilities:
     impulse: bool = True  #: it takes impulses
     energies: bool = True  #: it tells its energies
 
-    @property
-    def degree(self) -> int:
-        """Return the highest degree of the contact force; integrals that are not told are found by substeps."""
-        return min(2 if self.any_size else self.integrals, self.slopes)
-
 
 #: What is said of a body that lacks a capability.
 _LACKS = {
@@ -62,11 +57,13 @@ def _lacking(scene: Scene, body: Abilities) -> Iterator[tuple[str, str, str]]:
         for ability in abilities if is_so else ():
             if not getattr(body, ability) or (ability == "integrals" and body.integrals < 2):
                 yield asked, _LACKS[ability], instead
-    lower = f"use degree = {body.slopes if ordinary else body.degree}"
+    #: Integrals of the gap that the scheme sets to 0.
+    needed = 0 if ordinary else coupling.degree - (coupling.scheme == "hermite")
+    lower = f"use degree = {body.slopes if ordinary else min(body.integrals, body.slopes)}"
     if coupling.degree > body.slopes:
         yield degree, f"its input takes derivatives of order {body.slopes} at most" if body.slopes else _SLOPES, lower
-    if not ordinary and not body.any_size and coupling.degree > body.integrals:
-        yield degree, f"{_LACKS['integrals']}, and {_LACKS['any_size']}", lower
+    if needed > body.integrals:
+        yield degree, _LACKS["integrals"], lower
     if not coupling.adaptive and not body.any_size:
         H, multiple = scene.coupling.H, f"use a multiple of {scene.coupling.H:g}"
         if scene.equal_steps[1] != 0.0:
@@ -93,7 +90,7 @@ OFFERED = (
     ("any_size", "canHandleVariableCommunicationStepSize", "events, adaptive steps", "equal macro steps only"),
     ("serialized", "canSerializeFMUstate", "--checkpoint and resume", "no checkpoints"),
     ("slopes", "canInterpolateInputs", "degree 1, 2", "degree 0"),
-    ("integrals", "integral, integral_2", "degree 1, 2; adaptive steps", "degree 1, 2 by four substeps a step"),
+    ("integrals", "integral, integral_2", "degree 1, 2; adaptive steps", "degree 0"),
     ("velocity", "velocity", "events, hermite, adaptive steps", "the mean over a step in its place"),
     ("impulse", "impulse", "rigid impacts, foundation", '"compliance", "link", "tie" of equal velocities'),
     ("energies", "kinetic_energy, potential_energy", "the whole ledger", "the ledger of the interface"),

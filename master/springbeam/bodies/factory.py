@@ -8,7 +8,6 @@ from pathlib import Path
 
 from ..scene import Beam, Scene, Spring
 from ..scene.partners import ForeignFmu, Partner
-from ..scene.tables import ORDINARY_SCHEMES
 from .archive import fmu_directory, own_fmu
 from .elements import ELEMENTS
 from .fmu_bodies import FmuBeam, FmuSpring
@@ -45,9 +44,7 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[Body | None, Body | No
 def _body(scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None) -> Body:
     if isinstance(spec, ForeignFmu):
         assert found is not None
-        coupling = scene.coupling
-        by_substeps = coupling.degree > found.abilities.integrals and coupling.scheme not in ORDINARY_SCHEMES
-        return IsolatedBody(spec, spec is scene.upper, start_time, found, by_substeps)
+        return IsolatedBody(spec, spec is scene.upper, start_time, found)
     if isinstance(spec, Spring):
         return FmuSpring.of(spec, start_time)
     if not isinstance(spec, Beam):

@@ -1,10 +1,8 @@
 """An FMU that others made as a body: what it lacks is made up for where that is possible, elsewhere refused by name.
 
 * No velocity: the mean over the last step.
-* No integrals: at degree 0, where no scheme uses them, those of the cubic through the ends of the step (of the line
-  without velocities). At degrees 1 and 2 the step is made in four, which end on the nodes of Lobatto's rule: it is
-  exact where the displacement is a polynomial of degree 7, so that the error of a moment is of order 9. The velocity,
-  if it is not told, is then that of the polynomial through the nodes.
+* No integrals: those of the cubic through the ends of the step (of the line without velocities). Only degree 0, where
+  no condition needs them, is offered then.
 * No energies: the body is booked with the work that it has received, W = ∫ F ẇ dτ. The ledger is then that of the
   interface: the work of C on both ends and the energy of the law.
 """
@@ -12,13 +10,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from math import isfinite, sqrt
+from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
-import numpy as np
 
 from ..scene.partners import ForeignFmu
 from . import force
@@ -41,13 +37,6 @@ class Findings:
     velocity: float  #: at the start [m/s]
     H: float  #: a macro step, for trial steps [s]
     faults: tuple[str, ...] = ()  #: what it says, or a scene says of it, and is not so
-
-
-#: Lobatto's rule of five nodes on [0, 1]: nodes, weights; and weights of the slope at 1 of the polynomial through them.
-_NODES = np.array([0.0, 0.5 - sqrt(3.0 / 28.0), 0.5, 0.5 + sqrt(3.0 / 28.0), 1.0])
-_ONCE = np.array([0.05, 49.0 / 180.0, 16.0 / 45.0, 49.0 / 180.0, 0.05])
-_TWICE = _ONCE * (1.0 - _NODES)
-_SLOPE = np.linalg.solve(np.vander(_NODES, increasing=True).T, np.arange(5.0))
 
 
 class ForeignState(NamedTuple):
@@ -73,8 +62,6 @@ class ForeignBody(FmuBody, EndLoaded):
         [s].
     found
         What was found out about it.
-    by_substeps
-        Whether moments are found by substeps.
     """
 
     state: ForeignState
@@ -82,8 +69,8 @@ class ForeignBody(FmuBody, EndLoaded):
     #: Loads act on the end, and no input of the FMU is for them.
     expect_loads, set_loads = EndLoaded.expect_loads, EndLoaded.set_loads
 
-    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings, by_substeps: bool) -> None:
-        self._spec, self._found, self._by_substeps = spec, found, by_substeps
+    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings) -> None:
+        self._spec, self._found = spec, found
         names, energies = spec.named(spec.MOTION), spec.named(spec.ENERGIES)
         self._MOTION = tuple(name for name in names if name is not None)
         self._at = [None if name is None else self._MOTION.index(name) for name in names]
@@ -144,7 +131,13 @@ class ForeignBody(FmuBody, EndLoaded):
         load = self._followed(self._on_end, size)
         exchanged = force.combined((up, 1.0), (contact, foundation))
         inputs = self._followed(force.combined((sign * up, sign * up), (exchanged, load)), size)
-        end = self._in_parts(time, size, inputs) if self._by_substeps else self._part(time, size, inputs)
+        struck, self._size = self.state.pending != 0.0, size
+        if not isfinite(sum(inputs)):
+            self._refuse(inputs)
+        self._write(time, size, *inputs)
+        end = self._step(self._SLOPES > 0)  # the derivatives of one step may act in the next if they are not set again
+        if struck:
+            self._impulse.set((0.0,))  # should the FMU not take it as used up
         received = self.state.received + force.work_on(exchanged, start, end, size)
         load_work = self.state.load_work + force.work_on(load, start, end, size)
         self.state = self.state._replace(
@@ -157,25 +150,6 @@ class ForeignBody(FmuBody, EndLoaded):
         if not any(given[self._SLOPES + 1 :]):
             return given
         return force.derivatives(force.legendre(given, size, self._SLOPES), size)
-
-    def _part(self, time: float, size: float, inputs: Force) -> Motion:
-        struck, self._size = self.state.pending != 0.0, size
-        if not isfinite(sum(inputs)):
-            self._refuse(inputs)
-        self._write(time, size, *inputs)
-        end = self._step(self._SLOPES > 0)  # the derivatives of one step may act in the next if they are not set again
-        if struck:
-            self._impulse.set((0.0,))  # should the FMU not take it as used up
-        return end
-
-    def _in_parts(self, time: float, size: float, inputs: Force) -> Motion:
-        places = [self.state.motion.displacement]
-        for begin, until in pairwise((size * _NODES).tolist()):
-            end = self._part(time + begin, until - begin, force.shifted(inputs, begin))
-            places.append(end.displacement)
-        x = np.array(places)
-        velocity = end.velocity if self.abilities.velocity else float(_SLOPE @ x) / size
-        return Motion(x[-1].item(), velocity, size * float(_ONCE @ x), size**2 * float(_TWICE @ x))
 
     def apply_impulse(self, impulse: float) -> None:
         if not self._IMPULSE:

@@ -191,12 +191,12 @@ class IsolatedBody(EndLoaded):
 
     state: tuple[Motion, float]  #: the motion, and the work received [J]
 
-    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings, by_substeps: bool) -> None:
+    def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings) -> None:
         self.path, self.abilities = spec.fmu, found.abilities
         self._waiting: list[Call] = []
         self._process: FmuProcess | None = FmuProcess.of(_file(spec.fmu))
         try:
-            self.mass = self._ask("initialisation", "make", spec, upper, start_time, found, by_substeps)
+            self.mass = self._ask("initialisation", "make", spec, upper, start_time, found)
         except BaseException:
             self.close()
             raise

@@ -80,9 +80,8 @@ class Bench:
         self.close()
         self.stage("instantiation")
         self.abilities = replace(self.abilities, **abilities)
-        self._body = body = ForeignBody(
-            self.spec, self.upward > 0.0, self._start, Findings(self.abilities, 1.0, 0.0, self._H), by_substeps=False
-        )
+        found = Findings(self.abilities, 1.0, 0.0, self._H)
+        self._body = body = ForeignBody(self.spec, self.upward > 0.0, self._start, found)
         self.stage("saving the state")
         body.mark()
         return body
