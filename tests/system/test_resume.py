@@ -28,12 +28,6 @@ SCENES = {
         SOFT, beam={"fidelity": "quasi_static", "alpha_b": 0.1, "distributed_load": -20.0}, coupling={"degree": 1}
     ),
     "compliance": with_changes(SOFT, contact={**COMPLIANCE, "exponent": 1.5}, coupling={"degree": 2}),
-    "one-way": with_changes(
-        SOFT,
-        beam={"young_modulus": 1e6, "shear_modulus": 1e6},
-        contact={**COMPLIANCE, "stiffness": 100.0},
-        coupling={"feedback": "beam_drives", "feedback_tolerance": 0.1},
-    ),
     "gauss_seidel": with_changes(
         SOFT,
         contact={**COMPLIANCE, "stiffness": 100.0},
