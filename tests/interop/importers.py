@@ -75,10 +75,10 @@ class System:
             self.parameters["spring.velocity"] = -1.0
         self._scratch, self._reference, self._of_master = scratch, reference, of_master
 
-    def in_python(self, importer, **environment):
-        """Return the rows of ``run_IMPORTER.py``, run by the importer's own Python."""
+    def in_python(self, importer, ssp=None, **environment):
+        """Return the rows of ``run_IMPORTER.py``, run by the importer's own Python; ``ssp``: of this system file."""
         job = {"size": SIZE, "end": END, "fmus": self.fmus, "parameters": self.parameters}
-        job |= {"connections": self.connections, "outputs": [self.output]}
+        job |= {"connections": self.connections, "outputs": [self.output], "ssp": ssp and str(ssp)}
         python = installed(importer) / "venv/bin/python"
         output = run(python, HERE / f"run_{importer}.py", json.dumps(job), env=environment)
         return np.array(json.loads(output.split("ROWS ")[1]))[:, 1]

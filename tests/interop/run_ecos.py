@@ -10,18 +10,23 @@ def path(name: str) -> str:
     return name.replace(".", "::", 1)
 
 
-job = json.loads(sys.argv[1])
-with EcosSimulationStructure() as structure:
+def structure(job: dict) -> EcosSimulationStructure:
+    made = EcosSimulationStructure()
     for name, file in job["fmus"].items():
-        structure.add_model(name, file)
+        made.add_model(name, file)
     for start, end in job["connections"]:
-        structure.make_real_connection(path(start), path(end))
-    structure.add_parameter_set("scene", {path(name): value for name, value in job["parameters"].items()})
-    with EcosSimulation(structure=structure, step_size=job["size"]) as simulation:
-        assert simulation.init(parameter_set="scene")
-        rows = []
-        for _ in range(round(job["end"] / job["size"])):
-            time = simulation.step()
-            rows.append([time, *(simulation.get_real(path(name)) for name in job["outputs"])])
-        simulation.terminate()
+        made.make_real_connection(path(start), path(end))
+    made.add_parameter_set("soft", {path(name): value for name, value in job["parameters"].items()})
+    return made
+
+
+job = json.loads(sys.argv[1])
+system = {"ssp_path": job["ssp"]} if job["ssp"] else {"structure": structure(job)}
+with EcosSimulation(step_size=job["size"], **system) as simulation:
+    assert simulation.init(parameter_set="soft")
+    rows = []
+    for _ in range(round(job["end"] / job["size"])):
+        time = simulation.step()
+        rows.append([time, *(simulation.get_real(path(name)) for name in job["outputs"])])
+    simulation.terminate()
 print("ROWS " + json.dumps(rows))

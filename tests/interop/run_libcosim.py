@@ -10,20 +10,26 @@ from libcosimpy.CosimSlave import CosimLocalSlave
 
 job = json.loads(sys.argv[1])
 log_output_level(CosimLogLevel.ERROR)
-execution = CosimExecution.from_step_size(job["size"] * 1e9)
-slaves = {n: execution.add_local_slave(CosimLocalSlave(fmu_path=p, instance_name=n)) for n, p in job["fmus"].items()}
+if job["ssp"]:
+    execution = CosimExecution.from_ssp_file(job["ssp"], step_size=job["size"] * 1e9)
+    slaves = {slave.name.decode(): slave.index for slave in execution.slave_infos()}
+else:
+    execution = CosimExecution.from_step_size(job["size"] * 1e9)
+    local = {n: CosimLocalSlave(fmu_path=path, instance_name=n) for n, path in job["fmus"].items()}
+    slaves = {n: execution.add_local_slave(slave) for n, slave in local.items()}
 reference = {n: {v.name.decode(): v.reference for v in execution.slave_variables(i)} for n, i in slaves.items()}
 setters = {
     bool: execution.boolean_initial_value,
     int: execution.integer_initial_value,
     float: execution.real_initial_value,
 }
-for name, value in job["parameters"].items():
-    slave, variable = name.split(".")
-    assert setters[type(value)](slaves[slave], reference[slave][variable], value), name
-for start, end in job["connections"]:
-    (a, x), (b, y) = start.split("."), end.split(".")
-    execution.connect_real_variables(slaves[a], reference[a][x], slaves[b], reference[b][y])
+if not job["ssp"]:
+    for name, value in job["parameters"].items():
+        slave, variable = name.split(".")
+        assert setters[type(value)](slaves[slave], reference[slave][variable], value), name
+    for start, end in job["connections"]:
+        (a, x), (b, y) = start.split("."), end.split(".")
+        execution.connect_real_variables(slaves[a], reference[a][x], slaves[b], reference[b][y])
 observer = CosimObserver.create_last_value()
 execution.add_observer(observer)
 rows = []

@@ -66,6 +66,17 @@ def test_ecos(system):
     assert np.array_equal(rows, by_hand[: len(rows)])
 
 
+@pytest.mark.parametrize(
+    ("importer", "file", "within"),
+    [("libcosim", "spring_beam", 1e-12), ("ecos", "spring_beam", 0.0), ("ecos", "spring_beam3", 0.0)],
+)
+def test_system_file(system, fmu_folder, importer, file, within):
+    """Components, connections and parameters as the .ssp has them: the pair that is connected by hand."""
+    libraries = str(installed(importer) / "venv/lib")
+    rows = system.in_python(importer, fmu_folder / f"{file}.ssp", LD_LIBRARY_PATH=libraries)
+    system.check(rows, within)
+
+
 def test_pair_in_maestro(system, tmp_path):
     classpath = (installed("maestro") / "classpath").read_text()
 
