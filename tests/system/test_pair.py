@@ -1,19 +1,13 @@
 """The pair end to end: both FMUs and the master, beside ordinary masters, and with as much model as a scene needs."""
 
 import json
-from contextlib import closing
 
 import numpy as np
 import pytest
 from commands import printed
-from scenes import scene_from_dict
 
 from springbeam import RunStopped, load_scene, simulate, with_changes
-from springbeam.bodies.fmu_bodies import FmuBeam
-from springbeam.bodies.protocol import NO_FORCE
 from springbeam.monolithic import event_driven
-from springbeam.monolithic.semi_discrete import modal_beam
-from springbeam.scene import Beam
 
 
 def run(name, **coupling):
@@ -107,34 +101,6 @@ def test_run_leaves_the_promised_columns_and_numbers(tmp_path):
     assert told <= json.loads((tmp_path / "out" / "summary.json").read_text()).keys()
 
 
-def test_a_cantilever_under_a_sudden_force_meets_an_elastic_stop():
-    """Slender limit of L = 1, R = 0.1, E = 1e10, ρ = 1e6, −1000 N, a stop of 1e8 N/m at a gap of 1e-4.
-
-    Cubic Hermite elements, exact in time from contact to contact, have u(0.1315 s) = −1.840e-6, −1.838e-6 m and
-    v(0.1566 s) = −4.52e-3, −4.50e-3 m/s for 50 and 100 elements: v depends on the fastest modes.
-    """
-    area, inertia, thin = np.pi * 0.01, np.pi / 4.0 * 1e-4, 1e-4
-    beam = {
-        "density": 1e6, "area": area, "second_moment_of_area": thin * inertia, "young_modulus": 1e10 / thin,
-        "shear_modulus": 1e16 * inertia / area, "shear_coefficient": 1.0, "length": 1.0,
-        "n_elements": 20, "element_degree": 4,
-        "reduced_integration": True, "approach": "elastic",
-    }  # fmt: skip
-    table = {
-        "time": {"t_end": 0.16},
-        "beam": beam,
-        "stop": {"position": -1e-4},
-        "contact": {"law": "compliance", "stiffness": 1e8, "exponent": 1.0},
-        "coupling": {"macro_step": 1e-4, "degree": 2},
-        "loads": [{"on": "tip", "amplitude": -1000.0}],
-    }
-    found = simulate(scene_from_dict(table))
-    at = found.at([0.1315, 0.1566])
-    assert at.u_tip[0] == pytest.approx(-1.838e-6, rel=3e-3)
-    assert at.v_tip[1] == pytest.approx(-4.51e-3, rel=1e-2)
-    assert found.summary["max_energy_residual"] < 1e-11
-
-
 ORDINARY = [("jacobi", 0), ("jacobi", 1), ("gauss_seidel", 0), ("gauss_seidel", 1)]
 
 
@@ -172,51 +138,3 @@ def test_order_is_degree_plus_one_where_the_contact_is_resolved(scheme, degree):
         reference = event_driven.simulate(scene, sample_times=trajectory.time)
         errors.append(np.abs(trajectory.y - reference.y).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(degree + 1, abs=0.4)
-
-
-@pytest.mark.parametrize("reduced", [False, True])
-@pytest.mark.parametrize(("degree", "n"), [(1, 12), (2, 6), (3, 4), (5, 2), (12, 1)])
-def test_the_fmu_vibrates_with_the_frequencies_of_the_reference(degree, n, reduced):
-    """After a unit tip impulse v_tip(t) = Σ φ_k(L)² cos ω_k t: every frequency and every tip value takes part."""
-    beam = Beam.with_ones(
-        young_modulus=3.0, shear_modulus=7.0, n_elements=n, element_degree=degree, reduced_integration=reduced
-    )
-    modes, size = modal_beam(beam), 0.05
-    with closing(FmuBeam(beam, 0.0, 0.0)) as body:
-        assert 1.0 / body.mass == pytest.approx(modes.inverse_tip_mass, rel=1e-12)
-        body.apply_impulse(1.0)
-        for step in range(40):
-            body.advance(step * size, size, NO_FORCE)
-            t = (step + 1) * size
-            exact = np.sum(modes.tip**2 * np.cos(modes.omega * t))
-            # Two independent eigenproblems: ω_max t ≈ 500 rad with frequencies to 1e-13.
-            assert body.motion().velocity == pytest.approx(exact, abs=1e-10 * modes.inverse_tip_mass)
-
-
-def quasi_static(**beam):
-    """A loaded beam comes down on a heavy spring that moves already."""
-    return scene_from_dict(
-        {
-            "time": {"t_end": 2.0},
-            "beam": {
-                "fidelity": "quasi_static", "young_modulus": 30.0, "shear_modulus": 50.0, "alpha_b": 0.05,
-                "distributed_load": -1.0, "initial_velocity_slope": -1.0, **beam,
-            },
-            "spring": {"mass": 2.0, "linear_stiffness": 3.0, "initial_velocity": -0.5},
-            "coupling": {"degree": 2, "macro_step": 0.01},
-        }
-    )  # fmt: skip
-
-
-def test_without_inertia_is_the_limit_of_a_light_beam():
-    """The beam FMU at density ρ → 0: the difference is of first order in ρ, through meeting, release and retie."""
-    light = simulate(quasi_static())
-    differences = []
-    for density in (1e-3, 1e-4, 1e-5):
-        beam = {"fidelity": "dynamic", "density": density, "element_degree": 4, "n_elements": 2}
-        run = simulate(with_changes(light.scene, beam=beam))
-        assert [e.kind for e in run.events] == [e.kind for e in light.events] == ["impact", "release", "retie"]
-        differences.append(np.abs(np.interp(light.time, run.time, run.y) - light.y)[light.time < 0.8].max())
-    assert differences[0] / differences[1] == pytest.approx(10.0, rel=0.01)
-    assert differences[1] / differences[2] == pytest.approx(10.0, rel=0.01)
-    assert differences[2] < 1e-6

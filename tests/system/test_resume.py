@@ -1,16 +1,9 @@
 """A run goes on from a checkpoint to the same bits, whenever it was stopped and whatever it was doing."""
 
-import pickle
-from contextlib import suppress
-from enum import Enum
-
 import numpy as np
 import pytest
-from pydantic import BaseModel
 
 from springbeam.bodies.factory import load_bodies
-from springbeam.contact.phases import Phase
-from springbeam.coupling.soft import SoftSolver
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.master import Master
 from springbeam.scene import load_scene, with_changes
@@ -23,11 +16,16 @@ SCENES = {
     "energy": SOFT,
     "energy 2, damped": with_changes(SOFT, beam={"alpha_b": 1e-3}, spring={"damping": 0.5}, coupling={"degree": 2}),
     "hermite 2": with_changes(SOFT, coupling={"scheme": "hermite", "degree": 2, "macro_step": 1e-3}),
+    "adaptive": with_changes(SOFT, coupling={"relative_tolerance": 1e-4}),
     "generalized_alpha": with_changes(SOFT, beam={"integrator": "generalized_alpha", "rho_inf": 0.8}),
     "quasi-static": with_changes(
         SOFT, beam={"fidelity": "quasi_static", "alpha_b": 0.1, "distributed_load": -20.0}, coupling={"degree": 1}
     ),
     "compliance": with_changes(SOFT, contact={**COMPLIANCE, "exponent": 1.5}, coupling={"degree": 2}),
+    # Some of its steps find their force at degree 0 only.
+    "too stiff for its degree": with_changes(
+        SOFT, contact={**COMPLIANCE, "stiffness": 1e18}, coupling={"degree": 2, "macro_step": 4e-3}, stop=None
+    ),
     "gauss_seidel": with_changes(
         SOFT,
         contact={**COMPLIANCE, "stiffness": 100.0},
@@ -133,57 +131,3 @@ def test_the_scenes_pass_every_phase_and_event():
     assert {phase for t in trajectories for phase in t.phase} == {"free", "tied", "touch", "seated"}
     kinds = {event.kind for t in trajectories for event in t.events}
     assert kinds >= {"impact", "stop_impact", "release", "retie", "separation", "seated"}
-
-
-#: What changes during a run, but is set anew before it is used.
-SET_ANEW = {
-    *(f"{body}._marked" for body in ("FmuBeam", "FmuSpring")),
-    *(f"Fmu.{name}" for name in ("moved", "_time", "_size", "_start_time", "_messages")),
-    *(f"EventFunctions.{name}" for name in ("_phase", "_functions", "_ends", "_samples")),
-    *("Detector._tolerance", "Detector._tolerance_of", "Pair._last"),
-    # Follows from the records of the recorder.
-    *("Balance._first", "Balance._scale", "Log._first", "Log._past", "Log.events", "Log._records", "Log._events"),
-    "Log._shapes",
-    "RigidWall.state",
-    # In what the body saves.
-    "Fmu.steps",
-    "Fmu.rewinds",
-    "Loads._last",
-    "FmuBeam._loads",
-    *(f"FmuSpring.{name}" for name in ("_loads", "_on_end")),
-}
-
-
-def attributes(part, kept, seen):
-    """(name, whether it is remembered, value) of everything that ``part`` consists of; ``kept`` saves its state."""
-    seen[id(part)] = part
-    for name, value in vars(part).items():
-        ours = type(value).__module__.startswith("springbeam.") and hasattr(value, "__dict__")
-        if ours and name != "state" and not isinstance(value, (Phase, Enum)):
-            if id(value) not in seen and not isinstance(value, (BaseModel, MemoryRecorder)):
-                yield from attributes(value, kept, seen)
-        else:
-            yield f"{type(part).__name__}.{name}", name == "state" and part in kept, value
-
-
-def snapshot(simulation):
-    found, kept = [], list(simulation._parts().values())
-    kept += [part._simpler for part in kept if isinstance(part, SoftSolver)]  # in the state of the other one
-    for name, remembered, value in attributes(simulation, kept, {}):
-        with suppress(TypeError, AttributeError, ValueError, pickle.PicklingError):  # functions, what belongs to C
-            found.append((name, remembered, pickle.dumps(value)))
-    return found
-
-
-@pytest.mark.parametrize("name", ["energy 2, damped", "compliance", "seated", "loads", "paper"])
-def test_everything_that_changes_is_remembered_or_set_anew(name):
-    """An attribute that changes and is in no state is named here, before a resumed run differs."""
-    run = Run(SCENES[name])
-    before = snapshot(run.simulation)
-    while not run.simulation.done:
-        run.simulation.step()
-    after = snapshot(run.simulation)
-    run.close()
-    changed = set(after) - set(before)
-    assert len(changed) > 10
-    assert {name for name, remembered, _ in changed if not remembered} - SET_ANEW == set()
