@@ -1,8 +1,5 @@
 """``scheme = "auto"``: what it takes for which scene, and that what it takes is stable."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -65,17 +62,6 @@ def test_below_the_bound_no_pair_amplifies():
         pair = LinearPair(LinearBody(omega2, np.zeros_like(omega2), modal.tip), LinearBody(*spring))
         for x in (0.3, 0.6, 1.0):
             assert spectral_radius(pair, "hermite", 2, x * STABLE / fastest) < 1.0 + 1e-6
-
-
-def test_the_documentation_names_the_same_limit():
-    """It was 3.8 for the questions and answers, 3.2 and 3.0 elsewhere."""
-    docs = Path(__file__).parents[2] / "docs"
-    found = {
-        page.name: set(map(float, re.findall(r"ω_max H [<≤] (\d+(?:\.\d+)?)", page.read_text(encoding="utf-8"))))
-        for page in docs.glob("*.md")
-    }
-    named = {name: limits for name, limits in found.items() if limits}
-    assert named == {name: {STABLE} for name in ("accuracy.md", "coupling.md", "faq.md", "measured.md")}
 
 
 def test_where_hermite_is_not_defined_it_is_not_taken():

@@ -50,10 +50,6 @@ def bumper():
 K = 300.0
 
 
-def test_it_is_short():
-    assert sum(len(block.splitlines()) for block in BLOCKS) < 60
-
-
 @pytest.mark.usefixtures("stiffening")
 def test_master_and_reference_agree_and_keep_the_energy():
     """Degree 2 on a beam of 6 elements: the reference's tolerance is 1e-11; p is past the knee √(k/h) = 1 cm."""

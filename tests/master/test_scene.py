@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from scenes import scene_from_dict
 
 import springbeam
-from springbeam.scene import Beam, Scene, SceneError, load_scene, reference, shipped_scenes, suspicions, with_changes
-from springbeam.scene.partners import PARTNERS
+from springbeam.scene import Beam, Scene, SceneError, load_scene, shipped_scenes, suspicions, with_changes
 from springbeam.scene.suspicions import implausible
 
 
@@ -271,15 +270,6 @@ def test_what_can_hardly_be_meant_is_told(changes, said):
     lines = suspicions(with_changes(load_scene("steel-bumper"), beam=changes))
     assert len(lines) == len(said)
     assert all(fragment in line for fragment, line in zip(said, lines, strict=True))
-
-
-def test_every_key_is_explained():
-    for key in reference.listed():
-        assert key.meaning, key
-        assert key.unit, key
-    assert [f"{key.table}.{key.name}" for key in reference.listed() if key.table and key.table not in PARTNERS] == [
-        name.replace(".0.", ".") for name in springbeam.scene.scene_keys()
-    ]
 
 
 def test_bodies_without_any_scale_are_dimensionless():

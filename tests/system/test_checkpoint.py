@@ -316,7 +316,7 @@ def test_a_signal_ends_the_command_with_3_and_it_goes_on(tmp_path, long, number)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize("share", [0.0, 0.6])
 def test_a_run_that_is_killed_loads_and_goes_on_to_the_same_bytes(tmp_path, long, share):
     """SIGKILL once so much is written; test_recording.py has what a kill leaves of each write."""
     directory, whole = tmp_path / "run", written(long)
