@@ -72,38 +72,6 @@ def test_other_readings_of_algorithm_1_are_other_algorithms():
     assert np.max(failure.value.trajectory.e_total) > 1e9
 
 
-def test_the_first_step_of_algorithm_1_is_the_printed_system():
-    """(62), (53), (54) and lines 16–19 written out densely for one step."""
-    scene = small(spring={"damping": 0.3}, beam={"alpha_b": 1e-3}, time={"t_end": 1e-3})
-    result = algorithm1.simulate(scene)
-    h, stiffness = 1e-3, 1e4
-    d = assemble(scene.beam)
-    M, K = d.M.toarray(), d.K.toarray()
-    A, B = 4.0 * M + (h**2 + 2e-3 * h) * K, 4.0 * M + (2e-3 * h - h**2) * K
-    q, v, e = np.zeros(d.size), -d.slope_shape, d.tip_vector
-
-    def compliance(w):
-        return stiffness * max(-w, 0.0) ** 3
-
-    new = q
-    for _ in range(50):
-        new = np.linalg.solve(A, B @ q + 4.0 * h * M @ v + h**2 * e * (compliance(new[-1]) + compliance(0.0)))
-    assert new[-1] < 0.0  # line 14
-    y_temp, z = new[-1], -1.0
-    y = y_temp
-    for _ in range(50):
-        mean = 0.5 * (y + y_temp)
-        force = -3.0 * mean + 0.2 * 0.5 * (y**2 + y_temp**2) * mean - 0.3 * (y - y_temp) / h
-        force -= 0.5 * (compliance(y) + compliance(y_temp))
-        y = y_temp + h * z + 0.5 * h**2 * force
-    interior = np.arange(d.size - 1)
-    right = (B @ q + 4.0 * h * M @ v - A[:, -1] * y)[interior]
-    full = np.append(np.linalg.solve(A[np.ix_(interior, interior)], right), y)
-    assert (result.y[1], result.u_tip[1]) == (pytest.approx(y, abs=1e-16), result.y[1])
-    np.testing.assert_allclose(result.shapes[1][1], d.deflection_sampler() @ full, atol=1e-16)
-    assert (result.z[1], result.v_tip[1]) == pytest.approx((2.0 * y / h - z, 2.0 * y / h + 1.0), abs=1e-12)
-
-
 def test_algorithm_1_books_all_that_it_injects_and_stops_at_the_foundation():
     """ΔE = what the tip and the spring are given, what the compliance pair does on u ≠ y, and N on the way to φ."""
     scene = small(spring={"damping": 0.5, "external_force": -0.3}, beam={"alpha_b": 1e-3}, time={"t_end": 0.3})

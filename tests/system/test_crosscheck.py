@@ -8,6 +8,7 @@ import pytest
 import tomli_w
 from commands import command, printed
 from rich.console import Console
+from scenes import kinds
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.monolithic import algorithm1, event_driven
@@ -190,13 +191,18 @@ def test_a_change_of_contact_that_the_run_lacks_is_shown_as_none():
     assert ["opens", "none", "0.5000000000", "0.0e+00", "DIFFERS"] in map(str.split, console.export_text().splitlines())
 
 
+def resolved(**tables):
+    """A heavy spring on a stiff foundation under a beam that comes down on it, in steps that resolve both."""
+    beam = {"young_modulus": 1e3, "shear_modulus": 1e3, "n_elements": 4, "approach": "elastic"}
+    spring = {"mass": 100.0, "linear_stiffness": 7e3, "cubic_stiffness": 4e8, "damping": 50.0, "external_force": -9.0}
+    given = {"contact": {"law": "paper", "stiffness": 500.0}, "coupling": {"macro_step": 1e-3}}
+    moving = {"initial_velocity_slope": -0.1, "alpha_b": 1e-3}
+    return with_changes(with_changes(SOFT, beam={**beam, **moving}, spring=spring, **given), **tables)
+
+
 def test_algorithm_1_begins_in_contact_where_an_elastic_approach_begins_at_the_spring():
     """Its reference let the beam move freely for a step first."""
-    beam = {"young_modulus": 1e3, "shear_modulus": 1e3, "n_elements": 4, "approach": "elastic"}
-    beam |= {"initial_velocity_slope": -0.1}
-    spring = {"mass": 100.0, "linear_stiffness": 7e3, "cubic_stiffness": 0.0}
-    paper = {"contact": {"law": "paper", "stiffness": 500.0}, "coupling": {"macro_step": 1e-3}, "time": {"t_end": 5e-3}}
-    report = compare(with_changes(SOFT, beam=beam, spring=spring, **paper))
+    report = compare(resolved(time={"t_end": 5e-3}))
     assert report.reference.phase[0] == "tied"
     assert report.verdict == "agrees", report.rows
 
@@ -206,24 +212,21 @@ def test_algorithm_1_decides_as_its_reference_does_and_says_what_it_injects(stop
     """In all its columns, up to a last step of 0.3 h on the foundation or off it.
 
     The midpoint rule and the exact flow differ by (ωh)²/12 = 6e-6 of a step's motion, over 6 steps; 2e-4 is allowed.
+    What the spring is given differs by what its dashpot takes of the mean velocity of a step instead of the motion.
     """
-    beam = {"young_modulus": 1e3, "shear_modulus": 1e3, "n_elements": 4, "approach": "elastic"}
-    beam |= {"initial_velocity_slope": -0.1}
-    spring = {"mass": 100.0, "linear_stiffness": 7e3, "cubic_stiffness": 0.0}
-    contact = {"law": "paper", "stiffness": 500.0, "exponent": 1.0, "impact": "tip"}
-    steps = {"coupling": {"macro_step": 1e-3}, "time": {"t_end": 5.3e-3}}
-    scene = with_changes(SOFT, beam=beam, spring=spring, contact=contact, stop={"position": stop}, **steps)
+    contact = {"exponent": 1.0, "impact": "tip"}
+    scene = resolved(contact=contact, stop={"position": stop}, time={"t_end": 5.3e-3})
     run, reference = simulate(scene), algorithm1.simulate(scene)
     assert list(run.phase) == list(reference.phase)
     assert set(run.phase) == {"tied", "seated"}
-    assert [event.kind for event in run.events] == [event.kind for event in reference.events]
+    assert kinds(run) == kinds(reference)
     for name in ("u_tip", "v_tip", "y", "z", "contact_force", "compliance_force", "foundation_force", "e_beam"):
         largest = np.abs(reference[name]).max()
         assert run[name] == pytest.approx(reference[name], abs=2e-4 * largest, rel=0.0), name
     assert np.array_equal(run.contact_force_smoothed, run.contact_force)
-    for body in ("beam", "spring"):
+    for body, share in {"beam": 2e-4, "spring": 2e-3}.items():
         injected = reference[f"e_injected_{body}"][-1]
-        assert run.summary[f"injected_into_{body}"] == pytest.approx(injected, rel=2e-4)
+        assert run.summary[f"injected_into_{body}"] == pytest.approx(injected, rel=share)
 
 
 def test_a_reference_that_fails_is_one_error(tmp_path):
