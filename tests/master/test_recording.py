@@ -3,8 +3,10 @@
 import json
 import math
 import os
+import shutil
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -230,9 +232,8 @@ def test_summaries_take_numpy_and_name_what_json_has_no_number_for(tmp_path):
 
 
 def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch):
-    """What the run writes is written anew, byte after byte, and loaded on the way."""
-    writes = []
-    write = file_recorder._Appended.write
+    """Files with the first bytes, so many of them, of what a run writes to them one after the other."""
+    writes, write = [], file_recorder._Appended.write
 
     def noted(self, content):
         writes.append((self.path.name, content))
@@ -241,35 +242,30 @@ def test_a_kill_at_any_byte_leaves_all_blocks_but_the_last(tmp_path, monkeypatch
     monkeypatch.setattr(file_recorder._Appended, "write", noted)
     kept = [block(5, t_end=0.1), block(4, t_end=0.2, begin=5), block(12, t_end=0.9, begin=9)]
     recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path / "whole"))
-    done_after = [0]
-    for begin_block in kept:
-        recorder.keep(*begin_block)
-        done_after.append(sum(len(content) for _, content in writes))
+    done = [0]
+    for records in kept:
+        recorder.keep(*records)
+        done.append(sum(len(content) for _, content in writes))
     recorder.close()
-    whole = load_trajectory(tmp_path / "whole")
-
-    killed = RunDirectory(tmp_path / "killed")
-    killed.path.mkdir()
-    for path, header in recorder._headers.items():
-        (killed.path / path.name).write_bytes(header)
-    (killed.path / "summary.json").write_bytes((tmp_path / "whole" / "summary.json").read_bytes())
-    at, rng = 0, np.random.default_rng(1)
-    for name, content in writes:
-        for i in range(len(content)):
-            with (killed.path / name).open("ab") as file:
-                file.write(content[i : i + 1])
-            at += 1
-            if rng.random() > 0.05 and at not in done_after and i + 1 < len(content):
-                continue
-            there = load_trajectory(killed.path)
-            blocks = sum(done <= at for done in done_after) - 1
-            rows = sum(len(steps) for steps, _, _ in kept[:blocks])
-            assert rows <= len(there) <= rows + len(kept[min(blocks, 2)][0])
-            assert there.steps is None or there.steps.tobytes() == whole.steps[: len(there)].tobytes()
-            assert len(there.events) == (whole.steps["events"][len(there) - 1] if len(there) else 0)
-            assert there.events == whole.events[: len(there.events)]
-            assert np.array_equal(there.shapes[0], whole.shapes[0][: len(there)])
-    assert all_of(whole) == all_of(load_trajectory(killed.path))
+    headers = {path.name: header for path, header in recorder._headers.items()}
+    whole, killed = load_trajectory(tmp_path / "whole"), Path(shutil.copytree(tmp_path / "whole", tmp_path / "killed"))
+    borders = {*done, *np.cumsum([len(content) for _, content in writes])}
+    for at in sorted(borders.union(np.random.default_rng(1).integers(done[-1], size=200))):
+        files, left = dict(headers), at
+        for name, content in writes:
+            files[name] += content[:left]
+            left -= min(left, len(content))
+        for name, content in files.items():
+            (killed / name).write_bytes(content)
+        there = load_trajectory(killed)
+        blocks = sum(end <= at for end in done) - 1
+        rows = sum(len(steps) for steps, _, _ in kept[:blocks])
+        assert rows <= len(there) <= rows + len(kept[min(blocks, 2)][0])
+        assert there.steps is None or there.steps.tobytes() == whole.steps[: len(there)].tobytes()
+        assert len(there.events) == (whole.steps["events"][len(there) - 1] if len(there) else 0)
+        assert there.events == whole.events[: len(there.events)]
+        assert np.array_equal(there.shapes[0], whole.shapes[0][: len(there)])
+    assert all_of(whole) == all_of(there)
 
 
 # -- damaged files ------------------------------------------------------------------------------------------------
