@@ -55,6 +55,7 @@ VALUES = {
     "contact.force_window": 3e-3,
     "coupling.degree": 1,
     "coupling.tolerance": 1e-3,
+    "coupling.feedback_tolerance": 1e-2,
 }
 _RUNS = {}
 

@@ -44,6 +44,9 @@ OPTIONS = {
     "paper": "contact.law=paper",
     "rest": "contact.impact=rest",
     "tip": "contact.impact=tip",
+    "beam drives": "contact.law=compliance coupling.feedback=beam_drives coupling.feedback_tolerance=0.1",
+    "spring drives": "contact.law=compliance coupling.feedback=spring_drives contact.stiffness=0.05"
+    " coupling.feedback_tolerance=0.1",
     "quasi-static": "beam.fidelity=quasi_static",
     "midpoint": "beam.integrator=generalized_alpha beam.rho_inf=0.8",
     "elastic": "beam.approach=elastic",

@@ -126,29 +126,38 @@ class PointMass(SpringDamper):
         super().__init__(mass, displacement=displacement, velocity=velocity, external_force=external_force)
 
 
-class RigidWall(Body):
-    """An end held at rest at ``position`` [m]: the foundation, an elastic stop, or a seated spring."""
-
-    state: Motion
+class Prescribed(Body):
+    """An end that moves as told, whatever acts on it: a driving body, seen from the driven one."""
 
     mass = float("inf")
 
-    def __init__(self, position: float) -> None:
-        self.state = Motion(position, 0.0, 0.0, 0.0)
+    def __init__(self, motion: Motion) -> None:
+        self.state = motion
 
     def mark(self) -> None: ...
 
     def rewind(self) -> None: ...
 
     def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
-        w = self.state.displacement
-        self.state = Motion(w, 0.0, w * size, 0.5 * w * size * size)
-        return self.state
+        return self.motion()
 
     def motion(self) -> Motion:
-        return self.state
+        motion: Motion = self.state
+        return motion
 
     def apply_impulse(self, impulse: float) -> None: ...
+
+
+class RigidWall(Prescribed):
+    """An end held at rest at ``position`` [m]: the foundation, an elastic stop, or a seated spring."""
+
+    def __init__(self, position: float) -> None:
+        super().__init__(Motion(position, 0.0, 0.0, 0.0))
+
+    def advance(self, time: float, size: float, contact: Force, foundation: Force = NO_FORCE) -> Motion:
+        w = self.motion().displacement
+        self.state = Motion(w, 0.0, w * size, 0.5 * w * size * size)
+        return self.motion()
 
     def expect_loads(self, loads: Sequence[Load]) -> None: ...
 

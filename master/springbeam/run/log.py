@@ -21,10 +21,10 @@ Check = Callable[[np.ndarray, np.ndarray], Wrong | None]
 
 
 class Log:
-    """What a run says of its steps, on its way to ``recorder``; ``judge`` looks at the records beside the log."""
+    """What a run says of its steps, on its way to ``recorder``; ``checks`` judge the records beside the log."""
 
-    def __init__(self, scene: Scene, recorder: Recorder, judge: Check) -> None:
-        self._scene, self._recorder, self._checks = scene, recorder, (self._finite, judge)
+    def __init__(self, scene: Scene, recorder: Recorder, *checks: Check) -> None:
+        self._scene, self._recorder, self._checks = scene, recorder, (self._finite, *checks)
         self.events = 0  #: number of events so far
         #: What the recorder does not have yet; records are as of `springbeam.results.steps.packed`.
         self.records, self._events, self._shapes = list[bytes](), list[Event](), list[list[float]]()

@@ -35,6 +35,7 @@ from .ledger import Balance
 from .local_error import LocalError
 from .log import TOGETHER, Log
 from .macro_steps import AdaptiveSteps, MacroGrid
+from .neglect import Neglect, Past, neglected
 from .observed import NOT_SHOWN, observed
 from .outcome import OVERFLOW, RunStopped, raised_here
 from .stepping import Pair, State
@@ -92,7 +93,10 @@ class Master(Stateful):
             self._pair.equilibrium,
         )
         self._balance = Balance(scene, self._pair)
-        self._log = Log(scene, recorder, self._balance.check)
+        checks = [self._balance.check]
+        if scene.driver_stiffness is not None:
+            checks.append(Neglect(scene.coupling, scene.driver_stiffness).check)
+        self._log = Log(scene, recorder, *checks)
         self._told = BEAM_TELLS * self._pair.upper.tells + SPRING_TELLS * self._pair.lower.tells
         self._pictured = beam if isinstance(beam, BeamBody) else None
         self.state.shapes_left, self.state.next_shape = _SHAPES_AFTER_CONTACT, start_time
@@ -370,8 +374,13 @@ class Master(Stateful):
             pace=pace(inside),
         )
         warnings += filter(None, [unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
+        neglect = {}
+        if scene.driver_stiffness is not None and len(steps):
+            bound = neglected(steps, scene.driver_stiffness, Past())
+            neglect = {"neglected_motion": float(bound.motion[-1]), "neglected_share": float(bound.share[-1])}
         window = force_window(scene, stiffest(scene) if scene.contact.facts.opens else 0.0)
         return {
+            **neglect,
             **({} if self._choice is None else {"coupling": self._choice._asdict()}),
             "time": float(steps["time"][-1]) if len(steps) else self.state.time,
             "macro_steps": made,

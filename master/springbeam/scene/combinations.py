@@ -10,6 +10,11 @@ from .scene import Scene
 from .tables import ORDINARY_SCHEMES, Contact
 
 
+def _one_way(scene: Scene) -> bool:
+    """Return whether one of our own bodies drives the other."""
+    return scene.coupling.feedback != "two_way" and scene.beam is not None and scene.spring is not None
+
+
 def _wall_below(scene: Scene) -> bool:
     return isinstance(scene.lower, RigidWall)
 
@@ -131,14 +136,15 @@ FORBIDDEN: tuple[tuple[Callable[[Scene], bool], str], ...] = (
         '{beam.fidelity}: a beam without inertia needs a [spring]; use fidelity = "dynamic"',
     ),
     (
-        lambda s: s.massless and s.contact.soft and s.contact.lasting,
+        lambda s: s.massless and s.contact.soft and s.contact.lasting and s.coupling.feedback != "beam_drives",
         "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
         'law = "tie" or fidelity = "dynamic"',
     ),
     (
-        lambda s: s.massless and s.contact.facts.opens,
+        lambda s: s.massless and s.contact.facts.opens and s.coupling.feedback != "beam_drives",
         "{beam.fidelity}: the tip between the beam and {contact.law} would have no inertia; use "
-        'law = "transmission" or fidelity = "dynamic"',
+        'law = "transmission", fidelity = "dynamic", or neglect the force on the beam: [coupling] '
+        'feedback = "beam_drives"',
     ),
     (
         lambda s: s.massless and s.contact.algorithm,
@@ -165,5 +171,29 @@ FORBIDDEN: tuple[tuple[Callable[[Scene], bool], str], ...] = (
         ),
         "{beam.initial_deflection_slope}: without inertia and damping the beam starts in its static deflection; "
         'use 0.0, approach = "undeformed", or alpha_b > 0',
+    ),
+    # One-way coupling
+    (
+        lambda s: s.coupling.feedback != "two_way" and not s.joins,
+        '{coupling.feedback}: there is one body only; use "two_way"',
+    ),
+    (
+        lambda s: _one_way(s) and (not s.contact.facts.opens or s.coupling.scheme not in ("energy", "auto")),
+        f"{{coupling.feedback}}: needs [contact] law = {laws_that(lambda law: law.opens)} and [coupling] "
+        'scheme = "energy"; use "two_way" otherwise',
+    ),
+    (
+        lambda s: _one_way(s) and s.contact.damping > 0.0,
+        '{coupling.feedback}: its error is unknown for a damped contact; use [contact] damping = 0.0 or "two_way"',
+    ),
+    (
+        lambda s: (
+            _one_way(s)
+            and s.coupling.feedback == "spring_drives"
+            and s.spring is not None
+            and (s.spring.cubic_stiffness != 0.0 or s.spring.linear_stiffness <= 0.0)
+        ),
+        "{coupling.feedback}: its error is known only for a linear spring; linear_stiffness must be greater than 0 "
+        'and cubic_stiffness 0.0, or use "two_way"',
     ),
 )

@@ -90,6 +90,11 @@ def effects() -> tuple[Effect, ...]:
             lambda scene: scene.coupling.scheme not in ORDINARY_SCHEMES,
             "it counts with schemes that solve for the force of a step",
         ),
+        Effect(
+            ("coupling.feedback_tolerance",),
+            lambda scene: scene.coupling.feedback != "two_way",
+            'it counts with feedback = "beam_drives" or "spring_drives"',
+        ),
     )
 
 

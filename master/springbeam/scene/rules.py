@@ -68,6 +68,8 @@ def _partners_fit(scene: Scene, at: At) -> Iterator[str]:
         name = at(f"{table}.fmu" if foreign else f"{table}.element")
         if contact.algorithm:
             yield f"{name}: {at('contact.law')} is Algorithm 1, which needs our own bodies; take another law"
+        if scene.coupling.feedback != "two_way":
+            yield f'{name}: {at("coupling.feedback")} bounds what it neglects for our own bodies only; use "two_way"'
         if scene.massless and contact.facts.strikes:
             yield (
                 f"{name}: {at('contact.law')} needs our own spring below {at('beam.fidelity')}; "
@@ -165,6 +167,18 @@ def _heights_fit(scene: Scene, at: At) -> Iterator[str]:
         )
 
 
+def _feedback_negligible(scene: Scene, at: At) -> Iterator[str]:
+    contact, coupling = scene.contact, scene.coupling
+    # A contact of depth p has V = 2 λ p, whatever p.
+    share = 4.0 * contact.stiffness / (scene.driver_stiffness or math.inf)
+    if contact.exponent == 1.0 and "exponent" in contact.facts.takes and share > coupling.feedback_tolerance:
+        yield (
+            f"{at('coupling.feedback')}: neglects up to 4·stiffness/(stiffness of the driving end) = {share:.2g} of "
+            f"the penetration; allowed is feedback_tolerance = {coupling.feedback_tolerance:g}. "
+            'Use "two_way", or allow more'
+        )
+
+
 def _coupling_resolves(scene: Scene, at: At) -> Iterator[str]:
     coupling, H, t_end = scene.coupling, scene.coupling.macro_step, scene.time.t_end
     if scene.accuracy is not None:
@@ -215,6 +229,7 @@ _CHECKS = (
     _spring_holds,
     _tip_arrives,
     _nothing_moves_before,
+    _feedback_negligible,
     _coupling_resolves,
     _loads_act,
 )

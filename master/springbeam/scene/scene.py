@@ -10,7 +10,7 @@ from pydantic import Field
 
 from .loads import Load
 from .partners import ForeignFmu, LowerBody, Partner, UpperBody
-from .statics import tip_load_deflection
+from .statics import tip_compliance, tip_load_deflection
 from .tables import Beam, Contact, Coupling, Spring, Stop, Table, Time, key
 
 #: Remainders of the macro grid, as fractions of H: shorter than the first is rounding; shorter than the second, a step
@@ -111,6 +111,15 @@ class Scene(Table):
     def coupled(self) -> bool:
         """Whether a contact law acts at all: between the tip and the spring top, or an elastic stop."""
         return self.upper is not None and (self.lower is not None or self.elastic_stop)
+
+    @property
+    def driver_stiffness(self) -> float | None:
+        """Static force per displacement [N/m] of the end that drives a one-way coupling; ``None`` without one."""
+        if self.coupling.feedback == "beam_drives" and self.beam is not None:
+            return 1.0 / tip_compliance(self.beam)
+        if self.coupling.feedback == "spring_drives" and self.spring is not None:
+            return self.spring.linear_stiffness
+        return None
 
     @property
     def tip_at_start(self) -> Height | None:
