@@ -1,7 +1,8 @@
-"""Writes docs/scene.md from the declarations of the keys: python docs/scene.py"""
+"""Writes docs/scene.md and docs/scene.schema.json from the declarations of the keys: python docs/scene.py"""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from pages import DOCS, table  # beside this script
@@ -17,6 +18,10 @@ scene without it. Invalid keys and values are rejected; the error names the key 
 key that plays no part in the scene (`rho_inf` with the modal integrator, `stiffness` of a tie) is named in a warning.
 `springbeam new NAME` writes a commented scene to start from. The symbols are those of [model.md](model.md), the
 schemes those of [coupling.md](coupling.md).
+
+**Editors** complete and check keys by the JSON Schema [scene.schema.json](scene.schema.json), which
+`springbeam keys --schema` prints: with Taplo or Even Better TOML, the first line of a scene beside it is
+`#:schema scene.schema.json`.
 """
 
 
@@ -39,7 +44,8 @@ def page() -> str:
 
 def files() -> dict[Path, str]:
     """Return the text of each file."""
-    return {DOCS / "scene.md": page()}
+    schema = json.dumps(reference.schema(), indent=1, ensure_ascii=False)
+    return {DOCS / "scene.md": page(), DOCS / "scene.schema.json": f"{schema}\n"}
 
 
 if __name__ == "__main__":

@@ -1,19 +1,22 @@
 """Scene files that cannot be run: each is refused with its message, and leaves nothing behind."""
 
+import json
 import os
 import re
 from copy import deepcopy
 from pathlib import Path
 
+import jsonschema
 import pytest
 import tomli_w
 from commands import refused
 
-from springbeam.scene import load_scene, reference, scene_from_dict
+from springbeam.scene import load_scene, reference, scene_from_dict, shipped_scenes
 from springbeam.scene.reading import LONGEST_FILE, tomllib
 
 GROUPS = tomllib.loads(Path(__file__).with_name("scenes_bad.toml").read_text(encoding="utf-8"))
 BASE = GROUPS.pop("base")
+SCHEMA = jsonschema.Draft202012Validator(reference.schema())
 #: How each message about syntax ends.
 TOML_IS = "; a line is a [table] or key = value, with numbers like 0.5 or 1e-3 and texts in quotes"
 CASES = {f"{group}-{name}": case for group, cases in GROUPS.items() for name, case in cases.items()}
@@ -137,5 +140,23 @@ def test_what_is_no_file(tmp_path, monkeypatch):
     assert refused("run", "x" * 300 + ".toml") == f"error: {'x' * 59}…: File name too long\n"
 
 
-def test_a_scene_that_is_begun_can_be_run():
-    scene_from_dict(tomllib.loads(reference.beginning('a "scene"')))
+#: What the schema leaves to the rules; and 50.0 is a whole number in JSON.
+NOT_IN_SCHEMA = {"missing-body", "missing-law-without-stiffness", "missing-shear-coefficient"}
+NOT_IN_SCHEMA |= {"type-exponent-as-count", "type-float-as-count", "type-float-as-degree"}
+
+
+@pytest.mark.parametrize("name", [n for n in CASES if n.split("-")[0] in ("key", "table", "missing", "type", "range")])
+def test_the_schema_refuses_it_too(name):
+    accepted = SCHEMA.is_valid(json.loads(json.dumps(tomllib.loads(text_of(CASES[name])), default=str)))
+    assert accepted == (name in NOT_IN_SCHEMA)
+
+
+def test_the_schema_accepts_the_scenes_that_are_shipped_and_begun():
+    SCHEMA.check_schema(SCHEMA.schema)
+    texts = [
+        reference.beginning('a "scene"'),
+        *(path.read_text(encoding="utf-8") for path in shipped_scenes().values()),
+    ]
+    for text in texts:
+        SCHEMA.validate(tomllib.loads(text))
+        scene_from_dict(tomllib.loads(text))

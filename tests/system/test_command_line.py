@@ -16,7 +16,7 @@ from springbeam.bodies.archive import fmu_directory
 from springbeam.cli import app
 from springbeam.cli.run import _ProgressBar
 from springbeam.results.reading import load_summary
-from springbeam.scene import load_scene, scene_keys, shipped_scenes, with_changes
+from springbeam.scene import load_scene, reference, scene_keys, shipped_scenes, with_changes
 from springbeam.scene.reading import tomllib
 from springbeam.studies.metrics import METRICS
 from springbeam.studies.stability.predict import predict
@@ -172,7 +172,8 @@ def test_json_of_a_run_that_stops_early_is_its_summary_and_the_error_is_on_stder
     assert result.stderr.startswith("error: the run stopped early: ")
 
 
-def test_keys_has_the_metrics_too():
+def test_keys_has_the_schema_and_the_metrics_too():
+    assert json.loads(printed("keys", "--schema")) == reference.schema()
     listed = json.loads(printed("keys", "--metrics", "--json"))
     assert [(m["name"], m["unit"]) for m in listed] == [(name, m.unit) for name, m in METRICS.items()]
     lines = printed("keys", "--metrics").splitlines()

@@ -62,6 +62,9 @@ def keys(
             metavar="TABLE[.KEY]", help="Only the keys of this table, or this key.", autocompletion=_complete_table
         ),
     ] = None,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON Schema of scene files, for editors.")
+    ] = False,
     metrics: Annotated[
         bool, typer.Option("--metrics", help="List the numbers of a run that sweep and converge know instead.")
     ] = False,
@@ -73,6 +76,9 @@ def keys(
     """
     from ..scene import reference
 
+    if schema:
+        print_json(reference.schema())
+        return
     if metrics:
         from ..studies.metrics import METRICS
 
