@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +12,7 @@ from .loads import Load
 from .messages import allowed, extra
 from .partners import PARTNERS
 from .scene import TABLES, Scene
-from .tables import Table, Ways
+from .tables import Table
 
 #: Tables by their names, "" is what stands outside of them, and by theirs the bodies that are not our own.
 MODELS: dict[str, type[Table]] = {"": Scene, **TABLES, "loads": Load, **PARTNERS}
@@ -72,47 +71,23 @@ def _default(model: type[Table], name: str, field: FieldInfo) -> str:
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a scene file (draft 2020-12), for editors and other programs.
 
-    What several keys decide together is left to `springbeam.scene.rules`, but for the ways to give one thing.
+    It has each key alone: meaning, type and range. What several keys decide together, as which of them a table needs,
+    is left to `springbeam.scene.rules`.
     """
     found = {"$schema": "https://json-schema.org/draft/2020-12/schema", **Scene.model_json_schema()}
-    _plain(found["properties"])
-    models: list[type[Table]] = [*TABLES.values(), Load, *PARTNERS.values()]
-    for model in models:
-        table = found["$defs"][model.__name__]
-        _plain(table["properties"])
-        conditional = {name for name, field in model.model_fields.items() if extra(field, "otherwise")}
-        conditional |= {name for ways in model.WAYS for group in ways.groups for name in group}
-        table["required"] = [name for name in table.get("required", ()) if name not in conditional]
-        if model.WAYS:
-            table["allOf"] = [{"oneOf": list(_alternatives(model, ways))} for ways in model.WAYS]
-        if model.SCALES:
-            needed = [name for name in table["required"] if name in model.SCALES]
-            table["required"] = [name for name in table["required"] if name not in model.SCALES]
-            dimensionless = {"properties": dict.fromkeys(model.SCALES, False)}
-            table["anyOf"] = [{"required": needed}, dimensionless]
+    for described in (found, *found["$defs"].values()):
+        described.pop("required", None)
+        for key in described["properties"].values():
+            _plain(key)
     return found
 
 
-def _plain(properties: dict[str, dict[str, Any]]) -> None:
+def _plain(key: dict[str, Any]) -> None:
     """Take out what says nothing about a file: TOML has no null, and names are titles enough."""
-    for described in properties.values():
-        described |= next((way for way in described.pop("anyOf", ()) if way.get("type") != "null"), {})
-        for name, empty in (("title", described.get("title")), ("default", None), ("otherwise", "")):
-            if name in described and (described[name] == empty or isinstance(described[name], dict)):
-                del described[name]
-
-
-def _alternatives(model: type[Table], ways: Ways) -> Iterator[dict[str, Any]]:
-    everything = [name for group in ways.groups for name in group]
-    needed = model.model_fields[everything[0]].is_required()
-    for group in ways.groups:
-        others = {name: False for name in everything if name not in group}
-        if needed:
-            yield {"required": list(group), "properties": others}
-        else:
-            yield {"anyOf": [{"required": [name]} for name in group], "properties": others}
-    if not needed:
-        yield {"properties": dict.fromkeys(everything, False)}
+    key |= next((way for way in key.pop("anyOf", ()) if way.get("type") != "null"), {})
+    for name, empty in (("title", key.get("title")), ("default", None), ("otherwise", "")):
+        if name in key and (key[name] == empty or isinstance(key[name], dict)):
+            del key[name]
 
 
 def beginning(title: str) -> str:
