@@ -65,14 +65,46 @@ def test_a_stroke_within_a_macro_step_of_another_is_not_counted(later, mismatch)
     assert seen.mismatch_at_events == pytest.approx(2.0 / 3.0 * mismatch / 0.4, rel=1e-12)
 
 
+def sinking(depth, force):
+    """Steps in which the top rises past the resting tip on straight lines, to ``depth`` [m] at the rows."""
+    steps = records(Phase(), z=np.append(0.0, np.diff(depth)) / H)
+    steps["z_after"] = np.append(np.diff(depth), 0.0) / H
+    steps["y"] = steps["y_after"] = depth
+    before = np.append(0.0, depth[:-1])
+    steps["y_integral"], steps["y_integral_2"] = 0.5 * H * (before + depth), H**2 * (2.0 * before + depth) / 6.0
+    steps["contact_force"] = force
+    return steps
+
+
 def test_a_contact_is_late_by_each_steps_own_penetration():
     """x²/12 of each step, x² = 2 λ p (1/2 + 1) H² of the deeper of its ends."""
-    stiffness, depth = 3.0, [0.0, 0.1, 0.2, -0.1]
-    steps = records(Phase(), z=np.ones(4))
-    steps["y"], steps["contact_force"] = depth, 1.0
-    seen = observed(*pair(law="compliance", stiffness=stiffness, exponent=2.0), steps, [])
+    stiffness, depth = 3.0, np.array([0.0, 0.1, 0.2, -0.1])
+    seen = observed(*pair(law="compliance", stiffness=stiffness, exponent=2.0), sinking(depth, 1.0), [])
     assert seen.late == pytest.approx(2.0 * stiffness * (0.1 + 0.2 + 0.2) * 1.5 * H**3 / 12.0, rel=1e-12)
     assert seen.contact_frequency == pytest.approx(np.sqrt(2.0 * stiffness * 0.2 * 1.5), rel=1e-12)
+
+
+@pytest.mark.parametrize("law", ["compliance", "link"])
+def test_a_force_misses_the_law_by_its_impulse_along_the_path(law):
+    """λ p² where 1 N acts; in the last step contact opens 2/3 on. Or k p. The top has 300 kg·m/s."""
+    stiffness, depth = 3.0, np.array([0.0, 0.1, 0.2, -0.1])
+    asked = stiffness * np.array([0.1**2 / 3.0, (0.2**3 - 0.1**3) / 0.3, 2.0 / 3.0 * 0.2**2 / 3.0])
+    if law == "link":
+        asked = stiffness * 0.5 * (depth[:-1] + depth[1:])
+    seen = observed(*pair(law=law, stiffness=stiffness, exponent=2.0), sinking(depth, 1.0), [])
+    assert seen.missed == pytest.approx(H * np.linalg.norm(asked - 1.0) / 300.0, rel=1e-4)
+
+
+def test_a_contact_between_two_rows_is_seen():
+    """p = 1.6 s (1 − s) − 0.1 m on a step: where no row shows it and no force acts, the law asks for ∫ λ p₊ dτ."""
+    steps = sinking(np.array([-0.1, -0.1]), 0.0)
+    steps["z_after"][0], steps["z"][1] = 1.6 / H, -1.6 / H
+    steps["y_integral"] += 1.6 * H / 6.0
+    steps["y_integral_2"] += 1.6 * H**2 / 12.0
+    seen = observed(*pair(law="compliance", stiffness=3.0, exponent=1.0), steps, [])
+    assert seen.contact_frequency == pytest.approx(np.sqrt(3.0 * 1.5), rel=1e-12)
+    half = np.sqrt(0.3 / 1.6)  # of the time that it lasts
+    assert seen.missed == pytest.approx(3.0 * H * 4.0 / 3.0 * 0.3 * half / (1.6 / H), rel=1e-2)
 
 
 def test_contacts_and_strokes_within_a_macro_step_are_one_and_strokes_count_twice():

@@ -370,6 +370,7 @@ class Master(Stateful):
             shortest_contact=shortest,
             contact_frequency=seen.contact_frequency,
             late=seen.late,
+            missed=seen.missed,
             contacts=seen.contacts,
             pace=pace(inside),
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..contact.laws import SoftLaw
 from ..contact.phases import Phase
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.paths import Path
-from ..results.steps import joined
+from ..results.steps import impulse, joined
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from ..scene.resolution import VIBRATION, lateness, slowest_frequency
@@ -26,6 +26,9 @@ NOT_SHOWN = (
 )
 #: A stroke on the foundation, which reverses the velocities, amplifies what is late as so many contacts.
 _OF_STROKE = 2
+#: Places in a step where the law is asked, and their shares: Gauss points, so many because a law that opens has a kink.
+_POINTS, _SHARES = np.polynomial.legendre.leggauss(16)
+_INSIDE = 0.5 * (_POINTS + 1.0), 0.5 * _SHARES
 
 
 class Observed(NamedTuple):
@@ -36,6 +39,7 @@ class Observed(NamedTuple):
     mismatch_at_events: float = 0.0  #: impulse μ |v_tip − z| where they part or strike, over the momentum
     contact_frequency: float = 0.0  #: √(k (1/m_tip + 1/m)) of a soft contact at its stiffest [rad/s]
     late: float = 0.0  #: by which the steps make a soft contact late, all together [s]
+    missed: float = 0.0  #: impulse by which the force of the steps misses a soft law, over the momentum of a body
     contacts: int = 1  #: how many, with the strokes, `_OF_STROKE` times; those within a macro step are one
     hidden: bool = False  #: whether a compliance force was too large for its column
 
@@ -52,8 +56,8 @@ def observed(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event
     if pair.law is not None:
         # A link whose ends move as one does not swing, however stiff.
         swings = not pair.lasting or float(apart.max()) > VIBRATION * speed
-        frequency, late = _of_soft_contact(scene, pair, pair.law, steps) if swings else (0.0, 0.0)
-        return Observed(speed, contact_frequency=frequency, late=late, contacts=contacts)
+        frequency, late, missed = _of_soft_contact(scene, pair, pair.law, steps) if swings else (0.0, 0.0, 0.0)
+        return Observed(speed, contact_frequency=frequency, late=late, missed=missed, contacts=contacts)
     hidden = False
     if pair.joinable and not pair.lasting:
         hidden = bool((normal_compliance(scene, steps["u_tip_after"], steps[:1]) > MOST_SHOWN).any())
@@ -101,29 +105,32 @@ def _momenta(scene: Scene, pair: Pair, steps: np.ndarray) -> tuple[float, float]
     return float(upper), float(pair.lower.mass * lower) if lower else 0.0
 
 
-def _of_soft_contact(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray) -> tuple[float, float]:
-    """Return the frequency at the deepest penetration, also inside steps, and `Observed.late`.
+def _of_soft_contact(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray) -> tuple[float, float, float]:
+    """Return the frequency at the deepest penetration, also inside steps, `Observed.late` and `Observed.missed`.
 
-    A law that never opens is linear: how deep does not matter.
+    A law that never opens is linear: how deep does not matter, and its impulse is that of the mean penetration.
     """
-    forces = [steps[name] for name in ("contact_force", "contact_force_rate", "contact_force_rate_2")]
-    touching = np.flatnonzero((steps["size"] > 0.0) & np.any(forces, axis=0))
-    at_end = steps["y"] - steps["u_tip"]
-    depth = np.maximum(at_end, np.append(0.0, at_end[:-1]))[touching]
-    for i in np.flatnonzero(depth <= 0.0) if pair.opens_softly else ():
-        before, step = steps[touching[i] - 1], steps[touching[i]]
-        path = Path.through(
-            (before["u_tip_after"] - before["y_after"], before["v_tip_after"] - before["z_after"]),
-            (step["u_tip"] - step["y"], step["v_tip"] - step["z"]),
-            step["size"],
-            (
-                (step["u_tip_integral"] - step["y_integral"]) / step["size"],
-                (step["u_tip_integral_2"] - step["y_integral_2"]) / step["size"] ** 2,
-            ),
-        )
-        inside = path.lowest_inside()
-        depth[i] = 0.0 if inside is None else -path.at(inside)
+    made = np.flatnonzero(steps["size"] > 0.0)
+    before, step, size = steps[made - 1], steps[made], steps["size"][made]
+    start, end = before["y_after"] - before["u_tip_after"], step["y"] - step["u_tip"]
+    means = (step["y_integral"] - step["u_tip_integral"]) / size
+    twice = (step["y_integral_2"] - step["u_tip_integral_2"]) / size**2
+    deepest, touching = np.maximum(start, end), slice(None)
+    if law.one_sided:
+        rates = before["z_after"] - before["v_tip_after"], step["z"] - step["v_tip"]
+        path: Any = Path.through((start, rates[0]), (end, rates[1]), size, (means, twice))  # type: ignore[arg-type]
+        asked = np.zeros(len(step))  # by the law, of each step [N·s]
+        for s, share in zip(*_INSIDE, strict=True):
+            p, rate = path.at(s), path.slope(s) / size
+            closed = np.flatnonzero(p > 0.0)
+            asked[closed] += share * size[closed] * [law.force(p[i], rate[i]) for i in closed]
+            deepest = np.maximum(deepest, p)
+        touching = deepest > 0.0
+    else:
+        asked = size * [law.force(*both) for both in zip(means, (end - start) / size, strict=True)]
+    momentum = min((momentum for momentum in _momenta(scene, pair, steps) if momentum > 0.0), default=inf)
+    missed = float(np.linalg.norm(asked - impulse(step, size))) / momentum
     inverse_mass = sum(1.0 / body.mass for body in (pair.upper, pair.lower) if body.mass > 0.0)
-    turns = np.sqrt([inverse_mass * law.slope(p) for p in depth]) * steps["size"][touching]
-    late = sum(size * lateness(scene, turn) for size, turn in zip(steps["size"][touching], turns, strict=True))
-    return sqrt(law.slope(float(depth.max(initial=0.0))) * inverse_mass), float(late)
+    turns = np.sqrt([inverse_mass * law.slope(p) for p in deepest[touching]]) * size[touching]
+    late = float((size[touching] * lateness(scene, turns)).sum())
+    return sqrt(law.slope(float(deepest.max(initial=0.0))) * inverse_mass), late, missed

@@ -20,8 +20,10 @@ TURN = 1.0
 #: Gauss collocation of d + 1 stages would (for d = 0 the midpoint rule).
 COLLOCATION = (12.0, 720.0, 100800.0)
 #: Share of its way that an end may move, by degree, in the time by which all steps together make the contact late,
-#: times the number of contacts, each of which amplifies that (docs/accuracy.md has what it misses).
-LATE = (0.1, 0.05, 0.01)
+#: times the number of contacts, each of which amplifies that; and where, without a beam's inertia, all that moves is.
+LATE, LATE_IF_MASSLESS = (0.15, 0.4, 0.4), (0.05, 0.05, 0.01)
+#: Impulse by which the force of a run may miss a soft law, over the momentum of a body, times the number of contacts.
+MISSED = 0.015
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
@@ -50,6 +52,7 @@ def not_resolved(
     shortest_contact: float = inf,
     contact_frequency: float = 0.0,
     late: float = 0.0,
+    missed: float = 0.0,
     contacts: int = 1,
     pace: float = 0.0,
 ) -> str | None:
@@ -69,6 +72,9 @@ def not_resolved(
         Of tip and lower end on a soft contact law at the deepest penetration reached [rad/s], 0 without one.
     late
         By which the steps make a soft contact late, all together [s].
+    missed
+        The impulse by which the force of the steps misses a soft law along the path of the ends, the root of the sum of
+        all steps' squares, over the smaller momentum of both bodies.
     contacts
         How many there are, with twice the strokes on the foundation.
     pace
@@ -86,7 +92,7 @@ def not_resolved(
         if scene.massless and scene.contact.rigid:  # the ends are one oscillator, in its steps as in a soft contact's
             contact_frequency = joined_frequency(scene)
             late = scene.duration * lateness(scene, contact_frequency * H)
-        lost = _contact_lost(scene, contact_frequency, H, late * pace * contacts)
+        lost = _contact_lost(scene, contact_frequency, H, late * pace * contacts, missed * contacts)
         if lost := lost or _unstable(scene, H) or _waves_lag(scene, H):
             return lost
     if mismatch > MISMATCH[scene.coupling.degree]:
@@ -118,22 +124,24 @@ def _force_degree(scene: Scene) -> int:
     return scene.coupling.degree if scene.coupling.scheme == "energy" else 0
 
 
-def _contact_lost(scene: Scene, omega: float, H: float, moved: float) -> str | None:
+def _contact_lost(scene: Scene, omega: float, H: float, moved: float, missed: float) -> str | None:
     """Return in words why steps of H [s] do not follow a contact of ``omega`` [rad/s]; ``None`` if they do.
 
-    ``moved`` is the share of its way that an end moves while it is late.
+    ``moved`` is the share of its way that an end moves while it is late, ``missed`` the share of a momentum by which
+    the forces miss the law, which waves that the steps do not follow let fall with the square of H only.
     """
     projected, degree = scene.coupling.scheme == "energy", _force_degree(scene)
-    limit = LATE[max(degree, scene.massless)]  # there, all that moves is late
-    excess = (moved / limit) ** (0.5 / (degree + 1))
+    limit = (LATE_IF_MASSLESS if scene.massless else LATE)[degree]
+    excess = max((moved / limit) ** (0.5 / (degree + 1)), (missed / MISSED) ** 0.5)
     if excess <= 1.0:
         return None
-    raises = projected and degree + 1 < len(LATE) and (scene.beam is None or scene.beam.integrator == "modal")
+    raises = projected and degree + 1 < len(COLLOCATION) and (scene.beam is None or scene.beam.integrator == "modal")
     higher = ", a higher coupling.degree allows longer ones" if raises else ""
     where = "together" if scene.massless else "on the contact law at its deepest penetration"
+    beside = f", and the forces miss the law by {100.0 * missed:.2g} % of a momentum" if missed > MISSED else ""
     return (
         f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step"
-        f" {where}. Velocities, forces and times of contact are samples of a "
+        f" {where}{beside}. Velocities, forces and times of contact are samples of a "
         f"faster motion; coupling.macro_step <= {_rounded_down(H / excess)} resolves it{higher}"
     )
 
