@@ -168,6 +168,6 @@ def _condition(scene, span):
                 scale = np.abs(exact[name] - exact[name][0]).max() or 1.0
                 change = np.abs(moved[name][rows[same]] - exact[name][same]).max(initial=0.0)
                 worst = max(worst, float(change / (abs(share) * scale)))
-        late, _ = contact_time_difference(moved, exact, 2.0 * scene.coupling.H)
+        late = contact_time_difference(moved, exact, 2.0 * scene.coupling.H)
         worst = max(worst, late / (abs(share) * span))
     return worst

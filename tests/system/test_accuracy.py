@@ -40,7 +40,7 @@ def errors(found):
     times = np.union1d(np.linspace(found.time[0], found.time[-1], 401), found.time[:: len(found) // 50 + 1])
     reference = event_driven.simulate(found.scene, sample_times=times)
     rows, seen = np.searchsorted(reference.time, times), found.at(times)
-    wrong = {"times": contact_time_difference(found, reference, found.summary["accuracy"]["asked"] * span)[0] / span}
+    wrong = {"times": contact_time_difference(found, reference, found.summary["accuracy"]["asked"] * span) / span}
     for name in {"u_tip", "y"} & set(found.columns):
         exact = reference[name][rows]
         wrong[name] = np.abs(seen[name] - exact).max() / np.abs(exact - exact[0]).max()

@@ -48,8 +48,8 @@ def contact_changes(run: Trajectory, window: float) -> list[ContactChange]:
     return sorted(changes, key=lambda change: change.time)
 
 
-def contact_time_difference(first: Trajectory, second: Trajectory, window: float) -> tuple[float, int]:
-    """Return how far the times of two runs are apart [s], and how many of ``second`` that is about.
+def contact_time_difference(first: Trajectory, second: Trajectory, window: float) -> float:
+    """Return how far the times of two runs are apart [s].
 
     Each beginning and end of a contact is compared with the nearest one of the other run, or with the end of the run,
     if it is the later. Contacts closer than ``window`` [s] to each other are one. Those shorter than that which pass on
@@ -57,7 +57,7 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
     of a reference, whose impulses are not known.
     """
     end = float(second.time[-1])
-    worst, number = 0.0, 0
+    worst = 0.0
     runs = first, second
     tip = [_contacts(run, end) for run in runs]
     low = [foundation_contacts(run.events, end) for run in runs]
@@ -66,8 +66,7 @@ def contact_time_difference(first: Trajectory, second: Trajectory, window: float
         (low, [_felt(found, _passed_to_foundation(run), window) for found, run in zip(low, runs, strict=True)]),
     ):
         worst = max(worst, _furthest(felt[0], all_of[1], end), _furthest(felt[1], all_of[0], end))
-        number += sum(t < end for interval in felt[1] for t in set(interval))
-    return worst, number
+    return worst
 
 
 def impulse_difference(run: Trajectory, reference: Trajectory) -> float:

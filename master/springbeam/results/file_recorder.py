@@ -10,9 +10,9 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 import numpy as np
 from pydantic_core import to_json
@@ -35,7 +35,7 @@ _SAME = 1e-12
 class Written:
     """What has reached the disk of a run that goes on later."""
 
-    files: dict[str, tuple[int, int]]  #: by name, bytes and CRC-32
+    files: dict[str, int]  #: bytes by name
     interval: float | None  #: of the rows [s], as of `FileRecorder`
 
 
@@ -64,7 +64,8 @@ class FileRecorder(Recorder):
         self._headers = {directory.events: _line(EVENT_COLUMNS), directory.steps: b""}
         if scene.beam is not None:
             self._headers = {directory.shapes: _line(SHAPE_COLUMNS), **self._headers}
-        self._files: dict[Path, _Appended] = {}
+        #: Each hands what is written to the system at once, so that a killed run has it.
+        self._files: dict[Path, FileIO] = {}
 
     def __enter__(self) -> FileRecorder:
         return self
@@ -88,9 +89,9 @@ class FileRecorder(Recorder):
     def keep(self, steps: np.ndarray, events: Sequence[Event], shapes: np.ndarray) -> None:
         self._begin()
         if self.directory.shapes in self._files:
-            self._files[self.directory.shapes].write(_lines(shapes.tolist()))
-        self._files[self.directory.events].write(_lines(_fields(event) for event in events))
-        self._files[self.directory.steps].write(steps.tobytes())
+            _append(self._files[self.directory.shapes], _lines(shapes.tolist()))
+        _append(self._files[self.directory.events], _lines(_fields(event) for event in events))
+        _append(self._files[self.directory.steps], steps.tobytes())
 
     def steps(self) -> np.ndarray:
         path = self.directory.steps
@@ -137,16 +138,15 @@ class FileRecorder(Recorder):
 
     def _close_files(self) -> None:
         with ExitStack() as files:  # each is closed, also when another cannot be (a full disk)
-            for appended in self._files.values():
-                files.callback(appended.file.close)
+            for file in self._files.values():
+                files.callback(file.close)
 
     def save(self) -> Written:
         """Write what was recorded to the disk, and return what `restore` needs."""
         self._begin()
-        for appended in self._files.values():
-            os.fsync(appended.file.fileno())
-        files = {path.name: (appended.size, appended.crc) for path, appended in self._files.items()}
-        return Written(files, self._interval)
+        for file in self._files.values():
+            os.fsync(file.fileno())
+        return Written({path.name: path.stat().st_size for path in self._files}, self._interval)
 
     def restore(self, saved: Written) -> None:
         """Go on from what `save` of a recorder in the same directory returned; what came later is removed.
@@ -154,22 +154,20 @@ class FileRecorder(Recorder):
         Raises
         ------
         ResultsUnreadable
-            If a file is missing or has changed; nothing is removed then.
+            If a file is missing or shorter than it was; nothing is removed then.
         ResultsInUse
             If another process is writing them.
         """
         self.directory.claim()
-        with ExitStack() as opened:
-            files: dict[Path, _Appended] = {}
-            for path in self._headers:
-                files[path] = _Appended(path, *saved.files[path.name])
-                opened.callback(files[path].file.close)
-            for appended in files.values():
-                appended.check()
-            opened.pop_all()
-        self._files, self._interval = files, saved.interval
-        for appended in files.values():
-            appended.file.truncate(appended.size)
+        found = self.directory.sizes()
+        for path in self._headers:
+            if found.get(path.name, 0) < (size := saved.files[path.name]):
+                there = f"{found[path.name]} bytes" if path.name in found else "missing"
+                raise ResultsUnreadable(f"{path}: {there}, fewer than the {size} bytes once written")
+        self._open()
+        self._interval = saved.interval
+        for path, file in self._files.items():
+            file.truncate(saved.files[path.name])
         self.directory.trajectory.unlink(missing_ok=True)
         self._write_summary({"status": "running"})
         self._reserve_summary()
@@ -189,12 +187,15 @@ class FileRecorder(Recorder):
             raise
         for file in self.directory.results():
             file.unlink()
-        for path, header in self._headers.items():
+        for path in self._headers:
             os.replace(_part(path), path)
-            self._files[path] = _Appended(path, len(header), crc32(header))
+        self._open()
         # Last: where there is a summary, there is a run that can be loaded.
         self._write_summary({"status": "running"})
         self._reserve_summary()
+
+    def _open(self) -> None:
+        self._files = {path: path.open("ab", buffering=0) for path in self._headers}
 
     def _reserve_summary(self) -> None:
         """Keep room on the disk for the last summary, which has to be written also when the disk is full."""
@@ -248,33 +249,10 @@ def _part(path: Path) -> Path:
     return path.with_name(f"{path.name}.part")
 
 
-class _Appended:
-    """A result file that grows; what is written is handed to the system at once, so that a killed run has it."""
-
-    def __init__(self, path: Path, size: int, crc: int) -> None:
-        if not path.is_file():
-            raise ResultsUnreadable(f"{path}: missing")
-        self.path = path
-        self.size, self.crc = size, crc  #: of what was written [bytes], and its CRC-32
-        self.file = path.open("ab", buffering=0)
-
-    def check(self) -> None:
-        """Raise ResultsUnreadable if the file does not begin with what was written."""
-        found, left = 0, self.size
-        with self.path.open("rb") as file:
-            while left > 0 and (chunk := file.read(min(left, 1 << 20))):
-                found, left = crc32(chunk, found), left - len(chunk)
-        if left > 0:
-            raise ResultsUnreadable(f"{self.path}: {self.size - left} bytes, fewer than the {self.size} once written")
-        if found != self.crc:
-            raise ResultsUnreadable(f"{self.path}: changed since it was written")
-
-    def write(self, content: bytes) -> None:
-        written = 0
-        while written < len(content):  # a disk that is almost full takes a part, and then refuses
-            written += self.file.write(content[written:])
-        self.size += len(content)
-        self.crc = crc32(content, self.crc)
+def _append(file: FileIO, content: bytes) -> None:
+    written = 0
+    while written < len(content):  # a disk that is almost full takes a part, and then refuses
+        written += file.write(content[written:])
 
 
 def _fields(event: Event) -> list[Any]:

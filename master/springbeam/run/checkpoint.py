@@ -1,7 +1,7 @@
 """Checkpoints: all that a run needs to go on after it was killed, in one file of its directory.
 
-The file is a line with format and SHA-256, then MessagePack. Reading it executes nothing. It is replaced at once or not
-at all, after the records it belongs to have reached the disk.
+The file is a line with SHA-256, then MessagePack. Reading it executes nothing. It is replaced at once or not at all,
+after the records it belongs to have reached the disk.
 """
 
 from __future__ import annotations
@@ -22,9 +22,6 @@ from ..scene import Scene, scene_from_dict
 
 if TYPE_CHECKING:  # a command that only reads a checkpoint loads no FMU
     from .master import Master
-
-_FORMAT = 3
-_TITLE = b"springbeam checkpoint"
 
 
 class CheckpointRefused(ValueError):
@@ -49,8 +46,7 @@ class Checkpoint:
         scratch = path.with_name(path.name + ".part")
         try:
             with scratch.open("wb") as file:
-                file.write(b"%s %d sha256 %s\n" % (_TITLE, _FORMAT, _digest(content)))
-                file.write(content)
+                file.write(_title(content) + b"\n" + content)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(scratch, path)
@@ -58,7 +54,6 @@ class Checkpoint:
             with suppress(OSError):
                 scratch.unlink()
             raise
-        _sync_directory(path.parent)
 
     @classmethod
     def read(cls, path: Path) -> Checkpoint:
@@ -71,13 +66,8 @@ class Checkpoint:
             first, _, content = path.read_bytes().partition(b"\n")
         except OSError as error:
             raise CheckpointRefused(f"{path}: {error.strerror}") from error
-        words = first.removeprefix(_TITLE).split()
-        if not first.startswith(_TITLE) or len(words) != 3:
-            raise CheckpointRefused(f"{path}: not a checkpoint of springbeam")
-        if words[0] != b"%d" % _FORMAT:
-            raise CheckpointRefused(f"{path}: of format {words[0].decode(errors='replace')}, this is {_FORMAT}")
-        if words[2] != _digest(content):
-            raise CheckpointRefused(f"{path}: damaged, its checksum is wrong")
+        if first != _title(content):
+            raise CheckpointRefused(f"{path}: not a checkpoint of springbeam, or damaged")
         try:
             return msgspec.msgpack.decode(content, type=cls, dec_hook=scene_of)
         except (ValueError, RecursionError) as error:
@@ -118,16 +108,5 @@ class Checkpoints:
         self._due = perf_counter() + self._seconds
 
 
-def _sync_directory(path: Path) -> None:
-    """Make a renamed file's name durable, where the system can."""
-    if os.name == "nt":
-        return
-    folder = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
-
-
-def _digest(content: bytes) -> bytes:
-    return hashlib.sha256(content).hexdigest().encode()
+def _title(content: bytes) -> bytes:
+    return b"springbeam checkpoint sha256 " + hashlib.sha256(content).hexdigest().encode()

@@ -133,7 +133,7 @@ def differences(coarse: Trajectory, fine: Trajectory, short: float) -> dict[str,
     Contacts and flights shorter than the share ``short`` of that time are no evidence.
     """
     span = float(fine.time[-1] - fine.time[0])
-    found = {"motion": 0.0, "times": contact_time_difference(coarse, fine, short * span)[0] / span}
+    found = {"motion": 0.0, "times": contact_time_difference(coarse, fine, short * span) / span}
     rows = np.union1d(coarse.time, fine.time)
     times = np.append((rows[:-1, None] + _BETWEEN * np.diff(rows)[:, None]).ravel(), rows[-1])
     ours, theirs = coarse.at(times), fine.at(times)

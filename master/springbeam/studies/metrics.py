@@ -206,7 +206,7 @@ def errors(run: Trajectory, reference: Trajectory, window: float) -> dict[str, A
     """
     return {
         **motion_errors(run.at(reference.time).columns, reference),
-        "error_event_time": contact_time_difference(run, reference, window)[0],
+        "error_event_time": contact_time_difference(run, reference, window),
         "error_impulse": impulse_difference(run, reference),
         "error_energy": float(run.summary["max_energy_residual"]),
     }
