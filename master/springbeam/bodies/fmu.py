@@ -142,32 +142,27 @@ class Fmu:
     def _prepared_parameters(self, parameters: Mapping[str, Value]) -> list[Call]:
         """Return the calls that set the parameters. Raises FmuError for one that cannot be set so."""
         kinds = self._functions.KINDS
+        given: dict[str, dict[str, Any]] = {}  # by kind and name, as C takes them
+        for name, value in parameters.items():
+            variable = self.variable(name)
+            kind, what = variable.type, f"{self.path}: {name} = {value!r}: variable {name!r} is {variable.type}"
+            if kind not in kinds:
+                raise FmuError(f"{what}, which cannot be set here")
+            if variable.causality not in ("parameter", "input") and variable.initial != "exact":
+                raise FmuError(f"{self.path}: variable {name!r} is {variable.causality}, not a parameter")
+            if not isinstance(value, kinds[kind].taken):
+                raise FmuError(what)
+            if isinstance(value, int) and kinds[kind].ctype(value).value != value:
+                raise FmuError(f"{what}, too small for it")
+            given.setdefault(kind, {})[name] = value.encode() if isinstance(value, str) else value
         #: Where the value of a parameter is.
         self._parameters: dict[str, tuple[Any, int]] = {}
         calls = []
-        for name in parameters:
-            variable = self.variable(name)
-            if variable.type not in kinds:
-                raise FmuError(f"{self.path}: variable {name!r} is {variable.type}, which cannot be set here")
-            if variable.causality not in ("parameter", "input") and variable.initial != "exact":
-                raise FmuError(f"{self.path}: variable {name!r} is {variable.causality}, not a parameter")
-        for kind, (_, ctype, taken) in kinds.items():
-            names = [name for name in parameters if self.variable(name).type == kind]
-            if not names:
-                continue
-            given = [parameters[name] for name in names]
-            for name, value in zip(names, given, strict=True):
-                fits = isinstance(value, taken)
-                if fits and isinstance(value, int) and ctype(value).value != value:
-                    raise FmuError(f"{self.path}: {name} = {value!r}: variable {name!r} is {kind}, too small for it")
-                if not fits:
-                    raise FmuError(f"{self.path}: {name} = {value!r}: variable {name!r} is {kind}")
-            values: Any = (ctype * len(names))(
-                *[value.encode() if isinstance(value, str) else value for value in given]
-            )
-            references = self.references(names, kind)
-            calls.append(self._functions.accessor("Set", kind, references, values, len(names)))
-            self._parameters.update((name, (values, i)) for i, name in enumerate(names))
+        for kind, of_kind in given.items():
+            values: Any = (kinds[kind].ctype * len(of_kind))(*of_kind.values())
+            references = self.references(list(of_kind), kind)
+            calls.append(self._functions.accessor("Set", kind, references, values, len(of_kind)))
+            self._parameters.update((name, (values, i)) for i, name in enumerate(of_kind))
         return calls
 
     def initialise(self, time: float) -> None:

@@ -268,7 +268,7 @@ class OwnBody(FmuBody):
             self._write(time, size, c, *values, dc, ddc, *slopes)
         else:
             self._write(time, size, c, n, *values, dc, ddc, dn, ddn, *slopes)
-        return self._step(dc != 0.0 or ddc != 0.0 or dn != 0.0 or ddn != 0.0 or any(slopes))
+        return self._step(bool(dc or ddc or dn or ddn or any(slopes)))
 
     def energies(self) -> Energies:
         motion, told, pending, before = self.state

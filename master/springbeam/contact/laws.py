@@ -154,12 +154,9 @@ def depth(law: SoftLaw, energy: float) -> float:
         except OverflowError:
             return False
 
-    high = 1.0
+    low, high = 0.0, 1.0
     while stores_less(high):
-        high *= 2.0
-    while not stores_less(0.5 * high) and high > 0.0:
-        high *= 0.5
-    low = 0.5 * high
+        low, high = high, 2.0 * high
     while low < (middle := 0.5 * (low + high)) < high:
         low, high = (middle, high) if stores_less(middle) else (low, middle)
     return high

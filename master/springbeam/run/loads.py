@@ -132,7 +132,6 @@ class Loads:
     """
 
     def __init__(self, scene: Scene, beam: Body | None, spring: Body | None) -> None:
-        self._loads = scene.loads
         self._signals = [Signal(load) for load in scene.loads]
         self._end = scene.time.t_end
         self._kinked = [signal for signal in self._signals if signal.kinks]
@@ -160,7 +159,3 @@ class Loads:
         """
         kink = min((signal.next_kink(time, size) for signal in self._kinked), default=inf)
         return kink if kink < self._end else inf
-
-    def values(self, time: float) -> tuple[float, ...]:
-        """Return the loads at ``time`` [s], each in its unit."""
-        return tuple(float(load.value(time)) for load in self._loads)

@@ -50,13 +50,14 @@ class LocalError(Stateful):
         if energy > self.state.energy:
             self.state.energy = energy
 
-    def holds(self, state: State, step: Step, refused: str) -> bool:
+    def holds(self, state: State, step: Step, refused: str, *, to_kink: bool = False) -> bool:
         """Is the step as accurate as the scene asks? If not, the next one to try has the size that is then set.
 
-        ``refused`` says why longer ones were, or nothing. Raises RunStopped if there is no shorter one.
+        ``refused`` says why longer ones were, or nothing; ``to_kink``, whether it was to end on a kink of a load.
+        Raises RunStopped if there is no shorter one.
         """
         error, order = self._estimate(state, step)
-        if self._steps.judge(step.size, error, order):
+        if self._steps.judge(step.size, error, order, to_kink=to_kink):
             return True
         if self._steps.too_short:
             short = f"the error stays above the tolerance, down to a macro step of {step.size:.3g} s, where it is"

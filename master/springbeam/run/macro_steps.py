@@ -85,7 +85,7 @@ class AdaptiveSteps(Stateful):
 
     def __init__(self, start: float, end: float) -> None:
         self._end, self._length = end, end - start
-        self.state, self._cut = Rung(), False
+        self.state = Rung()
 
     @property
     def size(self) -> float:
@@ -95,21 +95,23 @@ class AdaptiveSteps(Stateful):
     def next(self, time: float, kink: float = inf) -> tuple[float, float]:
         """The time at which the step from ``time`` should end, and its size; ``kink`` as of `MacroGrid`."""
         size, left = self.size, self._end - time
-        self._cut = kink < time + (1.0 + _SHORT_REMAINDER) * size
-        if self._cut:
+        if kink < time + (1.0 + _SHORT_REMAINDER) * size:
             return kink, kink - time
         return (self._end, left) if left <= (1.0 + _SHORT_REMAINDER) * size else (time + size, size)
 
     def struck(self, time: float) -> None:
         """Do nothing: error estimates tell how long steps may be."""
 
-    def judge(self, size: float, error: float, order: int) -> bool:
-        """Whether a step of ``size`` [s] with ``error`` (1 is the tolerance) holds; `size` is then that of the next."""
+    def judge(self, size: float, error: float, order: int, *, to_kink: bool = False) -> bool:
+        """Whether a step of ``size`` [s] with ``error`` (1 is the tolerance) holds; `size` is then that of the next.
+
+        ``to_kink`` says whether it was to end on a kink.
+        """
         state, factor = self.state, _SAFETY * error ** (-1.0 / order) if error > 0.0 else _GROW
         if error <= 1.0:
             # A step that ended on a kink tells of whole ones by the order, unless it was much shorter.
             wanted = min(size * factor, self.size * (1.0 if state.just_rejected else _GROW))
-            if not (self._cut and (wanted < self.size or size < _SHORT_REMAINDER * self.size)):
+            if not (to_kink and (wanted < self.size or size < _SHORT_REMAINDER * self.size)):
                 state.number = self._rung_below(wanted)
             state.just_rejected = False
             return True

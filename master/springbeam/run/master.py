@@ -170,7 +170,7 @@ class Master(Stateful):
         state, steps, pair = self.state, self._steps, self._pair
         kink = pair.loads.next_kink(state.time + _SAME_TIME * steps.size, steps.size) if pair.loads.any else inf
         target, size = steps.next(state.time, kink)
-        step, event = self._advance(size)
+        step, event = self._advance(size, to_kink=target == kink)
         whole = event is None and abs(step.size - size) <= 1e-9 * steps.size
         end = target if whole else state.time + step.size
         if step.size < steps.size:
@@ -191,7 +191,7 @@ class Master(Stateful):
             self._act(event, step)
             self._record(step, pair.ends())
 
-    def _advance(self, size: float) -> tuple[Step, EventKind | None]:
+    def _advance(self, size: float, *, to_kink: bool) -> tuple[Step, EventKind | None]:
         """The next step and the event it ends on, the bodies left at its end."""
         state, pair = self.state, self._pair
         pair.mark()
@@ -205,7 +205,7 @@ class Master(Stateful):
                 if at_start is not None:
                     return Step(state.time, 0.0, state.contact, state.foundation, start, start), at_start
                 step = pair.attempt(state, size, start)
-                if self._error is None or self._error.holds(state, step, cause):
+                if self._error is None or self._error.holds(state, step, cause, to_kink=to_kink):
                     return self._detector.first_event(state, step)
                 pair.rewind()
                 size = self._steps.size
