@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 from contextlib import ExitStack
+from math import inf
 from pathlib import Path
 
-from ..scene import Beam, Scene, Spring
-from ..scene.partners import ForeignFmu, Partner
+from ..scene import Beam, Scene, SceneError, Spring
+from ..scene.partners import ForeignFmu, Partner, RigidWall
+from ..scene.statics import resting_height, tip_compliance, tip_load_deflection
 from .archive import fmu_directory, own_fmu
 from .elements import ELEMENTS
 from .fmu_bodies import FmuBeam, FmuSpring
@@ -17,8 +19,10 @@ from .protocol import Body, FmuError
 from .quasi_static import QuasiStaticBeam
 
 
-def load_bodies(scene: Scene, start_time: float) -> tuple[Body | None, Body | None]:
+def load_bodies(scene: Scene, start_time: float, contact: float = 0.0) -> tuple[Body | None, Body | None]:
     """Return the upper and the lower body of ``scene`` at ``start_time`` [s], our beam as the approach leaves it.
+
+    Where the scene starts at rest, it does so under the force ``contact`` between the ends [N].
 
     Raises
     ------
@@ -32,7 +36,7 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[Body | None, Body | No
     bodies: list[Body | None] = []
     with ExitStack() as made:
         for table, spec in (("beam", scene.upper), ("spring", scene.lower)):
-            body = None if spec is None else _body(scene, spec, start_time, found.get(table))
+            body = None if spec is None else _body(scene, spec, start_time, found.get(table), contact)
             if body is not None:
                 made.callback(body.close)
             bodies.append(body)
@@ -41,25 +45,53 @@ def load_bodies(scene: Scene, start_time: float) -> tuple[Body | None, Body | No
     return upper, lower
 
 
-def _body(scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None) -> Body:
+def _body(
+    scene: Scene, spec: Beam | Spring | Partner, start_time: float, found: Findings | None, contact: float
+) -> Body:
     if isinstance(spec, ForeignFmu):
         assert found is not None
         return IsolatedBody(spec, spec is scene.upper, start_time, found)
     if isinstance(spec, Spring):
-        return FmuSpring.of(spec, start_time)
+        return FmuSpring.of(spec, start_time, top_at_rest(scene, contact) if scene.static else None)
     if not isinstance(spec, Beam):
         return ELEMENTS[spec.element](**spec.model_dump(exclude={"element"}))
     if scene.contact.algorithm:  # (62): the midpoint rule on the whole mesh
         spec = spec.model_copy(update={"integrator": "generalized_alpha", "rho_inf": 1.0, "n_modes": 0})
     rate = spec.initial_velocity_slope
+    if spec.fidelity == "dynamic" and scene.static:
+        return FmuBeam.of(spec, start_time, 0.0, scene.loads, contact)
     if spec.fidelity == "dynamic":
         return FmuBeam.of(spec, start_time, spec.initial_deflection_slope + start_time * rate, scene.loads)
+    if scene.static:
+        tip = tip_load_deflection(spec) + contact * tip_compliance(spec)
+        return QuasiStaticBeam(spec, scene.coupling.degree, tip, 0.0)
     assert scene.tip_at_start is not None
     tip, velocity = scene.tip_at_start.value + start_time * rate * spec.length, rate * spec.length
     beam = QuasiStaticBeam(spec, scene.coupling.degree, tip, velocity)
     if spec.approach == "elastic" or scene.contact.soft:
         beam.release()
     return beam
+
+
+def top_at_rest(scene: Scene, contact: float) -> float:
+    """Return where what lies below the upper end rests under ``contact`` [N]: our spring, a wall or a stop [m].
+
+    Raises SceneError where the spring rests nowhere.
+    """
+    if (spring := scene.spring) is None:
+        return (
+            scene.lower.position if isinstance(scene.lower, RigidWall) else scene.stop.position if scene.stop else -inf
+        )
+    force = spring.external_force - contact
+    for load in scene.loads:
+        force += {"spring": 1.0, "base": -spring.mass}.get(load.on, 0.0) * float(load.value(0.0))
+    height = resting_height(spring, force)
+    if height is None:
+        raise SceneError(
+            f'[time] initial_state = "static": under {force:.6g} N the spring rests nowhere; use a stiffer one, or a '
+            "smaller load"
+        )
+    return height
 
 
 def findings(scene: Scene) -> dict[str, Findings]:

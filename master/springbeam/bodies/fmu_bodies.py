@@ -26,6 +26,7 @@ from .protocol import NO_FORCE, BeamBody, Body, Energies, Felt, FmuError, Force,
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
+_AT_REST = 2
 
 
 class FmuState(NamedTuple):
@@ -316,8 +317,18 @@ class FmuBeam(OwnBody, BeamBody):
     _IMPULSE = ("tip_impulse",)
     _FORCES = ("tip_force",)
 
-    def __init__(self, beam: Beam, start_time: float, deflection_slope: float, loads: Sequence[Load] = ()) -> None:
-        """Start at ``start_time`` [s] with u = ``deflection_slope``·x; ``loads`` say where point forces may act."""
+    def __init__(
+        self,
+        beam: Beam,
+        start_time: float,
+        deflection_slope: float,
+        loads: Sequence[Load] = (),
+        held_by: float | None = None,
+    ) -> None:
+        """Start at ``start_time`` [s] with u = ``deflection_slope``·x, or at rest.
+
+        ``loads`` say where point forces may act; it rests under them and a tip force ``held_by`` [N] if that is given.
+        """
         self._points = sorted({load.at for load in loads if load.at is not None})
         self._constants = {"distributed_load": beam.distributed_load}
         parameters: dict[str, float | int | bool] = {name: value for name, value in beam if name not in beam.GIVEN_ONLY}
@@ -326,6 +337,11 @@ class FmuBeam(OwnBody, BeamBody):
         parameters["initial_deflection_slope"] = deflection_slope
         parameters["section_height"] = beam.section_height
         parameters |= {f"point_force_position[{k}]": at for k, at in enumerate(self._points, 1)}
+        if held_by is not None:
+            parameters |= {"initial_state": _AT_REST, "tip_force": held_by}
+            for load in loads:
+                for name, share in self._inputs_of(load) if load.on != "spring" else ():
+                    parameters[name] = parameters.get(name, 0.0) + share * float(load.value(start_time))
         super().__init__(Fmu(self.NAME, own_fmu(self.NAME), parameters, start_time))
 
     def _prepare(self, fmu: Fmu) -> None:
@@ -367,10 +383,11 @@ class FmuSpring(OwnBody, EndLoaded):
     _IMPULSE = ("impulse",)
     _FORCES = ("contact_force", "foundation_force")
 
-    def __init__(self, spring: Spring, start_time: float) -> None:
+    def __init__(self, spring: Spring, start_time: float, displacement: float | None = None) -> None:
+        """Start at ``start_time`` [s] with y = ``displacement`` [m], which is Ψ if left out."""
         self._spring, self._constants = spring, {"external_force": spring.external_force}
         parameters: dict[str, float | int | bool] = spring.model_dump(exclude={"initial_velocity"})
-        parameters["displacement"] = spring.equilibrium
+        parameters["displacement"] = spring.equilibrium if displacement is None else displacement
         parameters["velocity"] = spring.initial_velocity
         super().__init__(Fmu(self.NAME, own_fmu(self.NAME), parameters, start_time))
 

@@ -34,7 +34,8 @@ def admit(scene: Scene, start_time: float, upper: Body | None, lower: Body | Non
     assert end is not None
     if scene.stop is not None:
         w, table = end.motion().displacement, "beam" if lower is None else "spring"
-        if scene.stop.position - w > _SAME_PLACE * max(abs(w), abs(scene.stop.position)):
+        found = scene.static and lower is None  # held up by the stop
+        if not found and scene.stop.position - w > _SAME_PLACE * max(abs(w), abs(scene.stop.position)):
             raise SceneError(
                 f"[stop] position = {scene.stop.position:g}: the body in [{table}] starts below the foundation, at "
                 f"{w:.9g} m; it must start there or above"
@@ -53,7 +54,7 @@ def _refuse_start(scene: Scene, start_time: float, upper: Body, lower: Body) -> 
     """Raise SceneError if the ends cannot start where they do."""
     (u, v, *_), (y, z, *_) = upper.motion(), lower.motion()
     # An undeformed tip has come down by v t, which rounds.
-    apart = abs(u - y) > _SAME_PLACE * max(abs(u), abs(y), start_time * abs(v))
+    apart = not scene.static and abs(u - y) > _SAME_PLACE * max(abs(u), abs(y), start_time * abs(v))
     contact, starts = scene.contact, f"the upper end starts at {u:.9g} m and the lower one at {y:.9g} m"
     if contact.lasting and contact.rigid:
         if apart:

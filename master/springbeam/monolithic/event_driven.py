@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq, minimize_scalar, newton
 
 from ..results.trajectory import Trajectory
 from ..scene import Scene
@@ -191,6 +191,8 @@ def _system(scene: Scene) -> HybridSystem:
 def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     """Return time [s] and state at the start, where an undeformed tip arrives; ``perturbation``: see `simulate`."""
     scene, X, time = s.scene, np.zeros(s.size), 0.0
+    if scene.time.initial_state == "static":
+        return time, _at_rest(s)
     inertia = s.inverse_tip_mass not in (0.0, np.inf)
     if s.has_spring:
         X[s.Y] = s.spring.equilibrium
@@ -213,6 +215,41 @@ def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
             s.synchronise(Phase("free"), X)
     X[s.T] = time
     return time, X
+
+
+def _at_rest(s: HybridSystem) -> np.ndarray:
+    """Return the state in which everything is at rest under the loads of t = 0 and the force between the ends.
+
+    Raises ReferenceFailure where the spring rests nowhere near Ψ.
+    """
+    X, loads, p = np.zeros(s.size), s.loads.values(np.zeros(())), s.spring
+    bent = (s.load + loads @ s.loads.patterns) / s.stiffness if s.r else np.zeros(0)
+    on_spring = p.external_force + float(loads @ s.loads.on_spring)
+
+    def top(C: float) -> float:
+        if not s.has_spring:
+            return s.stop.position
+        k1, k2 = p.linear_stiffness, p.cubic_stiffness
+        try:
+            y = newton(lambda y: (k1 + k2 * y**2) * y - on_spring + C, p.equilibrium, lambda y: k1 + 3.0 * k2 * y**2)
+        except RuntimeError as error:
+            raise ReferenceFailure(f"the spring rests nowhere: {error}") from error
+        return float(y)
+
+    def mismatch(C: float) -> float:
+        p = top(C) - float(s.b @ (bent + s.b * C / s.stiffness))
+        return p if s.law.rigid else float(s.law.force(np.array(p), np.zeros(()))) - C
+
+    C, obstacle = 0.0, s.has_spring or s.scene.stop is not None
+    deep = top(0.0) - float(s.b @ bent)
+    if s.r and obstacle and (deep > 0.0 or s.law.start != "free") and deep != 0.0:
+        far = deep / float(s.b @ (s.b / s.stiffness))
+        while mismatch(far) * deep > 0.0:
+            far *= 2.0
+        C = brentq(mismatch, 0.0, far, xtol=1e-300, rtol=1e-15)
+    X[s.A] = bent + (s.b * C / s.stiffness if s.r else 0.0)
+    X[s.Y] = float(s.b @ X[s.A]) if s.alone else top(C)
+    return X
 
 
 class EventLocator:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from .hybrid_system import HybridSystem, ReferenceFailure
+from .hybrid_system import NOISE, HybridSystem, ReferenceFailure
 from .laws import Phase
 from .oscillators import GAUSS, STAGES, Oscillators, StepWeights
 from .semi_discrete import singular_modes
@@ -201,15 +201,16 @@ class LinearForm:
         rates, amplitudes = rates[order], amplitudes[order]
         mode = order % len(self.omega2)
         stiffness = np.abs(self.omega2)[mode]
-        limits = [(np.abs(row)[mode] * amplitudes, _UNSEEN_DISPLACEMENT) for row in self.watched]
         alpha = self.oscillators.alpha
-        limits.append((np.abs(self.pressing)[mode] * stiffness * (1.0 + alpha * rates) * amplitudes, _UNSEEN_FORCE))
+        pressing = np.abs(self.pressing)[mode] * stiffness * (1.0 + alpha * rates)
+        limits = [(np.abs(row)[mode], 1, _UNSEEN_DISPLACEMENT) for row in self.watched]
+        limits.append((pressing, 1, _UNSEEN_FORCE))
         if alpha > 0.0:
-            limits.append(((stiffness + rates**2) * amplitudes**2, _UNSEEN_ENERGY))
-        fastest = 0.0
-        for shares, unseen in limits:
-            from_fast = np.cumsum(shares)
-            seen = from_fast > unseen * from_fast[-1]
+            limits.append((stiffness + rates**2, 2, _UNSEEN_ENERGY))
+        fastest, rounding = 0.0, NOISE * float(np.linalg.norm(xi))  # of each amplitude, where nothing moves
+        for weights, power, unseen in limits:
+            from_fast = np.cumsum(weights * amplitudes**power)
+            seen = from_fast > np.maximum(unseen * from_fast[-1], np.cumsum(weights) * rounding**power)
             if np.any(seen):
                 fastest = max(fastest, float(rates[np.argmax(seen)]))
         return min(_STEP_PHASE / fastest if fastest > 0.0 else np.inf, self.system.loads.longest_step)
@@ -280,7 +281,9 @@ class ExponentialPropagator:
         root_mobility = np.sqrt(form.mobility)
         self._speed = max(self._speed, float(np.max(np.abs(xi_dot @ form.inputs.T / root_mobility), initial=0.0)))
         tail = np.sum(np.abs(r @ GAUSS.transform[-2:].T), axis=1)
-        if np.any(tail * size * root_mobility > _TAIL * self._speed):
+        # A place that rounding would change as much is no reason for a shorter step.
+        reach = NOISE * float(np.max(np.abs(form.outputs @ xi.T), initial=0.0))
+        if np.any((tail * size * root_mobility > _TAIL * self._speed) & (tail * size**2 * form.mobility > reach)):
             return None
         states = form.unpack(xi, xi_dot, np.append(times, X[s.T] + size), X)
         if not np.all(np.isfinite(states)):

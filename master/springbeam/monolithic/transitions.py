@@ -35,6 +35,8 @@ class HybridState:
         if not (system.law.rigid and abs(float(m.v - m.z)) > system.noise("m/s", X)):
             self.phase = Phase(system.law.start)
             system.synchronise(self.phase, X)
+        if system.scene.static and not system.law.rigid and m.u < m.y and self.phase.contact == "free":
+            self.phase = Phase("touch")
 
     # What a phase ends with -----------------------------------------------------------------------------------------
 
@@ -94,10 +96,10 @@ class HybridState:
 
     def _meet(self) -> None:
         s, X = self.system, self.X
-        X[s.A] += s.b * ((float(X[s.Y]) - float(X[s.A] @ s.b)) / s.inverse_tip_mass)  # the gap is 0 but for rounding
         if not s.law.rigid:
             self._go_on("meet")
             return
+        X[s.A] += s.b * ((float(X[s.Y]) - float(X[s.A] @ s.b)) / s.inverse_tip_mass)  # the gap is 0 but for rounding
         m = s.motion(self.phase, X)
         before = self._mechanical_energy()
         relative = float(m.z - m.v)

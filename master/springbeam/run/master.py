@@ -62,6 +62,8 @@ class Master(Stateful):
         The bodies at the start time; ``None`` where the scene has none. A beam that is no `BeamBody` leaves no shapes.
     recorder
         Receives records, events and shapes.
+    contact
+        Force between the ends at the start [N], where the scene starts at rest.
 
     Raises SceneError if the scene cannot be run with these bodies.
     """
@@ -69,13 +71,19 @@ class Master(Stateful):
     state: State
 
     def __init__(
-        self, scene: Scene, start_time: float, beam: Body | None, spring: Body | None, recorder: Recorder
+        self,
+        scene: Scene,
+        start_time: float,
+        beam: Body | None,
+        spring: Body | None,
+        recorder: Recorder,
+        contact: float = 0.0,
     ) -> None:
         scene, self._choice = with_scheme_chosen(scene)
         self._scene, self._recorder = scene, recorder
         admit(scene, start_time, beam, spring)
         self._pair = Pair(scene, beam, spring)
-        self.state = self._pair.initial_state(start_time)
+        self.state = self._pair.initial_state(start_time, contact)
         self._steps: MacroGrid | AdaptiveSteps
         self._error = None
         if scene.coupling.adaptive:
@@ -237,7 +245,10 @@ class Master(Stateful):
         state.energy_at_start = float(ledger(self._scene, arriving)["e_total"][0])
         if self._error is not None:
             self._error.note(abs(state.energy_at_start))
-        if self._in_contact(start):
+        if pair.opens_softly and start[0].displacement < start[1].displacement:
+            state.phase = Phase(Joint.TOUCH)
+            self._happened(EventKind.IMPACT, Impact(), 0.0)
+        if self._in_contact(start) or (pair.law is None and state.contact[0] != 0.0):
             pair.mark()
             self._act(EventKind.IMPACT if pair.joinable else EventKind.STOP_IMPACT, step)
         self._record(step, pair.ends())

@@ -21,6 +21,7 @@ from ..results.recording import MemoryRecorder, Recorder
 from ..results.trajectory import Trajectory
 from ..scene import Scene, SceneError, scene_from_dict, suspicions
 from .checkpoint import Checkpoint, CheckpointRefused, Checkpoints
+from .equilibrium import contact_at_rest
 from .master import Master
 from .outcome import Progress, RunStopped
 from .stepping import State
@@ -65,9 +66,10 @@ class Simulation:
         self.scene, self.recorder = scene, recorder or MemoryRecorder(scene)
         of_scene = _without_own(scene, upper=upper, lower=lower)
         start_time = 0.0 if upper is not None else scene.contact_time or 0.0
-        self._bodies = beam, spring = load_bodies(of_scene, start_time)
+        contact = contact_at_rest(of_scene)
+        self._bodies = beam, spring = load_bodies(of_scene, start_time, contact)
         try:
-            self._master = Master(scene, start_time, upper or beam, lower or spring, self.recorder)
+            self._master = Master(scene, start_time, upper or beam, lower or spring, self.recorder, contact)
             if start is not None:
                 self._go_on(start)
         except BaseException:
@@ -325,6 +327,7 @@ def _without_own(scene: Scene, **own: Body | None) -> Scene:
             raise SceneError(f"[{name}]: missing; a body of your own takes the place of one that the scene has")
     asked = {
         f'contact.law = "{scene.contact.law}"': scene.contact.algorithm,
+        'time.initial_state = "static"': scene.static,
         'coupling.scheme = "auto"': scene.coupling.scheme == "auto",
         'beam.fidelity = "quasi_static"': scene.massless,
     }

@@ -116,11 +116,15 @@ class Pair:
         self.divides = self.repeatable and all(body.abilities.any_size for body in self.bodies)
         self.divides &= not self.joined.decides
 
-    def initial_state(self, time: float) -> State:
-        """Return the state before anything happens; ends that a soft law joins for good are joined from the start."""
+    def initial_state(self, time: float, contact: float = 0.0) -> State:
+        """Return the state before anything happens; ends that a soft law joins for good are joined from the start.
+
+        A rigid law holds them by ``contact`` [N].
+        """
         tip, low = ends = self.ends()
         if self.law is None:
-            return State(time, ends)
+            held = (contact, 0.0, 0.0)
+            return State(time, ends, contact=held, smoothed=contact, foundation=NO_FORCE if self.spring else held)
         at_start = self.law.force(low.displacement - tip.displacement, low.velocity - tip.velocity)
         phase = Phase(Joint.TIED) if self.lasting else Phase()
         return State(time, ends, phase, (at_start, 0.0, 0.0), smoothed=at_start)

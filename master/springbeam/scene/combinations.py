@@ -7,7 +7,7 @@ from collections.abc import Callable
 from .laws import laws_that
 from .partners import RigidWall
 from .scene import Scene
-from .tables import ORDINARY_SCHEMES, Contact
+from .tables import ORDINARY_SCHEMES, Beam, Contact, Spring
 
 
 def _one_way(scene: Scene) -> bool:
@@ -46,6 +46,34 @@ FORBIDDEN: tuple[tuple[Callable[[Scene], bool], str], ...] = (
         lambda s: _wall_below(s) and s.contact.facts.strikes and s.contact.impact == "tip",
         "{contact.impact}: gives the lower body the velocity of the tip, and {spring.element} cannot move; "
         'use impact = "inelastic"',
+    ),
+    # A start at rest
+    (
+        lambda s: s.static and s.beam is not None and s.beam.approach == "undeformed",
+        '{time.initial_state}: bends the beam from the start; use approach = "elastic" with it, not {beam.approach}',
+    ),
+    (
+        lambda s: s.static and s.contact.algorithm,
+        "{time.initial_state}: {contact.law} starts as the paper says; leave initial_state out",
+    ),
+    *(
+        (
+            lambda s, table=table: s.static and not isinstance(s.under(table), Beam | Spring | RigidWall | None),
+            f"{{time.initial_state}}: where the body in [{table}] rests is known of our own beam and spring and of a "
+            "rigid_wall only; leave initial_state out",
+        )
+        for table in ("beam", "spring")
+    ),
+    *(
+        (
+            lambda s, table=table, key=key: s.static and getattr(s.under(table), key, 0.0) != 0.0,
+            f"{{{table}.{key}}}: {{time.initial_state}} is at rest where the loads hold it; leave {key} out",
+        )
+        for table, key in (
+            ("beam", "initial_deflection_slope"),
+            ("beam", "initial_velocity_slope"),
+            ("spring", "initial_velocity"),
+        )
     ),
     # Laws
     *(

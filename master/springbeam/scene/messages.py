@@ -109,7 +109,8 @@ def extra(field: FieldInfo, name: str) -> Any:
 
 def _explain_top(kind: str, value: Any, name: str) -> str:
     if kind == "missing":
-        return f"[{name}]: missing table; it must have {', '.join(TABLES[name].model_fields)}"
+        needed = [key for key, field in TABLES[name].model_fields.items() if field.is_required()]
+        return f"[{name}]: missing table; it must have {', '.join(needed)}"
     if kind == "extra_forbidden" and isinstance(value, dict):
         return f"[{_bare(name)}]: unknown table; {nearest(name, TABLES)}allowed: {', '.join(TABLES)}"
     if kind == "extra_forbidden":

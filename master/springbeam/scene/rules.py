@@ -100,7 +100,7 @@ def _spring_holds(scene: Scene, at: At) -> Iterator[str]:
             f"{at('spring.equilibrium')}: the softening spring escapes from beyond "
             f"|y| = √(linear_stiffness/|cubic_stiffness|) = {hilltop:.6g} m; it must start inside"
         )
-    elif k2 < 0.0:
+    elif k2 < 0.0 and not scene.static:
         free = scene.beam is None and (spring.external_force > 0.0 or scene.stop is None)
         if free and abs(spring.external_force) >= (largest := largest_load(spring)):
             yield (

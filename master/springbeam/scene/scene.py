@@ -97,6 +97,11 @@ class Scene(Table):
         return ("beam",) * beam + ("spring",) * (self.spring is not None)
 
     @property
+    def static(self) -> bool:
+        """Whether the run starts at rest, in heights that are found when the bodies are there."""
+        return self.time.initial_state == "static"
+
+    @property
     def massless(self) -> bool:
         """Whether the upper body is our beam without inertia."""
         return self.beam is not None and self.beam.fidelity == "quasi_static"
@@ -123,12 +128,12 @@ class Scene(Table):
 
     @property
     def tip_at_start(self) -> Height | None:
-        """Where the upper end is at the start; ``None`` where only an FMU knows.
+        """Where the upper end is at the start; ``None`` where only an FMU knows, or it is found.
 
         That is s₀ L, or the static deflection of a beam let go without inertia and damping.
         """
         body = self.upper
-        if body is None or body.START is None:
+        if body is None or body.START is None or self.static:
             return None
         height: float = getattr(body, body.START)
         if isinstance(body, Beam):
@@ -138,8 +143,8 @@ class Scene(Table):
 
     @property
     def top_at_start(self) -> Height | None:
-        """Where the lower end is at the start, of our spring Ψ; ``None`` where only an FMU knows."""
-        if self.lower is None or self.lower.START is None:
+        """Where the lower end is at the start, of our spring Ψ; ``None`` where only an FMU knows, or it is found."""
+        if self.lower is None or self.lower.START is None or self.static:
             return None
         return Height(f"spring.{self.lower.START}", getattr(self.lower, self.lower.START))
 

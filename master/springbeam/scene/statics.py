@@ -16,7 +16,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from .tables import Beam
+from .tables import Beam, Spring
 
 #: Places at which the beam's shape is sampled, as fractions of its length.
 SHAPE_POINTS = np.linspace(0.0, 1.0, 21)
@@ -133,6 +133,17 @@ def tip_reach(beam: Beam) -> float:
     """
     swing = math.sqrt(2.0 * initial_kinetic_energy(beam) * tip_compliance(beam))
     return max(swing, abs(tip_load_deflection(beam)))
+
+
+def resting_height(spring: Spring, force: float) -> float | None:
+    """Return where the spring's top rests under an upward ``force`` [N], k1 y + k2 y³ = F [m].
+
+    Of several places it is the stable one nearest to Ψ; ``None`` if there is none.
+    """
+    k1, k2 = spring.linear_stiffness, spring.cubic_stiffness
+    roots = np.roots([k2, 0.0, k1, -force])
+    stable = [y for y in roots.real[roots.imag == 0.0].tolist() if k1 + 3.0 * k2 * y**2 > 0.0]
+    return min(stable, key=lambda y: abs(y - spring.equilibrium), default=None)
 
 
 def locking(beam: Beam) -> float:

@@ -37,7 +37,7 @@ def suspicions(scene: Scene) -> list[str]:
     found += implausible(scene)
     found += held_apart(scene)
     beam, spring = scene.beam, scene.spring
-    if spring is not None and spring.cubic_stiffness < 0.0:
+    if spring is not None and spring.cubic_stiffness < 0.0 and not scene.static:
         arriving = 0.0 if scene.massless else beam_energy(scene)
         energy, depth = spring_energy(spring) + arriving, well_depth(scene)
         if energy > depth:

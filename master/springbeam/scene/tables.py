@@ -126,6 +126,10 @@ class Time(Table):
     """The run, which starts at 0."""
 
     t_end: float = key("s", "end of the run", gt=0.0)
+    initial_state: Literal["given", "static"] = key(
+        "–", "as the bodies' keys say; or at rest under the loads as they then are, and the force of ends that touch",
+        "given",
+    )  # fmt: skip
 
 
 class Beam(Table):

@@ -1,0 +1,154 @@
+"""A start at rest: a scene whose loads do not change stays where statics have it, to rounding, whatever joins its ends.
+
+Closed forms: the tip of the continuous beam under its weight is at u₀ = −ρAg (L⁴/8EI + L²/2KAG); under a contact force
+it is at u₀ + c C, c = L³/3EI + L/KAG, and the top of a linear spring at (f − C)/k₁. Elements of degree 4 are exact.
+"""
+
+import numpy as np
+import pytest
+
+from springbeam.monolithic import event_driven
+from springbeam.results.trajectory import EventKind
+from springbeam.run.runner import simulate
+from springbeam.scene import SceneError, scene_from_dict
+from springbeam.scene.statics import tip_compliance
+
+G, K1, MASS, LINK = 9.81, 2.0e3, 0.05, 1.0e5
+BEAM = {
+    "length": 0.8,
+    "width": 0.03,
+    "height": 0.003,
+    "density": 2700.0,
+    "young_modulus": 7.0e10,
+    "poisson_ratio": 0.33,
+    "n_elements": 4,
+    "element_degree": 4,
+    "approach": "elastic",
+}
+SPRING = {"mass": MASS, "linear_stiffness": K1}
+TIME = {"t_end": 0.02, "initial_state": "static"}
+WEIGHT = {"on": "base", "amplitude": G}
+
+
+def scene(**tables):
+    given = {"time": TIME, "beam": BEAM, "coupling": {"macro_step": 1e-3}, "loads": [WEIGHT], **tables}
+    return scene_from_dict({name: table for name, table in given.items() if table is not None})
+
+
+def hanging(beam):
+    """Return u₀ [m]."""
+    EI, KAG = beam.young_modulus * beam.second_moment_of_area, beam.shear_coefficient * beam.area * beam.shear_modulus
+    return -beam.density * beam.area * G * (beam.length**4 / (8.0 * EI) + beam.length**2 / (2.0 * KAG))
+
+
+def pressed(beam, k, link):
+    """Return C [N] between the beam and a spring k under their weight, with a link between them."""
+    return (-MASS * G / k - hanging(beam)) / (tip_compliance(beam) + 1.0 / k + (1.0 / link if link else 0.0))
+
+
+def link(law, **keys):
+    return {"contact": {"law": law, "stiffness": LINK, **keys}}
+
+
+#: What joins the ends, the stiffness of the lower end [N/m], that of the law [N/m], and the phase.
+CASES = {
+    "tied": ({"spring": SPRING}, K1, 0.0, "tied"),
+    "above Ψ": ({"spring": {**SPRING, "equilibrium": -0.02}}, K1, 0.0, "touch"),
+    "tie": ({"spring": SPRING, "contact": {"law": "tie"}}, K1, 0.0, "tied"),
+    "link": ({"spring": SPRING, **link("link", damping=3.0)}, K1, LINK, "tied"),
+    "compliance": ({"spring": SPRING, **link("compliance", exponent=1.0)}, K1, LINK, "touch"),
+    "rigid stop": ({"stop": {"position": 0.0}}, np.inf, 0.0, "seated"),
+    "elastic stop": ({"stop": {"position": 0.0}, **link("compliance", exponent=1.0)}, np.inf, LINK, "touch"),
+    "wall": ({"spring": {"element": "rigid_wall"}}, np.inf, 0.0, "tied"),
+    "generalised α": ({"beam": {**BEAM, "integrator": "generalized_alpha"}, "spring": SPRING}, K1, 0.0, "tied"),
+    "adaptive": ({"spring": SPRING, "coupling": {"relative_tolerance": 1e-5}}, K1, 0.0, "tied"),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_ends_that_touch_stay_at_rest_under_the_force_of_statics(name):
+    tables, k, stiffness, phase = CASES[name]
+    what = scene(**tables)
+    run = simulate(what)
+    C, columns = pressed(what.beam, k, stiffness), run.columns
+    u = hanging(what.beam) + tip_compliance(what.beam) * C
+    assert columns["u_tip"][0] == pytest.approx(u, rel=1e-9, abs=1e-9 * -hanging(what.beam))
+    assert np.ptp(columns["u_tip"]) < 1e-13 * -hanging(what.beam)
+    assert set(columns["phase"]) == {phase}
+    force = columns["contact_force" if "contact_force" in columns else "foundation_force"]
+    np.testing.assert_allclose(force, C, rtol=1e-8)
+    assert np.abs(columns["energy_residual"]).max() < 1e-13
+
+
+def test_a_cantilever_hangs_at_rest_under_its_weight_and_its_clamp_bears_it():
+    what = scene()
+    run, length = simulate(what), what.beam.length
+    weight = what.beam.density * what.beam.area * length * G
+    np.testing.assert_allclose(run.columns["u_tip"], hanging(what.beam), rtol=1e-10)
+    np.testing.assert_allclose(run.columns["clamp_force"], weight, rtol=1e-10)
+    np.testing.assert_allclose(run.columns["clamp_moment"], weight * length / 2.0, rtol=1e-10)
+    assert not run.events
+    assert np.abs(run.columns["v_tip"]).max() < 1e-15
+
+
+def test_a_shock_on_a_linear_pair_at_rest_is_the_shock_alone_beside_its_statics():
+    shock = {"on": "base", "signal": "half_sine", "amplitude": 300.0, "duration": 5e-3}
+    tie = {"spring": SPRING, "contact": {"law": "tie"}}
+    both = simulate(scene(**tie, loads=[WEIGHT, shock])).columns["u_tip"]
+    alone = simulate(scene(**tie, loads=[shock])).columns["u_tip"]
+    at_rest = simulate(scene(**tie)).columns["u_tip"]
+    np.testing.assert_allclose(both, alone + at_rest, atol=1e-12 * np.abs(alone).max())
+
+
+def test_a_beam_without_inertia_starts_where_it_rests():
+    beam = {**BEAM, "fidelity": "quasi_static", "distributed_load": -5.0, "alpha_b": 0.01}
+    what = scene(beam=beam, spring=SPRING, loads=None)
+    columns = simulate(what).columns
+    EI, KAG = (
+        what.beam.young_modulus * what.beam.second_moment_of_area,
+        5 / 6 * what.beam.area * what.beam.shear_modulus,
+    )
+    free = -5.0 * (0.8**4 / (8.0 * EI) + 0.8**2 / (2.0 * KAG))
+    np.testing.assert_allclose(columns["y"], free / (1.0 + K1 * tip_compliance(what.beam)), rtol=1e-10)
+
+
+def test_a_spring_rests_in_the_well_nearest_to_where_it_is_put():
+    bistable = {"mass": 1.0, "linear_stiffness": -4.0, "cubic_stiffness": 1.0, "equilibrium": -1.5}
+    columns = simulate(scene(beam=None, spring=bistable, loads=None)).columns
+    np.testing.assert_allclose(columns["y"], -2.0, rtol=1e-12)
+
+
+def test_a_spring_under_a_wall_is_pressed_down_to_it():
+    upper = {"element": "rigid_wall", "position": -0.01}
+    columns = simulate(scene(beam=upper, spring=SPRING, loads=None)).columns
+    np.testing.assert_allclose(columns["y"], -0.01, rtol=1e-12)
+    np.testing.assert_allclose(columns["contact_force"], 0.01 * K1, rtol=1e-10)
+
+
+def test_a_spring_that_holds_no_such_load_is_refused():
+    softening = {"mass": 1.0, "linear_stiffness": 3.0, "cubic_stiffness": -1.0, "external_force": 2.1}
+    with pytest.raises(SceneError, match=r"under 2\.1 N the spring rests nowhere"):  # 2/3 k₁ √(k₁/3|k₂|) = 2
+        simulate(scene(beam=None, spring=softening, loads=None))
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"spring": {**SPRING, "cubic_stiffness": 1.0e7}, "contact": {"law": "tie"}},
+        {"spring": {**SPRING, "cubic_stiffness": 1.0e7}, **link("compliance", exponent=1.5)},
+    ],
+)
+def test_a_reference_of_its_own_starts_at_the_same_rest(tables):
+    shock = {"on": "base", "signal": "half_sine", "amplitude": 20.0, "duration": 5e-3}
+    beam = {**BEAM, "alpha_b": 1e-5, "n_modes": 4}
+    steps = {"coupling": {"macro_step": 5e-5, "degree": 2}, "time": {**TIME, "t_end": 5e-3}}
+    what = scene(**tables, **steps, beam=beam, loads=[WEIGHT, shock])
+    run, reference = simulate(what), event_driven.simulate(what)
+    assert reference.columns["u_tip"][0] == pytest.approx(run.columns["u_tip"][0], rel=1e-11)
+    assert reference.columns["u_tip"][-1] == pytest.approx(run.columns["u_tip"][-1], rel=1e-7)
+    assert reference.columns["y"][-1] == pytest.approx(run.columns["y"][-1], rel=1e-7)
+
+
+def test_a_contact_that_is_closed_at_the_start_is_told():
+    columns = simulate(scene(spring=SPRING, **link("compliance", exponent=1.0)))
+    assert [(event.kind, event.time) for event in columns.events] == [(EventKind.IMPACT, 0.0)]
