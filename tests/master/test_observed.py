@@ -65,6 +65,16 @@ def test_a_stroke_within_a_macro_step_of_another_is_not_counted(later, mismatch)
     assert seen.mismatch_at_events == pytest.approx(2.0 / 3.0 * mismatch / 0.4, rel=1e-12)
 
 
+@pytest.mark.parametrize(("mismatch", "size", "swing"), [(9.0, H, 2e-3), (4.0, H, 1e-3), (9.0, 0.9 * H, 0.0)])
+def test_rows_that_go_up_and_down_about_a_smooth_curve_jitter(mismatch, size, swing):
+    """y = (n/10)³ ± 2 mm while tied, at rows H apart; but no more than the mismatch parts the ends, w H/4."""
+    n = np.arange(8)
+    y = (n / 10.0) ** 3 + 2e-3 * (-1.0) ** n
+    steps = records(Phase(Joint.TIED), y=y, u_tip=2.0 * y, v_tip=np.append(np.zeros(7), 1e-3 * mismatch / H))
+    steps["phase"], steps["size"][1:] = steps["phase"][0], size
+    assert observed(*pair(), steps, []).jitter == pytest.approx(swing / np.ptp(y), rel=1e-9, abs=1e-12)
+
+
 def sinking(depth, force):
     """Steps in which the top rises past the resting tip on straight lines, to ``depth`` [m] at the rows."""
     steps = records(Phase(), z=np.append(0.0, np.diff(depth)) / H)

@@ -87,16 +87,27 @@ def test_durations_and_rebound():
     assert "rebound_velocity" not in found(steps, events[0], apart=False)
 
 
-def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_an_impulse():
+@pytest.mark.parametrize(
+    ("kinds", "column"),
+    [
+        (("impact", "separation"), "contact_force"),
+        (("release", "separation"), "contact_force"),
+        (("seated", "unseated"), "foundation_force"),
+    ],
+)
+def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_an_impulse(kinds, column):
     """0.2 s at 1 N; then 0.1 s without force, and one whose end came just before an interruption."""
-    steps = steps_with(lambda t: (float(t < 0.4), 0.0, 0.0), np.linspace(0.0, 0.8, 9))
+    steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))
+    steps[column] = steps["time"] < 0.45
     times = (0.1, 0.3, 0.5, 0.6, 0.75, 0.9)
-    events = [Event(time, ("impact", "separation")[k % 2]) for k, time in enumerate(times)]
-    assert shortest_contact(steps, events, 1.0, free_at_end=True) == pytest.approx(0.2, rel=1e-14)
-    assert shortest_contact(steps, events, 0.15, free_at_end=True) == np.inf
-    assert shortest_contact(steps[:0], events, 1.0, free_at_end=True) == np.inf
-    silent = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))  # no contact has passed anything on
-    assert shortest_contact(silent, events, 1.0, free_at_end=True) == pytest.approx(0.1, rel=1e-14)
+    events = [Event(time, EventKind(kinds[k % 2])) for k, time in enumerate(times)]
+
+    def shortest(below, least, of=steps):
+        return shortest_contact(of, events, below, least, free_at_end=True)
+
+    assert shortest(1.0, 0.19) == pytest.approx(0.2, rel=1e-14)
+    assert shortest(0.15, 0.19) == shortest(1.0, 0.21) == shortest(1.0, 0.1, steps[:0]) == np.inf
+    assert shortest(1.0, -1.0) == pytest.approx(0.1, rel=1e-14)
 
 
 def test_a_tip_that_strikes_the_stop_itself():

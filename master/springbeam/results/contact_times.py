@@ -104,6 +104,16 @@ def tip_contacts(events: Iterable[Event], end: float, *, free_at_end: bool) -> l
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
+def touches(events: Iterable[Event]) -> list[Interval]:
+    """Return from when to when released ends still touch until they part [s]."""
+    joins = [event for event in events if event.kind.joins]
+    return [
+        (event.time, after.time)
+        for event, after in itertools.pairwise(joins)
+        if (event.kind, after.kind) == (EventKind.RELEASE, EventKind.SEPARATION)
+    ]
+
+
 def foundation_contacts(events: Iterable[Event], end: float) -> list[Interval]:
     """Return the impacts on the foundation, and the rests on it; a rest that goes on ends at ``end`` [s]."""
     intervals: list[Interval] = []

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..scene import Scene
-from .contact_times import SLIGHT, foundation_contacts, kicks, tip_contacts
+from .contact_times import foundation_contacts, kicks, tip_contacts, touches
 from .dense import extremes
 from .steps import impulse
 from .trajectory import Event
@@ -118,23 +118,26 @@ def pace(steps: np.ndarray) -> float:
     return found
 
 
-def shortest_contact(steps: np.ndarray, events: Iterable[Event], below: float, *, free_at_end: bool) -> float:
-    """Return how long the shortest contact or rest on the foundation that has ended lasts [s]; ∞ if not ``below`` [s].
+def shortest_contact(
+    steps: np.ndarray, events: Iterable[Event], below: float, least: float, *, free_at_end: bool
+) -> float:
+    """Return how long the shortest contact, touch above Ψ or rest on the foundation lasts [s]; ∞ if not ``below`` [s].
 
-    Those that pass on hardly any of the impulse of a run are left out, and one whose end has no row, of a run that was
-    interrupted there. Other parameters as of `totals`.
+    Those are left out whose force passes on no more than ``least`` [N·s], and those that have not ended by the last
+    row. Other parameters as of `totals`.
     """
+    events, time, found = list(events), steps["time"], inf
     if len(steps) == 0:
         return inf
-    events = [event for event in events if event.time <= steps["time"][-1]]
-    intervals = [*tip_contacts(events, inf, free_at_end=free_at_end), *foundation_contacts(events, inf)]
-    short = [(since, until) for since, until in intervals if 0.0 < until - since < below]
-    if not short:
-        return inf
-    before, after = _cumulative(steps, events)
-    first, last = (np.searchsorted(steps["time"], times) for times in np.transpose(short))
-    passed = np.abs(before[last] - after[first])
-    return min((u - s for (s, u), j in zip(short, passed, strict=True) if j >= SLIGHT * abs(after[-1])), default=inf)
+    held = [*tip_contacts(events, inf, free_at_end=free_at_end), *touches(events)]
+    for intervals, force in ((held, "contact_force"), (foundation_contacts(events, inf), "foundation_force")):
+        passed = np.cumsum(impulse(steps, steps["size"], name=force))
+        for since, until in intervals:
+            if 0.0 < until - since < min(below, found) and until <= time[-1]:
+                first, last = np.searchsorted(time, (since, until))
+                if abs(passed[last] - passed[first]) > least:
+                    found = until - since
+    return found
 
 
 def _contact(

@@ -28,7 +28,7 @@ from ..results.totals import pace, shortest_contact, totals
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from ..scene.automatic import with_scheme_chosen
-from ..scene.resolution import CONTACT_STEPS, force_window, not_resolved, peak_force_doubt
+from ..scene.resolution import CONTACT_STEPS, SHORT_IMPULSE, force_window, not_resolved, peak_force_doubt
 from .crowd import SIMULTANEOUS, count_crowd
 from .detection import Detector
 from .ledger import Balance
@@ -374,10 +374,12 @@ class Master(Stateful):
         free_at_end = not are_joined(inside[-1:]).any()
         of_coupling, warned = joined.report(made)
         warnings = [*balance.warnings, *warned]
-        shortest = shortest_contact(inside, events, CONTACT_STEPS[scene.coupling.degree] * H, free_at_end=free_at_end)
+        short, least = CONTACT_STEPS[scene.coupling.degree] * H, SHORT_IMPULSE * seen.momentum
+        shortest = shortest_contact(inside, events, short, least, free_at_end=free_at_end)
         unresolved = not_resolved(
             scene,
             seen.mismatch_at_events,
+            jitter=seen.jitter,
             shortest_contact=shortest,
             contact_frequency=seen.contact_frequency,
             late=seen.late,

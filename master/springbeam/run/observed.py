@@ -37,6 +37,8 @@ class Observed(NamedTuple):
     speed: float = 0.0  #: the largest of an end [m/s]
     mismatch: float = 0.0  #: |v_tip − z| of ends that a rigid law joins [m/s]
     mismatch_at_events: float = 0.0  #: impulse μ |v_tip − z| where they part or strike, over the momentum
+    jitter: float = 0.0  #: of rows where the ends are joined, as far as the mismatch makes it, over the way of an end
+    momentum: float = inf  #: the smaller one of both bodies at their largest [kg·m/s]
     contact_frequency: float = 0.0  #: √(k (1/m_tip + 1/m)) of a soft contact at its stiffest [rad/s]
     late: float = 0.0  #: by which the steps make a soft contact late, all together [s]
     missed: float = 0.0  #: impulse by which the force of the steps misses a soft law, over the momentum of a body
@@ -50,6 +52,7 @@ def observed(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event
         return Observed()
     v, z = steps["v_tip_after"], steps["z_after"]
     speed, apart = float(np.abs([v, z]).max()), np.abs(v - z)
+    momentum = min((momentum for momentum in _momenta(scene, pair, steps) if momentum > 0.0), default=inf)
     met = [event for event in events if event.kind.strikes or event.kind is EventKind.IMPACT]
     apart_in_time = np.diff([event.time for event in met], prepend=-np.inf) > (scene.coupling.macro_step or 0.0)
     contacts = int(apart_in_time @ [_OF_STROKE if event.kind.strikes else 1 for event in met]) if met else 1
@@ -57,12 +60,33 @@ def observed(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event
         # A link whose ends move as one does not swing, however stiff.
         swings = not pair.lasting or float(apart.max()) > VIBRATION * speed
         frequency, late, missed = _of_soft_contact(scene, pair, pair.law, steps) if swings else (0.0, 0.0, 0.0)
-        return Observed(speed, contact_frequency=frequency, late=late, missed=missed, contacts=contacts)
+        return Observed(
+            speed,
+            momentum=momentum,
+            contact_frequency=frequency,
+            late=late,
+            missed=missed / momentum,
+            contacts=contacts,
+        )
     hidden = False
     if pair.joinable and not pair.lasting:
         hidden = bool((normal_compliance(scene, steps["u_tip_after"], steps[:1]) > MOST_SHOWN).any())
-    at_events = _mismatch_at_events(scene, pair, steps, events)
-    return Observed(speed, float(apart[joined(steps)].max(initial=0.0)), at_events, contacts=contacts, hidden=hidden)
+    mismatch, at_events = float(apart[joined(steps)].max(initial=0.0)), _mismatch_at_events(scene, pair, steps, events)
+    jitter = _jitter(steps, scene.coupling.macro_step, mismatch) if scene.coupling.macro_step and mismatch else 0.0
+    return Observed(speed, mismatch, at_events, jitter, momentum, contacts=contacts, hidden=hidden)
+
+
+def _jitter(steps: np.ndarray, H: float, mismatch: float) -> float:
+    """Return by how much the rows of joined ends go up and down about a smooth curve, over the smaller way of an end.
+
+    It is a sixteenth of the fourth difference of rows that are H [s] apart. A vibration that the steps follow may do
+    the same; a ``mismatch`` of velocities [m/s], which parts the ends by mismatch H/4 inside a step, is then smaller.
+    """
+    whole = joined(steps) & (np.abs(steps["size"] - H) <= 1e-6 * H)
+    five = joined(steps)[:-4] & whole[1:-3] & whole[2:-2] & whole[3:-1] & whole[4:]
+    swing = np.abs(np.diff(steps["y"], 4))[five].max(initial=0.0) / 16.0
+    way = min((way for way in (np.ptp(steps["u_tip"]), np.ptp(steps["y"])) if way > 0.0), default=inf)
+    return float(min(swing, 0.25 * mismatch * H) / way)
 
 
 def _mismatch_at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float:
@@ -98,15 +122,16 @@ def _mismatch_at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Seq
 
 def _momenta(scene: Scene, pair: Pair, steps: np.ndarray) -> tuple[float, float]:
     """Return the largest momenta of the upper and of the lower body [kg·m/s], without waves that a beam carries."""
-    upper, lower = pair.upper.mass * np.abs(steps["v_tip_after"]).max(), np.abs(steps["z_after"]).max()
+    speeds = np.abs(steps["v_tip_after"]).max(), np.abs(steps["z_after"]).max()
+    upper, lower = (body.mass * w if w else 0.0 for body, w in zip((pair.upper, pair.lower), speeds, strict=True))
     if scene.beam is not None:
         quarter = min(2.0 / slowest_frequency(scene.beam), scene.duration or inf)
         upper = max(upper, tip_inertia(scene.beam) * np.ptp(steps["u_tip"]) / quarter)
-    return float(upper), float(pair.lower.mass * lower) if lower else 0.0
+    return float(upper), float(lower)
 
 
 def _of_soft_contact(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray) -> tuple[float, float, float]:
-    """Return the frequency at the deepest penetration, also inside steps, `Observed.late` and `Observed.missed`.
+    """Return the frequency at the deepest penetration, also inside steps, `Observed.late` and the impulse missed [N·s].
 
     A law that never opens is linear: how deep does not matter, and its impulse is that of the mean penetration.
     """
@@ -128,8 +153,7 @@ def _of_soft_contact(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray) 
         touching = deepest > 0.0
     else:
         asked = size * [law.force(*both) for both in zip(means, (end - start) / size, strict=True)]
-    momentum = min((momentum for momentum in _momenta(scene, pair, steps) if momentum > 0.0), default=inf)
-    missed = float(np.linalg.norm(asked - impulse(step, size))) / momentum
+    missed = float(np.linalg.norm(asked - impulse(step, size)))
     inverse_mass = sum(1.0 / body.mass for body in (pair.upper, pair.lower) if body.mass > 0.0)
     turns = np.sqrt([inverse_mass * law.slope(p) for p in deepest[touching]]) * size[touching]
     late = float((size[touching] * lateness(scene, turns)).sum())

@@ -32,11 +32,16 @@ WAVE_LAG = 1.0
 #: ω α_b above which waves die out within two periods and need no resolution.
 DIES_OUT = 0.15
 #: Impulse by which joined ends disagree as they part or strike the foundation, over the momentum of a body, above which
-#: the motion is called unresolved, by degree; and where a contact is short (docs/accuracy.md has what they miss).
-MISMATCH, MISMATCH_IF_SHORT = {0: 0.015, 1: 0.015, 2: 0.03}, 0.01
+#: the motion is called unresolved, by degree (docs/accuracy.md has what it misses).
+MISMATCH = {0: 0.0175, 1: 0.0175, 2: 0.03}
+#: Share of its way by which a row of joined ends may be off a smooth curve: where the phase of the vibration that does
+#: so is lost, the ends are off by twice that.
+JITTER = 0.0055
 #: Macro steps by degree below which a contact is short, or a rest on the foundation: the forces of one step tell when
 #: it ends, at degree 0 those of two.
 CONTACT_STEPS = {0: 2.0, 1: 1.0, 2: 1.0}
+#: Share of the smaller momentum of both bodies that the force of a short contact may pass on: it is none to speak of.
+SHORT_IMPULSE = 0.1
 #: Velocity mismatch above which it is a vibration and no error.
 VIBRATION = 0.2
 #: Periods of the fastest wave of the mesh that a window must hold for the mean of a rigid force to be settled to 5 %.
@@ -49,6 +54,7 @@ def not_resolved(
     scene: Scene,
     mismatch: float,
     *,
+    jitter: float = 0.0,
     shortest_contact: float = inf,
     contact_frequency: float = 0.0,
     late: float = 0.0,
@@ -65,8 +71,10 @@ def not_resolved(
     mismatch
         The largest difference w of the joined ends' velocities as they part or strike the foundation, as impulse μ w of
         their reduced mass over the momentum of the body that it would change the most.
+    jitter
+        By how much the rows of joined ends go up and down about a smooth curve, over the smaller way of an end.
     shortest_contact
-        How long the shortest contact, or rest on the foundation, has lasted [s]; of a soft law it counts where the
+        How long the shortest contact, touch or rest on the foundation has lasted [s]; of a soft law it counts where the
         force is exchanged once per macro step.
     contact_frequency
         Of tip and lower end on a soft contact law at the deepest penetration reached [rad/s], 0 without one.
@@ -101,10 +109,14 @@ def not_resolved(
             f"{100.0 * mismatch:.2g} % of the momentum of a body; what they do then depends on it. "
             f"{_remedy(scene)}"
         )
+    if jitter > JITTER:
+        return (
+            f"not resolved: joined ends go up and down from row to row by {100.0 * jitter:.2g} % of their way, samples "
+            f"of a faster vibration that the steps do not follow. {_remedy(scene)}"
+        )
     held = scene.contact.rigid or scene.coupling.scheme in ORDINARY_SCHEMES  # a force that does not see the contact end
-    tells = scene.coupling.scheme == "energy" and not scene.massless  # whether the mismatch says how good the force is
     short = CONTACT_STEPS[scene.coupling.degree]
-    if H is not None and held and shortest_contact < short * H and not (tells and mismatch <= MISMATCH_IF_SHORT):
+    if H is not None and held and shortest_contact < short * H:
         return (
             f"not resolved: a contact lasts {shortest_contact / H:.2g} macro steps only, so that the force of one or "
             "two steps decides when it ends, and with it what follows; coupling.macro_step <= "
