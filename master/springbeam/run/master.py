@@ -245,7 +245,7 @@ class Master(Stateful):
         state.energy_at_start = float(ledger(self._scene, arriving)["e_total"][0])
         if self._error is not None:
             self._error.note(abs(state.energy_at_start))
-        if pair.opens_softly and start[0].displacement < start[1].displacement:
+        if pair.opens_softly and start[1].displacement - start[0].displacement > self._detector.tolerance(start):
             state.phase = Phase(Joint.TOUCH)
             self._happened(EventKind.IMPACT, Impact(), 0.0)
         if self._in_contact(start) or (pair.law is None and state.contact[0] != 0.0):
