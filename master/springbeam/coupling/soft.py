@@ -37,7 +37,6 @@ class SoftState(Responses):
 
     #: Size of the last step [s], and (E + A′)⁻¹ [m/N] where its crossing was found.
     last_crossing: tuple[float, Matrix] = (0.0, [])
-    simpler: SoftState | None = None  #: of the solver at degree 0
     unfelt: float = 0.0  #: work of the contact force on a driving end, which does not feel it [J]
 
 
@@ -59,32 +58,24 @@ class SoftSolver(Booked, StepSolver):
     def __init__(self, law: SoftLaw, degree: int, tolerance: float) -> None:
         StepSolver.__init__(self, energy.CONDITIONS[degree], degree, tolerance)
         Booked.__init__(self, law, degree)
-        self._simpler = SoftSolver(law, 0, tolerance) if degree > 0 else None
-        self._simplified = False  #: whether the last step tried was made at degree 0
-        self.state = SoftState(simpler=None if self._simpler is None else self._simpler.state)
-
-    def restore(self, saved: bytes) -> None:
-        super().restore(saved)
-        if self._simpler is not None and self.state.simpler is not None:
-            self._simpler.state = self.state.simpler
+        self.state = SoftState()
+        self._maker: SoftSolver = self  #: of the last step tried: another one if that was made at degree 0
 
     def solve(self, upper: Body, lower: Body, time: float, size: float, start: Ends, guess: Force) -> Step:
-        self._simplified = False
+        self._maker = self
         try:
             return super().solve(upper, lower, time, size, start, guess)
         except NotConverged:
-            if self._simpler is None:
+            if self.degree == 0:
                 raise
-        self._simplified = True
-        before = self._simpler.state.iterations
-        found = self._simpler.solve(upper, lower, time, size, start, (guess[0], 0.0, 0.0))
-        self.state.iterations += self._simpler.state.iterations - before
+        self._maker = SoftSolver(self.law, 0, self._tolerance)
+        found = self._maker.solve(upper, lower, time, size, start, (guess[0], 0.0, 0.0))
+        self.state.iterations += self._maker.state.iterations
         return found
 
     def accept(self, step: Step) -> None:
-        self.state.reduced += self._simplified
-        made = self._simpler if self._simplified and self._simpler is not None else self
-        self._book(step, made._projection)
+        self.state.reduced += self._maker is not self
+        self._book(step, self._maker._projection)
 
     def local_errors(self, step: Step, scales: Scales) -> list[ErrorEstimate]:
         """Estimate from the part of the law's force that the polynomial leaves out: it changes velocities."""
