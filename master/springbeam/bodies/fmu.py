@@ -8,10 +8,9 @@ import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
 from ctypes import byref, c_char, c_double, c_size_t, c_uint, c_void_p
-from functools import lru_cache, partial
+from functools import lru_cache
 from math import prod
 from pathlib import Path
-from struct import Struct
 from typing import Any, NoReturn
 
 from fmpy.model_description import ModelDescription, read_model_description
@@ -36,34 +35,6 @@ def _unpacked(path: Path, modified: int) -> tuple[Path, ModelDescription]:
     except Exception as error:  # FMPy raises bare Exceptions for whatever is wrong with an archive
         raise FmuError(f"{path}: not a usable FMU: {error}") from error
     return folder, description
-
-
-class Reals:
-    """Real numbers of an FMU, read and written together; the arguments are converted to C once.
-
-    Each variable has ``size`` values.
-    """
-
-    def __init__(self, fmu: Fmu, *names: str, size: int = 1) -> None:
-        n = len(names) * size
-        self._names = ", ".join(names)
-        self._fmu = fmu
-        self.values: Any = (c_double * n)()  #: as last read or written
-        self.unpacked = partial(Struct(f"{n}d").unpack, self.values)
-        self.read, self._write = (fmu.accessor(verb, names, self.values, size) for verb in ("Get", "Set"))
-        if names:
-            self.get()  # a wrong reference is found before the run
-
-    def get(self) -> tuple[float, ...]:
-        if (status := self.read()) > WARNING:
-            raise self._fmu.failed(status, f"cannot read {self._names}")
-        return self.unpacked()
-
-    def set(self, values: Sequence[float]) -> None:
-        self.values[:] = values
-        self._fmu.moved = True
-        if (status := self._write()) > WARNING:
-            raise self._fmu.failed(status, f"cannot set {self._names}")
 
 
 #: A value of a parameter.
@@ -190,12 +161,6 @@ class Fmu:
         """Return what gets or sets (``verb``) variables of ``size`` real numbers each by ``values``, an array of C."""
         references = self.references(names, self.real, size)
         return self._functions.accessor(verb, self.real, references, values, len(names) * size)
-
-    def array(self, name: str, size: int) -> Reals:
-        """Return all values of an array, of which FMI 2.0 knows the elements only."""
-        if name in self._variables:
-            return Reals(self, name, size=size)
-        return Reals(self, *[f"{name}[{i}]" for i in range(1, size + 1)])
 
     def variable(self, name: str) -> Any:
         """Return what the FMU says of a variable. Raises FmuError if it has none of this name."""

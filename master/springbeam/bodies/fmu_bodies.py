@@ -18,15 +18,43 @@ from ..scene import Beam, Load, Spring
 from ..scene.statics import SHAPE_POINTS
 from .archive import own_fmu
 from .end_loaded import EndLoaded
-from .fmu import Fmu, Reals
+from .fmu import Fmu
 from .force import combined
-from .functions import WARNING, Call
+from .functions import WARNING
 from .protocol import NO_FORCE, BeamBody, Body, Energies, Felt, FmuError, Force, Motion, StepRefused
 
 #: The numbers by which the beam FMU knows its alternatives.
 _INTEGRATORS = {"modal": 1, "generalized_alpha": 2}
 _MASS_MATRICES = {"consistent": 1, "averaged": 2}
 _AT_REST = 2
+
+
+class Reals:
+    """Real numbers of an FMU, read and written together; the arguments are converted to C once.
+
+    Each variable has ``size`` values.
+    """
+
+    def __init__(self, fmu: Fmu, *names: str, size: int = 1) -> None:
+        n = len(names) * size
+        self.names = names
+        self._fmu = fmu
+        self.values: Any = (c_double * n)()  #: as last read or written
+        self._unpacked = partial(Struct(f"{n}d").unpack, self.values)
+        self._read, self._write = (fmu.accessor(verb, names, self.values, size) for verb in ("Get", "Set"))
+        if names:
+            self.get()  # a wrong reference is found before the run
+
+    def get(self) -> tuple[float, ...]:
+        if (status := self._read()) > WARNING:
+            raise self._fmu.failed(status, f"cannot read {', '.join(self.names)}")
+        return self._unpacked()
+
+    def set(self, values: Sequence[float]) -> None:
+        self.values[:] = values
+        self._fmu.moved = True
+        if (status := self._write()) > WARNING:
+            raise self._fmu.failed(status, f"cannot set {', '.join(self.names)}")
 
 
 class FmuState(NamedTuple):
@@ -67,7 +95,7 @@ class FmuBody(Body):
             raise
 
     def _prepare(self, fmu: Fmu) -> None:
-        self._prepare_outputs()
+        self._outputs = Reals(fmu, *self._MOTION, *self._ENERGIES)
         self._impulse = Reals(fmu, *self._IMPULSE)
         self._prepare_inputs(())
         self.mass = self._mass()
@@ -89,16 +117,6 @@ class FmuBody(Body):
         #: The loads of a step, and two derivatives of each.
         self._loads: tuple[tuple[float, ...], tuple[float, ...]] = ((0.0,) * len(loads), (0.0,) * (2 * len(loads)))
 
-    def _prepare_outputs(self) -> None:
-        """Prepare the one call that reads motion and energies."""
-        self._outputs = (*self._MOTION, *self._ENERGIES)
-        self._get, self._unpack = self._reader(self._outputs)
-
-    def _reader(self, names: Sequence[str]) -> tuple[Call, Callable[[], tuple[float, ...]]]:
-        """Return the call that reads outputs and what then returns them; a wrong reference is found at once."""
-        reals = Reals(self.fmu, *names)
-        return reals.read, reals.unpacked
-
     def expect_loads(self, loads: Sequence[Load]) -> None:
         #: By input of the FMU: what is added to it by a unit of which load.
         self._shares: dict[str, list[tuple[int, float]]] = {}
@@ -107,7 +125,7 @@ class FmuBody(Body):
                 self._shares.setdefault(name, []).append((number, share))
         self._prepare_inputs(tuple(self._shares))
         self._ENERGIES, self._bears_loads = (*self._ENERGIES[:3], "load_work"), True
-        self._prepare_outputs()
+        self._outputs = Reals(self.fmu, *self._MOTION, *self._ENERGIES)
         self._tell()
 
     def _inputs_of(self, load: Load) -> list[tuple[str, float]]:
@@ -205,11 +223,9 @@ class FmuBody(Body):
 
     def _tell(self) -> Motion:
         """Read the motion, and the energies that belong to it."""
-        if (status := self._get()) > WARNING:
-            raise self.fmu.failed(status, f"cannot read {', '.join(self._outputs)}")
-        told = self._unpack()
+        told = self._outputs.get()
         if not isfinite(sum(told)) and not all(map(isfinite, told)):
-            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs, told, strict=True))
+            values = ", ".join(f"{name} = {value}" for name, value in zip(self._outputs.names, told, strict=True))
             raise StepRefused(f"not finite: {values} of {self.fmu.path.name}")
         return self._take(told)
 
@@ -346,9 +362,10 @@ class FmuBeam(OwnBody, BeamBody):
 
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)
-        self._shape = fmu.array("deflection", len(SHAPE_POINTS))
-        names = ("tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
-        self._get_felt, self._unpack_felt = self._reader(names)
+        points = len(SHAPE_POINTS)
+        each = [f"deflection[{i}]" for i in range(1, points + 1)]  # FMI 2.0 knows no arrays
+        self._shape = Reals(fmu, *each) if fmu.version == "2.0" else Reals(fmu, "deflection", size=points)
+        self._felt = Reals(fmu, "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
 
     def _mass(self) -> float:
         return Reals(self.fmu, "tip_mass").get()[0]
@@ -364,9 +381,7 @@ class FmuBeam(OwnBody, BeamBody):
         return [(f"distributed_load_{i}" if i else "distributed_load", s) for i, s in enumerate(shape) if s != 0.0]
 
     def felt(self) -> Felt:
-        if (status := self._get_felt()) > WARNING:
-            raise self.fmu.failed(status, "cannot read tip_acceleration, clamp_force, clamp_moment, max_bending_stress")
-        return _felt_of(Felt, self._unpack_felt())
+        return _felt_of(Felt, self._felt.get())
 
     def shape(self) -> np.ndarray:
         """Return the deflection [m] at `SHAPE_POINTS`, shape (21,)."""

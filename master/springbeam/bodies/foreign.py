@@ -101,9 +101,9 @@ class ForeignBody(FmuBody, EndLoaded):
                     raise FmuError(f"{fmu.path}: variable {name!r} is {causality}, and {key} must be an {wanted}")
         super()._prepare(fmu)
 
-    def told(self) -> tuple[Motion, float, int, int]:
-        """Return motion, the work received, doStep calls, and how often the state was set back."""
-        return self.state.motion, self.state.received, self.steps, self.rewinds
+    def told(self) -> tuple[Motion, float, Energies, int, int]:
+        """Return motion, the work received, energies, doStep calls, and how often the state was set back."""
+        return self.state.motion, self.state.received, self.energies(), self.steps, self.rewinds
 
     def start_as_fast_as(self, velocity: float) -> None:
         """Start with the ``velocity`` [m/s] of what it is tied to, where its own is not told but measured."""

@@ -189,7 +189,7 @@ def _examined(file: tuple[str, int, int], spec: str, upper: bool, start_time: fl
 class IsolatedBody(EndLoaded):
     """A `springbeam.bodies.foreign.ForeignBody` in a process of its own; parameters as of that."""
 
-    state: tuple[Motion, float]  #: the motion, and the work received [J]
+    state: tuple[Motion, float, Energies]  #: the motion, the work received [J], and the energies
 
     def __init__(self, spec: ForeignFmu, upper: bool, start_time: float, found: Findings) -> None:
         self.path, self.abilities = spec.fmu, found.abilities
@@ -237,10 +237,7 @@ class IsolatedBody(EndLoaded):
         self._waiting.append(("set_loads", forces))
 
     def energies(self) -> Energies:
-        if not self.abilities.energies:
-            return Energies(0.0, self.received, 0.0, 0.0)
-        energies: Energies = self._ask("telling its energies", "energies")
-        return energies
+        return self.state[2]
 
     @property
     def received(self) -> float:  # type: ignore[override]

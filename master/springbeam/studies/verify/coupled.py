@@ -13,8 +13,7 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 from scipy.special import ai_zeros, itairy, j0, spherical_jn
 
-from ...bodies.fmu import Reals
-from ...bodies.fmu_bodies import FmuBeam, FmuSpring
+from ...bodies.fmu_bodies import FmuBeam, FmuSpring, Reals
 from ...bodies.protocol import NO_FORCE
 from ...run.runner import simulate
 from ...scene import Beam, Coupling, Scene, Spring, Time, load_scene, scene_from_dict, with_changes
