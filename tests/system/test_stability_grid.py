@@ -133,6 +133,18 @@ def test_a_beam_that_is_given_another_force_is_garbage(monkeypatch, fault, law):
     assert run_cell(cell).kind == "garbage"
 
 
+def test_a_meeting_whose_phase_a_little_velocity_decides_is_no_evidence():
+    """The tip meets the spring 8e-11 m above Ψ, and both go down through Ψ within 2e-13 s.
+
+    The run takes the meeting for one at Ψ, where the ends are tied. The reference parts them, for C < 0 above Ψ.
+    """
+    cell = {**Grid(samples=20, resolution=0).cases()["3"], "steps": 10}
+    assert (cell["impact"], cell["coupling"][:2]) == ("tip", ("transmission", "hermite"))
+    outcome = run_cell(cell)
+    assert outcome.resolved
+    assert (outcome.kind, outcome.error_motion) == ("approximate", None)
+
+
 @pytest.mark.parametrize(("density", "kind"), [(1.01, "dissipative"), (1.3, "garbage")])
 def test_what_calls_itself_resolved_is_compared_with_the_reference(monkeypatch, density, kind):
     """Energy, overlap and what the run says are those of a right run; the motion is another one."""
