@@ -15,6 +15,7 @@ from runs import a_trajectory
 from springbeam.run.runner import simulate
 from springbeam.scene import SceneError, load_scene, scene_from_dict, with_changes
 from springbeam.studies import picture, sweep
+from springbeam.studies.converge import Converge
 from springbeam.studies.design import design, parse_axis
 from springbeam.studies.metrics import METRICS as METRICS_THERE_ARE
 from springbeam.studies.picture import Scale
@@ -151,25 +152,29 @@ def test_the_stroboscope_sees_one_point_of_a_forced_oscillation_and_two_of_a_dou
     scene = scene_from_dict(
         {"time": {"t_end": 30.0}, "spring": spring, "coupling": {"macro_step": 0.02}, "loads": [drive]}
     )
-    found = sweep.Sweep(scene=scene, vary=(), metric=("y_max",), stroboscopic=True).record({})
+    found = sweep.Sweep(scene=scene, vary=(), metric=("stroboscopic", "settled_y")).record({})
     w = 4.0 * np.pi
     exact = 3.0 / (40.0 - w * w + 4.0j * w)
     assert len(found["stroboscopic"]) == 20
     assert found["stroboscopic"] == pytest.approx([exact.imag] * 20, abs=1e-9)
-    assert found["peak_response"] == pytest.approx(abs(exact), rel=8e-3)  # of rows: (ωH)²/8 of it
+    assert found["settled_y"] == pytest.approx(abs(exact), rel=8e-3)  # of rows: (ωH)²/8 of it
     todo = sweep.Sweep(
-        scene=load_scene("vibro-impact"),
-        vary=("loads.0.frequency=35,45",),
-        metric=("u_tip_max",),
-        stroboscopic=True,
+        scene=load_scene("vibro-impact"), vary=("loads.0.frequency=35,45",), metric=("stroboscopic", "u_tip_max")
     )
-    todo.write(record_all(todo), tmp_path, pictures=True)
+    records = record_all(todo)
+    todo.write(records, tmp_path, pictures=False)
     columns = sweep.rows(tmp_path)
     once, doubled = (np.unique(np.round(np.array(points), 5)) for points in columns["stroboscopic"])
     assert (len(once), len(doubled)) == (1, 2)
-    assert (tmp_path / "sweep-bifurcation.png").stat().st_size > 5000
-    with pytest.raises(SceneError, match=r"--stroboscopic: the scene has no drive"):
-        planned("spring.mass=1,2", scene=load_scene("pulse"), stroboscopic=True).cases()
+    dots = todo.draw(records)["sweep"].axes[0].lines[0]
+    assert dots.get_linestyle() == "None"
+    assert dots.get_ydata().tolist() == [x for points in columns["stroboscopic"] for x in points]
+
+
+def test_several_numbers_of_a_run_are_for_sweeps_and_none_of_a_run_without_a_drive():
+    with pytest.raises(SceneError, match="stroboscopic: is several numbers"):
+        Converge(scene=load_scene("vibro-impact"), metric=("stroboscopic",)).cases()
+    assert METRICS_THERE_ARE["stroboscopic"](simulate(small())) is None
 
 
 def test_an_existing_cluster_is_used_and_a_missing_one_is_bad_input(tmp_path):

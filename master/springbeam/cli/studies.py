@@ -69,13 +69,6 @@ def sweep(
     ] = "latin_hypercube",
     seed: SeedOption = 0,
     metric: MetricOption = None,
-    stroboscopic: Annotated[
-        bool,
-        typer.Option(
-            "--stroboscopic",
-            help="Keep the positions once a period of the harmonic load in the last third of each run, and draw them.",
-        ),
-    ] = False,
     boundary: Annotated[
         str,
         typer.Option(
@@ -98,7 +91,6 @@ def sweep(
         sampling=sampling,
         seed=seed,
         metric=tuple(metric or ()),
-        stroboscopic=stroboscopic,
         boundary=boundary,
     )
 

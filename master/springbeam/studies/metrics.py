@@ -19,18 +19,23 @@ from ..results.extremes import Extremes
 from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import COLUMNS, TOLD, EventKind, Trajectory
 from ..scene import SceneError
+from ..signals.settled import drive_of, poincare, settled
+
+#: The transient of a driven motion that does not settle, as a share of the run.
+_TRANSIENT = 2.0 / 3.0
 
 
 @dataclass(frozen=True)
 class Metric:
-    """A number of a run; ``None`` where the scene has no such thing, or it did not happen."""
+    """A number of a run, or several; ``None`` where the scene has no such thing, or it did not happen."""
 
     unit: str  #: "" for a count
     words: str
-    of: Callable[[Trajectory], float | None]
+    of: Callable[[Trajectory], Any]
     asked: bool = False  #: kept only where it is named
+    several: bool = False
 
-    def __call__(self, run: Trajectory) -> float | None:
+    def __call__(self, run: Trajectory) -> Any:
         return self.of(run)
 
 
@@ -75,12 +80,21 @@ def _largest(column: str) -> Callable[[Trajectory], float | None]:
 
 def _settled(column: str) -> Callable[[Trajectory], float | None]:
     def of(run: Trajectory) -> float | None:
-        from ..signals.settled import settled
-
         tail = settled(run)
         return None if tail is None or column not in run.columns else tail.amplitude(run, column)
 
     return of
+
+
+def _stroboscopic(run: Trajectory) -> list[float] | None:
+    load, begin, end = drive_of(run), float(run.time[0]), float(run.time[-1])
+    if load is None or load.frequency is None or run.steps is None:
+        return None
+    tail = settled(run)
+    late = max(begin + _TRANSIENT * (end - begin), begin if tail is None else tail.since)
+    times, points = poincare(run, 1.0 / load.frequency, load.start)
+    found: list[float] = points[times >= late, 0].tolist()
+    return found
 
 
 _last: Callable[[np.ndarray], float] = itemgetter(-1)
@@ -115,6 +129,9 @@ METRICS: dict[str, Metric] = {
         for name, unit in _UNITS.items()
         if not name.startswith("e_")
     },
+    "stroboscopic": Metric(
+        "m", "tip, or spring's top, once a period of the drive, late", _stroboscopic, asked=True, several=True
+    ),
 }
 #: Those that are kept where none is named.
 USUAL = tuple(name for name, metric in METRICS.items() if not metric.asked)
@@ -169,9 +186,12 @@ def _own(name: str, what: str) -> Callable[[Trajectory], float | None]:
     return of
 
 
-def known(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the metrics as given. Raises SceneError if one is unknown."""
-    columns = [named(name)[0] for name in names]
+def known(names: Sequence[str], *, several: bool = False) -> tuple[str, ...]:
+    """Return the metrics as given. Raises SceneError if one is unknown, or is several numbers where it may not be."""
+    columns, metrics = zip(*map(named, names), strict=True) if names else ((), ())
+    for name, metric in zip(columns, metrics, strict=True):
+        if metric.several and not several:
+            raise SceneError(f"--metric {name}: is several numbers of a run; springbeam sweep keeps and draws them")
     if doubled := sorted({name for name in columns if columns.count(name) > 1}):
         raise SceneError(f"--metric {doubled[0]}: given twice")
     return tuple(names)

@@ -69,6 +69,12 @@ def column(rows: Rows, name: str) -> np.ndarray:
     return np.array([np.nan if row.get(name) is None else row[name] for row in rows], dtype=float)
 
 
+def singly(rows: Rows, name: str) -> Rows:
+    """Return a row for each number where a column has several."""
+    listed = [(row, row[name]) for row in rows if isinstance(row.get(name), list)]
+    return [{**row, name: value} for row, values in listed for value in values] if listed else rows
+
+
 def panels(count: int, wide: int, size: tuple[float, float], title: str) -> tuple[Figure, list[Axes]]:
     """Return a figure with ``count`` axes, at most ``wide`` beside each other."""
     wide = min(wide, count)
@@ -105,8 +111,8 @@ def multiples(rows: Rows, scales: Sequence[Scale], values: Mapping[str, str], ti
                 draws.append((ax, name, words, rows, pick))
     drawn = []
     for ax, name, _, some, over in draws:
-        every = column(rows, name)  # panels of one column share its colours
-        drawn.append(_panel(figure, ax, some, over, name, (np.nanmin(every), np.nanmax(every))))
+        every = column(singly(rows, name), name)  # panels of one column share its colours
+        drawn.append(_panel(figure, ax, singly(some, name), over, name, (np.nanmin(every), np.nanmax(every))))
     figure.draw_without_rendering()  # which decides by what the numbers of a scale are multiplied
     for (ax, _, words, *_), scale in zip(draws, drawn, strict=True):
         factor = scale.get_offset_text()

@@ -13,11 +13,8 @@ from typing import Any, ClassVar
 import numpy as np
 from rich.text import Text
 
-from ..pictures.drawing import BLUE, VERMILLION
-from ..results.trajectory import Trajectory
-from ..scene import Load, Scene, SceneError
+from ..scene import Scene
 from ..scene.reference import unit_of
-from ..signals.settled import poincare, settled
 from .boundary import Critical, Limit, boundary, draw_boundary, in_words, limit_of, pulse_axes
 from .design import Axis, Sampling, compatible, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, heading, known, named
@@ -25,10 +22,6 @@ from .study import Findings, Pictures, Row, Study
 from .tables import write_csv
 
 STATUSES = ("done", "stopped", "refused", "lost")
-#: What is kept of each run of a driven scene: positions at equal phase [m], and half the range of the motion [m].
-POINTS, PEAK = "stroboscopic", "peak_response"
-#: The transient, as a share of the run.
-_TRANSIENT = 2.0 / 3.0
 #: A metric that varies less, relative to its largest value, is constant.
 _ROUNDING = 1e-12
 
@@ -45,7 +38,6 @@ class Sweep(Study):
     sampling: Sampling = "latin_hypercube"
     seed: int = 0
     metric: tuple[str, ...] = ()  #: the usual ones if empty
-    stroboscopic: bool = False  #: whether each run is also seen once a period of its drive
     boundary: str = ""  #: METRIC=LIMIT, where the sweep is over a pulse and its damage boundary is wanted
 
     @property
@@ -72,21 +64,15 @@ class Sweep(Study):
         return [named(text)[0] for text in self.metric] or PRINCIPAL
 
     def cases(self) -> dict[str, Row]:
-        """Return the values of the axes. Raises SceneError if a key, a metric or the drive is not there."""
-        known(self.metrics)
+        """Return the values of the axes. Raises SceneError if a key or a metric is not there."""
+        known(self.metrics, several=True)
         axes = self.axes
         compatible(self.scene, axes)
-        if self.stroboscopic:
-            drive(self.scene)
         if self.boundary:
             pulse_axes(self.scene, axes)
         values = design(axes, self.samples, self.seed, self.sampling)
         names = [axis.name for axis in axes]
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
-
-    def measured(self, run: Trajectory, case: Row) -> Row:
-        """Return what is seen once a period, if that is asked for."""
-        return seen_once_a_period(run) if self.stroboscopic else {}
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Count the rows by status, and name the first error."""
@@ -113,18 +99,14 @@ class Sweep(Study):
         return files
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw what of the metrics the axes change; of a driven scene the bifurcation diagram."""
-        from .picture import Scale, column, multiples
+        """Draw what of the metrics the axes change."""
+        from .picture import Scale, column, multiples, singly
 
-        rows, axes, figures = self.rows(records), self.axes, Pictures()
+        rows, axes = self.rows(records), self.axes
         words = [any(isinstance(row[axis.name], str) for row in rows) for axis in axes]
         scales = [Scale(axis.name, _labelled(axis), axis.log, word) for axis, word in zip(axes, words, strict=True)]
-        shown = {name: heading(name) for name in self._shown if _varies(column(rows, name))}
-        if shown:
-            figures["sweep"] = multiples(rows, scales, shown, self.scene.title or "sweep")
-        if self.stroboscopic and len(axes) == 1 and not words[0]:
-            figures["sweep-bifurcation"] = _bifurcation(rows, scales[0])
-        return figures
+        shown = {name: heading(name) for name in self._shown if _varies(column(singly(rows, name), name))}
+        return {"sweep": multiples(rows, scales, shown, self.scene.title or "sweep")} if shown else {}
 
 
 def rows(directory: str | Path) -> dict[str, list[Any]]:
@@ -133,44 +115,6 @@ def rows(directory: str | Path) -> dict[str, list[Any]]:
 
     columns: dict[str, list[Any]] = pq.read_table(Path(directory) / "sweep.parquet").to_pydict()
     return columns
-
-
-def drive(scene: Scene) -> Load:
-    """Return the first harmonic load of ``scene``. Raises SceneError if it has none."""
-    for load in scene.loads:
-        if load.signal == "harmonic":
-            return load
-    raise SceneError('--stroboscopic: the scene has no drive; it needs [[loads]] with signal = "harmonic"')
-
-
-def seen_once_a_period(run: Trajectory) -> Row:
-    """Return `POINTS` and `PEAK` of the last third of a run, or less if it settles later: tip, or spring top."""
-    load, column = drive(run.scene), "u_tip" if "u_tip" in run.columns else "y"
-    assert load.frequency is not None
-    begin, end = float(run.time[0]), float(run.time[-1])
-    tail = settled(run)
-    late = max(begin + _TRANSIENT * (end - begin), begin if tail is None else tail.since)
-    times, points = poincare(run, 1.0 / load.frequency, load.start)
-    motion = run[column][run.time >= late]
-    return {POINTS: points[times >= late, 0].tolist(), PEAK: 0.5 * float(np.ptp(motion))}
-
-
-def _bifurcation(rows: Sequence[Row], scale: Any) -> Any:
-    """Return a picture of positions at equal phase, and the peak response, over the axis of ``scale``."""
-    from .picture import column, panels
-
-    figure, (upper, lower) = panels(2, 1, (7.0, 3.5), "")
-    at = column(rows, scale.name)
-    for x, row in zip(at, rows, strict=True):
-        points = row.get(POINTS, ())
-        upper.plot(np.full(len(points), x), points, ".", color=BLUE, markersize=2.0)
-    order = np.argsort(at, kind="stable")
-    lower.plot(at[order], column(rows, PEAK)[order], ".-", color=VERMILLION, linewidth=1.0)
-    for ax, what in ((upper, "position once a period of the drive [m]"), (lower, "half the range of the motion [m]")):
-        scale.mark(ax.xaxis, at, all_of_them=False)
-        ax.set_ylabel(what)
-        ax.grid(alpha=0.3)
-    return figure
 
 
 def _varies(values: np.ndarray) -> bool:
