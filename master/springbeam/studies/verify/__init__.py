@@ -15,16 +15,14 @@ from .alone import (
     duffing,
     escape,
     frequencies,
-    mesh_convergence,
     static_deflection,
-    stiff_frequency,
 )
 from .coupled import added_mass, bar_impact, energy_scheme, moving_base, pulse, resonance, slow_ramp, two_masses
 from .laws import compliant_impact, damped_link, hunt_crossley, linked_masses, tied_masses
 
 #: In the order of the table. Each raises FmuError if an FMU cannot be found, loaded or initialised.
 SECTIONS = (
-    *(static_deflection, frequencies, stiff_frequency, mesh_convergence, bar_frequencies, beam_energy, all_lost),
+    *(static_deflection, frequencies, bar_frequencies, beam_energy, all_lost),
     *(duffing, escape),
     *(bar_impact, two_masses, added_mass, energy_scheme),
     *(resonance, pulse, slow_ramp, moving_base),
