@@ -59,9 +59,7 @@ def frequencies(kappa: float, n: int) -> Iterator[Check]:
     root = sqrt(kappa)
     beam = Beam.with_ones(n_elements=n, n_modes=6, young_modulus=kappa, shear_modulus=kappa)
     measured = _measured_frequencies(beam, 0.1 / root, 300) / root
-    reason = (
-        "next order (kh)² of the error h²/24ω · ∫(EI θ''² + KAG u''²) of P1; rounding: ε N², N = 2n"
-    )
+    reason = "next order (kh)² of the error h²/24ω · ∫(EI θ''² + KAG u''²) of P1; rounding: ε N², N = 2n"
     for i, w in enumerate(clamped_free_frequencies()[:6], 1):
         error = _mesh_error(w) / n**2
         bound = error * (_wave_number(w) / n) ** 2 + (2 * n) ** 2 * EPS * w
