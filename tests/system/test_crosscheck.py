@@ -81,28 +81,14 @@ def test_what_cannot_be_compared_has_not_agreed(tmp_path):
     assert found.findings({"comparison": found.record({})}).code == 4
 
 
-@pytest.fixture(scope="module")
-def unresolved():
-    """`paper-fig2` turns its slowest mode 967 rad in a macro step; compared is a millionth of what it asks for."""
-    return with_changes(load_scene("paper-fig2"), beam={"n_elements": 4, "n_modes": 0})
-
-
-def test_a_run_that_is_not_resolved_cannot_agree(unresolved, tmp_path):
-    """It was compared for 6 µs of 4 s, in steps of 15 ns for 4 ms, and had "passed"."""
+def test_a_run_that_is_not_resolved_cannot_agree(tmp_path):
+    """`paper-fig2` turns its slowest mode 967 rad in a macro step. Compared for 6 µs of 4 s it had "passed"."""
+    unresolved = with_changes(load_scene("paper-fig2"), beam={"n_elements": 4, "n_modes": 0})
     result = command("crosscheck", write(unresolved, tmp_path), "--out", tmp_path / "out", "--json")
     found = json.loads(result.stdout)
-    assert (result.exit_code, found["verdict"]) == (4, "not comparable")
-    assert found["scene"]["time"]["t_end"] == pytest.approx(found["horizon"])
-    assert found["horizon"] < 0.51
-    assert found["scene"]["coupling"]["macro_step"] < 1e-5
-    assert all(row["passed"] for row in found["quantities"])
-
-
-def test_a_run_that_is_not_resolved_can_differ(unresolved, monkeypatch):
-    right = event_driven.simulate
-    wrong = {"beam": {"density": 1.1}}
-    monkeypatch.setattr(event_driven, "simulate", lambda scene, **more: right(with_changes(scene, **wrong), **more))
-    assert compare(unresolved).verdict == "differs"
+    assert (result.exit_code, found["verdict"], found["quantities"]) == (4, "not comparable", [])
+    assert found["horizon"] == unresolved.contact_time
+    assert found["notes"][0].startswith("not resolved")
 
 
 WRONG = {

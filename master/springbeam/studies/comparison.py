@@ -12,8 +12,7 @@ Nothing in it knows the reference, so a wrong sign, mass or law, which converges
 
 The verdict is about the run that was asked for. Nonsmooth trajectories separate: comparable is what comes before the
 first change of contact that the macro step, or a tiny perturbation of the reference, moves to another place in the
-order of events. A run that is not resolved at its own macro step is compared with smaller ones, as far as that goes;
-it may then differ, but it cannot agree.
+order of events. A run that is not resolved at its macro step cannot be compared at all.
 """
 
 from __future__ import annotations
@@ -29,7 +28,6 @@ from ..monolithic import algorithm1, event_driven
 from ..pictures.drawing import POSITIONS, present
 from ..results.contact_times import ContactChange, contact_changes
 from ..results.trajectory import TOLD, Trajectory, columns_of
-from ..run.outcome import RunStopped
 from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
 from ..scene.automatic import with_scheme_chosen
@@ -37,10 +35,6 @@ from ..scene.resolution import mesh_frequency
 from ..scene.statics import tip_compliance
 
 Verdict = Literal["agrees", "differs", "not comparable"]
-#: A scene whose comparable window is shorter than this many macro steps is resolved further, 4 times at a go.
-_ENOUGH_STEPS, _REFINEMENT, _MAX_REFINEMENTS = 40, 4.0, 16
-#: Macro steps of a window that had to be resolved further.
-_WINDOW_STEPS = 400
 #: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
 _RESOLVED = {"u_tip": 0.05, "y": 0.05, "v_tip": 0.25, "z": 0.25}
 #: Factor on what halving the macro step changes.
@@ -87,8 +81,7 @@ class Change(NamedTuple):
 class Report:
     """What `compare` found."""
 
-    asked: Scene
-    scene: Scene  #: as compared: the macro step and t_end may be finer and shorter than asked
+    scene: Scene
     reference: Trajectory | None = None
     trajectory: Trajectory | None = None
     horizon: float = 0.0  #: comparable up to here [s]
@@ -102,7 +95,7 @@ class Report:
         """Judge the run that was asked for."""
         if not (all(row.passed for row in self.rows) and all(change.passed for change in self.events)):
             return "differs"
-        whole = self.scene == self.asked and self.horizon >= self.asked.time.t_end * (1.0 - 1e-12)
+        whole = self.horizon >= self.scene.time.t_end * (1.0 - 1e-12)
         return "agrees" if self.rows and whole else "not comparable"
 
 
@@ -119,29 +112,13 @@ def compare(scene: Scene) -> Report:
     if scene.contact.algorithm:
         return _compare_paper(scene)
     refuse_without_reference(scene)
-    asked, note, failure, start = scene, "", None, scene.contact_time or 0.0
-    for _ in range(_MAX_REFINEMENTS):
-        size = scene.coupling.H
-        try:
-            runs = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
-            horizon = _same_story_until(*runs)
-            if horizon - start >= min(_ENOUGH_STEPS * size, 0.5 * (scene.time.t_end - start)):
-                break
-        except RunStopped as stopped:  # a finer step may get through
-            failure = stopped
-        size /= _REFINEMENT
-        t_end = min(asked.time.t_end, start + _WINDOW_STEPS * size)
-        scene = with_changes(scene, time={"t_end": t_end}, coupling={"macro_step": size})
-        note = (
-            f"At the scene's own macro step, {asked.coupling.H:g} s, the motion is not resolved: halving it "
-            f"changes the motion from the first contact on. Compared instead: {size:.3g} s, up to {t_end:.9g} s."
-        )
+    run, finer = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * scene.coupling.H}))
+    report = Report(scene, trajectory=run, horizon=_same_story_until(run, finer))
+    if report.horizon > (scene.contact_time or 0.0):
+        _compare_with_reference(report, run, finer)
     else:
-        if failure is not None:
-            raise failure
-        return Report(asked, asked, notes=[f"{note} Nothing could be compared at any macro step"])
-    report = Report(asked, scene, trajectory=runs[0], horizon=horizon, notes=[note] if note else [])
-    _compare_with_reference(report, *runs)
+        said = [warning for warning in run.summary["warnings"] if warning.startswith("not resolved")]
+        report.notes += said or ["not resolved: half the macro step changes the motion from the first contact on"]
     return report
 
 
@@ -157,7 +134,7 @@ def _compare_paper(scene: Scene) -> Report:
     reference, ours = algorithm1.simulate(scene), simulate(scene)
     moved = algorithm1.simulate(with_changes(scene, spring=stiffer))
     n = min(len(reference), len(ours), len(moved))
-    report = Report(scene, scene, reference, ours, float(ours.time[n - 1]))
+    report = Report(scene, reference, ours, float(ours.time[n - 1]))
     for name in ("u_tip", "y", "z", "v_tip", "contact_force", "e_beam", "e_spring"):
         q, exact, other = (run[name][:n] for run in (ours, reference, moved))
         floor = _step_error(scene) * np.arange(1, n + 1) * (float(np.abs(exact).max()) or 1.0)

@@ -62,16 +62,16 @@ class Crosscheck(Study):
         """Say what is run."""
         if self.scene.contact.algorithm:
             return "a run, and Algorithm 1 twice"
-        return "2 runs and 2 references, more where the motion is not resolved"
+        return "2 runs and 2 references"
 
     def record(self, case: Row) -> Row:
         """Return what was found, and both motions."""
         report = compare(self.at(case))
         found: Row = {
             "verdict": report.verdict,
-            "from": report.asked.contact_time or 0.0,
+            "from": report.scene.contact_time or 0.0,
             "horizon": report.horizon,
-            "t_end": report.asked.time.t_end,
+            "t_end": report.scene.time.t_end,
             "growth": report.growth,
             "quantities": [row._asdict() for row in report.rows],
             "events": [change._asdict() for change in report.events],
