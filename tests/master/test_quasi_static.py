@@ -8,7 +8,7 @@ from scipy.sparse.linalg import spsolve
 
 from springbeam.bodies.quasi_static import QuasiStaticBeam
 from springbeam.monolithic import event_driven
-from springbeam.monolithic.semi_discrete import assemble
+from springbeam.monolithic.semi_discrete import assemble, constant_forces
 from springbeam.results.contact_times import contact_changes
 from springbeam.scene import Beam, Coupling, statics, suspicions, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
@@ -25,7 +25,7 @@ BEAM = Beam.with_ones(
 def test_statics_are_those_of_a_mesh_that_holds_them():
     """Degree 5 holds the deflection under a load that is linear in each element (u of degree 5, θ of degree 4)."""
     d = assemble(BEAM.model_copy(update={"element_degree": 5}))
-    load = BEAM.distributed_load * d.uniform_load + BEAM.tip_load_coefficient * d.hat_load
+    load = d.nodal(*constant_forces(BEAM.model_copy(update={"element_degree": 5})))
     by_force, by_load = spsolve(d.K, d.tip_vector), spsolve(d.K, load)
     assert statics.tip_compliance(BEAM) == pytest.approx(by_force[d.tip], rel=1e-12)
     assert statics.tip_load_deflection(BEAM) == pytest.approx(by_load[d.tip], rel=1e-12)

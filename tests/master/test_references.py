@@ -11,7 +11,7 @@ from scipy.sparse.linalg import spsolve
 
 from springbeam.monolithic import algorithm1, event_driven
 from springbeam.monolithic.laws import law_of
-from springbeam.monolithic.semi_discrete import assemble, modal_beam
+from springbeam.monolithic.semi_discrete import assemble, constant_forces, modal_beam, points
 from springbeam.scene import Beam, load_scene, with_changes
 from springbeam.scene.statics import SHAPE_POINTS
 from springbeam.studies import exact, verify
@@ -322,8 +322,9 @@ def test_the_order_of_the_frequencies_is_twice_the_degree(degree, n, reduced):
 def test_forms_are_the_integrals_of_polynomials(degree):
     """θ = x^p, u = x^p/2 lie in the space: ∫ of their squares and strains, ∫u and ∫ψₙu in closed form."""
     n, length, p = 2, 1.4, degree
-    d = assemble(beam(3.0, 5.0, n_elements=n, element_degree=degree, length=length, density=7.0, area=0.5,
-                      second_moment_of_area=0.25))  # fmt: skip
+    mesh = {"n_elements": n, "element_degree": degree, "length": length}
+    b = beam(3.0, 5.0, **mesh, density=7.0, area=0.5, second_moment_of_area=0.25)
+    d, loaded = assemble(b), b.model_copy(update={"tip_load_coefficient": 1.0})
     # Values at the nodes, which are where u = x of the slope shape says.
     x, q = d.slope_shape[1::2], np.zeros(d.size)
     q[0::2], q[1::2] = x**p, 0.5 * x**p
@@ -332,12 +333,12 @@ def test_forms_are_the_integrals_of_polynomials(degree):
     shear = 5.0 * 0.5 * (0.25 * p * p * slope - p * product + square)
     assert q @ d.K @ q == pytest.approx(moment + shear, rel=1e-12)
     assert q @ d.M @ q == pytest.approx(7.0 * (0.25 + 0.25 * 0.5) * square, rel=1e-13)
-    assert d.uniform_load @ q == pytest.approx(0.5 * length ** (p + 1) / (p + 1), rel=1e-13)
+    assert d.nodal(*points(b)) @ q == pytest.approx(0.5 * length ** (p + 1) / (p + 1), rel=1e-13)
     h = length / n
     left = length - h
     terms = ((1, p + 2, 1 / h), (-1, p + 1, left / h))
     hat = sum(sign * (length**k - left**k) / k * factor for sign, k, factor in terms)
-    assert d.hat_load @ q == pytest.approx(0.5 * hat, rel=1e-12)
+    assert d.nodal(*constant_forces(loaded)) @ q == pytest.approx(0.5 * hat, rel=1e-12)
     np.testing.assert_allclose(d.deflection_sampler() @ q, 0.5 * (SHAPE_POINTS * length) ** p, atol=1e-14)
 
 
@@ -348,10 +349,11 @@ def test_truncated_beam_keeps_static_answers_and_its_start(n_modes):
     d, m = assemble(b), modal_beam(b)
     assert len(m.omega) == n_modes + 3
     assert m.tip**2 @ m.omega**-2.0 == pytest.approx(spsolve(d.K, d.tip_vector)[d.tip], rel=1e-11)
-    full = spsolve(d.K, -2.0 * d.uniform_load - 6.0 * d.hat_load)
+    full = spsolve(d.K, d.nodal(*constant_forces(b)))
     assert m.tip @ (m.load / m.omega**2) == pytest.approx(full[d.tip], rel=1e-11)
-    uniform = spsolve(d.K, d.uniform_load)
-    found = m.basis @ (m.basis.T @ d.uniform_load / m.omega**2)
+    unit = d.nodal(*points(b))
+    uniform = spsolve(d.K, unit)
+    found = m.basis @ (m.basis.T @ unit / m.omega**2)
     np.testing.assert_allclose(found, uniform, atol=1e-11 * abs(uniform).max())
     np.testing.assert_allclose(m.basis @ m.slope_shape, d.slope_shape, atol=1e-12)
     np.testing.assert_allclose(m.omega[:n_modes], modal_beam(b.model_copy(update={"n_modes": 0})).omega[:n_modes])

@@ -32,7 +32,7 @@ from ..results.trajectory import Event, EventKind, Trajectory
 from ..scene import Scene
 from .hybrid_system import ReferenceFailure
 from .rows import finished
-from .semi_discrete import assemble
+from .semi_discrete import assemble, constant_forces
 
 YTemp = Literal["equation", "guess", "both"]
 
@@ -112,7 +112,7 @@ class _Algorithm:
         self.scene, self.beam, self.spring = scene, scene.beam, scene.spring
         self.y_temp, self.tolerance = y_temp, tolerance
         self.discrete = d = assemble(scene.beam)
-        self.load = scene.beam.distributed_load * d.uniform_load + scene.beam.tip_load_coefficient * d.hat_load
+        self.load = d.nodal(*constant_forces(scene.beam))
         self._set_step(scene.coupling.H)
         self.phi = -np.inf if scene.stop is None else scene.stop.position
         self.stiffness = 0.0  #: λ_nc as the last step has left it

@@ -41,11 +41,6 @@ class SemiDiscreteBeam:
         Mass [kg·m², kg], consistent or averaged, and stiffness [N·m, N, N/m].
     B : (rows, 2N) csr matrix
         Strain factor, K = BᵀB.
-    uniform_load : (2N,) array
-        ∫ ψ dx in the deflection rows: the load vector of f_b = 1 N/m.
-    hat_load : (2N,) array
-        ∫ ψₙ ψ dx in the deflection rows, ψₙ the tip's linear hat function: the load vector of f_b = ψₙ(x)
-        (Figures 3 and 5).
     slope_shape : (2N,) array
         u = x, θ = 0.
     """
@@ -56,8 +51,6 @@ class SemiDiscreteBeam:
     M: sp.csc_matrix
     K: sp.csc_matrix
     B: sp.csr_matrix
-    uniform_load: np.ndarray
-    hat_load: np.ndarray
     slope_shape: np.ndarray
 
     @property
@@ -84,6 +77,10 @@ class SemiDiscreteBeam:
         values, _ = _lagrange(self.degree, position - element)
         rows = np.arange(len(fractions))[:, None]
         return _scatter(rows, 2 * nodes + 1, values[:, None, :], self.size + 2)[:, 2:]
+
+    def nodal(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
+        """Return the load vector, (2N,), of ``forces`` [N] at the places ``x`` [m] of the beam, both (k,)."""
+        return np.asarray(self.deflection_sampler(x / self.length).T @ forces)
 
 
 def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -144,12 +141,34 @@ def assemble(beam: Beam) -> SemiDiscreteBeam:
     M = M[2:, 2:].tocsc()
     B = B[:, 2:].tocsr()
 
-    uniform, hat, slope = (np.zeros(2 * (n * p + 1)) for _ in range(3))
-    for column in columns:
-        uniform[column[1::2]] += h * w @ values
-    hat[columns[-1][1::2]] = h * (w * x) @ values
+    slope = np.zeros(2 * (n * p + 1))
     slope[columns[:, 1::2]] = h * (elements[:, None] + _lobatto(p))
-    return SemiDiscreteBeam(n, p, beam.length, M, (B.T @ B).tocsc(), B, uniform[2:], hat[2:], slope[2:])
+    return SemiDiscreteBeam(n, p, beam.length, M, (B.T @ B).tocsc(), B, slope[2:])
+
+
+def points(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
+    """Return places x [m] along the beam, and how much of its length [m] each stands for: a Gauss rule an element."""
+    x, w = _gauss(beam.element_degree + 3)
+    h = beam.length / beam.n_elements
+    return h * (np.arange(beam.n_elements)[:, None] + x).ravel(), h * np.tile(w, beam.n_elements)
+
+
+def constant_forces(beam: Beam) -> tuple[np.ndarray, np.ndarray]:
+    """Return the loads that do not vary as places [m] and forces [N]; the tip's hat function is that of Figure 3."""
+    x, dx = points(beam)
+    hat = np.maximum(0.0, 1.0 - beam.n_elements * (1.0 - x / beam.length))
+    return x, (beam.distributed_load + beam.tip_load_coefficient * hat) * dx
+
+
+def unit_forces(beam: Beam, load: Load) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a unit of ``load`` does to the beam as places [m] and forces [N]; none if it acts on the spring."""
+    if load.on == "spring":
+        return np.zeros(0), np.zeros(0)
+    if load.on == "tip" or load.at is not None:
+        return np.array([(load.at or 1.0) * beam.length]), np.ones(1)
+    x, dx = points(beam)
+    shape = (-beam.density * beam.area,) if load.on == "base" else load.shape or (1.0,)
+    return x, np.polynomial.polynomial.polyval(x / beam.length, shape) * dx
 
 
 def _scatter(rows: np.ndarray, columns: np.ndarray, elements: np.ndarray, width: int) -> sp.csr_matrix:
@@ -187,10 +206,6 @@ class ModalBeam:
     basis: np.ndarray
     alpha: float
 
-    def force(self, load: np.ndarray) -> np.ndarray:
-        """Return the modal forces, (r,), of a load vector (N,), other than the tip force's, b."""
-        return np.asarray(self.basis.T @ load)
-
     @property
     def inverse_tip_mass(self) -> float:
         """eᵀM⁻¹e [1/kg]: what a tip impulse of 1 N·s adds to the tip's velocity."""
@@ -206,11 +221,10 @@ def modal_beam(beam: Beam) -> ModalBeam:
     discrete = assemble(beam)
     space = _augmented_space(discrete, beam) if beam.modes_kept < discrete.size else np.eye(discrete.size)
     omega, basis = _rayleigh_ritz(discrete, space)
-    load = beam.distributed_load * discrete.uniform_load + beam.tip_load_coefficient * discrete.hat_load
     return ModalBeam(
         omega=omega,
         tip=basis[discrete.tip].copy(),
-        load=basis.T @ load,
+        load=basis.T @ discrete.nodal(*constant_forces(beam)),
         slope_shape=basis.T @ (discrete.M @ discrete.slope_shape),
         sampler=discrete.deflection_sampler() @ basis,
         basis=basis,
@@ -246,7 +260,8 @@ def _augmented_space(discrete: SemiDiscreteBeam, beam: Beam) -> np.ndarray:
     D = _rotations_as_displacements(discrete)
     solve = spla.factorized(D @ discrete.K @ D)
     modes = _lowest_modes(discrete, beam.n_modes)
-    extra = [D @ solve(D @ discrete.tip_vector), D @ solve(D @ discrete.uniform_load), discrete.slope_shape]
+    uniform = discrete.nodal(*points(beam))
+    extra = [D @ solve(D @ discrete.tip_vector), D @ solve(D @ uniform), discrete.slope_shape]
     space = [column / np.sqrt(column @ (discrete.M @ column)) for column in modes.T]
     for shape in extra:
         residual = shape / np.sqrt(shape @ (discrete.M @ shape))
@@ -294,10 +309,9 @@ class Loads:
         self.patterns = np.zeros((len(scene.loads), modes))
         self.on_spring = np.zeros(len(scene.loads))
         mass = 0.0 if scene.spring is None else scene.spring.mass
-        mesh = assemble(scene.beam) if scene.loads and scene.beam is not None else None
         for i, load in enumerate(scene.loads):
-            if beam is not None and mesh is not None and load.on != "spring":
-                self.patterns[i] = beam.tip if load.on == "tip" else beam.force(_nodal(scene, mesh, load))
+            if beam is not None and scene.beam is not None and load.on != "spring":
+                self.patterns[i] = beam.basis.T @ assemble(scene.beam).nodal(*unit_forces(scene.beam, load))
             if load.on in ("spring", "base"):
                 self.on_spring[i] = 1.0 if load.on == "spring" else -mass
         self.kinks = sorted({float(time) for load in scene.loads for time in _kinks(load)})
@@ -338,17 +352,3 @@ def _rate(load: Load) -> float:
     if load.signal in ("harmonic", "chirp"):
         return 2.0 * np.pi * max(load.frequency or 0.0, load.frequency_end or 0.0)
     return np.pi / (load.duration or np.inf) if load.signal == "half_sine" else 0.0
-
-
-def _nodal(scene: Scene, mesh: SemiDiscreteBeam, load: Load) -> np.ndarray:
-    """Return the load vector of the mesh, (2N,), of a unit of ``load``."""
-    assert scene.beam is not None
-    if load.at is not None:
-        return np.asarray(mesh.deflection_sampler(np.array([load.at])).toarray()[0])
-    shape = load.shape or [1.0]
-    if load.on == "base":
-        shape = [-scene.beam.density * scene.beam.area]
-    nodes, weights = np.polynomial.legendre.leggauss(mesh.degree + 3)
-    x = (np.arange(mesh.n_elements)[:, None] + 0.5 * (nodes + 1.0)).ravel() / mesh.n_elements
-    force = np.tile(0.5 * weights, mesh.n_elements) * np.polynomial.polynomial.polyval(x, shape)
-    return np.asarray(mesh.deflection_sampler(x).T @ force) * mesh.length / mesh.n_elements
