@@ -4,7 +4,6 @@ import base64
 import dataclasses
 import json
 import re
-import shlex
 from collections import Counter
 
 import numpy as np
@@ -16,10 +15,10 @@ from runs import EVERY_EVENT, PAIR, SCENES, a_trajectory
 from springbeam.pictures.drawing import EVENT_LOOKS, NOT_RESOLVED, PIXEL_COLUMNS
 from springbeam.pictures.frames import MOST_FRAMES
 from springbeam.pictures.panels import panels
-from springbeam.pictures.report import described, page, shipped_command
+from springbeam.pictures.report import described, page
 from springbeam.results.directory import REPORT
 from springbeam.results.trajectory import Event
-from springbeam.scene import load_scene, scene_from_dict, shipped_scenes, with_changes
+from springbeam.scene import scene_from_dict, with_changes
 from springbeam.scene.reading import tomllib
 
 VOID = {"meta", "input", "br", "link", "img", "hr"}
@@ -270,23 +269,8 @@ def test_a_run_that_stopped_at_once_has_a_page(scene, rows):
 # -- how to run it again ------------------------------------------------------------------------------------------
 
 
-def test_the_command_gives_the_scene_as_run():
-    changes = {"scheme": "hermite", "degree": 2, "macro_step": 1.25e-4}
-    scene = with_changes(PAIR, coupling=changes, beam={"reduced_integration": True, "n_modes": 7})
-    program, command, name, *options = shlex.split(shipped_command(scene))
-    assert (program, command, {*options[::2]}) == ("springbeam", "run", {"--set"})
-    assert load_scene(name, options[1::2]) == scene
-    assert shipped_command(scene) in shown(a_trajectory(scene))["reproduce"]
-
-
-@pytest.mark.parametrize("name", shipped_scenes())
-def test_shipped_scenes_are_known(name):
-    assert shipped_command(load_scene(name)) == f"springbeam run {name}"
-
-
-def test_a_scene_of_ones_own_is_run_from_the_page():
+def test_the_scene_as_run_is_on_the_page():
     own = with_changes(PAIR, stop=None)
-    assert shipped_command(own) is None
     found = shown(a_trajectory(own))
     assert "springbeam run scene.toml" in found["reproduce"]
     text = found.root.get_element_by_id("scene").text_content().split("Scene as run")[1]

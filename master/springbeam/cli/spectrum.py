@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from rich.text import Text
 
@@ -63,41 +64,30 @@ def spectrum(
         found = spectra(trajectory, of or (), low, high, quality, since, segments)
         directory = out or run.with_name(f"{run.resolve().name}-spectrum")
         directory.mkdir(parents=True, exist_ok=True)
-        files = []
-        for end, shock in found.shock.items():
-            rows = [dict(zip(shock._fields, map(float, row), strict=True)) for row in zip(*shock, strict=True)]
-            files.append(write_csv(directory / f"shock-{end}.csv", rows))
+        tables = {f"shock-{end}": shock._asdict() for end, shock in found.shock.items()}
         for number, (what, power) in enumerate(found.power.items()):
-            name = what if what.isidentifier() else str(number)
-            rows = [dict(zip(power._fields, map(float, row), strict=True)) for row in zip(*power, strict=True)]
-            files.append(write_csv(directory / f"power-{name}.csv", rows))
-        for what, chirps in found.responses.items():
-            for chirp in chirps:
-                name = f"response-{what if what.isidentifier() else 'formula'}-load-{chirp.load}.csv"
-                rows = [
-                    {"frequency": float(f), "amplitude": float(a)}
-                    for f, a in zip(chirp.frequency, chirp.amplitude, strict=True)
-                ]
-                files.append(write_csv(directory / name, rows))
+            tables[f"power-{what if what.isidentifier() else number}"] = power._asdict()
+        swept = {(what, chirp.load): chirp for what, several in found.responses.items() for chirp in several}
+        for (what, load), chirp in swept.items():
+            name = f"response-{what if what.isidentifier() else 'formula'}-load-{load}"
+            tables[name] = {"frequency": chirp.frequency, "amplitude": chirp.amplitude}
         if found.points is not None:
-            rows = [
-                {"time": float(t), "position": float(x), "velocity": float(v)}
-                for t, (x, v) in zip(*found.points, strict=True)
-            ]
-            files.append(write_csv(directory / "poincare.csv", rows))
+            times, points = found.points
+            tables["poincare"] = {"time": times, "position": points[:, 0], "velocity": points[:, 1]}
+        files = []
+        for name, columns in tables.items():
+            rows = [dict(zip(columns, row, strict=True)) for row in np.transpose(list(columns.values())).tolist()]
+            files.append(write_csv(directory / f"{name}.csv", rows))
         if not no_plots:
             from ..pictures.spectra import draw
 
             files.append(directory / "spectrum.png")
             shocks = {f"shock at the {end}": (s.frequency, s.maximax) for end, s in found.shock.items()}
             powers = {f"power of {what}": (p.frequency[1:], p.density[1:]) for what, p in found.power.items()}
-            points = None if found.points is None else found.points[1]
-            swept = {
-                f"{what} to load {chirp.load}": (chirp.frequency, chirp.amplitude)
-                for what, several in found.responses.items()
-                for chirp in several
-            }
-            draw(shocks, powers, swept, points, trajectory.scene.title or str(run), files[-1])
+            answers = {f"{what} to load {load}": (c.frequency, c.amplitude) for (what, load), c in swept.items()}
+            draw(
+                shocks, powers, answers, found.points and found.points[1], trajectory.scene.title or str(run), files[-1]
+            )
     if as_json:
         print_json(
             {

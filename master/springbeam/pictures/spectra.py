@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -34,37 +35,26 @@ def draw(
     points
         Position [m] and velocity [m/s] once a period, shape (n, 2).
     """
-    parts = [bool(shock), bool(power), bool(responses), points is not None]
+    dots = {"linestyle": "none", "marker": ".", "markersize": 3.0}
+    position, velocity = "position once a period of the drive [m]", "velocity [m/s]"
+    groups: list[tuple[Mapping[str, Any], str, str, bool, dict[str, Any]]] = [
+        (shock, "frequency [Hz]", "largest acceleration [m/s²]", True, {}),
+        (power, "frequency [Hz]", "power density [unit²/Hz]", True, {}),
+        (responses, "frequency of the chirp [Hz]", "half the range [unit]", False, {}),
+        ({} if points is None else {"points": points.T}, position, velocity, False, dots),
+    ]
+    groups = [group for group in groups if group[0]]
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 0.6 + 2.4 * sum(parts)), layout="constrained")
-        axes = iter(figure.subplots(sum(parts), 1, squeeze=False)[:, 0])
-        for curves, quantity in ((shock, "largest acceleration [m/s²]"), (power, "power density [unit²/Hz]")):
-            if not curves:
-                continue
-            ax = next(axes)
-            for k, (name, (frequency, values)) in enumerate(curves.items()):
-                seen = values > _FLOOR * values.max(initial=0.0)
-                ax.loglog(
-                    frequency[seen],
-                    values[seen],
-                    color=_COLOURS[k % len(_COLOURS)],
-                    dashes=(4, k) if k else (),
-                    label=name,
-                )
-            ax.set(xlabel="frequency [Hz]", ylabel=quantity)
+        figure = Figure(figsize=(WIDTH, 0.6 + 2.4 * len(groups)), layout="constrained")
+        axes = figure.subplots(len(groups), 1, squeeze=False)[:, 0]
+        for ax, (curves, across, up, logarithmic, look) in zip(axes, groups, strict=True):
+            for k, (name, (x, y)) in enumerate(curves.items()):
+                seen = y > _FLOOR * y.max(initial=0.0) if logarithmic else slice(None)
+                dashes = {"dashes": (4, k)} if logarithmic and k else {}
+                ax.plot(x[seen], y[seen], color=_COLOURS[k % len(_COLOURS)], label=name, **look, **dashes)
+            scale = "log" if logarithmic else "linear"
+            ax.set(xlabel=across, ylabel=up, xscale=scale, yscale=scale)
             ax.legend()
-            ax.grid(alpha=0.3)
-        if responses:
-            ax = next(axes)
-            for k, (name, (frequency, values)) in enumerate(responses.items()):
-                ax.plot(frequency, values, color=_COLOURS[k % len(_COLOURS)], label=name)
-            ax.set(xlabel="frequency of the chirp [Hz]", ylabel="half the range [unit]")
-            ax.legend()
-            ax.grid(alpha=0.3)
-        if points is not None:
-            ax = next(axes)
-            ax.plot(*points.T, ".", color=BLUE, markersize=3.0)
-            ax.set(xlabel="position once a period of the drive [m]", ylabel="velocity [m/s]")
             ax.grid(alpha=0.3)
         figure.suptitle(title)
         figure.savefig(path, dpi=DPI)

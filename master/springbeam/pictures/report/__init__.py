@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-import shlex
 from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
@@ -18,7 +17,7 @@ import tomli_w
 
 from ...results.totals import in_words
 from ...results.trajectory import Event, Trajectory, rounded
-from ...scene import Scene, load_scene, shipped_scenes
+from ...scene import Scene
 from ...scene.automatic import with_scheme_chosen
 from ...scene.partners import kind_of
 from ...scene.statics import bending_stiffness, shear_stiffness
@@ -97,29 +96,12 @@ def page(trajectory: Trajectory) -> str:
         rows=len(time),
         points=max((chart.points for chart in over_time), default=0),
         toml=tomli_w.dumps(scene.model_dump(exclude_none=True)),
-        command=shipped_command(scene),
         data=_as_script(_data(trajectory, [*moving, *over_time], shown, frames) if over_time else None),
         glossary=list(_glossary(trajectory)),
         plotly=(_HERE / "plotly-basic.min.js").read_text(encoding="utf-8"),
         script=(_HERE / "page.js").read_text(encoding="utf-8"),
         style=(_HERE / "page.css").read_text(encoding="utf-8"),
     )
-
-
-def shipped_command(scene: Scene) -> str | None:
-    """Return the command that runs ``scene`` from the shipped scene of its title; ``None`` if none is."""
-    wanted = scene.flat()
-    for name in shipped_scenes():
-        given = load_scene(name).flat()
-        tables, shipped = ({place.rpartition(".")[0] for place in values} for values in (wanted, given))
-        if given.get("title") == scene.title and tables == shipped:
-            settings = [
-                f"--set {shlex.quote(f'{place}={value if isinstance(value, str) else json.dumps(value)}')}"
-                for place, value in wanted.items()
-                if "." in place and given.get(place) != value
-            ]
-            return " ".join(["springbeam", "run", name, *settings])
-    return None
 
 
 def _warnings(trajectory: Trajectory) -> list[str]:
@@ -163,10 +145,6 @@ def _numbers(trajectory: Trajectory) -> Iterator[tuple[str, str]]:
         if f"{body}_steps" in summary:
             taken_back = summary[f"{body}_rollbacks"]
             yield f"steps of the {body} FMU", f"{summary[f'{body}_steps']}, {taken_back} of them taken back"
-    for name in present(trajectory, POSITIONS) if len(trajectory) else ():
-        values = trajectory[name]
-        for words, row in (("lowest", np.argmin(values)), ("highest", np.argmax(values))):
-            yield f"{words} {POSITIONS[name].words}", f"{values[row]:.6g} m at t = {trajectory.time[row]:.6g} s"
 
 
 def _data(trajectory: Trajectory, drawn: list[Chart], moving: list[Sketch], frames: Frames | None) -> dict[str, Any]:
