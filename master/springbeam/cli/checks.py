@@ -24,7 +24,17 @@ from ..bodies.protocol import FmuError
 from ..scene import Beam, Scene, Spring, load_scene
 from ..scene.partners import kind_of
 from ..studies.tables import number, table
-from .common import BAD_INPUT, DISAGREES, JsonOption, SettingsOption, bad_input_reported, console_for, fail, print_json
+from .common import (
+    BAD_INPUT,
+    DISAGREES,
+    JsonOption,
+    SettingsOption,
+    bad_input_reported,
+    console_for,
+    fail,
+    print_json,
+    say,
+)
 
 _REQUIRED = ("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly", "pebble", "pyarrow")
 _FOR_CLUSTERS = ("distributed",)
@@ -49,8 +59,6 @@ def doctor(
             _examine(load_scene(scene, settings or ()), as_json)
         return
     found = _found()
-    if as_json:
-        print_json(found)
     versions, python, fmus = found["packages"] | found["cluster"], found["python"], found["fmus"]
     absent = [package for package, number in versions.items() if number is None]
     there = ", ".join(f"{package} {number}" for package, number in versions.items() if number is not None)
@@ -68,8 +76,7 @@ def doctor(
         )
         file = fmu["path"].name if fmu["path"] else f"{name}.fmu"
         lines.append((file, f"{state}\n{'':<12}{fmu['error'] or fmu['path']}"))
-    for name, text in lines:
-        console_for(silent=as_json).print(Text(f"{name:<12}{text}"), soft_wrap=True)
+    say(found, [], [(f"{name:<12}", text) for name, text in lines], as_json=as_json)
     if any(fmu["error"] is not None for fmu in fmus.values()):
         raise typer.Exit(DISAGREES)
 
@@ -79,29 +86,30 @@ def _examine(scene: Scene, as_json: bool) -> None:
     from ..bodies.abilities import OFFERED, refusals
     from ..bodies.factory import findings
 
-    found, console = findings(scene), console_for(silent=as_json)
+    found, shown = findings(scene), list[Any]()
     for name, body in {"beam": scene.upper, "spring": scene.lower}.items():
         if name not in found:
             if body is not None:
-                console.print(Text(f"[{name}] {kind_of(body).replace('_', ' ')}: everything is offered"))
+                shown.append(Text(f"[{name}] {kind_of(body).replace('_', ' ')}: everything is offered"))
             continue
         finding, given = found[name], scene.foreign[name]
         mass = "(measured)" if given.mass is None else f"measured, {given.mass:.9g} kg given"
-        console.print(Text(f"[{name}] {given.fmu}", style="bold"), soft_wrap=True)
-        console.print(Text(f"mass that a force or an impulse meets: {finding.mass:.9g} kg {mass}"))
+        shown.append(Text(f"[{name}] {given.fmu}", style="bold"))
+        shown.append(Text(f"mass that a force or an impulse meets: {finding.mass:.9g} kg {mass}"))
         names, told = ("", "capability", "shown by", "what is offered"), asdict(finding.abilities)
         rows = [
             ("yes", key, shown_by, having) if told[key] > 0 else ("no", key, shown_by, lacking)
             for key, shown_by, having, lacking in OFFERED
         ]
-        console.print(table(names, rows, words=names))
+        shown.append(table(names, rows, words=names))
     faults = [fault for finding in found.values() for fault in finding.faults]
     refused = refusals(scene, {table: finding.abilities for table, finding in found.items()})
-    if as_json:
-        print_json({"bodies": {name: asdict(finding) for name, finding in found.items()}, "refused": refused})
+    bodies = {name: asdict(finding) for name, finding in found.items()}
+    say({"bodies": bodies, "refused": refused}, shown, as_json=as_json)
     if faults or refused:
         fail(BAD_INPUT, "\n".join([*faults, *refused]))
-    console.print("The checks found nothing wrong, and the scene can be run.")
+    if not as_json:
+        typer.echo("The checks found nothing wrong, and the scene can be run.")
 
 
 def _found() -> dict[str, Any]:

@@ -6,10 +6,9 @@ Results go to stdout, progress and errors to stderr. ``--json`` puts one JSON do
 
 from __future__ import annotations
 
-import difflib
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
@@ -17,6 +16,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from rich.console import Console
 from rich.progress import Progress, ProgressColumn
+from rich.text import Text
 from typer.core import TyperCommand, TyperGroup
 
 from ..bodies.protocol import FmuError
@@ -105,15 +105,13 @@ class Command(_TellingParameters, TyperCommand):
 
 
 class Group(_TellingParameters, TyperGroup):
-    """A group of commands that suggests the nearest command for an unknown one."""
+    """A group of commands that tells a scene from a command."""
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         word = args[0]
-        if word not in self.commands and not word.startswith("-") and not ctx.resilient_parsing:
-            if word in shipped_scenes() or word.endswith(".toml"):
-                ctx.fail(f"{word} is a scene, not a command. Did you mean {ctx.command_path} run {word}?")
-            close = difflib.get_close_matches(word, self.commands, n=1)
-            ctx.fail(f"No such command '{word}'." + (f" Did you mean '{close[0]}'?" if close else ""))
+        is_scene = word in shipped_scenes() or word.endswith(".toml")
+        if is_scene and word not in self.commands and not ctx.resilient_parsing:
+            ctx.fail(f"{word} is a scene, not a command. Did you mean {ctx.command_path} run {word}?")
         return super().resolve_command(ctx, args)
 
 
@@ -133,6 +131,30 @@ def progress_bar(*columns: ProgressColumn, quiet: bool) -> Progress:
 def print_json(document: Any) -> None:
     """Print ``document`` as JSON; NaN and infinity, as in a run that stopped, become strings."""
     typer.echo(as_json(document).decode())
+
+
+def say(
+    document: Any,
+    shown: Iterable[Any],
+    files: Iterable[tuple[str, Any]] = (),
+    *,
+    where: Path | None = None,
+    quiet: bool = False,
+    as_json: bool = False,
+) -> None:
+    """Say what a command has found: one JSON ``document``, or with ``quiet`` only ``where``, or all for a reader.
+
+    That is what is ``shown``, tables and lines, and the ``files`` with the words before them.
+    """
+    if as_json:
+        print_json(document)
+    elif quiet and where is not None:
+        typer.echo(where)
+    console = console_for(silent=quiet or as_json)
+    for part in shown:
+        console.print(part)
+    for word, file in files:
+        console.print(Text(f"{word:<10}{file}"), soft_wrap=True)
 
 
 def results_directory(path: Path) -> Path:

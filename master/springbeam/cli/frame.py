@@ -28,8 +28,8 @@ from .common import (
     cause_of,
     console_for,
     fail,
-    print_json,
     progress_bar,
+    say,
 )
 
 if TYPE_CHECKING:
@@ -99,14 +99,14 @@ def carry_out(make: Callable[[], Study], scene: str | None, frame: Frame) -> Non
             computed = _computed(study, records, console, frame)
             files = study.write(computed, directory, pictures=not frame.no_plots)
         found = study.findings(computed)
-    if frame.as_json:
-        print_json({"directory": directory, "files": files, **found.document})
-    elif frame.quiet:
-        typer.echo(directory)
-    for part in (*map(Text, study.remarks), *found.shown):
-        console.print(part)
-    for file in files:
-        console.print(Text(f"results   {file}"), soft_wrap=True)
+    say(
+        {"directory": directory, "files": files, **found.document},
+        [*map(Text, study.remarks), *found.shown],
+        [("results", file) for file in files],
+        where=directory,
+        quiet=frame.quiet,
+        as_json=frame.as_json,
+    )
     if found.code:
         raise typer.Exit(found.code)
 

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn
-from rich.text import Text
 
 from ..results.directory import ANIMATIONS, REPORT
 from ..results.reading import load_trajectory
@@ -25,11 +24,10 @@ from .common import (
     QuietOption,
     RunArgument,
     bad_input_reported,
-    console_for,
     fail,
-    print_json,
     progress_bar,
     results_directory,
+    say,
 )
 
 
@@ -157,21 +155,20 @@ def compare(
         trajectories = [load_trajectory(results_directory(run)) for run in runs]
         names = [str(run) for run in runs]
         keys, results = differing_keys([run.scene for run in trajectories]), results_of(trajectories)
-        drawn = not no_plots
-        if drawn:
+        picture = None if no_plots else out
+        if picture is not None:
             from ..pictures.timeline import draw_compared  # matplotlib takes a second to load
 
             out.parent.mkdir(parents=True, exist_ok=True)
-            draw_compared(dict(zip(names, trajectories, strict=True)), out)
-    if as_json:
-        print_json({"runs": names, "keys": keys, "results": results, "picture": out if drawn else None})
-    elif quiet and drawn:
-        typer.echo(out)
-    console = console_for(silent=quiet or as_json)
-    for title, found in (("keys that differ", keys), ("results", results)):
-        console.print(table(("", *names), _rows(found), title))
-    if drawn:
-        console.print(Text(f"picture   {out}"), soft_wrap=True)
+            draw_compared(dict(zip(names, trajectories, strict=True)), picture)
+    document = {"runs": names, "keys": keys, "results": results, "picture": picture}
+    titles = {"keys that differ": keys, "results": results}
+    shown = [table(("", *names), _rows(found), title) for title, found in titles.items()]
+    say(document, shown, _drawn(picture), where=picture, quiet=quiet, as_json=as_json)
+
+
+def _drawn(picture: Path | None) -> list[tuple[str, Path]]:
+    return [] if picture is None else [("picture", picture)]
 
 
 def _beside_measured(
@@ -193,19 +190,14 @@ def _beside_measured(
             covered, curves = model(run, measured, moved)
             pairs = {name: (curve, measured.values[name][covered]) for name, curve in curves.items()}
             draw_measured(measured.time[covered] + moved, pairs, out)
-    if as_json:
-        print_json({"shift": moved, "residuals": [row._asdict() for row in found], "picture": out})
-    elif quiet and out is not None:
-        typer.echo(out)
-    console = console_for(silent=quiet or as_json)
     rows = [
         (row.signal, str(row.points), f"{row.rms:.4g}", f"{row.relative:.2%}", f"{row.largest:.4g}", f"{row.at:.6g}")
         for row in found
     ]
-    console.print(table(("curve", "points", "rms", "of its spread", "largest", "at t [s]"), rows))
-    console.print(f"shift     {moved:.6g} s" + (", found by correlation" if shift is None else ""))
-    if out is not None:
-        console.print(Text(f"picture   {out}"), soft_wrap=True)
+    columns = ("curve", "points", "rms", "of its spread", "largest", "at t [s]")
+    shown = [table(columns, rows), f"shift     {moved:.6g} s" + (", found by correlation" if shift is None else "")]
+    document = {"shift": moved, "residuals": [row._asdict() for row in found], "picture": out}
+    say(document, shown, _drawn(out), where=out, quiet=quiet, as_json=as_json)
 
 
 def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:

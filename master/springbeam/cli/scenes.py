@@ -26,6 +26,7 @@ from .common import (
     console_for,
     fail,
     print_json,
+    say,
 )
 
 
@@ -47,12 +48,9 @@ def scenes(as_json: JsonOption = False) -> None:
             listed.append({
                 "name": name, "contains": contents, "t_end": scene.time.t_end, "title": scene.title, "file": path
             })  # fmt: skip
-    if as_json:
-        print_json(listed)
-    console = console_for(silent=as_json)
     rows = [(row["name"], ", ".join(row["contains"]), f"{row['t_end']:g}", row["title"]) for row in listed]
-    console.print(table(("scene", "contains", "t_end [s]", "title"), rows, words=("contains", "title")))
-    console.print(Text(f"\nfiles: {path.parent}"), soft_wrap=True)
+    shown = table(("scene", "contains", "t_end [s]", "title"), rows, words=("contains", "title"))
+    say(listed, [shown, ""], [("files:", path.parent)], as_json=as_json)
 
 
 def keys(
@@ -156,20 +154,16 @@ def predict(
     with bad_input_reported():
         what = load_scene(scene, settings or ())
         prediction = prediction_of(what)
-    if as_json:
-        print_json(asdict(prediction))
-    console = console_for(silent=as_json)
-    console.print(Text(what.title or "(untitled scene)", style="bold"))
-    for name, text in _lines(prediction):
-        console.print(Text(f"{name:<10}{text}"))
+    shown: list[Any] = [Text(what.title or "(untitled scene)", style="bold")]
+    shown += [Text(f"{name:<10}{text}") for name, text in _lines(prediction)]
     if prediction.schemes:
         names = ("scheme", "degree", "spectral radius − 1", "critical H [s]", "")
-        console.print(table(names, [_scheme(s, prediction.threshold) for s in prediction.schemes], words=("",)))
-    for note in prediction.notes:
-        console.print(Text(f"note      {note}"))
+        shown.append(table(names, [_scheme(s, prediction.threshold) for s in prediction.schemes], words=("",)))
+    shown += [Text(f"note      {note}") for note in prediction.notes]
     if prediction.auto is not None:
         scheme, degree, because = prediction.auto
-        console.print(Text(f'fits      {scheme} {degree}, which coupling.scheme = "auto" takes: {because}'))
+        shown.append(Text(f'fits      {scheme} {degree}, which coupling.scheme = "auto" takes: {because}'))
+    say(asdict(prediction), shown, as_json=as_json)
 
 
 def _lines(p: Prediction) -> Iterator[tuple[str, str]]:

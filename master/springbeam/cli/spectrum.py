@@ -16,9 +16,8 @@ from .common import (
     QuietOption,
     RunArgument,
     bad_input_reported,
-    console_for,
-    print_json,
     results_directory,
+    say,
 )
 
 
@@ -88,23 +87,14 @@ def spectrum(
             draw(
                 shocks, powers, answers, found.points and found.points[1], trajectory.scene.title or str(run), files[-1]
             )
-    if as_json:
-        print_json(
-            {
-                "directory": directory,
-                "files": files,
-                "shock": {end: shock._asdict() for end, shock in found.shock.items()},
-                "jumps": found.jumps,
-                "highest": {what: power.highest for what, power in found.power.items()},
-                "settled": None
-                if found.settled is None
-                else {**found.settled._asdict(), "period": found.settled.period},
-            }
-        )
-    elif quiet:
-        typer.echo(directory)
-    console = console_for(silent=quiet or as_json)
-    for what, words in found.in_words():
-        console.print(Text(f"{what:<20}{words}"))
-    for file in files:
-        console.print(Text(f"results   {file}"), soft_wrap=True)
+    settled = None if found.settled is None else {**found.settled._asdict(), "period": found.settled.period}
+    document = {
+        "directory": directory,
+        "files": files,
+        "shock": {end: shock._asdict() for end, shock in found.shock.items()},
+        "jumps": found.jumps,
+        "highest": {what: power.highest for what, power in found.power.items()},
+        "settled": settled,
+    }
+    lines = [Text(f"{what:<20}{words}") for what, words in found.in_words()]
+    say(document, lines, [("results", file) for file in files], where=directory, quiet=quiet, as_json=as_json)
