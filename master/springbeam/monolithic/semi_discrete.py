@@ -314,8 +314,11 @@ class Loads:
                 self.patterns[i] = beam.basis.T @ assemble(scene.beam).nodal(*unit_forces(scene.beam, load))
             if load.on in ("spring", "base"):
                 self.on_spring[i] = 1.0 if load.on == "spring" else -mass
-        self.kinks = sorted({float(time) for load in scene.loads for time in _kinks(load)})
-        self.longest_step = min((_TURN / _rate(load) for load in scene.loads if _rate(load) > 0.0), default=np.inf)
+        breaks = [load.start + load.record.x if load.signal == "table" else load.kinks for load in scene.loads]
+        self.kinks = sorted({float(time) for times in breaks for time in times})
+        pulses = [np.pi / (load.duration or np.inf) for load in scene.loads if load.signal == "half_sine"]
+        fastest = max([*pulses, *(load.rate for load in scene.loads)], default=0.0)
+        self.longest_step = _TURN / fastest if fastest > 0.0 else np.inf
         self._until = np.inf
 
     def __len__(self) -> int:
@@ -336,19 +339,3 @@ class Loads:
         at = np.minimum(times, self._until)
         values = [load.value(at) for load in self._loads]
         return np.stack(values, axis=-1) if values else np.zeros((*np.shape(times), 0))
-
-
-def _kinks(load: Load) -> list[float]:
-    if load.signal == "table":
-        return list(load.start + load.record.x)
-    if load.signal == "constant":
-        return []
-    duration, rise = load.duration or 0.0, load.rise or 0.0
-    return [load.start, load.start + rise, load.start + duration - rise, load.start + duration]
-
-
-def _rate(load: Load) -> float:
-    """Return the largest rate of the load [rad/s]; what is no wave is a polynomial between kinks."""
-    if load.signal in ("harmonic", "chirp"):
-        return 2.0 * np.pi * max(load.frequency or 0.0, load.frequency_end or 0.0)
-    return np.pi / (load.duration or np.inf) if load.signal == "half_sine" else 0.0
