@@ -186,7 +186,7 @@ def test_what_cannot_be_run_is_refused_and_a_crash_is_garbage(monkeypatch):
     assert outcome.kind == "refused"
     assert 'law = "paper" integrates the beam by (62)' in outcome.reason
 
-    def crash(*_):
+    def crash(*_, **__):
         raise ZeroDivisionError("nothing there")
 
     monkeypatch.setattr(Master, "_advance", crash)
