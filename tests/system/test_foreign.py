@@ -4,6 +4,7 @@ import functools
 import os
 import signal
 import threading
+from itertools import product
 from pathlib import Path
 from time import sleep
 
@@ -158,22 +159,33 @@ def test_our_own_fmus_named_as_foreign_ones_give_our_own_run(fmu_folder):
     assert run.summary["warnings"] == []
 
 
-@pytest.mark.parametrize("weight", ["in the FMU", "a load"])
-@pytest.mark.parametrize(("position", "restitution"), [(-0.01, 0.5), (0.0, 0.0)], ids=["falls on it", "starts on it"])
-def test_the_seated_force_is_the_body_s(fmu, weight, position, restitution):
-    """A mass of weight 8 N on the foundation: it comes to rest, and the foundation bears it; k1 there is none."""
+ELEMENT = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
+#: A mass of weight 8 N below: its tables, and the stiffness k of what holds it.
+HEAVY = {
+    "by the FMU": ({"spring": {"parameters": {"m": M2, "v0": V, "load": -8.0}}}, 0.0),
+    "by a load": ({"spring": {"parameters": {"m": M2, "v0": V}}, "loads": [{"on": "spring", "amplitude": -8.0}]}, 0.0),
+    "as an element": ({"spring": {**ELEMENT, "external_force": -8.0}}, K),
+}
+
+
+FALLS, STARTS = (-0.01, 0.5), (0.0, 0.0)  #: position and restitution of a foundation that it falls or starts on
+
+
+@pytest.mark.parametrize(("heavy", "stop"), [*product(HEAVY, [FALLS]), *product(list(HEAVY)[:2], [STARTS])])
+def test_the_seated_force_is_the_body_s(fmu, heavy, stop):
+    """It comes to rest on the foundation, which bears 8 N + k φ."""
+    (tables, k), (position, restitution) = HEAVY[heavy], stop
     scene = pair(
         fmu(),
         beam={"element": "point_mass", "mass": 1e-3, "displacement": 5.0, "velocity": 0.0},
-        spring={"parameters": {"m": M2, "v0": V, "load": 0.0 if weight == "a load" else -8.0}},
-        loads=[{"on": "spring", "amplitude": -8.0}] if weight == "a load" else [],
         stop={"position": position, "restitution": restitution},
         contact={"law": "compliance", "stiffness": 1e4, "damping": 0.0, "exponent": 1.0},
         coupling={"degree": 0},
+        **tables,
     )
     run = simulate(scene)
     assert kinds(run)[-1] == "seated"
-    assert run["foundation_force"][-1] == pytest.approx(8.0, rel=1e-9)
+    assert run["foundation_force"][-1] == pytest.approx(8.0 + k * position, rel=1e-9)
     assert run.y[-1] == pytest.approx(position, abs=1e-14)
     assert run.summary["max_energy_residual"] < 1e-9
 
@@ -188,9 +200,6 @@ def test_an_fmu_of_fmi_3_is_as_good_as_one_of_fmi_2(fmu, contact, exact, order):
         errors.append(error(run, exact))
     assert order - 0.2 < np.log2(errors[0] / errors[1]) < order + 0.2
     assert np.abs(run.y - simulate(pair(fmu(), **changes)).y).max() < 1e-15
-
-
-ELEMENT = {"element": "spring_damper", "mass": M2, "stiffness": K, "damping": C}
 
 
 @pytest.mark.parametrize(
@@ -411,6 +420,7 @@ def test_events_are_those_of_the_element_and_a_run_goes_on_to_the_same_bits(fmu,
     assert kinds(run) == kinds(exact)
     assert {"impact", "stop_impact", "release", "separation"} <= set(kinds(run))
     assert [e.time for e in run.events] == pytest.approx([e.time for e in exact.events], abs=1e-10)
+    assert exact.summary["max_energy_residual"] < 1e-11
     assert run.summary["max_interface_residual"] < 1e-12
     assert goes_on_to_the_same_bits(scene, run, tmp_path, 0.5)
 

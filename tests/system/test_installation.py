@@ -86,3 +86,24 @@ def test_every_dependency_has_a_lowest_and_a_tested_version():
         (pin,) = tested[name]
         assert pin.operator == "=="
         assert specifier.contains(pin.version), name
+
+
+def test_a_run_uses_no_network(tmp_path):
+    script = """
+import socket, sys
+sockets = []
+
+def audit(event, arguments):
+    if event.startswith("socket."):
+        sockets.append(event)
+
+sys.addaudithook(audit)
+from springbeam import cli
+try:
+    cli.app(["run", "soft", "--set", "time.t_end=0.05", "--out", sys.argv[1], "-q"])
+except SystemExit as end:
+    print(end.code, sockets)
+"""
+    command = [sys.executable, "-c", script, str(tmp_path / "out")]
+    run = subprocess.run(command, capture_output=True, text=True, check=True, timeout=HANGS)
+    assert run.stdout.splitlines()[-1] == "0 []", run.stdout
