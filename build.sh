@@ -80,7 +80,8 @@ set_up_python() {
   stamp=$(cat pyproject.toml | cksum)" $1"
   if [ "$(cat "$venv/.installed-$1" 2>/dev/null)" != "$stamp" ]; then
     say "installing Python packages ($1)"
-    $python -m pip install --quiet --disable-pip-version-check -e ".[$1]" ||
+    # Python compiles what it imports: to compile all that there is would take as long as to install it.
+    $python -m pip install --quiet --no-compile --disable-pip-version-check -e ".[$1]" ||
       die "pip could not install the packages of pyproject.toml (is there a network, or PIP_INDEX_URL to set?)"
     printf '%s' "$stamp" >"$venv/.installed-$1"
   fi

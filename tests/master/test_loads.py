@@ -179,7 +179,7 @@ def test_steps_end_where_a_load_jumps_or_bends_and_none_is_a_sliver():
 
 
 def test_a_base_that_falls_faster_than_the_spring_lifts_it_off_the_foundation():
-    """A spring seated under a load, N = −s − f(t): it leaves when N vanishes, and the flight is the reference's."""
+    """A spring seated under a load, N = −s − f(t); test_beside_reference.py has when it leaves and how it flies."""
     table = {
         "time": {"t_end": 0.6},
         "spring": {"linear_stiffness": 3.0, "equilibrium": 0.01, "external_force": -2.0},
@@ -189,11 +189,7 @@ def test_a_base_that_falls_faster_than_the_spring_lifts_it_off_the_foundation():
     }
     scene = scene_from_dict(table)
     run = simulate(scene)
-    exact = event_driven.simulate(scene, sample_times=run.time)
     assert [event.kind for event in run.events[:2]] == ["seated", "unseated"]
-    leaves = next(event.time for event in exact.events if event.kind == "unseated")
-    assert run.events[1].time == pytest.approx(leaves, abs=1e-9)
-    assert np.abs(run.y - exact.y).max() < 1e-9
     # All momentum: of the foundation what the spring, the constant load and −m a do not account for.
     of_base = 4.0 / (6.0 * np.pi) * (1.0 - np.cos(6.0 * np.pi * 0.6))
     expected = run.z[-1] - run.z[0] + 3.0 * run.steps["y_integral"].sum() + 2.0 * 0.6 - of_base
@@ -201,8 +197,6 @@ def test_a_base_that_falls_faster_than_the_spring_lifts_it_off_the_foundation():
     assert found == pytest.approx(expected, rel=1e-7)  # N at the start of a step is off by (ωH)³ of the load
     middle = 0.5 * (run.events[0].time + run.events[1].time)
     assert run.at(middle).foundation_force[0] == pytest.approx(2.0 - 4.0 * np.sin(6.0 * np.pi * middle), abs=1e-6)
-    seated = (run.phase == "seated") & (exact.phase == "seated")
-    assert run.foundation_force[seated] == pytest.approx(exact.foundation_force[seated], abs=0.1)
     assert run.summary["max_energy_residual"] < 1e-11
 
 

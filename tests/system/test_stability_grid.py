@@ -233,10 +233,11 @@ def test_slices_reach_both_ends(s):
 
 
 class Part(Grid):
-    """Cells of the hypercube and corners of the slices."""
+    """Cells of the hypercube, but two of them that take half a minute together, and corners of the slices."""
 
     def cases(self):
-        return {str(k): cell for k, cell in enumerate([*sampled_cells(20, 3)[:16], *slice_cells(2)[::3]])}
+        cells = enumerate([*sampled_cells(20, 3)[:16], *slice_cells(2)[::3]])
+        return {str(k): cell for k, cell in cells if k not in (3, 11)}
 
 
 class Few(Part):
