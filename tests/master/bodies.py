@@ -114,7 +114,7 @@ class ModalBody(Double, BeamBody):
         self.v = self.v + self.b * impulse
 
     def shape(self):
-        return self._sampler @ self.a
+        return np.append(self._sampler @ self.a, np.zeros(2 * len(self._sampler)))  # it has no moments
 
 
 def beam_body(beam, slope=None):

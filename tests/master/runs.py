@@ -61,7 +61,7 @@ def block(n=300, scene=PAIR, t_end=3.0, begin=0):
     steps["told"] = BEAM_TELLS + SPRING_TELLS
     happen = number[number % 10 == 1]
     events = [Event(float(steps["time"][i - begin]), "impact", 0.5, -1.0, None, 0.1 * i) for i in happen]
-    shapes = np.column_stack([steps["time"], rng.normal(size=(n, 21))]) if scene.beam is not None else np.empty((0, 22))
+    shapes = np.column_stack([steps["time"], rng.normal(size=(n, 63))]) if scene.beam is not None else np.empty((0, 64))
     return steps, events, shapes
 
 

@@ -108,7 +108,7 @@ def test_report_fits_80_columns_with_whole_numbers_and_warnings_as_they_are(here
         strike = Event(123.456789, "stop_impact", -1.2345e-5, -1.234e-5, 0.1, 0.1, -1.234e-7, 1e-9, 1e-9)
         strikes = [replace(strike, time=strike.time + i) for i in range(40)]
         events = [Event(0.2, "release", -1.355e-20, 0.25, 0.0, 0.25), *strikes]
-        recorder.keep(np.empty(0, STEP), events, np.empty((0, 22)))
+        recorder.keep(np.empty(0, STEP), events, np.empty((0, 64)))
         fake_run(scene, recorder)
         recorder.finish({**SUMMARY, "warnings": ["[beam] is [bold]coarse[/bold]"]})
 

@@ -119,7 +119,7 @@ def test_a_run_goes_on_from_any_step_to_the_same_bits(name):
         rest.simulation.go_on(whole.saved[k])
         steps = whole.recorder.steps()[: k + 2]  # the row at the start, and one per step
         events = whole.trajectory.events[: int(steps["events"][-1])]
-        shapes = np.empty((0, 22)) if scene.beam is None else np.column_stack(whole.trajectory.shapes)
+        shapes = whole.trajectory.shape_table()
         rest.recorder.keep(steps, events, shapes[shapes[:, 0] <= steps["time"][-1]] if len(shapes) else shapes)
         rest.simulation.catch_up()
         rest.finish()

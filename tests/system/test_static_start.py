@@ -87,6 +87,9 @@ def test_a_cantilever_hangs_at_rest_under_its_weight_and_its_clamp_bears_it():
     np.testing.assert_allclose(run.columns["u_tip"], hanging(what.beam), rtol=1e-10)
     np.testing.assert_allclose(run.columns["clamp_force"], weight, rtol=1e-10)
     np.testing.assert_allclose(run.columns["clamp_moment"], weight * length / 2.0, rtol=1e-10)
+    arm = length * (1.0 - np.linspace(0.0, 1.0, 21))
+    np.testing.assert_allclose(run.bending_moment[-1], -weight / length * arm**2 / 2.0, atol=1e-10 * weight * length)
+    np.testing.assert_allclose(run.shear_force[-1], -weight / length * arm, atol=1e-10 * weight)
     assert not run.events
     assert np.abs(run.columns["v_tip"]).max() < 1e-15
 
@@ -103,13 +106,17 @@ def test_a_shock_on_a_linear_pair_at_rest_is_the_shock_alone_beside_its_statics(
 def test_a_beam_without_inertia_starts_where_it_rests():
     beam = {**BEAM, "fidelity": "quasi_static", "distributed_load": -5.0, "alpha_b": 0.01}
     what = scene(beam=beam, spring=SPRING, loads=None)
-    columns = simulate(what).columns
+    run = simulate(what)
+    columns = run.columns
     EI, KAG = (
         what.beam.young_modulus * what.beam.second_moment_of_area,
         5 / 6 * what.beam.area * what.beam.shear_modulus,
     )
     free = -5.0 * (0.8**4 / (8.0 * EI) + 0.8**2 / (2.0 * KAG))
     np.testing.assert_allclose(columns["y"], free / (1.0 + K1 * tip_compliance(what.beam)), rtol=1e-10)
+    C, arm = columns["contact_force"][0], 0.8 * (1.0 - np.linspace(0.0, 1.0, 21))
+    np.testing.assert_allclose(run.bending_moment[0], C * arm - 5.0 * arm**2 / 2.0, atol=1e-10)
+    np.testing.assert_allclose(run.shear_force[0], C - 5.0 * arm, atol=1e-10)
 
 
 def test_a_spring_rests_in_the_well_nearest_to_where_it_is_put():

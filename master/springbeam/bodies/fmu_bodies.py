@@ -362,9 +362,9 @@ class FmuBeam(OwnBody, BeamBody):
 
     def _prepare(self, fmu: Fmu) -> None:
         super()._prepare(fmu)
-        points = len(SHAPE_POINTS)
-        each = [f"deflection[{i}]" for i in range(1, points + 1)]  # FMI 2.0 knows no arrays
-        self._shape = Reals(fmu, *each) if fmu.version == "2.0" else Reals(fmu, "deflection", size=points)
+        along, points = ("deflection", "bending_moment", "shear_force"), len(SHAPE_POINTS)
+        each = [f"{name}[{i}]" for name in along for i in range(1, points + 1)]  # FMI 2.0 knows no arrays
+        self._shape = Reals(fmu, *each) if fmu.version == "2.0" else Reals(fmu, *along, size=points)
         self._felt = Reals(fmu, "tip_acceleration", "clamp_force", "clamp_moment", "max_bending_stress")
 
     def _mass(self) -> float:
@@ -384,9 +384,8 @@ class FmuBeam(OwnBody, BeamBody):
         return _felt_of(Felt, self._felt.get())
 
     def shape(self) -> np.ndarray:
-        """Return the deflection [m] at `SHAPE_POINTS`, shape (21,)."""
-        self._shape.get()
-        return np.array(np.frombuffer(self._shape.values))
+        """See `BeamBody.shape`."""
+        return np.array(self._shape.get())
 
 
 class FmuSpring(OwnBody, EndLoaded):

@@ -174,5 +174,8 @@ class BeamBody(Body):
     """A body that can show its shape."""
 
     def shape(self) -> np.ndarray:
-        """Return the deflection [m] at `springbeam.scene.statics.SHAPE_POINTS`, shape (21,)."""
+        """Return deflections [m], bending moments [N·m] and shear forces [N] one after another, shape (63,).
+
+        They are those at `springbeam.scene.statics.SHAPE_POINTS`.
+        """
         raise NotImplementedError

@@ -65,6 +65,8 @@ class QuasiStaticBeam(BeamBody):
         self._stiffness, self._alpha, self._degree = 1.0 / statics.tip_compliance(beam), beam.alpha_b, degree
         self._tip_shape = statics.tip_force_shape(beam, SHAPE_POINTS)
         self._load_shape = statics.load_shape(beam, SHAPE_POINTS)
+        self._arm = beam.length * (1.0 - SHAPE_POINTS)
+        self._load_shear, self._load_moment = statics.load_forces(beam, self._arm)
         self._rest, self._load_energy = statics.tip_load_deflection(beam), statics.load_energy(beam)
         self.state = BendState(tip - self._rest, velocity)
         self._responses = lru_cache(_SIZES_REMEMBERED)(self._response)
@@ -116,8 +118,11 @@ class QuasiStaticBeam(BeamBody):
         return Energies(0.0, strain, self.state.dissipated, -k * w * rest - self._load_energy)
 
     def shape(self) -> np.ndarray:
-        """Return the deflection [m] at `SHAPE_POINTS`, shape (21,)."""
-        return self._load_shape + self._stiffness * self.state.w * self._tip_shape
+        """See `BeamBody.shape`; without inertia moment and shear force are those of statics."""
+        deflection = self._load_shape + self._stiffness * self.state.w * self._tip_shape
+        C = self._stiffness * (self.state.w + self._alpha * self.state.velocity)
+        moment, shear = self._load_moment + C * self._arm, self._load_shear + C
+        return np.concatenate([deflection, moment, shear])
 
     def apply_impulse(self, impulse: float) -> None:
         raise AssertionError("a massless tip takes no impulse")

@@ -32,7 +32,7 @@ from ..results.trajectory import Event, EventKind, Trajectory
 from ..scene import Scene
 from .hybrid_system import ReferenceFailure
 from .rows import finished
-from .semi_discrete import assemble, constant_forces
+from .semi_discrete import assemble, constant_forces, inner_forces
 
 YTemp = Literal["equation", "guess", "both"]
 
@@ -321,5 +321,5 @@ class _Algorithm:
         summary: dict[str, Any] = {"reference": "algorithm1", "y_temp": self.y_temp, "newton": newton}
         summary |= {"steps_apart": int(np.sum(cases == 11)), "steps_joined": int(np.sum(cases == 14))}
         extra = ("case", "e_injected_beam", "e_injected_spring")
-        shapes = (d.deflection_sampler() @ q.T).T
+        shapes = np.hstack([q @ d.deflection_sampler().T, (q + alpha * v) @ inner_forces(self.beam, d).T])
         return finished(self.scene, columns, shapes, self.events, summary, extra)

@@ -131,8 +131,14 @@ class HybridSystem:
         return 0.0
 
     def shapes(self, states: np.ndarray) -> np.ndarray | None:
-        """Return the deflection [m] at `SHAPE_POINTS` of states of shape (k, 2r + 5); ``None`` without a beam."""
-        return None if self.beam is None else np.asarray(states[:, self.A] @ self.beam.sampler.T)
+        """Return deflections, bending moments and shear forces at `SHAPE_POINTS`, shape (k, 63), of k states.
+
+        They are in m, N·m and N; ``None`` without a beam.
+        """
+        if self.beam is None:
+            return None
+        a, v = states[:, self.A], states[:, self.V]
+        return np.hstack([a @ self.beam.sampler.T, (a + self.alpha_b * v) @ self.beam.inner.T])
 
     def energies(self, X: np.ndarray, phase: Phase) -> dict[str, np.ndarray]:
         """Return energies [J] of states of shape (k, 2r + 5); ``e_load`` is minus the work of the loads."""

@@ -40,7 +40,14 @@ class QuasiStaticSystem(HybridSystem):
         k, rest, stored = _statics(scene.beam)
         one = np.ones(1)
         tip = ModalBeam(
-            np.sqrt(k) * one, one, k * rest * one, scene.beam.length * one, one[None], one[None], scene.beam.alpha_b
+            np.sqrt(k) * one,
+            one,
+            k * rest * one,
+            scene.beam.length * one,
+            one[None],
+            one[None],
+            one[None],
+            scene.beam.alpha_b,
         )
         super().__init__(scene, tip)
         if not self.law.rigid:

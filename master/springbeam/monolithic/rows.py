@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..results.trajectory import Event, Trajectory, columns_of
+from ..results.trajectory import Event, Trajectory, columns_of, shapes_of
 from ..scene import Scene
 from .laws import Phase
 from .semi_discrete import ModalBeam, assemble, constant_forces, points, unit_forces
@@ -74,14 +74,14 @@ class Rows:
 def finished(
     scene: Scene,
     columns: dict[str, np.ndarray],
-    deflection: np.ndarray | None,
+    shapes: np.ndarray | None,
     events: list[Event],
     summary: dict[str, Any],
     extra: Sequence[str] = (),
 ) -> Trajectory:
     """Return the result of a reference: ``columns``, what follows from them, and their balance in ``summary``.
 
-    ``deflection`` [m] is that at `springbeam.scene.statics.SHAPE_POINTS`, (rows, 21), or ``None`` without a beam;
+    ``shapes`` are deflections, bending moments and shear forces as of `HybridSystem.shapes`, ``None`` without a beam;
     ``extra`` names the columns that only this reference has.
     """
     if scene.coupled:
@@ -89,7 +89,7 @@ def finished(
         together = columns["phase"] != "free"
         columns["velocity_mismatch"] = np.where(together, columns["v_tip"] - columns["z"], 0.0)
         columns["tie_reaction"] = columns["contact_force"] - columns["compliance_force"]
-    elif scene.stop is not None and deflection is not None:
+    elif scene.stop is not None and shapes is not None:
         columns["gap"] = columns["u_tip"] - scene.stop.position
     columns["e_total"] = np.sum([columns[name] for name in _ENERGIES], axis=0)
     columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
@@ -98,8 +98,8 @@ def finished(
     summary["largest_energy_residual"] = largest
     summary["largest_relative_energy_residual"] = largest / scale if scale > 0.0 else 0.0
     ordered = {name: columns[name] for name in (*columns_of(scene), *extra) if name in columns}
-    shapes = None if deflection is None else (columns["time"], deflection)
-    return Trajectory(scene, ordered, events, shapes, summary)
+    table = None if shapes is None else np.column_stack([columns["time"], shapes])
+    return Trajectory(scene, ordered, events, summary=summary, **shapes_of(table))
 
 
 class Clamp:

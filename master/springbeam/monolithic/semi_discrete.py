@@ -83,6 +83,24 @@ class SemiDiscreteBeam:
         return np.asarray(self.deflection_sampler(x / self.length).T @ forces)
 
 
+def inner_forces(beam: Beam, mesh: SemiDiscreteBeam) -> sp.csr_matrix:
+    """Return the (42, 2N) matrix that takes q + α_b q̇ to EI θ_x [N·m] and KAG (u_x − θ) [N] at `SHAPE_POINTS`.
+
+    Where two elements meet they are those of the one towards the tip, of whose error they have the order.
+    """
+    position = SHAPE_POINTS * mesh.n_elements
+    element = np.minimum(position.astype(int), mesh.n_elements - 1)
+    nodes = element[:, None] * mesh.degree + np.arange(mesh.degree + 1)
+    values, slopes = _lagrange(mesh.degree, position - element)
+    slopes = slopes * (mesh.n_elements / mesh.length)
+    EI = beam.young_modulus * beam.second_moment_of_area
+    KAG = beam.shear_coefficient * beam.area * beam.shear_modulus
+    rows, width = np.arange(len(SHAPE_POINTS))[:, None], mesh.size + 2
+    bent, slid = (_scatter(rows, 2 * nodes + of_u, slopes[:, None, :], width)[:, 2:] for of_u in (0, 1))
+    turned = _scatter(rows, 2 * nodes, values[:, None, :], width)[:, 2:]
+    return sp.vstack([EI * bent, KAG * (slid - turned)]).tocsr()
+
+
 def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return values and slopes at ``x`` in [0, 1] of the Lagrange polynomials on the p + 1 Gauss–Lobatto nodes.
 
@@ -194,6 +212,8 @@ class ModalBeam:
         Coordinates of u = x, θ = 0.
     sampler : (21, r) array
         a → deflection at `SHAPE_POINTS`.
+    inner : (42, r) array
+        a + α_b ȧ → bending moments and shear forces there.
     basis : (N, r) array
         q = basis @ a.
     """
@@ -203,6 +223,7 @@ class ModalBeam:
     load: np.ndarray
     slope_shape: np.ndarray
     sampler: np.ndarray
+    inner: np.ndarray
     basis: np.ndarray
     alpha: float
 
@@ -227,6 +248,7 @@ def modal_beam(beam: Beam) -> ModalBeam:
         load=basis.T @ discrete.nodal(*constant_forces(beam)),
         slope_shape=basis.T @ (discrete.M @ discrete.slope_shape),
         sampler=discrete.deflection_sampler() @ basis,
+        inner=inner_forces(beam, discrete) @ basis,
         basis=basis,
         alpha=beam.alpha_b,
     )

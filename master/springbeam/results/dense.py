@@ -18,6 +18,7 @@ between rows are no more accurate than the rows.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,7 @@ def at(run: Trajectory, times: Any) -> Trajectory:
     before, after = records[between], steps[row[between] + 1]
     records[between] = _between(run.scene, before, after, run.events, wanted[between])
     made = columns(run.scene, records, steps[:1])
-    return Trajectory(run.scene, made, list(run.events), run.shapes, dict(run.summary))
+    return replace(run, columns=made, events=list(run.events), summary=dict(run.summary), steps=None)
 
 
 def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:

@@ -6,8 +6,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
 from .directory import PARQUET, ResultsUnreadable, RunDirectory
 from .file_recorder import write_rows, write_summary
 from .reading import load_summary, read_run, refuse_cut
@@ -42,7 +40,7 @@ def export(directory: str | Path, form: Literal["csv", "parquet"]) -> list[Path]
     events = pandas.DataFrame([vars(event) for event in trajectory.events], columns=EVENT_COLUMNS)
     tables = {PARQUET[0]: pandas.DataFrame(trajectory.columns), PARQUET[1]: events}
     if trajectory.shapes is not None:
-        tables[PARQUET[2]] = pandas.DataFrame(np.column_stack(trajectory.shapes), columns=SHAPE_COLUMNS)
+        tables[PARQUET[2]] = pandas.DataFrame(trajectory.shape_table(), columns=SHAPE_COLUMNS)
     for name, table in tables.items():
         table.to_parquet(run.path / name, engine="pyarrow", index=False)
     return [run.path / name for name in tables]

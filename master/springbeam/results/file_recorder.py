@@ -108,8 +108,7 @@ class FileRecorder(Recorder):
     def write(self, run: Trajectory) -> None:
         """Write a finished run, also one by a reference, which has columns only."""
         recorded = run.steps is not None
-        shapes = np.column_stack(run.shapes) if run.shapes is not None else np.empty((0, len(SHAPE_COLUMNS)))
-        self.keep(np.empty(0, STEP) if run.steps is None else run.steps, run.events, shapes)
+        self.keep(np.empty(0, STEP) if run.steps is None else run.steps, run.events, run.shape_table())
         self.finish(
             {name: run.summary[name] for name in run.summary.keys() - {"scene", "files"}}, None if recorded else run
         )

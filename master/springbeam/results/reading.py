@@ -15,7 +15,7 @@ from ..scene import scene_from_dict
 from .directory import ResultsUnreadable, RunDirectory
 from .recording import trajectory_of
 from .steps import steps_of
-from .trajectory import EVENT_COLUMNS, PHASES, SHAPE_COLUMNS, Event, EventKind, Trajectory
+from .trajectory import EVENT_COLUMNS, PHASES, SHAPE_COLUMNS, Event, EventKind, Trajectory, shapes_of
 
 
 def load_trajectory(directory: str | Path) -> Trajectory:
@@ -59,8 +59,7 @@ def read_run(run: RunDirectory) -> Trajectory:
         table = _read_table(run.shapes, SHAPE_COLUMNS)
         shapes = np.column_stack([table[name] for name in SHAPE_COLUMNS])
     if len(steps) == 0 and run.trajectory.exists():  # it left no records: a reference
-        pictured = None if shapes is None else (shapes[:, 0].copy(), shapes[:, 1:].copy())
-        return Trajectory(scene, _read_table(run.trajectory), events, pictured, summary)
+        return Trajectory(scene, _read_table(run.trajectory), events, summary=summary, **shapes_of(shapes))
     # A run that was killed may have written what belongs to records that it has not.
     last, known = (steps["time"][-1], int(steps["events"][-1])) if len(steps) else (-inf, 0)
     if known > len(events):

@@ -14,7 +14,7 @@ import numpy as np
 from ..scene import Scene
 from .columns import blocks
 from .steps import STEP
-from .trajectory import SHAPE_COLUMNS, Event, Trajectory
+from .trajectory import SHAPE_COLUMNS, Event, Trajectory, shapes_of
 
 
 class Recorder(ABC):
@@ -40,7 +40,7 @@ class Recorder(ABC):
         events
             That happened on them.
         shapes
-            The beam's shapes at some of them: the numbers of `SHAPE_COLUMNS`, shape (m, 22).
+            The beam's shapes at some of them: the numbers of `SHAPE_COLUMNS`, shape (m, 64).
         """
 
     @abstractmethod
@@ -99,8 +99,8 @@ def trajectory_of(
     """Return the run that records, events and shapes amount to; parameters as of `Recorder`."""
     made = list(blocks(scene, steps))
     columns = {name: np.concatenate([block[name] for block in made]) for name in made[0]}
-    pictured = None if shapes is None else (shapes[:, 0].copy(), shapes[:, 1:].copy())
-    return Trajectory(scene, columns, events, pictured, summary, steps if steps["size"].any() else None)
+    inside = steps if steps["size"].any() else None
+    return Trajectory(scene, columns, events, summary=summary, steps=inside, **shapes_of(shapes))
 
 
 def with_scene(summary: Mapping[str, Any], scene: Scene) -> dict[str, Any]:

@@ -54,8 +54,9 @@ TOLD = {
 }
 #: What the column ``phase`` may hold.
 PHASES = ("free", "tied", "touch", "seated")
-#: Columns of the table of shapes: time [s] and deflections [m] at `SHAPE_POINTS`.
-SHAPE_COLUMNS = ("time", *(f"u_{i}" for i in range(len(SHAPE_POINTS))))
+#: Columns of the table of shapes: time [s], then deflections [m], bending moments [N·m] and shear forces [N] at
+#: `SHAPE_POINTS`.
+SHAPE_COLUMNS = ("time", *(f"{part}_{i}" for part in ("u", "moment", "shear") for i in range(len(SHAPE_POINTS))))
 #: A number below this share of its table's largest is a zero, rounded.
 _NOISE = 1e-13
 
@@ -113,6 +114,14 @@ class Event:
         object.__setattr__(self, "kind", EventKind(self.kind))
 
 
+def shapes_of(table: np.ndarray | None) -> dict[str, Any]:
+    """Return what a `Trajectory` has of a table of shapes, (n, 64): its ``shapes``, moments and shear forces."""
+    if table is None:
+        return {}
+    deflection, moment, shear = (part.copy() for part in np.split(table[:, 1:], 3, axis=1))
+    return {"shapes": (table[:, 0].copy(), deflection), "bending_moment": moment, "shear_force": shear}
+
+
 EVENT_COLUMNS = tuple(Event.__dataclass_fields__)
 
 
@@ -148,7 +157,9 @@ def rounded(value: float, scale: float) -> str:
 class Trajectory:
     """Columns as numpy arrays under the names of `COLUMNS`: ``trajectory["y"]`` or ``trajectory.y``.
 
-    ``shapes`` holds ``(time, deflection)`` with ``deflection`` of shape (n, 21) [m], or ``None`` without a beam.
+    ``shapes`` holds ``(time, deflection)`` with ``deflection`` of shape (n, 21) [m], or ``None`` without a beam;
+    ``bending_moment`` [N·m], positive where it bends the beam upwards, and ``shear_force`` [N], upward on the part
+    before it, are those of the same times and places.
     """
 
     scene: Scene
@@ -158,6 +169,8 @@ class Trajectory:
     summary: dict[str, Any] = field(default_factory=dict)
     #: What lies between the rows, a step per row (`springbeam.results.steps.STEP`); ``None`` without such data.
     steps: np.ndarray | None = None
+    bending_moment: np.ndarray | None = None
+    shear_force: np.ndarray | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.columns[name]
@@ -201,6 +214,12 @@ class Trajectory:
         """Return the units of the columns that have one."""
         return {name: unit for name, unit in columns_of(self.scene).items() if unit and name in self.columns}
 
+    def shape_table(self) -> np.ndarray:
+        """Return the numbers of `SHAPE_COLUMNS`, shape (n, 64); without a beam none."""
+        if self.shapes is None or self.bending_moment is None or self.shear_force is None:
+            return np.empty((0, len(SHAPE_COLUMNS)))
+        return np.column_stack([*self.shapes, self.bending_moment, self.shear_force])
+
     def at(self, times: Any) -> Trajectory:
         """Return the run at any ``times`` [s], shape (n,), with the same columns (`springbeam.results.dense`).
 
@@ -234,7 +253,13 @@ class Trajectory:
         }
         coordinates = {"time": variables.pop("time")}
         if self.shapes is not None and self.scene.beam is not None:
-            variables["deflection"] = (("shape_time", "x"), self.shapes[1], {"units": "m"})
+            along = {"deflection": (self.shapes[1], "m"), "bending_moment": (self.bending_moment, "N·m")}
+            along["shear_force"] = (self.shear_force, "N")
+            variables |= {
+                name: (("shape_time", "x"), values, {"units": unit})
+                for name, (values, unit) in along.items()
+                if values is not None
+            }
             coordinates["shape_time"] = ("shape_time", self.shapes[0], {"units": "s"})
             coordinates["x"] = ("x", SHAPE_POINTS * self.scene.beam.length, {"units": "m"})
         dataset: Dataset = _of_extra("xarray").Dataset(variables, coordinates, {"title": self.scene.title})

@@ -36,7 +36,7 @@ class Log:
         self._events.append(event)
 
     def show(self, time: float, shape: np.ndarray) -> None:
-        """Take the beam's shape [m], shape (21,), at the ``time`` [s] of the last record. Raises RunStopped."""
+        """Take the beam's shape, (63,), at the ``time`` [s] of the last record. Raises RunStopped."""
         if not np.isfinite(shape).all():
             raise RunStopped("the beam's shape is not finite", time)
         self._shapes.append([time, *shape.tolist()])

@@ -98,10 +98,10 @@ def tip_load_deflection(beam: Beam) -> float:
 
 def load_energy(beam: Beam) -> float:
     """Return the work of the loads on their own deflection, ∫ M²/EI + Q²/KAG [J], twice the energy they store."""
-    return _work(beam, 0.0, partial(_loads, beam))
+    return _work(beam, 0.0, partial(load_forces, beam))
 
 
-def _loads(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def load_forces(beam: Beam, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return (Q, M) of the loads at the distances ``t`` from the tip [N, N·m]."""
     f, c, h = beam.distributed_load, beam.tip_load_coefficient, beam.length / beam.n_elements
     s = np.minimum(t, h)
@@ -119,7 +119,7 @@ def _work(beam: Beam, start: float, virtual: Callable[[np.ndarray], tuple[np.nda
     h, total = beam.length / beam.n_elements, 0.0
     for a, b in ((start, max(start, h)), (max(start, h), beam.length)):
         t = a + (b - a) * _NODES
-        (Q, M), (q, m) = _loads(beam, t), virtual(t)
+        (Q, M), (q, m) = load_forces(beam, t), virtual(t)
         density = M * m / bending_stiffness(beam) + Q * q / shear_stiffness(beam)
         total += (b - a) * float(_WEIGHTS @ density)
     return total
