@@ -23,7 +23,7 @@ Set-up makes .venv here and installs Python packages into it; as root it also in
 missing (Debian, Ubuntu), otherwise it names them. Variables:
   PYTHON             the Python to start from, 3.10 or later (default: python3)
   CXX                the C++17 compiler
-  SPRINGBEAM_PREFIX  where Eigen, SUNDIALS and GoogleTest are if not in the system (also: CMAKE_PREFIX_PATH)
+  SPRINGBEAM_PREFIX  where Eigen, Spectra, SUNDIALS and GoogleTest are if not in the system (also: CMAKE_PREFIX_PATH)
   SPRINGBEAM_SUNDIALS_SOURCE  source of SUNDIALS 6.2 to 7 (default: Debian's source package, fetched once into the
                      cache); empty: take the installed SUNDIALS
   SPRINGBEAM_CACHE   where the source of SUNDIALS and the importers of `interop` are (default: ~/.cache/springbeam)
@@ -110,6 +110,7 @@ set_up_system() {
   local missing=()
   command -v "${CXX:-c++}" >/dev/null || install_packages "a C++ compiler is" g++
   has_header Eigen/SparseCore || missing+=(libeigen3-dev)
+  has_header Spectra/SymGEigsShiftSolver.h || missing+=(libspectra-dev)
   get_sundials || has_header ida/ida.h || missing+=(libsundials-dev)
   has_header gtest/gtest.h || missing+=(libgtest-dev)
   [ ${#missing[@]} = 0 ] || install_packages "libraries are" "${missing[@]}"

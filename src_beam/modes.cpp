@@ -1,13 +1,13 @@
 #include "modes.hpp"
 
+#include <Spectra/SymGEigsShiftSolver.h>
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
-#include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -29,44 +29,46 @@ constexpr double residual_tolerance = 1e-6;
 /// that enter it with φ(L)/ω².
 constexpr double rank_tolerance = 1e-12;
 
+/// y = A x for Spectra, which wants to set a shift: ours is 0.
+struct Operator {
+  using Scalar = double;
+  Index size;
+  std::function<void(const double* x, double* y)> times;
+
+  Index rows() const { return size; }
+  Index cols() const { return size; }
+  void set_shift(double) {}
+  void perform_op(const double* x, double* y) const { times(x, y); }
+};
+
 constexpr const char* remedy = "; keep fewer n_modes, or use the integrator generalized_alpha";
 
-/// Lowest modes, M-orthonormal columns, by Lanczos' method on K⁻¹M: A V = V T + f eᵀ with a basis V that is made
-/// M-orthonormal in full (Golub & Van Loan, Matrix Computations, section 10.3), which grows until they have converged.
+/// Lowest modes by implicitly restarted Lanczos on K⁻¹M, M-orthonormal columns.
 MatrixXd lanczos_modes(const Timoshenko& mesh, Index count) {
-  constexpr double tolerance = 1e-12;  ///< of the residual ‖f‖ |s|, relative to the eigenvalue
-  const Index size = mesh.size();
-  MatrixXd V;
-  VectorXd alpha, beta, f(size), Mf;
-  std::minstd_rand random;  // the same numbers everywhere
-  for (double& x : f) x = static_cast<double>(random()) / static_cast<double>(std::minstd_rand::max()) - 0.5;
-  f = mesh.flexibility_times(f);
-  double length = std::sqrt(mesh.mass_norm2(f));
-  Index k = 0;
-  for (Index most = std::min(size, std::max(2 * count, count + 20));; most = std::min(size, most + most / 4)) {
-    V.conservativeResize(size, most);
-    alpha.conservativeResize(most);
-    beta.conservativeResize(most);
-    for (; k < most; ++k) {
-      V.col(k) = f / length;
-      Mf = mesh.mass_times(V.col(k));
-      f = mesh.flexibility_times(Mf);
-      alpha[k] = f.dot(Mf);
-      f -= alpha[k] * V.col(k);
-      if (k > 0) f -= length * V.col(k - 1);
-      Mf = mesh.mass_times(f);
-      f.noalias() -= V.leftCols(k + 1) * (V.leftCols(k + 1).transpose() * Mf);
-      beta[k] = length = std::sqrt(mesh.mass_norm2(f));
-    }
-    Eigen::SelfAdjointEigenSolver<MatrixXd> T;
-    T.computeFromTridiagonal(alpha, beta.head(most - 1));
-    const auto converged = (length * T.eigenvectors().row(most - 1).tail(count).transpose().cwiseAbs()).array() <=
-                           tolerance * T.eigenvalues().tail(count).array();
-    if (T.info() == Eigen::Success && converged.all()) return V * T.eigenvectors().rightCols(count).rowwise().reverse();
-    if (most == size) break;
+  // Rayleigh quotient of the static tip shape: a little above the lowest ω².
+  const VectorXd shape = mesh.flexibility_times(mesh.unit_tip_force());
+  const double lowest = shape[mesh.tip_index()] / mesh.mass_norm2(shape);
+
+  // ν K⁻¹: the factor ν lifts the eigenvalues ν/ω² to where Spectra's convergence test, which has an absolute part of
+  // 4e-11, is relative.
+  Operator flexibility{mesh.size(), [&mesh, factor = 1e8 * lowest](const double* x, double* y) {
+                         mesh.flexibility_times(x, y);
+                         Eigen::Map<VectorXd>(y, mesh.size()) *= factor;
+                       }};
+  Operator mass{mesh.size(), [&mesh](const double* x, double* y) {
+                  std::fill(y, y + mesh.size(), 0.0);
+                  mesh.add_mass_times(1.0, x, y);
+                }};
+  const Index subspace = std::min(mesh.size(), std::max(2 * count, count + 20));
+  Spectra::SymGEigsShiftSolver<Operator, Operator, Spectra::GEigsMode::ShiftInvert> solver(flexibility, mass, count,
+                                                                                           subspace, 0.0);
+  solver.init();  // a fixed pseudo-random start
+  const Index converged = solver.compute(Spectra::SortRule::LargestMagn, 300, 1e-12, Spectra::SortRule::SmallestAlge);
+  if (converged < count) {
+    throw std::runtime_error("beam: only " + std::to_string(converged) + " of " + std::to_string(count) + " modes of " +
+                             std::to_string(mesh.elements()) + " elements converged" + remedy);
   }
-  throw std::runtime_error("beam: the " + std::to_string(count) + " lowest modes of " +
-                           std::to_string(mesh.elements()) + " elements did not converge" + remedy);
+  return solver.eigenvectors();
 }
 
 /// Singular values and right vectors. @throws std::runtime_error where Eigen would leave them uninitialised

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # build.sh OUT PYTHON — cross-compiles the libraries of the FMUs, beam.dll to spring3.dll, for 64-bit Windows into OUT,
 # with zig from PyPI, self-contained but for what Windows 10 has. SUNDIALS is compiled from SPRINGBEAM_SUNDIALS_SOURCE;
-# Eigen is the system's or that of SPRINGBEAM_PREFIX.
+# Eigen and Spectra are the system's or those of SPRINGBEAM_PREFIX.
 set -euo pipefail
 mkdir -p "$1"
 out=$(cd "$1" && pwd)
@@ -46,10 +46,15 @@ cross=(-G Ninja "-DCMAKE_MAKE_PROGRAM=$tools/ninja" "-DCMAKE_TOOLCHAIN_FILE=$out
   -DCMAKE_BUILD_TYPE=Release)
 
 [ -n "${SPRINGBEAM_SUNDIALS_SOURCE:-}" ] || die "the source of SUNDIALS is missing: SPRINGBEAM_SUNDIALS_SOURCE=…"
+# The headers alone: the system's include folder would bring Linux' own with them.
+mkdir -p "$out/include"
+for prefix in "${SPRINGBEAM_PREFIX:-}" /usr /usr/local; do
+  [ -d "$prefix/include/Spectra" ] && ln -sfn "$prefix/include/Spectra" "$out/include/Spectra" && break
+done
 if ! [ -f "$out/project/build.ninja" ]; then
   quietly configure "$tools/cmake" -S "$root" -B "$out/project" "${cross[@]}" "-DPython3_EXECUTABLE=$python" \
     -DSPRINGBEAM_TESTS=OFF "-DCMAKE_PREFIX_PATH=${SPRINGBEAM_PREFIX:-}" \
-    -DEigen3_ROOT=/usr -DEigen3_DIR="${Eigen3_DIR:-/usr/share/eigen3/cmake}"
+    "-DSPECTRA_INCLUDE_DIR=$out/include" -DEigen3_ROOT=/usr -DEigen3_DIR="${Eigen3_DIR:-/usr/share/eigen3/cmake}"
 fi
 say "building for win64"
 quietly build "$tools/ninja" -C "$out/project" beam spring beam3 spring3
