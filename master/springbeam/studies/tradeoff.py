@@ -1,9 +1,9 @@
 """Speed against accuracy: a scene run in many configurations, with the errors and the cost of each.
 
 All are judged on the same times, between the macro points too, beside the event-driven monolithic solution of the same
-semi-discrete model, so that what is measured is the coupling and the time integration (`converge` varies the model:
-modes, elements). scipy solves the same model as a good user would have it do (`rivals`). Every configuration is timed
-once in each of several passes, so that two of them are compared in turn.
+semi-discrete model, so that what is measured is the coupling and the time integration. Where the model itself varies
+(modes, elements) it is the solution on a finer mesh. scipy solves the same model as a good user would have it do
+(`rivals`). Every configuration is timed once in each of several passes, so that two of them are compared in turn.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from ..run.outcome import RunStopped
 from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import mesh_frequency, slowest_frequency
+from ..scene.tables import ALL_MODES_UP_TO
 from .comparison import comparable_until, refuse_without_reference
 from .design import RIGID, SOFT
 from .metrics import costs, errors, motion_errors, worst
@@ -32,6 +33,8 @@ from .tables import number, table
 
 #: A run that takes longer than this is given up, and finer ones of its family are not begun [s]; quick: ten times less.
 _LIMIT = 10.0
+#: So long the reference on a finer mesh may take [s].
+_LIMIT_FINER = 60.0
 #: Runs longer than this are timed once [s].
 _TIMED_ONCE = 3.0
 #: Times at which all are judged.
@@ -51,6 +54,9 @@ _ADAPTIVE_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 _MOST_RESOLVED = 2000.0
 #: Looser tolerances of IDA, and of the tie.
 _LOOSER = {"coupling.tolerance": 1e-6, "spring.relative_tolerance": 1e-4, "spring.absolute_tolerance": 1e-6}
+_MODES = (2, 4, 8, 16, 32, 64, 128)
+_MESHES = (0.25, 0.5, 1.0, 2.0)
+_DEGREES = (1, 4, 8)
 
 
 class Tradeoff(Study):
@@ -122,6 +128,8 @@ class Tradeoff(Study):
 
     def record(self, case: Row) -> Row:
         """Run, time and judge a configuration: ``cost_wall_time`` [s] is without ``cost_setup``."""
+        if case["finer"] and isinstance(self.finer_reference, str):
+            return {"status": "not judged", "error": self.finer_reference}
         began = perf_counter()
         try:
             found = self._by_scipy(case) if "rtol" in case else self._by_us(case)
@@ -140,12 +148,15 @@ class Tradeoff(Study):
         done = perf_counter()
         run.at(self.times)
         seconds = float(run.summary["wall_time"]) + perf_counter() - done
+        reference = self.finer_reference if case["finer"] else self.reference
+        assert isinstance(reference, Trajectory)
         return {
             "cost_wall_time": seconds,
             "cost_setup": float(run.summary["setup_time"]),
             **costs(run),
+            "unknowns": 0 if scene.beam is None else scene.beam.modes_kept,
             "cost_macro_steps": int(run.summary.get("macro_steps", 0)),
-            **errors(run, self.reference, _SHORT * (self.times[-1] - self.times[0])),
+            **errors(run, reference, _SHORT * (self.times[-1] - self.times[0])),
         }
 
     def _by_scipy(self, case: Row) -> Row:
@@ -167,13 +178,23 @@ class Tradeoff(Study):
         """The solution of the same model."""
         return event_driven.simulate(self.scene, sample_times=self.times)
 
+    @cached_property
+    def finer_reference(self) -> Trajectory | str:
+        """The solution on a finer mesh, or why there is none."""
+        model = finer(self.scene)
+        assert model is not None
+        try:
+            return event_driven.simulate(model, sample_times=self.times, time_limit=_LIMIT_FINER)
+        except event_driven.ReferenceFailure as failed:
+            return f"the reference on a finer mesh {failed}"
+
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per configuration: the errors of the first pass, and the medians of the times."""
         cases, found = self.cases(), list[Row]()
         for name in (name for name in records if not cases[name]["pass"]):
             turns = [records.get(_name(cases[name], turn), {}) for turn in range(self.passes)]
             times = [turn["cost_wall_time"] for turn in turns if turn.get("status") == "done"]
-            row = {"index": len(found), **cases[name], **records[name]}
+            row = {"index": len(found), **cases[name], "unknowns": None, **records[name]}
             del row["pass"]
             found.append(row | ({"cost_wall_time": statistics.median(times), "times": times} if times else {}))
         front = pareto(found)
@@ -209,6 +230,8 @@ class Tradeoff(Study):
         found, rows = list(self.remarks), self.rows(records)
         if slow := [_label(row) for row in rows if row["status"] == "stopped" and "takes more" in row["error"]]:
             found.append(f"given up after {_LIMIT:g} s, finer ones of their kind not run: {'; '.join(slow)}")
+        if unjudged := {row["family"]: row["error"] for row in rows if row["status"] == "not judged"}:
+            found.append(f"not run, {next(iter(unjudged.values()))}: {', '.join(unjudged)}")
         if hopeless := dict.fromkeys(c["method"] for c in self.configurations if _hopeless(self.scene, c)):
             turns = f"explicit steps would follow the mesh's fastest mode over {_MOST_TURNS:g} rad"
             found.append(f"not run, {turns}: {', '.join(hopeless)}")
@@ -217,16 +240,17 @@ class Tradeoff(Study):
         return found
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw the work–precision diagrams: error over time, and over doStep calls."""
+        """Draw the work–precision diagrams: error over time, over doStep calls, and the model's over its size."""
         from .picture import Point, curves
 
         rows = [row for row in self.rows(records) if np.isfinite(worst(row))]
-        over = {"wall time [s]": "cost_wall_time", "doStep calls of both FMUs": "cost_do_steps"}
+        over = {"wall time [s]": "cost_wall_time", "doStep calls of both FMUs": "cost_do_steps",
+                "unknowns of the beam, beside a finer mesh": "unknowns"}  # fmt: skip
         points = [
             Point(words, row["family"], row[cost], min(worst(row), 1.0))
             for words, cost in over.items()
             for row in rows
-            if cost in row
+            if row["finer"] == (cost == "unknowns") and cost in row
         ]
         title = f"{self.scene.title}: errors up to t = {self.scene.time.t_end:.6g} s"
         figure = curves(points, title, "", "largest relative error of u_tip and y", (6.0, 6.5))
@@ -242,7 +266,7 @@ def pareto(rows: Iterable[Row]) -> list[Row]:
     Errors of a tenth of the motion and more are no results.
     """
     best, front = 0.1, []
-    for row in sorted((r for r in rows if r["status"] == "done"), key=lambda r: r["cost_wall_time"]):
+    for row in sorted((r for r in rows if r["status"] == "done" and not r["finer"]), key=lambda r: r["cost_wall_time"]):
         if worst(row) < best:
             best = worst(row)
             front.append(row)
@@ -255,7 +279,7 @@ def cheapest(rows: Iterable[Row]) -> list[Row]:
     A configuration counts if all finer ones of its family keep the error too: not by luck. The ratio is the median of
     those of the passes.
     """
-    same = list(rows)
+    same = [row for row in rows if not row["finer"]]
 
     def best(ours: bool, target: float) -> Row | None:
         kept = []
@@ -305,15 +329,35 @@ def _configurations(scene: Scene) -> Iterator[Row]:
     sizes = [scene.coupling.H * share for share in _STEPS]
     for family, keys in (schemes | looser | auto).items():
         for H in (H for H in sizes if _FEWEST_STEPS <= scene.duration / H <= _MOST_STEPS):
-            yield {"family": family, "setting": f"H = {H:.3g}", **keys, "coupling.macro_step": H}
+            yield {"family": family, "setting": f"H = {H:.3g}", "finer": False, **keys, "coupling.macro_step": H}
     turns = 0.0 if beam is None or scene.massless else slowest_frequency(beam) * scene.duration
     for family, keys in best.items():
         for tolerance in _ADAPTIVE_TOLERANCES if turns <= _MOST_RESOLVED else ():
-            axes = {"family": f"{family} adaptive", "setting": f"{tolerance:.0e}"}
+            axes = {"family": f"{family} adaptive", "setting": f"{tolerance:.0e}", "finer": False}
             yield axes | keys | {"coupling.relative_tolerance": tolerance}
+    if (fine := finer(scene)) is not None and beam is not None and fine.beam is not None:
+        for modes in (modes for modes in _MODES if modes < beam.unknowns):
+            yield {"family": "modes", "setting": f"{modes}", "finer": True, "beam.n_modes": modes}
+        for degree in _DEGREES:
+            for n in (round(factor * beam.n_elements / degree) for factor in _MESHES):
+                if n >= 1 and 2 * n * degree <= fine.beam.n_elements * fine.beam.element_degree:
+                    axes = {"family": f"elements of degree {degree}", "setting": f"{n}", "finer": True}
+                    mesh = {"beam.n_elements": n, "beam.element_degree": degree, "beam.n_modes": 0}
+                    yield axes | mesh | ({"beam.reduced_integration": False} if degree > 2 else {})
     for method in () if scene.massless else TOLERANCES:
         for rtol in TOLERANCES[method]:
-            yield {"family": method, "setting": f"rtol {rtol:.0e}", "method": method, "rtol": rtol}
+            yield {"family": method, "setting": f"rtol {rtol:.0e}", "finer": False, "method": method, "rtol": rtol}
+
+
+def finer(scene: Scene) -> Scene | None:
+    """Return the scene with elements of higher degree, which stand for the continuum; ``None`` if that is too large."""
+    beam = scene.beam
+    if beam is None or beam.integrator != "modal":
+        return None
+    degree = min(max(_DEGREES), ALL_MODES_UP_TO // (2 * beam.n_elements))
+    if degree < 2 * beam.element_degree:
+        return None
+    return with_changes(scene, beam={"element_degree": degree, "n_modes": 0, "reduced_integration": False})
 
 
 def _hopeless(scene: Scene, case: Row) -> bool:
