@@ -3,6 +3,7 @@
 The script is below the master, in place of the functions of the shared library, so that whatever is called is seen.
 """
 
+import ctypes
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -36,7 +37,7 @@ class Fault:
     fmu: str
     function: str
     where: str
-    kind: str  #: a name of `NAMES`, "raise", or what is put into the values: "nan", "inf", "1e300"
+    kind: str  #: a name of `NAMES`, "raise", "hang", or what is put into the values: "nan", "inf", "1e300"
     once: bool = False
     skip: int = 3
     happened: int = 0
@@ -100,6 +101,16 @@ class Script:
             assert alive == (allowed == set()), f"{fmu} was not freed"
 
 
+def hang():
+    """Call a C function that never returns, not even for a signal: the second lock of a mutex."""
+    print("hanging", flush=True)
+    library, mutex = ctypes.CDLL(None), ctypes.create_string_buffer(256)
+    library.pthread_mutex_init(mutex, None)
+    library.pthread_mutex_lock(mutex)
+    library.pthread_mutex_lock(mutex)
+    raise AssertionError("returned")
+
+
 class Library:
     """A shared library with the script between it and its callers."""
 
@@ -121,6 +132,8 @@ class Library:
                 result = function(*arguments)
             elif fault.kind == "raise":
                 raise ZeroDivisionError("nobody expected this")
+            elif fault.kind == "hang":
+                hang()
             elif fault.kind in NAMES:
                 result = NAMES[fault.kind]
             else:

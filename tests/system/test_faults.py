@@ -1,13 +1,17 @@
 """FMUs that fail in every phase: the run goes on as designed or stops by name, and nothing computed is lost."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 import tomli_w
-from commands import command, written
+from commands import HANGS, command, printed, written
 from faulty import NAMES, Fault, installed
 
 from springbeam.results.reading import load_trajectory
@@ -192,3 +196,49 @@ def test_after_fmi2_fatal_the_next_run_is_as_ever(run):
     assert code == 0
     script.check()
     assert written(directory) == expected
+
+
+# -- an FMU call that never returns: Ctrl-C ends the command all the same -------------------------------------------
+
+#: The command with a shorter wait, and the FMU, the function and the place that are its first arguments.
+HANGING = """
+import sys
+import pytest
+from faulty import Fault, installed
+from springbeam import cli
+
+fmu, function, where, skip, *arguments = sys.argv[1:]
+cli.common.PATIENCE = 0.5
+installed(pytest.MonkeyPatch(), Fault(fmu, function, where, "hang", skip=int(skip)))
+sys.argv = ["springbeam", *arguments]
+cli.main()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
+@pytest.mark.parametrize(
+    ("number", "fmu", "where"),
+    [(signal.SIGINT, "spring", "tied"), (signal.SIGTERM, "beam", "location")],
+    ids=["tied", "location"],
+)
+def test_a_call_that_never_returns_can_be_interrupted(tmp_path, number, fmu, where):
+    directory, run = tmp_path / "run", ("run", PATH, "--no-plots", "-q", "--out")
+    printed(*run, tmp_path / "whole")
+    process = subprocess.Popen(
+        [sys.executable, "-c", HANGING, fmu, "fmi2DoStep", where, "3", *map(str, run), directory, "--checkpoint=0.02"],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "hanging\n"
+        with pytest.raises(subprocess.TimeoutExpired):  # it does hang
+            process.wait(0.2)
+        process.send_signal(number)
+        output, errors = process.communicate(timeout=HANGS)
+    finally:
+        process.kill()
+    assert (process.returncode, output) == (3, "")
+    assert errors == "error: interrupted: a call into an FMU has not returned within 0.5 s\n"
+    printed("resume", directory, "--no-plots", "-q")
+    assert written(directory) == written(tmp_path / "whole")

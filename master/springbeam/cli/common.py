@@ -6,6 +6,7 @@ Results go to stdout, progress and errors to stderr. ``--json`` puts one JSON do
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 from collections.abc import Iterable, Iterator
@@ -28,6 +29,8 @@ from ..scene import SceneError, scene_keys, shipped_scenes
 DISAGREES = 1
 BAD_INPUT = 2
 STOPPED = 3
+#: How long a signal waits for Python to act on it [s].
+PATIENCE = 5.0
 
 
 def complete_scene(incomplete: str) -> list[str]:
@@ -194,20 +197,43 @@ def cause_of(error: BaseException, place: Path | str) -> str:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """End the command with exit code 3 on Ctrl-C, and on SIGTERM, which batch systems send."""
-    main_thread = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGTERM, _interrupt) if main_thread else None
+    """End the command with exit code 3 on Ctrl-C, and on SIGTERM, which batch systems send.
+
+    Python acts on a signal when the call into an FMU returns. The wakeup descriptor gets it at once: if Python has not
+    acted within `PATIENCE`, the process ends. What a run has handed over is on disk then, as after a kill.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    acted, (receiver, sender) = threading.Event(), os.pipe()
+    os.set_blocking(sender, False)
+
+    def interrupt(*_: Any) -> NoReturn:
+        acted.set()
+        raise KeyboardInterrupt
+
+    def watch() -> None:
+        if os.read(receiver, 1) and not acted.wait(PATIENCE):
+            typer.echo(f"error: interrupted: a call into an FMU has not returned within {PATIENCE:g} s", err=True)
+            os._exit(STOPPED)
+
+    ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    numbers = (signal.SIGTERM,) if ignored else (signal.SIGINT, signal.SIGTERM)
+    before = {number: signal.signal(number, interrupt) for number in numbers}
+    wakeup = signal.set_wakeup_fd(sender, warn_on_full_buffer=False)
+    watchdog = threading.Thread(target=watch, name="watchdog", daemon=True)
+    watchdog.start()
     try:
         yield
     except KeyboardInterrupt:
         fail(STOPPED, "interrupted")
     finally:
-        if main_thread:
-            signal.signal(signal.SIGTERM, before)
-
-
-def _interrupt(*_: Any) -> NoReturn:
-    raise KeyboardInterrupt
+        signal.set_wakeup_fd(wakeup)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        os.close(sender)  # which ends the watch
+        watchdog.join()
+        os.close(receiver)
 
 
 def fail(code: int, message: str) -> NoReturn:
