@@ -1,15 +1,21 @@
 """Where an event is: the cubic through both ends against numpy, and location to rounding."""
 
 import math
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
+from bodies import DuffingBody, Upper
 from numpy.polynomial import Polynomial
 
-from springbeam.bodies.protocol import Motion
+from springbeam.bodies.protocol import NO_FORCE, Motion, StepRefused
 from springbeam.contact.events import EventFunctions, Height, Holding, clearance, gap, locate
 from springbeam.contact.phases import Joint, Phase, common_velocity
+from springbeam.coupling.protocol import Step
 from springbeam.results.paths import Path
+from springbeam.run.detection import Detector
+from springbeam.run.macro_steps import MacroGrid
+from springbeam.run.stepping import Pair
 from springbeam.scene import Beam, Spring, load_scene
 
 SIZE = 0.02
@@ -133,3 +139,22 @@ def test_joined_ends_go_on_with_their_common_velocity(v, z, rate):
     assert joined["release"](motions) == pytest.approx((0.0, -rate))
     assert dict(functions.of(Phase(Joint.TOUCH)))["retie"](motions) == pytest.approx((0.0, rate))
     assert dict(functions.of(Phase()))["stop_impact"](motions)[1] == z
+
+
+@pytest.mark.parametrize(("jump", "refused"), [(5e-10, True), (5e-11, False)])
+def test_a_motion_that_jumps_with_the_size_of_the_step_has_no_event(jump, refused, monkeypatch):
+    """The gap of ends 1 m high falls past 0 at once. Positions are known to 8 roundings, 1e5 of these are 1.8e-10."""
+    pair = Pair(load_scene("soft"), Upper(2.0), DuffingBody(1.0))
+    start = tuple(Motion(place, 0.0, 0.0, 0.0) for place in (1.0 + jump, 1.0))
+
+    def attempt(state, size, start):
+        tip = 1.0 + (jump if size < 0.3e-3 else -jump)
+        ends = (Motion(tip, -1e-9, size, 0.5 * size**2), Motion(1.0, 0.0, size, 0.5 * size**2))
+        return Step(0.0, size, NO_FORCE, NO_FORCE, start, ends)
+
+    monkeypatch.setattr(pair, "attempt", attempt)
+    detector = Detector(load_scene("soft"), pair, MacroGrid(0.0, 1.0, 1e-3), lambda: 1.0)
+    step = attempt(None, 1e-3, start)
+    with pytest.raises(StepRefused, match="the motion jumps by") if refused else nullcontext():
+        found, kind = detector.first_event(pair.initial_state(0.0), step)
+        assert (kind, found.size) == ("impact", pytest.approx(0.3e-3, rel=1e-12))

@@ -32,6 +32,10 @@ CASES = {
         "beam_drives",
         {"stop": {"position": -0.002, "restitution": 0.3}, "spring": {"external_force": -0.5}},
     ),
+    "on the foundation": (
+        "beam_drives",
+        {"stop": {"position": -1e-6, "restitution": 0.0}, "spring": {"external_force": -5.0}},
+    ),
     "heavy spring": ("spring_drives", {"beam": {"young_modulus": 100.0, "shear_modulus": 100.0}, "spring": HEAVY}),
 }
 

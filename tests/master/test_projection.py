@@ -71,6 +71,16 @@ def test_it_is_the_projection_of_the_force(degree, q, shape):
         assert value == pytest.approx(exact, abs=1e-7 * largest)
 
 
+@pytest.mark.parametrize("least", [0.02, 0.1, 0.25])
+def test_a_power_that_comes_near_its_zero_is_projected_as_well(least):
+    """p from ``least`` to 1 mm on a straight line; eight plain points leave 1e-9 and more of the largest force."""
+    law = Compliance(1e4, 1.5)
+    start, x = 1e-3 * least, [1e-3, 0.5e-3 * (1.0 + least)]
+    c = series(Projection(law, 1), start, x)
+    exact = 1.5 * integral(lambda s: law.force(legendre.legval(s, c)) * s, c)
+    assert Projection(law, 1).force(start, SIZE, x)[1] == pytest.approx(exact, abs=1e-10 * law.force(1e-3))
+
+
 @pytest.mark.parametrize("law", [Compliance(1e4, 1.5), Compliance(1e4, 3.0, 0.5), Link(1e4, 20.0)], ids=repr)
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize("shape", ["in", "opens", "dips in"])

@@ -54,6 +54,15 @@ def test_a_wild_guess_does_not_loosen_the_conditions(scheme, degree):
     assert abs(beam.motion().displacement - spring.motion().displacement) <= 1e-12 * size
 
 
+def test_the_responses_of_64_sizes_are_remembered_those_used_last():
+    beam, spring = after_impact(2)
+    tie = Tie("energy", 0, 1e-12)
+    sizes = [1e-3 * (1.0 + k / 100.0) for k in range(66)]
+    for size in (*sizes[:64], sizes[0], *sizes[64:]):
+        solve(tie, size, beam, spring)
+    assert list(tie.state.of_size) == [*sizes[3:64], sizes[0], *sizes[64:]]
+
+
 # -- energy ---------------------------------------------------------------------------------------------------------
 
 

@@ -27,8 +27,8 @@ from .macro_steps import AdaptiveSteps, MacroGrid
 from .separation import Separation
 from .stepping import Pair, State
 
-#: A path may be wrong by this share of its distance from the cubic; trial steps to the bottom of a dip.
-_UNSURE, _MAX_DIP_TRIALS = 0.25, 4
+#: Trial steps to the bottom of a dip.
+_MAX_DIP_TRIALS = 4
 #: Position tolerances by which the motion at a located event may be off before it is none.
 _JUMP = 1e5
 #: An event closer to the start of a step than this fraction of H happens at the start.
@@ -153,8 +153,8 @@ class Detector:
             # Ends that have just parted may close a little first, by the error of the time at which they were let go.
             return whole_step
         path = Path.through(start, end, step.size, function.means(step.end, step.size))
-        unsure = _UNSURE * path.beside_cubic
-        if whole_step is None and clearance(start, end, step.size)[0] - path.beside_cubic >= floor + unsure:
+        unsure = path.beside_cubic  # a path may be as wrong as the cubic is beside it
+        if whole_step is None and clearance(start, end, step.size)[0] - unsure >= floor + unsure:
             return None
         before, whole = 0.0, step.size
         for _ in range(_MAX_DIP_TRIALS):
@@ -201,7 +201,7 @@ class Detector:
             return step
         path = Path.through(start, end, step.size, gap.means(step.end, step.size))
         inside = path.lowest_inside()
-        if inside is None or path.at(inside) >= _UNSURE * path.beside_cubic:
+        if inside is None or path.at(inside) >= path.beside_cubic:
             return step
         cut = self._pair.attempt(state, inside * step.size, step.start)
         return cut if any(cut.contact) else step

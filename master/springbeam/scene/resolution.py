@@ -21,7 +21,7 @@ TURN = 1.0
 COLLOCATION = (12.0, 720.0, 100800.0)
 #: Share of its way that an end may move, by degree, in the time by which all steps together make the contact late,
 #: times the number of contacts, each of which amplifies that; and where, without a beam's inertia, all that moves is.
-LATE, LATE_IF_MASSLESS = (0.15, 0.4, 0.4), (0.05, 0.05, 0.01)
+LATE, LATE_IF_MASSLESS = (0.1, 0.4, 0.4), (0.05, 0.05, 0.01)
 #: Impulse by which the force of a run may miss a soft law, over the momentum of a body, times the number of contacts.
 MISSED = 0.015
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
