@@ -210,7 +210,7 @@ def test_a_contact_that_is_not_resolved_is_said(size, degree):
     """60 rad a step (u_tip 11 % off); with 128 steps of degree 2 no row is in contact, only what lies between them."""
     run = simulate(with_changes(STIFF, coupling={"macro_step": size, "degree": degree}))
     assert run.summary["resolved"] is False
-    (warning,) = (text for text in run.summary["warnings"] if "not found at coupling.degree" not in text)
+    (warning,) = run.summary["warnings"]
     assert "tip and lower end turn" in warning
     named = float(warning.split("macro_step <= ")[1].split()[0])
     omega = np.sqrt(1e8 * (modal_beam(STIFF.beam).inverse_tip_mass + 1.0))

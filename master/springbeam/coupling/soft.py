@@ -6,7 +6,8 @@ body:
 
     f(x) = E (x − x_k) + A(x) − a_k = 0,     E = (−∂x/∂a)⁻¹,
 
-x_k being what the bodies did under a_k. Newton's method is damped. `StepSolver` then tries the crossing on the bodies.
+x_k being what the bodies did under a_k. Newton's method is damped, and starts from the law softened where it does not
+find the root. `StepSolver` then tries the crossing on the bodies.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ _SETTLED = 4.0 * 2.0**-52
 _SLOW = 1e-3
 #: Corrections below this share of the penetration's numbers may be roundings, which do not become shorter.
 _ROUNDING = 1e-12
+#: A softened law is this much stiffer from one crossing to the next.
+_STIFFER = 16.0
 
 
 class SoftState(Responses):
@@ -97,7 +100,7 @@ class SoftSolver(Booked, StepSolver):
         try:
             if self.degree > 0 and size == last_size:  # at degree 0 the law's slope costs no more than a third force
                 found = self._newton(*step, flexibility)
-            found = found or self._newton(*step)
+            found = found or self._newton(*step) or self._stiffened(*step)
         except np.linalg.LinAlgError:
             pass
         if found is None:
@@ -155,3 +158,23 @@ class SoftSolver(Booked, StepSolver):
     def _flexibility(self, start: float, size: float, x: Vector, of_law: Vector, descent: Matrix) -> Matrix:
         """Return (E + A′)⁻¹ [m/N], where the law's force is ``of_law``."""
         return inverse(less(self._projection.slope(start, size, x, of_law), descent))
+
+    def _stiffened(
+        self, start: float, size: float, x: Vector, a: Vector, descent: Matrix
+    ) -> tuple[Vector, Vector] | None:
+        """Start from the law so soft that the bodies hardly feel it, and stiffen it from crossing to crossing.
+
+        The law softened by a factor s has its crossing where the law itself has one with E/s and a/s.
+        """
+        x = list(map(sub, x, times(inverse(descent), a)))
+        a = [0.0] * len(a)
+        slope = self._projection.slope(start, size, x, self._projection.force(start, size, x))
+        gain = max(abs(value) for row in slope for value in row) / max(abs(e) for row in descent for e in row)
+        softness = min(1.0, 1.0 / gain) if gain > 0.0 else 1.0
+        while True:
+            harder = [[e / softness for e in row] for row in descent]
+            found = self._newton(start, size, x, [c / softness for c in a], harder)
+            if found is None or softness == 1.0:
+                return found
+            x, a = found[0], [softness * c for c in found[1]]
+            softness = min(1.0, _STIFFER * softness)
