@@ -112,11 +112,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
   }
   slave->event_mode_used = eventModeUsed;
   slave->early_return_allowed = earlyReturnAllowed;
-  Component* const component = slave.get();
-  const Status status = fmi::instantiate(component, __func__, instanceName, instantiationToken);
-  if (status != Status::ok) return nullptr;
-  slave.release();
-  return component;
+  if (fmi::instantiate(slave.get(), __func__, instanceName, instantiationToken) != Status::ok) return nullptr;
+  return static_cast<Component*>(slave.release());
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String, fmi3String, fmi3String, fmi3Boolean, fmi3Boolean,

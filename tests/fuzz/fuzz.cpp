@@ -792,12 +792,11 @@ class Episode {
     const bool over = !k.states.empty() && random_.chance(0.3);
     const std::size_t at = over ? random_.below(k.states.size()) : 0;
     if (over) saved.key = k.states[at].key;
-    const unsigned phase = k.phase;
-    if (!k.wild && phase == complete) read_outputs(k, saved.outputs, ok | error_status);
+    if (!k.wild && k.phase == complete) read_outputs(k, saved.outputs, ok | error_status);
+    saved.phase = k.phase;  // an error, where an output has no finite value
     k.call("fmi2GetFMUstate", any_phase, ok, over ? "over another" : "",
            [&] { return fmi2GetFMUstate(k.c, &saved.key); });
     promise(saved.key != nullptr, "fmi2GetFMUstate delivered no state");
-    saved.phase = phase;
     saved.time = k.time;
     saved.stop = k.stop;
     saved.forged = k.wild;
