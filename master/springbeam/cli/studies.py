@@ -104,14 +104,15 @@ def fit(
         typer.Option(
             "--vary",
             metavar="KEY=GUESS",
-            help="A key to find, or shift, by which the measurement's clock moves [s]; may be repeated.",
+            help="A key to find, and where to begin; may be repeated.",
             autocompletion=complete_key,
         ),
     ] = None,
     names: MapOption = None,
     shift: Annotated[
-        float, typer.Option("--shift", metavar="SECONDS", help="Move the clock of the measurement by this.")
-    ] = 0.0,
+        float | None,
+        typer.Option("--shift", metavar="SECONDS", help="Move the clock of the measurement by this. Default: found."),
+    ] = None,
     settings: SettingsOption = None,
 ) -> Study:
     """Find keys of a scene by measured curves, with confidence intervals. Exit code 1 if the data does not tell.

@@ -153,8 +153,23 @@ def _factor(unit: str, wanted: str, where: str) -> float:
 def time_shift(run: Trajectory, measured: Measured) -> float:
     """Return by how much [s] the clock of the measurement is to be moved onward, so that its curves fit the run.
 
-    Where the mean square between them is least, found by correlation at equal steps and then refined. Half of the
-    shorter record takes part at least.
+    Where the mean square between them is least: the first of `time_shifts`, refined.
+    """
+    (coarse, *_), step = time_shifts(run, measured)
+
+    def misfit(shift: float) -> float:
+        return sum(residual.relative**2 for residual in residuals(run, measured, shift))
+
+    fine = minimize_scalar(
+        misfit, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": 1e-6 * step}
+    )
+    return float(fine.x)
+
+
+def time_shifts(run: Trajectory, measured: Measured) -> tuple[list[float], float]:
+    """Return shifts [s] at which the mean square between the curves is least nearby, best first, and their step.
+
+    They are found by correlation at equal steps [s]. Half of the shorter record takes part at least.
     """
     begin, end = float(run.time[0]), float(run.time[-1])
     first, last = float(measured.time[0]), float(measured.time[-1])
@@ -168,16 +183,10 @@ def time_shift(run: Trajectory, measured: Measured) -> float:
         square = correlate(a**2, other) - 2.0 * correlate(a, b) + correlate(one, b**2)
         total = total + square / common / (float(np.var(b)) or 1.0)
     total = np.where(common >= 0.5 * min(len(ours), len(theirs)), total, np.inf)
-    lag = int(correlation_lags(len(ours), len(theirs))[int(np.argmin(total))])
-    coarse = begin + lag * step - first
-
-    def misfit(shift: float) -> float:
-        return sum(residual.relative**2 for residual in residuals(run, measured, shift))
-
-    fine = minimize_scalar(
-        misfit, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": 1e-6 * step}
-    )
-    return float(fine.x)
+    beside = np.minimum(np.append(np.inf, total[:-1]), np.append(total[1:], np.inf))
+    lowest = np.flatnonzero((total <= beside) & np.isfinite(total))
+    lags = correlation_lags(len(ours), len(theirs))[lowest[np.argsort(total[lowest])]]
+    return (begin - first + step * lags).tolist(), step
 
 
 def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -2,7 +2,8 @@
 
 The unknowns are logarithms of the keys over their guesses, so that a key keeps its sign. Curves of different units are
 weighed by their spread, and then by what is left of each. An interval holds if what is left is noise that has the same
-size along a curve and does not remember its past.
+size along a curve and does not remember its past. The clock of the measurement may be off by a shift, which is one
+unknown more where the data determines it beside the keys.
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ from rich.text import Text
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
 from ..scene import Scene, SceneError, key_kind, with_changes
 from ..scene.scene import split_key
-from ..signals.measured import Measured, model, read_measured
+from ..signals.expressions import signal
+from ..signals.measured import Measured, read_measured, time_shifts
 from .accuracy import simulate
 from .study import Findings, Row, Study
 from .tables import table
@@ -28,6 +31,10 @@ from .tables import table
 _CASE = "fit"
 #: The unknown that moves the clock of the measurement [s], beside keys.
 SHIFT = "shift"
+#: Share of the run by which the clock may move from where a search begins before points leave the run.
+_MARGIN = 0.02
+#: Places at which the clock is tried, and evaluations of each such trial.
+_TRIED, _FIRST_LOOK = 4, 8
 #: Relative steps of the derivatives, and where the search ends.
 _STEP, _TOLERANCE = 1e-4, 1e-12
 #: Share of a residual that a run which cannot be made counts, so that the search turns back.
@@ -47,10 +54,12 @@ class Fit(Study):
     digest: str  #: of its content
     vary: tuple[str, ...]  #: KEY=GUESS
     names: tuple[str, ...] = ()  #: NAME=COLUMN
-    shift: float = 0.0  #: by which the clock of the measurement is moved [s]
+    shift: float | None = None  #: by which the clock of the measurement is moved [s]; found if it is left out
 
     @classmethod
-    def of(cls, scene: Scene, path: Path, vary: Sequence[str], names: Sequence[str] = (), shift: float = 0.0) -> Fit:
+    def of(
+        cls, scene: Scene, path: Path, vary: Sequence[str], names: Sequence[str] = (), shift: float | None = None
+    ) -> Fit:
         """Return the study of a file. Raises SceneError if it cannot be read."""
         try:
             digest = sha256(path.read_bytes()).hexdigest()
@@ -78,11 +87,11 @@ class Fit(Study):
                 guess = float(value)
             except ValueError:
                 raise SceneError(f"--vary {text}: must be KEY=GUESS, as in spring.linear_stiffness=800") from None
-            if key is None and name != SHIFT:
-                raise SceneError(f"--vary {text}: {name} is no key; a key is TABLE.KEY, or {SHIFT}")
-            if key is not None and key_kind(*key) is not float:
+            if key is None:
+                raise SceneError(f"--vary {text}: {name} is no key; a key is TABLE.KEY")
+            if key_kind(*key) is not float:
                 raise SceneError(f"--vary {text}: {name} takes no real numbers, and cannot be fitted")
-            if guess == 0.0 and name != SHIFT:
+            if guess == 0.0:
                 raise SceneError(f"--vary {text}: a guess has the sign and roughly the size of the value; 0 has none")
             if name in found:
                 raise SceneError(f"--vary {name}: given twice")
@@ -95,12 +104,30 @@ class Fit(Study):
 
     def cost(self) -> str:
         """Say what is run."""
-        return f"some {10 * (2 * len(self.vary) + 1)} runs"
+        keys = len(self.vary) if self.shift is not None else 3 * (len(self.vary) + 1)
+        return f"some {10 * (2 * keys + 1)} runs"
 
     def record(self, case: Row) -> Row:
         """Return the values found, their intervals, and every run on the way."""
-        search = _Search(self.scene, self.data(), self.guesses(), self.shift)
-        return search.found()
+        scene, data, guesses = self.scene, self.data(), self.guesses()
+        if self.shift is not None:
+            return _Search(scene, data, guesses, self.shift, moves=False).found()
+        try:
+            run = simulate(changed(scene, guesses))
+        except (RunStopped, SceneError) as refused:
+            raise SceneError(f"the guess cannot be run: {refused}") from refused
+        # While keys are wrong the curves may fit best a period too late: a few places are tried.
+        starts = time_shifts(run, data)[0][:_TRIED]
+        if inside(run, data, 0.0).mean() > 0.5:
+            starts.append(0.0)
+        searches = [_Search(scene, data, guesses, shift, moves=True) for shift in starts]
+        best = min(searches, key=lambda search: search.begin())
+        record = best.found()
+        if record["undetermined"] and 0.0 in starts:  # the keys alone may be
+            best = _Search(scene, data, guesses, 0.0, moves=False)
+            searches.append(best)
+            record = best.found()
+        return {**record, "runs": [run for search in searches for run in search.runs]}
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per run: the keys, and the root mean square of what is left of each curve."""
@@ -143,15 +170,28 @@ def mapping(names: Sequence[str]) -> dict[str, str]:
     return found
 
 
+def inside(run: Trajectory, data: Measured, shift: float, margin: float = 0.0) -> np.ndarray:
+    """Return which points of ``data`` lie in the run, further from its ends than ``margin``, a share of it."""
+    begin, end = float(run.time[0]), float(run.time[-1])
+    off = margin * (end - begin)
+    times = data.time + shift
+    return np.asarray((times >= begin + off) & (times <= end - off))
+
+
 class _Search:
     """One search; ``runs`` are the rows of the runs that it has made."""
 
-    def __init__(self, scene: Scene, data: Measured, guesses: Mapping[str, float], shift: float) -> None:
-        self._scene, self._data, self._guesses, self._shift = scene, data, guesses, shift
+    def __init__(
+        self, scene: Scene, data: Measured, guesses: Mapping[str, float], shift: float, *, moves: bool
+    ) -> None:
+        """Search from ``guesses`` with the clock moved by ``shift`` [s], and on from there if it ``moves``."""
+        self._scene, self._data, self._shift, self._moves = scene, data, shift, moves
+        self._guesses = {**guesses, **({SHIFT: shift} if moves else {})}
         self._spread = {name: float(np.std(values)) or 1.0 for name, values in data.values.items()}
         self._weights = {name: 1.0 / spread for name, spread in self._spread.items()}
         self._duration = float(data.time[-1] - data.time[0])
-        self._size = 0
+        self._start = np.zeros(len(self._guesses))
+        self._part: np.ndarray | None = None  #: which points take part
         self.runs: list[Row] = []
 
     def values(self, unknowns: np.ndarray) -> dict[str, float]:
@@ -167,34 +207,29 @@ class _Search:
         shift = values.get(SHIFT, self._shift)
         try:
             run = simulate(changed(self._scene, values))
-            covered, curves = model(run, self._data, shift)
         except (RunStopped, SceneError) as refused:
-            if not self._size:
+            if self._part is None:
                 raise SceneError(f"the guess cannot be run: {refused}") from refused
             self.runs.append({**values, "error": str(refused)})
-            return np.full(self._size, _REFUSED)
-        off = {name: curve - self._data.values[name][covered] for name, curve in curves.items()}
-        parts = []
-        for name, part in off.items():
-            whole = np.zeros(len(covered))  # the same number of points whatever the shift
-            whole[covered] = self._weights[name] * part
-            parts.append(whole)
+            return np.full(len(self._data.values) * int(self._part.sum()), _REFUSED)
+        if self._part is None:  # the same points from here on, wherever the clock moves
+            self._part = inside(run, self._data, shift, _MARGIN * self._moves)
+        times = np.clip(self._data.time[self._part] + shift, run.time[0], run.time[-1])
+        curves = run.at(times)
+        off = {name: signal(curves, name) - measured[self._part] for name, measured in self._data.values.items()}
         self.runs.append({
             **values, **{f"left_{name}": float(np.sqrt(np.mean(part**2))) for name, part in off.items()}, "error": ""
         })  # fmt: skip
-        self._points = int(covered.sum()) * len(off)
-        found = np.concatenate(parts)
-        self._size = len(found)
-        return found
+        return np.concatenate([self._weights[name] * part for name, part in off.items()])
 
     def found(self) -> Row:
         """Search, and judge what was found."""
-        start = np.zeros(len(self._guesses))
-        result = self._least(start)
-        if len(self._weights) > 1:  # a second time, each curve weighed by what is left of it
+        result = self._least(self._start)
+        if len(self._weights) > 1 or self._moves:  # a second time, each curve weighed by what is left of it
             self._weights = {
                 name: 1.0 / max(self.runs_left(result.x)[name], 1e-9 * spread) for name, spread in self._spread.items()
             }
+            self._part = None
             result = self._least(result.x)
         left = self.runs_left(result.x)
         keys, undetermined = self._judged(result)
@@ -206,10 +241,16 @@ class _Search:
             "runs": self.runs,
         }
 
-    def _least(self, start: np.ndarray) -> Any:
+    def begin(self) -> float:
+        """Search a little, to go on from there; return the mean square that is left of the weighed curves."""
+        result = self._least(self._start, _FIRST_LOOK)
+        self._start = result.x
+        return float(np.mean(result.fun**2))
+
+    def _least(self, start: np.ndarray, most: int = 60) -> Any:
         return least_squares(
             self.left, start, jac="3-point", diff_step=_STEP, xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=_TOLERANCE,
-            x_scale=1.0, max_nfev=60,
+            x_scale=1.0, max_nfev=most,
         )  # fmt: skip
 
     def runs_left(self, unknowns: np.ndarray) -> dict[str, float]:
@@ -223,10 +264,11 @@ class _Search:
         lengths = np.linalg.norm(result.jac, axis=0)
         undetermined = [f"{name} does not change the curves" for name, size in zip(names, lengths, strict=True)
                         if size <= _UNDETERMINED * float(lengths.max(initial=0.0)) or size == 0.0]  # fmt: skip
-        freedom = self._points - len(names)
+        points = len(result.fun)
+        freedom = points - len(names)
         if undetermined or freedom <= 0:
             if freedom <= 0:
-                undetermined.append(f"{self._points} points for {len(names)} keys")
+                undetermined.append(f"{points} points for {len(names)} keys")
             return [{"key": name, "value": values[name], "low": None, "high": None} for name in names], undetermined
         _, sizes, directions = np.linalg.svd(result.jac / lengths, full_matrices=False)
         if sizes[-1] < _UNDETERMINED * sizes[0]:
