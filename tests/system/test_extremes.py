@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import scene_from_dict
+from scenes import scene_from_dict, soft
 
 from springbeam import RunStopped, simulate
 from springbeam.bodies.fmu_bodies import FmuSpring
@@ -105,6 +105,18 @@ def test_a_tip_is_held_at_zero(scheme, degree, size, slope, load):
     assert seated.sum() * size > 0.01
     assert np.abs(run.u_tip[seated]).max() < 1e-14
     assert run.summary["halved_steps"] == 0
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "exponent", "degree", "size"), [(1e12, 1.0, 0, 1e-3), (1e12, 1.0, 1, 4e-3), (1e8, 1.5, 2, 4e-3)]
+)
+def test_the_force_of_a_contact_that_is_far_too_stiff_is_found(stiffness, exponent, degree, size):
+    """Some 10⁴ rad a step: no step is halved or made at degree 0, since the law is first softened, then stiffened."""
+    contact = {"law": "compliance", "stiffness": stiffness, "exponent": exponent}
+    coupling = {"macro_step": size, "degree": degree}
+    run = simulate(soft(10, time={"t_end": 0.3}, stop=None, contact=contact, coupling=coupling))
+    assert (run.summary["halved_steps"], run.summary.get("reduced_steps", 0)) == (0, 0)
+    assert run.summary["number_of_contacts"] > 0
 
 
 def test_finite_outputs_whose_sum_is_not_are_taken():
