@@ -10,6 +10,8 @@ from springbeam.results.trajectory import Event, EventKind
 from springbeam.run.observed import observed
 from springbeam.run.stepping import Pair
 from springbeam.scene import load_scene, with_changes
+from springbeam.scene.resolution import slowest_frequency
+from springbeam.scene.statics import tip_inertia
 
 #: Of 2 kg above and 1 kg below; the tip of the records rests, so that no motion of a beam adds to its momentum.
 TIP, TOP, H = 2.0, 1.0, 1e-3
@@ -52,6 +54,15 @@ def test_on_the_foundation_a_mismatch_is_the_tips_alone():
     steps = records(Phase(Joint.TIED, seated=True), v_tip=[0.5, 0.0, -0.1, 0.3], z=[0.0] * 4)
     seen = observed(*pair(), steps, [Event(3 * H, EventKind.UNSEATED)])
     assert seen.mismatch_at_events == pytest.approx(0.3 / 0.5, rel=1e-12)
+
+
+def test_a_beam_has_the_momentum_of_its_slowest_swing():
+    """Its inertia at the tip times the tip's range in 2/ω₁, where the tip itself is slower than that."""
+    steps = records(Phase(Joint.TIED, seated=True), u_tip=[0.0, 4.0, 4.0, 4.0], v_tip=[0.0, 0.0, 0.0, 0.3])
+    seen = observed(*pair(), steps, [Event(3 * H, EventKind.UNSEATED)])
+    momentum = tip_inertia(SCENE.beam) * 4.0 * 0.5 * slowest_frequency(SCENE.beam)
+    assert seen.momentum == pytest.approx(momentum, rel=1e-12)
+    assert seen.mismatch_at_events == pytest.approx(TIP * 0.3 / momentum, rel=1e-12)
 
 
 @pytest.mark.parametrize(("later", "mismatch"), [(0.4, 0.1), (1.4, 0.5)])

@@ -87,18 +87,15 @@ def test_durations_and_rebound():
     assert "rebound_velocity" not in found(steps, events[0], apart=False)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(
     ("kinds", "column"),
-    [
-        (("impact", "separation"), "contact_force"),
-        (("release", "separation"), "contact_force"),
-        (("seated", "unseated"), "foundation_force"),
-    ],
+    [(("impact", "separation"), "contact_force"), (("seated", "unseated"), "foundation_force")],
 )
-def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_an_impulse(kinds, column):
-    """0.2 s at 1 N; then 0.1 s without force, and one whose end came just before an interruption."""
+def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_an_impulse(kinds, column, sign):
+    """0.2 s at 1 N, or −1 N of a tie; then 0.1 s without force, and one whose end came just before an interruption."""
     steps = steps_with(lambda t: (0.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))
-    steps[column] = steps["time"] < 0.45
+    steps[column] = sign * (steps["time"] < 0.45)
     times = (0.1, 0.3, 0.5, 0.6, 0.75, 0.9)
     events = [Event(time, EventKind(kinds[k % 2])) for k, time in enumerate(times)]
 
@@ -108,6 +105,14 @@ def test_the_shortest_contact_that_ended_by_the_last_row_counts_if_it_passes_on_
     assert shortest(1.0, 0.19) == pytest.approx(0.2, rel=1e-14)
     assert shortest(0.15, 0.19) == shortest(1.0, 0.21) == shortest(1.0, 0.1, steps[:0]) == np.inf
     assert shortest(1.0, -1.0) == pytest.approx(0.1, rel=1e-14)
+
+
+def test_a_touch_after_a_release_is_a_contact_of_its_own():
+    steps = steps_with(lambda t: (1.0, 0.0, 0.0), np.linspace(0.0, 0.8, 9))
+    kinds = {0.0: "impact", 0.4: "release", 0.5: "separation"}
+    events = [Event(time, EventKind(kind)) for time, kind in kinds.items()]
+    assert shortest_contact(steps, events, 1.0, 0.05, free_at_end=True) == pytest.approx(0.1, rel=1e-14)
+    assert shortest_contact(steps, events, 1.0, 0.15, free_at_end=True) == pytest.approx(0.5, rel=1e-14)
 
 
 def test_a_tip_that_strikes_the_stop_itself():
