@@ -61,7 +61,7 @@ def test_below_the_bound_no_pair_amplifies():
             spring = [np.zeros(0)] * 3
         pair = LinearPair(LinearBody(omega2, np.zeros_like(omega2), modal.tip), LinearBody(*spring))
         for x in (0.3, 0.6, 1.0):
-            assert spectral_radius(pair, "hermite", 2, x * STABLE / fastest) < 1.0 + 1e-6
+            assert max(spectral_radius(pair, "hermite", d, x * STABLE / fastest) for d in (1, 2)) < 1.0 + 1e-6
 
 
 def test_where_hermite_is_not_defined_it_is_not_taken():

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import written
 from runs import PAIR, SCENES, a_trajectory, block
 
 from springbeam.results import file_recorder
@@ -460,30 +459,6 @@ def test_numbered_directories_are_new_each_time_also_in_parallel(tmp_path):
 
 
 # -- going on -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("scene", [PAIR, SCENES["spring"]])
-def test_a_restored_recorder_writes_the_same_files(tmp_path, scene):
-    first, second, other = block(5, scene), block(7, scene, 9.0, 5), block(3, scene, 8.0, 5)
-    filed(tmp_path / "whole", first, second, scene=scene)
-
-    killed = FileRecorder(scene, RunDirectory.create(tmp_path / "killed"))
-    killed.keep(*first)
-    saved = killed.save()
-    killed.keep(*other)
-    killed.close()
-    for name in ("events.csv", "steps.bin"):
-        with (tmp_path / "killed" / name).open("a") as more:
-            more.write("0.25,half a li")
-
-    resumed = FileRecorder(scene, RunDirectory(tmp_path / "killed"))
-    resumed.restore(saved)
-    assert load_summary(tmp_path / "killed")["status"] == "running"
-    assert len(load_trajectory(tmp_path / "killed")) == 5
-    assert resumed.time == first[0]["time"][-1]
-    resumed.keep(*second)
-    resumed.finish({"status": "done"})
-    assert written(tmp_path / "killed") == written(tmp_path / "whole")
 
 
 @pytest.mark.parametrize("name", ["steps.bin", "events.csv", "shapes.csv"])
