@@ -441,27 +441,10 @@ def test_a_foreign_body_that_rests_on_the_stop_is_resumed_to_the_same_bits(fmu, 
 
 
 def test_commands(fmu, tmp_path):
-    path = fmu()
-    text = f"""
-[time]
-t_end = 0.2
-[beam]
-element = "point_mass"
-mass = 2.0
-velocity = -0.3
-[spring]
-fmu = "{path}"
-force = "F"
-force_sign = -1
-displacement = "x"
-velocity = "v"
-parameters = {{ m = 3.0, k = 40.0 }}
-[contact]
-law = "link"
-stiffness = 50.0
-"""
+    names = dict.fromkeys(("integral", "integral_2", "impulse", *ENERGIES))
+    scene = pair(fmu(), spring=names, contact={"damping": 0.0}, coupling={"degree": 0}, time={"t_end": 0.2})
     file = tmp_path / "linked.toml"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(tomli_w.dumps(scene.model_dump(exclude_none=True)), encoding="utf-8")
     shown = printed("doctor", file)
     assert "the ledger of the interface" in shown
     assert "the scene can be run" in shown

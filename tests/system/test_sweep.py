@@ -9,7 +9,7 @@ from time import sleep
 
 import numpy as np
 import pytest
-from commands import command
+from commands import HANGS, command
 from runs import a_trajectory
 
 from springbeam.run.runner import simulate
@@ -177,17 +177,22 @@ def test_several_numbers_of_a_run_are_for_sweeps_and_none_of_a_run_without_a_dri
     assert METRICS_THERE_ARE["stroboscopic"](simulate(small())) is None
 
 
-def test_an_existing_cluster_is_used_and_a_missing_one_is_bad_input(tmp_path):
-    from distributed import LocalCluster
+def test_an_existing_cluster_is_used_and_a_missing_one_is_bad_input(tmp_path, monkeypatch):
+    import distributed
 
+    client = distributed.Client
+    monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout=0.02 * timeout))
     away = ["--scheduler", "127.0.0.1:1", "--out", tmp_path / "out"]
     result = command("sweep", "duffing", "--vary", "spring.mass=1,2", *away)
     assert result.exit_code == 2
     assert "--scheduler 127.0.0.1:1: cannot be reached" in result.stderr
     assert not (tmp_path / "out").exists()
+    monkeypatch.undo()
     plan = planned("spring.mass=1,2")
     with (
-        LocalCluster(n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as local,
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
+        ) as local,
         dask_cluster(local.scheduler_address) as cluster,
         Records(plan, tmp_path / "s") as records,
     ):
@@ -209,7 +214,7 @@ def test_a_worker_of_a_cluster_that_is_killed_costs_no_row(tmp_path):
             while (done := (out / "study.jsonl").read_bytes().count(b"\n")) < 40 and process.poll() is None:
                 sleep(0.01)
             os.kill(local.workers[0].pid, signal.SIGKILL)
-            errors = process.communicate(timeout=120)[1]
+            errors = process.communicate(timeout=HANGS)[1]
         finally:
             process.kill()
     assert done < 200
