@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -15,7 +14,7 @@ from rich.text import Text
 from ..monolithic import event_driven
 from ..pictures import drawing
 from ..pictures.drawing import BLACK, POSITIONS, Line, Look, present
-from ..pictures.panels import Curve, Panel, compared
+from ..pictures.panels import Curve, Panel
 from ..pictures.timeline import STYLE, timeline
 from ..results.contact_times import contact_changes
 from ..results.trajectory import Event, Trajectory, columns_of
@@ -123,16 +122,25 @@ class Crosscheck(Study):
         if not record["quantities"]:
             return {}
         run, reference = (
-            Trajectory(self.scene, {name: np.array(values) for name, values in record[which].items()})
-            for which in ("motion", "reference")
+            {name: np.array(values) for name, values in record[which].items()} for which in ("motion", "reference")
         )
-        trajectory = replace(run, events=[Event(**mark) for mark in record["marks"]])
+        trajectory = Trajectory(self.scene, run, [Event(**mark) for mark in record["marks"]])
         with matplotlib.rc_context(STYLE):
-            shown = [*compared({"co-simulation": run, "reference": reference}), _errors(record["quantities"])]
+            shown = [_positions(run, reference), _errors(record["quantities"])]
             figure = timeline(trajectory, "Co-simulation and reference", shown)
             horizon = drawing.time_unit(trajectory).factor * record["horizon"]
             figure.axes[1].axvline(horizon, color=BLACK, lw=0.8, ls="--")
         return {"crosscheck": figure}
+
+
+def _positions(run: Mapping[str, np.ndarray], reference: Mapping[str, np.ndarray]) -> Panel:
+    """Return both motions, the reference as a thin line within the other."""
+    curves = []
+    for name in (name for name in POSITIONS if name in reference):
+        ours = Look(POSITIONS[name].colour, f"{name}, co-simulation", Line(2.5, opacity=0.5))
+        curves.append(Curve(name, ours, run["time"], run[name]))
+        curves.append(Curve(name, Look(BLACK, f"{name}, reference", Line(0.7)), reference["time"], reference[name]))
+    return Panel("positions", "Positions", "position", "m", curves, 2.2)
 
 
 def _errors(rows: list[Row]) -> Panel:
