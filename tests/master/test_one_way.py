@@ -105,17 +105,3 @@ def test_a_run_stops_when_the_bound_passes_the_tolerance():
         assert words in str(stopped)
     assert 0.0 < run.time[-1] < 0.04
     assert allowed < run.summary["neglected_share"] < 1.1 * allowed
-
-
-@pytest.mark.parametrize("degree", [0, 2])
-def test_a_seated_spring_is_pressed_by_a_penetration_that_is_known(degree):
-    """Over a step C does the work that the law stores, λ (p₁² − p₀²)/2 for exponent 1, on a tip that moves by −Δp."""
-    stop, pressed = {"position": -2e-4, "restitution": 0.0}, {"external_force": -50.0}
-    run = simulate(scene(stop=stop, spring=pressed, coupling={"feedback": "beam_drives", "degree": degree}))
-    depth, seated = run.y - run.u_tip, run.phase == "seated"
-    steps = np.flatnonzero(seated[:-1] & seated[1:] & (depth[:-1] > 0.0) & (depth[1:] > 0.0))
-    assert len(steps) > 20
-    if degree == 0:
-        work = run.contact_force[steps + 1] * np.diff(depth)[steps]
-        assert work == pytest.approx(0.5 * LAW[0] * np.diff(depth**2)[steps], rel=1e-9, abs=1e-16)
-    assert run.summary["max_energy_residual"] < 1e-13
