@@ -80,14 +80,14 @@ def timeline(trajectory: Trajectory, title: str, panels: Sequence[Panel]) -> Fig
 
 
 def _mark_events(axes: list[Axes], trajectory: Trajectory) -> list[Line2D]:
-    """Mark events above the first panel and by lines through all; many only by ticks, a row for each kind.
+    """Mark events above the first panel, in a row for each kind, and by lines through all; many only by ticks.
 
     Returns what the key shows.
     """
     many, factor = len(trajectory.events) > MANY_EVENTS, time_unit(trajectory).factor
     handles: list[Line2D] = []
     for event in event_marks(trajectory):
-        height = _MARK_HEIGHT + (_MARK_ROW * len(handles) if many else 0.0)
+        height = _MARK_HEIGHT + _MARK_ROW * len(handles)  # so that those of two kinds do not cover each other
         shape, size = ("|", 4.0) if many else (event.marker.matplotlib, event.marker.size)
         look: dict[str, Any] = {"color": event.look.colour, "marker": shape, "markersize": size, "ls": "none"}
         times, first = factor * event.times, axes[0]

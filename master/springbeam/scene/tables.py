@@ -372,7 +372,7 @@ class Coupling(Table):
         "–", "one-way coupling: the body that drives does not feel the contact force (compliance)", "two_way"
     )
     feedback_tolerance: float = key(
-        "–", "largest motion of the driving end that one-way coupling may neglect, over the largest penetration",
+        "–", "how far the neglected force may move the driving end at most, as a share of the largest penetration",
         1.0e-6, gt=0.0, le=0.1,
     )  # fmt: skip
 
