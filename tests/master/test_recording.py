@@ -5,6 +5,7 @@ import math
 import os
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 
@@ -488,20 +489,22 @@ def test_results_that_are_cut_are_not_continued_nor_touched(tmp_path, name, dama
 # -- a full disk --------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def room():
-    """Sets the most that a file may hold [bytes], which stands for the room on a disk."""
+@contextmanager
+def room(size):
+    """Let files be no longer than this [bytes], which stands for the room on a disk: those of pytest are files, too."""
     resource = pytest.importorskip("resource", reason="limits of a process are POSIX")
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_rows_that_find_no_room_lose_no_record(tmp_path, room):
+def test_rows_that_find_no_room_lose_no_record(tmp_path):
     recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path / "run"))
     recorder.keep(*block(240))
-    room(20_000)
-    with pytest.raises(OSError, match="File too large"):
+    with room(20_000), pytest.raises(OSError, match="File too large"):
         recorder.finish({"status": "done"})
     assert not (tmp_path / "run" / "trajectory.csv").exists()
     assert len(load_trajectory(tmp_path / "run")) == 240
@@ -509,12 +512,11 @@ def test_rows_that_find_no_room_lose_no_record(tmp_path, room):
 
 
 @pytest.mark.parametrize("size", [0, 1000])
-def test_a_disk_without_room_for_a_new_run_keeps_the_old_one(tmp_path, room, size):
+def test_a_disk_without_room_for_a_new_run_keeps_the_old_one(tmp_path, size):
     filed(tmp_path, block(3))
     before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
     recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path, replace=True))
-    room(size)
-    with pytest.raises(OSError, match="File too large"):
+    with room(size), pytest.raises(OSError, match="File too large"):
         recorder.keep(*block(3))
     assert not recorder.begun
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
