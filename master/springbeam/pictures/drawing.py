@@ -52,7 +52,7 @@ PHASE_LOOKS = {
     "seated": Look("#CFE8DD", "seated (at φ)"),
 }
 EVENT_LOOKS = {
-    EventKind.IMPACT: Look(VERMILLION, "impact tip–spring", marker=Marker("▼", "v", "triangle-down")),
+    EventKind.IMPACT: Look(VERMILLION, "impact of the tip", marker=Marker("▼", "v", "triangle-down")),
     EventKind.STOP_IMPACT: Look(BLACK, "impact on foundation", marker=Marker("▲", "^", "triangle-up")),
     EventKind.RELEASE: Look(BLUE, "release", marker=Marker("●", "o", "circle")),
     EventKind.RETIE: Look(PURPLE, "retie", marker=Marker("■", "s", "square")),
