@@ -8,7 +8,10 @@ import pytest
 from springbeam.bodies import force
 from springbeam.bodies.protocol import Motion
 from springbeam.coupling.hermite import gap_inside
+from springbeam.run.crowd import count_crowd
 from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid
+from springbeam.run.outcome import RunStopped
+from springbeam.run.stepping import State
 
 LENGTH = 3.0
 
@@ -102,3 +105,14 @@ def test_the_moment_inside_and_the_work_on_it_are_those_of_the_gap(degree):
     end = Motion(g(H), g.deriv()(H), once(H), twice(H))
     assert gap_inside(end, H, degree) == pytest.approx(abs(expected), rel=1e-12)
     assert force.work(c, end, H) == pytest.approx(work, rel=1e-12)
+
+
+@pytest.mark.parametrize(("apart", "most", "words"), [(0.0, 500, "events at once"), (2e-6, 20_000, "within a macro")])
+def test_events_that_crowd_stop_the_run(apart, most, words):
+    """500 at once, or 20,000 within a macro step, are none too many."""
+    H = 1e-3
+    state = State(0.0, (Motion(0.0, 0.0, 0.0, 0.0),) * 2)
+    for k in range(most):
+        count_crowd(state, apart * k * H, apart * H, H)
+    with pytest.raises(RunStopped, match=f"{most} .*{words}" if apart == 0.0 else words):
+        count_crowd(state, apart * most * H, apart * H, H)
