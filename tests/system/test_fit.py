@@ -216,6 +216,10 @@ def test_the_command_ends_with_1_where_the_data_does_not_tell(tmp_path, monkeypa
     }.items():
         assert why in refused(*line, vary)
     assert "must be a finite number greater than 0" in refused(*line, "spring.mass=-1")
+    written(tmp_path / "few.csv", "time,y", TIMES[:2], exact()[:2])
+    few = command("fit", "duffing", "few.csv", "--vary", "spring.mass=1", "--out", "few")
+    assert few.exit_code == 2
+    assert "fewer of its points lie in the run" in few.stderr
 
 
 def test_a_fit_that_is_done_is_shown_at_once(tmp_path, monkeypatch):

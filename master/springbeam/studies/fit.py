@@ -120,6 +120,12 @@ class Fit(Study):
         starts = time_shifts(run, data)[0][:_TRIED]
         if inside(run, data, 0.0).mean() > 0.5:
             starts.append(0.0)
+        starts = [shift for shift in starts if inside(run, data, shift, _MARGIN).sum() > len(guesses) + 1]
+        if not starts:
+            raise SceneError(
+                f"{self.file}: fewer of its points lie in the run than are needed to find {', '.join(guesses)} and the "
+                "shift of its clock; make time.t_end longer, give more points, or fix the shift with --shift"
+            )
         searches = [_Search(scene, data, guesses, shift, moves=True) for shift in starts]
         best = min(searches, key=lambda search: search.begin())
         record = best.found()
@@ -192,6 +198,7 @@ class _Search:
         self._duration = float(data.time[-1] - data.time[0])
         self._start = np.zeros(len(self._guesses))
         self._part: np.ndarray | None = None  #: which points take part
+        self._chosen = False  #: whether these are those for where the clock is
         self.runs: list[Row] = []
 
     def values(self, unknowns: np.ndarray) -> dict[str, float]:
@@ -212,8 +219,12 @@ class _Search:
                 raise SceneError(f"the guess cannot be run: {refused}") from refused
             self.runs.append({**values, "error": str(refused)})
             return np.full(len(self._data.values) * int(self._part.sum()), _REFUSED)
-        if self._part is None:  # the same points from here on, wherever the clock moves
-            self._part = inside(run, self._data, shift, _MARGIN * self._moves)
+        if not self._chosen:  # the same points from here on, wherever the clock moves
+            part = inside(run, self._data, shift, _MARGIN * self._moves)
+            if self._part is None or part.sum() > len(self._guesses):  # else the clock has run away
+                self._part = part
+            self._chosen = True
+        assert self._part is not None
         times = np.clip(self._data.time[self._part] + shift, run.time[0], run.time[-1])
         curves = run.at(times)
         off = {name: signal(curves, name) - measured[self._part] for name, measured in self._data.values.items()}
@@ -229,7 +240,7 @@ class _Search:
             self._weights = {
                 name: 1.0 / max(self.runs_left(result.x)[name], 1e-9 * spread) for name, spread in self._spread.items()
             }
-            self._part = None
+            self._chosen = False
             result = self._least(result.x)
         left = self.runs_left(result.x)
         keys, undetermined = self._judged(result)
