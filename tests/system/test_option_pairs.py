@@ -58,7 +58,7 @@ OPTIONS = {
 }
 
 
-@pytest.mark.parametrize("pair", combinations(OPTIONS, 2), ids=" + ".join)
+@pytest.mark.parametrize("pair", [*combinations(OPTIONS, 2)], ids=" + ".join)
 def test_a_pair_runs_or_is_refused(tmp_path, monkeypatch, pair):
     monkeypatch.chdir(tmp_path)
     words = " ".join(OPTIONS[name] for name in pair).split()

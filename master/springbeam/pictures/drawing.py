@@ -186,7 +186,8 @@ def alternates(values: np.ndarray) -> bool:
     if len(values) < 20:
         return False
     jumps = np.diff(values)
-    reversals = np.mean(jumps[1:] * jumps[:-1] < 0.0)
+    signs = np.sign(jumps)  # a product of the jumps themselves may leave the range of numbers
+    reversals = np.mean(signs[1:] * signs[:-1] < 0.0)
     usual_range = np.subtract(*np.quantile(values, (0.95, 0.05)))
     return bool(reversals > 0.6 and np.mean(np.abs(jumps)) > 0.15 * usual_range)
 
