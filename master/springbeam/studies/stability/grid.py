@@ -120,6 +120,7 @@ class Grid(Study):
                 drawn = cells(ax, mine, Scale(s.x, s.x, words=True), Scale(s.y, s.y, words=True), values, **look)
                 ax.set(title=s.name, facecolor=STONE)  # where nothing was run
                 ax.tick_params(labelsize="small")
+                ax.tick_params(axis="x", labelrotation=30)
             bar = figure.colorbar(drawn, ax=axes, shrink=0.6)
             if what == "classes":
                 bar.set_ticks(range(len(CLASSES)), labels=CLASSES)
