@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 from pathlib import Path
 
@@ -82,7 +83,8 @@ def test_a_killed_worker_loses_its_own_case_alone_and_only_if_it_dies_again(tmp_
 
 def test_an_interrupted_study_says_how_it_goes_on_and_does(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    printed(*SWEEP, "--workers", "2", "--out", "whole")
+    shown = printed(*SWEEP, "--workers", "2", "--out", "whole")
+    assert re.search(r"^spring\.mass +y_min\n1 .*\n1\.25 .*\n1\.5 .*\n1\.75 .*\n2 .*\nresults ", shown, re.M)
     monkeypatch.setattr(sweep.Sweep, "parallel", False)
     interrupt, record = Interrupt(3), sweep.Sweep.record
     monkeypatch.setattr(sweep.Sweep, "record", lambda *arguments: interrupt() or record(*arguments))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+from rich.table import Table
 from rich.text import Text
 
 from ..scene import Scene
@@ -19,9 +20,11 @@ from .boundary import Critical, Limit, boundary, draw_boundary, in_words, limit_
 from .design import Axis, Sampling, compatible, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, heading, known, named
 from .study import Findings, Pictures, Row, Study
-from .tables import write_csv
+from .tables import table, write_csv
 
 STATUSES = ("done", "stopped", "refused", "lost")
+#: How many rows are shown on the terminal; the files have all.
+_FIRST_ROWS = 10
 #: A metric that varies less, relative to its largest value, is constant.
 _ROUNDING = 1e-12
 
@@ -75,7 +78,7 @@ class Sweep(Study):
         return {str(index): dict(zip(names, several, strict=True)) for index, several in enumerate(values)}
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
-        """Count the rows by status, and name the first error."""
+        """Count the rows by status, name the first error, and show the first values of metrics that were asked for."""
         counts = Counter(record["status"] for record in records.values())
         lines = [f"runs      {', '.join(f'{counts[status]} {status}' for status in STATUSES if counts[status])}"]
         if first := next((record["error"] for record in records.values() if record["error"]), None):
@@ -84,7 +87,13 @@ class Sweep(Study):
         if self.boundary:
             document["boundary"] = [critical._asdict() for critical in self._critical(records)]
             lines += in_words(self._critical(records), self.boundary)
-        return Findings(document, [Text(line) for line in lines])
+        return Findings(document, [Text(line) for line in lines] + ([self._first(records)] if self.metric else []))
+
+    def _first(self, records: Mapping[str, Row]) -> Table:
+        names = [*(axis.name for axis in self.axes), *self._shown]
+        rows = self.rows(records)
+        cells = [[_in_words(row[name]) for name in names] for row in rows[:_FIRST_ROWS]]
+        return table(names, cells, f"the first {_FIRST_ROWS} of {len(rows)} rows" if len(rows) > _FIRST_ROWS else "")
 
     def _critical(self, records: Mapping[str, Row]) -> list[Critical]:
         return boundary(*pulse_axes(self.scene, self.axes), self.rows(records), self._limit)
@@ -115,6 +124,12 @@ def rows(directory: str | Path) -> dict[str, list[Any]]:
 
     columns: dict[str, list[Any]] = pq.read_table(Path(directory) / "sweep.parquet").to_pydict()
     return columns
+
+
+def _in_words(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return ", ".join(map(_in_words, value)) if isinstance(value, (list, tuple)) else "" if value is None else str(value)
 
 
 def _varies(values: np.ndarray) -> bool:
