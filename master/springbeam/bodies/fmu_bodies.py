@@ -1,4 +1,4 @@
-"""The two FMUs as bodies."""
+"""The two FMUs as bodies. One module, though longer than others: every step of a run passes through all of it."""
 
 from __future__ import annotations
 

@@ -24,11 +24,11 @@ from ..results.columns import ledger
 from ..results.recording import Recorder
 from ..results.steps import BEAM_TELLS, SPRING_TELLS, STEP, packed
 from ..results.steps import joined as are_joined
-from ..results.totals import pace, shortest_contact, totals
+from ..results.totals import totals
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from ..scene.automatic import with_scheme_chosen
-from ..scene.resolution import CONTACT_STEPS, SHORT_IMPULSE, force_window, not_resolved, peak_force_doubt
+from ..scene.resolution import force_window, peak_force_doubt
 from .crowd import SIMULTANEOUS, count_crowd
 from .detection import Detector
 from .ledger import Balance
@@ -36,7 +36,7 @@ from .local_error import LocalError
 from .log import TOGETHER, Log
 from .macro_steps import AdaptiveSteps, MacroGrid
 from .neglect import Neglect, Past, neglected
-from .observed import NOT_SHOWN, observed
+from .observed import NOT_SHOWN, observed, why_not_resolved
 from .outcome import OVERFLOW, RunStopped, raised_here
 from .stepping import Pair, State
 
@@ -365,7 +365,7 @@ class Master(Stateful):
 
     def summary(self) -> dict[str, Any]:
         """Counts, residuals, warnings and results, as they go into ``summary.json``: of what the recorder has."""
-        scene, H, steps = self._scene, self._steps.size, self._recorder.steps()
+        scene, steps = self._scene, self._recorder.steps()
         known = int(steps["events"][-1]) if len(steps) else 0  # a full disk may have events without their records
         events = list(islice(self._recorder.events(), known))
         made, joined = int(np.count_nonzero(np.diff(steps["time"]))), self._pair.joined
@@ -374,19 +374,7 @@ class Master(Stateful):
         free_at_end = not are_joined(inside[-1:]).any()
         of_coupling, warned = joined.report(made)
         warnings = [*balance.warnings, *warned]
-        short, least = CONTACT_STEPS[scene.coupling.degree] * H, SHORT_IMPULSE * seen.momentum
-        shortest = shortest_contact(inside, events, short, least, free_at_end=free_at_end)
-        unresolved = not_resolved(
-            scene,
-            seen.mismatch_at_events,
-            jitter=seen.jitter,
-            shortest_contact=shortest,
-            contact_frequency=seen.contact_frequency,
-            late=seen.late,
-            missed=seen.missed,
-            contacts=seen.contacts,
-            pace=pace(inside),
-        )
+        unresolved = why_not_resolved(scene, self._steps.size, seen, inside, events, free_at_end=free_at_end)
         warnings += filter(None, [unresolved or peak_force_doubt(scene), NOT_SHOWN if seen.hidden else None])
         neglect = {}
         if scene.driver_stiffness is not None and len(steps):

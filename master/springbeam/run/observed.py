@@ -13,9 +13,17 @@ from ..contact.phases import Phase
 from ..results.columns import MOST_SHOWN, normal_compliance
 from ..results.paths import Path
 from ..results.steps import impulse, joined
+from ..results.totals import pace, shortest_contact
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
-from ..scene.resolution import VIBRATION, lateness, slowest_frequency
+from ..scene.resolution import (
+    CONTACT_STEPS,
+    SHORT_IMPULSE,
+    VIBRATION,
+    lateness,
+    not_resolved,
+    slowest_frequency,
+)
 from ..scene.statics import tip_inertia
 from .stepping import Pair
 
@@ -74,6 +82,24 @@ def observed(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event
     mismatch, at_events = float(apart[joined(steps)].max(initial=0.0)), _mismatch_at_events(scene, pair, steps, events)
     jitter = _jitter(steps, scene.coupling.macro_step, mismatch) if scene.coupling.macro_step and mismatch else 0.0
     return Observed(speed, mismatch, at_events, jitter, momentum, contacts=contacts, hidden=hidden)
+
+
+def why_not_resolved(
+    scene: Scene, H: float, seen: Observed, steps: np.ndarray, events: Sequence[Event], *, free_at_end: bool
+) -> str | None:
+    """Return in words why a run in steps of H [s] that shows ``seen`` is not resolved; ``None`` if it is."""
+    short, least = CONTACT_STEPS[scene.coupling.degree] * H, SHORT_IMPULSE * seen.momentum
+    return not_resolved(
+        scene,
+        seen.mismatch_at_events,
+        jitter=seen.jitter,
+        shortest_contact=shortest_contact(steps, events, short, least, free_at_end=free_at_end),
+        contact_frequency=seen.contact_frequency,
+        late=seen.late,
+        missed=seen.missed,
+        contacts=seen.contacts,
+        pace=pace(steps),
+    )
 
 
 def _jitter(steps: np.ndarray, H: float, mismatch: float) -> float:
