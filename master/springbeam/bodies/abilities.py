@@ -57,7 +57,7 @@ def _lacking(scene: Scene, body: Abilities) -> Iterator[tuple[str, str, str]]:
         for ability in abilities if is_so else ():
             if not getattr(body, ability) or (ability == "integrals" and body.integrals < 2):
                 yield asked, _LACKS[ability], instead
-    #: Integrals of the gap that the scheme sets to 0.
+    # Integrals of the gap that the scheme sets to 0.
     needed = 0 if ordinary else coupling.degree - (coupling.scheme == "hermite")
     lower = f"use degree = {body.slopes if ordinary else min(body.integrals, body.slopes)}"
     if coupling.degree > body.slopes:

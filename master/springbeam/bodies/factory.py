@@ -79,9 +79,8 @@ def top_at_rest(scene: Scene, contact: float) -> float:
     Raises SceneError where the spring rests nowhere.
     """
     if (spring := scene.spring) is None:
-        return (
-            scene.lower.position if isinstance(scene.lower, RigidWall) else scene.stop.position if scene.stop else -inf
-        )
+        level = scene.lower if isinstance(scene.lower, RigidWall) else scene.stop
+        return -inf if level is None else level.position
     force = spring.external_force - contact
     for load in scene.loads:
         force += {"spring": 1.0, "base": -spring.mass}.get(load.on, 0.0) * float(load.value(0.0))
