@@ -11,7 +11,7 @@ from measure import Row, Times, below, compare, median_and_spread, ratio_row, sh
 
 from springbeam import load_scene, simulate, with_changes
 from springbeam.bodies.factory import load_bodies
-from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring
+from springbeam.bodies.fmu_bodies import FmuBeam, FmuSpring, release
 from springbeam.bodies.functions import Functions
 from springbeam.monolithic import algorithm1
 from springbeam.results.recording import MemoryRecorder
@@ -100,14 +100,16 @@ def master(effort):
         outside, within = [], []
         for _ in range(effort.rounds):
             seconds, steps = tied_phase(scene)
+            release()  # instances that are kept would go on with calls that nobody times
             with Inside() as inside:
                 summary = simulate(only_tied).summary
+            release()
             of_fmus = (inside.seconds - inside.calls * empty) / summary["macro_steps"]
             within.append(1e6 * of_fmus)
             outside.append(1e6 * (seconds / steps - of_fmus))
-        name = f"`soft` tied, {scheme} {degree}, H = {H:g}"
+        name, goal = f"`soft` tied, {scheme} {degree}, H = {H:g}", 26.0 if degree == 0 else 30.0
         inner = f"inside {median_and_spread(within)} µs"
-        yield below(f"{name}: time outside the FMUs per macro step", outside, 40.0, "µs", inner)
+        yield below(f"{name}: time outside the FMUs per macro step", outside, goal, "µs", inner)
         if effort.quick:
             return
 
@@ -127,7 +129,7 @@ def profile(effort):
     pair.mark()
     step = pair.attempt(state, H, start)
     end = pair.ends()
-    master._next_shape, master._shapes_left = float("inf"), 0
+    state.next_shape, state.shapes_left = float("inf"), 0
 
     def recorded(number):
         for _ in range(number):
