@@ -1,6 +1,6 @@
 """Errors in the macro step on `soft`, before any event and through three:  .venv/bin/python docs/orders.py   (a minute)
 
-Writes the second table and the picture of docs/coupling.md, "Orders measured".
+Writes the second table and the picture of docs/measured.md, "Orders".
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def main() -> None:
     picture(errors)
     head = ["order of", *(f"{phase}: y, v" for phase in list(PHASES)[1:]),
             "y before any event at 1 ms … 1/8 ms [m]", "in the flight"]  # fmt: skip
-    write_section("coupling.md", "orders", table(head, rows(errors)))
+    write_section("measured.md", "orders", table(head, rows(errors)))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,6 @@ PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
 #: What each program prints, as a regular expression, by page and number of the block.
 PROGRAMS = {
     ("README.md", 0): r"deepest tip -0\.015000 m, energy residual \d\.\de-1[0-9]\n0\.000000000 s  impact",
-    ("coupling.md", 0): r"^[23]\.\d+e-06 [56]\.\d+e-08 9\.\d+e-06\n1500 2077 ",
     ("measured.md", 0): r"energy  0   5\.0e-04  1\.9e-09 (.*\n)+hermite 2   5\.0e-04  1\.1e-12 .* 3\.7e-10 ",
     ("scripting.md", 0): r"mass 1\.0 kg: first impact on the foundation at 0\.07\d+ s",
     ("scripting.md", 1): r"largest difference of y: \d\.\de-1[0-4] m\nenergy residual: \d\.\de-1[0-9]",
