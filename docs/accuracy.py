@@ -42,7 +42,7 @@ WINDOWS = {
 }
 runner.perf_counter = tradeoff.perf_counter = rivals.perf_counter = process_time  # type: ignore[attr-defined]
 #: Schemes at the scene's own macro step and at 4 times of it.
-SCHEMES = ("energy 0", "energy 1", "energy 2", "hermite 1", "hermite 2")
+SCHEMES = ("energy 0", "energy 2", "hermite 2")
 
 
 def cell(row: Row | None) -> str:
