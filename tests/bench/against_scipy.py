@@ -74,7 +74,7 @@ def accuracy(effort):
             )
             whole = compare(partial(_whole, chosen.scene), partial(_whole_of_scipy, soft, method, rtol, scale),
                             effort.rounds)  # fmt: skip
-            besides = "whole calls in a warm process: of scipy's, assembly and modes are a part"
+            besides = "of scipy's, with assembly and modes"
             yield ratio_row("the same, whole calls", whole, 1.0, besides, faster=True)
             if effort.quick:
                 return

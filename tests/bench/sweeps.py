@@ -52,5 +52,5 @@ def throughput(effort):
                     f"a sweep on {workers} worker{'s' * (workers > 1)}, runs of {shown(each)}",
                     times,
                     1.18,  # 85 % of the throughput
-                    "a pool of as many processes, handed the same runs one by one",
+                    "a plain pool of as many processes",
                 )
