@@ -1,6 +1,7 @@
 #include "table.hpp"
 
 #include <cstdio>
+#include <initializer_list>
 #include <stdexcept>
 
 #include "text.hpp"
@@ -9,26 +10,72 @@
 namespace fmi {
 namespace {
 
-/// What the descriptions are made of, as one text.
-std::string everything(const Table& t) {
-  std::string text = SPRINGBEAM_VERSION;
-  const auto add = [&text](const std::string& part) { text += part + '\n'; };
-  for (const std::string& part : {t.identifier, t.title, t.description}) add(part);
-  for (const double number : {t.stop_time, t.step_size, t.tolerance}) add(fmi::number(number));
-  for (const Choice& c : t.choices) {
-    add(c.name + c.description);
-    for (const std::string& item : c.items) add(item);
-  }
-  for (const Variable& v : t.variables) {
-    for (const std::string& part : {v.name, v.unit, v.description, v.choice}) add(part);
-    for (const double number :
-         {v.start, v.min, v.max, v.nominal, static_cast<double>(v.causality), static_cast<double>(v.type),
-          v.exact ? 1.0 : 0.0, v.consumed ? 1.0 : 0.0, static_cast<double>(v.elements)})
-      add(fmi::number(number));
-    for (const Dependency& d : v.dependencies) add(d.input + std::to_string(d.order));
-    for (const std::string& name : v.initial_dependencies) add(name);
-  }
-  return text;
+// The table as JSON. Numbers are text: they are written as they are, infinite ones too.
+
+std::string quoted(const std::string& text) { return '"' + text + '"'; }
+std::string quoted(double value) { return quoted(number(value)); }
+std::string yes(bool value) { return value ? "true" : "false"; }
+
+template <class Items, class Write>
+std::string array(const Items& items, const Write& write) {
+  std::string text;
+  for (const auto& item : items) text += (text.empty() ? "" : ",") + write(item);
+  return "[" + text + "]";
+}
+
+std::string object(std::initializer_list<std::pair<const char*, std::string>> fields) {
+  std::string text;
+  for (const auto& [name, value] : fields) text += (text.empty() ? "" : ",") + quoted(name) + ":" + value;
+  return "{" + text + "}\n";
+}
+
+std::string names(const std::vector<std::string>& list) {
+  return array(list, [](const std::string& name) { return quoted(name); });
+}
+
+std::string variable(const Variable& v) {
+  constexpr const char* causalities[] = {"parameter", "input", "output", "local"};
+  const auto dependency = [](const Dependency& d) {
+    return "[" + quoted(d.input) + "," + std::to_string(d.order) + "]";
+  };
+  return object({{"name", quoted(v.name)},
+                 {"causality", quoted(causalities[static_cast<int>(v.causality)])},
+                 {"type", quoted(type_names[static_cast<int>(v.type)])},
+                 {"unit", quoted(v.unit)},
+                 {"description", quoted(v.description)},
+                 {"choice", quoted(v.choice)},
+                 {"start", quoted(v.start)},
+                 {"min", quoted(v.min)},
+                 {"max", quoted(v.max)},
+                 {"nominal", quoted(v.nominal)},
+                 {"exact", yes(v.exact)},
+                 {"consumed", yes(v.consumed)},
+                 {"elements", std::to_string(v.elements)},
+                 {"dependencies", array(v.dependencies, dependency)},
+                 {"initial_dependencies", names(v.initial_dependencies)}});
+}
+
+std::string choice(const Choice& c) {
+  return object({{"name", quoted(c.name)}, {"description", quoted(c.description)}, {"items", names(c.items)}});
+}
+
+std::string category(const LogCategory& c) {
+  return object({{"name", quoted(c.name)}, {"description", quoted(c.description)}});
+}
+
+std::string printed(const Table& t, const std::string& guid) {
+  return object({{"identifier", quoted(t.identifier)},
+                 {"title", quoted(t.title)},
+                 {"description", quoted(t.description)},
+                 {"version", quoted(SPRINGBEAM_VERSION)},
+                 {"guid", quoted(guid)},
+                 {"stop_time", quoted(t.stop_time)},
+                 {"step_size", quoted(t.step_size)},
+                 {"tolerance", quoted(t.tolerance)},
+                 {"ends_steps_early", yes(t.ends_steps_early)},
+                 {"log_categories", array(log_categories, category)},
+                 {"choices", array(t.choices, choice)},
+                 {"variables", array(t.variables, variable)}});
 }
 
 std::string make_guid(const std::string& content) {
@@ -43,21 +90,16 @@ std::string make_guid(const std::string& content) {
 
 }  // namespace
 
-std::size_t Table::index(const std::string& name) const {
-  for (std::size_t i = 0; i < variables.size(); ++i) {
-    if (variables[i].name == name) return i;
-  }
-  throw std::logic_error("no variable '" + name + "'");
-}
-
 const Table& table() {
   static const Table instance = make_table();
   return instance;
 }
 
 const std::string& guid() {
-  static const std::string made = make_guid(everything(table()));
+  static const std::string made = make_guid(printed(table(), ""));
   return made;
 }
+
+std::string printed_table() { return printed(table(), guid()); }
 
 }  // namespace fmi

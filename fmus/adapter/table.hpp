@@ -32,7 +32,7 @@ struct Variable {
   std::string name;
   Causality causality = Causality::output;
   Type type = Type::real;
-  std::string unit;  ///< one of units(), empty if dimensionless
+  std::string unit;  ///< one of those in fmus/description.py, empty if dimensionless
   std::string description;
   std::string choice;  ///< name of its type, see Table::choices
   double start = 0.0;  ///< of parameters, inputs and exact outputs
@@ -84,12 +84,10 @@ inline constexpr int max_input_derivative_order = 2, max_output_derivative_order
 struct Table {
   std::string identifier;  ///< modelIdentifier
   std::string title, description;
-  double stop_time = 1.0, step_size = 1e-3, tolerance = 0.0;  ///< DefaultExperiment; tolerance 0: none
-  bool ends_steps_early = false;                              ///< at events, where it may
+  double stop_time = 1.0, step_size = 1e-3, tolerance = 1e-6;  ///< DefaultExperiment
+  bool ends_steps_early = false;                               ///< at events, where it may
   std::vector<Choice> choices;
   std::vector<Variable> variables;
-
-  std::size_t index(const std::string& name) const;  ///< @throws std::logic_error
 };
 
 /// Each FMU defines these two (fmus/beam/beam_fmu.cpp, fmus/spring/spring_fmu.cpp).
@@ -100,6 +98,9 @@ const Table& table();  ///< made once
 
 /// A hash of everything the table says: two FMUs with the same GUID have the same variables.
 const std::string& guid();
+
+/// The table as JSON: fmus/description.py makes the descriptions of all versions of FMI from it.
+std::string printed_table();
 
 /// Adds variables bound to a concrete model `M`.
 template <class M>

@@ -192,7 +192,6 @@ fmi::Table fmi::make_table() {
       "Viscoelastic (Kelvin-Voigt) Timoshenko beam, clamped at x = 0, loaded at its tip x = L by a contact force";
   t.stop_time = 0.6;
   t.step_size = 1e-3;
-  t.tolerance = 1e-6;  // for the tool's own use
   t.choices.push_back({"MassMatrix",
                        "mass of an element",
                        {"consistent, its kinetic energy exact",

@@ -307,7 +307,6 @@ fmi::Table fmi::make_table() {
       "foundation";
   t.stop_time = 0.6;
   t.step_size = 1e-3;
-  t.tolerance = 1e-6;  // for the tool's own use: what it hands on never loosens relative_tolerance
   t.ends_steps_early = true;
   t.choices.push_back({"ContactLaw",
                        "where the contact force comes from",

@@ -77,7 +77,9 @@ class Fmu {
  public:
   explicit Fmu(const std::vector<std::pair<const char*, double>>& values) {
     for (const auto& [name, value] : values) {
-      const auto i = static_cast<unsigned>(fmi::table().index(name));
+      const auto named = [&](const fmi::Variable& v) { return v.name == name; };
+      const auto& variables = fmi::table().variables;
+      const auto i = static_cast<unsigned>(std::find_if(variables.begin(), variables.end(), named) - variables.begin());
       instance_.set(i, fmi::table().variables[i].type, value);
     }
     instance_.ensure_built();

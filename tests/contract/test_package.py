@@ -3,6 +3,7 @@
 import ctypes as ct
 import re
 import subprocess
+import sys
 import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
@@ -23,13 +24,15 @@ def output(*command):
 
 
 def test_static_model_is_the_packed_one_and_fmpy_reports_nothing(case, tmp_path):
-    # The description printed from the table, before there is a binary. Only a list of sources is added to it.
-    printed = tmp_path / "modelDescription.xml"
-    describe = str(ROOT / "build" / "fmus" / f"describe_{case.name}")
-    printed.write_text(output(describe, case.version[0]), encoding="utf-8")
+    # The description made from the table, before there is a binary. Only a list of sources is added to it.
+    table, no_sources, printed = (tmp_path / name for name in ("table", "list", "modelDescription.xml"))
+    table.write_text(output(str(ROOT / "build" / "fmus" / f"describe_{case.name}")), encoding="utf-8")
+    no_sources.touch()
+    description = [sys.executable, str(ROOT / "fmus" / "description.py"), case.version[0], str(table), str(no_sources)]
+    printed.write_text(output(*description), encoding="utf-8")
     assert validate_fmu(str(tmp_path)) == []
     packed = (case.folder / "modelDescription.xml").read_text(encoding="utf-8")
-    without_list = re.sub(r">\n    <SourceFiles>.*</CoSimulation>", "/>", packed, flags=re.DOTALL)
+    without_list = re.sub(r">\s*<SourceFiles>.*</CoSimulation>", " />", packed, flags=re.DOTALL)
     assert without_list == printed.read_text(encoding="utf-8")
 
 

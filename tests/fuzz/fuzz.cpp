@@ -35,7 +35,6 @@
 #include <thread>
 #include <vector>
 
-#include "description.hpp"
 #include "fmi2Functions.h"
 #include "table.hpp"
 #include "text.hpp"
