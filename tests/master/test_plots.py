@@ -138,17 +138,16 @@ def test_panels_are_painted_with_all_that_they_say():
     assert [line.get_label() for line in energies.lines if line.get_label()[0] != "_"] == ["total"]
 
 
-def test_what_is_compared_is_drawn_in_the_unit_of_its_axis_and_with_what_strikes_it(tmp_path, monkeypatch):
+def test_what_is_compared_is_drawn_in_the_unit_of_its_axis_and_with_what_strikes_it(monkeypatch):
     """One run is seated, the other struck twice: it has stems, not only a force of zero."""
-    figures, drawn = [], []
-    monkeypatch.setattr(timeline.Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
+    drawn = []
     monkeypatch.setattr(Axes, "vlines", lambda ax, time, low, high, **_: drawn.append((ax.get_ylabel(), high)))
     run, zero = a_trajectory(), np.zeros(400)
     strokes = [Event(t, "stop_impact", 0, 0, 0, 0, 0.0, 0.6, 0.0) for t in (0.1, 0.3)]
     struck = a_trajectory(events=strokes, foundation_force=zero)
-    timeline.draw_compared({"one": run, "struck": struck}, tmp_path / "a.png")
+    figure = timeline.draw_compared({"one": run, "struck": struck})
     units = {"u_tip": "[mm]", "v_tip": "[mm/s]", "contact_force": "[mN]"}
-    for ax, (column, unit) in zip(figures[0].axes, units.items(), strict=False):
+    for ax, (column, unit) in zip(figure.axes, units.items(), strict=False):
         assert ax.get_ylabel().endswith(unit)
         assert np.abs(ax.lines[0].get_ydata()).max() == pytest.approx(1e3 * np.abs(run[column]).max(), rel=1e-12)
     assert [high.tolist() for _, high in drawn] == [[0.6, 0.6]]

@@ -272,7 +272,7 @@ def test_an_event_moves_in_proportion_to_a_perturbation_and_not_with_the_rows():
     ("changes", "arguments", "message"),
     [
         ({"contact": {"impact": "rest"}}, {}, "rigid tie"),
-        ({"contact": {"law": "paper"}}, {}, "knows 'transmission', 'compliance'"),
+        ({"contact": {"law": "paper"}}, {}, "know 'transmission', 'compliance'"),
         ({"beam": {"initial_deflection_slope": -0.1}}, {}, "below"),
         ({"beam": {"initial_deflection_slope": 0.1, "initial_velocity_slope": 0.0}}, {}, "never"),
         ({}, {"sample_times": []}, "no row lies between the start of the run, 0 s, and its end, 0.6 s"),

@@ -157,10 +157,10 @@ def compare(
         keys, results = differing_keys([run.scene for run in trajectories]), results_of(trajectories)
         picture = None if no_plots else out
         if picture is not None:
-            from ..pictures.timeline import draw_compared  # matplotlib takes a second to load
+            from ..pictures.timeline import DPI, draw_compared  # matplotlib takes a second to load
 
             out.parent.mkdir(parents=True, exist_ok=True)
-            draw_compared(dict(zip(names, trajectories, strict=True)), picture)
+            draw_compared(dict(zip(names, trajectories, strict=True))).savefig(picture, dpi=DPI)
     document = {"runs": names, "keys": keys, "results": results, "picture": picture}
     titles = {"keys that differ": keys, "results": results}
     shown = [table(("", *names), _rows(found), title) for title, found in titles.items()]

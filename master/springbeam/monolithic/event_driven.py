@@ -19,16 +19,16 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar, newton
 
 from ..results.trajectory import Trajectory
-from ..scene import Scene
+from ..scene import Scene, SceneError
 from .exponential import ExponentialPropagator, LinearForm, Segment
 from .hybrid_system import HybridSystem, ReferenceFailure
-from .laws import Phase, Watch
+from .laws import Phase, Watch, law_of
 from .quasi_static import QuasiStaticForm, QuasiStaticSystem
 from .rows import Rows
 from .semi_discrete import modal_beam
 from .transitions import HybridState
 
-__all__ = ["ReferenceFailure", "simulate"]
+__all__ = ["ReferenceFailure", "refuse", "simulate"]
 
 #: More events than this at one time are a fault, not physics.
 _AT_ONCE = 20
@@ -70,21 +70,38 @@ def simulate(
     ------
     ReferenceFailure
         If an integration or the event logic cannot go on, or ``time_limit`` is over.
+    SceneError
+        If the scene has no reference: `refuse`.
     ValueError
-        If the scene or an argument is outside what this reference defines, or no row lies in the run.
+        If no row lies in the run.
     """
+    refuse(scene)
     return _Run(scene, velocity_perturbation, t_end).execute(sample_times, time_limit)
+
+
+def refuse(scene: Scene) -> None:
+    """Raise SceneError if this reference does not define the motion of ``scene``; the message names what it does."""
+    law = law_of(scene)
+    for table, body in scene.partners.items():
+        raise SceneError(
+            f"[{table}] {'fmu' if table in scene.foreign else 'element'}: no reference knows this body, a "
+            f"{type(body).__name__}; springbeam run --accuracy compares runs of smaller and smaller steps instead"
+        )
+    if scene.coupled and law.rigid and scene.contact.impact == "rest":
+        raise SceneError(
+            "contact.impact = 'rest': no reference has it, since it leaves tip and spring with velocities that differ, "
+            f"which the rigid tie of law '{scene.contact.law}' excludes; use 'inelastic' or 'tip'"
+        )
+    if scene.massless and not law.rigid:
+        raise SceneError(
+            f"beam.fidelity = 'quasi_static': no reference has it with law '{scene.contact.law}'; use 'dynamic'"
+        )
 
 
 class _Run:
     def __init__(self, scene: Scene, velocity_perturbation: float, t_end: float | None) -> None:
         self.scene, self.system = scene, _system(scene)
         self.t_end = scene.time.t_end if t_end is None else min(t_end, scene.time.t_end)
-        if scene.coupled and self.system.law.rigid and scene.contact.impact == "rest":
-            raise ValueError(
-                "contact.impact = 'rest' leaves tip and spring with different velocities, which the rigid tie of law "
-                f"'{scene.contact.law}' excludes; allowed here: 'inelastic', 'tip'"
-            )
         self._form = QuasiStaticForm if isinstance(self.system, QuasiStaticSystem) else LinearForm
         self._forms: dict[Phase, LinearForm] = {}
         self.counts = {"steps": 0, "phases": 0}
@@ -183,7 +200,7 @@ class _Run:
 
 
 def _system(scene: Scene) -> HybridSystem:
-    if scene.beam is not None and scene.beam.fidelity == "quasi_static":
+    if scene.massless:
         return QuasiStaticSystem(scene)
     return HybridSystem(scene, None if scene.beam is None else modal_beam(scene.beam))
 
@@ -191,7 +208,7 @@ def _system(scene: Scene) -> HybridSystem:
 def initial(s: HybridSystem, perturbation: float) -> tuple[float, np.ndarray]:
     """Return time [s] and state at the start, where an undeformed tip arrives; ``perturbation``: see `simulate`."""
     scene, X, time = s.scene, np.zeros(s.size), 0.0
-    if scene.time.initial_state == "static":
+    if scene.static:
         return time, _at_rest(s)
     inertia = s.inverse_tip_mass not in (0.0, np.inf)
     if s.has_spring:

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..scene import Scene
+from ..scene import Scene, SceneError
 
 Contact = Literal["free", "touch", "slack", "tied"]
 
@@ -228,8 +228,8 @@ LAWS: dict[str, type[Law]] = {"transmission": Transmission, "compliance": Compli
 
 
 def law_of(scene: Scene) -> Law:
-    """Return the law of a scene. Raises ValueError if it is none of `LAWS`."""
+    """Return the law of a scene. Raises SceneError if it is none of `LAWS`."""
     if scene.contact.law not in LAWS:
         known = ", ".join(f"'{name}'" for name in LAWS)
-        raise ValueError(f"contact.law = {scene.contact.law!r}: this reference knows {known}")
+        raise SceneError(f"contact.law = '{scene.contact.law}': no reference has it; those there are know {known}")
     return LAWS[scene.contact.law](scene)

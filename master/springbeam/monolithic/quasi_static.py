@@ -30,10 +30,7 @@ _OF_SPRING = slice(2, None)
 
 
 class QuasiStaticSystem(HybridSystem):
-    """Equations of a beam without inertia and a spring, under a rigid law.
-
-    Raises ValueError for another law.
-    """
+    """Equations of a beam without inertia and a spring, under a rigid law."""
 
     def __init__(self, scene: Scene) -> None:
         assert scene.beam is not None
@@ -50,10 +47,6 @@ class QuasiStaticSystem(HybridSystem):
             scene.beam.alpha_b,
         )
         super().__init__(scene, tip)
-        if not self.law.rigid:
-            raise ValueError(
-                f"contact.law = {scene.contact.law!r}: with a quasi-static beam, this reference knows a tie only"
-            )
         self.inverse_tip_mass = np.inf
         self._rest = rest
         #: Strain energy [J] under the loads that the tip's deflection does not tell.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import matplotlib
@@ -195,8 +194,8 @@ def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
     return figure
 
 
-def draw_compared(runs: Mapping[str, Trajectory], path: Path) -> None:
-    """Draw runs by their names to ``path``, in the panels that any of them has something to show for."""
+def draw_compared(runs: Mapping[str, Trajectory]) -> Figure:
+    """Return the figure of runs by their names, in the panels that any of them has something to show for."""
     panels = compared(runs)
     heights = [panel.height for panel in panels]
     with matplotlib.rc_context(STYLE):
@@ -205,4 +204,4 @@ def draw_compared(runs: Mapping[str, Trajectory], path: Path) -> None:
         for ax, panel in zip(axes, panels, strict=True):
             paint(ax, panel, Unit(1.0, "s"))
             ax.label_outer()
-        figure.savefig(path, dpi=DPI)
+    return figure

@@ -19,20 +19,20 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
-from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
 from ..monolithic import algorithm1, event_driven
-from ..pictures.drawing import POSITIONS, present
+from ..pictures.drawing import present
 from ..results.contact_times import ContactChange, contact_changes
 from ..results.trajectory import TOLD, Trajectory, columns_of
 from ..run.runner import simulate
-from ..scene import Scene, SceneError, with_changes
+from ..scene import Scene, with_changes
 from ..scene.automatic import with_scheme_chosen
 from ..scene.resolution import mesh_frequency
 from ..scene.statics import tip_compliance
+from .study import Row
 
 Verdict = Literal["agrees", "differs", "not comparable"]
 #: Largest change by halving the macro step, relative to the largest displacement (velocity), of a resolved motion.
@@ -41,88 +41,58 @@ _RESOLVED = {"u_tip": 0.05, "y": 0.05, "v_tip": 0.25, "z": 0.25}
 _SAFETY = 4.0
 #: Least relative error of a step, where IDA's tolerance is not a looser one.
 _LEAST = 1e-12
+#: Relative change of the initial velocity that shows how fast two solutions separate, and how far that may grow.
+PERTURBATION, _GROWTH = 1e-7, 1e4
+#: Intervals of contact shorter than this many macro steps are no evidence either way.
+SHORT = 2.0
+#: Columns of both motions that are kept for a picture.
+_DRAWN = ("time", "u_tip", "y", "v_tip", "z", "contact_force", "foundation_force")
 
 
-class Quantity(NamedTuple):
-    """One compared quantity."""
+def compare(scene: Scene) -> Row:
+    """Run ``scene`` and the reference of its law and return what was found.
 
-    quantity: str
-    error: float  #: max norm, in the quantity's unit; where the bound is broken, the furthest out of it
-    at: float  #: where it occurred [s]
-    l2: float  #: root mean square over the window
-    bound: float  #: at that time
-    passed: bool
-    times: np.ndarray  #: of the compared rows [s]
-    errors: np.ndarray
-    bounds: np.ndarray
-
-    @classmethod
-    def judged(cls, name: str, times: np.ndarray, error: np.ndarray, bound: np.ndarray) -> Quantity:
-        """Judge the errors of a quantity at ``times`` [s]."""
-        worst, top = int(np.argmax(error / bound)), int(np.argmax(error))
-        at = worst if error[worst] > bound[worst] else top
-        return cls(
-            name, float(error[at]), float(times[at]), float(np.sqrt(np.mean(error**2))), float(bound[at]),
-            bool(np.all(error <= bound)), times, error, bound,
-        )  # fmt: skip
-
-
-class Change(NamedTuple):
-    """One compared change of contact."""
-
-    kind: str
-    time: float | None  #: ``None`` if the co-simulation lacks it
-    reference: float
-    bound: float
-    passed: bool
-
-
-@dataclass
-class Report:
-    """What `compare` found."""
-
-    scene: Scene
-    reference: Trajectory | None = None
-    trajectory: Trajectory | None = None
-    horizon: float = 0.0  #: comparable up to here [s]
-    growth: float = 1.0  #: of a perturbation of the reference up to the horizon
-    rows: list[Quantity] = field(default_factory=list)
-    events: list[Change] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def verdict(self) -> Verdict:
-        """Judge the run that was asked for."""
-        if not (all(row.passed for row in self.rows) and all(change.passed for change in self.events)):
-            return "differs"
-        whole = self.horizon >= self.scene.time.t_end * (1.0 - 1e-12)
-        return "agrees" if self.rows and whole else "not comparable"
-
-
-def compare(scene: Scene) -> Report:
-    """Run ``scene`` and the reference of its law and compare them.
+    Returns
+    -------
+    Row
+        ``verdict``; ``from``, ``horizon``, ``t_end``: compared from and to, and asked for [s]; ``growth`` of a
+        perturbation of the reference up to the horizon; ``quantities``: a row each, with the largest error (where a
+        bound is broken the furthest out of it), when it occurred, its root mean square, the bound then, and whether it
+        has passed; ``events``: a row per change of contact, whose ``time`` is ``None`` where the run lacks it;
+        ``notes``; ``scene``; and ``runs``, columns and events of both where they were compared.
 
     Raises
     ------
     SceneError
-        If the reference is not defined for the scene (law `transmission` with ``contact.impact = "rest"``).
+        If the reference is not defined for the scene.
     RunStopped, ReferenceFailure
         If either stops early.
     """
-    if scene.contact.algorithm:
-        return _compare_paper(scene)
-    refuse_without_reference(scene)
-    run, finer = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * scene.coupling.H}))
-    report = Report(scene, trajectory=run, horizon=_same_story_until(run, finer))
-    if report.horizon > (scene.contact_time or 0.0):
-        _compare_with_reference(report, run, finer)
-    else:
-        said = [warning for warning in run.summary["warnings"] if warning.startswith("not resolved")]
-        report.notes += said or ["not resolved: half the macro step changes the motion from the first contact on"]
-    return report
+    found: Row = {"verdict": "differs", "from": scene.contact_time or 0.0, "t_end": scene.time.t_end, "growth": 1.0}
+    found |= {"quantities": [], "events": [], "notes": [], "scene": scene.model_dump(exclude_none=True)}
+    runs = (_beside_algorithm_1 if scene.contact.algorithm else _beside_event_driven)(scene, found)
+    found["runs"] = {
+        name: {"columns": {column: run[column] for column in present(run, _DRAWN)}, "events": run.events}
+        for name, run in zip(("co-simulation", "reference"), runs, strict=False)
+    }
+    if all(row["passed"] for row in (*found["quantities"], *found["events"])):
+        whole = found["horizon"] >= scene.time.t_end * (1.0 - 1e-12)
+        found["verdict"] = "agrees" if found["quantities"] and whole else "not comparable"
+    return found
 
 
-def _compare_paper(scene: Scene) -> Report:
+def _judged(name: str, times: np.ndarray, error: np.ndarray, changed: np.ndarray, floor: np.ndarray) -> Row:
+    """Judge the errors of a quantity at ``times`` [s] by what ``changed`` up to then, and a ``floor``."""
+    bound = _SAFETY * np.maximum.accumulate(changed) + floor
+    worst = int(np.argmax(error / bound))
+    at = worst if error[worst] > bound[worst] else int(np.argmax(error))
+    return {
+        "quantity": name, "error": float(error[at]), "at": float(times[at]), "l2": float(np.sqrt(np.mean(error**2))),
+        "bound": float(bound[at]), "passed": bool(np.all(error <= bound)),
+    }  # fmt: skip
+
+
+def _beside_algorithm_1(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
     """Compare law `paper` through the FMUs with Algorithm 1 as one system, which differs by the midpoint rule alone.
 
     With a = (ωh)² one midpoint step and the exact flow differ in the displacement by y a²/12 and h z a/12. Algorithm 1
@@ -131,20 +101,62 @@ def _compare_paper(scene: Scene) -> Report:
     """
     assert scene.spring is not None
     stiffer = {name: 4.0 / 3.0 * getattr(scene.spring, name) for name in ("linear_stiffness", "cubic_stiffness")}
-    reference, ours = algorithm1.simulate(scene), simulate(scene)
+    reference, run = algorithm1.simulate(scene), simulate(scene)
     moved = algorithm1.simulate(with_changes(scene, spring=stiffer))
-    n = min(len(reference), len(ours), len(moved))
-    report = Report(scene, reference, ours, float(ours.time[n - 1]))
+    n = min(len(reference), len(run), len(moved))
+    found["horizon"] = float(run.time[n - 1])
     for name in ("u_tip", "y", "z", "v_tip", "contact_force", "e_beam", "e_spring"):
-        q, exact, other = (run[name][:n] for run in (ours, reference, moved))
+        q, exact, other = (each[name][:n] for each in (run, reference, moved))
         floor = _step_error(scene) * np.arange(1, n + 1) * (float(np.abs(exact).max()) or 1.0)
-        bound = _SAFETY * np.maximum.accumulate(np.abs(other - exact)) + floor
-        report.rows.append(Quantity.judged(name, ours.time[:n], np.abs(q - exact), bound))
-    report.notes.append(
+        found["quantities"].append(_judged(name, run.time[:n], np.abs(q - exact), np.abs(other - exact), floor))
+    found["notes"].append(
         "bounds from Algorithm 1 with 4/3 of its stiffness: as much as the midpoint rule changes a step of "
         f"{scene.coupling.H:g} s"
     )
-    return report
+    return run, reference
+
+
+def _beside_event_driven(scene: Scene, found: Row) -> tuple[Trajectory, ...]:
+    """Compare a run with the event-driven reference, by bounds from a run at half its macro step."""
+    event_driven.refuse(scene)
+    size = scene.coupling.H
+    coarse, fine = simulate(scene), simulate(with_changes(scene, coupling={"macro_step": 0.5 * size}))
+    found["horizon"] = _same_story_until(coarse, fine)
+    if found["horizon"] <= found["from"]:
+        said = [warning for warning in coarse.summary["warnings"] if warning.startswith("not resolved")]
+        found["notes"] += said or ["not resolved: half the macro step changes the motion from the first contact on"]
+        return ()
+    times = macro_points(scene)
+    reference, perturbed = reference_and_perturbed(scene, times)
+    changes = [contact_changes(run, SHORT * size) for run in (coarse, fine, reference, perturbed)]
+    stable = _agree_until(changes[2], changes[3], found["from"], float(coarse.time[-1]))
+    found["horizon"] = min(found["horizon"], stable)
+    before = times <= found["horizon"]
+    # A jump at slightly different times is an event error, judged there.
+    jumps = [event.time for run in (coarse, reference) for event in run.events]
+    away = away_from(
+        times, jumps + [kink for load in scene.loads if not load.is_finer_than(size) for kink in load.kinks], size
+    )
+    neglected = coarse.summary.get("neglected_share", 0.0)
+    for name in quantities(scene):
+        ours, halved = (sample(run, times, name) for run in (coarse, fine))
+        good = before & np.isfinite(ours) & np.isfinite(halved) & (away | (name in ("u_tip", "y")))
+        if good.sum() < 2:
+            continue
+        ours, halved, exact, moved = (values[good] for values in (ours, halved, reference[name], perturbed[name]))
+        scale = float(np.abs(exact).max()) or 1.0
+        growth = np.maximum(1.0, np.maximum.accumulate(np.abs(moved - exact) / (PERTURBATION * scale)))
+        found["growth"] = max(found["growth"], float(growth[-1]))
+        floor = _step_error(scene) * (np.flatnonzero(good) + 1.0) + _SAFETY * (_rounding(scene, name) + neglected)
+        judged = _judged(name, times[good], np.abs(ours - exact), np.abs(ours - halved), floor * growth * scale)
+        found["quantities"].append(judged)
+    if not found["quantities"]:
+        found["notes"].append(
+            f"Nothing could be compared: another change of contact comes first, from t = {found['horizon']:.9g} s on, "
+            "if the initial velocity changes a little; begin with another velocity, or at a distance"
+        )
+    _compare_events(scene, found, *changes[:3])
+    return coarse, reference
 
 
 def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
@@ -166,42 +178,6 @@ def _same_story_until(coarse: Trajectory, fine: Trajectory) -> float:
         if differ[1:].any():
             horizon = min(horizon, float(times[1:][differ[1:]][0]) - size)
     return horizon
-
-
-def _compare_with_reference(report: Report, coarse: Trajectory, fine: Trajectory) -> None:
-    """Judge ``coarse``, the run of the report, by bounds from ``fine``, at half its macro step."""
-    scene, times, size = report.scene, macro_points(report.scene), report.scene.coupling.H
-    reference, perturbed = reference_and_perturbed(scene, times)
-    report.reference = reference
-    changes = [contact_changes(run, SHORT * size) for run in (coarse, fine, reference, perturbed)]
-    stable = _agree_until(changes[2], changes[3], float(times[0]), float(coarse.time[-1]))
-    report.horizon = min(report.horizon, stable)
-    before = times <= report.horizon
-    # A jump at slightly different times is an event error, judged there.
-    jumps = [event.time for run in (coarse, reference) for event in run.events]
-    away = away_from(
-        times, jumps + [kink for load in scene.loads if not load.is_finer_than(size) for kink in load.kinks], size
-    )
-    neglected = coarse.summary.get("neglected_share", 0.0)
-    for name in quantities(scene):
-        ours, halved = (sample(run, times, name) for run in (coarse, fine))
-        exact, moved = reference[name], perturbed[name]
-        good = before & np.isfinite(ours) & np.isfinite(halved) & (away | (name in POSITIONS))
-        if good.sum() < 2:
-            continue
-        scale = float(np.abs(exact[good]).max()) or 1.0
-        floor = _step_error(scene) * (np.arange(len(times)) + 1.0) + _SAFETY * (_rounding(scene, name) + neglected)
-        grown = np.abs(moved - exact)[good] / (PERTURBATION * scale)
-        growth = np.maximum(1.0, np.maximum.accumulate(grown))
-        report.growth = max(report.growth, float(growth[-1]))
-        bound = _SAFETY * np.maximum.accumulate(np.abs(ours - halved)[good]) + (floor[good] * growth * scale)
-        report.rows.append(Quantity.judged(name, times[good], np.abs(ours - exact)[good], bound))
-    if not report.rows:
-        report.notes.append(
-            f"Nothing could be compared: another change of contact comes first, from t = {report.horizon:.9g} s on, if "
-            "the initial velocity changes a little; begin with another velocity, or at a distance"
-        )
-    _compare_events(report, *changes[:3])
 
 
 def _step_error(scene: Scene) -> float:
@@ -234,50 +210,25 @@ def _agree_until(first: list[ContactChange], second: list[ContactChange], start:
 
 
 def _compare_events(
-    report: Report, coarse: list[ContactChange], fine: list[ContactChange], reference: list[ContactChange]
+    scene: Scene, found: Row, coarse: list[ContactChange], fine: list[ContactChange], reference: list[ContactChange]
 ) -> None:
-    scene, size, start = report.scene, report.scene.coupling.H, report.scene.contact_time or 0.0
+    size, start = scene.coupling.H, found["from"]
     by_means = with_scheme_chosen(scene)[0].coupling.degree == 0
     moved = 0.0
-    for i, (kind, time) in enumerate(change for change in reference if change.time <= report.horizon):
+    for i, (kind, time) in enumerate(change for change in reference if change.time <= found["horizon"]):
+        row: dict[str, Any] = {"kind": kind, "time": None, "reference": time, "bound": 0.0, "passed": False}
+        found["events"].append(row)
         if i >= len(coarse) or coarse[i].kind != kind:
-            report.events.append(Change(kind, None, time, 0.0, False))
             return
         ours = coarse[i].time
         if i < len(fine):
             moved = max(moved, abs(ours - fine[i].time))
         steps = (time - start) / size + 1.0
         # The unit of time in which the state changes as a whole is what the events so far have taken.
-        bound = _SAFETY * moved + _step_error(scene) * steps * report.growth * max(time - start, size)
+        bound = _SAFETY * moved + _step_error(scene) * steps * found["growth"] * max(time - start, size)
         if kind in ("opens", "leaves") and by_means:
             bound += 0.5 * size  # a force known by its means tells no better when it vanishes
-        report.events.append(Change(kind, ours, time, bound, abs(ours - time) <= bound))
-
-
-#: Relative change of the initial velocity that shows how fast two solutions separate, and how far that may grow.
-PERTURBATION, _GROWTH = 1e-7, 1e4
-#: Intervals of contact shorter than this many macro steps are no evidence either way.
-SHORT = 2.0
-
-
-def refuse_without_reference(scene: Scene) -> None:
-    """Raise SceneError if `event_driven` cannot solve ``scene``; the message names what it can solve."""
-    if scene.contact.algorithm:
-        raise SceneError(
-            f'[contact] law = "{scene.contact.law}": Algorithm 1 has no exact solution to compare with, and does not '
-            'converge; law = "transmission" or "compliance" has, and does'
-        )
-    for table, body in scene.partners.items():
-        raise SceneError(
-            f"[{table}] {'fmu' if table in scene.foreign else 'element'}: no reference knows this body, a "
-            f"{type(body).__name__}; springbeam run --accuracy compares runs of smaller and smaller steps instead"
-        )
-    if scene.contact.facts.strikes and scene.contact.impact == "rest" and scene.beam and scene.spring:
-        raise SceneError("contact.impact = 'rest': no reference has it; use 'inelastic' or 'tip'")
-    if scene.contact.soft and scene.massless:
-        raise SceneError(
-            f"beam.fidelity = 'quasi_static': no reference has it with law '{scene.contact.law}'; use 'dynamic'"
-        )
+        row |= {"time": ours, "bound": bound, "passed": abs(ours - time) <= bound}
 
 
 def reference_and_perturbed(scene: Scene, times: np.ndarray) -> tuple[Trajectory, Trajectory]:
@@ -301,16 +252,10 @@ def comparable_until(scene: Scene) -> float:
     change of contact [s]."""
     times = np.linspace(scene.contact_time or 0.0, scene.time.t_end, 401)
     exact, moved = reference_and_perturbed(scene, times)
+    end = _agree_until(contact_changes(exact, 0.0), contact_changes(moved, 0.0), float(times[0]), scene.time.t_end)
     name = "u_tip" if scene.beam is not None else "y"
     off = np.abs(moved[name] - exact[name]) > _GROWTH * PERTURBATION * np.abs(exact[name] - exact[name][0]).max()
-    end = float(times[np.argmax(off)]) if off.any() else float(times[-1])
-    changes, others = contact_changes(exact, 0.0), contact_changes(moved, 0.0)
-    for i, (kind, time) in enumerate(changes):
-        if time >= end:
-            break
-        if i >= len(others) or others[i].kind != kind or abs(others[i].time - time) > 1e-3 * end:
-            return 0.5 * (time + (changes[i - 1].time if i else float(exact.time[0])))
-    return end
+    return min(end, *times[off].tolist()) if off.any() else end
 
 
 def macro_points(scene: Scene) -> np.ndarray:

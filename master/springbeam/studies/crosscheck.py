@@ -7,39 +7,20 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any, ClassVar
 
-import matplotlib
 import numpy as np
 from rich.text import Text
 
 from ..monolithic import event_driven
-from ..pictures import drawing
-from ..pictures.drawing import BLACK, POSITIONS, Line, Look, present
-from ..pictures.panels import Curve, Panel
-from ..pictures.timeline import STYLE, timeline
 from ..results.contact_times import contact_changes
 from ..results.trajectory import Event, Trajectory, columns_of
 from ..scene import Scene
-from .comparison import (
-    SHORT,
-    Verdict,
-    away_from,
-    compare,
-    macro_points,
-    quantities,
-    refuse_without_reference,
-    sample,
-)
+from .comparison import SHORT, Verdict, away_from, compare, macro_points, quantities, sample
 from .study import Findings, Pictures, Row, Study
-from .tables import table
+from .tables import number, table
 
 #: Exit codes of the command.
 CODES: dict[Verdict, int] = {"agrees": 0, "differs": 1, "not comparable": 4}
 _CASE = "comparison"
-#: What is told of a compared quantity; the errors at all times are for the picture.
-_TOLD = ("quantity", "error", "at", "l2", "bound", "passed")
-_COLOURS = (
-    *(drawing.BLUE, drawing.SKY, drawing.VERMILLION, drawing.ORANGE, drawing.GREEN, drawing.PURPLE, drawing.GREY),
-)
 #: How often the macro step is halved; once less if quick.
 _HALVINGS = 3
 
@@ -54,53 +35,33 @@ class Crosscheck(Study):
     def cases(self) -> dict[str, Row]:
         """Return the one comparison. Raises SceneError if there is no reference."""
         if not self.scene.contact.algorithm:
-            refuse_without_reference(self.scene)
+            event_driven.refuse(self.scene)
         start, end = self.scene.contact_time or 0.0, self.scene.time.t_end
         return {_CASE: {"time.t_end": start + 0.25 * (end - start)} if self.quick else {}}
 
     def cost(self) -> str:
         """Say what is run."""
-        if self.scene.contact.algorithm:
-            return "a run, and Algorithm 1 twice"
-        return "2 runs and 2 references"
+        return "a run, and Algorithm 1 twice" if self.scene.contact.algorithm else "2 runs and 2 references"
 
     def record(self, case: Row) -> Row:
-        """Return what was found, and both motions."""
-        report = compare(self.at(case))
-        found: Row = {
-            "verdict": report.verdict,
-            "from": report.scene.contact_time or 0.0,
-            "horizon": report.horizon,
-            "t_end": report.scene.time.t_end,
-            "growth": report.growth,
-            "quantities": [row._asdict() for row in report.rows],
-            "events": [change._asdict() for change in report.events],
-            "notes": report.notes,
-            "scene": report.scene.model_dump(exclude_none=True),
-        }
-        run, reference = report.trajectory, report.reference
-        if run is not None and reference is not None:
-            positions = present(run, POSITIONS)
-            found["motion"] = {name: run[name] for name in ("time", "phase", *positions)}
-            found["marks"] = run.events
-            found["reference"] = {name: reference[name] for name in ("time", *positions)}
-        return found
+        """Return what was found, as `compare` has it."""
+        return compare(self.at(case))
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per quantity."""
-        return [{name: row[name] for name in _TOLD} for row in records[_CASE]["quantities"]]
+        return list(records[_CASE]["quantities"])
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Show what was compared, quantities and changes of contact, and the verdict."""
         record, units = records[_CASE], columns_of(self.scene)
         shown: list[Any] = [*map(Text, record["notes"])]
         if record["quantities"]:
-            quantities = [
+            cells = [
                 (f"{row['quantity']} [{units[row['quantity']]}]", f"{row['error']:.2e}", f"{row['at']:.6g}",
                  f"{row['l2']:.1e}", f"{row['bound']:.1e}", _ok(row))
                 for row in record["quantities"]
             ]  # fmt: skip
-            shown.append(table(("quantity", "max error", "at t [s]", "L2 error", "bound", ""), quantities))
+            shown.append(table(("quantity", "max error", "at t [s]", "L2 error", "bound", ""), cells))
         if record["events"]:
             names = ("contact", "t [s]", "reference [s]", "error [s]", "bound [s]", "")
             shown.append(table(names, map(_contact, record["events"])))
@@ -113,47 +74,22 @@ class Crosscheck(Study):
         looks = {"agrees": "bold green", "differs": "bold red", "not comparable": "bold"}
         words = {"not comparable": "not comparable over the run that was asked for"}
         shown.append(Text(words.get(verdict, verdict), style=looks[verdict]))
-        told = {name: record[name] for name in ("verdict", "horizon", "growth", "events", "notes", "scene")}
-        return Findings({**told, "quantities": self.rows(records)}, shown, CODES[verdict])
+        told = ("verdict", "horizon", "growth", "events", "notes", "scene", "quantities")
+        return Findings({name: record[name] for name in told}, shown, CODES[verdict])
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw both motions, and every error below its bound."""
-        record = records[_CASE]
-        if not record["quantities"]:
-            return {}
-        run, reference = (
-            {name: np.array(values) for name, values in record[which].items()} for which in ("motion", "reference")
-        )
-        trajectory = Trajectory(self.scene, run, [Event(**mark) for mark in record["marks"]])
-        with matplotlib.rc_context(STYLE):
-            shown = [_positions(run, reference), _errors(record["quantities"])]
-            figure = timeline(trajectory, "Co-simulation and reference", shown)
-            horizon = drawing.time_unit(trajectory).factor * record["horizon"]
-            figure.axes[1].axvline(horizon, color=BLACK, lw=0.8, ls="--")
-        return {"crosscheck": figure}
+        """Draw both motions, forces and impulses."""
+        from ..pictures.timeline import draw_compared
 
-
-def _positions(run: Mapping[str, np.ndarray], reference: Mapping[str, np.ndarray]) -> Panel:
-    """Return both motions, the reference as a thin line within the other."""
-    curves = []
-    for name in (name for name in POSITIONS if name in reference):
-        ours = Look(POSITIONS[name].colour, f"{name}, co-simulation", Line(2.5, opacity=0.5))
-        curves.append(Curve(name, ours, run["time"], run[name]))
-        curves.append(Curve(name, Look(BLACK, f"{name}, reference", Line(0.7)), reference["time"], reference[name]))
-    return Panel("positions", "Positions", "position", "m", curves, 2.2)
-
-
-def _errors(rows: list[Row]) -> Panel:
-    curves, seen = [], [0.0]
-    for row, colour in zip(rows, _COLOURS, strict=False):
-        name, time = row["quantity"], np.array(row["times"])
-        error, bound = (np.where(np.array(row[part]) > 0.0, row[part], np.nan) for part in ("errors", "bounds"))
-        curves.append(Curve(name, Look(colour, name, Line(0.9)), time, error))
-        curves.append(Curve(name, Look(colour, "", Line(0.9, dashed=True)), time, bound))
-        seen += [float(x) for x in (*error, *bound) if x > 1e-18]
-    limits = min(seen[1:], default=1e-16), 10.0 * (max(seen) or 1.0)
-    quantity = "error (lines), bound (dashed)\n"
-    return Panel("errors", "Errors", quantity, "unit of the quantity", curves, 3.0, logarithmic=limits)
+        runs = {
+            name: Trajectory(
+                self.scene,
+                {column: np.array(values) for column, values in run["columns"].items()},
+                [Event(**event) for event in run["events"]],
+            )
+            for name, run in records[_CASE]["runs"].items()
+        }
+        return {"crosscheck": draw_compared(runs)} if runs else {}
 
 
 def _ok(row: Mapping[str, Any]) -> str:
@@ -180,7 +116,7 @@ class Orders(Study):
 
     def cases(self) -> dict[str, Row]:
         """Return the macro steps. Raises SceneError if there is no reference to converge to."""
-        refuse_without_reference(self.scene)
+        event_driven.refuse(self.scene)
         H, halvings = self.scene.coupling.H, range(_HALVINGS + 1 - self.quick)
         return {f"H/{2**k}" if k else "H": {"coupling.macro_step": H / 2**k} for k in halvings}
 
@@ -190,36 +126,31 @@ class Orders(Study):
         return event_driven.simulate(self.scene, sample_times=macro_points(self.scene))
 
     def measured(self, run: Trajectory, case: Row) -> Row:
-        """Return ``stretches``: the largest errors between two changes of contact each."""
+        """Return ``errors``: a row per quantity between two changes of contact, with the largest error."""
         reference, times, H = self.reference, macro_points(self.scene), self.scene.coupling.H
         names = [name for name in quantities(self.scene) if name not in ("e_beam", "e_spring")]
         off = {name: np.abs(sample(run, times, name) - reference[name]) for name in names}
         changes = [change.time for change in contact_changes(reference, SHORT * H)]
-        stretches = []
+        found = []
         for begin, end in itertools.pairwise([times[0], *changes, self.scene.time.t_end]):
             inside = np.flatnonzero((times > begin) & (times < end) & away_from(times, (begin, end), H))
-            if len(inside) >= 4:
-                phase = reference.phase[inside[len(inside) // 2]]
-                stretch = {"phase": phase, "begin": begin, "end": end}
-                for name in (name for name in names if (name, phase) != ("contact_force", "free")):
-                    known = off[name][inside]
-                    stretch[f"error_{name}"] = float(np.nanmax(known)) if np.isfinite(known).any() else None
-                stretches.append(stretch)
-        return {"stretches": stretches}
+            phase = reference.phase[inside[len(inside) // 2]] if len(inside) >= 4 else ""
+            for name in (name for name in names if phase and (name, phase) != ("contact_force", "free")):
+                error = float(np.nanmax(off[name][inside]))
+                found.append({"phase": phase, "begin": begin, "end": end, "quantity": name, "error": error})
+        return {"errors": found}
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
         """Return a row per stretch and quantity: the errors at all steps, and the orders between neighbours."""
-        steps, several = list(records), [record.get("stretches", ()) for record in records.values()]
         found = []
-        for stretches in zip(*several, strict=True):
-            first = stretches[0]
-            for name in (key for key in first if key.startswith("error_")):
-                errors = [stretch[name] for stretch in stretches]
-                row = {**{key: first[key] for key in ("phase", "begin", "end")}, "quantity": name.partition("_")[2]}
-                row |= {f"error_{step}": error for step, error in zip(steps, errors, strict=True)}
-                for step, (a, b) in zip(steps, itertools.pairwise(errors), strict=False):
-                    row[f"order_{step}"] = float(np.log2(a / b)) if a and b else None
-                found.append(row)
+        for several in zip(*(record.get("errors", ()) for record in records.values()), strict=False):
+            errors = {step: row["error"] for step, row in zip(records, several, strict=True)}
+            orders = {
+                f"order_{step}": float(np.log2(a / b)) if a and b else None
+                for step, (a, b) in zip(errors, itertools.pairwise(errors.values()), strict=False)
+            }
+            same = {name: several[0][name] for name in ("phase", "begin", "end", "quantity")}
+            found.append(same | {f"error_{step}": error for step, error in errors.items()} | orders)
         return found
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
@@ -227,12 +158,14 @@ class Orders(Study):
         rows, steps = self.rows(records), list(records)
         cells = [
             (row["phase"], f"{row['begin']:.4f}", row["quantity"],
-             *("" if row[f"error_{step}"] is None else f"{row[f'error_{step}']:.1e}" for step in steps),
-             " ".join("–" if row[f"order_{step}"] is None else f"{row[f'order_{step}']:.1f}" for step in steps[:-1]))
+             *(f"{row[f'error_{step}']:.1e}" for step in steps),
+             " ".join(number(row[f"order_{step}"], ".1f", "–") for step in steps[:-1]))
             for row in rows
         ]  # fmt: skip
         names = ("phase", "from [s]", "quantity", *steps, "orders")
-        return Findings({"orders": rows}, [table(names, cells, "largest errors", words=("from [s]", "quantity"))])
+        stopped = [Text(f"stopped   {name}: {r['error']}") for name, r in records.items() if r["error"]]
+        shown = table(names, cells, "largest errors", words=("from [s]", "quantity"))
+        return Findings({"orders": rows}, [shown, *stopped])
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw errors over the macro step, a panel a stretch."""

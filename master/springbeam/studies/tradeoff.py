@@ -24,7 +24,7 @@ from ..run.runner import simulate
 from ..scene import Scene, SceneError, with_changes
 from ..scene.resolution import mesh_frequency, slowest_frequency
 from ..scene.tables import ALL_MODES_UP_TO
-from .comparison import comparable_until, refuse_without_reference
+from .comparison import comparable_until
 from .design import RIGID, SOFT
 from .metrics import costs, errors, motion_errors, worst
 from .rivals import TOLERANCES, Rival
@@ -73,7 +73,7 @@ class Tradeoff(Study):
 
         Raises SceneError if no reference is defined for the scene.
         """
-        refuse_without_reference(scene)
+        event_driven.refuse(scene)
         window = comparable_until(scene) if until is None else min(until, scene.time.t_end)
         remarks = []
         if scene.accuracy is not None:
