@@ -14,10 +14,9 @@ HEAD = """# Scene files
 Made by `python docs/scene.py` from the declarations that `springbeam keys` lists.
 
 A scene is a TOML file of tables. All values are SI, up is positive. A missing `[beam]`, `[spring]` or `[stop]` is a
-scene without it. Invalid keys and values are rejected; the error names the key and the allowed values. A
-key that plays no part in the scene (`rho_inf` with the modal integrator, `stiffness` of a tie) is named in a warning.
-`springbeam new NAME` writes a commented scene to start from. The symbols are those of [model.md](model.md), the
-schemes those of [coupling.md](coupling.md).
+scene without it. Invalid keys and values are rejected; the error names the key and the allowed values. A key that
+plays no part in the scene is named in a warning. `springbeam new NAME` writes a commented scene to start from. The
+symbols are those of [model.md](model.md), the schemes those of [coupling.md](coupling.md).
 
 **Editors** complete and check keys by the JSON Schema [scene.schema.json](scene.schema.json), which
 `springbeam keys --schema` prints: with Taplo or Even Better TOML, the first line of a scene beside it is
@@ -25,21 +24,55 @@ schemes those of [coupling.md](coupling.md).
 """
 
 
+#: How the values of a key are told in a narrow column.
+SHORT = {
+    "a finite number": "number",
+    "a whole number": "integer",
+    "a text in quotes": "text",
+    "greater than": ">",
+    "less than": "<",
+    "at least": "≥",
+    "at most": "≤",
+    " and ": ", ",
+    '" or "': '", "',
+}
+COLUMNS = ("key", "unit", "value", "default", "meaning")
+
+
+def row(key: reference.Key) -> tuple[str, ...]:
+    """Return a line of a table."""
+    value = key.allowed
+    for words, short in SHORT.items():
+        value = value.replace(words, short)
+    return f"`{key.name}`", key.unit, value, key.default, key.meaning.replace("|", "\\|")
+
+
+def elements() -> list[str]:
+    """Return one table of the keys of all bodies that need no FMU."""
+    names = [name for name in reference.MODELS if name in reference.PARTNERS and name != "fmu"]
+    of: dict[tuple[str, ...], list[str]] = {}
+    for name in names:
+        for key in reference.listed(name):
+            if key.name != "element":
+                of.setdefault(row(key), []).append(f"`{name}`")
+    about = [f'* `element = "{name}"`: {reference.about(name)}' for name in names]
+    rows = [(*cells, ", ".join(of[cells])) for cells in of]
+    return ["## [beam] or [spring] with element\n", *about, "", *table((*COLUMNS, "of"), rows), ""]
+
+
 def page() -> str:
     """Return the text of scene.md."""
     lines = [HEAD]
     for name, model in reference.MODELS.items():
+        if name in reference.PARTNERS and name != "fmu":
+            continue
         heading = reference.heading(name)
         lines += [f"## {heading}\n\n{reference.about(name)}\n" if name else f"## {heading.capitalize()}\n"]
         for ways in model.WAYS:
             marked = ", or ".join(" and ".join(f"`{key}`" for key in group) for group in ways.groups)
             lines.append(f"Give the {ways.thing} one way: {marked}.\n")
-        rows = [
-            (f"`{key.name}`", key.unit, key.allowed, key.default, key.meaning.replace("|", "\\|"))
-            for key in reference.listed(name)
-        ]
-        lines += [*table(("key", "unit", "value", "default", "meaning"), rows), ""]
-    return "\n".join(lines)
+        lines += [*table(COLUMNS, map(row, reference.listed(name))), ""]
+    return "\n".join([*lines, *elements()])
 
 
 def files() -> dict[Path, str]:

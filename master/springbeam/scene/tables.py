@@ -292,7 +292,7 @@ class Contact(Table):
 
     law: str = key("–", "the interface law (docs/contact.md says which)", "transmission", one_of=tuple(LAWS))
     impact: Literal["inelastic", "rest", "tip"] = key(
-        "–", "what a rigid meeting does: both ends get their common velocity; the spring's becomes 0, or the tip's",
+        "–", "when rigid ends meet: both get their common velocity, both keep theirs, or the spring gets the tip's",
         "inelastic",
     )  # fmt: skip
     stiffness: float = key(
