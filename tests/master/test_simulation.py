@@ -29,13 +29,13 @@ def test_contacts_of_the_compliance_law_begin_and_end_where_the_ends_meet(degree
     """Ends are at one place there. Times converge at least with ``order``: a force that opens has a kink."""
     law = {"law": "compliance", "stiffness": 2e3, "exponent": 1.5}
 
-    def changes(size):
-        run = simulate(soft(contact=law, coupling={"scheme": "energy", "degree": degree, "macro_step": size}))
+    def changes(run):
         return [e for e in run.events if e.kind in ("impact", "separation")]
 
-    exact, *runs = (changes(size) for size in (6.25e-5, 1e-3, 2.5e-4))
-    errors = []
-    for events in runs:
+    scene = soft(contact=law, coupling={"scheme": "energy", "degree": degree})
+    exact, errors = changes(event_driven.simulate(scene, sample_times=[0.0])), []
+    for size in (1e-3, 2.5e-4):
+        events = changes(simulate(with_changes(scene, coupling={"macro_step": size})))
         assert [e.kind for e in events] == ["impact", "separation", "impact"]
         for event in events:
             assert event.u_tip == pytest.approx(event.y, abs=1e-13)
@@ -95,15 +95,17 @@ def test_a_damped_contact_that_opens_fast_pushes_only(degree):
     """χ ṗ falls below −1 before it opens: the force is then 0, not a pull; beside the reference."""
     law = {"law": "compliance", "stiffness": 1e4, "exponent": 1.5, "damping": 20.0}
     coupling = {"scheme": "energy", "degree": degree, "macro_step": 2.5e-4}
-    scene = soft(4, contact=law, stop=None, beam={"initial_velocity_slope": -2.0}, coupling=coupling)
+    shot = {"stop": None, "beam": {"initial_velocity_slope": -2.0}, "time": {"t_end": 0.1}}
+    scene = soft(4, contact=law, **shot, coupling=coupling)
     run = simulate(scene)
-    exact = event_driven.simulate(scene, sample_times=np.unique(run.time))
+    rows = np.arange(2, len(run), 10)
+    exact = event_driven.simulate(scene, sample_times=run.time[rows])
     touches = run.gap < 0.0
     assert (20.0 * run.velocity_mismatch[touches]).max() > 1.0
     assert run.contact_force.min() >= (-1e-12 if degree == 0 else -1e-3)
     assert run.compliance_force.min() == 0.0
     for name in ("u_tip", "y"):
-        apart = run[name] - exact[name][np.searchsorted(exact.time, run.time)]
+        apart = run[name][rows] - exact[name][np.searchsorted(exact.time, run.time[rows])]
         assert np.abs(apart).max() < 1e-3 * np.abs(exact[name]).max()
 
 

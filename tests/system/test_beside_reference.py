@@ -32,7 +32,7 @@ def hermite(**changes):
 
 
 def fine(**changes):
-    return with_changes(load_scene("soft"), time={"t_end": 0.25}, coupling={"macro_step": 2.5e-4}, **changes)
+    return soft(time={"t_end": 0.25}, coupling={"macro_step": 2.5e-4}, **changes)
 
 
 ENDS = ["impact", "release", "impact", "separation"]
@@ -119,7 +119,8 @@ CASES = {
 def test_a_run_is_that_of_the_reference(name):
     simulated, scene, bounds = CASES[name]
     run = simulated(scene)
-    exact = event_driven.simulate(scene, sample_times=np.unique(run.time))
+    rows = np.searchsorted(run.time, np.unique(run.time)[:: len(run) // 250 + 1], side="right") - 1
+    exact = event_driven.simulate(scene, sample_times=run.time[rows])
     starts, within = bounds.get("starts", []), bounds.get("within", [])
     assert kinds(run)[: len(starts)] == kinds(exact)[: len(starts)] == starts
     for found in (kinds(run), kinds(exact)):
@@ -133,11 +134,11 @@ def test_a_run_is_that_of_the_reference(name):
         assert ours.energy_loss == pytest.approx(theirs.energy_loss, abs=bounds.get("losses", np.inf))
     given = [sum(pair[k].impulse_foundation for pair in pairs) for k in (0, 1)]
     assert given[0] == pytest.approx(given[1], rel=bounds.get("stop", np.inf))
-    rows = run.time <= bounds.get("until", np.inf)
+    rows = rows[run.time[rows] <= bounds.get("until", np.inf)]
     for column in {"u_tip", "y"} & set(run.columns):
-        there = exact[column][np.searchsorted(exact.time, run.time)]
+        there = exact[column][np.searchsorted(exact.time, run.time[rows])]
         scale = min(np.ptp(exact[column]), np.abs(exact[column]).max())
-        assert np.abs(run[column] - there)[rows].max() <= bounds.get("motion", np.inf) * scale, column
+        assert np.abs(run[column][rows] - there).max() <= bounds.get("motion", np.inf) * scale, column
     assert run.summary["max_energy_residual"] < bounds.get("energy", np.inf)
 
 
