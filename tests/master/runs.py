@@ -19,10 +19,9 @@ SCENES = {
 }
 #: Columns that a picture must get along with.
 ODD_COLUMNS = {
-    "no energy": dict.fromkeys(("e_beam", "e_spring", "e_total"), np.zeros(400)),
     "nothing": {name: np.zeros(400) for name in columns_of(PAIR) if name not in ("time", "phase")},
-    "negative": {"e_spring": np.linspace(-1.0, 1.0, 400)},
-    "stiff, extreme, alternating": {
+    "negative energy, extreme, alternating": {
+        "e_spring": np.linspace(-1.0, 1.0, 400),
         "e_beam": np.full(400, 4.5e9),
         "u_tip": np.full(400, 1e-300),
         "y": np.full(400, -1e300),

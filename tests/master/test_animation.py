@@ -38,7 +38,7 @@ def test_each_frame_is_a_recorded_one_and_says_if_the_motion_is_not_resolved():
         assert shown._words.get_text().split() == ["t", "=", f"{run.time[frame]:.4f}", "s", str(run.phase[frame])]
 
 
-@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+@pytest.mark.parametrize("scene", [SCENES["all"], SCENES["spring"]], ids=["all", "spring"])
 def test_a_gif_plays_as_long_as_asked(tmp_path, recwarn, scene):
     path = tmp_path / "run.gif"
     animate(a_trajectory(scene), path, seconds=0.5, fps=10)

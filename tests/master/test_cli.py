@@ -163,8 +163,9 @@ def test_an_unforeseen_error_is_not_hidden(here, monkeypatch):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
-@pytest.mark.parametrize("arguments", [["scenes"], ["--version"], ["run", "soft", "--no-plots"]])
-@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize(
+    ("arguments", "unbuffered"), [(["--version"], "1"), (["scenes"], ""), (["run", "soft", "--no-plots"], "")]
+)
 def test_an_output_without_room_is_one_error(here, fmu_folder, arguments, unbuffered):
     process = [sys.executable, "-m", "springbeam", *arguments]
     environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}

@@ -153,10 +153,11 @@ def test_the_schemes_keep_their_orders_under_loads(names, scheme, degree, displa
         assert order < expected + 1.5 or error < 1e-12
 
 
-@pytest.mark.parametrize(("scheme", "degree"), [("energy", 0), ("energy", 1), ("energy", 2)])
-@pytest.mark.parametrize("law", ["transmission", "compliance"])
-def test_the_ledger_closes_under_all_kinds_of_loads(scheme, degree, law):
-    scene = with_changes(soft(*SIGNALS, t_end=0.2, scheme=scheme, degree=degree), contact={"law": law, "exponent": 1.5})
+@pytest.mark.parametrize(
+    ("law", "degree"), [("transmission", 0), ("transmission", 1), ("transmission", 2), ("compliance", 2)]
+)
+def test_the_ledger_closes_under_all_kinds_of_loads(law, degree):
+    scene = with_changes(soft(*SIGNALS, t_end=0.1, degree=degree), contact={"law": law, "exponent": 1.5})
     run = simulate(with_changes(scene, beam={"alpha_b": 1e-3}, spring={"damping": 0.3}))
     assert run.summary["max_energy_residual"] < 1e-11
     assert np.ptp(run.e_load) > 1e-3 * run.e_total[0]

@@ -23,9 +23,10 @@ def exact_events():
 
 def errors(run):
     """Return the errors of y before the foundation, over the way there, and of the three event times, relative."""
-    rows = (run.time > 0.0) & (run.time < 0.0712)
+    rows = np.flatnonzero((run.time > 0.0) & (run.time < 0.0712))
+    rows = rows[:: len(rows) // 100 + 1]
     reference = event_driven.simulate(run.scene, sample_times=run.time[rows], t_end=0.0713)
-    y = np.abs(run.y[rows] - reference.y[: rows.sum()]).max() / 0.015
+    y = np.abs(run.y[rows] - reference.y[: len(rows)]).max() / 0.015
     assert [e.kind for e in run.events[:4]] == ["impact", "stop_impact", "release", "impact"]
     late = [abs(e.time - t) / t for e, t in zip(run.events[1:4], exact_events(), strict=True)]
     return float(y), max(late)
@@ -68,9 +69,10 @@ def test_the_compliance_law_follows_the_tolerance():
     contact = {"law": "compliance", "stiffness": 1e4, "exponent": 1.0}
     found = []
     for tolerance in (1e-2, 1e-3, 1e-4):
-        run = simulate(soft(tolerance, t_end=0.07, contact=contact))
-        reference = event_driven.simulate(run.scene, sample_times=run.time)
-        found.append(np.abs(run.y - reference.y).max() / np.ptp(run.y))
+        run = simulate(soft(tolerance, t_end=0.07, contact=contact, beam={"n_elements": 10}))
+        rows = slice(1, None, len(run) // 100 + 1)
+        reference = event_driven.simulate(run.scene, sample_times=run.time[rows])
+        found.append(np.abs(run.y[rows] - reference.y).max() / np.ptp(run.y))
         assert 1e-3 * tolerance < found[-1] < tolerance
         assert run.summary["max_energy_residual"] < 1e-11
     assert 0.7 < np.log10(found[0] / found[2]) / 2.0 < 1.3
@@ -119,8 +121,7 @@ def test_from_rest_rounding_is_no_error():
 
 
 @pytest.mark.parametrize("law", [{"law": "tie"}, {"law": "compliance", "stiffness": 1e4, "exponent": 1.5}])
-@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
-def test_fine_data_ends_no_steps(tmp_path, law, tolerance):
+def test_fine_data_ends_no_steps(tmp_path, law):
     """A record of 3601 lines, as of a shaken base: steps are as long as the error allows, and the rows keep it."""
     times = np.linspace(0.0, 0.9, 3601)
     record = sum(np.sin(2.0 * np.pi * f * times + f) / f for f in (3.0, 7.0, 13.0, 23.0))
@@ -135,11 +136,12 @@ def test_fine_data_ends_no_steps(tmp_path, law, tolerance):
         loads=[{"on": "base", "signal": "table", "file": str(tmp_path / "record.csv"), "amplitude": 20.0}],
     )
     every_line = simulate(with_changes(scene, coupling={"degree": 2, "macro_step": 2.5e-4}))
-    sizes = {"macro_step": None, "relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
-    run = simulate(with_changes(scene, coupling={"degree": 2, **sizes}))
     assert every_line.summary["macro_steps"] >= 4000
-    assert run.summary["macro_steps"] < {1e-4: 130, 1e-6: 400}[tolerance]
-    assert 0.9 in run.time  # where it ends, the load jumps
-    at_rows = every_line.at(run.time)
-    for name in ("u_tip", "y"):
-        assert np.abs(run[name] - at_rows[name]).max() < tolerance * np.ptp(every_line[name])
+    for tolerance, most in ((1e-4, 130), (1e-6, 400)):
+        sizes = {"macro_step": None, "relative_tolerance": tolerance, "absolute_tolerance": 1e-2 * tolerance}
+        run = simulate(with_changes(scene, coupling={"degree": 2, **sizes}))
+        assert run.summary["macro_steps"] < most
+        assert 0.9 in run.time  # where it ends, the load jumps
+        at_rows = every_line.at(run.time)
+        for name in ("u_tip", "y"):
+            assert np.abs(run[name] - at_rows[name]).max() < tolerance * np.ptp(every_line[name])

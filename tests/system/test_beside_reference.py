@@ -9,7 +9,7 @@ from scenes import kinds, scene_from_dict, soft
 
 from springbeam import simulate
 from springbeam.monolithic import event_driven
-from springbeam.scene import load_scene, with_changes
+from springbeam.scene import with_changes
 from springbeam.scene.reading import tomllib
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")

@@ -3,13 +3,11 @@
 import hashlib
 import json
 import os
-import re
 import shutil
 import signal
 import subprocess
 import sys
 import time
-from functools import partial
 from itertools import count
 from pathlib import Path
 from unittest.mock import patch
@@ -96,52 +94,32 @@ def test_a_state_of_another_kind_of_part_is_refused():
 # -- refused --------------------------------------------------------------------------------------------------------
 
 
-def flipped(at, file):
-    changed = bytearray(file)
-    changed[at] ^= 0x04
-    return bytes(changed)
-
-
-def cut(size, file):
-    return file[:size]
-
-
-def foreign(content, _):
-    return content
-
-
-def checksummed(old, new, file):
+def checksummed(content):
     """A file with a good checksum of content that no run writes: no accident, but no traceback either."""
-    content = file.partition(b"\n")[2].replace(old, new, 1) if old else new
     return b"springbeam checkpoint sha256 %s\n%s" % (hashlib.sha256(content).hexdigest().encode(), content)
 
 
-#: What happens to the file, by what its refusal says.
-DAMAGE = {
-    "not a checkpoint of springbeam, or damaged": [
-        *(partial(flipped, at) for at in (0, 10, 22, 40, 100, 3000, -1)),
-        *(partial(cut, size) for size in (0, 1, 21, 60, 120, 2000, -1)),
-        *(partial(foreign, content) for content in (b"PK\x03\x04", b"{}", b"\xff" * 100)),
-        partial(foreign, b"springbeam checkpoint\n"),
-        partial(foreign, b"springbeam checkpoint sha256\n"),
-    ],
-    "": [
-        *(partial(checksummed, b"", content) for content in (b"\x90", b"\x91" * 100_000, b"nonsense", b"\xc1")),
-        partial(checksummed, b"version", b"visions"),
-        partial(checksummed, b"macro_steps", b"micro_steps"),
-        partial(checksummed, b"touch", b"couch"),
-        partial(checksummed, b"springbm", b"AAAAngbm"),
-    ],
-}
+def refused_untouched(directory, contents):
+    """Return what `resume` says of each file in the place of the checkpoint; it touches nothing."""
+    for content in contents:
+        (directory / "run.checkpoint").write_bytes(content)
+        before = files(directory)
+        yield refused("resume", directory)
+        assert files(directory) == before
 
 
-@pytest.mark.parametrize(("said", "damage"), [(said, damage) for said, some in DAMAGE.items() for damage in some])
-def test_a_damaged_checkpoint_is_refused_and_nothing_is_touched(interrupted, said, damage):
-    path = interrupted / "run.checkpoint"
-    path.write_bytes(damage(path.read_bytes()))
-    before = files(interrupted)
-    assert re.match(rf"error: .*({said})", refused("resume", interrupted))
-    assert files(interrupted) == before
+def test_a_damaged_checkpoint_is_refused_and_nothing_is_touched(interrupted):
+    good = (interrupted / "run.checkpoint").read_bytes()
+    damaged = [good[:at] + bytes([good[at] ^ 4]) + good[at + 1 :] for at in (0, 10, 22, 40, 100, 3000)]
+    damaged += [good[:size] for size in (0, 1, 21, 60, 120, 2000, -1)]
+    damaged += [b"PK\x03\x04", b"{}", b"\xff" * 100, b"springbeam checkpoint\n", b"springbeam checkpoint sha256\n"]
+    for said in refused_untouched(interrupted, damaged):
+        assert "not a checkpoint of springbeam, or damaged" in said
+    forged = [b"\x90", b"\x91" * 100_000, b"nonsense", b"\xc1"]
+    for old, new in ((b"version", b"visions"), (b"macro_steps", b"micro_steps"), (b"touch", b"couch")):
+        forged.append(good.partition(b"\n")[2].replace(old, new, 1))
+    for said in refused_untouched(interrupted, map(checksummed, forged)):
+        assert said.startswith("error: ")
 
 
 def test_a_run_without_checkpoints_says_how_to_take_them(interrupted):
@@ -300,30 +278,22 @@ def started(directory):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_command_with_3_and_it_goes_on(tmp_path, long, number):
-    run = started(tmp_path / "run")
-    run.send_signal(number)
-    _, errors = run.communicate(timeout=HANGS)
-    assert run.returncode == 3
-    assert "interrupted (reached t = " in errors
-    assert "Traceback" not in errors
-    assert load_trajectory(tmp_path / "run").summary["status"] == "interrupted"
-    printed("resume", tmp_path / "run", "--no-plots", "-q")
-    assert written(tmp_path / "run") == written(long)
-
-
-@pytest.mark.skipif(os.name == "nt", reason="POSIX signals")
-@pytest.mark.parametrize("share", [0.0, 0.6])
-def test_a_run_that_is_killed_loads_and_goes_on_to_the_same_bytes(tmp_path, long, share):
-    """SIGKILL once so much is written; test_recording.py has what a kill leaves of each write."""
+@pytest.mark.parametrize(
+    ("number", "share", "code", "status"),
+    [(signal.SIGTERM, 0.0, 3, "interrupted"), (signal.SIGKILL, 0.6, -signal.SIGKILL, "running")],
+)
+def test_a_run_that_is_ended_from_outside_goes_on_to_the_same_bytes(tmp_path, long, number, share, code, status):
+    """Once so much is written; test_recording.py has what a kill leaves of each write."""
     directory, whole = tmp_path / "run", written(long)
     run = started(directory)
     while run.poll() is None and (directory / "steps.bin").stat().st_size < share * len(whole["steps.bin"]):
         time.sleep(1e-3)
-    run.kill()
-    run.communicate(timeout=HANGS)
-    assert load_trajectory(directory).summary["status"] == "running"
+    run.send_signal(number)
+    _, errors = run.communicate(timeout=HANGS)
+    assert run.returncode == code
+    assert ("interrupted (reached t = " in errors) == (status == "interrupted")
+    assert "Traceback" not in errors
+    assert load_trajectory(directory).summary["status"] == status
     assert all(whole[name].startswith(content) for name, content in written(directory).items())
     printed("resume", directory, "--no-plots", "-q")
     assert written(directory) == whole

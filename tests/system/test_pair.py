@@ -17,7 +17,7 @@ def run(name, **coupling):
 # -- energy ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["soft", "steel-bumper", "beam-on-stop", *(f"paper-fig{k}" for k in (2, 3, 4, 5))])
+@pytest.mark.parametrize("name", ["soft", "steel-bumper", "beam-on-stop", "paper-fig2", "paper-fig5"])
 @pytest.mark.parametrize("factor", [1.0, 5.0, 0.2])
 def test_energy_is_conserved_at_any_macro_step(name, factor):
     scene, bound = load_scene(name), 1e-7 if name.startswith("paper") else 1e-9
