@@ -157,8 +157,7 @@ Status deserialize_state(void* c, const char* function, const void* bytes, std::
     require(bytes, "serializedState");
     require(state, "the FMU state");
     // Purely an output, unlike get_state's: importers leave anything in it.
-    *state = k.keep(
-        deserialize(static_cast<const char*>(bytes), size, guid(), k.instance.n_settings(), k.instance.n_inputs()));
+    *state = k.keep(deserialize(static_cast<const char*>(bytes), size, guid(), k.instance.n_values()));
   });
 }
 

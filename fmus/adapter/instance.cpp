@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 
@@ -46,20 +47,19 @@ void require_allowed(const Variable& v, const Polynomial& p) {
   }
 }
 
-/// What every input is before it is set: nothing acts.
-constexpr Polynomial idle{0.0, unset, unset};
-
 bool is_setting(const Variable& v) { return v.causality == Causality::parameter || v.exact; }
 
 }  // namespace
 
 Instance::Instance() : table_(table()), place_(table_.variables.size()) {
-  for (std::size_t i = 0; i < place_.size(); ++i) {
-    const Variable& v = table_.variables[i];
-    if (v.get && !v.exact) continue;
-    std::vector<const Variable*>& among = is_setting(v) ? fixed_ : inputs_;
-    place_[i] = among.size();
-    among.push_back(&v);
+  for (const bool settings : {true, false}) {
+    for (std::size_t i = 0; i < place_.size(); ++i) {
+      const Variable& v = table_.variables[i];
+      if ((v.get && !v.exact) || is_setting(v) != settings) continue;
+      place_[i] = settable_.size();
+      settable_.push_back(&v);
+    }
+    if (settings) n_settings_ = settable_.size();
   }
   reset();
 }
@@ -67,11 +67,8 @@ Instance::Instance() : table_(table()), place_(table_.variables.size()) {
 void Instance::reset() {
   model_ = make_model();
   progress = {};
-  std::vector<double> starts;
-  starts.reserve(fixed_.size());
-  for (const Variable* v : fixed_) starts.push_back(v->start);
-  settings_ = std::make_shared<const std::vector<double>>(std::move(starts));
-  values_.assign(inputs_.size(), idle);
+  values_.clear();
+  for (const Variable* v : settable_) values_.push_back({v->start, unset, unset});
 }
 
 void Instance::setup(double start, double stop, double tolerance) {
@@ -88,7 +85,7 @@ void Instance::setup(double start, double stop, double tolerance) {
 
 void Instance::ensure_built() {
   if (progress.built) return;
-  for (std::size_t i = 0; i < fixed_.size(); ++i) fixed_[i]->set(*model_, {(*settings_)[i], 0.0, 0.0});
+  for (std::size_t i = 0; i < n_settings_; ++i) settable_[i]->set(*model_, values_[i]);
   model_->build(progress.tolerance);
   for (const Variable& v : table_.variables) {
     const double value = v.get ? v.get(*model_) : 0.0;
@@ -98,23 +95,15 @@ void Instance::ensure_built() {
     }
   }
   progress.built = true;
-  push_inputs();
+  for (std::size_t i = n_settings_; i < settable_.size(); ++i) settable_[i]->set(*model_, values_[i]);
   observe();
 }
 
-void Instance::push_inputs() {
-  for (const std::size_t i : used_) inputs_[i]->set(*model_, values_[i]);
-}
-
-void Instance::show(const Variable& v, std::size_t input) {
+void Instance::changed(std::size_t place) {
+  if (place < n_settings_) progress.built = false;
   if (!progress.built) return;
-  v.set(*model_, values_[input]);
+  settable_[place]->set(*model_, values_[place]);
   observe();
-}
-
-Polynomial& Instance::use(std::size_t input) {
-  if (std::find(used_.begin(), used_.end(), input) == used_.end()) used_.push_back(input);
-  return values_[input];
 }
 
 const Variable& Instance::variable(unsigned reference, Type type, const char* what) const {
@@ -132,9 +121,7 @@ const Variable& Instance::variable(unsigned reference, Type type, const char* wh
 
 double Instance::get(unsigned reference, Type type) {
   const Variable& v = variable(reference, type, "get");
-  if (v.causality == Causality::input) return values_[place_[reference]][0];
-  if (v.causality == Causality::parameter || (progress.phase == instantiated && v.exact))
-    return (*settings_)[place_[reference]];
+  if (!v.get || (progress.phase == instantiated && v.exact)) return values_[place_[reference]][0];
   if (progress.phase == instantiated) {
     throw std::invalid_argument("'" + v.name + "' is not known before initialization mode");
   }
@@ -151,20 +138,8 @@ void Instance::set(unsigned reference, Type type, double value) {
     throw std::invalid_argument("'" + v.name + "' can only be set before the end of initialization mode");
   }
   require_allowed(v, value);
-  const std::size_t place = place_[reference];
-  if (is_setting(v)) {
-    change_setting(place, value);
-    return;
-  }
-  use(place)[0] = value;
-  show(v, place);
-}
-
-void Instance::change_setting(std::size_t place, double value) {
-  auto changed = std::make_shared<std::vector<double>>(*settings_);
-  (*changed)[place] = value;
-  settings_ = std::move(changed);
-  progress.built = false;
+  values_[place_[reference]][0] = value;
+  changed(place_[reference]);
 }
 
 void Instance::set_derivative(unsigned reference, int order, double value) {
@@ -177,9 +152,8 @@ void Instance::set_derivative(unsigned reference, int order, double value) {
   if (!std::isfinite(value)) {
     throw std::invalid_argument("derivative of '" + v.name + "' = " + number(value) + " is not finite");
   }
-  const std::size_t place = place_[reference];
-  use(place)[static_cast<std::size_t>(order)] = value;
-  show(v, place);
+  values_[place_[reference]][static_cast<std::size_t>(order)] = value;
+  changed(place_[reference]);
 }
 
 double Instance::input_derivative(unsigned reference, int order) const {
@@ -223,16 +197,12 @@ double Instance::partial_derivative(unsigned unknown, unsigned known) {
 double Instance::difference(const Variable& of, unsigned known) {
   const Variable& by = table_.variables[known];
   const std::size_t place = place_[known];
-  const double x = is_setting(by) ? (*settings_)[place] : values_[place][0];
+  const double x = values_[place][0];
   const double change = 1e-6 * (x != 0.0 ? std::abs(x) : by.nominal);
   const auto put = [&](double value) {
-    if (is_setting(by)) {
-      change_setting(place, value);
-      ensure_built();
-    } else {
-      use(place)[0] = value;
-      show(by, place);
-    }
+    values_[place][0] = value;
+    changed(place);
+    ensure_built();
   };
   // One side may be out of bounds, its own or those that other parameters set.
   const auto beside = [&](double to, double& result) {
@@ -288,41 +258,38 @@ void Instance::update() {
 
 /// Impulses have acted; after a step derivatives have, too.
 void Instance::settle(bool stepped) {
-  for (const std::size_t i : used_) {
-    Polynomial& value = values_[i];
-    const bool consumed = inputs_[i]->consumed, sloped = stepped && !(std::isnan(value[1]) && std::isnan(value[2]));
-    if (!consumed && !sloped) continue;
-    value = {consumed ? 0.0 : value[0], unset, unset};
-    inputs_[i]->set(*model_, value);
+  for (std::size_t i = n_settings_; i < settable_.size(); ++i) {
+    const bool consumed = settable_[i]->consumed;
+    const Polynomial past = values_[i];
+    const bool sloped = stepped && !(std::isnan(past[1]) && std::isnan(past[2]));
+    if (!(consumed && past[0] != 0.0) && !sloped) continue;
+    values_[i] = {consumed ? 0.0 : past[0], unset, unset};
+    settable_[i]->set(*model_, values_[i]);
   }
   if (stepped) model_->settle();
 }
 
 void Instance::save(Snapshot& s) const {
   s.progress = progress;
-  s.settings = settings_;
-  if (s.foreign) s.inputs.clear();  // it may know inputs that are not used here
-  s.inputs.resize(values_.size(), idle);
-  for (const std::size_t i : used_) s.inputs[i] = values_[i];
+  s.values = values_;
   s.foreign = false;
   s.numerics.clear();
   if (progress.built) model_->save(s.numerics);
 }
 
 void Instance::restore(Snapshot& s) {
-  if (s.foreign) {
-    for (std::size_t i = 0; i < fixed_.size(); ++i) require_allowed(*fixed_[i], {(*s.settings)[i], unset, unset});
-    for (std::size_t i = 0; i < inputs_.size(); ++i) require_allowed(*inputs_[i], s.inputs[i]);
-    for (std::size_t i = 0; i < inputs_.size(); ++i) use(i);
-  }
-  progress.built = progress.built && s.progress.built && progress.tolerance == s.progress.tolerance &&
-                   (settings_ == s.settings || *settings_ == *s.settings);
-  if (settings_ != s.settings) settings_ = s.settings;
-  for (const std::size_t i : used_) values_[i] = s.inputs[i];
+  if (s.foreign)
+    for (std::size_t i = 0; i < settable_.size(); ++i) require_allowed(*settable_[i], s.values[i]);
+  progress.built = progress.built && s.progress.built && progress.tolerance == s.progress.tolerance;
   progress.tolerance = s.progress.tolerance;
+  for (std::size_t i = 0; i < settable_.size(); ++i) {
+    if (std::memcmp(&values_[i], &s.values[i], sizeof values_[i]) == 0) continue;  // which NaN do not equal
+    values_[i] = s.values[i];
+    progress.built = progress.built && i >= n_settings_;
+    if (progress.built) settable_[i]->set(*model_, values_[i]);
+  }
   if (s.progress.built) {
     ensure_built();
-    push_inputs();
     if (s.foreign) model_->require_state(s.numerics);
     model_->restore(s.numerics);
   }

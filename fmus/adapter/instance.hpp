@@ -47,26 +47,21 @@ class Instance {
   /// A foreign snapshot is checked, and then no longer foreign. @throws std::invalid_argument if it is no state
   void restore(Snapshot& snapshot);
 
-  std::size_t n_settings() const { return fixed_.size(); }
-  std::size_t n_inputs() const { return inputs_.size(); }
+  std::size_t n_values() const { return values_.size(); }
 
  private:
   const Variable& variable(unsigned reference, Type type, const char* what) const;
   void observe() { model_->observe((progress.phase & (instantiated | initialization)) != 0); }
-  void push_inputs();
   void settle(bool stepped);
-  void change_setting(std::size_t place, double value);
   double difference(const Variable& of, unsigned known);  ///< the derivative by differences
-  Polynomial& use(std::size_t input);
-  void show(const Variable& v, std::size_t input);  ///< to the model, if there is one
+  void changed(std::size_t place);                        ///< by the importer
 
   const Table& table_;
   std::unique_ptr<Model> model_;
-  std::vector<const Variable*> inputs_, fixed_;          ///< fixed: what is set before the start
-  std::vector<std::size_t> place_;                       ///< of every variable, among the inputs or the fixed
-  std::shared_ptr<const std::vector<double>> settings_;  ///< of the fixed; saved states share it
-  std::vector<Polynomial> values_;                       ///< of the inputs
-  std::vector<std::size_t> used_;                        ///< inputs that were ever set: the others cost nothing
+  std::vector<const Variable*> settable_;  ///< what is set before the start, then the inputs
+  std::size_t n_settings_ = 0;             ///< the former
+  std::vector<std::size_t> place_;         ///< of every variable, among these
+  std::vector<Polynomial> values_;         ///< of these
 };
 
 }  // namespace fmi

@@ -107,14 +107,12 @@ def damaged(blob, position):
     [
         (lambda b: b"", "0 bytes are fewer"),
         (lambda b: b[:40], "40 bytes are fewer"),
-        (lambda b: damaged(b, 0), "do not begin with its mark"),
-        (lambda b: damaged(b, 8), "byte order"),
-        (lambda b: damaged(b, 12), "format"),
-        (lambda b: damaged(b, 20), "written by the FMU"),
-        (lambda b: b[:-8], "its header announces"),
-        (lambda b: b + b"\0" * 8, "its header announces"),
+        (lambda b: damaged(b, 0), "not written by the FMU"),
+        (lambda b: damaged(b, 20), "not written by the FMU"),
+        (lambda b: b[:-8], "checksum"),
+        (lambda b: b + b"\0" * 8, "checksum"),
         (lambda b: damaged(b, len(b) - 1), "checksum"),
-        (lambda b: bytes(len(b)), "do not begin with its mark"),
+        (lambda b: bytes(len(b)), "not written by the FMU"),
     ],
 )
 def test_foreign_bytes_are_refused_with_the_reason(case, damage, why):
@@ -128,4 +126,4 @@ def test_a_state_of_the_other_fmu_is_refused(beam, spring):
     blob = beam.running().serialized()
     k = spring.running()
     assert k.try_deserialize(blob)[0] == ERROR
-    assert f"written by the FMU {beam.description.guid}" in k.message
+    assert f"not written by the FMU {spring.description.guid}" in k.message

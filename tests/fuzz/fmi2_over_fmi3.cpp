@@ -57,7 +57,7 @@ bool may_be_initialized(const Adapter* a) {
   std::vector<fmi3Byte> bytes(size);
   fmi3SerializeFMUState(a->c, state, bytes.data(), size);
   fmi3FreeFMUState(a->c, &state);
-  std::copy_n(bytes.begin() + 72, sizeof phase, reinterpret_cast<fmi3Byte*>(&phase));
+  std::copy_n(bytes.begin() + 48, sizeof phase, reinterpret_cast<fmi3Byte*>(&phase));
   return phase == fmi::instantiated;
 }
 

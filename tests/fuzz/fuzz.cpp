@@ -918,16 +918,14 @@ class Episode {
     k.states.push_back(made);
   }
 
-  /// Header of snapshot.cpp: mark, order, format, GUID (40), count, checksum; then doubles.
+  /// Header of snapshot.cpp: GUID (40), checksum; then doubles.
   void forge(std::vector<char>& blob) {
-    constexpr std::size_t header = 72, count_at = 56, checksum_at = 64;
+    constexpr std::size_t header = 48, checksum_at = 40;
     if (blob.size() <= header) return;
     std::size_t n = (blob.size() - header) / sizeof(double);
     if (random_.chance(0.2)) {
       n = random_.below(n + 8);
       blob.resize(header + n * sizeof(double));
-      const std::uint64_t count = n;
-      std::memcpy(&blob[count_at], &count, sizeof count);
     }
     const std::size_t changes = 1 + random_.below(4);
     for (std::size_t i = 0; n > 0 && i < changes; ++i) {
