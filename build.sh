@@ -63,8 +63,8 @@ or name a prefix that has them: SPRINGBEAM_PREFIX=/path ./build.sh …"
 
 python_is_recent() { "$1" -c 'import sys; sys.exit(sys.version_info < (3, 10))' 2>/dev/null; }
 
-set_up_python() {
-  local base=${PYTHON:-python3} stamp
+make_environment() {
+  local base=${PYTHON:-python3}
   if ! [ -x $python ] || ! $python -m pip --version >/dev/null 2>&1; then
     command -v "$base" >/dev/null || install_packages "Python is" python3 python3-venv
     python_is_recent "$base" || die "$base is older than 3.10; name a later one: PYTHON=… ./build.sh …"
@@ -77,14 +77,24 @@ set_up_python() {
       "$base" -m venv $venv || die "$base -m venv failed"
     fi
   fi
-  stamp=$(cat pyproject.toml | cksum)" $1"
-  if [ "$(cat "$venv/.installed-$1" 2>/dev/null)" != "$stamp" ]; then
-    say "installing Python packages ($1)"
-    # Python compiles what it imports: to compile all that there is would take as long as to install it.
-    $python -m pip install --quiet --no-compile --disable-pip-version-check -e ".[$1]" ||
-      die "pip could not install the packages of pyproject.toml (is there a network, or PIP_INDEX_URL to set?)"
-    printf '%s' "$stamp" >"$venv/.installed-$1"
-  fi
+}
+
+# install NAME PACKAGE… — with pip, once for each state of pyproject.toml.
+install() {
+  local installed=$venv/.installed-$1 stamp
+  stamp=$(cksum <pyproject.toml)" $*"
+  [ "$(cat "$installed" 2>/dev/null)" != "$stamp" ] || return 0
+  say "installing Python packages ($1)"
+  shift
+  # Python compiles what it imports: to compile all that there is would take as long as to install it.
+  $python -m pip install --quiet --no-compile --disable-pip-version-check "$@" ||
+    die "pip could not install $* (is there a network, or PIP_INDEX_URL to set?)"
+  printf '%s' "$stamp" >"$installed"
+}
+
+set_up_python() {
+  make_environment
+  install "$1" -e ".[$1]"
 }
 
 # has_header HEADER — where CMake would look for it.
@@ -120,8 +130,11 @@ build() {
   # One at a time: two would build into the same folder.
   exec 9<.
   command -v flock >/dev/null && { flock -n 9 || { say "waiting for another build"; flock 9; }; }
-  set_up_python dev
-  local configured
+  make_environment
+  # What the build takes comes first, FMPy for its headers; all else is installed while the compiler works.
+  install build --no-deps cmake ninja fmpy
+  install dev -e ".[dev]" &
+  local configured packages=$!
   configured="$PWD ${SPRINGBEAM_PREFIX:-} ${CMAKE_PREFIX_PATH:-} ${CXX:-} $sundials"
   if [ "$(cat build/.configured 2>/dev/null)" != "$configured" ]; then
     rm -rf build
@@ -141,6 +154,7 @@ build() {
   [ ! -f build/win64/beam.dll ] || { get_sundials && fmus/win64/build.sh build/win64 $python; }
   say "building"
   $venv/bin/ninja -C build ${JOBS:+-j "$JOBS"} --quiet "$@" >&2 || die "the build stopped, see above"
+  wait $packages
   exec 9<&-
 }
 

@@ -135,6 +135,10 @@ class Instance:
 
     BOOLEAN = ct.c_int
 
+    def counted(self, n):
+        """Return what follows an array of ``n`` values: FMI 3.0 asks for their number."""
+        return ()
+
     @property
     def message(self):
         """The last one."""
@@ -145,7 +149,7 @@ class Instance:
 
     def access(self, function, references, n, values):
         """Get or set values of ``n`` variables."""
-        return self.call(function, references, ct.c_size_t(n), values)
+        return self.call(function, references, ct.c_size_t(n), values, *self.counted(n))
 
     def free(self):
         if self.component:
@@ -211,15 +215,15 @@ class Instance:
         return self.call("SetRealInputDerivatives", reference, 1, (ct.c_int * 1)(order), (ct.c_double * 1)(value))
 
     def derivative(self, name, order=1):
-        reference = self.fmu.references(name)
-        value = (ct.c_double * 1)(math.nan)
-        return self.call("GetOutputDerivatives", reference, ct.c_size_t(1), (ct.c_int * 1)(order), value), value[0]
+        reference, value = self.fmu.references(name), (ct.c_double * 1)(math.nan)
+        arguments = (reference, ct.c_size_t(1), (ct.c_int * 1)(order), value, *self.counted(1))
+        return self.call("GetOutputDerivatives", *arguments), value[0]
 
     def partials(self, outputs, name):
         """Return the status, and the derivatives of the outputs by an input or, before the start, by a parameter."""
-        values = (ct.c_double * len(outputs))(*[math.nan] * len(outputs))
+        n, values = len(outputs), (ct.c_double * len(outputs))(*[math.nan] * len(outputs))
         unknown, known, one = self.fmu.references(*outputs), self.fmu.references(name), (ct.c_double * 1)(1.0)
-        arguments = (unknown, ct.c_size_t(len(outputs)), known, ct.c_size_t(1), one, values)
+        arguments = (unknown, ct.c_size_t(n), known, ct.c_size_t(1), one, *self.counted(1), values, *self.counted(n))
         return self.call("GetDirectionalDerivative", *arguments), list(values)
 
     def try_step(self, time, size):
@@ -289,8 +293,8 @@ class Instance3(Instance):
     def _log3(self, environment, status, category, message):
         self.messages.append((status, category.decode(), message.decode()))
 
-    def access(self, function, references, n, values):
-        return self.call(function, references, ct.c_size_t(n), values, ct.c_size_t(n))
+    def counted(self, n):
+        return (ct.c_size_t(n),)
 
     def try_enter(self, start=0.0, stop=None, tolerance=None):
         return self.call("EnterInitializationMode", *self._experiment(start, stop, tolerance))
@@ -307,17 +311,6 @@ class Instance3(Instance):
 
     def derive(self, name, order, value):
         return self.try_set(f"der({name}{'' if order == 1 else f',{order}'})", value)
-
-    def derivative(self, name, order=1):
-        reference, one = self.fmu.references(name), ct.c_size_t(1)
-        value = (ct.c_double * 1)(math.nan)
-        return self.call("GetOutputDerivatives", reference, one, (ct.c_int * 1)(order), value, one), value[0]
-
-    def partials(self, outputs, name):
-        values = (ct.c_double * len(outputs))(*[math.nan] * len(outputs))
-        unknown, known, seed = self.fmu.references(*outputs), self.fmu.references(name), (ct.c_double * 1)(1.0)
-        n, one = ct.c_size_t(len(outputs)), ct.c_size_t(1)
-        return self.call("GetDirectionalDerivative", unknown, n, known, one, seed, one, values, n), list(values)
 
     def try_step(self, time, size):
         told = [ct.byref(value) for value in (self.event, self.end, self.early, self.last)]

@@ -211,19 +211,6 @@ def test_wrong_parameters_are_told_once(beam, spring, what):
     assert count in (None, pair.spring.integer("warnings"))
 
 
-def test_nothing_passed_on_before_the_first_step_is_told(beam, spring):
-    for known in (True, False):  # start values of the spring's inputs
-        pair = Pair(beam, spring, 1e-3)
-        pair.start() if known else pair.start(tip_velocity_forecast=0.0)
-        for k, names in ((pair.spring, BY_NAME), (pair.beam, ["tip_force"])):
-            for name in names:
-                k.set(name, 0.0)
-        pair.run(0.02)
-        (warning,) = warnings(pair)
-        assert "nothing was passed on before the first step" in warning
-        assert pair.spring.integer("warnings") == 1
-
-
 def test_the_first_force_does_not_depend_on_what_was_seen_before(spring):
     forces = []
     for seen in ([0.0], [0.02, 0.0]):

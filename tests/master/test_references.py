@@ -13,7 +13,6 @@ from springbeam.monolithic import algorithm1, event_driven
 from springbeam.monolithic.laws import law_of
 from springbeam.monolithic.semi_discrete import assemble, constant_forces, modal_beam, points
 from springbeam.scene import Beam, load_scene, with_changes
-from springbeam.scene.statics import SHAPE_POINTS
 from springbeam.studies import exact, verify
 from springbeam.studies.verify.alone import clamped_free_frequencies
 
@@ -316,30 +315,6 @@ def test_the_order_of_the_frequencies_is_twice_the_degree(degree, n, reduced):
     # Of higher degrees the errors of the lowest modes are rounding, those of the highest not small yet.
     judged = orders if degree == 1 else orders[2:4]
     assert np.all(np.abs(judged - 2 * degree) < 0.08 * degree)
-
-
-@pytest.mark.parametrize("degree", [1, 2, 3, 8, 12])
-def test_forms_are_the_integrals_of_polynomials(degree):
-    """θ = x^p, u = x^p/2 lie in the space: ∫ of their squares and strains, ∫u and ∫ψₙu in closed form."""
-    n, length, p = 2, 1.4, degree
-    mesh = {"n_elements": n, "element_degree": degree, "length": length}
-    b = beam(3.0, 5.0, **mesh, density=7.0, area=0.5, second_moment_of_area=0.25)
-    d, loaded = assemble(b), b.model_copy(update={"tip_load_coefficient": 1.0})
-    # Values at the nodes, which are where u = x of the slope shape says.
-    x, q = d.slope_shape[1::2], np.zeros(d.size)
-    q[0::2], q[1::2] = x**p, 0.5 * x**p
-    moment = 3.0 * 0.25 * p * p * length ** (2 * p - 1) / (2 * p - 1)
-    slope, product, square = (length ** (2 * p - 1 + k) / (2 * p - 1 + k) for k in range(3))
-    shear = 5.0 * 0.5 * (0.25 * p * p * slope - p * product + square)
-    assert q @ d.K @ q == pytest.approx(moment + shear, rel=1e-12)
-    assert q @ d.M @ q == pytest.approx(7.0 * (0.25 + 0.25 * 0.5) * square, rel=1e-13)
-    assert d.nodal(*points(b)) @ q == pytest.approx(0.5 * length ** (p + 1) / (p + 1), rel=1e-13)
-    h = length / n
-    left = length - h
-    terms = ((1, p + 2, 1 / h), (-1, p + 1, left / h))
-    hat = sum(sign * (length**k - left**k) / k * factor for sign, k, factor in terms)
-    assert d.nodal(*constant_forces(loaded)) @ q == pytest.approx(0.5 * hat, rel=1e-12)
-    np.testing.assert_allclose(d.deflection_sampler() @ q, 0.5 * (SHAPE_POINTS * length) ** p, atol=1e-14)
 
 
 @pytest.mark.parametrize("n_modes", [1, 3, 8])

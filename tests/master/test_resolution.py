@@ -94,13 +94,6 @@ def test_velocities_that_differ_matter_where_the_ends_part_or_strike():
     assert "where they part or strike" in whole.summary["warnings"][0]
 
 
-def test_a_contact_shorter_than_a_macro_step_is_said():
-    told = not_resolved(PAIR, 0.015, shortest_contact=0.9 * PAIR.coupling.H)
-    assert told is not None
-    assert "a contact lasts 0.9 macro steps only" in told
-    assert not_resolved(PAIR, 0.015, shortest_contact=3.0 * PAIR.coupling.H) is None
-
-
 def test_a_soft_contact_within_a_macro_step_is_lost_to_an_exchange_alone():
     """It finds the force at the ends of the step, where the contact is over: a cell of the grid was 110 % off."""
     for scheme, resolved in (("energy", True), ("gauss_seidel", False), ("jacobi", False)):

@@ -164,17 +164,6 @@ def test_soft_is_predicted():
     assert p.auto[:2] == ("hermite", 2)
 
 
-def test_advice_beyond_the_bound_of_hermite_and_beyond_the_lowest_mode():
-    soft = with_changes(load_scene("soft"), beam={"n_elements": 10})
-    critical = predict(soft).schemes[-1].critical_step
-    coarse = predict(with_changes(soft, coupling={"macro_step": 1.05 * critical}))
-    assert coarse.auto[:2] == ("energy", 2)
-    aliased = predict(with_changes(soft, coupling={"macro_step": 0.1}))
-    assert aliased.auto[:2] == ("energy", 0)
-    assert aliased.resolved_modes == 0
-    assert any("not resolved" in note for note in aliased.notes)
-
-
 def test_compliance_is_predicted_where_it_is_stiffest():
     """p = 1: λ itself; p = 3 at the depth that takes the energy E = 1/6 J: λ δ⁴/4 = E, stiffness 3 λ δ²."""
     soft = with_changes(load_scene("soft"), beam={"n_elements": 5}, contact={"law": "compliance", "exponent": 1.0})

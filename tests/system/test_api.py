@@ -11,9 +11,8 @@ from runs import a_trajectory
 
 import springbeam
 from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
-from springbeam.results.totals import LOSS_NAMES, TOTALS
+from springbeam.results.totals import LOSS_NAMES
 from springbeam.scene.statics import SHAPE_POINTS
-from springbeam.studies.metrics import METRICS
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
@@ -63,21 +62,6 @@ def test_losses_add_up_by_where():
     # The contact force applied, summed up, is what the law's own rows come to.
     rows = np.trapezoid(run.compliance_force, run.time)
     assert run.summary["contact_impulse"] == pytest.approx(rows, rel=1e-3)
-
-
-def test_metrics_are_the_totals(run):
-    for name in (*TOTALS, *LOSS_NAMES):
-        assert METRICS[name](run) == run.summary.get(name)
-    paper = simulate(
-        with_changes(
-            load_scene("paper-fig4"),
-            beam={"n_elements": 4, "n_modes": 0},
-            contact={"law": "paper"},
-            time={"t_end": 0.52},
-        )
-    )
-    assert paper.steps is None
-    assert METRICS["contact_force_max"](paper) is None
 
 
 # -- handed on ------------------------------------------------------------------------------------------------------

@@ -45,6 +45,9 @@ TABLES = {
     "doctor": "",
 }
 
+#: Those that print a name of a file alone, or whose documents are read in the tests of their own.
+WITHOUT_JSON = ("new", "compare", "spectrum", "fit", "report", "animate", "export", "resume")
+
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory):
@@ -81,10 +84,43 @@ def test_every_command_is_looked_at():
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_what_a_command_prints_fits_80_columns(place, arguments, name):
-    shown = printed(name, *arguments(TABLES[name]))
+def test_what_a_command_prints_fits_80_columns_and_its_json_is_one_document(place, arguments, name):
+    """Studies show what they have found once more."""
+    line = [name, *arguments(TABLES[name])]
+    shown = printed(*line)
     assert max(map(len, lines_without_paths(shown))) <= 80
     assert "…" not in shown or name == "stability"  # nothing cut off but reasons, which are in its table
+    if name in WITHOUT_JSON:
+        return
+    document = json.loads(printed(*line, "--json"))
+    if name == "run":
+        directory = Path(document.pop("directory"))
+        assert document == load_summary(directory)
+    elif name == "sweep":
+        assert document["runs"] == {"done": 2, "stopped": 0, "refused": 0, "lost": 0}
+        assert all(Path(file).exists() for file in document["files"])
+    elif name == "crosscheck":
+        assert document["verdict"] == "agrees"
+        assert all(row["error"] <= row["bound"] for row in document["quantities"])
+        assert [event["kind"] for event in document["events"]] == ["closes", "strikes"]
+    elif name == "scenes":
+        assert [scene["name"] for scene in document] == list(shipped_scenes())
+        (soft,) = [scene for scene in document if scene["name"] == "soft"]
+        assert (soft["contains"], Path(soft["file"])) == (["beam", "spring", "stop"], shipped_scenes()["soft"])
+    elif name == "keys":
+        found = {f"{key['table']}.{key['name']}" for key in document}
+        assert {name.replace(".0.", ".") for name in scene_keys()} <= found
+    elif name == "doctor":
+        assert [fmu["error"] for fmu in document["fmus"].values()] == [None, None]
+    elif name == "predict":
+        expected = predict(with_changes(load_scene("soft"), beam={"n_elements": 10}))
+        assert document["omega_max"] == expected.omega_max
+        assert document["schemes"][3]["critical_step"] == expected.schemes[3].critical_step
+        assert document["auto"][:2] == ["hermite", 2]
+    elif name == "stability":
+        assert sum(document["classes"].values()) == document["cells"] == 4
+    else:
+        assert Path(document["directory"], f"{name}.csv").exists()
 
 
 @pytest.mark.parametrize(
@@ -122,47 +158,6 @@ def test_the_command_alone_shows_how_to_start():
 # -- JSON, quiet, colours -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        name
-        for name in TABLES
-        if name not in ("new", "compare", "spectrum", "fit", "report", "animate", "export", "resume")
-    ],
-)
-def test_json_is_one_document_and_all_of_stdout(arguments, tmp_path, monkeypatch, name):
-    monkeypatch.chdir(tmp_path)
-    document = json.loads(printed(name, *arguments(TABLES[name]), "--json"))
-    if name == "run":
-        directory = Path(document.pop("directory"))
-        assert document == load_summary(directory)
-    elif name == "sweep":
-        assert document["runs"] == {"done": 2, "stopped": 0, "refused": 0, "lost": 0}
-        assert all(Path(file).exists() for file in document["files"])
-    elif name == "crosscheck":
-        assert document["verdict"] == "agrees"
-        assert all(row["error"] <= row["bound"] for row in document["quantities"])
-        assert [event["kind"] for event in document["events"]] == ["closes", "strikes"]
-    elif name == "scenes":
-        assert [scene["name"] for scene in document] == list(shipped_scenes())
-        (soft,) = [scene for scene in document if scene["name"] == "soft"]
-        assert (soft["contains"], Path(soft["file"])) == (["beam", "spring", "stop"], shipped_scenes()["soft"])
-    elif name == "keys":
-        found = {f"{key['table']}.{key['name']}" for key in document}
-        assert {name.replace(".0.", ".") for name in scene_keys()} <= found
-    elif name == "doctor":
-        assert [fmu["error"] for fmu in document["fmus"].values()] == [None, None]
-    elif name == "predict":
-        expected = predict(with_changes(load_scene("soft"), beam={"n_elements": 10}))
-        assert document["omega_max"] == expected.omega_max
-        assert document["schemes"][3]["critical_step"] == expected.schemes[3].critical_step
-        assert document["auto"][:2] == ["hermite", 2]
-    elif name == "stability":
-        assert sum(document["classes"].values()) == document["cells"] == 4
-    else:
-        assert Path(document["directory"], f"{name}.csv").exists()
-
-
 def test_json_of_a_run_that_stops_early_is_its_summary_and_the_error_is_on_stderr(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     unstable = ["contact.law=compliance", "coupling.scheme=jacobi", "contact.stiffness=1e9", "coupling.macro_step=1e-2"]
@@ -182,7 +177,7 @@ def test_keys_has_the_schema_and_the_metrics_too():
 
 @pytest.mark.parametrize(
     ("name", "place_of_results"),
-    [("run", "results/soft"), ("sweep", "varied"), ("tradeoff", "traded"), ("report", "page.html")],
+    [("run", "results/soft"), ("sweep", "varied"), ("report", "page.html")],
 )
 def test_quiet_prints_only_where_the_results_are(place, arguments, tmp_path, monkeypatch, name, place_of_results):
     (tmp_path / "done").symlink_to(place / "done")

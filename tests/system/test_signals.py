@@ -60,11 +60,6 @@ def test_what_is_not_driven_or_too_short_has_not_settled():
     assert METRICS["settled_y"](simulate(load_scene("duffing", ["time.t_end=1"]))) is None
 
 
-def test_a_motion_of_twice_the_period_of_its_drive_is_told():
-    found = settled(simulate(load_scene("vibro-impact")))
-    assert found.multiple == 2
-
-
 def test_contacts_are_counted_and_bouncing_ends_with_the_last_closing():
     """A tip on a soft stop under a load that holds it there: told by the sign of the gap on the dense curve."""
     scene = load_scene(
