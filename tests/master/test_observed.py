@@ -18,8 +18,8 @@ TIP, TOP, H = 2.0, 1.0, 1e-3
 SCENE = with_changes(load_scene("soft"), coupling={"macro_step": H})
 
 
-def pair(**contact):
-    scene = with_changes(SCENE, contact=contact)
+def pair(degree=1, **contact):
+    scene = with_changes(SCENE, contact=contact, coupling={"degree": degree})
     return scene, Pair(scene, Upper(TIP), DuffingBody(TOP))
 
 
@@ -65,7 +65,7 @@ def test_a_beam_has_the_momentum_of_its_slowest_swing():
     assert seen.mismatch_at_events == pytest.approx(TIP * 0.3 / momentum, rel=1e-12)
 
 
-@pytest.mark.parametrize(("later", "mismatch"), [(0.4, 0.1), (1.4, 0.5)])
+@pytest.mark.parametrize(("later", "mismatch"), [(0.4, 0.1), (1.4, np.hypot(0.1, 0.5))])
 def test_a_stroke_within_a_macro_step_of_another_is_not_counted(later, mismatch):
     """The rebounds that die out are as slow as one likes, and what the scheme leaves the ends is not."""
     steps = records(Phase(Joint.TIED), v_tip=[0.0, 0.5, 0.4, 0.5, 0.9], z=[0.0, 0.4, 0.4, 0.4, 0.4])
@@ -74,6 +74,35 @@ def test_a_stroke_within_a_macro_step_of_another_is_not_counted(later, mismatch)
     strokes = [Event(float(time), EventKind.STOP_IMPACT) for time in steps["time"][-2:]]
     seen = observed(*pair(), steps, strokes)
     assert seen.mismatch_at_events == pytest.approx(2.0 / 3.0 * mismatch / 0.4, rel=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["separation", "stop_impact"])
+def test_mismatches_of_all_events_add_up(kind):
+    """0.5 m/s at rows 3 and 4 and 0.1 m/s at row 6, of ends that stay tied in the records."""
+    steps = records(Phase(Joint.TIED), v_tip=[0.0, 0.4, 0.4, 0.9, 0.9, 0.4, 0.5], z=[0.0, *6 * [0.4]])
+    steps["phase"], steps["events"] = steps["phase"][0], [0.0, 0.0, 0.0, 1.0, 2.0, 2.0, 3.0]
+    events = [Event(time * H, EventKind(kind)) for time in (3.0, 4.5, 6.0)]
+    steps["time"][4:] += 0.5 * H
+    apart = np.linalg.norm([0.5, 0.5, 0.1])
+    assert observed(*pair(), steps, events).mismatch_at_events == pytest.approx(2.0 / 3.0 * apart / 0.4, rel=1e-12)
+
+
+@pytest.mark.parametrize("number", [3, 4, 12])
+@pytest.mark.parametrize("seated", [False, True])
+def test_at_degree_0_the_force_before_ends_part_tells(number, seated):
+    """It falls by 2 N a step and goes up and down by 3 N, and turns a mismatch of ±0.01 m/s round besides; the first
+    steps, by 50 N more, are too long ago. Of a force of two steps alone nothing is known: the mismatch tells."""
+    phase, n, mass = Phase(Joint.TIED, seated), np.arange(number), TIP if seated else TIP * TOP / (TIP + TOP)
+    w = 0.01 * (-1.0) ** n
+    both = 0.0 if seated else 0.5
+    steps = records(phase, v_tip=both + w, z=np.full(number, both))
+    force = 20.0 - 2.0 * n + (3.0 + 50.0 * (n < number - 8)) * (-1.0) ** n
+    steps["foundation_force" if seated else "contact_force"] = force - mass * (np.roll(w, 1) - w) / H
+    seen = observed(*pair(degree=0), steps, [Event(H * (number - 1), EventKind.SEPARATION)])
+    momentum = TIP * 0.01 if seated else TOP * 0.5
+    alternates = number > 3
+    assert seen.alternation == pytest.approx(3.0 * H / momentum if alternates else 0.0, rel=1e-9)
+    assert seen.mismatch_at_events == pytest.approx(0.0 if alternates else mass * 0.01 / momentum, rel=1e-9)
 
 
 @pytest.mark.parametrize(("mismatch", "size", "swing"), [(9.0, H, 2e-3), (4.0, H, 1e-3), (9.0, 0.9 * H, 0.0)])
@@ -100,7 +129,7 @@ def sinking(depth, force):
 def test_a_contact_is_late_by_each_steps_own_penetration():
     """x²/12 of each step, x² = 2 λ p (1/2 + 1) H² of the deeper of its ends."""
     stiffness, depth = 3.0, np.array([0.0, 0.1, 0.2, -0.1])
-    seen = observed(*pair(law="compliance", stiffness=stiffness, exponent=2.0), sinking(depth, 1.0), [])
+    seen = observed(*pair(0, law="compliance", stiffness=stiffness, exponent=2.0), sinking(depth, 1.0), [])
     assert seen.late == pytest.approx(2.0 * stiffness * (0.1 + 0.2 + 0.2) * 1.5 * H**3 / 12.0, rel=1e-12)
     assert seen.contact_frequency == pytest.approx(np.sqrt(2.0 * stiffness * 0.2 * 1.5), rel=1e-12)
 
@@ -128,9 +157,24 @@ def test_a_contact_between_two_rows_is_seen():
     assert seen.missed == pytest.approx(3.0 * H * 4.0 / 3.0 * 0.3 * half / (1.6 / H), rel=1e-2)
 
 
-def test_contacts_and_strokes_within_a_macro_step_are_one_and_strokes_count_twice():
-    kinds = [(0.0, "impact"), (1.0, "separation"), (5.0, "stop_impact"), (5.5, "stop_impact"), (5.9, "seated")]
+@pytest.mark.parametrize("law", ["compliance", "link"])
+def test_a_force_misplaces_the_lower_end_by_its_course_inside_steps(law):
+    """C is the mean of what the law asks for on a step on which p grows from 0 to 0.1 m: ½ k p. It acts too early."""
+    stiffness, depth = 3.0, np.array([0.0, 0.1])
+    steps = sinking(depth, 0.5 * stiffness * 0.1)
+    seen = observed(*pair(law=law, stiffness=stiffness, exponent=1.0), steps, [])
+    course = stiffness * 0.1 * H**2 * (1.0 / 4.0 - 1.0 / 6.0)  # ∫ (H − τ) C dτ
+    assert seen.missed == pytest.approx(0.0, abs=1e-15)
+    assert seen.misplaced == pytest.approx(course / TOP / 0.1, rel=1e-9)
+    steps["contact_force"], steps["contact_force_rate"] = 0.0, stiffness * 0.1 / H
+    assert observed(*pair(law=law, stiffness=stiffness, exponent=1.0), steps, []).misplaced < 1e-15
+
+
+def test_strokes_count_by_their_impulse_and_twice():
+    """The top has 1 kg·m/s: 2 N·s turns it round, 0.25 N·s counts a quarter of that of 1 N·s or more."""
+    kinds = [("impact", 0.0), ("separation", 0.0), ("stop_impact", 2.0), ("stop_impact", 0.25), ("seated", 0.0)]
     steps = records(Phase(), z=np.ones(9))
     steps["events"] = len(kinds)
-    seen = observed(*pair(), steps, [Event(H * t, EventKind(kind)) for t, kind in kinds])
-    assert seen.contacts == 3
+    events = [Event(H * n, EventKind(kind), impulse_foundation=impulse) for n, (kind, impulse) in enumerate(kinds)]
+    assert observed(*pair(), steps, events).contacts == 1.0 + 2.0 * 1.25
+    assert observed(*pair(), steps, []).contacts == 1.0

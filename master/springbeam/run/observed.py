@@ -32,8 +32,8 @@ NOT_SHOWN = (
     f"compliance_force is larger than {MOST_SHOWN:g} N at times and is written as that, tie_reaction with it; "
     "the motion does not depend on either. A smaller contact.stiffness or contact.exponent keeps them in range"
 )
-#: A stroke on the foundation, which reverses the velocities, amplifies what is late as so many contacts.
-_OF_STROKE = 2
+#: Steps before ends part whose forces tell how far these go up and down, and how many they must be.
+_BEFORE, _LEAST = 8, 3
 #: Places in a step where the law is asked, and their shares: Gauss points, so many because a law that opens has a kink.
 _POINTS, _SHARES = np.polynomial.legendre.leggauss(16)
 _INSIDE = 0.5 * (_POINTS + 1.0), 0.5 * _SHARES
@@ -44,13 +44,15 @@ class Observed(NamedTuple):
 
     speed: float = 0.0  #: the largest of an end [m/s]
     mismatch: float = 0.0  #: |v_tip − z| of ends that a rigid law joins [m/s]
-    mismatch_at_events: float = 0.0  #: impulse μ |v_tip − z| where they part or strike, over the momentum
+    mismatch_at_events: float = 0.0  #: impulses μ |v_tip − z| where they part or strike, over the momentum
+    alternation: float = 0.0  #: of the force before they part, at degree 0: impulse of a step over the momentum
     jitter: float = 0.0  #: of rows where the ends are joined, as far as the mismatch makes it, over the way of an end
     momentum: float = inf  #: the smaller one of both bodies at their largest [kg·m/s]
     contact_frequency: float = 0.0  #: √(k (1/m_tip + 1/m)) of a soft contact at its stiffest [rad/s]
     late: float = 0.0  #: by which the steps make a soft contact late, all together [s]
     missed: float = 0.0  #: impulse by which the force of the steps misses a soft law, over the momentum of a body
-    contacts: int = 1  #: how many, with the strokes, `_OF_STROKE` times; those within a macro step are one
+    misplaced: float = 0.0  #: distance by which that force misplaces the lower end, over the way of that
+    contacts: float = 1.0  #: how many, and twice the strokes, each as far as it turns the lower end's momentum round
     hidden: bool = False  #: whether a compliance force was too large for its column
 
 
@@ -60,28 +62,40 @@ def observed(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event
         return Observed()
     v, z = steps["v_tip_after"], steps["z_after"]
     speed, apart = float(np.abs([v, z]).max()), np.abs(v - z)
-    momentum = min((momentum for momentum in _momenta(scene, pair, steps) if momentum > 0.0), default=inf)
-    met = [event for event in events if event.kind.strikes or event.kind is EventKind.IMPACT]
-    apart_in_time = np.diff([event.time for event in met], prepend=-np.inf) > (scene.coupling.macro_step or 0.0)
-    contacts = int(apart_in_time @ [_OF_STROKE if event.kind.strikes else 1 for event in met]) if met else 1
+    momenta = _momenta(scene, pair, steps)
+    momentum = min((momentum for momentum in momenta if momentum > 0.0), default=inf)
     if pair.law is not None:
         # A link whose ends move as one does not swing, however stiff.
         swings = not pair.lasting or float(apart.max()) > VIBRATION * speed
-        frequency, late, missed = _of_soft_contact(scene, pair, pair.law, steps) if swings else (0.0, 0.0, 0.0)
+        frequency, late, missed, misplaced = _of_soft_contact(scene, pair, pair.law, steps) if swings else (0.0,) * 4
         return Observed(
             speed,
             momentum=momentum,
             contact_frequency=frequency,
             late=late,
             missed=missed / momentum,
-            contacts=contacts,
+            misplaced=misplaced,
+            contacts=_contacts(events, momenta[1]),
         )
     hidden = False
     if pair.joinable and not pair.lasting:
         hidden = bool((normal_compliance(scene, steps["u_tip_after"], steps[:1]) > MOST_SHOWN).any())
-    mismatch, at_events = float(apart[joined(steps)].max(initial=0.0)), _mismatch_at_events(scene, pair, steps, events)
+    mismatch = float(apart[joined(steps)].max(initial=0.0))
+    at_events, alternation = _at_events(scene, pair, steps, events)
     jitter = _jitter(steps, scene.coupling.macro_step, mismatch) if scene.coupling.macro_step and mismatch else 0.0
-    return Observed(speed, mismatch, at_events, jitter, momentum, contacts=contacts, hidden=hidden)
+    contacts = _contacts(events, momenta[1])
+    return Observed(speed, mismatch, at_events, alternation, jitter, momentum, contacts=contacts, hidden=hidden)
+
+
+def _contacts(events: Sequence[Event], momentum: float) -> float:
+    """Return how many contacts amplify what is late; ``momentum`` is the largest of the lower end [kg·m/s].
+
+    A stroke on the foundation reverses velocities and counts twice; one that dies out counts by its impulse.
+    """
+    impacts = sum(event.kind is EventKind.IMPACT for event in events)
+    impulses = [abs(event.impulse_foundation) for event in events if event.kind.strikes]
+    strokes = sum(min(passed / momentum, 1.0) if momentum > 0.0 else 1.0 for passed in impulses)
+    return max(impacts + 2.0 * strokes, 1.0)
 
 
 def why_not_resolved(
@@ -92,11 +106,13 @@ def why_not_resolved(
     return not_resolved(
         scene,
         seen.mismatch_at_events,
+        alternation=seen.alternation,
         jitter=seen.jitter,
         shortest_contact=shortest_contact(steps, events, short, least, free_at_end=free_at_end),
         contact_frequency=seen.contact_frequency,
         late=seen.late,
         missed=seen.missed,
+        misplaced=seen.misplaced,
         contacts=seen.contacts,
         pace=pace(steps),
     )
@@ -115,19 +131,21 @@ def _jitter(steps: np.ndarray, H: float, mismatch: float) -> float:
     return float(min(swing, 0.25 * mismatch * H) / way)
 
 
-def _mismatch_at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> float:
-    """Return the largest impulse μ |v_tip − z| by which joined ends disagree as they part or strike the foundation.
+def _at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Sequence[Event]) -> tuple[float, float]:
+    """Return what is open where joined ends part or strike the foundation: the mismatch, the alternation of the force.
 
-    It is over the momentum of the body that it would change the most. Either end of the last step counts: the mismatch
-    alternates, and where the step is cut it may be small by chance. Strikes less than a macro step after another one
-    are left out, and what happens at the start of a phase: they may be as slow as one likes.
+    The mismatch is the impulse μ |v_tip − z|, the root of the sum of all events' squares. Either end of the last step
+    counts: the mismatch alternates, and where the step is cut it may be small by chance. Strikes less than a macro step
+    after another one are left out, and what happens at the start of a phase: they may be as slow as one likes. At
+    degree 0 the force decides when ends part, as far as some steps before tell how much it alternates (`_alternation`).
+    Both are over the momentum of the body that they would change the most.
     """
     strikes = np.array([event.kind.strikes for event in events], bool)
     let_go = [event.kind.opens or event.kind is EventKind.UNSEATED for event in events]
     counted = np.flatnonzero(strikes | np.array(let_go, bool))
     free, held = pair.reduced_mass(Phase()), pair.reduced_mass(Phase(seated=True))
     if held == 0.0 or not counted.size:
-        return 0.0
+        return 0.0, 0.0
     H = scene.coupling.macro_step or float(steps["size"].max())
     row = np.searchsorted(steps["events"], counted + 1.0)
     before = np.maximum(row - 1, 0)
@@ -137,13 +155,41 @@ def _mismatch_at_events(scene: Scene, pair: Pair, steps: np.ndarray, events: Seq
     made = np.cumsum(steps["size"] > 0.0)
     entered = np.diff(steps["phase"], prepend=steps["phase"][0]) != 0.0
     since = np.maximum.accumulate(np.where(entered, made, 0))
-    row, before = (found[late & joined(steps)[before] & (made[row] > since[before])] for found in (row, before))
+    kept = late & joined(steps)[before] & (made[row] > since[before])
+    row, before, struck = row[kept], before[kept], struck[kept]
     apart = np.abs([steps["v_tip"][row] - steps["z"][row], steps["v_tip_after"][before] - steps["z_after"][before]])
     seated = steps["phase"][before] >= 3.0
-    impulse = np.where(seated, held, free) * apart.max(axis=0, initial=0.0)
-    of_tip, of_lower = (over.max(initial=0.0) for over in (impulse, impulse[~seated]))
-    tip, lower = _momenta(scene, pair, steps)
-    return max(float(of_tip / tip) if of_tip else 0.0, float(of_lower / lower) if of_lower else 0.0)
+    tip, lower = (momentum or inf for momentum in _momenta(scene, pair, steps))
+    momentum = np.where(seated, tip, min(tip, lower))
+    mismatch = np.where(seated, held, free) * apart.max(axis=0, initial=0.0) / momentum
+    alternation = np.full(len(row), np.nan)
+    if scene.coupling.macro_step and pair.joined.degree == 0:
+        alternation[~struck] = _alternation(steps, row[~struck], H, free, held) / momentum[~struck]
+    unknown = np.isnan(alternation)
+    return float(np.linalg.norm(mismatch[unknown])), float(alternation[~unknown].max(initial=0.0))
+
+
+def _alternation(steps: np.ndarray, rows: np.ndarray, H: float, free: float, held: float) -> np.ndarray:
+    """Return by how much the force that can only push alternates before each of ``rows``, as impulse of a step [N·s].
+
+    It is the median over the last steps of a quarter of the force's second difference, without what turns a mismatch of
+    velocities round; NaN where the ends were joined for too few steps. ``free`` is the reduced mass of the ends [kg],
+    ``held`` that while the lower end is seated.
+    """
+    joined_before, seated = np.append(False, joined(steps)[:-1]), np.append(False, steps["phase"][:-1] >= 3.0)
+    whole = (steps["size"] > 0.0) & joined_before
+    size = np.where(whole, steps["size"], H)
+    turned = np.append(0.0, (steps["v_tip_after"] - steps["z_after"])[:-1]) - (steps["v_tip"] - steps["z"])
+    pushed = np.where(seated, impulse(steps, size, name="foundation_force"), impulse(steps, size))
+    pushed = (pushed + np.where(seated, held, free) * turned) * H / size
+    last_not = np.maximum.accumulate(np.where(whole, -1, np.arange(len(steps))))
+    found = np.full(len(rows), np.nan)
+    for i, row in enumerate(rows):
+        end = row if whole[row] else row - 1
+        since = max(last_not[end], end - _BEFORE) + 1
+        if end + 1 - since >= _LEAST:
+            found[i] = np.median(np.abs(np.diff(pushed[since : end + 1], 2))) / 4.0
+    return found
 
 
 def _momenta(scene: Scene, pair: Pair, steps: np.ndarray) -> tuple[float, float]:
@@ -156,31 +202,43 @@ def _momenta(scene: Scene, pair: Pair, steps: np.ndarray) -> tuple[float, float]
     return float(upper), float(lower)
 
 
-def _of_soft_contact(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray) -> tuple[float, float, float]:
-    """Return the frequency at the deepest penetration, also inside steps, `Observed.late` and the impulse missed [N·s].
+def _of_soft_contact(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray) -> tuple[float, float, float, float]:
+    """Return the frequency at the deepest penetration, also inside steps, the time late [s], and what the steps miss.
 
-    A law that never opens is linear: how deep does not matter, and its impulse is that of the mean penetration.
+    That is the impulse [N·s], and how far the lower end is misplaced because the force of a step has the impulse of the
+    law, but not its course: the steps' shares add up until the force falls again. A law that never opens is linear: how
+    deep does not matter, and its mean over a step is that of the mean penetration, however weighted.
     """
     made = np.flatnonzero(steps["size"] > 0.0)
     before, step, size = steps[made - 1], steps[made], steps["size"][made]
     start, end = before["y_after"] - before["u_tip_after"], step["y"] - step["u_tip"]
-    means = (step["y_integral"] - step["u_tip_integral"]) / size
-    twice = (step["y_integral_2"] - step["u_tip_integral_2"]) / size**2
+    mean = (step["y_integral"] - step["u_tip_integral"]) / size
+    early = 2.0 * (step["y_integral_2"] - step["u_tip_integral_2"]) / size**2  # its mean with the weight 2 (1 − τ/H)
     deepest, touching = np.maximum(start, end), slice(None)
     if law.one_sided:
         rates = before["z_after"] - before["v_tip_after"], step["z"] - step["v_tip"]
-        path: Any = Path.through((start, rates[0]), (end, rates[1]), size, (means, twice))  # type: ignore[arg-type]
-        asked = np.zeros(len(step))  # by the law, of each step [N·s]
+        path: Any = Path.through((start, rates[0]), (end, rates[1]), size, (mean, 0.5 * early))  # type: ignore[arg-type]
+        asked, asked_early = np.zeros(
+            (2, len(step))
+        )  # means of the law's force in each step [N], early with the weight
         for s, share in zip(*_INSIDE, strict=True):
             p, rate = path.at(s), path.slope(s) / size
             closed = np.flatnonzero(p > 0.0)
-            asked[closed] += share * size[closed] * [law.force(p[i], rate[i]) for i in closed]
+            forces = [law.force(p[i], rate[i]) for i in closed]
+            asked[closed] += np.multiply(share, forces)
+            asked_early[closed] += np.multiply(2.0 * (1.0 - s) * share, forces)
             deepest = np.maximum(deepest, p)
         touching = deepest > 0.0
     else:
-        asked = size * [law.force(*both) for both in zip(means, (end - start) / size, strict=True)]
-    missed = float(np.linalg.norm(asked - impulse(step, size)))
+        asked = np.array([law.force(*both) for both in zip(mean, (end - start) / size, strict=True)])
+        asked_early = np.array([law.force(*both) for both in zip(early, 2.0 * (mean - start) / size, strict=True)])
+    missed = float(np.linalg.norm(size * asked - impulse(step, size)))
+    rate, bend = step["contact_force_rate"], step["contact_force_rate_2"]
+    applied_early = step["contact_force"] + size * (rate / 3.0 + size * bend / 12.0)
+    way = np.ptp(steps["y_after"]) * pair.lower.mass
+    too_far = np.abs(np.cumsum(0.5 * size**2 * (applied_early - asked_early))).max(initial=0.0)
+    misplaced = float(too_far / way) if 0.0 < way < inf else 0.0
     inverse_mass = sum(1.0 / body.mass for body in (pair.upper, pair.lower) if body.mass > 0.0)
     turns = np.sqrt([inverse_mass * law.slope(p) for p in deepest[touching]]) * size[touching]
     late = float((size[touching] * lateness(scene, turns)).sum())
-    return sqrt(law.slope(float(deepest.max(initial=0.0))) * inverse_mass), late, missed
+    return sqrt(law.slope(float(deepest.max(initial=0.0))) * inverse_mass), late, missed, misplaced

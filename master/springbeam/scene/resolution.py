@@ -21,9 +21,11 @@ TURN = 1.0
 COLLOCATION = (12.0, 720.0, 100800.0)
 #: Share of its way that an end may move, by degree, in the time by which all steps together make the contact late,
 #: times the number of contacts, each of which amplifies that; and where, without a beam's inertia, all that moves is.
-LATE, LATE_IF_MASSLESS = (0.1, 0.4, 0.4), (0.05, 0.05, 0.01)
+LATE, LATE_IF_MASSLESS = (0.15, 0.6, 0.6), (0.05, 0.05, 0.01)
 #: Impulse by which the force of a run may miss a soft law, over the momentum of a body, times the number of contacts.
-MISSED = 0.015
+MISSED = 0.0125
+#: Share of its way by which the course of the force inside steps may misplace the lower end.
+MISPLACED = 0.01
 #: Limit of ω_max H for `hermite` of degree 2, whatever the scene: of 1300 random pairs none grows up to here, the first
 #: one from 3.2 on, and the beam of `soft` only from 3.8 on (docs/coupling.md, "The scheme that fits").
 STABLE = 3.0
@@ -33,7 +35,9 @@ WAVE_LAG = 1.0
 DIES_OUT = 0.15
 #: Impulse by which joined ends disagree as they part or strike the foundation, over the momentum of a body, above which
 #: the motion is called unresolved, by degree (docs/accuracy.md has what it misses).
-MISMATCH = {0: 0.0175, 1: 0.0175, 2: 0.03}
+MISMATCH = {0: 0.05, 1: 0.02, 2: 0.025}
+#: Impulse by which the force of a step goes up and down before ends part, over the momentum of a body.
+ALTERNATION = 0.015
 #: Share of its way by which a row of joined ends may be off a smooth curve: where the phase of the vibration that does
 #: so is lost, the ends are off by twice that.
 JITTER = 0.0055
@@ -54,12 +58,14 @@ def not_resolved(
     scene: Scene,
     mismatch: float,
     *,
+    alternation: float = 0.0,
     jitter: float = 0.0,
     shortest_contact: float = inf,
     contact_frequency: float = 0.0,
     late: float = 0.0,
     missed: float = 0.0,
-    contacts: int = 1,
+    misplaced: float = 0.0,
+    contacts: float = 1.0,
     pace: float = 0.0,
 ) -> str | None:
     """Return in words why the run did not resolve its motion and what would; ``None`` if it did.
@@ -69,8 +75,11 @@ def not_resolved(
     scene
         The scene as run.
     mismatch
-        The largest difference w of the joined ends' velocities as they part or strike the foundation, as impulse μ w of
-        their reduced mass over the momentum of the body that it would change the most.
+        Difference w of the joined ends' velocities where they part or strike the foundation, as impulse μ w of their
+        reduced mass over the momentum of the body that it would change the most; of all events, the root of the sum of
+        squares.
+    alternation
+        By how much the force goes up and down from step to step before ends part, as impulse over that momentum.
     jitter
         By how much the rows of joined ends go up and down about a smooth curve, over the smaller way of an end.
     shortest_contact
@@ -83,8 +92,10 @@ def not_resolved(
     missed
         The impulse by which the force of the steps misses a soft law along the path of the ends, the root of the sum of
         all steps' squares, over the smaller momentum of both bodies.
+    misplaced
+        The distance by which that force misplaces the lower end, over the way of that.
     contacts
-        How many there are, with twice the strokes on the foundation.
+        How many amplify what is late.
     pace
         The largest speed of an end over how far it moves [1/s], of the faster end.
     """
@@ -100,14 +111,19 @@ def not_resolved(
         if scene.massless and scene.contact.rigid:  # the ends are one oscillator, in its steps as in a soft contact's
             contact_frequency = joined_frequency(scene)
             late = scene.duration * lateness(scene, contact_frequency * H)
-        lost = _contact_lost(scene, contact_frequency, H, late * pace * contacts, missed * contacts)
+        lost = _contact_lost(scene, contact_frequency, H, late * pace * contacts, missed * contacts, misplaced)
         if lost := lost or _unstable(scene, H) or _waves_lag(scene, H):
             return lost
     if mismatch > MISMATCH[scene.coupling.degree]:
         return (
-            f"not resolved: the joined ends' velocities differ where they part or strike the foundation, by up to "
+            f"not resolved: the joined ends' velocities differ where they part or strike the foundation, in all by "
             f"{100.0 * mismatch:.2g} % of the momentum of a body; what they do then depends on it. "
             f"{_remedy(scene)}"
+        )
+    if alternation > ALTERNATION:
+        return (
+            "not resolved: the force on joined ends goes up and down from step to step before they part, by "
+            f"{100.0 * alternation:.2g} % of the momentum of a body; it decides when they do. {_remedy(scene)}"
         )
     if jitter > JITTER:
         return (
@@ -136,21 +152,24 @@ def _force_degree(scene: Scene) -> int:
     return scene.coupling.degree if scene.coupling.scheme == "energy" else 0
 
 
-def _contact_lost(scene: Scene, omega: float, H: float, moved: float, missed: float) -> str | None:
+def _contact_lost(scene: Scene, omega: float, H: float, moved: float, missed: float, misplaced: float) -> str | None:
     """Return in words why steps of H [s] do not follow a contact of ``omega`` [rad/s]; ``None`` if they do.
 
     ``moved`` is the share of its way that an end moves while it is late, ``missed`` the share of a momentum by which
-    the forces miss the law, which waves that the steps do not follow let fall with the square of H only.
+    the forces miss the law, ``misplaced`` the share of its way by which they misplace the lower end. Waves that the
+    steps do not follow let the last two fall with the square of H only.
     """
     projected, degree = scene.coupling.scheme == "energy", _force_degree(scene)
     limit = (LATE_IF_MASSLESS if scene.massless else LATE)[degree]
-    excess = max((moved / limit) ** (0.5 / (degree + 1)), (missed / MISSED) ** 0.5)
+    excess = max((moved / limit) ** (0.5 / (degree + 1)), max(missed / MISSED, misplaced / MISPLACED) ** 0.5)
     if excess <= 1.0:
         return None
     raises = projected and degree + 1 < len(COLLOCATION) and (scene.beam is None or scene.beam.integrator == "modal")
     higher = ", a higher coupling.degree allows longer ones" if raises else ""
     where = "together" if scene.massless else "on the contact law at its deepest penetration"
     beside = f", and the forces miss the law by {100.0 * missed:.2g} % of a momentum" if missed > MISSED else ""
+    if misplaced > MISPLACED:
+        beside += f", and misplace the lower end by {100.0 * misplaced:.2g} % of its way"
     return (
         f"not resolved: tip and lower end turn {omega * H:.3g} rad in a macro step"
         f" {where}{beside}. Velocities, forces and times of contact are samples of a "
