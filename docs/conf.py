@@ -1,5 +1,8 @@
 """Settings of `./build.sh docs`: the pages as a site that needs no network to be read."""
 
+import re
+from pathlib import Path
+
 project = html_title = "springbeam"
 extensions = ["myst_parser"]
 html_theme = "furo"
@@ -10,18 +13,21 @@ html_show_sphinx = False
 myst_heading_anchors = 3
 suppress_warnings = ["myst.xref_missing"]
 
-PAGES = {
-    "How to": "tutorial contact accuracy report loads sweeps signals scripting own_fmu tools faq",
-    "Reference": "scene commands files api fmu_variables glossary",
-    "Theory and measurements": "model coupling stability measured performance paper",
-    "Development": "architecture contributing notebook",
-}
+#: Pages by the headings of the index, README.md.
+PAGES: dict[str, list[str]] = {}
+for heading, page in re.findall(
+    r"^\| (?:\*\*(.+)\*\*|\[.*\]\((\w+)\.md\)) \|", Path(__file__).with_name("README.md").read_text("utf-8"), re.M
+):
+    if heading:
+        PAGES[heading] = []
+    else:
+        PAGES[list(PAGES)[-1]].append(page)
 
 
 def setup(app):
     """Give the site its contents, which a code host has no use for."""
     trees = "".join(
-        f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n{chr(10).join(pages.split())}\n```\n"
+        f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n{chr(10).join(pages)}\n```\n"
         for caption, pages in PAGES.items()
     )
 

@@ -60,7 +60,7 @@ class Impact:
 
 
 def meeting(kind: str, v: float, z: float, tip_mass: float, mass: float) -> Impact:
-    """Tip [m/s, kg] meets spring top [m/s, kg] (design: section "Interface laws").
+    """Tip [m/s, kg] meets spring top [m/s, kg] (docs/model.md, "What happens at an event").
 
     ``inelastic``: J = (z − v)/(1/m_tip + 1/m), equal and opposite, both leave with one velocity; ``rest``: velocities
     are kept; ``tip``: z := v (Ahn & Tate, Algorithm 1, line 5), which takes the energy from nowhere and books it.
