@@ -256,17 +256,6 @@ def test_a_tip_that_starts_on_the_stop_acts_on_it_at_once(speed, e, kind):
     assert result.phase[0] == ("seated" if kind == "seated" else "free")
 
 
-def test_an_event_moves_in_proportion_to_a_perturbation_and_not_with_the_rows():
-    scene = soft()
-    base, once, twice = (
-        event_driven.simulate(scene, velocity_perturbation=delta, t_end=0.15).events[2].time
-        for delta in (0.0, 1e-6, 2e-6)
-    )
-    assert (twice - base) / (once - base) == pytest.approx(2.0, rel=1e-4)
-    few = event_driven.simulate(scene, sample_times=[0.2, 0.0], t_end=0.2)
-    assert (few.time.tolist(), few.events[2].time) == ([0.0, 0.2], pytest.approx(base, abs=1e-13))
-
-
 @pytest.mark.parametrize(
     ("changes", "arguments", "message"),
     [

@@ -13,7 +13,6 @@ from commands import HANGS, printed
 from scenes import completed, scene_from_dict
 
 from springbeam.monolithic import event_driven
-from springbeam.results.contact_times import contact_time_difference, impulse_difference
 from springbeam.results.reading import load_trajectory
 from springbeam.results.recording import MemoryRecorder
 from springbeam.run.outcome import RunStopped
@@ -22,6 +21,7 @@ from springbeam.scene import SceneError, with_changes
 from springbeam.scene.reading import tomllib
 from springbeam.scene.statics import tip_load_deflection
 from springbeam.studies import accuracy as search
+from springbeam.studies import metrics
 from springbeam.studies.accuracy import differences, simulate
 from springbeam.studies.crosscheck import Orders
 
@@ -37,12 +37,9 @@ def errors(found):
     span = found.time[-1] - found.time[0]
     times = np.union1d(np.linspace(found.time[0], found.time[-1], 201), found.time[:: len(found) // 25 + 1])
     reference = event_driven.simulate(found.scene, sample_times=times)
-    rows, seen = np.searchsorted(reference.time, times), found.at(times)
-    wrong = {"times": contact_time_difference(found, reference, found.summary["accuracy"]["asked"] * span) / span}
-    for name in {"u_tip", "y"} & set(found.columns):
-        exact = reference[name][rows]
-        wrong[name] = np.abs(seen[name] - exact).max() / np.abs(exact - exact[0]).max()
-    wrong["impulses"] = np.nan_to_num(impulse_difference(found, reference))
+    wrong = metrics.errors(found, reference, found.summary["accuracy"]["asked"] * span)
+    wrong["error_event_time"] /= span
+    wrong = {name: np.nan_to_num(error or 0.0) for name, error in wrong.items() if name != "error_energy"}
     if not found.scene.contact.rigid:
         sharp = {"macro_step": found.scene.coupling.H / 8.0, "tolerance": 1e-12}
         exact = simulate(with_changes(found.scene, coupling=sharp)).summary["contact_force_max"]

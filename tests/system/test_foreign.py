@@ -190,18 +190,6 @@ def test_the_seated_force_is_the_body_s(fmu, heavy, stop):
     assert run.summary["max_energy_residual"] < 1e-9
 
 
-@pytest.mark.parametrize(("contact", "exact", "order"), [({}, linked, 2), (TIE, tied, 4)], ids=["link", "tie"])
-def test_an_fmu_of_fmi_3_is_as_good_as_one_of_fmi_2(fmu, contact, exact, order):
-    """FMI 3.0 has no input derivatives: degree 0, to the rounding of one of FMI 2.0."""
-    three, errors = fmu("three", version="3.0"), []
-    for size in (4e-3, 2e-3):
-        changes = {"contact": contact, "time": {"t_end": 0.04}, "coupling": {"degree": 0, "macro_step": size}}
-        run = simulate(pair(three, **changes))
-        errors.append(error(run, exact))
-    assert order - 0.2 < np.log2(errors[0] / errors[1]) < order + 0.2
-    assert np.abs(run.y - simulate(pair(fmu(), **changes)).y).max() < 1e-15
-
-
 @pytest.mark.parametrize(
     ("spring", "version", "degree", "order"),
     [(ELEMENT, "2.0", 2, 6.0), ({}, "2.0", 2, 6.0), ({}, "3.0", 0, 2.0)],
