@@ -17,7 +17,7 @@ from springbeam.studies.study import record_all
 
 
 def bifurcation() -> None:
-    """Draw what `springbeam sweep vibro-impact --vary loads.0.frequency=25:65:81 --stroboscopic` draws."""
+    """Draw what `springbeam sweep vibro-impact --vary loads.0.frequency=25:65:81 --metric stroboscopic` draws."""
     todo = sweep.Sweep(
         scene=load_scene("vibro-impact"),
         vary=("loads.0.frequency=25:65:81",),

@@ -116,12 +116,24 @@ def test_every_shipped_scene_loads_alone_and_moves(browser, folder, scene):
     shown.page.close()
 
 
+#: The charts whose buttons, or the controls of the motion, lie over a key or over the words of an axis.
+COVERED = """() => [...document.querySelectorAll(".chart")].filter(chart => {
+  const over = [chart.querySelector(".modebar"), document.getElementById("controls")];
+  const words = [...chart.querySelectorAll(".legend, .xtitle")];
+  return over.some(one => words.some(other => {
+    const a = one.getBoundingClientRect(), b = other.getBoundingClientRect();
+    return a.width > 0 && a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  }));
+}).map(chart => chart.id)"""
+
+
 @pytest.mark.parametrize("size", [{"width": 1440, "height": 900}, {"width": 390, "height": 844}], ids=str)
-@pytest.mark.parametrize("scene", ["soft", "paper-fig2"])
-def test_the_slider_is_in_sight_at_once_also_below_warnings(browser, folder, scene, size):
+@pytest.mark.parametrize("scene", ["soft", "paper-fig2", "vibro-impact"])
+def test_the_slider_is_in_sight_at_once_also_below_warnings_and_nothing_covers_words(browser, folder, scene, size):
     shown = Shown(browser, run_and_report(folder, scene), size)
     box = shown.page.locator("#slider").bounding_box()
     assert 0.0 <= box["y"] <= size["height"] - box["height"]
+    assert shown.page.evaluate(COVERED) == []
     shown.page.close()
 
 

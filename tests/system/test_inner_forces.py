@@ -64,7 +64,13 @@ def test_moments_along_the_beam_are_those_of_the_reference_and_the_clamp_bears_t
         np.testing.assert_allclose(mine[2:-1, :12], theirs[there, :12], atol=3e-3 * np.abs(theirs).max())
     np.testing.assert_allclose(run.bending_moment[:, 0], -run.clamp_moment[rows], rtol=1e-9)
     np.testing.assert_allclose(run.shear_force[:, 0], -run.clamp_force[rows], rtol=1e-9)
-    assert np.array_equal(run.at(times[3:5]).bending_moment, run.bending_moment)
+    along = run.at([times[4], 0.25 * times[4] + 0.75 * times[5]])
+    for name in ("bending_moment", "shear_force"):
+        between = getattr(run, name)[4:6]
+        np.testing.assert_allclose(
+            getattr(along, name), [between[0], 0.25 * between[0] + 0.75 * between[1]], rtol=1e-12
+        )
+    np.testing.assert_array_equal(along.shapes[0], along.time)
 
 
 @pytest.mark.parametrize("degree", [0, 2])

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from math import pi, sqrt
 
 import numpy as np
@@ -98,6 +99,23 @@ def test_a_metric_of_ones_own_is_a_column_of_a_sweep(monkeypatch):
     assert row["g"] == pytest.approx(np.abs(run.a_y).max() / 9.80665, rel=1e-12)
 
 
+def test_a_rigid_impact_leaves_no_peak_of_an_acceleration():
+    metrics = ("max_a_tip", "p=max_a_y/g", "q=max(abs(a_y))", "max_v_tip")
+    study = Sweep(scene=load_scene("soft", ["time.t_end=0.05"]), vary=("spring.mass=1,2",), metric=metrics)
+    records = record_all(study)
+    for row in records.values():
+        assert (row["max_a_tip"], row["p"], row["q"]) == (None, None, None)
+        assert row["max_v_tip"] > 0.0
+        jumps = dict(re.findall(r"(a_\w+) has no peak: a rigid impact changes \w+ by (\S+) m/s", row["warnings"]))
+        assert float(jumps["a_tip"]) == pytest.approx(0.99, abs=0.01)  # of 1 m/s, which the inertia of the spring takes
+        assert 0.0 < float(jumps["a_y"]) < 0.01
+    assert any("warnings  of 2 runs" in str(line) for line in study.findings(records).shown)
+    soft = Sweep(
+        scene=load_scene("vibro-impact", ["time.t_end=0.1"]), vary=("beam.n_elements=30,40",), metric=("max_a_tip",)
+    )
+    assert all(row["max_a_tip"] > 0.0 and row["warnings"] == "" for row in record_all(soft).values())
+
+
 def test_a_formula_that_gives_no_number_spoils_its_row_only():
     study = Sweep(scene=oscillator(t_end=0.1), vary=("spring.mass=0.1,0.2",), metric=("a=y*2",))
     for row in record_all(study).values():
@@ -173,6 +191,8 @@ def test_a_rigid_impact_has_no_peak_acceleration_and_a_soft_one_has():
     rigid = spectra(simulate(load_scene("soft", ["time.t_end=0.1"])))
     assert rigid.jumps["tip"] > 0.1
     assert any("there is no peak acceleration" in words for _, words in rigid.in_words())
+    of_tip = spectra(simulate(load_scene("soft", ["time.t_end=0.1"])), of=["a_tip/g"])
+    assert any("of what lies between the impacts: a_tip has no peak" in words for _, words in of_tip.in_words())
     soft = spectra(simulate(load_scene("pulse", ["time.t_end=0.02"])))
     assert soft.jumps == {"tip": 0.0, "spring": 0.0}
     assert not any("no peak acceleration" in words for _, words in soft.in_words())

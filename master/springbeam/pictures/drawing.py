@@ -86,7 +86,6 @@ POSITIONS = {
 }
 VELOCITIES = {"v_tip": Look(BLUE, "tip v(t, L)", Line(1.5)), "z": Look(VERMILLION, "spring top z", Line(0.8))}
 ACCELERATIONS = {"a_tip": Look(BLUE, "tip", Line(1.4)), "a_y": Look(VERMILLION, "spring top", Line(0.8))}
-CLAMP = {"clamp_force": Look(BLUE, "on the beam, upward"), "clamp_moment": Look(BLUE, "on the beam, counter-clockwise")}
 FORCES = {
     "contact_force": Look(ORANGE, "contact C, as applied", Line(2.6, opacity=0.7)),
     "contact_force_smoothed": Look(BLUE, "contact C, smoothed", Line(0.9)),

@@ -17,11 +17,11 @@ from .drawing import (
     ALTERNATES,
     BLACK,
     BLUE,
-    CLAMP,
     ENERGIES,
     FORCES,
     GREEN,
     IMPULSES,
+    LEVELS,
     ORANGE,
     POSITIONS,
     PURPLE,
@@ -45,6 +45,12 @@ from .drawing import (
 _INVISIBLE = 5e-3
 #: A curve that is so much higher than the peak force that the run tells shows another number.
 _ANOTHER_PEAK = 0.01
+#: Heading, quantity, unit and words of what the beam feels.
+_OF_THE_BEAM = {
+    "clamp_force": ("Force of the clamp", "force", "N", "of the clamp, upward"),
+    "clamp_moment": ("Moment of the clamp", "moment", "N·m", "of the clamp, counter-clockwise"),
+    "bending_stress": ("Bending stress", "stress", "Pa", "largest along the beam"),
+}
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 #: Quantity, unit, and columns or fields of events of the panels in which runs are compared.
 _COMPARED = (
@@ -81,7 +87,6 @@ class Panel:
     si: str  #: its unit
     curves: list[Curve]
     height: float = 1.6  #: [inch]
-    levels: dict[str, float] = field(default_factory=dict)  #: heights [m] of Ψ and φ
     logarithmic: tuple[float, float] | None = None  #: limits of a logarithmic axis; stems begin at the lower one
     remarks: list[str] = field(default_factory=list)
 
@@ -119,8 +124,11 @@ def panels(trajectory: Trajectory) -> list[Panel]:
 
 def positions(trajectory: Trajectory) -> Panel:
     """Return tip and spring top, with the levels that are near what moves."""
-    levels = near_levels(trajectory.scene, [trajectory[name] for name in present(trajectory, POSITIONS)])
-    return _lines(trajectory, "positions", "Positions", POSITIONS, "position", "m", height=2.4, levels=levels)
+    panel = _lines(trajectory, "positions", "Positions", POSITIONS, "position", "m", height=2.4)
+    near = near_levels(trajectory.scene, [trajectory[name] for name in present(trajectory, POSITIONS)])
+    ends = trajectory["time"][[0, -1]]
+    panel.curves += [Curve(symbol, LEVELS[symbol], ends, np.full(2, height)) for symbol, height in near.items()]
+    return panel
 
 
 def enlarged(trajectory: Trajectory) -> Panel:
@@ -168,13 +176,12 @@ def loads(trajectory: Trajectory) -> list[Panel]:
 
 
 def inside(trajectory: Trajectory) -> list[Panel]:
-    """Return accelerations, and what the clamp does to the beam."""
-    force, moment = ({name: CLAMP[name]} for name in CLAMP)
-    return [
-        _lines(trajectory, "accelerations", "Accelerations", ACCELERATIONS, "acceleration", "m/s²"),
-        _lines(trajectory, "clamp-force", "Force of the clamp", force, "force", "N", height=1.2),
-        _lines(trajectory, "clamp-moment", "Moment of the clamp", moment, "moment", "N·m", height=1.2),
-    ]
+    """Return accelerations, what the clamp does to the beam, and the largest stress along it."""
+    found = [_lines(trajectory, "accelerations", "Accelerations", ACCELERATIONS, "acceleration", "m/s²")]
+    for column, (heading, quantity, unit, words) in _OF_THE_BEAM.items():
+        look = {column: Look(BLUE, words)}
+        found.append(_lines(trajectory, column.replace("_", "-"), heading, look, quantity, unit, height=1.2))
+    return found
 
 
 def _peak_in_words(trajectory: Trajectory) -> list[str]:

@@ -1,4 +1,4 @@
-"""Pictures of a run: the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5, and loads with accelerations and the clamp.
+"""Pictures of a run: the sub-figures (A)–(E) of Ahn & Tate's Figures 2–5; loads, accelerations and what the beam feels.
 
 Besides colours, lines differ in width or dashes and events in shape, so that the pictures survive a black-and-white
 printer.
@@ -6,7 +6,7 @@ printer.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import matplotlib
@@ -21,18 +21,21 @@ from ..results.trajectory import Trajectory
 from ..scene.statics import SHAPE_POINTS
 from . import panels
 from .drawing import (
+    BLACK,
     GREY,
+    LEVELS,
     POSITIONS,
     VELOCITIES,
     alternates,
     drawable,
     length_along,
+    level_side,
     near_levels,
     pairs,
     present,
     readable_unit,
 )
-from .timeline import DPI, REMARK, STYLE, figure_for, paint_levels, timeline
+from .timeline import DPI, REMARK, STYLE, figure_for, line_style, timeline
 
 _SHAPES_EARLY, _SHAPES_LATER = 20, 24
 #: Early to late, dark to light, but not so light that a line is lost on paper.
@@ -82,14 +85,17 @@ def _drawn(trajectory: Trajectory, picture: str) -> Figure | None:
 # -- (A), (B): the beam's shape -----------------------------------------------------------------------------------
 
 
-def _since_contact(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
-    """Return the times [s] and shapes [m] since the tip first met something, or all; none without a beam."""
+def _since_contact(trajectory: Trajectory, values: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the times [s] since the tip first met something, or all, and ``values`` at these; without any, shapes [m].
+
+    There are none without a beam.
+    """
     if trajectory.shapes is None:
         return np.empty(0), np.empty((0, len(SHAPE_POINTS)))
     times, shapes = trajectory.shapes
     meetings = (event.time for event in trajectory.events if event.kind.collision)
     first = int(np.searchsorted(times, next(meetings, trajectory.time[0])))
-    return times[first:], shapes[first:]
+    return times[first:], (shapes if values is None else values)[first:]
 
 
 def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
@@ -117,25 +123,46 @@ def _shapes_after_contact(trajectory: Trajectory) -> Figure | None:
 
 
 def _shapes_later(trajectory: Trajectory) -> Figure | None:
+    return _later(trajectory, "(B) Subsequent motion of the beam", {"deflection u": ("m", None)})
+
+
+def _moments(trajectory: Trajectory) -> Figure | None:
+    if trajectory.bending_moment is None or trajectory.shear_force is None:
+        return None
+    drawn = {"bending moment": ("N·m", trajectory.bending_moment), "shear force": ("N", trajectory.shear_force)}
+    return _later(trajectory, "(G) Bending moment and shear force along the beam", drawn)
+
+
+def _later(
+    trajectory: Trajectory, title: str, quantities: Mapping[str, tuple[str, np.ndarray | None]]
+) -> Figure | None:
+    """Draw quantities along the beam, a row each: curves at some times with their envelope, and a map of all."""
     times, shapes = _since_contact(trajectory)
     if len(times) < _SHAPES_EARLY:
         return None
-    figure = figure_for(trajectory, "(B) Subsequent motion of the beam", 3.6)
-    left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.06})
+    figure = figure_for(trajectory, title, 0.6 + 3.0 * len(quantities))
+    rows = figure.subplots(len(quantities), 2, squeeze=False, gridspec_kw={"wspace": 0.06})
     jumpy = alternates(shapes[:, -1])
     evenly = np.searchsorted(times, np.linspace(times[0], times[-1], _SHAPES_LATER))
     some = pairs(times, _SHAPES_LATER // 2) if jumpy else np.unique(evenly)
-    _curves(left, trajectory, times[some], shapes[some], "deflection u", "m", bar=True)
-    _map(right, trajectory, times, shapes)
-    if jumpy:
-        left.set_title("pairs of successive shapes: they alternate\nfrom step to step", **REMARK)
+    for (left, right), (what, (unit, found)) in zip(rows, quantities.items(), strict=True):
+        _, values = _since_contact(trajectory, found)
+        x, factor = _curves(left, trajectory, times[some], values[some], what, unit, bar=True)
+        for limit in (values.max(axis=0), values.min(axis=0)):
+            left.plot(x, factor * limit, color=BLACK, lw=0.8, ls=":")
+        _map(right, trajectory, times, values, what, unit)
+        remark = "pairs of successive shapes: they alternate\nfrom step to step; " * jumpy + "dotted: envelope of all"
+        left.set_title(remark, **REMARK)
     return figure
 
 
 def _curves(
     ax: Axes, trajectory: Trajectory, times: np.ndarray, curves: np.ndarray, what: str, unit: str, *, bar: bool
-) -> None:
-    """Draw curves over x, coloured from early (dark) to late; beside deflections [m] the levels that are near."""
+) -> tuple[np.ndarray, float]:
+    """Draw curves over x, coloured from early (dark) to late; beside deflections [m] the levels that are near.
+
+    Returns the places and the factor of the values, as drawn.
+    """
     readable, clock = readable_unit([curves], unit), readable_unit([times], "s")
     x = _along_the_beam(ax, trajectory)
     segments = [np.column_stack([x, readable.factor * curve]) for curve in curves]
@@ -147,14 +174,18 @@ def _curves(
     ax.autoscale_view(scalex=False)
     if unit == "m":
         near = near_levels(trajectory.scene, [curves])
-        paint_levels(ax, {symbol: readable.factor * height for symbol, height in near.items()})
+        for symbol, height in near.items():
+            ax.axhline(readable.factor * height, xmin=0.93, zorder=1, **line_style(LEVELS[symbol]))
+            ax.annotate(symbol, (1.0, readable.factor * height), xycoords=("axes fraction", "data"), fontsize=8.0,
+                        xytext=(3.0, 0.0), textcoords="offset points", va=level_side(symbol, near))  # fmt: skip
     if bar:
         ax.figure.colorbar(lines, ax=ax, label=f"time t [{clock.name}]", pad=0.05, aspect=30)
+    return x, readable.factor
 
 
-def _map(ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray) -> None:
-    """Draw the deflection over x and t."""
-    readable, clock = readable_unit([shapes], "m"), readable_unit([times], "s")
+def _map(ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray, what: str, unit: str) -> None:
+    """Draw values over x and t."""
+    readable, clock = readable_unit([shapes], unit), readable_unit([times], "s")
     x = _along_the_beam(ax, trajectory)
     distinct = np.r_[True, np.diff(times) > 0.0]
     times, shapes = times[distinct], shapes[distinct]
@@ -162,7 +193,7 @@ def _map(ax: Axes, trajectory: Trajectory, times: np.ndarray, shapes: np.ndarray
     mesh = ax.pcolormesh(x, clock.factor * times, readable.factor * shapes, cmap="PuOr", vmin=-largest, vmax=largest,
                          shading="gouraud", rasterized=True)  # fmt: skip
     ax.set_ylabel(f"time t [{clock.name}]")
-    ax.figure.colorbar(mesh, ax=ax, label=f"deflection u [{readable.name}]", pad=0.02, aspect=30)
+    ax.figure.colorbar(mesh, ax=ax, label=f"{what} [{readable.name}]", pad=0.02, aspect=30)
 
 
 def _along_the_beam(ax: Axes, trajectory: Trajectory) -> np.ndarray:
@@ -209,4 +240,5 @@ _DRAWINGS: dict[str, Callable[[Trajectory], Figure | None]] = {
     "velocities_and_forces": _velocities_and_forces,
     "gap_and_energy": _gap_and_energy,
     "loads_and_clamp": _loads_and_clamp,
+    "moments": _moments,
 }

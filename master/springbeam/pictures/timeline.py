@@ -18,13 +18,11 @@ from matplotlib.ticker import LogLocator
 from ..results.trajectory import Trajectory
 from .drawing import (
     GREY,
-    LEVELS,
     MANY_EVENTS,
     VERMILLION,
     Look,
     Unit,
     event_marks,
-    level_side,
     mark,
     shaded_phases,
     time_unit,
@@ -124,7 +122,6 @@ def paint(ax: Axes, panel: Panel, clock: Unit) -> None:
     for curve in panel.curves:
         if not curve.stacked:
             _paint_curve(ax, curve, clock.factor * curve.time, factor * curve.values, panel)
-    paint_levels(ax, {symbol: factor * height for symbol, height in panel.levels.items()}, whole_width=True)
     if panel.logarithmic is not None:
         ax.set_yscale("log")
         ax.set_ylim(panel.logarithmic)
@@ -154,23 +151,6 @@ def _paint_curve(ax: Axes, curve: Curve, time: np.ndarray, values: np.ndarray, p
     if curve.alternates:
         style |= {"linewidth": 0.25, "marker": ".", "markersize": 1.6, "markeredgewidth": 0.0}
     ax.plot(time, values, label=words, **style)
-
-
-def paint_levels(ax: Axes, heights: Mapping[str, float], *, whole_width: bool = False) -> None:
-    """Draw Ψ and φ, at ``heights`` in the unit of the axis, across the panel or as ticks at its right edge."""
-    for symbol, height in heights.items():
-        ax.axhline(height, xmin=0.0 if whole_width else 0.93, zorder=1, **line_style(LEVELS[symbol]))
-        # One above and one below: however near the two levels are, their names are apart.
-        side: str = level_side(symbol, heights)
-        place: dict[str, Any] = {"xytext": (3.0, 0.0), "va": side}
-        if whole_width:  # beside the panel is the key
-            place = {
-                "xytext": (-2.0, -1.5 if side == "top" else 1.5),
-                "ha": "right",
-                "va": side.replace("center", "bottom"),
-            }
-        ax.annotate(symbol, (1.0, height), xycoords=("axes fraction", "data"), textcoords="offset points", fontsize=8.0,
-                    **place)  # fmt: skip
 
 
 def line_style(look: Look) -> dict[str, Any]:

@@ -13,6 +13,8 @@ record as at a row, and its columns follow from that (`springbeam.results.column
 
 At the time of a row the values are the row's, at an event those after it. Orders are those of the polynomials: values
 between rows are no more accurate than the rows.
+
+Shapes, bending moments and shear forces along the beam are linear between those that the run has kept.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ from .columns import columns
 from .extremes import Extremes
 from .paths import Path
 from .steps import joined
-from .trajectory import Event, Trajectory
+from .trajectory import Event, Trajectory, shapes_of
 
 #: Fields that are linear between rows, and do not change with an event.
 _LINEAR = (
@@ -44,10 +46,22 @@ _TOGETHER = 65536
 
 
 def at(run: Trajectory, times: Any) -> Trajectory:
-    """Return ``run`` at ``times`` [s], in any order, shape (n,): the same columns, events, shapes and summary.
+    """Return ``run`` at ``times`` [s], in any order, shape (n,): columns and shapes there, events and summary.
 
-    Raises ValueError for times outside of those that are known, and for a run that has no steps.
+    Before its first shape and after its last one the beam has these. Raises ValueError for times outside of those that
+    are known, and for a run that has no steps.
     """
+    found = rows_at(run, times)
+    table = run.shape_table()
+    if not len(table):
+        return found
+    there = np.column_stack([np.interp(found.time, table[:, 0], column) for column in table.T])
+    there[:, 0] = found.time
+    return replace(found, **shapes_of(there))
+
+
+def rows_at(run: Trajectory, times: Any) -> Trajectory:
+    """Return what `at` does without shapes, for many times."""
     wanted = np.atleast_1d(np.asarray(times, dtype=float))
     if wanted.ndim != 1:
         raise ValueError(f"times of shape {wanted.shape}: one number, or a sequence of them")
@@ -64,7 +78,7 @@ def at(run: Trajectory, times: Any) -> Trajectory:
     before, after = records[between], steps[row[between] + 1]
     records[between] = _between(run.scene, before, after, run.events, wanted[between])
     made = columns(run.scene, records, steps[:1])
-    return replace(run, columns=made, events=list(run.events), summary=dict(run.summary), steps=None)
+    return Trajectory(run.scene, made, list(run.events), summary=dict(run.summary))
 
 
 def extremes(scene: Scene, steps: np.ndarray, name: str) -> Extremes:

@@ -28,6 +28,7 @@ PICTURES = (
     "d_velocities_and_forces.png",
     "e_gap_and_energy.png",
     "f_loads_and_clamp.png",
+    "g_moments.png",
 )
 #: What `springbeam export --format parquet` leaves there.
 PARQUET = ("trajectory.parquet", "events.parquet", "shapes.parquet")

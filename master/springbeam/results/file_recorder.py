@@ -19,6 +19,7 @@ from pydantic_core import to_json
 
 from ..scene import Scene
 from .columns import blocks
+from .dense import rows_at
 from .directory import ResultsUnreadable, RunDirectory
 from .reading import load_events, read_run
 from .recording import Recorder, with_scene
@@ -240,7 +241,7 @@ def at_multiples(run: Trajectory, interval: float) -> dict[str, np.ndarray]:
     """Return the columns of ``run`` at the multiples of ``interval`` [s] from its first to its last row."""
     first, last = (run.time[i] / interval for i in (0, -1))
     times = interval * np.arange(np.ceil(first * (1.0 - _SAME)), np.floor(last * (1.0 + _SAME)) + 1.0)
-    return run.at(np.clip(times, run.time[0], run.time[-1])).columns
+    return rows_at(run, np.clip(times, run.time[0], run.time[-1])).columns
 
 
 def _part(path: Path) -> Path:

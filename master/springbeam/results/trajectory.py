@@ -224,7 +224,8 @@ class Trajectory:
         """Return the run at any ``times`` [s], shape (n,), with the same columns (`springbeam.results.dense`).
 
         Between rows y and u_tip follow the polynomial of order 6 that has the step's ends and moments, the contact
-        force is the polynomial applied, energies are linear. Raises ValueError for times outside of the run, and for a
+        force is the polynomial applied, energies are linear; shapes, moments and shear forces along the beam are linear
+        between those of the run, some 400, and less accurate. Raises ValueError for times outside of the run, and for a
         run that left no steps.
         """
         from .dense import at
@@ -267,7 +268,7 @@ class Trajectory:
 
     def plot(self, picture: str = "positions") -> Figure:
         """Return a matplotlib Figure: ``shapes_after_contact``, ``shapes_later``, ``positions``,
-        ``velocities_and_forces``, ``gap_and_energy`` or ``loads_and_clamp``.
+        ``velocities_and_forces``, ``gap_and_energy``, ``loads_and_clamp`` or ``moments``.
 
         Raises ValueError for another name, and where the run has nothing of it to show.
         """

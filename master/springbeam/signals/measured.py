@@ -19,6 +19,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import correlate, correlation_lags
 
+from ..results.dense import rows_at
 from ..results.trajectory import Trajectory, columns_of
 from ..scene import Scene, SceneError
 from .expressions import GRAVITY, Expression, signal
@@ -175,7 +176,7 @@ def time_shifts(run: Trajectory, measured: Measured) -> tuple[list[float], float
     first, last = float(measured.time[0]), float(measured.time[-1])
     step = max(float(np.median(np.diff(measured.time))), (end - begin + last - first) / _MOST)
     ours, theirs = np.arange(begin, end, step), np.arange(first, last, step)
-    found, total = run.at(ours), np.zeros(len(ours) + len(theirs) - 1)
+    found, total = rows_at(run, ours), np.zeros(len(ours) + len(theirs) - 1)
     one, other = np.ones(len(ours)), np.ones(len(theirs))
     common = np.maximum(correlate(one, other), 1.0)
     for what, values in measured.values.items():
@@ -198,7 +199,7 @@ def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.n
             f"the run is known from {run.time[0]:g} s to {run.time[-1]:g} s, the measurement from {times[0]:g} s to "
             f"{times[-1]:g} s: they have no times in common"
         )
-    found = run.at(times[covered])
+    found = rows_at(run, times[covered])
     return covered, {what: signal(found, what) for what in measured.values}
 
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
+from .expressions import Expression
 from .response import Response, responses
 from .settled import Settled, drive_of, poincare, settled
-from .shock import VELOCITIES, ShockSpectrum, largest_jump, shock_of_run
+from .shock import VELOCITIES, ShockSpectrum, largest_jump, shock_of_run, without_peak
 from .spectra import PowerSpectrum, power_spectrum
 
 #: Oscillators of a shock spectrum in an octave.
@@ -27,6 +28,7 @@ class Spectra:
     shock: Mapping[str, ShockSpectrum]  #: by the end, "tip" or "spring"
     jumps: Mapping[str, float]  #: largest jump of each end's velocity [m/s]
     power: Mapping[str, PowerSpectrum]
+    without_peak: Mapping[str, str]  #: why signals with accelerations of rigid impacts have no peak
     responses: Mapping[str, list[Response]]  #: to each chirp
     points: tuple[np.ndarray, np.ndarray] | None  #: `poincare` once a period of the drive
     settled: Settled | None
@@ -45,6 +47,8 @@ class Spectra:
         for what, power in self.power.items():
             line = power.frequency[1]
             yield f"power of {what}", f"highest at {power.highest:.5g} Hz, lines {line:.3g} Hz apart"
+            if what in self.without_peak:
+                yield "", f"of what lies between the impacts: {self.without_peak[what]}"
         for what, chirps in self.responses.items():
             for chirp in chirps:
                 at = int(np.argmax(chirp.amplitude))
@@ -101,5 +105,6 @@ def spectra(
     if drive is not None and drive.frequency is not None:
         points = poincare(run, 1.0 / drive.frequency, drive.start)
     power = {what: power_spectrum(run, what, begin, segments) for what in wanted}
+    unpeaked = {what: why for what in wanted if (why := without_peak(run, Expression(what).names))}
     chirps = {what: found for what in wanted if (found := responses(run, what))}
-    return Spectra(shock, jumps, power, chirps, points, tail, drive is not None, quality)
+    return Spectra(shock, jumps, power, unpeaked, chirps, points, tail, drive is not None, quality)

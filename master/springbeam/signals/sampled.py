@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..results.dense import rows_at
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
 from .expressions import signal
@@ -40,5 +41,5 @@ def sampled(run: Trajectory, what: str, step: float | None = None, since: float 
     if not 2 <= count <= MOST:
         raise SceneError(f"{what}: {count:,} samples at this step; there must be from 2 to {MOST:,}")
     times = np.linspace(begin, end, count) if step is None else begin + step * np.arange(count)
-    found = run.at(np.minimum(times, end))
+    found = rows_at(run, np.minimum(times, end))
     return Samples(begin, float(times[1] - times[0]), signal(found, what))

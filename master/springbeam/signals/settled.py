@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..results.dense import rows_at
 from ..results.trajectory import Trajectory
 from ..scene import Load
 
@@ -46,7 +47,7 @@ def poincare(run: Trajectory, period: float, start: float = 0.0) -> tuple[np.nda
     first = np.ceil((run.time[0] - start) / period - 1e-9)
     last = np.floor((run.time[-1] - start) / period + 1e-9)
     times = start + period * np.arange(first, last + 1.0)
-    found = run.at(np.clip(times, run.time[0], run.time[-1]))
+    found = rows_at(run, np.clip(times, run.time[0], run.time[-1]))
     return times, np.column_stack([found[name] for name in names])
 
 

@@ -12,6 +12,7 @@ its acceleration would be no number. For the same reason a spectrum that has a j
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -25,8 +26,9 @@ from .sampled import sampled
 _PER_PERIOD = 64
 #: A jump of velocity below this share of the largest speed is none to speak of.
 _JUMP = 1e-3
-#: The velocities whose shock is asked for.
+#: The velocities whose shock is asked for, and the accelerations that they are the integrals of.
 VELOCITIES = {"tip": "v_tip", "spring": "z"}
+_ACCELERATIONS = {"a_tip": "v_tip", "a_y": "z"}
 
 
 class ShockSpectrum(NamedTuple):
@@ -97,6 +99,17 @@ def shock_of_run(run: Trajectory, end: str, frequencies: np.ndarray, quality: fl
             middle = load.value(times[:-1] + 0.5 * samples.step)
             velocity[1:] += samples.step * np.cumsum(middle)
     return shock_spectrum(velocity, samples.step, frequencies, quality)
+
+
+def without_peak(run: Trajectory, columns: Iterable[str]) -> str:
+    """Return which of ``columns`` are accelerations that rigid impacts leave without a peak; "" if none is."""
+    jumps = {name: largest_jump(run, _ACCELERATIONS[name]) for name in columns if name in _ACCELERATIONS}
+    return "; ".join(
+        f"{name} has no peak: a rigid impact changes {_ACCELERATIONS[name]} by {jump:.3g} m/s at once. "
+        'contact.law = "compliance" is not rigid'
+        for name, jump in jumps.items()
+        if jump
+    )
 
 
 def largest_jump(run: Trajectory, column: str) -> float:

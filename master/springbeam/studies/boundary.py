@@ -90,7 +90,7 @@ def boundary(
 def in_words(found: Sequence[Critical], limit: str) -> list[str]:
     """Return what the boundary says: both of its sides."""
     if not found:
-        return [f"boundary  {limit} is not reached anywhere"]
+        return [f"boundary  {limit} is not reached in any run that has a value of it"]
     slowest, least = min(found, key=lambda c: c.velocity_change), min(found, key=lambda c: c.peak)
     return [
         f"boundary  {limit} is reached from a velocity change of {slowest.velocity_change:.4g} on "

@@ -20,6 +20,7 @@ from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import COLUMNS, TOLD, EventKind, Trajectory
 from ..scene import SceneError
 from ..signals.settled import drive_of, poincare, settled
+from ..signals.shock import without_peak
 
 #: The transient of a driven motion that does not settle, as a share of the run.
 _TRANSIENT = 2.0 / 3.0
@@ -34,9 +35,15 @@ class Metric:
     of: Callable[[Trajectory], Any]
     asked: bool = False  #: kept only where it is named
     several: bool = False
+    takes: tuple[str, ...] = ()  #: columns
 
     def __call__(self, run: Trajectory) -> Any:
-        return self.of(run)
+        return None if self.lacking(run) else self.of(run)
+
+    def lacking(self, run: Trajectory) -> str:
+        """Return why the run has no such number, in words if that is not plain to see, else nothing."""
+        absent = [name for name in self.takes if name not in run.columns]
+        return f"the run has no column {', '.join(absent)}" if absent else without_peak(run, self.takes)
 
 
 def _of(column: str, pick: Callable[[np.ndarray], float]) -> Callable[[Trajectory], float | None]:
@@ -119,12 +126,16 @@ METRICS: dict[str, Metric] = {
     **{f"first_{kind}": Metric("s", f"first event {kind}", _first(kind)) for kind in EventKind},
     **{f"number_of_{kind}": Metric("", f"events {kind}", _number(kind)) for kind in EventKind},
     **{
-        f"max_{name}": Metric(unit, f"largest magnitude of {name}", _largest(name), asked=True)
+        f"max_{name}": Metric(unit, f"largest magnitude of {name}", _largest(name), asked=True, takes=(name,))
         for name, unit in _UNITS.items()
     },
     **{
         f"settled_{name}": Metric(
-            unit, f"half the range of {name} once the driven motion has settled", _settled(name), asked=True
+            unit,
+            f"half the range of {name} once the driven motion has settled",
+            _settled(name),
+            asked=True,
+            takes=(name,),
         )
         for name, unit in _UNITS.items()
         if not name.startswith("e_")
@@ -161,10 +172,10 @@ def named(text: str) -> tuple[str, Metric]:
         )
     if name in METRICS:
         raise SceneError(f"--metric {text}: {name} is a metric already; give yours another name")
-    return name, Metric("", what, _own(name, what))
+    return name, _own(name, what)
 
 
-def _own(name: str, what: str) -> Callable[[Trajectory], float | None]:
+def _own(name: str, what: str) -> Metric:
     from ..signals.expressions import Expression, function_of
 
     function = function_of(what)
@@ -183,7 +194,9 @@ def _own(name: str, what: str) -> Callable[[Trajectory], float | None]:
             raise SceneError(f"--metric {name}={what}: gives {np.size(found)} values; a metric is one number")
         return float(np.asarray(found, dtype=float).item())
 
-    return of
+    parts = () if formula is None else formula.names
+    takes = (column for part in parts for column in (METRICS[part].takes if part in METRICS else (part,)))
+    return Metric("", what, of, takes=tuple(takes))
 
 
 def known(names: Sequence[str], *, several: bool = False) -> tuple[str, ...]:

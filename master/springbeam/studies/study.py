@@ -109,12 +109,13 @@ class Study(BaseModel, ABC):
         try:
             run = simulate(self.at(case))
             numbers = {name: metric(run) for name, metric in metrics.items()}
+            lacking = dict.fromkeys(metric.lacking(run) for metric in metrics.values())
         except SceneError as refused:
             row |= {"status": "refused", "error": str(refused)}
         except RunStopped as stopped:
             row |= {"status": "stopped", "error": str(stopped)}
         else:
-            row["warnings"] = "\n".join(run.summary["warnings"])
+            row["warnings"] = "\n".join([*run.summary["warnings"], *filter(None, lacking)])
             row |= numbers | costs(run)
             row |= self.measured(run, case)
         return row if self.parallel else {**row, "cost_wall_time": perf_counter() - began}

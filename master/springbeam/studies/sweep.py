@@ -83,6 +83,8 @@ class Sweep(Study):
         lines = [f"runs      {', '.join(f'{counts[status]} {status}' for status in STATUSES if counts[status])}"]
         if first := next((record["error"] for record in records.values() if record["error"]), None):
             lines.append(f"error     {first}, the first of them")
+        if warned := [record["warnings"] for record in records.values() if record["warnings"]]:
+            lines.append(f"warnings  of {len(warned)} runs, the first of them: {warned[0].splitlines()[0]}")
         document: dict[str, Any] = {"runs": {status: counts[status] for status in STATUSES}}
         if self.boundary:
             document["boundary"] = [critical._asdict() for critical in self._critical(records)]

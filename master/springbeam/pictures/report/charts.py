@@ -13,7 +13,6 @@ from ..drawing import (
     BLACK,
     EVENT_LOOKS,
     GREY,
-    LEVELS,
     MANY_EVENTS,
     Look,
     Marker,
@@ -89,12 +88,6 @@ def _of_panel(trajectory: Trajectory, panel: Panel) -> Chart:
             hovertemplate=f"%{{y:.6g}} {panel.unit.name}",
             **_style(curve, panel),
         )
-    ends = clock * trajectory["time"][[0, -1]]
-    for symbol, height in panel.levels.items():
-        figure.add_scatter(
-            x=ends, y=factor * np.array([height, height]), mode="lines", name=LEVELS[symbol].words,
-            line=_line_style(LEVELS[symbol]), hoverinfo="skip",
-        )  # fmt: skip
     figure.update_yaxes(title_text=panel.axis)
     if panel.logarithmic is not None:
         begin, end = (float(np.log10(limit)) for limit in panel.logarithmic)
@@ -140,7 +133,7 @@ def moving_chart(sketch: Sketch, frames: Frames) -> Chart:
         shown = part in ("beam", "top")
         figure.add_scatter(
             x=x, y=sketch.unit.factor * frames.heights(part, 0) if part is not None else y, mode="lines+text",
-            text=["", label] if label else None, textposition="middle right", cliponaxis=False, meta=part,
+            text=["", f"\u00a0{label}"] if label else None, textposition="middle right", cliponaxis=False, meta=part,
             name=look.words, line=_line_style(look), showlegend=part is not None, hoverinfo=None if shown else "skip",
             hovertemplate=f"%{{y:.6g}} {sketch.unit.name}" if shown else None,
         )  # fmt: skip
