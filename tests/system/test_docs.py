@@ -15,7 +15,7 @@ from commands import COMMAND, HANGS, command
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md")), *sorted(ROOT.glob("src_*/README.md"))]
 
 #: What each program prints, as a regular expression, by page and number of the block.
 PROGRAMS = {
