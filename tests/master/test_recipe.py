@@ -79,8 +79,8 @@ def test_the_window_of_its_peak_force_and_its_frequency_are_its_own():
     # The law's peak, not a mean over a fiftieth of the beam's period.
     assert run.summary["contact_force_max"] == pytest.approx(np.max(run.contact_force), rel=0.02)
     found = predict(scene)
-    assert found.contact_frequency == pytest.approx(
-        np.sqrt(slope * (1.0 / found.tip_mass + 1.0 / scene.spring.mass)), rel=1e-12
+    assert found["contact_frequency"] == pytest.approx(
+        np.sqrt(slope * (1.0 / found["tip_mass"] + 1.0 / scene.spring.mass)), rel=1e-12
     )
 
 

@@ -48,17 +48,6 @@ def test_linear_elements_converge_by_order_two(tmp_path):
     assert written == {"study.jsonl", "converge.csv", "converge.parquet", "converge.png"}
 
 
-@pytest.mark.parametrize("asked", [{"coupling": {"relative_tolerance": 1e-4}}, {"accuracy": 1e-3}])
-def test_finer_steps_follow_from_what_the_scene_asks_for(asked):
-    """Neither is a macro step, which there is none of to be halved: one was an error, the other changed nothing."""
-    scene = with_changes(load_scene("soft"), beam={"n_elements": 5}, time={"t_end": 0.06}, **asked)
-    study = Converge(scene=scene, metric=("y_end",), quick=True)
-    cases = list(study.cases().values())
-    finest = [case for case in cases if case["refined"] == "elements"][-1]
-    given, changed = (study.record(case)["y_end"] for case in (finest, cases[-1]))
-    assert 0.0 < abs(changed - given) < 1e-8
-
-
 def test_an_accuracy_with_the_mesh_is_kept_beside_a_mesh_that_is_much_finer():
     scene = with_changes(load_scene("soft"), beam={"n_elements": 10}, time={"t_end": 0.06})
     run = pick_mesh(scene.model_copy(update={"accuracy": 2e-3}))

@@ -21,7 +21,7 @@ from springbeam.scene.laws import LAWS
 from springbeam.studies.stability import grid
 from springbeam.studies.stability.cells import AT_REST, COUPLINGS, PARAMETERS, SLICES, sampled_cells, slice_cells
 from springbeam.studies.stability.grid import Grid
-from springbeam.studies.stability.outcome import CLASSES, Outcome, judged, run_cell
+from springbeam.studies.stability.outcome import CLASSES, ended, judged, run_cell
 from springbeam.studies.study import record_all
 
 SMALL = {"time": {"t_end": 0.05}, "beam": {"n_elements": 5}, "coupling": {"macro_step": 2e-3}}
@@ -65,9 +65,9 @@ def test_what_auto_takes_decides_how_it_is_judged():
     for run, taken in ((done("auto"), "hermite"), (done("auto", integrator="generalized_alpha"), "energy")):
         assert run.summary["coupling"]["scheme"] == taken
         off = changed(run, (), energy_residual=residual(run, 10.0 * EXACT))
-        assert judged(off).kind == ("approximate" if taken == "hermite" else "garbage")
+        assert judged(off)["kind"] == ("approximate" if taken == "hermite" else "garbage")
     damped = done("auto", integrator="generalized_alpha", rho_inf=0.5)
-    assert judged(changed(damped, (), energy_residual=residual(damped, -0.5))).kind == "dissipative"
+    assert judged(changed(damped, (), energy_residual=residual(damped, -0.5)))["kind"] == "dissipative"
 
 
 @pytest.mark.parametrize("scheme", ["energy", "hermite"])
@@ -83,8 +83,8 @@ def test_energy_that_changes_is_approximate_if_said_and_garbage_if_not(scheme):
         (1.1 * bound, ("something has changed the energy",), "approximate"),
     ):
         outcome = judged(changed(run, warnings, energy_residual=residual(run, share)))
-        assert outcome.kind == kind
-        assert outcome.residual == pytest.approx(share, rel=1e-6)
+        assert outcome["kind"] == kind
+        assert outcome["residual"] == pytest.approx(share, rel=1e-6)
 
 
 @pytest.mark.parametrize("cause", ["", "energy of degree 1 has changed the energy by 1 %"])
@@ -93,7 +93,7 @@ def test_a_coupling_that_changes_no_energy_is_not_excused_by_what_it_says(cause)
     said = ("something has changed the energy",)
     for scheme, kind in (("energy", "garbage"), ("hermite", "stopped" if cause else "approximate")):
         run = done(scheme, 1)
-        assert judged(changed(run, said, energy_residual=residual(run, 1e-2)), cause).kind == kind
+        assert judged(changed(run, said, energy_residual=residual(run, 1e-2)), cause)["kind"] == kind
 
 
 # -- mutations ------------------------------------------------------------------------------------------------------
@@ -118,9 +118,9 @@ def test_a_beam_that_is_given_another_force_is_garbage(monkeypatch, fault, law):
     """With half of it 116 cells had said "0 garbage": they warned, and the bound was that of the warning."""
     cell = short(coupling=(law, "energy", 2))
     right = run_cell(cell)
-    assert right.kind in ("dissipative", "conserved")
-    assert right.resolved
-    assert right.error_motion < 1e-6
+    assert right["kind"] in ("dissipative", "conserved")
+    assert right["resolved"]
+    assert right["error_motion"] < 1e-6
     advance, seen = FmuBeam.advance, {"time": None, "force": NO_FORCE, "before": NO_FORCE}
 
     def wrong(self, time, size, force, *foundation):
@@ -130,7 +130,7 @@ def test_a_beam_that_is_given_another_force_is_garbage(monkeypatch, fault, law):
         return advance(self, time, size, FAULTS[fault](force, seen["before"]), *foundation)
 
     monkeypatch.setattr(FmuBeam, "advance", wrong)
-    assert run_cell(cell).kind == "garbage"
+    assert run_cell(cell)["kind"] == "garbage"
 
 
 def test_a_meeting_whose_phase_a_little_velocity_decides_is_no_evidence():
@@ -141,8 +141,8 @@ def test_a_meeting_whose_phase_a_little_velocity_decides_is_no_evidence():
     cell = {**Grid(samples=20, resolution=0).cases()["3"], "steps": 10}
     assert (cell["impact"], cell["coupling"][:2]) == ("tip", ("transmission", "hermite"))
     outcome = run_cell(cell)
-    assert outcome.resolved
-    assert (outcome.kind, outcome.error_motion) == ("approximate", None)
+    assert outcome["resolved"]
+    assert (outcome["kind"], outcome["error_motion"]) == ("approximate", None)
 
 
 @pytest.mark.parametrize(("density", "kind"), [(1.01, "dissipative"), (1.3, "garbage")])
@@ -152,8 +152,8 @@ def test_what_calls_itself_resolved_is_compared_with_the_reference(monkeypatch, 
     wrong = {"beam": {"density": density}}
     monkeypatch.setattr(event_driven, "simulate", lambda scene, **more: right(with_changes(scene, **wrong), **more))
     outcome = run_cell(short(coupling=("transmission", "energy", 2)))
-    assert (outcome.kind, outcome.resolved) == (kind, True)
-    assert outcome.error_motion > 1e-3
+    assert (outcome["kind"], outcome["resolved"]) == (kind, True)
+    assert outcome["error_motion"] > 1e-3
 
 
 @pytest.mark.parametrize(
@@ -172,26 +172,26 @@ def test_what_must_not_be_is_garbage_whatever_the_energy(column, reason):
     motion = np.abs(run.shapes[1]).max() + 2e-3 * max(np.abs(run.v_tip).max(), np.abs(run.z).max())
     values[-1] = {"z": np.nan, "gap": 2e-9 * motion, "time": 0.0}.get(column, values[-1] - 1e-6)
     outcome = judged(changed(run, **{column: values}))
-    assert outcome.kind == "garbage"
-    assert reason in outcome.reason
+    assert outcome["kind"] == "garbage"
+    assert reason in outcome["reason"]
 
 
 def test_a_run_that_ends_early_is_stopped_for_its_cause():
     outcome = judged(done(), "the contact chatters")
-    assert (outcome.kind, outcome.reason) == ("stopped", "the contact chatters")
+    assert (outcome["kind"], outcome["reason"]) == ("stopped", "the contact chatters")
 
 
 def test_what_cannot_be_run_is_refused_and_a_crash_is_garbage(monkeypatch):
     outcome = run_cell({**slice_cells(2)[0], "coupling": ("paper", "energy", 0), "fidelity": "quasi_static"})
-    assert outcome.kind == "refused"
-    assert 'law = "paper" integrates the beam by (62)' in outcome.reason
+    assert outcome["kind"] == "refused"
+    assert 'law = "paper" integrates the beam by (62)' in outcome["reason"]
 
     def crash(*_, **__):
         raise ZeroDivisionError("nothing there")
 
     monkeypatch.setattr(Master, "_advance", crash)
     outcome = run_cell(slice_cells(2)[0])
-    assert (outcome.kind, outcome.reason) == ("garbage", "crashed: ZeroDivisionError: nothing there")
+    assert (outcome["kind"], outcome["reason"]) == ("garbage", "crashed: ZeroDivisionError: nothing there")
 
 
 # -- cells ----------------------------------------------------------------------------------------------------------
@@ -265,7 +265,7 @@ def test_a_part_of_the_grid_has_no_garbage_and_depends_on_nothing_else():
 def test_command(tmp_path, monkeypatch, kinds, code):
     ends = itertools.cycle(kinds)
     monkeypatch.setattr(Grid, "parallel", False)
-    monkeypatch.setattr(grid, "run_cell", lambda cell: Outcome(next(ends), "y = 1.5 m", 1e-9, 0.0, 3, 1))
+    monkeypatch.setattr(grid, "run_cell", lambda cell: ended(next(ends), "y = 1.5 m") | {"residual": 1e-9})
     out = tmp_path / "grid"
     result = command("stability", "--samples", "30", "--resolution", "3", "--out", out)
     assert result.exit_code == code, result.output

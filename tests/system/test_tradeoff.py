@@ -101,7 +101,7 @@ OTHERS = {"DOP853", "LSODA", "Radau", "modes", "elements of degree 1", "elements
 )
 def test_every_axis_is_swept_that_the_law_has(law, there, absent):
     study = Tradeoff(scene=small(contact={"law": law}, time={"t_end": 0.05}))
-    families = {case["family"] for case in study.configurations}
+    families = {case["family"] for case in study.configurations.values()}
     assert ENERGY | OTHERS | {"energy 2 adaptive"} | there <= families
     assert absent not in families
 
@@ -123,8 +123,7 @@ def test_explicit_solvers_are_not_sent_after_a_mode_that_is_too_fast_for_them():
 
     def left_out(name, until):
         study = Tradeoff(scene=with_changes(load_scene(name), time={"t_end": until}))
-        every, taken = ({c.get("method") for c in cases} for cases in (study.configurations, study.cases().values()))
-        return every - taken
+        return {case["method"] for case in study.cases().values() if "method" in case and study._pointless(case)}
 
     assert left_out("bar-impact", 3.0) == {"DOP853", "LSODA"}
     assert left_out("soft", 0.0712) == set()
@@ -144,7 +143,7 @@ def test_what_takes_too_long_is_given_up_and_named(monkeypatch):
     assert "modes" not in given_up  # it is not they that were too slow
     assert unjudged.startswith("not run, the reference on a finer mesh takes more than 0 s")
     assert unjudged.endswith(": modes, elements of degree 1, elements of degree 4, elements of degree 8")
-    assert {row["status"] for row in rows if row["finer"]} == {"not judged"}
+    assert {row["status"] for row in rows if row["finer"]} == {"not run"}
 
 
 # -- scipy ----------------------------------------------------------------------------------------------------------

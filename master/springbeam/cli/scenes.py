@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import asdict
 from itertools import groupby
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from rich.text import Text
@@ -16,7 +15,7 @@ from rich.text import Text
 from ..scene import load_scene, shipped_scenes
 from ..scene.messages import nearest
 from ..scene.reference import MODELS
-from ..studies.tables import table
+from ..studies.tables import number, table
 from .common import (
     BAD_INPUT,
     JsonOption,
@@ -132,9 +131,6 @@ def new(
     typer.echo(f"{path}: a scene to change; springbeam predict checks its values")
 
 
-if TYPE_CHECKING:
-    from ..studies.stability.predict import Prediction, SchemePrediction
-
 #: A mesh that is so much too stiff is said to lock.
 _LOCKS = 1.05
 
@@ -149,64 +145,65 @@ def predict(
     Example: springbeam predict soft --set coupling.macro_step=4e-3
     """
     from ..studies.stability.predict import predict as prediction_of
-    from ..studies.tables import table
 
     with bad_input_reported():
         what = load_scene(scene, settings or ())
-        prediction = prediction_of(what)
+        p = prediction_of(what)
     shown: list[Any] = [Text(what.title or "(untitled scene)", style="bold")]
-    shown += [Text(f"{name:<10}{text}") for name, text in _lines(prediction)]
-    if prediction.schemes:
+    shown += [Text(f"{name:<10}{text}") for name, text in _lines(p)]
+    if p["schemes"]:
         names = ("scheme", "degree", "spectral radius − 1", "critical H [s]", "")
-        shown.append(table(names, [_scheme(s, prediction.threshold) for s in prediction.schemes], words=("",)))
-    shown += [Text(f"note      {note}") for note in prediction.notes]
-    if prediction.auto is not None:
-        scheme, degree, because = prediction.auto
+        shown.append(table(names, [_scheme(**s, threshold=p["threshold"]) for s in p["schemes"]], words=("",)))
+    shown += [Text(f"note      {note}") for note in p["notes"]]
+    if p["auto"] is not None:
+        scheme, degree, because = p["auto"]
         shown.append(Text(f'fits      {scheme} {degree}, which coupling.scheme = "auto" takes: {because}'))
-    say(asdict(prediction), shown, as_json=as_json)
+    say(p, shown, as_json=as_json)
 
 
-def _lines(p: Prediction) -> Iterator[tuple[str, str]]:
+def _lines(p: dict[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield what is predicted, a line a subject."""
-    e, H = p.estimates, p.macro_step
-    masses = {"beam": e.beam_mass, "spring": e.spring_mass}
-    yield "mass", ", ".join(f"{name} {mass:.4g} kg" for name, mass in masses.items() if mass is not None)
-    if e.frequency is not None and p.frequencies:
-        found = ", ".join(f"{frequency:.4g}" for frequency in p.frequencies)
-        yield "vibrates", f"at {found} Hz on this mesh; first without a mesh {e.frequency:.4g} Hz"
-    locks = e.locking is not None and e.locking > _LOCKS
-    yield "stiffness", ", ".join([
-        *([] if e.tip_stiffness is None else [f"tip {e.tip_stiffness:.4g} N/m (static)"]),
-        *([f"{e.locking:.3g} times that on this mesh, which locks"] if locks else []),
-        *([] if e.spring_stiffness is None else [f"spring {e.spring_stiffness:.4g} N/m"]),
-    ])  # fmt: skip
-    if e.contact_time not in (None, inf) or e.contact_duration is not None:
-        yield "contact", ", ".join([
-            *([] if e.contact_time in (None, inf) else [f"first at t = {e.contact_time:.4g} s"]),
-            *([] if e.contact_duration is None
-              else [f"lasts about {e.contact_duration:.2g} s (half a period together)"]),
-        ])  # fmt: skip
-    yield "H", f"{H:g} s"
-    if p.omega_1 is not None and p.omega_max is not None:
-        beside = f", beside {p.static_shapes} static shapes" if p.static_shapes else ""
-        yield "beam", (f"ω₁H = {p.omega_1 * H:.3g}, ω_max H = {p.omega_max * H:.3g}; "
-                       f"{p.resolved_modes} of {p.modes} modes resolved (ωH ≤ 1){beside}")  # fmt: skip
-        yield "", f"tip mass {p.tip_mass:.3g} kg, impedance Z = {p.impedance:.3g} N·s/m"
-    for name, omega in (("spring", p.spring_frequency), ("contact", p.contact_frequency)):
-        if omega is not None:
-            yield name, f"ωH = {omega * H:.3g} at its stiffest"
-    if p.displacement_gain is not None:
-        verdict = "diverges" if p.displacement_gain > 1.0 else "converges"
-        yield "exchange", f"of displacement against force: gain 2m/(ZH) = {p.displacement_gain:.3g}, {verdict}"
-
-
-def _scheme(s: SchemePrediction, threshold: float) -> tuple[str, ...]:
-    """Return the row of a scheme."""
-    excess = s.spectral_radius - 1.0
-    return (
-        s.scheme,
-        str(s.degree),
-        "0" if abs(excess) < 1e-11 else f"{excess:.1e}",
-        "none" if s.critical_step is None else f"{s.critical_step:.3g}",
-        "unstable" if excess > threshold else "",
+    e, H = p["estimates"], p["macro_step"]
+    yield "mass", _listed(("beam {:.4g} kg", e["beam_mass"]), ("spring {:.4g} kg", e["spring_mass"]))
+    if e["frequency"] is not None and p["frequencies"]:
+        found = ", ".join(f"{frequency:.4g}" for frequency in p["frequencies"])
+        yield "vibrates", f"at {found} Hz on this mesh; first without a mesh {e['frequency']:.4g} Hz"
+    locks = e["locking"] if e["locking"] is not None and e["locking"] > _LOCKS else None
+    yield (
+        "stiffness",
+        _listed(
+            ("tip {:.4g} N/m (static)", e["tip_stiffness"]),
+            ("{:.3g} times that on this mesh, which locks", locks),
+            ("spring {:.4g} N/m", e["spring_stiffness"]),
+        ),
     )
+    begins = e["contact_time"] if e["contact_time"] != inf else None
+    lasts = "lasts about {:.2g} s (half a period together)"
+    if contact := _listed(("first at t = {:.4g} s", begins), (lasts, e["contact_duration"])):
+        yield "contact", contact
+    yield "H", f"{H:g} s"
+    if p["omega_1"] is not None:
+        beside = f", beside {p['static_shapes']} static shapes" if p["static_shapes"] else ""
+        yield "beam", (f"ω₁H = {p['omega_1'] * H:.3g}, ω_max H = {p['omega_max'] * H:.3g}; "
+                       f"{p['resolved_modes']} of {p['modes']} modes resolved (ωH ≤ 1){beside}")  # fmt: skip
+        yield "", f"tip mass {p['tip_mass']:.3g} kg, impedance Z = {p['impedance']:.3g} N·s/m"
+    for name in ("spring", "contact"):
+        if p[f"{name}_frequency"] is not None:
+            yield name, f"ωH = {p[f'{name}_frequency'] * H:.3g} at its stiffest"
+    if (gain := p["displacement_gain"]) is not None:
+        verdict = "diverges" if gain > 1.0 else "converges"
+        yield "exchange", f"of displacement against force: gain 2m/(ZH) = {gain:.3g}, {verdict}"
+
+
+def _listed(*told: tuple[str, float | None]) -> str:
+    """Return what there is of numbers with their words."""
+    return ", ".join(words.format(value) for words, value in told if value is not None)
+
+
+def _scheme(
+    scheme: str, degree: int, spectral_radius: float, critical_step: float | None, threshold: float
+) -> tuple[str, ...]:
+    """Return the row of a scheme."""
+    excess = spectral_radius - 1.0
+    size = "0" if abs(excess) < 1e-11 else f"{excess:.1e}"
+    return scheme, str(degree), size, number(critical_step, ".3g", "none"), "unstable" * (excess > threshold)

@@ -160,7 +160,6 @@ def converge(
         int, typer.Option("--levels", metavar="N", min=3, max=8, help="Meshes, each with twice the elements.")
     ] = 4,
     metric: MetricOption = None,
-    quick: QuickOption = False,
 ) -> Study:
     """Show how the results settle with finer meshes and more modes: observed orders, extrapolated values, cost.
 
@@ -168,7 +167,7 @@ def converge(
     """
     from ..studies.converge import Converge
 
-    return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()), quick=quick)
+    return Converge(scene=load_scene(scene, settings or ()), levels=levels, metric=tuple(metric or ()))
 
 
 @study_command()

@@ -125,7 +125,7 @@ class LinearForm:
         self.watched = np.array([tip, top])
         #: Damping of the spring that α_b × stiffness does not hold yet [N·s/m].
         self.extra_damping = p.damping - s.alpha_b * p.linear_stiffness
-        self.oscillators = Oscillators(self.omega2, s.alpha_b)
+        self.oscillators = Oscillators(self.omega2, s.alpha_b * self.omega2)
         self.mobility = np.sum(self.inputs**2, axis=1)  #: acceleration per unit force r [1/kg]
         self._cache: dict[str, StepWeights] = {}
 
@@ -201,7 +201,7 @@ class LinearForm:
         rates, amplitudes = rates[order], amplitudes[order]
         mode = order % len(self.omega2)
         stiffness = np.abs(self.omega2)[mode]
-        alpha = self.oscillators.alpha
+        alpha = self.system.alpha_b
         pressing = np.abs(self.pressing)[mode] * stiffness * (1.0 + alpha * rates)
         limits = [(np.abs(row)[mode], 1, _UNSEEN_DISPLACEMENT) for row in self.watched]
         limits.append((pressing, 1, _UNSEEN_FORCE))

@@ -1,7 +1,7 @@
-"""Damped oscillators ξ̈ + α ω² ξ̇ + ω² ξ = f(t), many at once, under forces that are polynomials over a step.
+"""Damped oscillators ξ̈ + c ξ̇ + ω² ξ = f(t), many at once, under forces that are polynomials over a step.
 
 Free response and response to a polynomial are exact to rounding for any step, underdamped to overdamped, however
-fast the oscillator. With the roots s₁,₂ = −σ ± √(σ² − ω²), σ = α ω²/2::
+fast the oscillator. With the roots s₁,₂ = −σ ± √(σ² − ω²), σ = c/2::
 
     S(τ) = (e^{s₁τ} − e^{s₂τ})/(s₁ − s₂)    response to a unit impulse;    C = Ṡ + 2σ S    to a unit displacement
     ξ(τ) = C(τ) ξ₀ + S(τ) ξ̇₀ + ∫₀^τ S(τ − ν) f(ν) dν
@@ -74,13 +74,12 @@ class Oscillators:
     ----------
     omega2 : (p,) array
         ω² [1/s²]; may be zero or negative.
-    alpha : float
-        α [s].
+    c : (p,) array
+        Damping [1/s].
     """
 
-    def __init__(self, omega2: np.ndarray, alpha: float) -> None:
-        self.omega2, self.alpha = omega2, alpha
-        self.sigma = 0.5 * alpha * omega2
+    def __init__(self, omega2: np.ndarray, c: np.ndarray) -> None:
+        self.omega2, self.c, self.sigma = omega2, c, 0.5 * c
         #: s₁, s₂ with |s₁| ≤ |s₂|, (p,) complex; apart, so that one can divide by their difference.
         self.slow, self.fast = self._roots(_CRITICAL)
 
@@ -105,24 +104,24 @@ class Oscillators:
         S = t * np.exp(slow * t) * mean
         return S.real, (slow * S + np.exp(fast * t)).real
 
-    def weights(self, size: float) -> StepWeights:
-        """Return the weights of a step of ``size`` [s]."""
-        S, S_dot = self.kernels(TARGETS * size)
-        shape = (len(TARGETS), STAGES, len(self.omega2))
+    def weights(self, size: float, at: slice = slice(None)) -> StepWeights:
+        """Return the weights of a step of ``size`` [s], of those targets that ``at`` picks."""
+        S, S_dot = self.kernels(TARGETS[at] * size)
+        shape = (len(S), STAGES, len(self.omega2))
         force, force_dot = np.empty(shape), np.empty(shape)
         near = np.abs(self.fast) * size <= _SLOW
         if np.any(near):
-            oscillators = Oscillators(self.omega2[near], self.alpha)
-            kernel, kernel_dot = oscillators.kernels((TARGETS[:, None] - _ELAPSED) * size)
-            force[..., near] = np.matmul(_WEIGHTED * size, kernel)
-            force_dot[..., near] = np.matmul(_WEIGHTED * size, kernel_dot)
+            oscillators = Oscillators(self.omega2[near], self.c[near])
+            kernel, kernel_dot = oscillators.kernels((TARGETS[:, None] - _ELAPSED)[at] * size)
+            force[..., near] = np.matmul(_WEIGHTED[at] * size, kernel)
+            force_dot[..., near] = np.matmul(_WEIGHTED[at] * size, kernel_dot)
         if not np.all(near):
             far = ~near
             slow, fast = self.slow[far], self.fast[far]
-            with_slow, with_fast = _convolve(slow, size), _convolve(fast, size)
+            with_slow, with_fast = _convolve(slow, size, at), _convolve(fast, size, at)
             force[..., far] = ((with_slow - with_fast) / (slow - fast)).real
             force_dot[..., far] = ((slow * with_slow - fast * with_fast) / (slow - fast)).real
-        return StepWeights(S_dot + 2.0 * self.sigma * S, S, -self.omega2 * S, S_dot, force, force_dot)
+        return StepWeights(S_dot + self.c * S, S, -self.omega2 * S, S_dot, force, force_dot)
 
     def components(self, xi: np.ndarray, xi_dot: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rates |s| [1/s] and amplitudes of the free motion about equilibrium under ``force``, both (2p,)."""
@@ -135,16 +134,16 @@ class Oscillators:
         return rates, np.where(rates > 0.0, np.nan_to_num(amplitudes), 0.0)
 
 
-def _convolve(s: np.ndarray, size: float) -> np.ndarray:
-    """Return ∫₀^τ e^{s(τ − ν)} ℓ_k(ν) dν at the targets, for roots s: (targets, stages, len(s)).
+def _convolve(s: np.ndarray, size: float, at: slice) -> np.ndarray:
+    """Return ∫₀^τ e^{s(τ − ν)} ℓ_k(ν) dν at those targets that ``at`` picks, for roots s: (targets, stages, len(s)).
 
     On [0, 1], ∫ e^{z(1 − x)} P_m(2x − 1) dx = e^{−w} i_m(w) with w = −z/2 and i_m the modified spherical Bessel
     functions (Abramowitz & Stegun, 10.1.14 and 10.2.2).
     """
-    w = -0.5 * size * TARGETS[:, None] * s
+    w = -0.5 * size * TARGETS[at][:, None] * s
     m = np.arange(STAGES)[:, None, None]
     with np.errstate(over="ignore", invalid="ignore"):
         bessel = np.sqrt(0.5 * np.pi / w) * ive(m + 0.5, w) * np.exp(np.abs(w.real) - w)
         limit = 0.5 * (1.0 - (-1.0) ** m * np.exp(-2.0 * w)) / w
     responses = np.where(np.abs(w) > _LIMIT, limit, bessel)
-    return np.asarray(size * np.einsum("tmk,mtp->tkp", _ON_PARTS, responses))
+    return np.asarray(size * np.einsum("tmk,mtp->tkp", _ON_PARTS[at], responses))

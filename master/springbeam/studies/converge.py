@@ -15,7 +15,6 @@ from rich.text import Text
 from scipy.optimize import brentq
 
 from ..scene import Scene, SceneError
-from ..scene.tables import STEP_KEY, TOLERANCE_KEYS
 from .metrics import heading, known, named
 from .study import Findings, Pictures, Row, Study
 from .tables import number, table
@@ -31,7 +30,6 @@ _RATIO = 2
 _LEAST_ORDER, _MOST_ORDER = 0.5, 20.0
 #: Changes below this part of the value are rounding.
 _ROUNDING = 1e-12
-_LAST = "finer steps"
 
 
 class Settled(NamedTuple):
@@ -83,9 +81,7 @@ class Converge(Study):
         return self.metric or QUANTITIES
 
     def cases(self) -> dict[str, Row]:
-        """Return the meshes by what is refined, coarse to fine, and the finest with finer steps.
-
-        ``unknowns`` are the modes that take part.
+        """Return the meshes by what is refined, coarse to fine; ``unknowns`` are the modes that take part.
 
         Raises
         ------
@@ -98,21 +94,19 @@ class Converge(Study):
         if self.scene.massless:
             raise SceneError('beam.fidelity = "quasi_static": a beam without inertia has no mesh to refine')
         known(self.metrics)
-        more = [_RATIO**k for k in range(3 if self.quick else self.levels)]
-        found: list[tuple[str, Row]] = [
-            ("elements", {"beam.n_elements": beam.n_elements * k, "beam.n_modes": beam.n_modes}) for k in more
-        ]
-        finest = found[-1][1]
+        more = [_RATIO**k for k in range(self.levels)]
+        found = [("elements", beam.n_elements * k, beam.n_modes) for k in more]
         if beam.integrator == "modal" and beam.modes_kept >= more[-1]:
-            for n_modes in (*(beam.modes_kept // k for k in more[:0:-1]), beam.n_modes):
-                found.append(("modes", {"beam.n_elements": beam.n_elements, "beam.n_modes": n_modes}))
-        found.append((_LAST, finest | _finer_steps(self.scene)))
-        return {
-            f"{refined}: {', '.join(f'{key} = {value}' for key, value in keys.items())}": {
-                "refined": refined, "unknowns": _modes_kept(self.at(keys)), **keys
-            }
-            for refined, keys in found
-        }  # fmt: skip
+            fewer = [beam.modes_kept // k for k in more[:0:-1]]
+            found += [("modes", beam.n_elements, n_modes) for n_modes in (*fewer, beam.n_modes)]
+        cases = {}
+        for refined, elements, modes in found:
+            keys = {"beam.n_elements": elements, "beam.n_modes": modes}
+            mesh = self.at(keys).beam
+            assert mesh is not None
+            label = f"{refined}: {', '.join(f'{key} = {value}' for key, value in keys.items())}"
+            cases[label] = {"refined": refined, "unknowns": mesh.modes_kept, **keys}
+        return cases
 
     def sequences(self, records: Mapping[str, Row]) -> dict[str, list[Row]]:
         """Return the rows of each sequence as they were run."""
@@ -142,26 +136,20 @@ class Converge(Study):
 
     def findings(self, records: Mapping[str, Row]) -> Findings:
         """Judge how the quantities settle."""
-        quantities, sequences = self.quantities(records), self.sequences(records)
-        (by_steps,) = sequences.pop(_LAST)
-        elements = next(iter(sequences.values()))
-        document: dict[str, Any] = {"finer_steps": by_steps}
+        sequences, document = self.sequences(records), dict[str, Any]()
+        given = sequences["elements"][0]
         shown: list[Any] = [Text(self.scene.title or "(untitled scene)", style="bold")]
         for refined, rows in sequences.items():
-            found = {name: self.settled(rows, name) for name in quantities}
+            found = {name: self.settled(rows, name) for name in self.quantities(records)}
             document[refined] = {"levels": rows, "settled": {name: s._asdict() for name, s in found.items()}}
-            cells = [_cells(name, s, elements, by_steps) for name, s in found.items()]
-            names = ("", "as given", "extrapolated", "error", "order", "by steps")
-            shown.append(table(names, cells, f"more {refined}"))
+            cells = [_cells(name, given[name], s) for name, s in found.items()]
+            shown.append(table(("", "as given", "extrapolated", "error", "order"), cells, f"more {refined}"))
             meshes = (
                 f"{row['beam.n_elements']} el. {row['unknowns']} modes {row['cost_wall_time']:.2g} s" for row in rows
             )
             shown.append(Text(f"runs      {', '.join(meshes)}"))
         shown += [Text(f"stopped   {name}: {r['error']}") for name, r in records.items() if r["error"]]
         shown.append("error: of the run as given; in brackets the last change, where the values show no limit")
-        shown.append(
-            "by steps: what half the macro step, or a tenth of accuracy or tolerances, changes on the finest mesh"
-        )
         return Findings(document, shown)
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
@@ -169,9 +157,9 @@ class Converge(Study):
         from .picture import Point, curves
 
         points = []
-        for row in (row for row in self.rows(records) if row["refined"] != _LAST):
+        for row in self.rows(records):
             for name in self.quantities(records):
-                if (error := row.get(f"error_{name}")) is not None:
+                if (error := row[f"error_{name}"]) is not None:
                     share = abs(error / (row[name] - error or 1.0))
                     points.append(Point(f"more {row['refined']}", heading(name), row["unknowns"], share))
         points = [point for point in points if point.y > _ROUNDING]
@@ -179,31 +167,10 @@ class Converge(Study):
         return {"converge": curves(points, title, "unknowns of the beam", "distance from the limit, relative")}
 
 
-def _modes_kept(scene: Scene) -> int:
-    return 0 if scene.beam is None else scene.beam.modes_kept
-
-
-def _finer_steps(scene: Scene) -> Row:
-    """Return half the macro step, or a tenth of what the steps follow from."""
-    if scene.accuracy is not None:
-        return {"accuracy": 0.1 * scene.accuracy}
-    if not scene.coupling.adaptive:
-        return {f"coupling.{STEP_KEY}": 0.5 * scene.coupling.H}
-    given = {name: getattr(scene.coupling, name) for name in TOLERANCE_KEYS}
-    return {f"coupling.{name}": 0.1 * value for name, value in given.items() if value is not None}
-
-
-def _cells(name: str, settled: Settled, elements: Sequence[Row], by_steps: Row) -> tuple[str, ...]:
+def _cells(name: str, given: float | None, settled: Settled) -> tuple[str, ...]:
     """Return a quantity for a terminal: of the mesh as given, and where finer ones or more modes lead."""
-    given, last, finer = (row[name] for row in (elements[0], elements[-1], by_steps))
-    error = "" if settled.change is None else f"({settled.change:.1e})"
+    error = number(settled.change, ".1e")
+    error = f"({error})" if error else ""
     if given is not None and settled.limit is not None:
         error = f"{given - settled.limit:.1e}"
-    return (
-        heading(name),
-        number(given, ".6g"),
-        number(settled.limit, ".6g"),
-        error,
-        number(settled.order, ".1f"),
-        "" if last is None or finer is None else f"{finer - last:.1e}",
-    )
+    return heading(name), number(given, ".6g"), number(settled.limit, ".6g"), error, number(settled.order, ".1f")

@@ -3,7 +3,7 @@
 All are judged on the same times, between the macro points too, beside the event-driven monolithic solution of the same
 semi-discrete model, so that what is measured is the coupling and the time integration. Where the model itself varies
 (modes, elements) it is the solution on a finer mesh. scipy solves the same model as a good user would have it do
-(`rivals`). Every configuration is timed once in each of several passes, so that two of them are compared in turn.
+(`rivals`).
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ _DEGREES = (1, 4, 8)
 
 
 class Tradeoff(Study):
-    """All configurations of a scene, in passes; coarse to fine in each family."""
+    """All configurations of a scene; coarse to fine in each family."""
 
     kind: ClassVar[str] = "tradeoff"
 
@@ -83,9 +83,17 @@ class Tradeoff(Study):
         return cls(scene=scene, remarks=tuple(remarks), **settings)
 
     @cached_property
-    def configurations(self) -> list[Row]:
-        """The axes of all configurations that the scene can have: family, setting, and keys or scipy's tolerance."""
-        return [case for case in _configurations(self.scene) if "rtol" in case or self._allowed(case)]
+    def configurations(self) -> dict[str, Row]:
+        """The axes of all configurations that the scene can have, by label; if quick, of every third of a family.
+
+        They are family, setting, and keys or scipy's tolerance.
+        """
+        families: dict[str, list[Row]] = {}
+        for case in _configurations(self.scene):
+            if "rtol" in case or self._allowed(case):
+                families.setdefault(case["family"], []).append(case)
+        chosen = [case for cases in families.values() for case in cases[:: 3 if self.quick else 1]]
+        return {_label(case): case for case in chosen}
 
     def _allowed(self, case: Row) -> bool:
         try:
@@ -95,47 +103,45 @@ class Tradeoff(Study):
         return True
 
     def cases(self) -> dict[str, Row]:
-        """Return the configurations of each pass; if quick, every third of a family, once."""
-        families: dict[str, list[Row]] = {}
-        for case in self.configurations:
-            families.setdefault(case["family"], []).append(case)
-        chosen = [case for cases in families.values() for case in cases[:: 3 if self.quick else 1]
-                  if not _hopeless(self.scene, case)]  # fmt: skip
-        return {_name(case, turn): {**case, "pass": turn} for turn in range(self.passes) for case in chosen}
-
-    @property
-    def passes(self) -> int:
-        """How often each configuration is timed."""
-        return 1 if self.quick else self.repeats
+        """Return the configurations."""
+        return self.configurations
 
     def cost(self) -> str:
         """Say how many configurations there are."""
-        what = f"{len(self.cases()) // self.passes} configurations, timed {self.passes}×"
+        what = f"{len(self.cases())} configurations, timed {1 if self.quick else self.repeats}×"
         return f"{what}; finer ones of a kind are left out after one that takes too long"
 
     def skipped(self, case: Row, records: Mapping[str, Row]) -> Row | None:
-        """Leave out what a coarser one of the family was too slow for, and needless timings."""
-        first = records.get(_name(case, 0))
-        if case["pass"]:
-            again = first is not None and first["status"] == "done" and first["cost_wall_time"] <= _TIMED_ONCE
-            return None if again else {"status": "skipped", "error": "timed once"}
+        """Leave out what a coarser one of the family was too slow for."""
         limit = 0.1 * _LIMIT if self.quick else _LIMIT
-        family = (_name(other, 0) for other in self.configurations if other["family"] == case["family"])
-        slow = next((name for name in family if records.get(name, {}).get("cost_wall_time", 0.0) > limit), None)
-        if slow is None:
-            return None
-        return {"status": "skipped", "error": f"{slow.rpartition(',')[0]} took more than {limit:g} s"}
+        for name, other in self.configurations.items():
+            if other["family"] == case["family"] and records.get(name, {}).get("cost_wall_time", 0.0) > limit:
+                return {"status": "skipped", "error": f"{name} took more than {limit:g} s"}
+        return None
 
     def record(self, case: Row) -> Row:
-        """Run, time and judge a configuration: ``cost_wall_time`` [s] is without ``cost_setup``."""
-        if case["finer"] and isinstance(self.finer_reference, str):
-            return {"status": "not judged", "error": self.finer_reference}
-        began = perf_counter()
+        """Run, time and judge a configuration: ``cost_wall_time`` [s] is the median of ``times``, without set-up."""
+        if why := self._pointless(case):
+            return {"status": "not run", "error": why}
+        began, times, found = perf_counter(), list[float](), Row()
         try:
-            found = self._by_scipy(case) if "rtol" in case else self._by_us(case)
+            while not times or (len(times) < self.repeats and not self.quick and times[-1] <= _TIMED_ONCE):
+                found = self._by_scipy(case) if "rtol" in case else self._by_us(case)
+                times.append(found["cost_wall_time"])
         except (event_driven.ReferenceFailure, RunStopped) as failed:
             return {"status": "stopped", "error": str(failed), "cost_wall_time": perf_counter() - began}
-        return {"status": "done", "error": "", **found}
+        return {"status": "done", "error": "", **found, "cost_wall_time": statistics.median(times), "times": times}
+
+    def _pointless(self, case: Row) -> str:
+        """Return why a configuration is not run, "" if it is."""
+        if case["finer"]:
+            return self.finer_reference if isinstance(self.finer_reference, str) else ""
+        if "rtol" in case and self.scene.massless:
+            return "a quasi-static beam has no equation of motion to hand to it"
+        beam = self.scene.beam if case.get("method") in _EXPLICIT else None
+        if beam is not None and mesh_frequency(beam) * self.scene.duration > _MOST_TURNS:
+            return f"explicit steps would follow the mesh's fastest mode over {_MOST_TURNS:g} rad"
+        return ""
 
     def _by_us(self, case: Row) -> Row:
         scene, limit, began = self.at(case), _LIMIT, perf_counter()
@@ -189,14 +195,8 @@ class Tradeoff(Study):
             return f"the reference on a finer mesh {failed}"
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
-        """Return a row per configuration: the errors of the first pass, and the medians of the times."""
-        cases, found = self.cases(), list[Row]()
-        for name in (name for name in records if not cases[name]["pass"]):
-            turns = [records.get(_name(cases[name], turn), {}) for turn in range(self.passes)]
-            times = [turn["cost_wall_time"] for turn in turns if turn.get("status") == "done"]
-            row = {"index": len(found), **cases[name], "unknowns": None, **records[name]}
-            del row["pass"]
-            found.append(row | ({"cost_wall_time": statistics.median(times), "times": times} if times else {}))
+        """Return a row per configuration."""
+        found = [{"unknowns": None, **row} for row in super().rows(records)]
         front = pareto(found)
         return [row | {"on_front": row in front} for row in found]
 
@@ -227,17 +227,13 @@ class Tradeoff(Study):
 
     def notes(self, records: Mapping[str, Row]) -> list[str]:
         """Return what was left out, and why."""
-        found, rows = list(self.remarks), self.rows(records)
-        if slow := [_label(row) for row in rows if row["status"] == "stopped" and "takes more" in row["error"]]:
+        found, why = list[str](), dict[str, dict[str, None]]()
+        if slow := [name for name, r in records.items() if r["status"] == "stopped" and "takes more" in r["error"]]:
             found.append(f"given up after {_LIMIT:g} s, finer ones of their kind not run: {'; '.join(slow)}")
-        if unjudged := {row["family"]: row["error"] for row in rows if row["status"] == "not judged"}:
-            found.append(f"not run, {next(iter(unjudged.values()))}: {', '.join(unjudged)}")
-        if hopeless := dict.fromkeys(c["method"] for c in self.configurations if _hopeless(self.scene, c)):
-            turns = f"explicit steps would follow the mesh's fastest mode over {_MOST_TURNS:g} rad"
-            found.append(f"not run, {turns}: {', '.join(hopeless)}")
-        if self.scene.massless:
-            found.append("not run: scipy, since a quasi-static beam has no equation of motion to hand to it")
-        return found
+        for name, record in records.items():
+            if record["status"] == "not run":
+                why.setdefault(record["error"], {})[self.configurations[name]["family"]] = None
+        return found + [f"not run, {cause}: {', '.join(families)}" for cause, families in why.items()]
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
         """Draw the work–precision diagrams: error over time, over doStep calls, and the model's over its size."""
@@ -276,8 +272,7 @@ def pareto(rows: Iterable[Row]) -> list[Row]:
 def cheapest(rows: Iterable[Row]) -> list[Row]:
     """Return for each of `TARGETS` the cheapest configuration here and of scipy's, and how much longer scipy takes.
 
-    A configuration counts if all finer ones of its family keep the error too: not by luck. The ratio is the median of
-    those of the passes.
+    A configuration counts if all finer ones of its family keep the error too: not by luck.
     """
     same = [row for row in rows if not row["finer"]]
 
@@ -291,14 +286,9 @@ def cheapest(rows: Iterable[Row]) -> list[Row]:
     found = []
     for target in TARGETS:
         ours, theirs = best(True, target), best(False, target)
-        pairs = zip(theirs["times"], ours["times"], strict=False) if ours and theirs else ()
-        ratio = statistics.median(their / our for their, our in pairs) if ours and theirs else None
+        ratio = theirs["cost_wall_time"] / ours["cost_wall_time"] if ours and theirs else None
         found.append({"error": target, "co_simulation": ours, "scipy": theirs, "ratio": ratio})
     return found
-
-
-def _name(case: Row, turn: int) -> str:
-    return f"{_label(case)}, {turn}"
 
 
 def _label(case: Row) -> str:
@@ -344,7 +334,7 @@ def _configurations(scene: Scene) -> Iterator[Row]:
                     axes = {"family": f"elements of degree {degree}", "setting": f"{n}", "finer": True}
                     mesh = {"beam.n_elements": n, "beam.element_degree": degree, "beam.n_modes": 0}
                     yield axes | mesh | ({"beam.reduced_integration": False} if degree > 2 else {})
-    for method in () if scene.massless else TOLERANCES:
+    for method in TOLERANCES:
         for rtol in TOLERANCES[method]:
             yield {"family": method, "setting": f"rtol {rtol:.0e}", "finer": False, "method": method, "rtol": rtol}
 
@@ -358,9 +348,3 @@ def finer(scene: Scene) -> Scene | None:
     if degree < 2 * beam.element_degree:
         return None
     return with_changes(scene, beam={"element_degree": degree, "n_modes": 0, "reduced_integration": False})
-
-
-def _hopeless(scene: Scene, case: Row) -> bool:
-    """Tell whether an explicit method would have to follow the fastest mode of the mesh for too long."""
-    beam = scene.beam if case.get("method") in _EXPLICIT else None
-    return beam is not None and mesh_frequency(beam) * scene.duration > _MOST_TURNS

@@ -8,7 +8,6 @@ from __future__ import annotations
 import statistics
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -22,7 +21,7 @@ from ...scene import SceneError
 from ..study import Findings, Pictures, Row, Study
 from ..tables import table
 from .cells import COUPLINGS, SLICES, sampled_cells, scene_dict, slice_cells
-from .outcome import CLASSES, Outcome, run_cell
+from .outcome import CLASSES, ended, run_cell
 
 #: Of `CLASSES`; residuals outside are drawn in the colours of the ends.
 _COLOURS, _RESIDUALS = (BLUE, SKY, GREEN, STONE, ORANGE, BLACK), (1e-16, 1.0)
@@ -56,11 +55,11 @@ class Grid(Study):
 
     def record(self, case: Mapping[str, Any]) -> Row:
         """Run a cell."""
-        return asdict(run_cell(dict(case)))
+        return run_cell(dict(case))
 
     def lost(self, cause: str) -> Row:
         """Return the outcome of a cell that crashes."""
-        return asdict(Outcome("garbage", f"crashed: {cause}"))
+        return ended("garbage", f"crashed: {cause}")
 
     def failed(self, record: Row) -> bool:
         """Tell whether a cell is garbage."""

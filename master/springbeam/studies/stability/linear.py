@@ -23,29 +23,11 @@ from ...bodies import force
 from ...bodies.protocol import Motion
 from ...coupling.projection import penetration_series
 from ...coupling.tie import SCHEMES
-
-#: S₋₁ … S₅: what a quadratic force and two integrals of the displacement need.
-_ORDERS = 7
-_TERMS = 24
-#: Roots nearer than this share of their modulus are moved apart: S changes by its square.
-_CRITICAL = 1e-6
-
-
-def _phi(z: np.ndarray) -> list[np.ndarray]:
-    """Return φ_0 … φ_5 with φ_0 = e^z, φ_{j+1} = (φ_j − 1/j!)/z."""
-    near = np.abs(z) < 1.0
-    small, large = np.where(near, z, 0.0), np.where(near, 1.0, z)
-    values, recurred = [], np.exp(large)
-    for j in range(_ORDERS - 1):
-        if j > 0:
-            recurred = (recurred - 1.0 / factorial(j - 1)) / large
-        series = np.polynomial.polynomial.polyval(small, [1.0 / factorial(n + j) for n in range(_TERMS)])
-        values.append(np.where(near, series, recurred))
-    return values
+from ...monolithic.oscillators import GAUSS, Oscillators
 
 
 def impulse_integrals(omega2: np.ndarray, c: np.ndarray, h: float) -> np.ndarray:
-    """Return S₋₁ … S₅ at time ``h`` [s].
+    """Return S₋₁ … S₅ at time ``h`` [s]: S_j, j > 0, is the response to the force τ^{j−1}/(j − 1)!.
 
     Parameters
     ----------
@@ -57,28 +39,9 @@ def impulse_integrals(omega2: np.ndarray, c: np.ndarray, h: float) -> np.ndarray
     (7, r) array
         Row j + 1 is S_j [s^{j+1}].
     """
-    discriminant = np.sqrt((0.25 * c * c - omega2).astype(complex))
-    fast = -0.5 * c - discriminant
-    fast = np.where(np.abs(discriminant) < _CRITICAL * np.abs(fast), fast * (1.0 + 2.0 * _CRITICAL), fast)
-    result = np.empty((_ORDERS, len(omega2)))
-
-    smooth = np.abs(fast) * h < 1.0
-    if np.any(smooth):
-        x, d = omega2[smooth] * h * h, c[smooth] * h
-        derivatives = [np.zeros_like(x), np.ones_like(x)]
-        for _ in range(_TERMS):
-            derivatives.append(-d * derivatives[-1] - x * derivatives[-2])
-        for j in range(-1, _ORDERS - 1):
-            series = [b / factorial(n + j) for n, b in enumerate(derivatives) if n + j >= 0]
-            result[j + 1, smooth] = h ** (j + 1) * np.sum(series, axis=0)
-    if not np.all(smooth):
-        s2 = fast[~smooth]
-        s1 = omega2[~smooth] / s2  # the roots' product; their sum would cancel
-        phi1, phi2 = _phi(s1 * h), _phi(s2 * h)
-        result[0, ~smooth] = ((s1 * phi1[0] - s2 * phi2[0]) / (s1 - s2)).real
-        for j in range(_ORDERS - 1):
-            result[j + 1, ~smooth] = (h**j * (phi1[j] - phi2[j]) / (s1 - s2)).real
-    return result
+    at_end = Oscillators(omega2, c).weights(h, slice(-1, None))
+    forces = [(h * GAUSS.nodes) ** j / factorial(j) for j in range(5)]
+    return np.vstack([at_end.S_dot, at_end.S, forces @ at_end.force[0]])
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import chain, count
 from typing import Any
 
@@ -34,6 +33,7 @@ from ...scene import Scene, SceneError, scene_from_dict, with_changes
 from ...scene.automatic import with_scheme_chosen
 from ..comparison import PERTURBATION, initial_speed
 from ..metrics import motion_errors, worst
+from ..study import Row
 from .cells import scene_dict
 
 #: In the order in which pictures and tables show them; the last must stay empty.
@@ -58,27 +58,24 @@ class _Enough(BaseException):
     """The cell has taken all the steps that it may; no error, which a run would turn into a stop."""
 
 
-@dataclass
-class Outcome:
-    """How a cell ended."""
+def ended(kind: str, reason: str = "") -> Row:
+    """Return the record of a cell that ended as one of `CLASSES`.
 
-    kind: str  #: one of `CLASSES`
-    reason: str = ""  #: refused, stopped, garbage: why; approximate: the run's warnings
-    residual: float | None = None  #: largest energy residual over the largest energy until then
-    overlap: float | None = None  #: of bodies, or the gap of joined ones, over the largest motion
-    resolved: bool = False  #: whether the run calls itself resolved
-    #: of u_tip and y beside the reference, over their largest changes; of what is resolved and well-conditioned
-    error_motion: float | None = None
-    macro_steps: int = 0
-    events: int = 0
+    ``reason``: refused, stopped, garbage: why; approximate: the run's warnings. ``residual``: the largest energy
+    residual over the largest energy until then; ``overlap`` of bodies, or the gap of joined ones, over the largest
+    motion; ``resolved``: whether the run calls itself so; ``error_motion`` of u_tip and y beside the reference, over
+    their largest changes, of what is resolved and well-conditioned.
+    """
+    told: Row = dict.fromkeys(("residual", "overlap", "error_motion"))
+    return {"kind": kind, "reason": reason, **told, "resolved": False, "macro_steps": 0, "events": 0}
 
 
-def run_cell(cell: dict[str, Any]) -> Outcome:
-    """Run a cell and say how it ended."""
+def run_cell(cell: dict[str, Any]) -> Row:
+    """Run a cell and return how it ended."""
     try:
         scene = scene_from_dict(scene_dict(cell), source="cell")
     except SceneError as error:
-        return Outcome("refused", str(error))
+        return ended("refused", str(error))
     recorder, accepted, cause = MemoryRecorder(scene), count(1), ""
 
     def enough(*_: object) -> None:
@@ -88,20 +85,20 @@ def run_cell(cell: dict[str, Any]) -> Outcome:
     try:
         run(scene, recorder, enough)
     except FmuError as error:
-        return Outcome("refused", str(error))
+        return ended("refused", str(error))
     except RunStopped as stopped:
         cause = stopped.cause
     except _Enough:
         pass
     found = recorder.trajectory()
     if "traceback" in found.summary:  # an error that nobody foresaw
-        return Outcome("garbage", f"crashed: {cause}")
+        return ended("garbage", f"crashed: {cause}")
     outcome = judged(found, cause)
-    if outcome.resolved and outcome.kind not in ("stopped", "garbage"):
-        outcome.error_motion = _error(found)
-        if outcome.error_motion is not None and outcome.error_motion > _RESOLVED:
-            outcome.kind = "garbage"
-            outcome.reason = f"calls itself resolved, and is {outcome.error_motion:.1e} of its motion off the reference"
+    if outcome["resolved"] and outcome["kind"] not in ("stopped", "garbage"):
+        outcome["error_motion"] = off = _error(found)
+        if off is not None and off > _RESOLVED:
+            why = f"calls itself resolved, and is {off:.1e} of its motion off the reference"
+            outcome |= {"kind": "garbage", "reason": why}
     return outcome
 
 
@@ -143,39 +140,42 @@ def _spring_pushed(scene: Scene, change: float) -> Iterator[Scene]:
             yield with_changes(scene, spring={"initial_velocity": velocity})
 
 
-def judged(run: Trajectory, cause: str = "") -> Outcome:
+def judged(run: Trajectory, cause: str = "") -> Row:
     """Return the class of a run that is done, or has stopped for ``cause``, from what it recorded."""
-    summary = run.summary
-    outcome = Outcome("stopped" if cause else "", cause, macro_steps=summary["macro_steps"], events=summary["events"])
+    counts = {name: run.summary[name] for name in ("macro_steps", "events")}
     if len(run.time) == 0:
-        return outcome
-    scale = _energy_scale(run)
+        return ended("stopped", cause) | counts
+    scale, overlap = _energy_scale(run), _overlap(run)
     relative = np.divide(run.energy_residual, scale, out=np.zeros_like(scale), where=scale > 0.0)
-    outcome.residual = float(np.abs(relative).max())
-    outcome.overlap = _overlap(run)
-    outcome.resolved = bool(summary["resolved"])
+    measured = {
+        "residual": float(np.abs(relative).max()),
+        "overlap": overlap,
+        "resolved": bool(run.summary["resolved"]),
+    }
+    return ended(*_class(run, cause, relative, scale, overlap)) | counts | measured
+
+
+def _class(run: Trajectory, cause: str, relative: np.ndarray, scale: np.ndarray, overlap: float) -> tuple[str, str]:
+    """Return the class of a run and why, by its relative residuals, the scale of its energy and its overlap."""
     scene, _ = with_scheme_chosen(run.scene)
+    residual = float(np.abs(relative).max())
     damped = scene.beam is not None and scene.beam.damped_numerically
     keeps = scene.coupling.scheme == "energy" and not scene.contact.algorithm
-    if keeps and not damped and outcome.residual > _GUARANTEED:
-        outcome.kind = "garbage"
-        outcome.reason = f"energy residual {outcome.residual:.1e} of a coupling that changes none; {cause}"
-    if outcome.kind:
-        return outcome
-    bound, _ = bounds(scene)
-    said = [text for text in summary["warnings"] if "energy" in text]
-    lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
-    if faults := list(_faults(run, outcome.overlap, scale)):
-        outcome.kind, outcome.reason = "garbage", "; ".join(faults)
-    elif outcome.residual <= EXACT:
-        outcome.kind = "dissipative" if lost > EXACT * scale[-1] else "conserved"
-    elif keeps and damped and relative.max() <= EXACT:
-        outcome.kind = "dissipative"
-    elif outcome.residual <= bound or said:
-        outcome.kind, outcome.reason = "approximate", "; ".join(said)
-    else:
-        outcome.kind, outcome.reason = "garbage", f"energy residual {outcome.residual:.1e}, and nothing says so"
-    return outcome
+    if keeps and not damped and residual > _GUARANTEED:
+        return "garbage", f"energy residual {residual:.1e} of a coupling that changes none; {cause}"
+    if cause:
+        return "stopped", cause
+    if faults := list(_faults(run, overlap, scale)):
+        return "garbage", "; ".join(faults)
+    if residual <= EXACT:
+        lost = run.e_dissipated[-1] + run.e_impact_loss[-1]
+        return "dissipative" if lost > EXACT * scale[-1] else "conserved", ""
+    if keeps and damped and relative.max() <= EXACT:
+        return "dissipative", ""
+    said = [text for text in run.summary["warnings"] if "energy" in text]
+    if said or residual <= bounds(scene)[0]:
+        return "approximate", "; ".join(said)
+    return "garbage", f"energy residual {residual:.1e}, and nothing says so"
 
 
 def _energy_scale(run: Trajectory) -> np.ndarray:

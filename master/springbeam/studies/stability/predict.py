@@ -7,8 +7,7 @@ largest penetration that the energy at first contact allows; a softening spring 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -16,7 +15,7 @@ from scipy.optimize import brentq
 from ...contact.laws import depth, law_of
 from ...monolithic.semi_discrete import ModalBeam, modal_beam
 from ...scene import Beam, Scene, suspicions
-from ...scene.automatic import Choice, choice
+from ...scene.automatic import choice
 from ...scene.linearised import contact_energy, spring_frequency, spring_stiffness
 from ...scene.resolution import STABLE
 from ...scene.statics import locking, lowest_frequency, shear_stiffness, tip_compliance, tip_inertia
@@ -35,150 +34,120 @@ RESOLVED = 1.0
 _SEARCH = {"hermite": (STABLE / 1.2, 1.03), "jacobi": (1e-3, 2.0), "gauss_seidel": (1e-3, 2.0)}
 
 
-@dataclass(frozen=True)
-class SchemePrediction:
-    """One scheme on the scene."""
+def predict(scene: Scene) -> dict[str, Any]:
+    """Predict the coupling of ``scene`` (no FMU is loaded).
 
-    scheme: str
-    degree: int
-    spectral_radius: float  #: at the scene's macro step
-    critical_step: float | None  #: smallest unstable H [s]; None: none found, see `critical_step`
+    Returns
+    -------
+    dict
+        ``None`` where the scene lacks a body or key that is needed:
 
-
-class Estimates(NamedTuple):
-    """What a scene is, by hand calculation; ``None`` where it has no such thing."""
-
-    beam_mass: float | None  #: ρAL [kg]
-    frequency: float | None  #: lowest of the beam, tip free, without a mesh [Hz]
-    tip_stiffness: float | None  #: static, 1/(L³/3EI + L/KAG) [N/m]
-    locking: float | None  #: the static stiffness of the mesh over that of the beam
-    spring_mass: float | None  #: [kg]
-    spring_stiffness: float | None  #: k1 [N/m]
-    contact_time: float | None  #: first contact of an undeformed approach [s]
-    contact_duration: float | None  #: half a period of spring and beam together [s]
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """What can be predicted of a scene's coupling; ``None`` if the scene lacks a body or key that is needed."""
-
-    estimates: Estimates  #: mass, frequency, stiffness, time of contact, by hand
-    frequencies: tuple[float, ...]  #: the lowest three of the beam's mesh [Hz]
-    macro_step: float  #: H [s]
-    threshold: float  #: of the spectral radius above 1, from which on a coupling is called unstable
-    omega_1: float | None  #: lowest and highest frequency kept of the beam [rad/s]
-    omega_max: float | None
-    spring_frequency: float | None  #: of the linearised spring [rad/s]; 0 where it does not oscillate
-    contact_frequency: float | None  #: of tip and spring top on the linearised contact law [rad/s]
-    tip_mass: float | None  #: [kg]
-    impedance: float | None  #: Z = √(KAG ρA) [N·s/m]
-    #: 2m/(ZH) of rigid laws: the fixed-point gain of an exchange of displacement against force
-    displacement_gain: float | None
-    resolved_modes: int | None  #: of the beam's, with ωH ≤ `RESOLVED`
-    modes: int | None
-    static_shapes: int | None  #: kept beside them where not all modes are; they are the fastest
-    schemes: tuple[SchemePrediction, ...]
-    auto: Choice | None  #: the scheme that fits, which ``scheme = "auto"`` takes, where there is something to couple
-    notes: tuple[str, ...]
-
-
-def predict(scene: Scene) -> Prediction:
-    """Predict the coupling of ``scene`` (no FMU is loaded)."""
-    H = scene.coupling.H
+        * ``estimates``: what the scene is, by hand calculation, see `_estimates`; ``frequencies``: the lowest three of
+          the beam's mesh [Hz];
+        * ``macro_step``: H [s]; ``threshold`` of the spectral radius above 1, from which on a coupling is unstable;
+        * ``omega_1``, ``omega_max``: lowest and highest frequency kept of the beam; ``spring_frequency`` of the
+          linearised spring, 0 where it does not oscillate; ``contact_frequency`` of tip and spring top on the
+          linearised contact law [rad/s];
+        * ``tip_mass`` [kg]; ``impedance`` Z = √(KAG ρA) [N·s/m]; ``displacement_gain`` 2m/(ZH) of rigid laws: of an
+          exchange of displacement against force;
+        * ``modes`` of the beam, ``resolved_modes`` among them, with ωH ≤ `RESOLVED`, and ``static_shapes`` that are
+          kept beside them where not all modes are;
+        * ``schemes``: a row each, with ``spectral_radius`` at H and ``critical_step``, the smallest unstable H [s];
+        * ``auto``: the scheme that fits, which ``scheme = "auto"`` takes; ``notes``.
+    """
+    H, beam = scene.coupling.H, scene.beam
     notes = suspicions(scene)
     notes += [f"[{table}] is not our own body: its frequencies are not known beforehand" for table in scene.partners]
     if scene.accuracy is not None:
         notes.append(f"accuracy = {scene.accuracy:g} picks scheme and macro step by itself; this is about those given")
-    modal = kept = None
+    modal = None
+    names = ("omega_1", "omega_max", "tip_mass", "resolved_modes", "modes", "static_shapes")
+    of_modes: dict[str, Any] = dict.fromkeys(names)
     if scene.massless:
         notes.append("a quasi-static beam has no inertia and no step of its own: nothing to predict")
-    elif scene.beam is not None:
-        beam, truncated = _reduced(scene.beam)
-        modal = modal_beam(beam)
-        kept = min(beam.modes_kept, len(modal.omega))
-        if truncated:
+    elif beam is not None:
+        reduced = _reduced(beam)
+        modal, kept = modal_beam(reduced), reduced.modes_kept
+        resolved = int(np.sum(modal.omega[:kept] * H <= RESOLVED))
+        if reduced is not beam:
             notes.append(f"predicted with the lowest {MOST_MODES} modes of the beam")
-        if scene.beam.integrator == "generalized_alpha":
+        if beam.integrator == "generalized_alpha":
             notes.append("predicted for exact modes; generalized_alpha with rho_inf = 1 adds no energy of its own")
+        ends = (float(modal.omega[0]), float(modal.omega[-1]), 1.0 / modal.inverse_tip_mass)
+        of_modes = dict(zip(names, (*ends, resolved, kept, len(modal.omega) - kept), strict=True))
     of_the_paper = scene.contact.algorithm
     pair = None if modal is None or of_the_paper else linear_pair(scene, modal)
-    schemes: tuple[SchemePrediction, ...] = ()
+    schemes: list[dict[str, Any]] = []
     if of_the_paper:
         notes.append("Algorithm 1 (law = 'paper') overwrites the tip's position: no matrix of this kind")
     elif pair is None and not notes:
         notes.append("nothing to couple: a scene with one body and no stop under its tip")
     elif pair is not None:
-        schemes = tuple(
-            SchemePrediction(scheme, degree, spectral_radius(pair, scheme, degree, H),
-                             critical_step(pair, scheme, degree))
+        schemes = [
+            {"scheme": scheme, "degree": degree, "spectral_radius": spectral_radius(pair, scheme, degree, H),
+             "critical_step": critical_step(pair, scheme, degree)}
             for scheme, degree in (SOFT if pair.soft else RIGID)
-            if scene.beam is None or scene.beam.integrator == "modal" or degree == 0
-        )  # fmt: skip
-    if any(s.scheme == "hermite" and s.critical_step is not None for s in schemes):
-        assert pair is not None
-        notes.append(
-            "hermite is unstable in bands of H: some narrower than 3 % may lie below its critical H, none has been "
-            f"seen below ω_max H = {STABLE:g}, {STABLE / _frequencies(pair)[0]:.3g} s here"
-        )
+            if beam is None or beam.integrator == "modal" or degree == 0
+        ]  # fmt: skip
+        if any(s["scheme"] == "hermite" and s["critical_step"] is not None for s in schemes):
+            notes.append(
+                "hermite is unstable in bands of H: some narrower than 3 % may lie below its critical H, none has been "
+                f"seen below ω_max H = {STABLE:g}, {STABLE / _frequencies(pair)[0]:.3g} s here"
+            )
+    rates = {f"loads.{i} turns": load.rate for i, load in enumerate(scene.loads) if load.rate * H > RESOLVED}
+    if modal is not None and not of_modes["resolved_modes"]:
+        rates["the beam's lowest mode turns"] = of_modes["omega_1"]
     notes += [
-        f"the motion is not resolved: loads.{i} turns {load.rate * H:.3g} rad in a macro step; H <= "
-        f"{RESOLVED / load.rate:.3g} s resolves it"
-        for i, load in enumerate(scene.loads)
-        if load.rate * H > RESOLVED
+        f"the motion is not resolved: {what} {rate * H:.3g} rad in a macro step; H <= {RESOLVED / rate:.3g} s resolves "
+        "it"
+        for what, rate in rates.items()
     ]
-    Z = None if scene.beam is None else math.sqrt(shear_stiffness(scene.beam) * scene.beam.density * scene.beam.area)
-    mass = None if scene.spring is None else scene.spring.mass
-    resolved = None if modal is None else int(np.sum(modal.omega[:kept] * H <= RESOLVED))
-    if modal is not None and resolved == 0:
-        notes.append(
-            f"the motion is not resolved: the beam's lowest mode turns {modal.omega[0] * H:.3g} rad in a macro step; "
-            f"H <= {RESOLVED / modal.omega[0]:.3g} s resolves it"
-        )
-    return Prediction(
-        estimates=_estimates(scene),
-        frequencies=() if modal is None else tuple(float(omega) / (2.0 * math.pi) for omega in modal.omega[:3]),
-        macro_step=H,
-        threshold=THRESHOLD,
-        omega_1=None if modal is None else float(modal.omega[0]),
-        omega_max=None if modal is None else float(modal.omega[-1]),
-        spring_frequency=None if scene.spring is None else spring_frequency(scene),
-        contact_frequency=None if pair is None or not pair.soft else pair.contact_frequency,
-        tip_mass=None if modal is None else 1.0 / modal.inverse_tip_mass,
-        impedance=Z,
-        displacement_gain=None if mass is None or Z is None or (pair and pair.soft) else 2.0 * mass / (Z * H),
-        resolved_modes=resolved,
-        modes=kept,
-        static_shapes=None if modal is None or kept is None else len(modal.omega) - kept,
-        schemes=schemes,
-        auto=choice(scene) if schemes else None,
-        notes=tuple(notes),
-    )
+    Z = None if beam is None else math.sqrt(shear_stiffness(beam) * beam.density * beam.area)
+    exchanged = Z is not None and scene.spring is not None and not (pair and pair.soft)
+    return {
+        "estimates": _estimates(scene),
+        "frequencies": [] if modal is None else (modal.omega[:3] / (2.0 * math.pi)).tolist(),
+        "macro_step": H,
+        "threshold": THRESHOLD,
+        **of_modes,
+        "spring_frequency": None if scene.spring is None else spring_frequency(scene),
+        "contact_frequency": None if pair is None or not pair.soft else pair.contact_frequency,
+        "impedance": Z,
+        "displacement_gain": 2.0 * scene.spring.mass / (Z * H) if exchanged and Z and scene.spring else None,
+        "schemes": schemes,
+        "auto": choice(scene) if schemes else None,
+        "notes": notes,
+    }
 
 
-def _estimates(scene: Scene) -> Estimates:
-    """Return what ``scene`` is, by hand calculation."""
+def _estimates(scene: Scene) -> dict[str, float | None]:
+    """Return what ``scene`` is, by hand calculation; ``None`` where it has no such thing.
+
+    ``frequency`` is the lowest of the beam, tip free, without a mesh [Hz], ``tip_stiffness`` static, 1/(L³/3EI + L/KAG)
+    [N/m], ``locking`` the static stiffness of the mesh over that of the beam; ``contact_time`` is that of the first
+    contact of an undeformed approach [s], ``contact_duration`` half a period of spring and beam together [s].
+    """
     beam, spring = scene.beam, scene.spring
     duration = None
     if beam is not None and spring is not None and not scene.contact.lasting:
         stiffness = spring.linear_stiffness + 1.0 / tip_compliance(beam)
         if stiffness > 0.0:
             duration = math.pi * math.sqrt((spring.mass + tip_inertia(beam)) / stiffness)
-    return Estimates(
-        beam_mass=None if beam is None else beam.density * beam.area * beam.length,
-        frequency=None if beam is None or scene.massless else lowest_frequency(beam) / (2.0 * math.pi),
-        tip_stiffness=None if beam is None else 1.0 / tip_compliance(beam),
-        locking=None if beam is None else locking(beam),
-        spring_mass=None if spring is None else spring.mass,
-        spring_stiffness=None if spring is None else spring.linear_stiffness,
-        contact_time=scene.contact_time,
-        contact_duration=duration,
-    )
+    return {
+        "beam_mass": None if beam is None else beam.density * beam.area * beam.length,
+        "frequency": None if beam is None or scene.massless else lowest_frequency(beam) / (2.0 * math.pi),
+        "tip_stiffness": None if beam is None else 1.0 / tip_compliance(beam),
+        "locking": None if beam is None else locking(beam),
+        "spring_mass": None if spring is None else spring.mass,
+        "spring_stiffness": None if spring is None else spring.linear_stiffness,
+        "contact_time": scene.contact_time,
+        "contact_duration": duration,
+    }
 
 
-def _reduced(beam: Beam) -> tuple[Beam, bool]:
-    if beam.modes_kept <= MOST_MODES:
-        return beam, False
-    return beam.model_copy(update={"n_modes": MOST_MODES, "integrator": "modal"}), True
+def _reduced(beam: Beam) -> Beam:
+    fewer = {"n_modes": MOST_MODES, "integrator": "modal"}
+    return beam if beam.modes_kept <= MOST_MODES else beam.model_copy(update=fewer)
 
 
 # -- the linearised scene -------------------------------------------------------------------------------------------
@@ -210,7 +179,7 @@ def linear_pair(scene: Scene, modal: ModalBeam) -> LinearPair | None:
 def contact_frequency(scene: Scene) -> float:
     """Return √(k (1/m_tip + 1/m)) of beam and spring on a soft law [rad/s], where it is stiffest."""
     assert scene.beam is not None
-    pair = linear_pair(scene, modal_beam(_reduced(scene.beam)[0]))
+    pair = linear_pair(scene, modal_beam(_reduced(scene.beam)))
     assert pair is not None
     return pair.contact_frequency
 
