@@ -111,11 +111,9 @@ def pick(scene: Scene) -> Trajectory:
             coarse, before = None, {}
             continue
         if coarse is not None:
-            apart = differences(coarse, fine, asked)
-            errors = {name: value / (2.0 ** _order(before.get(name), value) - 1.0) for name, value in apart.items()}
+            before, errors = _estimated(coarse, fine, asked, before)
             if _SAFETY * max(errors.values()) <= asked:
                 return _told(fine, asked, errors, pilots)
-            before = apart
         pilots.append(fine)
         coarse = fine
     reached = f"runs still differ by {max(before.values()):.1e}" if before else f"a run that may do takes {steps:.1g}"
@@ -150,9 +148,19 @@ def differences(coarse: Trajectory, fine: Trajectory, short: float) -> dict[str,
     return found
 
 
-def _order(before: float | None, now: float) -> float:
-    """Return the order that two successive differences show, 1 … 2; 1 where there is one only."""
-    return min(max(math.log2(before / now), 1.0), 2.0) if before and now else 1.0
+def _estimated(
+    coarse: Trajectory, fine: Trajectory, short: float, before: dict[str, float]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the `differences` of two runs, and with them the error of the finer one: D/(2ᵖ − 1).
+
+    The order p is what these differences and those ``before`` show, 1 … 2; 1 where there are none.
+    """
+    apart, errors = differences(coarse, fine, short), {}
+    for name, now in apart.items():
+        then = before.get(name)
+        order = min(max(math.log2(then / now), 1.0), 2.0) if then and now else 1.0
+        errors[name] = now / (2.0**order - 1.0)
+    return apart, errors
 
 
 def _first(scene: Scene) -> float:
@@ -222,19 +230,18 @@ def pick_mesh(scene: Scene) -> Trajectory:
         raise SceneError("[beam]: the scene has no mesh to choose")
     beam, asked = scene.beam, scene.accuracy
     coarse: Trajectory | None = None
-    before, error, factor = 0.0, math.inf, 1
+    before: dict[str, float] = {}
+    error, factor = math.inf, 1
     while beam.unknowns * factor <= ALL_MODES_UP_TO:
         mesh = {"n_modes": factor * beam.n_modes, "n_elements": factor * beam.n_elements}
         fine = pick(with_changes(scene, accuracy=_SHARE * asked, beam=mesh))
         if coarse is not None:
-            apart = differences(coarse, fine, _SHORT)
-            difference = max(apart["motion"], apart["times"])
-            error = difference / (2.0 ** _order(before, difference) - 1.0)
+            before, errors = _estimated(coarse, fine, _SHORT, before)
+            error = max(errors["motion"], errors["times"])
             if error <= _SHARE * asked:
                 found = fine.summary["accuracy"]
                 found |= {"asked": asked, "picked": {**found["picked"], **mesh}, "estimated_mesh_error": error}
                 return fine
-            before = difference
         coarse, factor = fine, 2 * factor
     reached = f"{factor // 2 * beam.n_elements} elements still leave some {error:.1e}"
     raise SceneError(

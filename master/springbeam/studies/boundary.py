@@ -7,12 +7,10 @@ is that at which the metric first reaches its limit, linear between the amplitud
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..pictures.drawing import VERMILLION
 from ..scene import Load, Scene, SceneError
 from .design import Axis
 from .metrics import named
@@ -21,31 +19,19 @@ from .metrics import named
 _POINTS = 20_001
 
 
-class Limit(NamedTuple):
-    """A metric of ``springbeam.studies.metrics``, by name, and what it must not reach."""
+def limit_of(text: str, own: Sequence[str] = ()) -> tuple[str, float]:
+    """Read ``METRIC=LIMIT``, what must not be reached, the metric being one of ``own`` or known.
 
-    metric: str
-    value: float
-
-
-class Critical(NamedTuple):
-    """A pulse at the boundary."""
-
-    duration: float  #: [s]
-    velocity_change: float  #: ∫ of the load over its duration, in the load's unit times s
-    peak: float  #: in the load's unit
-
-
-def limit_of(text: str, own: Sequence[str] = ()) -> Limit:
-    """Read ``METRIC=LIMIT``, the metric being one of ``own`` or known. Raises SceneError for anything else."""
-    metric, separator, value = text.rpartition("=")
+    Raises SceneError for anything else.
+    """
+    metric, _, value = text.rpartition("=")
     try:
         limit = float(value)
     except ValueError:
         limit = 0.0
-    if not separator or not limit > 0.0:
+    if not limit > 0.0:
         raise SceneError(f"--boundary {text}: must be METRIC=LIMIT with a limit above 0, as in max_a_tip=400")
-    return Limit(metric.strip() if metric.strip() in own else named(metric.strip())[0], limit)
+    return metric.strip() if metric.strip() in own else named(metric.strip())[0], limit
 
 
 def pulse_axes(scene: Scene, axes: Sequence[Axis]) -> tuple[Load, str, str]:
@@ -65,55 +51,37 @@ def pulse_axes(scene: Scene, axes: Sequence[Axis]) -> tuple[Load, str, str]:
 
 
 def boundary(
-    load: Load, amplitude: str, duration: str, rows: Iterable[Mapping[str, Any]], limit: Limit
-) -> list[Critical]:
+    load: Load, amplitude: str, duration: str, rows: Iterable[Mapping[str, Any]], metric: str, limit: float
+) -> list[dict[str, float]]:
     """Return the critical pulses by duration; none at durations whose runs stay below the limit.
 
-    ``rows`` are those of the sweep, ``amplitude`` and ``duration`` the names of its axes.
+    ``rows`` are those of the sweep, ``amplitude`` and ``duration`` the names of its axes. A critical pulse has its
+    ``duration`` [s], its ``peak``, in the load's unit, and its ``velocity_change``, the integral of the load.
     """
     by_duration: dict[float, list[tuple[float, float]]] = {}
     for row in rows:
-        if row[limit.metric] is not None:
-            by_duration.setdefault(row[duration], []).append((abs(row[amplitude]), abs(row[limit.metric])))
+        if row[metric] is not None:
+            by_duration.setdefault(row[duration], []).append((abs(row[amplitude]), abs(row[metric])))
     found = []
     for length, pairs in sorted(by_duration.items()):
         peaks, values = np.array([(0.0, 0.0), *sorted(pairs)]).T
-        above = np.flatnonzero(values >= limit.value)
+        above = np.flatnonzero(values >= limit)
         if above.size:
-            k = int(above[0])
-            share = (limit.value - values[k - 1]) / (values[k] - values[k - 1])
-            peak = float(peaks[k - 1] + share * (peaks[k] - peaks[k - 1]))
-            found.append(Critical(length, peak * _area(load, length), peak))
+            around = slice(above[0] - 1, above[0] + 1)
+            peak = float(np.interp(limit, values[around], peaks[around]))
+            pulse = load.model_copy(update={"amplitude": 1.0, "duration": length, "start": 0.0})
+            mean = float(pulse.value((np.arange(_POINTS) + 0.5) * length / _POINTS).mean())
+            found.append({"duration": length, "velocity_change": peak * mean * length, "peak": peak})
     return found
 
 
-def in_words(found: Sequence[Critical], limit: str) -> list[str]:
+def in_words(found: Sequence[Mapping[str, float]], limit: str) -> list[str]:
     """Return what the boundary says: both of its sides."""
     if not found:
         return [f"boundary  {limit} is not reached in any run that has a value of it"]
-    slowest, least = min(found, key=lambda c: c.velocity_change), min(found, key=lambda c: c.peak)
+    slowest, least = (min(found, key=lambda pulse: pulse[side]) for side in ("velocity_change", "peak"))
     return [
-        f"boundary  {limit} is reached from a velocity change of {slowest.velocity_change:.4g} on "
-        f"(in {slowest.duration:.4g} s)",
-        f"          and from a peak of {least.peak:.4g} on (in {least.duration:.4g} s)",
+        f"boundary  {limit} is reached from a velocity change of {slowest['velocity_change']:.4g} on "
+        f"(in {slowest['duration']:.4g} s)",
+        f"          and from a peak of {least['peak']:.4g} on (in {least['duration']:.4g} s)",
     ]
-
-
-def draw_boundary(found: Sequence[Critical], limit: str, path: Path) -> Path:
-    """Draw peaks over velocity changes; what lies above and to the right damages."""
-    from .picture import panels
-
-    figure, (ax,) = panels(1, 1, (7.0, 4.0), f"damage boundary: {limit}")
-    along = sorted(found, key=lambda c: c.duration)
-    ax.loglog([c.velocity_change for c in along], [c.peak for c in along], ".-", color=VERMILLION)
-    ax.set(xlabel="velocity change [unit of the load × s]", ylabel="peak [unit of the load]")
-    ax.grid(alpha=0.3, which="both")
-    figure.savefig(path, dpi=100)
-    return path
-
-
-def _area(load: Load, duration: float) -> float:
-    """Return ∫ of the pulse over its duration at an amplitude of 1 [s]."""
-    pulse = load.model_copy(update={"amplitude": 1.0, "duration": duration, "start": 0.0})
-    middle = (np.arange(_POINTS) + 0.5) * duration / _POINTS
-    return float(pulse.value(middle).mean()) * duration

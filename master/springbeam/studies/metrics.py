@@ -54,11 +54,15 @@ def _extreme(column: str, pick: Callable[[Extremes], float]) -> Callable[[Trajec
     def of(run: Trajectory) -> float | None:
         if column not in run.columns:
             return None
-        if run.steps is None:  # a reference, which has its rows only
+        if run.steps is None or column not in MOTION:  # which is known at its rows only
             return pick(Extremes.of_rows(run.time, run[column]))
         return pick(extremes(run.scene, run.steps, column))
 
     return of
+
+
+def _magnitude(found: Extremes) -> float:
+    return max(found.highest, -found.lowest)
 
 
 def _first(kind: EventKind) -> Callable[[Trajectory], float | None]:
@@ -71,18 +75,6 @@ def _number(kind: EventKind) -> Callable[[Trajectory], float | None]:
 
 def _total(name: str) -> Callable[[Trajectory], float | None]:
     return lambda run: float(run.summary[name]) if name in run.summary else None
-
-
-def _largest(column: str) -> Callable[[Trajectory], float | None]:
-    def of(run: Trajectory) -> float | None:
-        if column not in run.columns:
-            return None
-        if column in MOTION and run.steps is not None:
-            found = extremes(run.scene, run.steps, column)
-            return max(found.highest, -found.lowest)
-        return float(np.abs(run[column]).max())
-
-    return of
 
 
 def _settled(column: str) -> Callable[[Trajectory], float | None]:
@@ -115,7 +107,7 @@ METRICS: dict[str, Metric] = {
     "y_min": Metric("m", "lowest place of the spring's top", _extreme("y", attrgetter("lowest"))),
     "y_max": Metric("m", "highest place of the spring's top", _extreme("y", attrgetter("highest"))),
     "y_end": Metric("m", "the spring's top at the end", _of("y", _last)),
-    "z_max": Metric("m/s", "largest speed of the spring's top", _extreme("z", lambda z: max(z.highest, -z.lowest))),
+    "z_max": Metric("m/s", "largest speed of the spring's top", _extreme("z", _magnitude)),
     "gap_max": Metric("m", "largest gap", _extreme("gap", attrgetter("highest"))),
     **{name: Metric(unit, words, _total(name)) for name, (words, unit) in TOTALS.items()},
     **{name: Metric("J", f"energy lost by {words}", _total(name)) for name, words in LOSS_NAMES.items()},
@@ -126,7 +118,9 @@ METRICS: dict[str, Metric] = {
     **{f"first_{kind}": Metric("s", f"first event {kind}", _first(kind)) for kind in EventKind},
     **{f"number_of_{kind}": Metric("", f"events {kind}", _number(kind)) for kind in EventKind},
     **{
-        f"max_{name}": Metric(unit, f"largest magnitude of {name}", _largest(name), asked=True, takes=(name,))
+        f"max_{name}": Metric(
+            unit, f"largest magnitude of {name}", _extreme(name, _magnitude), asked=True, takes=(name,)
+        )
         for name, unit in _UNITS.items()
     },
     **{

@@ -16,7 +16,7 @@ from rich.text import Text
 
 from ..scene import Scene
 from ..scene.reference import unit_of
-from .boundary import Critical, Limit, boundary, draw_boundary, in_words, limit_of, pulse_axes
+from .boundary import boundary, in_words, limit_of, pulse_axes
 from .design import Axis, Sampling, compatible, design, parse_axis
 from .metrics import PRINCIPAL, USUAL, heading, known, named
 from .study import Findings, Pictures, Row, Study
@@ -52,14 +52,14 @@ class Sweep(Study):
     def metrics(self) -> Sequence[str]:
         """Those asked for."""
         asked = self.metric or USUAL
-        return (*asked, self._limit.metric) if self.boundary and self._limit.metric not in self._columns else asked
+        return asked if not self.boundary or self._limit[0] in self._columns else (*asked, self._limit[0])
 
     @property
     def _columns(self) -> list[str]:
         return [named(text)[0] for text in self.metric or USUAL]
 
     @property
-    def _limit(self) -> Limit:
+    def _limit(self) -> tuple[str, float]:
         return limit_of(self.boundary, self._columns)
 
     @property
@@ -87,8 +87,8 @@ class Sweep(Study):
             lines.append(f"warnings  of {len(warned)} runs, the first of them: {warned[0].splitlines()[0]}")
         document: dict[str, Any] = {"runs": {status: counts[status] for status in STATUSES}}
         if self.boundary:
-            document["boundary"] = [critical._asdict() for critical in self._critical(records)]
-            lines += in_words(self._critical(records), self.boundary)
+            document["boundary"] = self._critical(records)
+            lines += in_words(document["boundary"], self.boundary)
         return Findings(document, [Text(line) for line in lines] + ([self._first(records)] if self.metric else []))
 
     def _first(self, records: Mapping[str, Row]) -> Table:
@@ -97,27 +97,30 @@ class Sweep(Study):
         cells = [[_in_words(row[name]) for name in names] for row in rows[:_FIRST_ROWS]]
         return table(names, cells, f"the first {_FIRST_ROWS} of {len(rows)} rows" if len(rows) > _FIRST_ROWS else "")
 
-    def _critical(self, records: Mapping[str, Row]) -> list[Critical]:
-        return boundary(*pulse_axes(self.scene, self.axes), self.rows(records), self._limit)
+    def _critical(self, records: Mapping[str, Row]) -> list[Row]:
+        return boundary(*pulse_axes(self.scene, self.axes), self.rows(records), *self._limit)
 
     def write(self, records: Mapping[str, Row], directory: Path, *, pictures: bool) -> list[Path]:
         """Write the table, the damage boundary if it is wanted, and with ``pictures`` these."""
         files = super().write(records, directory, pictures=pictures)
         if self.boundary and (found := self._critical(records)):
-            files.append(write_csv(directory / "sweep-boundary.csv", [critical._asdict() for critical in found]))
-            if pictures:
-                files.append(draw_boundary(found, self.boundary, directory / "sweep-boundary.png"))
+            files.append(write_csv(directory / "sweep-boundary.csv", found))
         return files
 
     def draw(self, records: Mapping[str, Row]) -> Pictures:
-        """Draw what of the metrics the axes change."""
-        from .picture import Scale, column, multiples, singly
+        """Draw what of the metrics the axes change, and the damage boundary: what lies above it damages."""
+        from .picture import Point, Scale, column, curves, multiples, singly
 
-        rows, axes = self.rows(records), self.axes
+        rows, axes, figures = self.rows(records), self.axes, Pictures()
         words = [any(isinstance(row[axis.name], str) for row in rows) for axis in axes]
         scales = [Scale(axis.name, _labelled(axis), axis.log, word) for axis, word in zip(axes, words, strict=True)]
-        shown = {name: heading(name) for name in self._shown if _varies(column(singly(rows, name), name))}
-        return {"sweep": multiples(rows, scales, shown, self.scene.title or "sweep")} if shown else {}
+        if shown := {name: heading(name) for name in self._shown if _varies(column(singly(rows, name), name))}:
+            figures["sweep"] = multiples(rows, scales, shown, self.scene.title or "sweep")
+        if self.boundary and (found := self._critical(records)):
+            points = [Point("", self.boundary, pulse["velocity_change"], pulse["peak"]) for pulse in found]
+            labels = ("velocity change [unit of the load × s]", "peak [unit of the load]")
+            figures["sweep-boundary"] = curves(points, f"damage boundary: {self.boundary}", *labels, (7.0, 4.0))
+        return figures
 
 
 def rows(directory: str | Path) -> dict[str, list[Any]]:

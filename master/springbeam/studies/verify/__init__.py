@@ -9,7 +9,6 @@ A new exact solution is a function in one of the modules beside this one, made a
 from __future__ import annotations
 
 from .alone import (
-    all_lost,
     bar_frequencies,
     beam_energy,
     duffing,
@@ -22,7 +21,7 @@ from .laws import compliant_impact, damped_link, hunt_crossley, linked_masses, t
 
 #: In the order of the table. Each raises FmuError if an FMU cannot be found, loaded or initialised.
 SECTIONS = (
-    *(static_deflection, frequencies, bar_frequencies, beam_energy, all_lost),
+    *(static_deflection, frequencies, bar_frequencies, beam_energy),
     *(duffing, escape),
     *(bar_impact, two_masses, added_mass, energy_scheme),
     *(resonance, pulse, slow_ramp, moving_base),
