@@ -48,6 +48,17 @@ def test_locking_is_the_stiffness_of_the_mesh_over_that_of_the_beam(degree):
     assert statics.locking(beam) == pytest.approx(ratio, rel=1e-11)
 
 
+@pytest.mark.parametrize("alpha", [1e-3, 0.2, 4.0])
+def test_let_go_it_relaxes_exponentially(alpha):
+    rest, size = statics.tip_load_deflection(BEAM), 0.5
+    beam = QuasiStaticBeam(BEAM.model_copy(update={"alpha_b": alpha}), 0, 0.1, 0.0)
+    beam.release()
+    w0, w = (0.1 - rest) * np.exp([0.0, -size / alpha])
+    once = alpha * (w0 - w)
+    expected = (rest + w, -w / alpha, rest * size + once, 0.5 * rest * size**2 + alpha * (w0 * size - once))
+    assert beam.advance_alone(0.0, size) == pytest.approx(expected, rel=1e-12)
+
+
 # -- the pair -------------------------------------------------------------------------------------------------------
 
 
