@@ -7,7 +7,8 @@ import shutil
 import sys
 import textwrap
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextlib import closing
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
@@ -36,8 +37,10 @@ from .common import (
     say,
 )
 
-_REQUIRED = ("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly", "pebble", "pyarrow")
-_FOR_CLUSTERS = ("distributed",)
+_PACKAGES = (
+    *("fmpy", "numpy", "scipy", "pydantic", "typer", "rich", "matplotlib", "plotly", "pebble", "pyarrow"),
+    "distributed",  # for clusters
+)
 
 
 def doctor(
@@ -54,31 +57,56 @@ def doctor(
 
     Example: springbeam doctor my-scene.toml
     """
+    from ..bodies.fmu_bodies import FmuBeam, FmuSpring
+
     if scene is not None:
         with bad_input_reported():
             _examine(load_scene(scene, settings or ()), as_json)
         return
-    found = _found()
-    versions, python, fmus = found["packages"] | found["cluster"], found["python"], found["fmus"]
-    absent = [package for package, number in versions.items() if number is None]
+    installed = {package.name.lower(): package.version for package in metadata.distributions()}
+    versions = {name: installed.get(name) for name in _PACKAGES}
+    fmus = {
+        "beam": _loaded("beam", lambda: FmuBeam(Beam.with_ones(), 0.0, 0.0)),
+        "spring": _loaded("spring", lambda: FmuSpring(Spring.with_ones(), 0.0)),
+    }
+    document = {
+        "version": metadata.version("springbeam"),
+        "path": Path(__file__).parents[1],
+        "python": {"version": platform.python_version(), "executable": sys.executable},
+        "system": f"{platform.platform()}, {platform.machine()}",
+        "packages": versions,
+        "ffmpeg": shutil.which("ffmpeg"),
+        "fmus": fmus,
+    }
     there = ", ".join(f"{package} {number}" for package, number in versions.items() if number is not None)
     lines = [
-        ("springbeam", f"{found['version']} in {found['path']}"),
-        ("Python", f"{python['version']} ({python['executable']})"),
-        ("system", f"{found['system']}, {found['machine']}"),
+        ("springbeam", f"{document['version']} in {document['path']}"),
+        ("Python", f"{platform.python_version()} ({sys.executable})"),
+        ("system", document["system"]),
         ("packages", textwrap.fill(there, 66, break_on_hyphens=False, subsequent_indent=" " * 12)),
-        *(("missing", f"{package}: pip install --upgrade {package}") for package in absent),
-        ("ffmpeg", found["ffmpeg"] or "not found: springbeam animate then writes GIFs only, no MP4"),
+        *(("missing", f"{name}: pip install --upgrade {name}") for name, number in versions.items() if number is None),
+        ("ffmpeg", document["ffmpeg"] or "not found: springbeam animate then writes GIFs only, no MP4"),
+        *((fmu["file"], f"{fmu['state']}\n{'':<12}{fmu['error'] or fmu['path']}") for fmu in fmus.values()),
     ]
-    for name, fmu in fmus.items():
-        state = (
-            f"FMI {fmu['fmi']}, loads; binaries for {', '.join(fmu['platforms'])}" if fmu["error"] is None else "FAILED"
-        )
-        file = fmu["path"].name if fmu["path"] else f"{name}.fmu"
-        lines.append((file, f"{state}\n{'':<12}{fmu['error'] or fmu['path']}"))
-    say(found, [], [(f"{name:<12}", text) for name, text in lines], as_json=as_json)
+    say(document, [], [(f"{name:<12}", text) for name, text in lines], as_json=as_json)
     if any(fmu["error"] is not None for fmu in fmus.values()):
         raise typer.Exit(DISAGREES)
+
+
+def _loaded(name: str, make: Callable[[], OwnBody]) -> dict[str, Any]:
+    """Return how our FMU of ``name`` is found and loaded."""
+    found: dict[str, Any] = {"path": None, "file": f"{name}.fmu", "fmi": None, "state": "FAILED", "error": None}
+    try:
+        found["path"] = path = own_fmu(name)
+        found["file"] = path.name
+        with closing(make()) as body:
+            found["fmi"] = body.fmu.version
+        with zipfile.ZipFile(path) as archive:
+            binaries = {file.split("/")[1] for file in archive.namelist() if file.startswith("binaries/")}
+        found["state"] = f"FMI {found['fmi']}, loads; binaries for {', '.join(sorted(binaries))}"
+    except FmuError as failure:
+        found["error"] = str(failure)
+    return found
 
 
 def _examine(scene: Scene, as_json: bool) -> None:
@@ -112,46 +140,8 @@ def _examine(scene: Scene, as_json: bool) -> None:
         typer.echo("The checks found nothing wrong, and the scene can be run.")
 
 
-def _found() -> dict[str, Any]:
-    """Return everything that `doctor` prints."""
-    from ..bodies.fmu_bodies import FmuBeam, FmuSpring
-
-    fmus = {}
-    for name, body in (("beam", lambda: FmuBeam(Beam.with_ones(), 0.0, 0.0)),
-                       ("spring", lambda: FmuSpring(Spring.with_ones(), 0.0))):  # fmt: skip
-        found: dict[str, Any] = {"path": None, "fmi": None, "platforms": [], "error": None}
-        try:
-            found["path"] = own_fmu(name)
-            made = body()
-            found["fmi"] = made.fmu.version
-            made.close()
-            with zipfile.ZipFile(found["path"]) as archive:
-                binaries = {file.split("/")[1] for file in archive.namelist() if file.startswith("binaries/")}
-            found["platforms"] = sorted(binaries)
-        except FmuError as failure:
-            found["error"] = str(failure)
-        fmus[name] = found
-    return {
-        "version": metadata.version("springbeam"),
-        "path": Path(__file__).parents[1],
-        "python": {"version": platform.python_version(), "executable": sys.executable},
-        "system": platform.platform(),
-        "machine": platform.machine(),
-        "packages": {name: _version(name) for name in _REQUIRED},
-        "cluster": {name: _version(name) for name in _FOR_CLUSTERS},
-        "ffmpeg": shutil.which("ffmpeg"),
-        "fmus": fmus,
-    }
-
-
-def _version(name: str) -> str | None:
-    try:
-        return metadata.version(name)
-    except metadata.PackageNotFoundError:
-        return None
-
-
 if TYPE_CHECKING:
+    from ..bodies.fmu_bodies import OwnBody
     from ..studies.verify.check import Check, Section
 
 

@@ -164,11 +164,7 @@ def compare(
     document = {"runs": names, "keys": keys, "results": results, "picture": picture}
     titles = {"keys that differ": keys, "results": results}
     shown = [table(("", *names), _rows(found), title) for title, found in titles.items()]
-    say(document, shown, _drawn(picture), where=picture, quiet=quiet, as_json=as_json)
-
-
-def _drawn(picture: Path | None) -> list[tuple[str, Path]]:
-    return [] if picture is None else [("picture", picture)]
+    say(document, shown, [("picture", picture)] * (picture is not None), where=picture, quiet=quiet, as_json=as_json)
 
 
 def _beside_measured(
@@ -197,7 +193,7 @@ def _beside_measured(
     columns = ("curve", "points", "rms", "of its spread", "largest", "at t [s]")
     shown = [table(columns, rows), f"shift     {moved:.6g} s" + (", found by correlation" if shift is None else "")]
     document = {"shift": moved, "residuals": [row._asdict() for row in found], "picture": out}
-    say(document, shown, _drawn(out), where=out, quiet=quiet, as_json=as_json)
+    say(document, shown, [("picture", out)] * (out is not None), where=out, quiet=quiet, as_json=as_json)
 
 
 def differing_keys(scenes: list[Scene]) -> dict[str, list[Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from math import inf
 from pathlib import Path
@@ -96,8 +95,7 @@ def run(
         if accuracy is not None and not 0.0 < accuracy < 1.0:
             fail(BAD_INPUT, f"--accuracy {accuracy:g}: must be between 0 and 1, as in --accuracy 1e-4")
         what = load_scene(scene, settings or (), accuracy)
-        for option, cause in _amiss(what, mesh, checkpoint, interval):
-            fail(BAD_INPUT, f"{option}: {cause}")
+        _refuse_options(what, mesh, checkpoint, interval)
         for line in () if quiet or as_json else implausible(what):
             typer.echo(f"warning: {line}", err=True)
         made = picked(what, mesh)
@@ -119,24 +117,23 @@ def run(
     )
 
 
-def _amiss(scene: Scene, mesh: bool, checkpoint: float | None, interval: float | None) -> Iterator[tuple[str, str]]:
-    """Yield the options that the run of ``scene`` cannot have, and why."""
-    asked, apart = f"accuracy = {scene.accuracy or 0.0:g}", "leave one of the two out"
-    if checkpoint is not None and scene.accuracy is not None:
-        why = f"a run with {asked} is written when it is done, and has nothing to resume before; {apart}"
-        yield f"--checkpoint {checkpoint:g}", why
-    if mesh and scene.accuracy is None:
-        yield "--mesh", "picks a mesh that keeps an accuracy; give one, as in --accuracy 1e-3 --mesh"
-    if interval is None:
-        return
-    option = f"--output-interval {interval:g}"
-    if not 0.0 < interval < inf:
-        yield option, "must be a time above 0 s, as in --output-interval 1e-3"
-    elif scene.contact.algorithm:
-        yield option, f'contact.law = "{scene.contact.law}" has no data between its steps; {apart}'
-    elif scene.time.t_end / interval > _MOST_ROWS:
-        end = f"time.t_end = {scene.time.t_end:g} s"
-        yield option, f"more than {_MOST_ROWS:,} rows up to {end}; take a longer one"
+def _refuse_options(scene: Scene, mesh: bool, checkpoint: float | None, interval: float | None) -> None:
+    """End the command if the run of ``scene`` cannot have an option."""
+    asked, apart, end = f"accuracy = {scene.accuracy or 0.0:g}", "leave one of the two out", scene.time.t_end
+    written = f"a run with {asked} is written when it is done, and has nothing to resume before; {apart}"
+    law = f'contact.law = "{scene.contact.law}" has no data between its steps; {apart}'
+    many = f"more than {_MOST_ROWS:,} rows up to time.t_end = {end:g} s; take a longer one"
+    step = 1.0 if interval is None else interval
+    for option, value, wrong, why in (
+        ("--checkpoint", checkpoint, checkpoint is not None and scene.accuracy is not None, written),
+        ("--mesh", None, mesh and scene.accuracy is None, "picks a mesh that keeps an accuracy; give one, as in "
+         "--accuracy 1e-3 --mesh"),
+        ("--output-interval", step, not 0.0 < step < inf, "must be a time above 0 s, as in --output-interval 1e-3"),
+        ("--output-interval", step, interval is not None and scene.contact.algorithm, law),
+        ("--output-interval", step, interval is not None and end > _MOST_ROWS * step, many),
+    ):  # fmt: skip
+        if wrong:
+            fail(BAD_INPUT, f"{option}{'' if value is None else f' {value:g}'}: {why}")
 
 
 def picked(scene: Scene, mesh: bool = False) -> Trajectory | None:

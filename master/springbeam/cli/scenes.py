@@ -22,7 +22,6 @@ from .common import (
     SceneArgument,
     SettingsOption,
     bad_input_reported,
-    console_for,
     fail,
     print_json,
     say,
@@ -77,12 +76,12 @@ def keys(
         print_json(reference.schema())
         return
     if metrics:
-        from ..studies.metrics import METRICS
+        from ..studies.metrics import METRICS, heading
 
         if as_json:
             print_json([{"name": name, "unit": m.unit, "meaning": m.words} for name, m in METRICS.items()])
         for name, m in () if as_json else METRICS.items():
-            typer.echo(f"{name}{f' [{m.unit}]' if m.unit else ''}: {m.words}")
+            typer.echo(f"{heading(name)}: {m.words}")
         return
     found = reference.listed()
     if what is not None:
@@ -93,23 +92,19 @@ def keys(
             there = [key.name for key in reference.listed(table)] if table in MODELS else [*filter(None, MODELS)]
             kind, hint = ("key", nearest(name, there)) if table in MODELS else ("table", nearest(table, there))
             fail(BAD_INPUT, f"{what}: unknown {kind}; {hint}allowed: {', '.join(there)}")
-    if as_json:
-        print_json([key._asdict() for key in found])
-    console = console_for(silent=as_json)
+    shown: list[Any] = []
     for name, group in groupby(found, lambda key: key.table):
-        console.print(
-            Text(
-                f"\n{reference.heading(name)}  {reference.about(name)}" if name else reference.heading(name),
-                style="bold",
-            )
-        )
-        for ways in MODELS[name].WAYS:
-            console.print(Text(f"give the {ways.thing} one way: {ways}"))
+        title = f"\n{reference.heading(name)}  {reference.about(name)}" if name else reference.heading(name)
+        shown.append(Text(title, style="bold"))
+        shown += [Text(f"give the {ways.thing} one way: {ways}") for ways in MODELS[name].WAYS]
         for key in group:
             unit = "" if key.unit == "–" else f" [{key.unit}]"
-            console.print(Text(f"{key.name}{unit}: {key.meaning}"), style="")
             left_out = key.default if key.default.startswith("needed") else f"default: {key.default}"
-            console.print(Text(f"    {key.allowed}; {left_out}"), style="dim")
+            shown += [
+                Text(f"{key.name}{unit}: {key.meaning}"),
+                Text(f"    {key.allowed}; {left_out}", style="dim"),
+            ]
+    say([key._asdict() for key in found], shown, as_json=as_json)
 
 
 def new(
