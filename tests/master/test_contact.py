@@ -134,3 +134,14 @@ def test_bounces_die_out_unless_nothing_is_lost(z, restitution, kind):
     found, phase, impact = struck_at(z, restitution)
     assert (found, phase.seated) == (kind, kind == "seated")
     assert impact.of_foundation == pytest.approx(-z * (1.0 + (0.0 if kind == "seated" else restitution)), rel=1e-14)
+
+
+@pytest.mark.parametrize(("v", "kind"), [(0.4, "stop_impact"), (0.6, "seated")])
+@pytest.mark.parametrize("restitution", [0.9, 1.0])
+def test_a_top_that_strikes_while_both_ends_rise_stays(v, kind, restitution):
+    """The tie leaves it −0.1 m/s where both ends together rise: its rebound would be over in no time."""
+    scene = with_changes(load_scene("soft"), stop={"position": -0.5, "restitution": restitution})
+    transitions = Transitions(scene, None, 0.2, 1.0, lambda: 1.0, 0.0)
+    ends = Motion(-0.5, v, 0.0, 0.0), Motion(-0.5, -0.1, 0.0, 0.0)
+    found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-16)
+    assert found == (kind if restitution < 1.0 else "stop_impact")

@@ -2,8 +2,14 @@
 
 import numpy as np
 import pytest
-from bodies import simulate, stopping
+from bodies import DuffingBody, simulate, solve, stopping, unit_beam
 
+from springbeam.bodies.elements import RigidWall
+from springbeam.bodies.protocol import NO_FORCE
+from springbeam.contact.laws import Compliance
+from springbeam.coupling.one_way import OneWay
+from springbeam.coupling.protocol import NotConverged, Step
+from springbeam.coupling.soft import SoftSolver
 from springbeam.results.steps import STEP
 from springbeam.run.neglect import Past, neglected
 from springbeam.run.outcome import RunStopped
@@ -65,6 +71,28 @@ def test_the_driving_body_steps_once_a_macro_step():
         one_way = simulate(scene(**{**changes, "coupling": {"feedback": feedback}}))
         assert one_way.summary["work"][driver] == one_way.summary["macro_steps"] == 200
         assert two_way.summary["work"][driver] > 1.2 * 200
+
+
+def test_a_step_on_the_foundation_is_of_the_degree_asked_for_whatever_was_tried_before(monkeypatch):
+    """A step with the lower end let go was tried, found no force above degree 0, and was not taken."""
+    coupling = OneWay(Compliance(1e3, 1.5), 2, 1e-12, upper_drives=True)
+    beam, top, wall = unit_beam(4), DuffingBody(), RigidWall(0.0)
+    aim = SoftSolver.aim
+
+    def fails_above_0(self, *given):
+        if self.degree > 0:
+            raise NotConverged(1.0, 1)
+        return aim(self, *given)
+
+    with monkeypatch.context() as failing:
+        failing.setattr(SoftSolver, "aim", fails_above_0)
+        assert solve(coupling, 1e-2, beam, top)[1:] == (0.0, 0.0)
+    beam.rewind()
+    start = beam.motion(), wall.motion()
+    contact = solve(coupling, 1e-2, beam, wall)
+    coupling.accept(Step(0.0, 1e-2, contact, NO_FORCE, start, (beam.motion(), wall.motion())))
+    assert contact[2] != 0.0
+    assert coupling.state.reduced == 0
 
 
 def steps_under(forces, depths):

@@ -467,6 +467,21 @@ def test_results_that_are_cut_are_not_continued_nor_touched(tmp_path, name, dama
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
+def test_rows_of_a_run_that_goes_on_are_gone_until_it_ends(tmp_path):
+    recorder = FileRecorder(PAIR, RunDirectory.create(tmp_path))
+    recorder.keep(*block(3))
+    saved = recorder.save()
+    recorder.finish({"status": "interrupted"})
+    recorder.close()
+    rows = (tmp_path / "trajectory.csv").read_bytes()
+    with FileRecorder(PAIR, RunDirectory(tmp_path)) as recorder:
+        recorder.restore(saved)
+        assert not (tmp_path / "trajectory.csv").exists()
+        assert load_summary(tmp_path)["status"] == "running"
+        recorder.finish({"status": "done"})
+    assert (tmp_path / "trajectory.csv").read_bytes() == rows
+
+
 # -- a full disk --------------------------------------------------------------------------------------------------
 
 

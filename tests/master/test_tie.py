@@ -23,6 +23,14 @@ def after_impact(n, stiffness=100.0, **spring):
     return beam, top
 
 
+@pytest.mark.parametrize(("scheme", "degree"), SCHEMES)
+def test_the_force_is_looked_at_where_it_is_the_most_accurate(scheme, degree):
+    """Where P′_{d+2} vanishes last, or P_{d+1} for `hermite`: the part of the next degree is 0 there."""
+    basis = np.polynomial.Legendre.basis
+    left_out = basis(degree + 2).deriv() if scheme == "energy" else basis(degree + 1)
+    assert 2.0 * Tie(scheme, degree, 1e-12).sharpest - 1.0 == pytest.approx(left_out.roots().max(), abs=1e-14)
+
+
 # -- the conditions -------------------------------------------------------------------------------------------------
 
 

@@ -201,18 +201,18 @@ def test_algorithm_1_begins_in_contact_where_an_elastic_approach_begins_at_the_s
     assert compare(scene)["verdict"] == "agrees"
 
 
-@pytest.mark.parametrize("stop", [-0.015, -1e-4])
-def test_algorithm_1_decides_as_its_reference_does_and_says_what_it_injects(stop):
+@pytest.mark.parametrize(("stop", "stiffness"), [(-0.015, 500.0), (-1e-4, 1e5)])
+def test_algorithm_1_decides_as_its_reference_does_and_says_what_it_injects(stop, stiffness):
     """In all its columns, up to a last step of 0.3 h on the foundation or off it.
 
     The midpoint rule and the exact flow differ by (ωh)²/12 = 6e-6 of a step's motion, over 6 steps; 2e-4 is allowed.
     What the spring is given differs by what its dashpot takes of the mean velocity of a step instead of the motion.
     """
-    contact = {"exponent": 1.0, "impact": "tip"}
+    contact = {"exponent": 1.0, "impact": "tip", "stiffness": stiffness}
     scene = resolved(contact=contact, stop={"position": stop}, time={"t_end": 5.3e-3})
     run, reference = simulate(scene), algorithm1.simulate(scene)
     assert list(run.phase) == list(reference.phase)
-    assert set(run.phase) == {"tied", "seated"}
+    assert {"tied", "seated"} <= set(run.phase)
     assert kinds(run) == kinds(reference)
     for name in ("u_tip", "v_tip", "y", "z", "contact_force", "compliance_force", "foundation_force", "e_beam"):
         largest = np.abs(reference[name]).max()
