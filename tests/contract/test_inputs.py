@@ -146,20 +146,6 @@ def test_inputs_that_are_another_times_a_factor(case):
     assert a.get("load_work") != 0.0
 
 
-def test_derivatives_see_the_inputs_that_were_set(beam, spring):
-    b = beam.running(initial_velocity_slope=0.0)
-    rest = b.derivative("tip_velocity")[1]
-    b.set("tip_force", 0.4)
-    assert b.derivative("tip_velocity")[1] - rest == pytest.approx(0.4 / b.get("tip_mass"), rel=1e-12)
-    for law in (1, 2):
-        s = spring.running(contact_law=law, mass=2.0)
-        s.set("tip_displacement", 1.0)  # no contact
-        s.step(0.0, 0.01)
-        rest = s.derivative("velocity")[1]
-        s.set("external_force", 0.3)
-        assert s.derivative("velocity")[1] - rest == pytest.approx(0.15, rel=1e-12)
-
-
 def test_contact_force_is_ignored_by_the_law_inside(spring):
     values = {"contact_law": 2, "displacement": 0.1}
     plain, pressed = spring.running(**values), spring.running(**values, contact_force=5.0)

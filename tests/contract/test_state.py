@@ -54,23 +54,6 @@ def test_inputs_that_were_not_set_yet_belong_to_the_state(case, overwritten):
     assert k.get(case.force) == (0.0 if overwritten else 0.7)
 
 
-def test_a_state_can_be_overwritten_and_freed(case):
-    k = case.moving()
-    token = k.state()
-    k.step(0.0, 0.01)
-    here = k.outputs()
-    value = token.value
-    assert k.call("GetFMUState", ct.byref(token)) == OK
-    assert token.value == value
-    k.step(0.01, 0.01)
-    k.restore(token)
-    assert k.outputs() == here
-    assert k.call("FreeFMUState", ct.byref(token)) == OK
-    assert token.value is None
-    assert k.call("FreeFMUState", ct.byref(token)) == OK  # NULL: ignored
-    assert k.call("FreeFMUState", None) == OK
-
-
 @pytest.mark.parametrize("phase", PHASES)
 def test_a_state_carries_its_phase_parameters_and_time(case, phase):
     def finish(k):

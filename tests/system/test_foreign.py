@@ -214,7 +214,7 @@ def test_without_state_saving_values_are_exchanged(fmu, scheme, version):
     errors = []
     for size in (2e-3, 1e-3):
         coupling = {"scheme": scheme, "degree": 0, "macro_step": size}
-        run = simulate(pair(path, spring=spring, coupling=coupling, time={"t_end": 0.2}))
+        run = simulate(pair(path, spring=spring, coupling=coupling, time={"t_end": 0.1}))
         assert run.summary["spring_rollbacks"] == 0
         errors.append(np.abs(run.y - linked(run.time)[1]).max())
     assert 0.9 < np.log2(errors[0] / errors[1]) < 1.1
@@ -336,22 +336,22 @@ def test_ctrl_c_names_an_fmu_that_does_not_return(fmu, monkeypatch, hanging):
 
 
 @pytest.mark.usefixtures("hanging")
-@pytest.mark.parametrize("lie", LATE)
-def test_a_crash_in_mid_run_loses_nothing(fmu, tmp_path, lie):
+def test_a_crash_in_mid_run_loses_nothing(fmu, tmp_path):
     rows = {}
-    for name in ("none", lie):
-        scene = pair(fmu(), spring={"parameters": {"m": M2, "k": K, "lie": oscillator.LIES[name]}}, time={"t_end": 2.0})
+    for lie in ("none", *LATE):
+        scene = pair(fmu(), spring={"parameters": {"m": M2, "k": K, "lie": oscillator.LIES[lie]}}, time={"t_end": 2.0})
         (tmp_path / "scene.toml").write_text(tomli_w.dumps(scene.model_dump(exclude_none=True)))
-        done = command("run", tmp_path / "scene.toml", "--out", tmp_path / name, "--no-plots", "-q")
-        rows[name] = (tmp_path / name / "trajectory.csv").read_bytes()
-    assert done.exit_code == 3
-    assert LATE[lie] in done.stderr
-    summary = load_summary(tmp_path / lie)
-    assert summary["status"] == "stopped"
-    assert LATE[lie] in summary["cause"]
-    assert summary["time"] == pytest.approx(1.5, abs=0.02)
-    assert rows["none"].startswith(rows[lie])
-    assert rows[lie].count(b"\n") == pytest.approx(1.5 / 0.02, abs=3)
+        done = command("run", tmp_path / "scene.toml", "--out", tmp_path / lie, "--no-plots", "-q")
+        rows[lie] = (tmp_path / lie / "trajectory.csv").read_bytes()
+        if lie == "none":
+            continue
+        summary = load_summary(tmp_path / lie)
+        assert (done.exit_code, summary["status"]) == (3, "stopped")
+        assert LATE[lie] in done.stderr
+        assert LATE[lie] in summary["cause"]
+        assert summary["time"] == pytest.approx(1.5, abs=0.02)
+        assert rows["none"].startswith(rows[lie])
+        assert rows[lie].count(b"\n") == pytest.approx(1.5 / 0.02, abs=3)
 
 
 NAMES = {
@@ -440,5 +440,3 @@ def test_commands(fmu, tmp_path):
     printed("report", tmp_path / "run")
     assert "no reference knows this body" in refused("crosscheck", file)
     printed("run", file, "--accuracy", "1e-4", "--out", tmp_path / "accurate", "--quiet")
-    for setting in ("spring.force=x", "spring.parameters.lie=2.0", "coupling.degree=2 "):
-        refused("run", file, "--set", setting, "--out", tmp_path / "wrong", "--set", "coupling.scheme=hermite")
