@@ -29,23 +29,6 @@ def test_legendre_coefficients_and_derivatives_are_one_polynomial(a, size):
     assert force.mean(f, size) == pytest.approx(a[0], abs=2 * bound)  # P_k ⊥ 1 for k > 0
 
 
-def test_cut_above_a_degree_is_the_best_fit():
-    """Legendre series are cut by dropping terms: the rest is the L² projection."""
-    f = force.derivatives((0.7, -2.3, 1.9), 0.01)
-    assert force.legendre(f, 0.01, 1) == pytest.approx([0.7, -2.3], rel=1e-14)
-    assert force.legendre(f, 0.01, 0) == pytest.approx([0.7], rel=1e-14)
-
-
-def test_shifted_is_the_same_polynomial():
-    f, size = force.derivatives((0.7, -2.3, 1.9), 0.25), 0.25
-    g = force.shifted(f, size)
-    assert g[0] == force.value(f, size)
-    assert [force.value(g, tau) for tau in (-0.25, 0.1)] == pytest.approx(
-        [force.value(f, tau + size) for tau in (-0.25, 0.1)], rel=1e-14
-    )
-    assert force.legendre(force.shifted(g, -size), size, 2) == pytest.approx([0.7, -2.3, 1.9], rel=1e-14)
-
-
 @pytest.mark.parametrize("size", [1e-4, 0.5])
 def test_free_mass_response_is_the_repeated_integral(size):
     """m y⁽²⁾ = −P_k from rest: displacement, velocity and both integrals are its 2nd, 1st, 3rd, 4th integrals."""

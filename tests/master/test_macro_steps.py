@@ -79,16 +79,6 @@ def test_the_last_step_ends_the_run():
     assert steps.next(LENGTH - 1.3 * size) == (pytest.approx(LENGTH - 0.3 * size), size)
 
 
-def test_an_error_that_no_step_is_short_enough_for_ends():
-    steps = AdaptiveSteps(0.0, LENGTH)
-    for _ in range(8):  # 26 octaves from the first size, 3 at a time
-        assert not steps.judge(steps.size, 50.0, 1)
-    assert not steps.too_short
-    assert not steps.judge(steps.size, 50.0, 1)
-    assert steps.too_short
-    assert steps.size < 1e-11 * LENGTH
-
-
 # -- estimates ------------------------------------------------------------------------------------------------------
 
 
