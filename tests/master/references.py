@@ -44,7 +44,7 @@ def integrated_anew(scene, patch, t_end):
         return segment
 
     patch.setattr(ExponentialPropagator, "_step", noted)
-    run = simulate(scene, sample_times=np.linspace(0.0, t_end, 301), t_end=t_end)
+    run = simulate(scene, sample_times=np.linspace(0.0, t_end, 31), t_end=t_end)
     for propagator, segment in (one for some in kept.values() for one in some):
         s, phase = propagator.system, propagator.phase
 
