@@ -10,9 +10,8 @@ from functools import partial
 import numpy as np
 from measure import compare, ratio_row, timed
 
-from springbeam import load_scene, simulate, with_changes
+from springbeam import Scene, load_scene, simulate, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.scene import Scene
 from springbeam.studies.rivals import Rival
 
 #: Ours: macro steps, and tolerances of the coupling and of IDA; the force is quadratic.

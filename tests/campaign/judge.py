@@ -5,12 +5,9 @@ from dataclasses import asdict, dataclass, fields, replace
 import numpy as np
 from draw import KINDS, drawn
 
-from springbeam import simulate, with_changes
+from springbeam import RunStopped, SceneError, Trajectory, simulate, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.results.contact_times import contact_time_difference
-from springbeam.results.trajectory import Trajectory
-from springbeam.run.outcome import RunStopped
-from springbeam.scene import SceneError
 from springbeam.scene.resolution import peak_force_doubt
 from springbeam.scene.suspicions import suspicions
 from springbeam.studies.metrics import errors

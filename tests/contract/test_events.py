@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
-from springbeam import load_scene, simulate
-from springbeam.scene import with_changes
+from springbeam import load_scene, simulate, with_changes
 
 OK, ERROR = 0, 3
 #: A top that falls on its foundation: y = -t - t² meets -0.1 at FALL with the velocity -1 - 2 FALL, and loses half.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from springbeam.bodies.protocol import Motion
+from springbeam import Motion, load_scene, with_changes
 from springbeam.contact.phases import (
     Impact,
     Joint,
@@ -12,7 +12,6 @@ from springbeam.contact.phases import (
     meeting,
 )
 from springbeam.results.trajectory import EventKind
-from springbeam.scene import load_scene, with_changes
 
 MASSES = [(0.25, 1.0), (1.0, 0.01), (3.0, 100.0)]
 VELOCITIES = [(-1.0, 0.0), (-0.2, 0.7), (0.1, 0.3)]

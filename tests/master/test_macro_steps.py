@@ -5,12 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from springbeam import Motion, RunStopped
 from springbeam.bodies import force
-from springbeam.bodies.protocol import Motion
 from springbeam.coupling.hermite import gap_inside
 from springbeam.run.crowd import count_crowd
 from springbeam.run.macro_steps import AdaptiveSteps, MacroGrid
-from springbeam.run.outcome import RunStopped
 from springbeam.run.stepping import State
 
 LENGTH = 3.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, simulate, solve, stopping, unit_beam
 
-from springbeam.bodies.elements import RigidWall
+from springbeam import RigidWall, RunStopped, load_scene, with_changes
 from springbeam.bodies.protocol import NO_FORCE
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.one_way import OneWay
@@ -12,8 +12,6 @@ from springbeam.coupling.protocol import NotConverged, Step
 from springbeam.coupling.soft import SoftSolver
 from springbeam.results.steps import STEP
 from springbeam.run.neglect import Past, neglected
-from springbeam.run.outcome import RunStopped
-from springbeam.scene import load_scene, with_changes
 
 LAW = (100.0, 1.0)
 

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.image import imread
 from runs import EVERY_EVENT, ODD_COLUMNS, PAIR, SCENES, a_trajectory
 
+from springbeam import Event, with_changes
 from springbeam.pictures import plots, timeline
 from springbeam.pictures.drawing import (
     EVENT_LOOKS,
@@ -25,8 +26,6 @@ from springbeam.pictures.drawing import (
 from springbeam.pictures.panels import panels
 from springbeam.pictures.plots import figure_of, plot_run
 from springbeam.results.directory import PICTURES
-from springbeam.results.trajectory import Event
-from springbeam.scene import with_changes
 from springbeam.scene.statics import SHAPE_POINTS
 
 A, B, C, D, E, F, G = PICTURES

@@ -12,12 +12,11 @@ import tomli_w
 from commands import HANGS, printed
 from scenes import completed, scene_from_dict
 
+from springbeam import RunStopped, SceneError, with_changes
 from springbeam.monolithic import event_driven
 from springbeam.results.reading import load_trajectory
 from springbeam.results.recording import MemoryRecorder
-from springbeam.run.outcome import RunStopped
 from springbeam.run.runner import run
-from springbeam.scene import SceneError, with_changes
 from springbeam.scene.reading import tomllib
 from springbeam.scene.statics import tip_load_deflection
 from springbeam.studies import accuracy as search

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scenes import kinds, scene_from_dict, soft
 
-from springbeam import simulate
+from springbeam import simulate, with_changes
 from springbeam.monolithic import event_driven
-from springbeam.scene import with_changes
 from springbeam.scene.reading import tomllib
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")

@@ -19,7 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import springbeam
-from springbeam.bodies.elements import RigidWall, SpringDamper
+from springbeam import RigidWall, SpringDamper, load_scene, with_changes
 from springbeam.bodies.protocol import FmuError
 from springbeam.contact.laws import Compliance
 from springbeam.coupling.soft import SoftSolver
@@ -28,7 +28,6 @@ from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.reading import load_trajectory
 from springbeam.run import runner
 from springbeam.run.checkpoint import Checkpoint, CheckpointRefused
-from springbeam.scene import load_scene, with_changes
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 

@@ -6,14 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from springbeam import load_scene, simulate, with_changes
+from springbeam import Simulation, load_scene, simulate, with_changes
 from springbeam.bodies import fmu
 from springbeam.bodies.fmu_bodies import release
 from springbeam.bodies.functions import Functions
 from springbeam.contact.events import EventFunctions
 from springbeam.contact.laws import law_of
 from springbeam.contact.phases import Joint, Phase
-from springbeam.run.runner import Simulation
 from springbeam.scene import shipped_scenes
 
 SET_SLOPES = "fmi2SetRealInputDerivatives"

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scenes import scene_from_dict, soft
 
-from springbeam import RunStopped, simulate
+from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.bodies.fmu_bodies import FmuSpring
 from springbeam.monolithic import event_driven
-from springbeam.scene import load_scene, with_changes
 from springbeam.scene.reading import tomllib
 
 SCENES = tomllib.loads(Path(__file__).with_name("extremes.toml").read_text(encoding="utf-8"))

@@ -7,8 +7,7 @@ import pytest
 from commands import command, printed, refused
 from scenes import scene_from_dict
 
-from springbeam import load_scene, simulate, with_changes
-from springbeam.scene import SceneError
+from springbeam import SceneError, load_scene, simulate, with_changes
 from springbeam.signals.measured import read_measured, residuals, time_shift
 from springbeam.studies.fit import Fit
 from springbeam.studies.study import record_all

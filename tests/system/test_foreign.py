@@ -15,14 +15,13 @@ import tomli_w
 from commands import HANGS, command, printed, refused
 from scenes import kinds
 
-from springbeam import SceneError, load_scene, resume, simulate, with_changes
+from springbeam import RunStopped, SceneError, load_scene, resume, simulate, with_changes
 from springbeam.bodies import isolated
 from springbeam.bodies.protocol import FmuError
 from springbeam.results.directory import RunDirectory
 from springbeam.results.file_recorder import FileRecorder
 from springbeam.results.reading import load_summary
 from springbeam.run import runner
-from springbeam.run.outcome import RunStopped
 from springbeam.scene import scene_from_dict
 
 M1, M2, K, C, V = 2.0, 3.0, 40.0, 0.2, -0.3

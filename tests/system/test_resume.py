@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from springbeam import Simulation
-from springbeam.scene import load_scene, with_changes
+from springbeam import Simulation, load_scene, with_changes
 
 pytestmark = pytest.mark.usefixtures("fmu_folder")
 
