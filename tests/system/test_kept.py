@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from springbeam import load_scene, simulate, with_changes
+from springbeam import RunStopped, load_scene, simulate, with_changes
 from springbeam.bodies import fmu, fmu_bodies
 from springbeam.bodies.fmu_bodies import release
 
@@ -68,3 +68,15 @@ def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
     release()
     assert len(closed) == len(springs)
     assert not any(one.faultless for one in closed)
+
+
+def test_a_body_whose_calls_fail_is_not_kept(made, monkeypatch):
+    def failing(self):
+        raise self.fmu.failed(3, "cannot save the state")
+
+    with monkeypatch.context() as during:
+        during.setattr(fmu_bodies.FmuBody, "mark", failing)
+        with pytest.raises(RunStopped, match=r"beam\.fmu: cannot save the state"):
+            simulate(SOFT)
+    simulate(SOFT)
+    assert made == ["beam", "spring", "beam"]  # the spring had not been called
