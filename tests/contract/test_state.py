@@ -23,18 +23,14 @@ def advance(case, k, time, steps, impulse):
     return rows
 
 
-def test_steps_from_a_saved_state_are_bit_identical(case):
-    """In the same instance, in another that had the same history, and in one that only gets the bytes."""
+def test_the_bytes_of_a_state_are_all_that_another_instance_needs(case):
+    """tests/fuzz repeats steps from their states."""
     k, twin, fresh = case.moving(), case.moving(), case.instance()
     for one in (k, twin):
         advance(case, one, 0.0, 3, 0.2)
-    time = 0.01 + 0.02 + 0.03
-    token, blob = k.state(), k.serialized()
+    time, blob = 0.01 + 0.02 + 0.03, k.serialized()
     assert twin.serialized() == blob  # no pointers in it
     first = advance(case, k, time, 7, 0.2)
-    for _ in range(3):
-        k.restore(token)
-        assert advance(case, k, time, 7, 0.2) == first
     k.free()
     fresh.restore(fresh.deserialized(blob))
     assert advance(case, fresh, time, 7, 0.2) == first
