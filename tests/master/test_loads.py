@@ -178,6 +178,20 @@ def test_steps_end_where_a_load_jumps_or_bends_and_none_is_a_sliver():
     assert np.diff(run.time).min() >= min(gaps[gaps > 1e-12].min(), 0.25e-3)
 
 
+def test_fine_lines_of_a_table_end_no_step_but_its_first_and_its_last_do(tmp_path):
+    """100 lines, 0.1 ms apart from 10 ms on."""
+    times = 1e-4 * np.arange(100)
+    np.savetxt(tmp_path / "fine.csv", np.column_stack([times, np.cos(900.0 * times)]), delimiter=",")
+    given = {"on": "tip", "signal": "table", "amplitude": 1.0, "interpolation": "linear", "start": 0.01}
+    signal = Signal(Load(file=str(tmp_path / "fine.csv"), **given))
+    last = signal.kinks[-1]
+    assert signal.next_kink(0.0095, 1e-3) == signal.kinks[0] == 0.01
+    assert signal.next_kink(0.0105, 1e-3) == last
+    assert signal.next_kink(0.01052, 3e-4) == signal.kinks[6]  # three of them in a step
+    assert signal.next_kink(last - 1.5e-4, 1e-3) == signal.kinks[-2]
+    assert signal.next_kink(last, 1e-3) == np.inf
+
+
 def test_the_reference_integrates_loads_as_scipy_does(monkeypatch):
     run = integrated_anew(soft(*SIGNALS, t_end=0.06), monkeypatch, 0.06)
     assert np.abs(run.energy_residual).max() < 1e-11 * run.e_beam.max()

@@ -109,8 +109,8 @@ def test_what_is_neglected_is_twice_the_variation_of_the_force_over_the_stiffnes
     bound = neglected(steps, 50.0, Past())
     assert bound.motion == pytest.approx(2.0 * np.cumsum([2.0, 3.0, 4.0, 1.0]) / 50.0)
     assert bound.share == pytest.approx(bound.motion / [0.02, 0.05, 0.05, 0.05])
-    past = Past()
-    for part in (steps[:1], steps[1:3], steps[3:]):
+    past, event = Past(), np.zeros(1, STEP)  # a row that ends no step changes nothing
+    for part in (steps[:1], event, steps[1:3], steps[3:]):
         motion, _, past = neglected(part, 50.0, past)
     assert motion[-1] == bound.motion[-1]
     assert past == bound.past

@@ -64,11 +64,11 @@ class Signal:
 
     def over(self, time: float, size: float) -> Force:
         """Return the projection onto a step of ``size`` [s] from ``time`` [s] on."""
-        same = _SAME * size
-        if time + same >= self._end:
+        if time >= self._end:
             return NO_FORCE
         if self._lines is not None:
             return force.derivatives(self._of_table(self._lines, time, size), size)
+        same = _SAME * size
         cuts = [time, *(kink for kink in self.kinks if time + same < kink < time + size - same), time + size]
         if len(cuts) == 2:
             return force.derivatives(self._legendre(time, size), size)

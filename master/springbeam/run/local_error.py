@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ..bodies.protocol import Motion
 from ..bodies.stateful import Memory, Stateful
-from ..contact.phases import Joint, Phase
+from ..contact.phases import Phase
 from ..coupling.protocol import Scales, Step
 from ..results.paths import Path
 from ..scene import Scene
@@ -16,8 +16,6 @@ from .macro_steps import AdaptiveSteps
 from .outcome import RunStopped
 from .stepping import Pair, State
 
-#: Joined, the cubic through a step's ends is only looked at for events; it is within this fraction of the motion.
-_SEEN = 1e-2
 #: Displacements are rounded to so many ulp.
 _ULPS, _EPS = 16.0, 2.0**-52
 #: Order of the cubic.
@@ -39,7 +37,7 @@ class LocalError(Stateful):
     state: Reach
 
     def __init__(self, scene: Scene, pair: Pair, steps: AdaptiveSteps) -> None:
-        self._scene, self._pair, self._steps = scene, pair, steps
+        self._pair, self._steps = pair, steps
         self._relative = scene.coupling.relative_tolerance or 0.0
         self._absolute = scene.coupling.absolute_tolerance or 0.0
         at_start = [end.displacement for end in pair.ends()]
@@ -76,8 +74,7 @@ class LocalError(Stateful):
         tolerance = self._relative + self._absolute / span
         coupling = pair.coupling(state.phase)
         scales = Scales(span, speed, self.state.energy, pair.reduced_mass(Phase()))
-        tied = pair.law is None and state.phase.joint is not Joint.FREE
-        curve = self._curve(cubic, ranges, max(self._relative, _SEEN) if tied else self._relative)
+        curve = self._curve(cubic, ranges)
         told = coupling.local_errors(step, scales)
         return max(curve, *((error / tolerance, order) for error, order in told)) if told else curve
 
@@ -92,20 +89,17 @@ class LocalError(Stateful):
         highest = [max(high, *places) for high, places in zip(self.state.highest, passed, strict=True)]
         return lowest, highest, max(self.state.fastest, *(abs(end.velocity) for end in (*step.start, *step.end)))
 
-    def _curve(self, errors: list[float], ranges: list[float], relative: float) -> tuple[float, int]:
-        allowed = (self._absolute + relative * r for r in ranges)
+    def _curve(self, errors: list[float], ranges: list[float]) -> tuple[float, int]:
+        allowed = (self._absolute + self._relative * r for r in ranges)
         told = zip(errors, ranges, allowed, self._rounding(), strict=True)
         ratios = [e / (a + least) for e, r, a, least in told if r > 0.0]
         return max(ratios, default=0.0), _CUBIC
 
     def _rounding(self) -> list[float]:
-        """Up to where displacements of the ends are rounding, and the spring's tolerance [m]: no step is too long for
-        that, though from rest the motion so far is shorter still."""
-        reach = [max(abs(low), abs(high)) for low, high in zip(self.state.lowest, self.state.highest, strict=True)]
-        tip, lower = (_ULPS * _EPS * r for r in reach)
-        if (spring := self._scene.spring) is not None:
-            lower += spring.relative_tolerance * reach[1] + spring.absolute_tolerance
-        return [tip, lower]
+        """Up to where displacements of the ends are rounding [m]: no step is too long for that, though from rest the
+        motion so far is shorter still."""
+        places = zip(self.state.lowest, self.state.highest, strict=True)
+        return [_ULPS * _EPS * max(abs(low), abs(high)) for low, high in places]
 
 
 def _beside_cubic(start: Motion, end: Motion, size: float) -> float:
