@@ -268,3 +268,8 @@ def test_a_peak_force_that_depends_on_the_mesh_is_told():
     assert "contact.force_window >= 0.0095 s" in peak_force_doubt(scene)
     for changes in ({"law": "compliance"}, {"law": "link"}, {"force_window": 1.0}):
         assert peak_force_doubt(with_changes(scene, contact=changes)) is None
+    # Waves that are not kept settle nothing: of 5 modes the fastest counts.
+    slow = 2.5 * 2.0 * np.pi / fastest_frequency(with_changes(scene, beam={"n_modes": 5}).beam)
+    for factor, told in ((1.01, False), (0.99, True)):
+        few = with_changes(scene, beam={"n_modes": 5}, contact={"force_window": factor * slow})
+        assert (peak_force_doubt(few) is not None) == told

@@ -6,7 +6,7 @@ from bodies import DuffingBody, Upper, simulate, stopping
 from references import dips
 from scenes import kinds, scene_from_dict
 
-from springbeam.bodies.protocol import NO_FORCE
+from springbeam.bodies.protocol import NO_FORCE, StepRefused
 from springbeam.monolithic import event_driven
 from springbeam.results.steps import STEP
 from springbeam.run.ledger import bounds, errors
@@ -209,6 +209,22 @@ def wrapped(**overrides):
         return beam, spring
 
     return wrap
+
+
+def test_a_step_that_stays_refused_is_halved_20_times():
+    """The run then stops where that step begins; what was made before is kept."""
+    scene, tried = with_changes(load_scene("duffing"), time={"t_end": 0.1}, coupling={"macro_step": 1e-3}), []
+
+    def advance(own, time, size, *forces):
+        if time < 0.0495:
+            return own(time, size, *forces)
+        tried.append(size)
+        raise StepRefused("stuck")
+
+    trajectory, stopped = stopping(scene, wrapped(advance=advance))
+    assert tried == pytest.approx([1e-3 * 0.5**n for n in range(21)], rel=1e-12)
+    assert (stopped.cause, trajectory.summary["halved_steps"]) == ("stuck", 20)
+    assert stopped.time == trajectory.time[-1] == pytest.approx(0.05, rel=1e-12)
 
 
 @pytest.mark.parametrize(("stiffness", "exponent"), [(1e308, 1.0), (1e4, 100.0)])
