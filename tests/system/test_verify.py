@@ -18,7 +18,7 @@ from springbeam.coupling.tie import SCHEMES
 from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import Beam
 from springbeam.studies import verify
-from springbeam.studies.verify.alone import _mesh_error, clamped_free_frequencies
+from springbeam.studies.verify.alone import clamped_free_frequencies
 from springbeam.studies.verify.check import Check, section
 from springbeam.studies.verify.coupled import _airy_overshoot
 
@@ -172,12 +172,10 @@ def test_a_case_that_cannot_be_computed_fails_alone_and_with_its_cause():
 
 
 def test_frequencies_of_the_transfer_matrix_are_the_limit_of_the_mesh():
-    """And its leading error is the predicted one: extrapolation leaves O((kh)⁴), 0.05⁴ relative at n = 160."""
+    """Extrapolation by h² leaves O((kh)⁴), 0.05⁴ relative at n = 160."""
     w = np.array(clamped_free_frequencies()[:6])
     coarse, fine = (modal_beam(Beam.with_ones(n_elements=n)).omega[:6] for n in (80, 160))
     assert (4.0 * fine - coarse) / 3.0 == pytest.approx(w, rel=(8.4 / 80.0) ** 4)
-    predicted = np.array([_mesh_error(x) for x in w]) / 160**2
-    assert fine - w == pytest.approx(predicted, rel=(8.4 / 160.0) ** 2)
 
 
 def test_the_overshoot_of_a_dispersed_step_is_the_integral_of_airy():

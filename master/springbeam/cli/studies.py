@@ -121,7 +121,7 @@ def fit(
     """
     from ..studies.fit import Fit
 
-    return Fit.of(load_scene(scene, settings or ()), measured, vary or (), names or (), shift)
+    return Fit.of(load_scene(scene, settings or ()), measured, vary or (), names=tuple(names or ()), shift=shift)
 
 
 @study_command()

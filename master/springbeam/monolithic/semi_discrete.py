@@ -69,14 +69,22 @@ class SemiDiscreteBeam:
         e[self.tip] = 1.0
         return e
 
-    def deflection_sampler(self, fractions: np.ndarray = SHAPE_POINTS) -> sp.csr_matrix:
-        """Return the (k, 2N) matrix that takes q to u at k ``fractions`` of the length."""
+    def interpolated(self, fractions: np.ndarray, of_u: int, *, slopes: bool = False) -> sp.csr_matrix:
+        """Return the (k, 2N) matrix that takes q to θ or, with ``of_u`` = 1, u at k ``fractions`` of the length.
+
+        Or to their slopes [1/m]. Where two elements meet they are those of the one towards the tip, of whose error
+        they have the order.
+        """
         position = fractions * self.n_elements
         element = np.minimum(position.astype(int), self.n_elements - 1)
         nodes = element[:, None] * self.degree + np.arange(self.degree + 1)
-        values, _ = _lagrange(self.degree, position - element)
+        values = _lagrange(self.degree, position - element)[slopes] * (self.n_elements / self.length) ** slopes
         rows = np.arange(len(fractions))[:, None]
-        return _scatter(rows, 2 * nodes + 1, values[:, None, :], self.size + 2)[:, 2:]
+        return _scatter(rows, 2 * nodes + of_u, values[:, None, :], self.size + 2)[:, 2:]
+
+    def deflection_sampler(self, fractions: np.ndarray = SHAPE_POINTS) -> sp.csr_matrix:
+        """Return the (k, 2N) matrix that takes q to u at k ``fractions`` of the length."""
+        return self.interpolated(fractions, 1)
 
     def nodal(self, x: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Return the load vector, (2N,), of ``forces`` [N] at the places ``x`` [m] of the beam, both (k,)."""
@@ -84,21 +92,11 @@ class SemiDiscreteBeam:
 
 
 def inner_forces(beam: Beam, mesh: SemiDiscreteBeam) -> sp.csr_matrix:
-    """Return the (42, 2N) matrix that takes q + α_b q̇ to EI θ_x [N·m] and KAG (u_x − θ) [N] at `SHAPE_POINTS`.
-
-    Where two elements meet they are those of the one towards the tip, of whose error they have the order.
-    """
-    position = SHAPE_POINTS * mesh.n_elements
-    element = np.minimum(position.astype(int), mesh.n_elements - 1)
-    nodes = element[:, None] * mesh.degree + np.arange(mesh.degree + 1)
-    values, slopes = _lagrange(mesh.degree, position - element)
-    slopes = slopes * (mesh.n_elements / mesh.length)
+    """Return the (42, 2N) matrix that takes q + α_b q̇ to EI θ_x [N·m] and KAG (u_x − θ) [N] at `SHAPE_POINTS`."""
     EI = beam.young_modulus * beam.second_moment_of_area
     KAG = beam.shear_coefficient * beam.area * beam.shear_modulus
-    rows, width = np.arange(len(SHAPE_POINTS))[:, None], mesh.size + 2
-    bent, slid = (_scatter(rows, 2 * nodes + of_u, slopes[:, None, :], width)[:, 2:] for of_u in (0, 1))
-    turned = _scatter(rows, 2 * nodes, values[:, None, :], width)[:, 2:]
-    return sp.vstack([EI * bent, KAG * (slid - turned)]).tocsr()
+    bent, slid = (mesh.interpolated(SHAPE_POINTS, of_u, slopes=True) for of_u in (0, 1))
+    return sp.vstack([EI * bent, KAG * (slid - mesh.interpolated(SHAPE_POINTS, 0))]).tocsr()
 
 
 def _lagrange(degree: int, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

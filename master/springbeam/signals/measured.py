@@ -35,6 +35,15 @@ class Measured(NamedTuple):
     time: np.ndarray  #: [s], shape (n,)
     values: dict[str, np.ndarray]  #: by column or formula, in its unit, shapes (n,)
 
+    def covered(self, run: Trajectory, shift: float = 0.0, margin: float = 0.0) -> np.ndarray:
+        """Return which points lie in the run, shape (n,), if the clock is moved by ``shift`` [s].
+
+        Points nearer to the ends of the run than its share ``margin`` do not.
+        """
+        begin, end = float(run.time[0]), float(run.time[-1])
+        off, times = margin * (end - begin), self.time + shift
+        return np.asarray((times >= begin + off) & (times <= end - off))
+
 
 class Residual(NamedTuple):
     """How far a run is from a measured curve, where both are known."""
@@ -192,8 +201,7 @@ def time_shifts(run: Trajectory, measured: Measured) -> tuple[list[float], float
 
 def model(run: Trajectory, measured: Measured, shift: float = 0.0) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return which points of the measurement the run covers, shape (n,), and its curves at these."""
-    times = measured.time + shift
-    covered = (times >= run.time[0]) & (times <= run.time[-1])
+    times, covered = measured.time + shift, measured.covered(run, shift)
     if covered.sum() < 2:
         raise SceneError(
             f"the run is known from {run.time[0]:g} s to {run.time[-1]:g} s, the measurement from {times[0]:g} s to "

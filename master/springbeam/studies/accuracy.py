@@ -25,6 +25,7 @@ from ..scene import Scene, SceneError, with_changes
 from ..scene.automatic import choice
 from ..scene.resolution import STABLE, TURN, joined_frequency, lasting_frequency, slow_oscillations
 from ..scene.tables import ALL_MODES_UP_TO
+from .metrics import motion_errors, worst
 from .stability.predict import contact_frequency
 
 #: Fewest and most macro steps of a run.
@@ -131,17 +132,15 @@ def differences(coarse: Trajectory, fine: Trajectory, short: float) -> dict[str,
     Contacts and flights shorter than the share ``short`` of that time are no evidence.
     """
     span = float(fine.time[-1] - fine.time[0])
-    found = {"motion": 0.0, "times": contact_time_difference(coarse, fine, short * span) / span}
     rows = np.union1d(coarse.time, fine.time)
     times = np.append((rows[:-1, None] + _BETWEEN * np.diff(rows)[:, None]).ravel(), rows[-1])
-    ours, theirs = coarse.at(times), fine.at(times)
-    held = {"u_tip": 0.0 if fine.shapes is None else _HELD * float(np.abs(fine.shapes[1]).max(initial=0.0))}
-    for name in {"u_tip", "y"} & set(fine.columns):
-        scale = max(float(np.abs(theirs[name] - fine[name][0]).max()), held.get(name, 0.0)) or 1.0
-        found["motion"] = max(found["motion"], float(np.abs(ours[name] - theirs[name]).max()) / scale)
-    found["impulses"] = max(
-        np.nan_to_num([impulse_difference(coarse, fine), impulse_difference(fine, coarse)]).tolist()
-    )
+    held = 0.0 if fine.shapes is None else _HELD * float(np.abs(fine.shapes[1]).max(initial=0.0))
+    impulses = [impulse_difference(coarse, fine), impulse_difference(fine, coarse)]
+    found = {
+        "motion": worst(motion_errors(coarse.at(times).columns, fine.at(times), held)),
+        "times": contact_time_difference(coarse, fine, short * span) / span,
+        "impulses": max(np.nan_to_num(impulses).tolist()),
+    }
     if not fine.scene.contact.rigid and "contact_force_max" in fine.summary:
         peak, other = (float(run.summary["contact_force_max"]) for run in (fine, coarse))
         found["force"] = abs(peak - other) / (max(peak, other) or 1.0)

@@ -82,18 +82,18 @@ def parse_axis(text: str) -> Axis:
                 raise _wrong(text, f"{value!r} is no value of {split[1]}; a list is 1,2,5, a range LOW:HIGH:COUNT")
         return Axis(target, listed)
     log = parts[-1] == "log"
-    parts = parts[:-1] if log else parts
+    ends, counted = parts[:2], parts[2 : len(parts) - log]
     try:
-        low, high = float(parts[0]), float(parts[1])
-        count = int(parts[2]) if len(parts) == 3 else 0
-    except (ValueError, IndexError):
-        raise _wrong(text, "a range is LOW:HIGH:COUNT, or LOW:HIGH with --samples; :log may follow") from None
-    if len(parts) > 3 or (len(parts) == 3 and count < 2) or low == high or not math.isfinite(high - low):
-        raise _wrong(text, "a range is LOW:HIGH:COUNT with LOW and HIGH different and COUNT of at least 2")
-    if log and not (low > 0.0 and high > 0.0):
-        raise _wrong(text, "a logarithmic range needs LOW and HIGH greater than 0")
-    if count > MOST_RUNS:
-        raise _wrong(text, f"at most {MOST_RUNS} values are allowed")
+        (low, high), count = map(float, ends), int(*counted)
+        possible = low != high and math.isfinite(high - low) and (not log or min(low, high) > 0.0)
+    except (ValueError, TypeError):
+        possible = False
+    if not possible or (counted and not 2 <= count <= MOST_RUNS):
+        raise _wrong(
+            text,
+            f"a range is LOW:HIGH:COUNT with LOW and HIGH different and COUNT from 2 to {MOST_RUNS}, or LOW:HIGH with "
+            "--samples; :log may follow if both are greater than 0",
+        )
     axis = Axis(target, (), low, high, log, kind is int)
     return replace(axis, values=axis.grid(count)) if count else axis
 

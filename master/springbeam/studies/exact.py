@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.special import beta, ellipj, ellipk, lambertw
+from scipy.special import beta, ellipk, lambertw
 
 from ..scene import Beam, Scene, scene_from_dict
 
@@ -22,25 +22,14 @@ from ..scene import Beam, Scene, scene_from_dict
 _LIMP, _RIGID = 1e-13, 1e14
 
 
-class Duffing:
-    """Undamped m ÿ + k1 y + k2 y³ = 0 of a unit mass, from rest at ``amplitude`` [m].
+def duffing_period(k1: float, k2: float, amplitude: float) -> float:
+    """Return the period [s] of the undamped ÿ + k1 y + k2 y³ = 0 of a unit mass, from rest at ``amplitude`` [m].
 
     Hardening: y = A cn(ωt|μ), ω² = k1 + k2A², μ = k2A²/2ω². Softening: y = A sn(ωt + K|μ), ω² = k1 + k2A²/2,
     μ = −k2A²/2ω². Period 4K(μ)/ω.
     """
-
-    def __init__(self, k1: float, k2: float, amplitude: float) -> None:
-        self._hardens, self._amplitude = k2 > 0.0, amplitude
-        self._omega = float(np.sqrt(k1 + k2 * amplitude**2 * (1.0 if self._hardens else 0.5)))
-        self._mu = abs(k2) * amplitude**2 / (2.0 * self._omega**2)
-        self.period = 4.0 * float(ellipk(self._mu)) / self._omega  #: [s]
-
-    def displacement(self, times: np.ndarray) -> np.ndarray:
-        """Return y [m] at ``times`` [s]; `ellipj` is good to about 1e-12."""
-        angle = self._omega * times
-        if self._hardens:
-            return np.asarray(self._amplitude * ellipj(angle, self._mu)[1])
-        return np.asarray(self._amplitude * ellipj(angle + ellipk(self._mu), self._mu)[0])
+    omega2 = k1 + k2 * amplitude**2 * (1.0 if k2 > 0.0 else 0.5)
+    return float(4.0 * ellipk(abs(k2) * amplitude**2 / (2.0 * omega2)) / np.sqrt(omega2))
 
 
 class Impact(NamedTuple):

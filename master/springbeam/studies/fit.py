@@ -3,7 +3,7 @@
 The unknowns are logarithms of the keys over their guesses, so that a key keeps its sign. Curves of different units are
 weighed by their spread, and then by what is left of each. An interval holds if what is left is noise that has the same
 size along a curve and does not remember its past. The clock of the measurement may be off by a shift, which is one
-unknown more where the data determines it beside the keys.
+unknown more unless it is given.
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ from rich.text import Text
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
-from ..results.trajectory import Trajectory
 from ..run.outcome import RunStopped
-from ..scene import Scene, SceneError, key_kind, with_changes
+from ..scene import Scene, SceneError, key_kind
 from ..scene.scene import split_key
 from ..signals.expressions import signal
 from ..signals.measured import Measured, read_measured, time_shifts
@@ -57,21 +56,17 @@ class Fit(Study):
     shift: float | None = None  #: by which the clock of the measurement is moved [s]; found if it is left out
 
     @classmethod
-    def of(
-        cls, scene: Scene, path: Path, vary: Sequence[str], names: Sequence[str] = (), shift: float | None = None
-    ) -> Fit:
+    def of(cls, scene: Scene, path: Path, vary: Sequence[str], **settings: Any) -> Fit:
         """Return the study of a file. Raises SceneError if it cannot be read."""
         try:
             digest = sha256(path.read_bytes()).hexdigest()
         except OSError as error:
             raise SceneError(f"{path}: {error.strerror}") from error
-        return cls(
-            scene=scene, file=str(path), digest=digest, vary=tuple(vary), names=tuple(names), shift=shift
-        )  # fmt: skip
+        return cls(scene=scene, file=str(path), digest=digest, vary=tuple(vary), **settings)
 
     def cases(self) -> dict[str, Row]:
         """Return the one search. Raises SceneError for keys, guesses or columns that are not there."""
-        changed(self.scene, self.guesses())
+        self.at(self.guesses())
         self.data()
         return {_CASE: {}}
 
@@ -104,35 +99,31 @@ class Fit(Study):
 
     def cost(self) -> str:
         """Say what is run."""
-        keys = len(self.vary) if self.shift is not None else 3 * (len(self.vary) + 1)
-        return f"some {10 * (2 * keys + 1)} runs"
+        unknowns, searches = (len(self.vary), 1) if self.shift is not None else (len(self.vary) + 1, 3)
+        return f"some {10 * searches * (2 * unknowns + 1)} runs"
 
     def record(self, case: Row) -> Row:
         """Return the values found, their intervals, and every run on the way."""
-        scene, data, guesses = self.scene, self.data(), self.guesses()
+        data, guesses = self.data(), self.guesses()
         if self.shift is not None:
-            return _Search(scene, data, guesses, self.shift, moves=False).found()
+            return _Search(self, data, guesses, self.shift).found()
         try:
-            run = simulate(changed(scene, guesses))
+            run = simulate(self.at(guesses))
         except (RunStopped, SceneError) as refused:
             raise SceneError(f"the guess cannot be run: {refused}") from refused
         # While keys are wrong the curves may fit best a period too late: a few places are tried.
-        starts = time_shifts(run, data)[0][:_TRIED]
-        if inside(run, data, 0.0).mean() > 0.5:
-            starts.append(0.0)
-        starts = [shift for shift in starts if inside(run, data, shift, _MARGIN).sum() > len(guesses) + 1]
+        starts = time_shifts(run, data)[0][:_TRIED] + [0.0] * int(data.covered(run).mean() > 0.5)
+        starts = [shift for shift in starts if data.covered(run, shift, _MARGIN).sum() > len(guesses) + 1]
         if not starts:
             raise SceneError(
                 f"{self.file}: fewer of its points lie in the run than are needed to find {', '.join(guesses)} and the "
                 "shift of its clock; make time.t_end longer, give more points, or fix the shift with --shift"
             )
-        searches = [_Search(scene, data, guesses, shift, moves=True) for shift in starts]
-        best = min(searches, key=lambda search: search.begin())
-        record = best.found()
+        searches = [_Search(self, data, {**guesses, SHIFT: shift}, shift) for shift in starts]
+        record = min(searches, key=lambda search: search.least(_FIRST_LOOK).cost).found()
         if record["undetermined"] and 0.0 in starts:  # the keys alone may be
-            best = _Search(scene, data, guesses, 0.0, moves=False)
-            searches.append(best)
-            record = best.found()
+            searches.append(_Search(self, data, guesses, 0.0))
+            record = searches[-1].found()
         return {**record, "runs": [run for search in searches for run in search.runs]}
 
     def rows(self, records: Mapping[str, Row]) -> list[Row]:
@@ -156,55 +147,33 @@ class Fit(Study):
                         1 if record["undetermined"] else 0)  # fmt: skip
 
 
-def changed(scene: Scene, values: Mapping[str, float]) -> Scene:
-    """Return ``scene`` with the keys that ``values`` has. Raises SceneError if it cannot be run."""
-    tables: dict[str, dict[str, float]] = {}
-    for name, value in values.items():
-        if (key := split_key(name)) is not None:
-            tables.setdefault(key[0], {})[key[1]] = value
-    return with_changes(scene, **tables)
-
-
 def mapping(names: Sequence[str]) -> dict[str, str]:
     """Return what ``NAME=COLUMN`` say. Raises SceneError for anything else."""
     found = {}
     for text in names:
-        name, separator, column = text.partition("=")
-        if not separator or not name.strip() or not column.strip():
+        name, _, column = (part.strip() for part in text.partition("="))
+        if not name or not column:
             raise SceneError(f"--map {text}: must be NAME=COLUMN, as in CH1=a_tip")
-        found[name.strip()] = column.strip()
+        found[name] = column
     return found
 
 
-def inside(run: Trajectory, data: Measured, shift: float, margin: float = 0.0) -> np.ndarray:
-    """Return which points of ``data`` lie in the run, further from its ends than ``margin``, a share of it."""
-    begin, end = float(run.time[0]), float(run.time[-1])
-    off = margin * (end - begin)
-    times = data.time + shift
-    return np.asarray((times >= begin + off) & (times <= end - off))
-
-
 class _Search:
-    """One search; ``runs`` are the rows of the runs that it has made."""
+    """One search from guesses of keys, and of `SHIFT` if the clock moves; ``runs`` are the rows of its runs."""
 
-    def __init__(
-        self, scene: Scene, data: Measured, guesses: Mapping[str, float], shift: float, *, moves: bool
-    ) -> None:
-        """Search from ``guesses`` with the clock moved by ``shift`` [s], and on from there if it ``moves``."""
-        self._scene, self._data, self._shift, self._moves = scene, data, shift, moves
-        self._guesses = {**guesses, **({SHIFT: shift} if moves else {})}
+    def __init__(self, fit: Fit, data: Measured, guesses: Mapping[str, float], shift: float) -> None:
+        self._fit, self._data, self._guesses, self._shift = fit, data, guesses, shift
         self._spread = {name: float(np.std(values)) or 1.0 for name, values in data.values.items()}
         self._weights = {name: 1.0 / spread for name, spread in self._spread.items()}
-        self._duration = float(data.time[-1] - data.time[0])
-        self._start = np.zeros(len(self._guesses))
-        self._part: np.ndarray | None = None  #: which points take part
-        self._chosen = False  #: whether these are those for where the clock is
+        self._best = np.zeros(len(guesses))  #: unknowns at which the search goes on
+        self._part: np.ndarray | None = None  #: which points take part, wherever the clock moves
         self.runs: list[Row] = []
 
     def values(self, unknowns: np.ndarray) -> dict[str, float]:
         """Return the keys at ``unknowns``."""
+        duration = float(np.ptp(self._data.time))
         return {
-            name: guess + x * self._duration if name == SHIFT else guess * float(np.exp(x))
+            name: guess + x * duration if name == SHIFT else guess * float(np.exp(np.clip(x, -700.0, 700.0)))
             for (name, guess), x in zip(self._guesses.items(), unknowns.tolist(), strict=True)
         }
 
@@ -213,37 +182,40 @@ class _Search:
         values = self.values(unknowns)
         shift = values.get(SHIFT, self._shift)
         try:
-            run = simulate(changed(self._scene, values))
+            run = simulate(self._fit.at(values))
         except (RunStopped, SceneError) as refused:
             if self._part is None:
                 raise SceneError(f"the guess cannot be run: {refused}") from refused
             self.runs.append({**values, "error": str(refused)})
             return np.full(len(self._data.values) * int(self._part.sum()), _REFUSED)
-        if not self._chosen:  # the same points from here on, wherever the clock moves
-            part = inside(run, self._data, shift, _MARGIN * self._moves)
-            if self._part is None or part.sum() > len(self._guesses):  # else the clock has run away
-                self._part = part
-            self._chosen = True
-        assert self._part is not None
-        times = np.clip(self._data.time[self._part] + shift, run.time[0], run.time[-1])
-        curves = run.at(times)
+        if self._part is None:
+            self._part = self._data.covered(run, shift, _MARGIN * (SHIFT in values))
+        curves = run.at(np.clip(self._data.time[self._part] + shift, run.time[0], run.time[-1]))
         off = {name: signal(curves, name) - measured[self._part] for name, measured in self._data.values.items()}
-        self.runs.append({
-            **values, **{f"left_{name}": float(np.sqrt(np.mean(part**2))) for name, part in off.items()}, "error": ""
-        })  # fmt: skip
+        rms = {f"left_{name}": float(np.sqrt(np.mean(part**2))) for name, part in off.items()}
+        self.runs.append({**values, **rms, "error": ""})
         return np.concatenate([self._weights[name] * part for name, part in off.items()])
 
+    def least(self, most: int = 60) -> Any:
+        """Search on from where the search is, by at most so many evaluations."""
+        result = least_squares(
+            self.left, self._best, jac="3-point", diff_step=_STEP, xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=_TOLERANCE,
+            max_nfev=most,
+        )  # fmt: skip
+        self._best = result.x
+        return result
+
     def found(self) -> Row:
-        """Search, and judge what was found."""
-        result = self._least(self._start)
-        if len(self._weights) > 1 or self._moves:  # a second time, each curve weighed by what is left of it
-            self._weights = {
-                name: 1.0 / max(self.runs_left(result.x)[name], 1e-9 * spread) for name, spread in self._spread.items()
-            }
-            self._chosen = False
-            result = self._least(result.x)
-        left = self.runs_left(result.x)
+        """Search, then once more with each curve weighed by what is left of it, and judge what was found."""
+        self.left(self.least().x)
+        self._weights = {
+            name: 1.0 / max(self.runs[-1][f"left_{name}"], 1e-9 * spread) for name, spread in self._spread.items()
+        }
+        self._part = None  # the clock may be elsewhere
+        result = self.least()
+        self.left(result.x)
         keys, undetermined = self._judged(result)
+        left = {name: self.runs[-1][f"left_{name}"] for name in self._spread}
         return {
             "keys": keys,
             "undetermined": undetermined,
@@ -252,34 +224,16 @@ class _Search:
             "runs": self.runs,
         }
 
-    def begin(self) -> float:
-        """Search a little, to go on from there; return the mean square that is left of the weighed curves."""
-        result = self._least(self._start, _FIRST_LOOK)
-        self._start = result.x
-        return float(np.mean(result.fun**2))
-
-    def _least(self, start: np.ndarray, most: int = 60) -> Any:
-        return least_squares(
-            self.left, start, jac="3-point", diff_step=_STEP, xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=_TOLERANCE,
-            x_scale=1.0, max_nfev=most,
-        )  # fmt: skip
-
-    def runs_left(self, unknowns: np.ndarray) -> dict[str, float]:
-        """Return the root mean square of what is left of each curve, in its unit."""
-        self.left(unknowns)
-        return {name: self.runs[-1][f"left_{name}"] for name in self._data.values}
-
     def _judged(self, result: Any) -> tuple[list[Row], list[str]]:
         """Return the keys with their intervals, and what the data does not determine."""
         names, values = list(self._guesses), self.values(result.x)
         lengths = np.linalg.norm(result.jac, axis=0)
         undetermined = [f"{name} does not change the curves" for name, size in zip(names, lengths, strict=True)
                         if size <= _UNDETERMINED * float(lengths.max(initial=0.0)) or size == 0.0]  # fmt: skip
-        points = len(result.fun)
-        freedom = points - len(names)
-        if undetermined or freedom <= 0:
-            if freedom <= 0:
-                undetermined.append(f"{points} points for {len(names)} keys")
+        freedom = len(result.fun) - len(names)
+        if freedom <= 0:
+            undetermined.append(f"{len(result.fun)} points for {len(names)} keys")
+        if undetermined:
             return [{"key": name, "value": values[name], "low": None, "high": None} for name in names], undetermined
         _, sizes, directions = np.linalg.svd(result.jac / lengths, full_matrices=False)
         if sizes[-1] < _UNDETERMINED * sizes[0]:
@@ -288,15 +242,11 @@ class _Search:
             undetermined.append(f"{' and '.join(together)} change the curves in the same way: fix one of them")
         inverse = directions.T / np.maximum(sizes, 1e-300)
         deviation = np.sqrt(2.0 * result.cost / freedom * (inverse**2).sum(axis=1)) / lengths
-        half = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, freedom)) * deviation
+        half = np.diag(float(student.ppf(0.5 + 0.5 * _CONFIDENCE, freedom)) * deviation)
         keys = []
-        for name, x, width in zip(names, result.x.tolist(), half.tolist(), strict=True):
-            if name == SHIFT:
-                low, high = (self._guesses[name] + (x + side * width) * self._duration for side in (-1.0, 1.0))
-            else:
-                wide = min(width, 700.0)
-                low, high = sorted(values[name] * float(np.exp(side * wide)) for side in (-1.0, 1.0))
-                if width > np.log(2.0):
-                    undetermined.append(f"{name} may be anything from {low:.3g} to {high:.3g}")
+        for name, off in zip(names, half, strict=True):
+            low, high = sorted(self.values(result.x + side * off)[name] for side in (-1.0, 1.0))
+            if name != SHIFT and off.max() > np.log(2.0):
+                undetermined.append(f"{name} may be anything from {low:.3g} to {high:.3g}")
             keys.append({"key": name, "value": values[name], "low": low, "high": high})
         return keys, undetermined

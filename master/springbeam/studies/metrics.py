@@ -210,17 +210,20 @@ def costs(run: Trajectory) -> dict[str, int]:
     return {"cost_do_steps": run.do_steps, "cost_rollbacks": rollbacks}
 
 
-def motion_errors(columns: Mapping[str, np.ndarray], reference: Trajectory) -> dict[str, float | None]:
+def motion_errors(
+    columns: Mapping[str, np.ndarray], reference: Trajectory, held: float = 0.0
+) -> dict[str, float | None]:
     """Return the largest errors of u_tip and y, over the largest change of the reference from its start.
 
-    ``columns`` are at the times of the rows of ``reference``; an error is ``None`` where there is no such body.
+    ``columns`` are at the times of the rows of ``reference``; an error is ``None`` where there is no such body. A tip
+    that moves less than ``held`` [m] does not move: its error is over that.
     """
     found: dict[str, float | None] = {}
     for name in ("u_tip", "y"):
         found[f"error_{name}"] = None
         if name in columns and name in reference.columns:
             exact = reference[name]
-            scale = float(np.abs(exact - exact[0]).max()) or 1.0
+            scale = max(float(np.abs(exact - exact[0]).max()), held * (name == "u_tip")) or 1.0
             found[f"error_{name}"] = float(np.abs(columns[name] - exact).max()) / scale
     return found
 

@@ -91,31 +91,22 @@ def multiples(rows: Rows, scales: Sequence[Scale], values: Mapping[str, str], ti
     Over two axes and no more a panel a column, else a row of panels a column: of a full grid maps over the first two
     axes, one for each pick of the others; of samples a panel over each axis.
     """
-    draws: list[tuple[Axes, str, str, Rows, Sequence[Scale]]] = []
-    if len(scales) <= 2:
-        figure, axes = panels(len(values), 3, (4.0, 3.0), title)
-        draws = [(ax, name, words, rows, scales) for ax, (name, words) in zip(axes, values.items(), strict=True)]
-    else:
-        levels = [list(dict.fromkeys(row[scale.name] for row in rows)) for scale in scales]
-        of_grid = len(rows) == np.prod([len(level) for level in levels])
-        picks = list(itertools.product(*levels[2:])) if of_grid else [(scale,) for scale in scales]
-        picks = picks[:: -(-len(picks) // _MOST)]
-        figure, axes = panels(len(picks) * len(values), len(picks), (3.6, 3.0), title)
-        for ax, ((name, words), pick) in zip(axes, itertools.product(values.items(), picks), strict=True):
-            if of_grid:
-                fixed = dict(zip((scale.name for scale in scales[2:]), pick, strict=True))
-                mine: Rows = [row for row in rows if all(row[key] == value for key, value in fixed.items())]
-                where = ", ".join(f"{key.rpartition('.')[2]} = {_short(value)}" for key, value in fixed.items())
-                draws.append((ax, name, f"{words}, {where}", mine, scales[:2]))
-            else:
-                draws.append((ax, name, words, rows, pick))
+    levels = [list(dict.fromkeys(row[scale.name] for row in rows)) for scale in scales]
+    of_grid = len(scales) <= 2 or len(rows) == np.prod([len(level) for level in levels])
+    picks: list[tuple[Any, ...]] = list(itertools.product(*levels[2:])) if of_grid else [(scale,) for scale in scales]
+    picks = picks[:: -(-len(picks) // _MOST)]
+    figure, axes = panels(len(picks) * len(values), len(picks) if len(picks) > 1 else 3, (3.8, 3.0), title)
     drawn = []
-    for ax, name, _, some, over in draws:
+    for ax, ((name, words), pick) in zip(axes, itertools.product(values.items(), picks), strict=True):
+        fixed = dict(zip((scale.name for scale in scales[2:]), pick, strict=True)) if of_grid else {}
+        mine = [row for row in rows if all(row[key] == value for key, value in fixed.items())]
+        where = "".join(f", {key.rpartition('.')[2]} = {_short(value)}" for key, value in fixed.items())
         every = column(singly(rows, name), name)  # panels of one column share its colours
-        drawn.append(_panel(figure, ax, singly(some, name), over, name, (np.nanmin(every), np.nanmax(every))))
+        ends = np.nanmin(every), np.nanmax(every)
+        scale = _panel(figure, ax, singly(mine, name), scales[:2] if of_grid else pick, name, ends)
+        drawn.append((ax, f"{words}{where}", scale.get_offset_text()))
     figure.draw_without_rendering()  # which decides by what the numbers of a scale are multiplied
-    for (ax, _, words, *_), scale in zip(draws, drawn, strict=True):
-        factor = scale.get_offset_text()
+    for ax, words, factor in drawn:
         ax.set_title(f"{words}   {factor.get_text()}", fontsize="medium")
         factor.set_visible(False)
     return figure

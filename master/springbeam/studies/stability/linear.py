@@ -6,18 +6,17 @@ impulse and S_j its j-fold integral (S₋₁ = Ṡ), a step of size h under F(τ
     ξ(h) = (Ṡ + cS) ξ₀ + S ξ̇₀ + b Σ F_j S_{j+1}      ∫ξ, ∫∫ξ: each index one, two higher
     ξ̇(h) = −ω²S ξ₀ + Ṡ ξ̇₀ + b Σ F_j S_j
 
-A step of a scheme is written as what it does to states; those of the identity give its matrix.
 Nothing here uses the bodies or the solvers of a run, except the conditions that define a scheme.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import factorial, inf, sqrt
 
 import numpy as np
 from numpy.polynomial import legendre
+from scipy.linalg import block_diag
 
 from ...bodies import force
 from ...bodies.protocol import Motion
@@ -61,56 +60,24 @@ class LinearBody:
     b: np.ndarray
 
     @property
-    def size(self) -> int:
-        """Length 2r of a state (ξ, ξ̇)."""
-        return 2 * len(self.omega2)
-
-    @property
     def mass(self) -> float:
         """What an impulse at the interface meets [kg]; ∞ of a wall, which has no modes."""
         mobility = float(self.b @ self.b)
         return 1.0 / mobility if mobility > 0.0 else inf
 
-    def displacement(self, x: np.ndarray) -> np.ndarray:
-        """Return w [m] of states, the columns of ``x``."""
-        return np.asarray(self.b @ x[: len(self.b)])
+    def step(self, h: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return the exact step over ``h`` [s] as matrices.
 
-    def velocity(self, x: np.ndarray) -> np.ndarray:
-        """Return ẇ [m/s] of states, the columns of ``x``."""
-        return np.asarray(self.b @ x[len(self.b) :])
-
-
-class Step:
-    """The exact step of a `LinearBody` over ``h`` [s]."""
-
-    def __init__(self, body: LinearBody, h: float) -> None:
-        self.body, self.h = body, h
-        S = impulse_integrals(body.omega2, body.c, h)[:, :, None]
-        c, omega2, b = (v[:, None] for v in (body.c, body.omega2, body.b))
-        # Of ∫ᵏξ, k = 0, 1, 2, and of ξ̇, k = −1: what ξ₀, ξ̇₀ and each F_j add.
-        at_start = {k: (S[k] + c * S[k + 1], S[k + 1]) for k in (0, 1, 2)} | {-1: (-omega2 * S[1], S[0])}
-        self._rows = [(*at_start[k], [b * S[j] for j in range(k + 2, k + 5)]) for k in (0, -1, 1, 2)]
-
-    def __call__(self, x: np.ndarray, forces: Sequence[np.ndarray | float] = ()) -> tuple[np.ndarray, np.ndarray]:
-        """Return states and motions (`Motion` as rows, shape (4, columns)) after the step.
-
-        ``x`` has a state per column; ``forces`` are F, Ḟ, F̈ at the start, as many as there are, per column.
+        The first two give the state (ξ, ξ̇) at its end from that at its start, (2r, 2r), and from F, Ḟ, F̈ there,
+        (2r, 3); the others give the `Motion` at its end from these, (4, 2r) and (4, 3).
         """
-        r = len(self.body.b)
-        xi, rate = x[:r], x[r:]
-        rows = []
-        for of_place, of_rate, of_forces in self._rows:
-            row = of_place * xi + of_rate * rate
-            for f, g in zip(forces, of_forces, strict=False):
-                row = row + g * f
-            rows.append(row)
-        end, b = np.vstack(rows[:2]), self.body.b
-        return end, np.array([self.body.displacement(end), self.body.velocity(end), b @ rows[2], b @ rows[3]])
-
-    def response(self, degree: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return states and motions from rest under P₀ … P_degree, a column each."""
-        units = [force.derivatives(row.tolist(), self.h) for row in np.eye(degree + 1)]
-        return self(np.zeros((self.body.size, degree + 1)), list(np.array(units).T))
+        S = impulse_integrals(self.omega2, self.c, h)
+        parts = [(S[k] + self.c * S[k + 1], S[k + 1], S[k + 2 : k + 5]) for k in (0, 1, 2)]  # of ξ, ∫ξ, ∫∫ξ
+        parts.insert(1, (-self.omega2 * S[1], S[0], S[1:4]))  # of ξ̇
+        of_state = [np.hstack([np.diag(place), np.diag(rate)]) for place, rate, _ in parts]
+        of_force = [(self.b * forced).T for _, _, forced in parts]
+        motion, pushed = (np.array([self.b @ row for row in rows]) for rows in (of_state, of_force))
+        return np.vstack(of_state[:2]), np.vstack(of_force[:2]), motion, pushed
 
 
 @dataclass(frozen=True)
@@ -132,32 +99,34 @@ class LinearPair:
         """Return √(k (1/m_tip + 1/m)) of a soft law [rad/s], 0 of a tie."""
         return sqrt(self.stiffness * (1.0 / self.beam.mass + 1.0 / self.spring.mass)) if self.soft else 0.0
 
-    def split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the states of the beam and of the spring."""
-        return x[: self.beam.size], x[self.beam.size :]
-
-    def penetration(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return y − u_tip [m] and its rate [m/s]."""
-        a, s = self.split(x)
-        return (
-            self.spring.displacement(s) - self.beam.displacement(a),
-            self.spring.velocity(s) - self.beam.velocity(a),
-        )
-
 
 def amplification(pair: LinearPair, scheme: str, degree: int, h: float) -> np.ndarray:
     """Return the matrix of one macro step of size ``h`` [s], for states (ξ, ξ̇) of the beam, then of the spring."""
-    states = np.eye(pair.beam.size + pair.spring.size)
-    if scheme in ("jacobi", "gauss_seidel"):
-        return _exchanged(pair, scheme == "gauss_seidel", degree, h, states)
-    return _solved(pair, scheme, degree, h, states)
+    (A, of_C, u, u_of_C), (B, of_force, y, y_of_force) = pair.beam.step(h), pair.spring.step(h)
+    ends = block_diag(*(np.kron(np.eye(2), body.b) for body in (pair.beam, pair.spring)))  # u, v, y, z at the start
+    p, rate = ends[2:] - ends[:2]
+    moved = np.hstack([-u, y])  # what C = 0 does to the `Motion` of y − u
+    exchanged = scheme in ("jacobi", "gauss_seidel")
+    C = other = np.zeros((3, len(p)))  # C, Ċ, C̈ at the start, on the beam and on the spring
+    if exchanged:
+        C = other = np.array([pair.stiffness * p + pair.damping * rate, degree * pair.stiffness * rate, 0.0 * p])
+    if scheme == "gauss_seidel":  # as `coupling.exchange.Exchange`
+        tip = np.hstack([u, 0.0 * y]) + u_of_C @ C
+        expected = ends[2] + degree * h * ends[3]
+        at_end = pair.stiffness * (expected - tip[0]) + pair.damping * (ends[3] - tip[1])
+        other = np.array([C[0], (at_end - C[0]) / h, 0.0 * p] if degree else [at_end, 0.0 * p, 0.0 * p])
+    if not exchanged:
+        C = other = _solved(pair, scheme, degree, h, moved, u_of_C + y_of_force, p)
+    return np.asarray(block_diag(A, B) + np.vstack([of_C @ C, -of_force @ other]))
 
 
-def _solved(pair: LinearPair, scheme: str, degree: int, h: float, x: np.ndarray) -> np.ndarray:
-    """Return states after a step by ``energy`` or ``hermite``, in closed form what the solvers of `coupling` find.
+def _solved(
+    pair: LinearPair, scheme: str, degree: int, h: float, moved: np.ndarray, by_force: np.ndarray, p: np.ndarray
+) -> np.ndarray:
+    """Return C, Ċ, C̈ of a step by ``energy`` or ``hermite``, in closed form what the solvers of `coupling` find.
 
     Of a soft law C has the first Legendre coefficients of k p̃ + c p̃′. Of a tie, its limit for k → ∞, the numbers that
-    p̃ is made of are zero.
+    p̃ is made of are zero. ``moved`` less ``by_force`` @ (C, Ċ, C̈) is the `Motion` of y − u, ``p`` that at the start.
     """
     n = degree + 1
     own, from_numbers, from_start = np.zeros((n, n)), np.eye(n), np.zeros(n)
@@ -168,30 +137,9 @@ def _solved(pair: LinearPair, scheme: str, degree: int, h: float, x: np.ndarray)
         from_start = law @ penetration_series(1.0, [0.0] * n)
     condition = SCHEMES[scheme][degree]
     numbers = from_numbers @ np.array([condition(Motion(*unit), h) for unit in np.eye(4)]).T
-    beam, spring = Step(pair.beam, h), Step(pair.spring, h)
-    (beam_states, beam_motions), (spring_states, spring_motions) = beam.response(degree), spring.response(degree)
-    p, _ = pair.penetration(x)
-    a, s = pair.split(x)
-    (a, u), (s, y) = beam(a), spring(s)
-    coefficients = np.linalg.solve(
-        own + numbers @ (beam_motions + spring_motions), numbers @ (y - u) + np.outer(from_start, p)
-    )
-    return np.vstack([a + beam_states @ coefficients, s - spring_states @ coefficients])
-
-
-def _exchanged(pair: LinearPair, sequential: bool, degree: int, h: float, x: np.ndarray) -> np.ndarray:
-    """Return states after a step of a soft law by ``jacobi`` or ``gauss_seidel``, as `coupling.exchange.Exchange`."""
-    beam, spring, k, c = Step(pair.beam, h), Step(pair.spring, h), pair.stiffness, pair.damping
-    p, rate = pair.penetration(x)
-    a, s = pair.split(x)
-    at_start = k * p + c * rate
-    forces = [at_start, k * rate][: degree + 1]
-    end, u = beam(a, forces)
-    if sequential:
-        moved = pair.spring.displacement(s) + degree * h * pair.spring.velocity(s)
-        at_end = k * (moved - u[0]) + c * (pair.spring.velocity(s) - u[1])
-        forces = [at_start, (at_end - at_start) / h] if degree else [at_end]
-    return np.vstack([end, spring(s, [-f for f in forces])[0]])
+    derivatives = np.transpose([force.derivatives(row, h) for row in np.eye(n).tolist()])
+    coefficients = np.linalg.solve(own + numbers @ by_force @ derivatives, numbers @ moved + np.outer(from_start, p))
+    return np.asarray(derivatives @ coefficients)
 
 
 def spectral_radius(pair: LinearPair, scheme: str, degree: int, h: float) -> float:

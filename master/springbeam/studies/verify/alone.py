@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from ...bodies.fmu_bodies import FmuBeam, FmuSpring
 from ...bodies.protocol import NO_FORCE, FmuError, StepRefused
 from ...scene import Beam, Spring
-from ..exact import Duffing
+from ..exact import duffing_period
 from .check import EPS, UNIT_FORCE, Check, section
 
 _VARIANTS: dict[str, dict[str, Any]] = {
@@ -53,17 +53,21 @@ def static_deflection(kag: float, variant: str) -> Iterator[Check]:
     yield Check(name, share, _at_rest(beam) / true, (2 * n) ** 2 * EPS * share, reason)
 
 
-@section("Beam: clamped–free frequencies on n elements", (1.0, 80), (1.0, 160), (3.6e10, 160))
-def frequencies(kappa: float, n: int) -> Iterator[Check]:
-    """Clamped–free frequencies over √κ, and how much too high linear elements make them, from the motion of the tip."""
-    root = sqrt(kappa)
-    beam = Beam.with_ones(n_elements=n, n_modes=6, young_modulus=kappa, shear_modulus=kappa)
+@section("Beam: clamped–free frequencies", (1.0,), (3.6e10,))
+def frequencies(kappa: float) -> Iterator[Check]:
+    """Clamped–free frequencies over √κ, of 8 elements of degree 8, from the motion of the tip."""
+    root, n, degree = sqrt(kappa), 8, 8
+    mesh = {"n_elements": n, "element_degree": degree, "n_modes": 6}
+    beam = Beam.with_ones(young_modulus=kappa, shear_modulus=kappa, **mesh)
     measured = _measured_frequencies(beam, 0.1 / root, 300) / root
-    reason = "next order (kh)² of the error h²/24ω · ∫(EI θ''² + KAG u''²) of P1; rounding: ε N², N = 2n"
     for i, w in enumerate(clamped_free_frequencies()[:6], 1):
-        error = _mesh_error(w) / n**2
-        bound = error * (_wave_number(w) / n) ** 2 + (2 * n) ** 2 * EPS * w
-        yield Check(f"κ = {kappa:g}, n = {n}: ω{i}", w + error, _nearest(measured, w), bound, reason)
+        yield Check(
+            f"κ = {kappa:g}: ω{i}",
+            w,
+            _nearest(measured, w),
+            (2 * n * degree) ** 2 * EPS * w,
+            "rounding: ε N², N unknowns",
+        )
 
 
 #: How a bar of c = 1 is discretised, and the ω h of its wave that turns by kh over h.
@@ -156,27 +160,6 @@ def transfer_rate(w: float, softer: complex = 1.0) -> np.ndarray:
     return np.array([[0, softer, 0, 0], [-w * w, 0, 0, -1], [1, 0, 0, softer], [0, 0, -w * w, 0]])
 
 
-def _mesh_error(w: float) -> float:
-    """Return the leading error (ω_h − ω)/h² of P1 elements for the clamped–free frequency ω = ``w``.
-
-    ω_h² − ω² is the energy of what P1 cannot follow of the mode: h²/12 ∫ EI θ''² + KAG u''² over ∫ ρI θ² + ρA u².
-    """
-    start = np.zeros(4)
-    start[[1, 3]] = np.linalg.svd(free_end(expm(transfer_rate(w))))[2][-1]
-    nodes, weights = np.polynomial.legendre.leggauss(24)
-    curvature = mass = 0.0
-    for x, weight in zip((nodes + 1.0) / 2.0, weights, strict=True):
-        theta, moment, u, shear = expm(transfer_rate(w) * x) @ start
-        curvature += weight * ((-shear - w * w * theta) ** 2 + (moment - w * w * u) ** 2)
-        mass += weight * (theta**2 + u**2)
-    return float(curvature / mass / 12.0 / (2.0 * w))
-
-
-def _wave_number(w: float) -> float:
-    """Return the larger k [1/m] of the unit beam at ω: (k² − ω²)² = ω²."""
-    return sqrt(w * w + w)
-
-
 def _measured_frequencies(beam: Beam, size: float, samples: int) -> np.ndarray:
     """Return the frequencies [rad/s] in the tip's velocity after an impulse, from 2 ``samples`` rows at ``size`` [s].
 
@@ -212,11 +195,11 @@ _SPRINGS = ((3.0, -0.2, 0.5), (3.0, -0.2, 1.0), (150.0, 67.0, 0.5), (150.0, 67.0
 
 @section("Spring: Duffing (k1, k2, A), from rest", *_SPRINGS)
 def duffing(k1: float, k2: float, amplitude: float) -> Iterator[Check]:
-    """Undamped Duffing spring, m = 1, from rest at A: where it is, at rest again, after one period (`exact.Duffing`).
+    """Undamped Duffing spring, m = 1, from rest at A: where it is, at rest again, after `exact.duffing_period`.
 
     A period that is off by δT leaves it with ẏ = (k1 A + k2 A³) δT.
     """
-    period = Duffing(k1, k2, amplitude).period
+    period = duffing_period(k1, k2, amplitude)
     spring = Spring.with_ones(linear_stiffness=k1, cubic_stiffness=k2, equilibrium=amplitude)
     name, relative = f"({k1:g}, {k2:g}, {amplitude:g})", ida_error(2.0 * pi)
     with closing(FmuSpring(spring, 0.0)) as body:
