@@ -1,5 +1,7 @@
-"""The command in this process, one that is interrupted, and what it has written: for tests of several folders."""
+"""The command in this process, one that is interrupted, what it has written; other programs. For several folders."""
 
+import os
+import subprocess
 from functools import cache
 
 import typer
@@ -36,6 +38,15 @@ def refused(*arguments):
     assert (result.exit_code, result.stdout) == (2, ""), result.output
     assert "Traceback" not in result.stderr
     return result.stderr
+
+
+def ran(*words, env=None, **options):
+    """Return what another program printed, which must succeed; ``env`` is added to the environment."""
+    environment = {**os.environ, **(env or {})}
+    process = [str(word) for word in words]
+    done = subprocess.run(process, env=environment, capture_output=True, text=True, timeout=HANGS, **options)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    return done.stdout
 
 
 def written(directory):

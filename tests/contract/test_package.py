@@ -2,7 +2,6 @@
 
 import ctypes as ct
 import re
-import subprocess
 import sys
 import xml.etree.ElementTree as ET
 import zipfile
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import fmpy
 import pytest
+from commands import ran
 from fmpy import simulate_fmu
 from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
@@ -18,17 +18,13 @@ from lxml import etree
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def output(*command):
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
-
-
 def test_static_model_is_the_packed_one_and_fmpy_reports_nothing(case, tmp_path):
     # The description made from the table, before there is a binary. Only a list of sources is added to it.
     table, no_sources, printed = (tmp_path / name for name in ("table", "list", "modelDescription.xml"))
-    table.write_text(output(str(ROOT / "build" / "fmus" / f"describe_{case.name}")), encoding="utf-8")
+    table.write_text(ran(ROOT / "build" / "fmus" / f"describe_{case.name}"), encoding="utf-8")
     no_sources.touch()
-    description = [sys.executable, str(ROOT / "fmus" / "description.py"), case.version[0], str(table), str(no_sources)]
-    printed.write_text(output(*description), encoding="utf-8")
+    description = [sys.executable, ROOT / "fmus" / "description.py", case.version[0], table, no_sources]
+    printed.write_text(ran(*description), encoding="utf-8")
     assert validate_fmu(str(tmp_path)) == []
     packed = (case.folder / "modelDescription.xml").read_text(encoding="utf-8")
     without_list = re.sub(r">\s*<SourceFiles>.*</CoSimulation>", " />", packed, flags=re.DOTALL)
@@ -59,14 +55,14 @@ def test_capabilities_are_declared(case):
 
 
 def test_binary_needs_only_libc_and_libm_and_binds_its_own_symbols_first(case):
-    dynamic = output("readelf", "-d", str(case.binary))
+    dynamic = ran("readelf", "-d", case.binary)
     needed = set(re.findall(r"\(NEEDED\).*\[(.*)\]", dynamic))
     assert needed <= {"libc.so.6", "libm.so.6", "ld-linux-x86-64.so.2"}
     assert "SYMBOLIC" in dynamic
 
 
 def test_binary_shows_the_functions_of_its_version_and_nothing_else(case):
-    symbols = {line.split()[-1] for line in output("nm", "-D", "--defined-only", str(case.binary)).splitlines()}
+    symbols = {line.split()[-1] for line in ran("nm", "-D", "--defined-only", case.binary).splitlines()}
     header = Path(fmpy.__file__).parent / "c-code" / f"fmi{case.version[0]}FunctionTypes.h"
     declared = set(re.findall(r"\b(fmi[23]\w+)TYPE\b", header.read_text(encoding="utf-8")))
     if case.version == "3.0":
@@ -217,7 +213,7 @@ def test_terminals_connect_the_pair_as_the_system_file_does(beam, spring, fmu_fo
 
 def test_binary_loads_on_systems_since_glibc_2_14(case):
     # RHEL 7 has 2.17. See fmus/adapter/old_glibc.cpp, which is where a name listed here wants a definition.
-    symbols = re.findall(r"GLIBC_([0-9.]+)\)?\s+(\S+)", output("objdump", "-T", str(case.binary)))
+    symbols = re.findall(r"GLIBC_([0-9.]+)\)?\s+(\S+)", ran("objdump", "-T", case.binary))
     assert len(symbols) > 20
     assert [(name, v) for v, name in symbols if tuple(int(part) for part in v.split(".")) > (2, 14)] == []
 

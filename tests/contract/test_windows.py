@@ -2,23 +2,16 @@
 
 import os
 import shutil
-import subprocess
 import zipfile
 from pathlib import Path
 
 import fmpy
 import pytest
-from commands import HANGS
+from commands import ran
 
 HERE = Path(__file__).resolve().parent
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 ZIG = HERE.parents[1] / "build" / "win64" / "zig-cc"
-
-
-def run(*command, **options):
-    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, timeout=HANGS, **options)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
 
 
 def arguments(case):
@@ -36,7 +29,7 @@ def linux_host(tmp_path_factory):
     if compiler is None:
         pytest.skip("no C compiler: the FMUs are not tried in a C host")
     host = tmp_path_factory.mktemp("host") / "host"
-    run(compiler, "-O1", "-isystem", HEADERS, HERE / "host.c", "-o", host, "-ldl")
+    ran(compiler, "-O1", "-isystem", HEADERS, HERE / "host.c", "-o", host, "-ldl")
     return host
 
 
@@ -48,7 +41,7 @@ def wine_prefix(tmp_path_factory):
 
 @pytest.mark.parametrize("version", ["2.0"])
 def test_c_host(case, linux_host):
-    result = rows(run(linux_host, case.binary, *arguments(case)))
+    result = rows(ran(linux_host, case.binary, *arguments(case)))
     repeated = [row for row in result if row[0] == "100"]
     assert len(repeated) == 8  # step 100 was made twice, from the same state
     assert repeated[:4] == repeated[4:]
@@ -65,10 +58,10 @@ def test_windows_binary_under_wine(case, linux_host, wine_prefix, tmp_path):
     if wine is None or not ZIG.is_file():
         pytest.skip("Wine is not installed (Debian: wine64): THE WINDOWS BINARIES ARE NOT TESTED")
     host = tmp_path / "host.exe"
-    run(ZIG, "-O1", "-isystem", HEADERS, HERE / "host.c", "-o", host)
+    ran(ZIG, "-O1", "-isystem", HEADERS, HERE / "host.c", "-o", host)
     environment = {**os.environ, "WINEPREFIX": str(wine_prefix), "WINEDEBUG": "-all"}
-    theirs = rows(run(wine, host, f"binaries\\win64\\{case.name}.dll", *arguments(case), cwd=tmp_path, env=environment))
-    ours = rows(run(linux_host, case.binary, *arguments(case)))
+    theirs = rows(ran(wine, host, f"binaries\\win64\\{case.name}.dll", *arguments(case), cwd=tmp_path, env=environment))
+    ours = rows(ran(linux_host, case.binary, *arguments(case)))
     assert [row[:2] for row in theirs] == [row[:2] for row in ours]
     repeated = [row for row in theirs if row[0] == "100"]
     assert repeated[:4] == repeated[4:]

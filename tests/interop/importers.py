@@ -2,14 +2,13 @@
 
 import json
 import os
-import subprocess
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
-from commands import HANGS
+from commands import ran
 
 HERE = Path(__file__).resolve().parent
 SIZE, END = 1e-3, 0.4
@@ -45,20 +44,6 @@ def installed(name):
     return folder
 
 
-def run(*command, cwd=None, env=None):
-    """What the command printed; it must succeed."""
-    done = subprocess.run(
-        [str(c) for c in command],
-        cwd=cwd,
-        env={**os.environ, **(env or {})},
-        capture_output=True,
-        text=True,
-        timeout=HANGS,
-    )
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-    return done.stdout
-
-
 class System:
     """The pair, or one FMU alone: a job for an importer, and what has to come out.
 
@@ -80,7 +65,7 @@ class System:
         job = {"size": SIZE, "end": END, "fmus": self.fmus, "parameters": self.parameters}
         job |= {"connections": self.connections, "outputs": [self.output], "ssp": ssp and str(ssp)}
         python = installed(importer) / "venv/bin/python"
-        output = run(python, HERE / f"run_{importer}.py", json.dumps(job), env=environment)
+        output = ran(python, HERE / f"run_{importer}.py", json.dumps(job), env=environment)
         return np.array(json.loads(output.split("ROWS ")[1]))[:, 1]
 
     def check(self, rows, within=0.0):

@@ -8,7 +8,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from importers import run
+from commands import ran
 
 pytestmark = pytest.mark.slow
 
@@ -38,7 +38,7 @@ def test_compiled_from_its_own_sources_it_gives_the_same_bits(fmu_folder, tmp_pa
         "PATH": os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]),
         "CMAKE_GENERATOR": "Ninja",
     }
-    run(sys.executable, "-m", "fmpy", "compile", compiled, env=tools, cwd=tmp_path)
+    ran(sys.executable, "-m", "fmpy", "compile", compiled, env=tools, cwd=tmp_path)
     with zipfile.ZipFile(compiled) as archive:
         assert f"binaries/linux64/{model}.so" in archive.namelist()
     outputs = [v.name for v in description.modelVariables if v.causality == "output"]

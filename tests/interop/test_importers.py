@@ -12,7 +12,8 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from importers import END, HERE, SIZE, SYSTEMS, installed, run
+from commands import ran
+from importers import END, HERE, SIZE, SYSTEMS, installed
 
 each_system = pytest.mark.parametrize("system", SYSTEMS, indirect=True)
 each_model = pytest.mark.parametrize("model", ["beam", "spring"])
@@ -25,13 +26,13 @@ each_file = pytest.mark.parametrize(
 @pytest.mark.parametrize("rules", ["static", "rules"])
 def test_vdmcheck_finds_nothing(fmu_folder, model, rules):
     folder = next((installed("vdmcheck") / rules).iterdir())
-    output = run("bash", folder / "VDMCheck2.sh", fmu_folder / f"{model}.fmu", cwd=folder)
+    output = ran("bash", folder / "VDMCheck2.sh", fmu_folder / f"{model}.fmu", cwd=folder)
     assert output.strip() == "No errors found."
 
 
 @each_file
 def test_fmpy_accepts_it_from_its_command_line(fmu_folder, file, version):
-    assert "No problems found" in run(sys.executable, "-m", "fmpy", "validate", fmu_folder / f"{file}.fmu")
+    assert "No problems found" in ran(sys.executable, "-m", "fmpy", "validate", fmu_folder / f"{file}.fmu")
 
 
 @each_file
@@ -99,7 +100,7 @@ def test_pair_in_maestro(system, tmp_path):
     }
     (tmp_path / "model.json").write_text(json.dumps(model))
     (tmp_path / "experiment.json").write_text(json.dumps(experiment))
-    run(
+    ran(
         *("java", "-cp", classpath, "org.intocps.maestro.Main", "import", "sg1", "-output", "out"),
         *("model.json", "experiment.json", "--interpret"),
         cwd=tmp_path,
@@ -116,7 +117,7 @@ def test_single_fmu_in_fmi_sim(fmu_folder, tmp_path, model, output):
     tool = installed("fmi-sim") / "bin/fmi-sim"
     name, value = {"beam": ("initial_velocity_slope", -1.0), "spring": ("displacement", 0.5)}[model]
     result = tmp_path / "out.csv"
-    run(
+    ran(
         *(tool, "--model", fmu_folder / f"{model}.fmu", "--output-file", result, "co-simulation", "-f", "0.1"),
         *("--output-interval", "0.01", "--step", "0.01", "--init-values", f"{name}={value}"),
     )
@@ -139,7 +140,7 @@ def java(tmp_path_factory):
     """The class path of the importers and of our callers, compiled."""
     libraries = (installed("java") / "classpath").read_text().strip()
     classes = tmp_path_factory.mktemp("classes")
-    run("javac", "-cp", libraries, "-d", classes, *(HERE / "java").glob("*.java"))
+    ran("javac", "-cp", libraries, "-d", classes, *(HERE / "java").glob("*.java"))
     return f"{classes}:{libraries}"
 
 
@@ -148,7 +149,7 @@ def java(tmp_path_factory):
 def test_java(system, java, importer):
     # Half-way each state goes through its serialised bytes.
     values = {**system.fmus, **system.parameters}
-    output = run(
+    output = ran(
         # JavaFMI 2.24.3 sets a file's permissions by a method that Java 17 hides.
         *("java", "--add-opens", "java.prefs/java.util.prefs=ALL-UNNAMED", "-cp", java, "Pair", importer),
         *(str(SIZE), str(round(END / SIZE)), system.output),
@@ -176,7 +177,7 @@ def test_fmucontainer(system, tmp_path):
     (tmp_path / "container.csv").write_text("\n".join(lines) + "\n")
     for name, path in system.fmus.items():
         (tmp_path / f"{name}.fmu").symlink_to(path)
-    run(
+    ran(
         *(tool, "-container", f"container.csv:{SIZE}", "-no-auto-input", "-no-auto-output", "-no-auto-link"),
         cwd=tmp_path,
     )

@@ -2,11 +2,10 @@
 
 import logging.config
 import os
-import subprocess
 import sys
 from pathlib import Path
 
-from commands import HANGS
+from commands import ran
 from importlinter.cli import lint_imports
 
 ROOT = Path(__file__).parents[2]
@@ -28,5 +27,4 @@ try:
 except SystemExit:
     print("SLOW", *sorted({"scipy", "fmpy", "matplotlib", "plotly", "distributed", "pandas"} & set(sys.modules)))
 """
-    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=HANGS)
-    assert ran.stdout.splitlines()[-1].split() == ["SLOW"]
+    assert ran(sys.executable, "-c", script).splitlines()[-1].split() == ["SLOW"]

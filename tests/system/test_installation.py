@@ -9,7 +9,7 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from commands import HANGS, command, printed
+from commands import HANGS, command, printed, ran
 from packaging.requirements import Requirement
 
 from springbeam.scene.reading import tomllib
@@ -104,6 +104,4 @@ try:
 except SystemExit as end:
     print(end.code, sockets)
 """
-    command = [sys.executable, "-c", script, str(tmp_path / "out")]
-    run = subprocess.run(command, capture_output=True, text=True, check=True, timeout=HANGS)
-    assert run.stdout.splitlines()[-1] == "0 []", run.stdout
+    assert ran(sys.executable, "-c", script, tmp_path / "out").splitlines()[-1] == "0 []"
