@@ -5,6 +5,7 @@ import pytest
 from numpy.polynomial import Legendre
 
 from springbeam.bodies import force
+from springbeam.bodies.protocol import Motion
 
 EPS = float(np.finfo(float).eps)
 #: Degrees 0, 1 and 2, with coefficients of both signs.
@@ -39,3 +40,14 @@ def test_free_mass_response_is_the_repeated_integral(size):
         scales = [size**n / mass for n in (2, 1, 3, 4)]
         for got, want, scale in zip(motion, exact, scales, strict=True):
             assert got == pytest.approx(want, abs=4 * EPS * scale)
+
+
+@pytest.mark.parametrize("size", [1e-4, 0.5])
+def test_the_work_on_an_end_is_of_its_motion_from_wherever_it_starts(size):
+    """∫ C ẇ over w = 0.3 + 0.4 s − 0.7 s² + 0.2 s³, s = τ/H."""
+    w, a = np.polynomial.Polynomial([0.3, 0.4, -0.7, 0.2]), COEFFICIENTS[2]
+    once, twice = w.integ(), w.integ(2)
+    start = Motion(w(0.0), w.deriv()(0.0) / size, 0.0, 0.0)
+    end = Motion(w(1.0), w.deriv()(1.0) / size, size * once(1.0), size**2 * twice(1.0))
+    exact = (Legendre(a, domain=(0.0, 1.0)).convert(kind=np.polynomial.Polynomial) * w.deriv()).integ()(1.0)
+    assert force.work_on(force.derivatives(a, size), start, end, size) == pytest.approx(exact, rel=1e-13)

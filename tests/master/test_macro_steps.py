@@ -70,6 +70,15 @@ def test_a_step_after_a_rejected_one_does_not_grow():
     assert steps.state.rejections == 1
 
 
+@pytest.mark.parametrize(("share", "error", "change"), [(0.5, 0.9, 1.0), (0.5, 1e-9, 2.0), (0.2, 1e-30, 1.0)])
+def test_a_step_that_a_kink_has_cut_makes_the_next_one_longer_or_leaves_it(share, error, change):
+    """A cut step that was much shorter than a whole one tells nothing of these."""
+    steps = AdaptiveSteps(0.0, LENGTH)
+    size = steps.size
+    assert steps.judge(share * size, error, 4, to_kink=True)
+    assert steps.size == pytest.approx(change * size, rel=1e-9)
+
+
 def test_the_last_step_ends_the_run():
     """A remainder of up to a quarter more is taken at once, and none is ever shorter than a quarter of the size."""
     steps = AdaptiveSteps(0.0, LENGTH)

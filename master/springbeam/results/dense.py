@@ -156,15 +156,14 @@ def _between(
         found[name] = linear(name, after[name])
     # What the event at the end of the step moves and takes is kinetic, or springs back with a massless tip.
     lost = after["impact_loss"] - before["impact_loss"]
-    of_tip = _impulses(before, after, events) * 0.5 * (after["v_tip"] + after["v_tip_after"])
+    of_tip = _impulses(after, events) * 0.5 * (after["v_tip"] + after["v_tip_after"])
     of_spring = np.where(after["z_after"] != after["z"], -lost - of_tip, 0.0)
     found["beam_kinetic"] = linear("beam_kinetic", after["beam_kinetic"] + lost + of_spring)
     found["spring_kinetic"] = linear("spring_kinetic", after["spring_kinetic"] - of_spring)
     return found
 
 
-def _impulses(before: np.ndarray, after: np.ndarray, events: Sequence[Event]) -> np.ndarray:
-    """Return the impulse on the tip at the end of each step [N·s], 0 where no event ends it."""
-    at = np.array([(event.time, event.impulse_contact) for event in events] or [(np.inf, 0.0)])
-    time, impulse = at[np.maximum(after["events"].astype(int) - 1, 0)].T
-    return np.where((after["events"] > before["events"]) & (time == after["time"]), impulse, 0.0)
+def _impulses(after: np.ndarray, events: Sequence[Event]) -> np.ndarray:
+    """Return the impulse on the tip by the last event up to the end of each step [N·s], 0 before the first."""
+    impulses = np.array([0.0, *(event.impulse_contact for event in events)])
+    return np.asarray(impulses[after["events"].astype(int)])
