@@ -6,11 +6,12 @@ from bodies import DuffingBody, Upper, simulate, stopping
 from references import dips
 from scenes import kinds, scene_from_dict
 
+from springbeam.bodies.gate import admit
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 from springbeam.monolithic import event_driven
 from springbeam.results.steps import STEP
 from springbeam.run.ledger import bounds, errors
-from springbeam.scene import load_scene, with_changes
+from springbeam.scene import SceneError, load_scene, with_changes
 
 
 def soft(n=6, **tables):
@@ -343,3 +344,14 @@ def test_a_contact_too_stiff_for_its_degree_is_said_and_keeps_the_energy():
     assert 0 < reduced < 0.5 * run.summary["macro_steps"]
     assert any(f"{reduced} of" in warning for warning in run.summary["warnings"])
     assert run.summary["max_energy_residual"] < 1e-5
+
+
+@pytest.mark.parametrize("miss", [2e-13, -2e-13])
+def test_an_undeformed_tip_may_miss_what_it_meets_by_the_rounding_of_its_way(miss):
+    """It has come down by 1 m/s for 0.5 s, to 1e-12 of that; a start at rest has no way to round."""
+    scene = with_changes(load_scene("soft"), beam={"initial_deflection_slope": 0.5})
+    assert scene.contact_time == 0.5
+    admit(scene, 0.5, Upper(1.0, y=miss, z=-1.0), DuffingBody(1.0))
+    for u, time in ((miss, 0.0), (4.0 * miss, 0.5)):
+        with pytest.raises(SceneError, match="the upper end starts at"):
+            admit(scene, time, Upper(1.0, y=u, z=-1.0), DuffingBody(1.0))
