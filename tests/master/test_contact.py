@@ -144,3 +144,16 @@ def test_a_top_that_strikes_while_both_ends_rise_stays(v, kind, restitution):
     ends = Motion(-0.5, v, 0.0, 0.0), Motion(-0.5, -0.1, 0.0, 0.0)
     found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(Joint.TIED), ends, 0.0, ends, 0.0, 1e-16)
     assert found == (kind if restitution < 1.0 else "stop_impact")
+
+
+@pytest.mark.parametrize(("speed", "tolerance", "kind"), [
+    (0.99e-4, 5.1e-12, "seated"), (0.99e-4, 4.7e-12, "stop_impact"), (1.01e-4, 1.0, "stop_impact"),
+])  # fmt: skip
+def test_a_rebound_that_is_lower_than_heights_can_be_told_apart_is_none_if_it_is_slow(speed, tolerance, kind):
+    """It rises by (e z)²/2a with a = 1 km/s², 4.9e-12 m, and counts as none below 1e-4 of the fastest impact."""
+    scene = with_changes(load_scene("soft"), stop={"restitution": 0.9})
+    transitions = Transitions(scene, None, 0.01, 1.0, fastest=lambda: 1.0, equilibrium=0.0)
+    for z in (-1.0, -speed / 0.9):
+        before, end = ((Motion(0.0, 0.0, 0.0, 0.0), Motion(scene.stop.position, w, 0.0, 0.0)) for w in (z + 1e-3, z))
+        found, *_ = transitions.after(EventKind.STOP_IMPACT, Phase(), before, 1e-6, end, 0.0, tolerance)
+    assert found == kind

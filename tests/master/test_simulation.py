@@ -8,9 +8,11 @@ from scenes import kinds, scene_from_dict
 
 from springbeam.bodies.gate import admit
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
+from springbeam.contact.phases import Joint, Phase
 from springbeam.monolithic import event_driven
 from springbeam.results.steps import STEP
 from springbeam.run.ledger import bounds, errors
+from springbeam.run.stepping import Pair
 from springbeam.scene import SceneError, load_scene, with_changes
 
 
@@ -355,3 +357,15 @@ def test_an_undeformed_tip_may_miss_what_it_meets_by_the_rounding_of_its_way(mis
     for u, time in ((miss, 0.0), (4.0 * miss, 0.5)):
         with pytest.raises(SceneError, match="the upper end starts at"):
             admit(scene, time, Upper(1.0, y=u, z=-1.0), DuffingBody(1.0))
+
+
+@pytest.mark.parametrize(("times", "continued"), [(3.9, True), (4.1, False)])
+def test_a_force_is_continued_over_four_times_its_step_and_held_beyond(times, continued, monkeypatch):
+    """After steps that dying impacts have cut to 1e-9 H its slope would throw the ends as far as rounding lets them."""
+    pair = Pair(with_changes(load_scene("soft"), coupling={"degree": 2}), Upper(1.0), DuffingBody(1.0))
+    state = pair.initial_state(0.0)
+    state.phase, state.contact, state.last_size = Phase(Joint.TIED), (2.0, 3.0, 5.0), 1e-3
+    guesses = []
+    monkeypatch.setattr(pair.joined, "solve", lambda *given: guesses.append(given[-1]))
+    pair.attempt(state, times * 1e-3, state.ends)
+    assert guesses == [(2.0, 3.0, 5.0) if continued else (2.0, 0.0, 0.0)]
