@@ -264,6 +264,15 @@ def test_a_missing_capability_is_named_with_what_would_work(fmu, what):
     assert any(all(text in line for text in (*words, "[spring]")) for line in lines)
 
 
+def test_a_state_that_cannot_be_written_is_refused_before_a_run_with_checkpoints(fmu, tmp_path):
+    scene = pair(fmu("plain", **PLAIN), coupling={"scheme": "jacobi", "degree": 0})
+    directory = RunDirectory.create(tmp_path / "run")
+    refused = pytest.raises(SceneError, match=r"\[spring\] fmu: .*canSerializeFMUstate = false.*--checkpoint")
+    with refused, FileRecorder(scene, directory) as recorder:
+        runner.run(scene, recorder, seconds=0.0)
+    assert not directory.results()
+
+
 @pytest.mark.parametrize("lie", [name for name in oscillator.LIES if name not in ("none", "hang", *LATE)])
 def test_an_fmu_that_lies_is_found_before_the_run(fmu, lie):
     parameters = {"m": M2, "k": K, "lie": oscillator.LIES[lie]}

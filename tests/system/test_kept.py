@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from springbeam import RunStopped, load_scene, simulate, with_changes
+from springbeam import RunStopped, SceneError, load_scene, simulate, with_changes
 from springbeam.bodies import fmu, fmu_bodies
+from springbeam.bodies.elements import PointMass
 from springbeam.bodies.fmu_bodies import release
 
 SOFT = with_changes(load_scene("soft"), beam={"n_elements": 10}, coupling={"macro_step": 1e-3}, time={"t_end": 0.25})
@@ -68,6 +69,13 @@ def test_few_are_kept_and_the_oldest_is_freed(monkeypatch):
     release()
     assert len(closed) == len(springs)
     assert not any(one.faultless for one in closed)
+
+
+def test_a_simulation_that_is_refused_gives_its_bodies_back(made):
+    for _ in range(2):
+        with pytest.raises(SceneError, match="must start there or above"):
+            simulate(SOFT, lower=PointMass(1.0, displacement=1.0))
+    assert made == ["beam"]
 
 
 def test_a_body_whose_calls_fail_is_not_kept(made, monkeypatch):
