@@ -299,17 +299,11 @@ class _Algorithm:
             "e_injected_spring": total(booked * (np.diff(e_spring) - worked)),
         }
         cases, steps = found["case"], max(len(self.rows) - 1, 1)
-        solves = self.iterations | {"spring": self.iterations["predicted"] + self.iterations["joined"]}
-        means = {name: float(np.mean(counts)) if counts else 0.0 for name, counts in solves.items()}
-        newton = {
-            "spring_predicted": means["predicted"],
-            "spring_joined": means["joined"],
-            "spring": means["spring"],
-            "solves": len(solves["spring"]),
-            "time_per_step": (clock.perf_counter() - began) / steps,
-        }
-        summary: dict[str, Any] = {"reference": "algorithm1", "y_temp": self.y_temp, "newton": newton}
-        summary["steps_apart"] = int(np.sum(cases == 11))
+        predicted, joined = self.iterations["predicted"], self.iterations["joined"]
+        solves = {"spring_predicted": predicted, "spring_joined": joined, "spring": predicted + joined}
+        newton = {name: float(np.mean(counts)) if counts else 0.0 for name, counts in solves.items()}
+        newton |= {"solves": len(solves["spring"]), "time_per_step": (clock.perf_counter() - began) / steps}
+        summary: dict[str, Any] = {"reference": "algorithm1", "newton": newton, "steps_apart": int(np.sum(cases == 11))}
         extra = ("case", "e_injected_beam", "e_injected_spring")
         shapes = np.hstack([q @ d.deflection_sampler().T, (q + alpha * v) @ inner_forces(self.beam, d).T])
         return finished(self.scene, columns, shapes, self.events, summary, extra)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import time as clock
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -342,13 +343,6 @@ def _root(g: Callable[[float], float], low: float, high: float) -> float:
 
 def _early_crossing(g: Callable[[float], float], first: float, noise: float) -> float:
     """Return where a function falls to zero that starts there, is positive, and is negative at the first node."""
-    high = first
-    for _ in range(60):
-        low = 0.5 * high
-        value = g(low)
-        if value > noise:
-            return _root(g, low, high)
-        if abs(value) <= noise:
-            return 0.0
-        high = low
-    return 0.0
+    nearer = takewhile(lambda tau: abs(g(tau)) > noise, (first * 0.5**k for k in range(1, 61)))
+    low = next((tau for tau in nearer if g(tau) > 0.0), None)
+    return 0.0 if low is None else _root(g, low, 2.0 * low)

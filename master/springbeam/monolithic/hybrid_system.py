@@ -46,15 +46,14 @@ class HybridSystem:
         #: Without a stop nothing is ever seated on this one.
         self.stop = scene.stop or Stop(position=0.0)
         empty = np.zeros(0)
-        self.omega = empty if self.beam is None else self.beam.omega
         self.b = empty if self.beam is None else self.beam.tip
         self.load = empty if self.beam is None else self.beam.load
         self.alpha_b = 0.0 if self.beam is None else self.beam.alpha
-        self.stiffness = self.omega**2
+        self.stiffness = empty if self.beam is None else self.beam.omega**2
         #: eᵀM⁻¹e [1/kg]; infinite for a beam without inertia.
         self.inverse_tip_mass = float(self.b @ self.b)
         self.loads = Loads(scene, self.beam)
-        self.r = len(self.omega)
+        self.r = len(self.stiffness)
         self.size = 2 * self.r + 5
         self.A, self.V = slice(0, self.r), slice(self.r, 2 * self.r)
         self.Y, self.Z = 2 * self.r, 2 * self.r + 1

@@ -36,7 +36,6 @@ class Rows:
             columns["compliance_force"] = s.law.inside(columns["contact_force"], columns["u_tip"])
         loads = s.loads.values(columns["time"])
         columns |= {f"load_{i}": values for i, values in enumerate(loads.T)}
-        summary["seat_height"] = None if s.scene.stop is None else self._state.seat_height()
         return finished(s.scene, columns, s.shapes(states), self._state.events, summary)
 
     def _columns(self, states: np.ndarray) -> dict[str, np.ndarray]:
@@ -95,7 +94,6 @@ def finished(
     columns["energy_residual"] = columns["e_total"] - columns["e_total"][0]
     scale = max(float(np.max(np.abs(columns[c]))) for c in ("e_beam", "e_spring", "e_contact", "e_load"))
     largest = float(np.max(np.abs(columns["energy_residual"])))
-    summary["largest_energy_residual"] = largest
     summary["largest_relative_energy_residual"] = largest / scale if scale > 0.0 else 0.0
     ordered = {name: columns[name] for name in (*columns_of(scene), *extra) if name in columns}
     table = None if shapes is None else np.column_stack([columns["time"], shapes])
