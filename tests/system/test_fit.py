@@ -208,8 +208,9 @@ def test_the_command_ends_with_1_where_the_data_does_not_tell(tmp_path, monkeypa
     line = ["fit", "duffing", "m.csv", "--set", "time.t_end=0.6", "--vary"]
     assert command(*line, "spring.cubic_stiffness=-1e-12", "--out", "f").exit_code == 1
     for vary, why in {
-        "spring.mass": "KEY=GUESS",
-        "mass=1": "is no key",
+        "spring.mass": "TABLE.KEY=VALUES",
+        "mass=1": "TABLE.KEY=VALUES",
+        "spring.mass=1:2:3": "a guess is one value",
         "spring.mass=0": "0 has none",
         "beam.n_elements=4": "takes no real numbers",
     }.items():

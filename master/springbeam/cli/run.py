@@ -233,11 +233,9 @@ def _run_into(
                 with suppress(OSError):  # on a full disk: the rows that fit are there, and the cause is reported
                     status = "interrupted" if interrupted else "stopped"
                     recorder.finish({"status": status, "cause": cause, "time": reached})
-            how = "; a run begun with --checkpoint SECONDS can go on after it has ended early"
-            if directory.checkpoint.exists():
-                how = f"; springbeam resume {directory.path} goes on from the last checkpoint"
-            elif seconds is not None or made is not None:
-                how = ""
+            begun = "; a run begun with --checkpoint SECONDS can go on after it has ended early"
+            again = f"; springbeam resume {directory.path} goes on from the last checkpoint"
+            how = again if directory.checkpoint.exists() else begun * (seconds is None and made is None)
             what = cause if interrupted else f"the run stopped early: {cause}"
             return f"{what} (reached t = {reached:.9g} s of {t_end:g} s); what was computed is in {directory.path}{how}"
 

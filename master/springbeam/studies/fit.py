@@ -24,6 +24,7 @@ from ..scene.scene import split_key
 from ..signals.expressions import signal
 from ..signals.measured import Measured, read_measured, time_shifts
 from .accuracy import simulate
+from .design import design, parse_axis
 from .study import Findings, Row, Study
 from .tables import table
 
@@ -72,26 +73,18 @@ class Fit(Study):
 
     def guesses(self) -> dict[str, float]:
         """Return the keys and where the search begins."""
-        if not self.vary:
-            raise SceneError("--vary: nothing varies; give at least one KEY=GUESS, as in spring.linear_stiffness=800")
-        found: dict[str, float] = {}
-        for text in self.vary:
-            name, _, value = text.partition("=")
-            name, key = name.strip(), split_key(name)
-            try:
-                guess = float(value)
-            except ValueError:
-                raise SceneError(f"--vary {text}: must be KEY=GUESS, as in spring.linear_stiffness=800") from None
-            if key is None:
-                raise SceneError(f"--vary {text}: {name} is no key; a key is TABLE.KEY")
-            if key_kind(*key) is not float:
-                raise SceneError(f"--vary {text}: {name} takes no real numbers, and cannot be fitted")
-            if guess == 0.0:
-                raise SceneError(f"--vary {text}: a guess has the sign and roughly the size of the value; 0 has none")
-            if name in found:
-                raise SceneError(f"--vary {name}: given twice")
-            found[name] = guess
-        return found
+        axes = [parse_axis(text) for text in self.vary]
+        (values, *more), names = design(axes, 0, 0, "random"), [axis.name for axis in axes]
+        for name, guess in zip(names, values, strict=True):
+            key = split_key(name)
+            if key is None or key_kind(*key) is not float:
+                raise SceneError(f"--vary {name}: takes no real numbers, and cannot be fitted")
+            if more or guess == 0.0:
+                raise SceneError(
+                    f"--vary {name}: a guess is one value that has the sign and roughly the size of what is sought, as in "
+                    "spring.linear_stiffness=800; 0 has none"
+                )
+        return dict(zip(names, map(float, values), strict=True))
 
     def data(self) -> Measured:
         """Return the measured curves."""

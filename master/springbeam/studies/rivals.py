@@ -115,22 +115,19 @@ class _Phase:
         self._system, self._phase = s, phase
         self._soft = s.scene.coupled and not s.joined(phase) and s.law.acts(phase.contact)
         self._by_beam, self._by_spring = s.multiplier(phase) if s.joined(phase) else (0.0, 0.0)
-        self._k2 = s.spring.cubic_stiffness
         self.jacobian: Callable[[float, np.ndarray], np.ndarray] | None = None
         if not self._soft or s.law.linear is not None:  # linear but for the cubic spring
-            n, cubic = s.T - 2, self._k2
-            units, self._k2 = np.eye(n), 0.0
-            start = self.rhs(0.0, np.zeros(n))
-            self._linear = np.transpose([self.rhs(0.0, unit) - start for unit in units])
-            self._k2 = 1.0
-            self._cubic = self.rhs(0.0, units[s.Y]) - start - self._linear[:, s.Y]
-            self._k2, self.jacobian = cubic, self._jacobian
+            units, self.jacobian = np.eye(s.T - 2), self._jacobian
+            self._linear = np.transpose([0.5 * (self.rhs(0.0, unit) - self.rhs(0.0, -unit)) for unit in units])
+            two = 2.0 * units[s.Y]
+            self._cubic = (0.25 * (self.rhs(0.0, two) - self.rhs(0.0, -two)) - self._linear[:, s.Y]) / 3.0
+            self._linear[:, s.Y] -= self._cubic
 
     def rhs(self, time: float, X: np.ndarray) -> np.ndarray:
         s, spring = self._system, self._system.spring
         a, v, (y, z) = X[s.A], X[s.V], X[s.Y :].tolist()
         p = s.load - s.stiffness * (a + s.alpha_b * v if s.alpha_b else a)
-        S = spring.external_force - spring.damping * z - (spring.linear_stiffness + self._k2 * y * y) * y
+        S = spring.external_force - spring.damping * z - (spring.linear_stiffness + spring.cubic_stiffness * y * y) * y
         if len(s.loads):
             values = s.loads.values(np.array(time))
             p, S = p + values @ s.loads.patterns, S + values @ s.loads.on_spring
@@ -145,7 +142,7 @@ class _Phase:
 
     def _jacobian(self, time: float, X: np.ndarray) -> np.ndarray:
         J, y = self._linear.copy(), self._system.Y
-        J[:, y] += 3.0 * self._k2 * X[y] ** 2 * self._cubic
+        J[:, y] += 3.0 * X[y] ** 2 * self._cubic
         return np.asarray(J)
 
     def event(self, watch: Watch, start: np.ndarray) -> Callable[[float, np.ndarray], float]:
