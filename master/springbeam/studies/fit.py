@@ -81,8 +81,8 @@ class Fit(Study):
                 raise SceneError(f"--vary {name}: takes no real numbers, and cannot be fitted")
             if more or guess == 0.0:
                 raise SceneError(
-                    f"--vary {name}: a guess is one value that has the sign and roughly the size of what is sought, as in "
-                    "spring.linear_stiffness=800; 0 has none"
+                    f"--vary {name}: a guess is one value that has the sign and roughly the size of what is sought, as "
+                    "in spring.linear_stiffness=800; 0 has none"
                 )
         return dict(zip(names, map(float, values), strict=True))
 
