@@ -170,8 +170,7 @@ class Detector:
                 start, before = bottom, dip.size
             else:
                 end, whole = bottom, dip.size
-            shrunk = (whole - before) / step.size
-            path, unsure = Path.through(start, end, whole - before), unsure * shrunk**4
+            path = Path.through(start, end, whole - before)
         return whole_step
 
     def _located(self, state: State, function: EventFunction, bracket: Step, guess: float) -> Step:
