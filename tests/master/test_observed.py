@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from bodies import DuffingBody, Upper
 
+from springbeam.bodies.elements import RigidWall
 from springbeam.contact.phases import Joint, Phase
 from springbeam.results.steps import STEP
 from springbeam.results.trajectory import Event, EventKind
@@ -171,6 +172,18 @@ def test_a_force_misplaces_the_lower_end_by_its_course_inside_steps(law):
     assert seen.misplaced == pytest.approx(2.0 * course / TOP / 0.2, rel=1e-9)
     steps["contact_force"], steps["contact_force_rate"] = stiffness * np.array([0.0, 0.0, 0.1]), stiffness * 0.1 / H
     assert observed(*pair(law=law, stiffness=stiffness, exponent=1.0), steps, []).misplaced < 1e-15
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_elastic_stop_is_not_misplaced():
+    """It has no momentum either: the body that moves is the tip."""
+    scene, both = pair(law="compliance", stiffness=3.0, exponent=1.0)
+    both.lower = RigidWall(0.0)
+    steps = sinking(np.array([0.0, 0.1]), 1.0)
+    steps["y"] = steps["y_after"] = steps["z"] = steps["z_after"] = 0.0
+    steps["v_tip"] = steps["v_tip_after"] = -1.0
+    seen = observed(scene, both, steps, [])
+    assert (seen.misplaced, seen.momentum) == (0.0, TIP)
 
 
 def test_strokes_count_by_their_impulse_and_twice():

@@ -235,9 +235,9 @@ def _of_soft_contact(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray) 
     missed = float(np.linalg.norm(size * asked - impulse(step, size)))
     rate, bend = step["contact_force_rate"], step["contact_force_rate_2"]
     applied_early = step["contact_force"] + size * (rate / 3.0 + size * bend / 12.0)
-    way = np.ptp(steps["y_after"]) * pair.lower.mass
+    way = float(np.ptp(steps["y_after"]))
     too_far = np.abs(np.cumsum(0.5 * size**2 * (applied_early - asked_early))).max(initial=0.0)
-    misplaced = float(too_far / way) if 0.0 < way < inf else 0.0
+    misplaced = float(too_far / (way * pair.lower.mass)) if way > 0.0 else 0.0
     inverse_mass = sum(1.0 / body.mass for body in (pair.upper, pair.lower) if body.mass > 0.0)
     turns = np.sqrt([inverse_mass * law.slope(p) for p in deepest[touching]]) * size[touching]
     late = float((size[touching] * lateness(scene, turns)).sum())
