@@ -21,7 +21,7 @@ TURN = 1.0
 COLLOCATION = (12.0, 720.0, 100800.0)
 #: Share of its way that an end may move, by degree, in the time by which all steps together make the contact late,
 #: times the number of contacts, each of which amplifies that; and where, without a beam's inertia, all that moves is.
-LATE, LATE_IF_MASSLESS = (0.15, 0.6, 0.6), (0.05, 0.05, 0.01)
+LATE, LATE_IF_MASSLESS = (0.15, 0.4, 0.6), (0.05, 0.05, 0.01)
 #: Impulse by which the force of a run may miss a soft law, over the momentum of a body, times the number of contacts.
 MISSED = 0.0125
 #: Share of its way by which the course of the force inside steps may misplace the lower end.
@@ -37,7 +37,7 @@ DIES_OUT = 0.15
 #: the motion is called unresolved, by degree (docs/accuracy.md has what it misses).
 MISMATCH = {0: 0.04, 1: 0.02, 2: 0.025}
 #: Impulse by which the force of a step goes up and down before ends part, over the momentum of a body.
-ALTERNATION = 0.015
+ALTERNATION = 0.0135
 #: Share of its way by which a row of joined ends may be off a smooth curve: where the phase of the vibration that does
 #: so is lost, the ends are off by twice that.
 JITTER = 0.0055
