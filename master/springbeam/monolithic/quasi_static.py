@@ -12,16 +12,18 @@ A tip that is let go undamped jumps to u_F, and ½ k (u − u_F)² is lost. Meet
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-import scipy.sparse.linalg as spla
+from scipy.integrate import fixed_quad
 
 from ..scene import Beam, Scene
 from .exponential import LinearForm
 from .hybrid_system import NOISE, HybridSystem
 from .laws import Phase
-from .semi_discrete import ModalBeam, assemble, constant_forces
+from .semi_discrete import ModalBeam
 
 #: What a spring alone has of a state X.
 _OF_SPRING = slice(2, None)
@@ -120,9 +122,24 @@ class QuasiStaticForm(LinearForm):
 
 
 def _statics(beam: Beam) -> tuple[float, float, float]:
-    """Return (k, u_F, ½ work of the loads), of elements that hold the deflection under loads linear in an element."""
-    exact = beam.model_copy(update={"element_degree": max(beam.element_degree, 5), "reduced_integration": False})
-    mesh = assemble(exact)
-    F = mesh.nodal(*constant_forces(exact))
-    by_force, by_loads = spla.spsolve(mesh.K, np.column_stack([mesh.tip_vector, F])).T
-    return 1.0 / float(by_force[-1]), float(by_loads[-1]), 0.5 * float(F @ by_loads)
+    """Return (k, u_F, ½ work of the loads) by the influence function G(x, ξ) of a unit force at ξ."""
+    L, h = beam.length, beam.length / beam.n_elements
+    EI = beam.young_modulus * beam.second_moment_of_area
+    KAG = beam.shear_coefficient * beam.area * beam.shear_modulus
+
+    def integral(f: Callable[[np.ndarray], np.ndarray], *breaks: float) -> float:
+        parts = itertools.pairwise(np.unique([0.0, L, *breaks]))
+        return float(sum(fixed_quad(f, a, b, n=5)[0] for a, b in parts))
+
+    def influence(x: float, at: np.ndarray) -> np.ndarray:
+        low, high = np.minimum(x, at), np.maximum(x, at)
+        return np.asarray(low / KAG + low**2 * (3.0 * high - low) / (6.0 * EI))
+
+    def load(x: np.ndarray) -> np.ndarray:
+        return beam.distributed_load + beam.tip_load_coefficient * np.maximum(0.0, 1.0 - (L - x) / h)
+
+    def deflection(x: float) -> float:
+        return integral(lambda at: influence(x, at) * load(at), L - h, x)
+
+    work = integral(lambda x: load(x) * np.array([deflection(at) for at in x]), L - h)
+    return 1.0 / float(influence(L, np.array([L]))[0]), deflection(L), 0.5 * work

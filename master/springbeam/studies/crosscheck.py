@@ -62,18 +62,16 @@ class Crosscheck(Study):
                 for row in record["quantities"]
             ]  # fmt: skip
             shown.append(table(("quantity", "max error", "at t [s]", "L2 error", "bound", ""), cells))
-        if record["events"]:
             names = ("contact", "t [s]", "reference [s]", "error [s]", "bound [s]", "")
-            shown.append(table(names, map(_contact, record["events"])))
-        verdict: Verdict = record["verdict"]
-        if record["quantities"]:
+            shown += [table(names, map(_contact, record["events"]))] * bool(record["events"])
             shown.append(
                 f"comparable from {record['from']:.9g} to {record['horizon']:.9g} s of {record['t_end']:.9g} s; there "
                 f"a perturbation of the reference has grown {record['growth']:.3g} times"
             )
+        verdict: Verdict = record["verdict"]
+        over = " over the run that was asked for" * (verdict == "not comparable")
         looks = {"agrees": "bold green", "differs": "bold red", "not comparable": "bold"}
-        words = {"not comparable": "not comparable over the run that was asked for"}
-        shown.append(Text(words.get(verdict, verdict), style=looks[verdict]))
+        shown.append(Text(f"{verdict}{over}", style=looks[verdict]))
         told = ("verdict", "horizon", "growth", "events", "notes", "scene", "quantities")
         return Findings({name: record[name] for name in told}, shown, CODES[verdict])
 
