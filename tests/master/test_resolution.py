@@ -12,7 +12,6 @@ from springbeam.monolithic.semi_discrete import modal_beam
 from springbeam.scene import shipped_scenes
 from springbeam.scene.resolution import (
     ALTERNATION,
-    CONTACT_STEPS,
     JITTER,
     LATE,
     LATE_IF_MASSLESS,
@@ -79,7 +78,7 @@ def test_the_limits_of_the_mismatch_and_of_the_shortest_contact(degree, share, r
     assert (not_resolved(scene, 0.0, alternation=share * ALTERNATION) is None) is resolved
     agreeing = {"coupling": {"scheme": "hermite", "degree": 2}}, {"beam": {"fidelity": "quasi_static"}}
     for given in (scene, *(with_changes(PAIR, **tables) for tables in agreeing)):
-        lasted = CONTACT_STEPS[given.coupling.degree] * PAIR.coupling.H / share
+        lasted = PAIR.coupling.H / share
         assert (not_resolved(given, 0.0, shortest_contact=lasted) is None) is resolved
 
 

@@ -17,7 +17,6 @@ from ..results.totals import pace, shortest_contact
 from ..results.trajectory import Event, EventKind
 from ..scene import Scene
 from ..scene.resolution import (
-    CONTACT_STEPS,
     SHORT_IMPULSE,
     VIBRATION,
     lateness,
@@ -102,13 +101,13 @@ def why_not_resolved(
     scene: Scene, H: float, seen: Observed, steps: np.ndarray, events: Sequence[Event], *, free_at_end: bool
 ) -> str | None:
     """Return in words why a run in steps of H [s] that shows ``seen`` is not resolved; ``None`` if it is."""
-    short, least = CONTACT_STEPS[scene.coupling.degree] * H, SHORT_IMPULSE * seen.momentum
+    least = SHORT_IMPULSE * seen.momentum
     return not_resolved(
         scene,
         seen.mismatch_at_events,
         alternation=seen.alternation,
         jitter=seen.jitter,
-        shortest_contact=shortest_contact(steps, events, short, least, free_at_end=free_at_end),
+        shortest_contact=shortest_contact(steps, events, H, least, free_at_end=free_at_end),
         contact_frequency=seen.contact_frequency,
         late=seen.late,
         missed=seen.missed,

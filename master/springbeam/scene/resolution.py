@@ -41,9 +41,6 @@ ALTERNATION = 0.0135
 #: Share of its way by which a row of joined ends may be off a smooth curve: where the phase of the vibration that does
 #: so is lost, the ends are off by twice that.
 JITTER = 0.0055
-#: Macro steps by degree below which a contact is short, or a rest on the foundation: the forces of one step tell when
-#: it ends, at degree 0 those of two.
-CONTACT_STEPS = {0: 2.0, 1: 1.0, 2: 1.0}
 #: Share of the smaller momentum of both bodies that the force of a short contact may pass on: it is none to speak of.
 SHORT_IMPULSE = 0.1
 #: Velocity mismatch above which it is a vibration and no error.
@@ -131,12 +128,11 @@ def not_resolved(
             f"of a faster vibration that the steps do not follow. {_remedy(scene)}"
         )
     held = scene.contact.rigid or scene.coupling.scheme in ORDINARY_SCHEMES  # a force that does not see the contact end
-    short = CONTACT_STEPS[scene.coupling.degree]
-    if H is not None and held and shortest_contact < short * H:
+    if H is not None and held and shortest_contact < H:
         return (
             f"not resolved: a contact lasts {shortest_contact / H:.2g} macro steps only, so that the force of one or "
             "two steps decides when it ends, and with it what follows; coupling.macro_step <= "
-            f"{_rounded_down(shortest_contact / short)} resolves it"
+            f"{_rounded_down(shortest_contact)} resolves it"
         )
     return None
 
