@@ -14,7 +14,7 @@ from springbeam.monolithic import algorithm1
 
 def simulate(scene):
     """Run Algorithm 1 as printed; arguments are the defaults of `springbeam.monolithic.algorithm1.simulate`."""
-    return _AsPrinted(scene, "equation", 1e-12).run()
+    return _AsPrinted(scene, "equation").run()
 
 
 class _AsPrinted(algorithm1._Algorithm):

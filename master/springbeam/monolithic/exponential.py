@@ -306,8 +306,8 @@ class ExponentialPropagator:
         if not len(r):
             return r
         for iteration in range(_MAX_ITERATIONS):
-            displacements, velocities = w.motion(xi, xi_dot, load + r.T @ form.inputs)
             with np.errstate(over="ignore", invalid="ignore"):  # an escaping spring; found below
+                displacements, velocities = w.motion(xi, xi_dot, load + r.T @ form.inputs)
                 new = form.forces(form.outputs @ displacements[:-1].T, form.outputs @ velocities[:-1].T, self.X)
             if not np.all(np.isfinite(new)):
                 return None
