@@ -212,15 +212,33 @@ def test_loads_are_changed_by_their_number_and_tables_lie_beside_the_scene(tmp_p
         load_scene(folder / "one.toml", ["loads.2.frequency=7"])
 
 
+LEAVE_OUT = "leave the line out, or begin it with #"
+
+
+@pytest.mark.parametrize("text", ["time [ms];force (kN)\n0;0.001\n20;0.003\n", "# of a scope\n0,1\n\n0.02\t,3\n"])
+def test_a_table_may_name_its_units_and_be_parted_by_semicolons(text):
+    Path("record.csv").write_text(text)
+    load = soft("linear").loads[0]
+    assert load.value([load.start + 0.005, load.start + 0.01]) == pytest.approx([1.5, 2.0], rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("0,1\n1,two\n", "line 2, column 2: 'two' is not a finite number"),
-        ("t,f\n0,1\n\n# a note\n0,nan\n", "line 5, column 2: 'nan' is not a finite number"),
-        ("0,1\n1,2,3\n", "line 2: 3 columns; a table has two, time and value"),
-        ("0,1\n2,2\n1,3\n", "line 3, column 1: 1.0 s comes after 2.0 s; times must increase"),
-        ("time,value\n0,1\n", "1 lines with numbers; a table needs two at least"),
-        ("0,1\n1,\udcff\n", "not a text in UTF-8: invalid start byte at byte 6"),
+        ("0,1\n1,two\n", f"line 2, column 2: 'two' is not a finite number; {LEAVE_OUT}"),
+        ("t,f\n0,1\n\n# a note\n0,nan\n", f"line 5, column f: 'nan' is not a finite number; {LEAVE_OUT}"),
+        ("0;1\n1;2,5\n", "line 2, column 2: '2,5' is not a finite number; decimals have a point"),
+        ("0,1\n1,2,3\n", "line 2: 3 columns; the first line has 2"),
+        ("0,1,2\n1,2,3\n", "3 columns; a table has two, time and value"),
+        ("0 1\n1 2\n", "line 1: one column; there must be two at least, with , or ; or a tab between"),
+        ("0,1\n2,2\n1,3\n", "line 3: time 1 comes after 2; times must increase"),
+        ("time,value\n0,1\n", "1 lines with numbers; there must be two at least"),
+        ("0,1\n1,\udcff\n", "not a text in UTF-8: invalid start byte at byte 6; save it as that"),
+        (
+            "time,force [kg]\n0,1\n1,1",
+            "column force: [kg] is no unit of what a run has in N: Cannot convert from "
+            "'kilogram' ([mass]) to 'newton' ([mass] * [length] / [time] ** 2)",
+        ),
     ],
 )
 def test_a_bad_table_is_named_with_line_and_column(text, error):

@@ -74,13 +74,14 @@ def test_residuals_are_those_of_each_curve(tmp_path):
 
 
 BAD = {
-    "time,y\n0,1": "lines; there must be names",
+    "time,y\n0,1": "1 lines with numbers; there must be two at least",
+    "0,1\n1,2": "the first line must name the columns",
     "time,y\n0,1\n0,2": "times must increase",
     "time,y\n0,1\n1,x": "line 3, column y: 'x' is not a finite number",
     "time,y\n0,1\n1,nan": "line 3, column y: 'nan' is not a finite number",
-    "time,y\n0,1\n1,2,3": "line 3: 3 columns; the first line names 2",
+    "time,y\n0,1\n1,2,3": "line 3: 3 columns; the first line has 2",
     "time,w\n0,1\n1,2": "no column is called as one of the run (time, y",
-    "time,y [kg]\n0,1\n1,2": "column y, which is y: [kg] is no unit of what a run has in m",
+    "time,y [kg]\n0,1\n1,2": "column y: [kg] is no unit of what a run has in m",
     "time,y [wurst]\n0,1\n1,2": "[wurst] is no unit",
 }
 
@@ -106,7 +107,7 @@ def test_the_command_compare_takes_a_measurement(tmp_path, monkeypatch):
     assert json.loads(printed("compare", "run", "m.csv", "--map", "position=y", "--shift", "-0.2", "--json",
                               "--no-plots"))["residuals"][0]["relative"] < 1e-8  # fmt: skip
     assert (tmp_path / "results" / "comparison.png").stat().st_size > 10_000
-    assert "m.csv has the columns position" in refused("compare", "run", "m.csv", "--map", "CH1=y")
+    assert "m.csv: --map CH1: there are the columns position" in refused("compare", "run", "m.csv", "--map", "CH1=y")
 
 
 # -- keys found ---------------------------------------------------------------------------------------------------

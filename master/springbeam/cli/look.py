@@ -150,7 +150,7 @@ def compare(
         _beside_measured(runs[0], runs[1], names or [], shift, None if no_plots else out, quiet=quiet, as_json=as_json)
         return
     if names or shift is not None:
-        fail(BAD_INPUT, "--map, --shift: belong to a file of measurements, and there is none")
+        fail(BAD_INPUT, f"{runs[-1]}: no such file; --map and --shift belong to a file of measurements")
     with bad_input_reported():
         trajectories = [load_trajectory(results_directory(run)) for run in runs]
         names = [str(run) for run in runs]

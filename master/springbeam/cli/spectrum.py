@@ -95,5 +95,5 @@ def spectrum(
         "highest": {what: power.highest for what, power in found.power.items()},
         "settled": settled,
     }
-    lines = [Text(f"{what:<20}{words}") for what, words in found.in_words()]
+    lines = [Text(f"{what:<20} {words}") for what, words in found.in_words()]
     say(document, lines, [("results", file) for file in files], where=directory, quiet=quiet, as_json=as_json)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from .drawing import BLACK, BLUE, GREEN, ORANGE, PURPLE, VERMILLION
-from .timeline import DPI, STYLE, WIDTH
+from .timeline import DPI, STYLE, TITLE_WIDTH, WIDTH
 
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, BLACK)
 #: Power below this share of the highest line is not drawn.
@@ -56,7 +57,7 @@ def draw(
             ax.set(xlabel=across, ylabel=up, xscale=scale, yscale=scale)
             ax.legend()
             ax.grid(alpha=0.3)
-        figure.suptitle(title)
+        figure.suptitle(textwrap.fill(title, TITLE_WIDTH), fontsize=10.0, x=0.01, ha="left")
         figure.savefig(path, dpi=DPI)
 
 

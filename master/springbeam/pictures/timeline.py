@@ -47,6 +47,7 @@ STYLE: dict[Any, Any] = {
 REMARK: dict[str, Any] = {"fontsize": 7.0, "style": "italic", "color": GREY}
 DPI = 160
 WIDTH = 8.2  # inches
+TITLE_WIDTH = 110  # characters
 _MARK_HEIGHT, _MARK_ROW = 1.045, 0.04
 _KEY_COLUMNS = 4
 #: Characters of a line of a remark beside a panel.
@@ -168,7 +169,7 @@ def figure_for(trajectory: Trajectory, title: str, height: float) -> Figure:
     """Return an empty figure of ``height`` [inch] with title, scene and, where the motion is not resolved, its mark."""
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
-    scene = trajectory.scene.title
+    scene = textwrap.fill(trajectory.scene.title, TITLE_WIDTH)
     figure.suptitle(f"{title}\n{scene}" if scene else title, fontsize=10.0, x=0.01, ha="left")
     figure.text(0.99, 0.985, mark(trajectory), fontsize=8.0, weight="bold", color=VERMILLION, ha="right", va="top")
     return figure

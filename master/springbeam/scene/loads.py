@@ -1,19 +1,19 @@
 """A load of a scene, ``[[loads]]``: where it acts, and its value as a function of time.
 
-``docs/model.md``, "Loads", has the equations. A table is a file of lines ``time, value``, in seconds and in the unit of
-the load; lines that are empty or begin with # are skipped, and the first may name the columns.
+``docs/model.md``, "Loads", has the equations. A table is a file of two columns, time and value (``recorded``).
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
-from math import inf, isfinite, nan
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from .recorded import Recorded
 from .tables import Table, key
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ class Load(Table):
         assert self.file is not None
         path = Path(self.file)
         try:
-            return _record(path, path.stat().st_mtime_ns, self.interpolation)
+            return _record(path, path.stat().st_mtime_ns, self.interpolation, self.unit)
         except (OSError, ValueError) as error:
             why = error.strerror if isinstance(error, OSError) else error
             raise ValueError(f'file = "{path}": {why}') from error
@@ -184,50 +184,14 @@ class Load(Table):
 
 
 @lru_cache(maxsize=16)
-def _record(path: Path, modified: int, interpolation: str) -> PPoly:
-    times, values = _columns(path)
+def _record(path: Path, modified: int, interpolation: str, unit: str) -> PPoly:
+    recorded = Recorded(path)
+    if len(recorded) != 2:
+        raise ValueError(f"{len(recorded)} columns; a table has two, time and value")
+    values, times = recorded.column(1, unit), recorded.times()
     from scipy.interpolate import CubicSpline, PPoly  # takes half a second to load: only for who has a table
 
     if interpolation == "cubic":
         spline = CubicSpline(times, values)
         return PPoly(spline.c, spline.x)
     return PPoly(np.array([np.diff(values) / np.diff(times), values[:-1]]), times)
-
-
-def _columns(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Return times [s] and values of a table. Raises ValueError, or OSError."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except UnicodeDecodeError as error:
-        raise ValueError(f"not a text in UTF-8: {error.reason} at byte {error.start}") from error
-    rows: list[tuple[float, float]] = []
-    named = False
-    for number, line in enumerate(lines, 1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        cells = [cell.strip() for cell in line.split(",")]
-        if len(cells) != 2:
-            raise ValueError(f"line {number}: {len(cells)} columns; a table has two, time and value")
-        found = [_number(cell) for cell in cells]
-        if wrong := [column for column, value in enumerate(found) if not isfinite(value)]:
-            if len(wrong) == 2 and not rows and not named:
-                named = True
-                continue
-            cell = cells[wrong[0]][:40]
-            raise ValueError(f"line {number}, column {wrong[0] + 1}: {cell!r} is not a finite number")
-        time, value = found
-        if rows and time <= rows[-1][0]:
-            raise ValueError(f"line {number}, column 1: {time!r} s comes after {rows[-1][0]!r} s; times must increase")
-        rows.append((time, value))
-    if len(rows) < 2:
-        raise ValueError(f"{len(rows)} lines with numbers; a table needs two at least")
-    times, values = np.array(rows).T
-    return times, values
-
-
-def _number(text: str) -> float:
-    """Return a number, NaN for what is none."""
-    try:
-        return float(text)
-    except ValueError:
-        return nan

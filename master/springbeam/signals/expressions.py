@@ -19,11 +19,11 @@ from asteval import Interpreter, get_ast_names
 
 from ..results.trajectory import Trajectory
 from ..scene import SceneError
+from ..scene.messages import nearest
+from ..scene.recorded import GRAVITY
 
 #: Names of asteval that reach outside.
 _OUTSIDE = ("open", "dir", "input", "print", "type", "id")
-#: Standard gravity [m/s²], known as ``g``.
-GRAVITY = 9.80665
 #: ``package.module:function``
 _FUNCTION = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")
 
@@ -47,7 +47,8 @@ class Expression:
         for name in self.names:
             if name not in allowed:
                 raise SceneError(
-                    f"{self.text}: {name} is unknown; there are {', '.join(allowed)}, and numpy's functions"
+                    f"{self.text}: {name} is unknown; {nearest(name, allowed)}there are {', '.join(allowed)}, "
+                    "and numpy's functions"
                 )
 
     def __call__(self, look_up: Callable[[str], Any]) -> Any:

@@ -1,19 +1,11 @@
-"""Measured data: a file of columns, read into the units of a run, and laid beside it.
-
-The first line names the columns, each with its unit in brackets, as ``time [ms], acceleration [g]``; the first column
-is the time. Columns without a unit are in that of the run. Pint knows the units; ``g`` of an acceleration is standard
-gravity.
-"""
+"""Measured data (`springbeam.scene.recorded`) in the units of a run, and laid beside it."""
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping
-from functools import lru_cache
-from math import isfinite, nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -22,11 +14,11 @@ from scipy.signal import correlate, correlation_lags
 from ..results.dense import rows_at
 from ..results.trajectory import Trajectory, columns_of
 from ..scene import Scene, SceneError
-from .expressions import GRAVITY, Expression, signal
+from ..scene.recorded import Recorded
+from .expressions import Expression, signal
 
 #: Most samples of a correlation.
 _MOST = 200_000
-_NAME = re.compile(r"\s*(.*?)\s*(?:\[(.*)\])?\s*")
 
 
 class Measured(NamedTuple):
@@ -62,7 +54,7 @@ def read_measured(path: str | Path, scene: Scene, names: Mapping[str, str] | Non
     Parameters
     ----------
     path
-        Of the file; its separator is a comma, a semicolon or a tab, and lines that begin with # are skipped.
+        Of the file, whose first line names the columns.
     scene
         Says which columns a run has, and their units.
     names
@@ -72,92 +64,40 @@ def read_measured(path: str | Path, scene: Scene, names: Mapping[str, str] | Non
     Raises SceneError, which names file, line and column, and what would be allowed.
     """
     path, units = Path(path), columns_of(scene)
-    header, cells = _table(path)
-    there = [name for name, _ in header[1:]]
-    if wrong := [name for name in names or () if name not in there]:
-        raise SceneError(f"--map {wrong[0]}: {path} has the columns {', '.join(there)}")
+    try:
+        return _read(Recorded(path), units, names or {})
+    except OSError as error:
+        raise SceneError(f"{path}: {error.strerror}") from error
+    except ValueError as error:
+        raise SceneError(f"{path}: {error}") from error
+
+
+def _read(file: Recorded, units: Mapping[str, str], names: Mapping[str, str]) -> Measured:
+    if not file.names:
+        raise ValueError("the first line must name the columns, as in time [ms],acceleration [g]")
+    there = file.names[1:]
+    if wrong := [name for name in names if name not in there]:
+        raise ValueError(f"--map {wrong[0]}: there are the columns {', '.join(there)}")
     wanted = names or {name: name for name in there if name in units and name != "phase"}
     if not wanted:
-        raise SceneError(
-            f"{path}: no column is called as one of the run ({', '.join(units)}); --map NAME=COLUMN says which is which"
+        raise ValueError(
+            f"no column is called as one of the run ({', '.join(units)}); --map NAME=COLUMN says which is which"
         )
-    time = _factor(header[0][1] or "s", "s", f"{path}: column {header[0][0]}") * _numbers(path, header, cells, 0)
-    if not (np.diff(time) > 0.0).all():
-        row = int(np.argmin(np.diff(time) > 0.0))
-        raise SceneError(f"{path}: {time[row + 1]!s} s comes after {time[row]!s} s; times must increase")
     values = {}
     for name, what in wanted.items():
         Expression(what).check(column for column in units if column != "phase")
         k = 1 + there.index(name)
-        unit, factor = header[k][1], 1.0
-        if unit:
-            own = units[what] if what in units else _unit_of(what, units)
-            factor = _factor(unit, own, f"{path}: column {name}, which is {what}")
-        values[what] = factor * _numbers(path, header, cells, k)
-    return Measured(time, values)
+        own = units[what] if what in units else _unit_of(what, units) if file.unit(k) else ""
+        values[what] = file.column(k, own)
+    return Measured(file.times(), values)
 
 
 def _unit_of(formula: str, units: Mapping[str, str]) -> str:
-    """Return the unit of a formula whose columns all have the same one. Raises SceneError for another."""
-    found = {units[name] for name in Expression(formula).names}
-    if len(found) != 1:
-        raise SceneError(f"{formula}: takes columns of several units; give the measured column without a unit")
+    """Return the unit of a sum of columns that all have the same one. Raises ValueError for another formula."""
+    found = {units.get(part, "") for part in re.sub(r"[()+-]", " ", formula).split()}
+    if len(found) != 1 or "" in found:
+        raise ValueError(f"{formula}: is no sum of columns of one unit; give the measured column without a unit")
     return found.pop()
-
-
-def _table(path: Path) -> tuple[list[tuple[str, str]], list[tuple[int, list[str]]]]:
-    """Return names and units of the columns, and the cells of each line with its number."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(f"{path}: {getattr(error, 'strerror', None) or error}") from error
-    kept = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
-    if len(kept) < 3:
-        raise SceneError(f"{path}: {len(kept)} lines; there must be names of columns and two lines of numbers at least")
-    separator = max(",;\t", key=kept[0][1].count)
-    header = [(m[1], m[2] or "") for cell in next(csv.reader([kept[0][1]], delimiter=separator))
-              if (m := _NAME.fullmatch(cell)) is not None]  # fmt: skip
-    rows = [(number, line.split(separator)) for number, line in kept[1:]]
-    for number, cells in rows:
-        if len(cells) != len(header):
-            raise SceneError(f"{path}: line {number}: {len(cells)} columns; the first line names {len(header)}")
-    return header, rows
-
-
-def _numbers(path: Path, header: list[tuple[str, str]], rows: list[tuple[int, list[str]]], column: int) -> np.ndarray:
-    """Return the numbers of a column."""
-    found = []
-    for number, cells in rows:
-        try:
-            value = float(cells[column])
-        except ValueError:
-            value = nan
-        if not isfinite(value):
-            cell = cells[column].strip()[:40]
-            raise SceneError(f"{path}: line {number}, column {header[column][0]}: {cell!r} is not a finite number")
-        found.append(value)
-    return np.array(found)
-
-
-@lru_cache(maxsize=1)
-def _registry() -> Any:
-    from pint import UnitRegistry  # takes a second: only for who has units to convert
-
-    return UnitRegistry()
-
-
-def _factor(unit: str, wanted: str, where: str) -> float:
-    """Return what a value in ``unit`` is multiplied by to have it in ``wanted``. Raises SceneError."""
-    if unit == wanted:
-        return 1.0
-    if (unit, wanted) == ("g", "m/s²"):
-        return GRAVITY
-    from pint.errors import PintError
-
-    try:
-        return float(_registry().Quantity(1.0, unit.replace("·", "*")).to(wanted.replace("·", "*")).magnitude)
-    except (PintError, ValueError, AssertionError) as error:
-        raise SceneError(f"{where}: [{unit}] is no unit of what a run has in {wanted}: {error}") from error
 
 
 def time_shift(run: Trajectory, measured: Measured) -> float:

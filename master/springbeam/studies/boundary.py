@@ -30,7 +30,7 @@ def limit_of(text: str, own: Sequence[str] = ()) -> tuple[str, float]:
     except ValueError:
         limit = 0.0
     if not limit > 0.0:
-        raise SceneError(f"--boundary {text}: must be METRIC=LIMIT with a limit above 0, as in max_a_tip=400")
+        raise SceneError(f"--boundary {text}: must be METRIC=LIMIT with a limit above 0, as in max_clamp_moment=0.3")
     return metric.strip() if metric.strip() in own else named(metric.strip())[0], limit
 
 

@@ -19,6 +19,7 @@ from ..results.extremes import Extremes
 from ..results.totals import LOSS_NAMES, TOTALS
 from ..results.trajectory import COLUMNS, TOLD, EventKind, Trajectory
 from ..scene import SceneError
+from ..scene.messages import nearest
 from ..signals.settled import drive_of, poincare, settled
 from ..signals.shock import without_peak
 
@@ -161,7 +162,7 @@ def named(text: str) -> tuple[str, Metric]:
     name, what = name.strip(), what.strip()
     if not separator or not name.isidentifier():
         raise SceneError(
-            f"--metric {text}: unknown; allowed: {', '.join(METRICS)}, and your own, as in "
+            f"--metric {text}: unknown; {nearest(text, METRICS)}allowed: {', '.join(METRICS)}, and your own, as in "
             "'shock=max(abs(a_tip))/9.81' or 'shock=module:function'"
         )
     if name in METRICS:

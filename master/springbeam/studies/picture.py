@@ -19,6 +19,8 @@ from ..pictures.drawing import BLUE, VERMILLION
 Rows = Sequence[Mapping[str, Any]]
 #: Values of an axis that are named on it, and columns of small multiples.
 _FEW, _MOST = 8, 6
+#: Values are named on an axis if the range is less than so many times the least distance of two of them.
+_APART = 5.0
 #: Letters of a title to an inch.
 _LETTERS = 9
 _MARKERS = "os^DvPX*<>"
@@ -47,7 +49,7 @@ class Scale(NamedTuple):
             axis.set_ticks([levels.index(value) for value in some], [_short(value) for value in some])
         elif self.log:
             logarithmic(axis, np.array(levels, dtype=float))
-        elif all_of_them and len(levels) <= _FEW:
+        elif all_of_them and np.ptp(levels) < _APART * np.diff(levels).min(initial=np.inf):
             axis.set_ticks(levels)
 
 

@@ -16,7 +16,7 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[str]], title: str = ""
     made = Table(box=None, pad_edge=False, header_style="bold", title=title or None, title_justify="left")
     for k, name in enumerate(columns):
         left = k == 0 or name in words
-        made.add_column(Text(name), justify="left" if left else "right", no_wrap=not left, overflow="fold")
+        made.add_column(Text(name), justify="left" if left else "right", overflow="fold")
     for row in rows:
         made.add_row(*map(Text, row))
     return made
