@@ -171,7 +171,9 @@ def _beside_measured(
     directory: Path, file: Path, names: list[str], shift: float | None, out: Path | None, *, quiet: bool, as_json: bool
 ) -> None:
     """Show how far a run is from measured curves."""
+    from ..signals.expressions import Expression
     from ..signals.measured import model, read_measured, residuals, time_shift
+    from ..signals.shock import without_peak
     from ..studies.fit import mapping
 
     with bad_input_reported():
@@ -192,6 +194,8 @@ def _beside_measured(
     ]
     columns = ("curve", "points", "rms", "of its spread", "largest", "at t [s]")
     shown = [table(columns, rows), f"shift     {moved:.6g} s" + (", found by correlation" if shift is None else "")]
+    columns_taken = [column for name in measured.values for column in Expression(name).names]
+    shown += [why] if (why := without_peak(run, columns_taken)) else []
     document = {"shift": moved, "residuals": [row._asdict() for row in found], "picture": out}
     say(document, shown, [("picture", out)] * (out is not None), where=out, quiet=quiet, as_json=as_json)
 

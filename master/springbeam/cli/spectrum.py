@@ -83,7 +83,9 @@ def spectrum(
             files.append(directory / "spectrum.png")
             shocks = {f"shock at the {end}": (s.frequency, s.maximax) for end, s in found.shock.items()}
             powers = {f"power of {what}": (p.frequency[1:], p.density[1:]) for what, p in found.power.items()}
-            answers = {f"{what} to load {load}": (c.frequency, c.amplitude) for (what, load), c in swept.items()}
+            answers = {
+                f"{what} to load {load}, {c.way}": (c.frequency, c.amplitude) for (what, load), c in swept.items()
+            }
             once = None if found.points is None else found.points[1]
             draw(shocks, powers, answers, once, trajectory.scene.title or str(run), files[-1])
     settled = None if found.settled is None else {**found.settled._asdict(), "period": found.settled.period}

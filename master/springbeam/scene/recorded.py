@@ -40,10 +40,10 @@ class Recorded:
         self.names = [m[1] for m in found] if named else []
         self._units = [(m[2] or m[3] or "") if named else "" for m in found]
         self._labels = self.names or [str(k + 1) for k in range(len(found))]
+        if kept and len(found) < 2:
+            raise ValueError(f"line {kept[0][0]}: one column; there must be two at least, with , or ; or a tab between")
         if len(self._rows) < 2:
             raise ValueError(f"{len(self._rows)} lines with numbers; there must be two at least")
-        if len(found) < 2:
-            raise ValueError(f"line {kept[0][0]}: one column; there must be two at least, with , or ; or a tab between")
         for number, row in self._rows:
             if len(row) != len(found):
                 raise ValueError(f"line {number}: {len(row)} columns; the first line has {len(found)}")
@@ -67,9 +67,7 @@ class Recorded:
             value = _number(row[k])
             if value is None or not isfinite(value):
                 cell = row[k].strip()[:40]
-                remedy = (
-                    "decimals are written with a point" if "," in cell else "leave the line out, or begin it with #"
-                )
+                remedy = "decimals have a point" if "," in cell else "leave the line out, or begin it with #"
                 raise ValueError(f"line {number}, column {self._labels[k]}: {cell!r} is not a finite number; {remedy}")
             found.append(value)
         unit = self._units[k]

@@ -52,9 +52,8 @@ class Spectra:
         for what, chirps in self.responses.items():
             for chirp in chirps:
                 at = int(np.argmax(chirp.amplitude))
-                way = "up" if chirp.frequency[-1] > chirp.frequency[0] else "down"
                 largest = f"largest half range {chirp.amplitude[at]:.4g} at {chirp.frequency[at]:.5g} Hz"
-                yield f"{what} to load {chirp.load}", f"{largest}, on the way {way}"
+                yield f"{what} to load {chirp.load}", f"{largest}, on the way {chirp.way}"
         if self.settled is not None:
             of = "the drive's" if self.settled.multiple == 1 else f"{self.settled.multiple} of the drive's"
             yield "motion", f"periodic from {self.settled.since:.6g} s on, period {self.settled.period:.6g} s, {of}"

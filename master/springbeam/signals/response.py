@@ -25,6 +25,11 @@ class Response(NamedTuple):
     frequency: np.ndarray  #: [Hz]
     amplitude: np.ndarray
 
+    @property
+    def way(self) -> str:
+        """``up`` or ``down``."""
+        return "up" if self.frequency[-1] > self.frequency[0] else "down"
+
 
 def responses(run: Trajectory, what: str) -> list[Response]:
     """Return the response of a column, or of a formula of columns, to each chirp of the run."""

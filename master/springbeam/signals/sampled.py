@@ -39,7 +39,9 @@ def sampled(run: Trajectory, what: str, step: float | None = None, since: float 
         raise SceneError(f"from {begin:g} s: the run ends at {end:g} s")
     count = int(np.count_nonzero(run.time >= begin)) if step is None else int((end - begin) / step * (1 + 1e-12)) + 1
     if not 2 <= count <= MOST:
-        raise SceneError(f"{what}: {count:,} samples at this step; there must be from 2 to {MOST:,}")
+        raise SceneError(
+            f"{what}: {count:,} samples; there must be from 2 to {MOST:,}: take lower frequencies, or less of the run"
+        )
     times = np.linspace(begin, end, count) if step is None else begin + step * np.arange(count)
     found = rows_at(run, np.minimum(times, end))
     return Samples(begin, float(times[1] - times[0]), signal(found, what))
