@@ -49,7 +49,7 @@ class Scale(NamedTuple):
             axis.set_ticks([levels.index(value) for value in some], [_short(value) for value in some])
         elif self.log:
             logarithmic(axis, np.array(levels, dtype=float))
-        elif all_of_them and np.ptp(levels) < _APART * np.diff(levels).min(initial=np.inf):
+        elif all_of_them and np.ptp(levels) < _APART * np.diff(np.array(levels, float)).min(initial=np.inf):
             axis.set_ticks(levels)
 
 
