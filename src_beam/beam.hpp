@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <initializer_list>
 #include <memory>
 #include <vector>
 
@@ -120,7 +121,7 @@ class Beam {
   // Step sizes, forces and impulses are finite, sizes > 0: whoever takes them from outside has checked that.
 
   /// Advance by `size` [s] under the tip force C [N] and the loads.
-  /// @throws std::domain_error (state unchanged) if the result is not finite
+  /// @throws std::domain_error (state unchanged) if the result is not finite or too large
   void step(double size, const Polynomial& tip_force, const Loads& loads);
 
   /// Instantaneous upward impulse J [N·s] at the tip: v += M⁻¹ e J.
@@ -208,7 +209,7 @@ class Beam {
     Loads::Values loads;
   };
 
-  /// Makes the step and changes `now_`, but for the loads. Returns a sum of squares of the new motion, see `ordinary`.
+  /// Makes the step and changes `now_`, but for the loads. Returns a sum of squares of the new motion, see `largest`.
   virtual double advance(double size, const Polynomial& tip_force, const Loads& loads) = 0;
   virtual void undo() = 0;  ///< takes the last advance() back, but for `now_`
   virtual void strike(double impulse) = 0;
@@ -216,16 +217,15 @@ class Beam {
   virtual void save_motion(double* numbers) const = 0;     ///< motion_size of them
   virtual void restore_motion(const double* numbers) = 0;  ///< likewise
 
-  /// While coefficients, loads and the sum of squares stay below `ordinary` and step sizes below `ordinary_size`, no
-  /// output can overflow. Outputs of a step beyond are looked at one by one.
-  static constexpr double ordinary = 1e40, ordinary_size = 1e10;
-  bool ordinary_ = false;  ///< whether all coefficients stay below
+  /// While coefficients, inputs and the sum of squares stay below `largest` and step sizes [s] below `largest_size`, no
+  /// output can overflow. What is not is refused.
+  static constexpr double largest = 1e40, largest_size = 1e10;
+  static void require_coefficients(std::initializer_list<double> values);  ///< @throws std::invalid_argument
 
   mutable Scalars now_{};
 
  private:
   class Trial;
-  bool outputs_finite() const;
   std::size_t motion_size_;
 };
 

@@ -17,109 +17,66 @@ namespace beam {
 namespace {
 
 using Eigen::Index;
-using Eigen::Matrix2d;
-using Eigen::Vector2d;
 using Eigen::VectorXd;
 
-// Banded matrices stay banded in their natural order.
-using Factorisation = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>>;
-
-/// LDLᵀ of a matrix of linear elements, eliminated node by node from both ends to a node in the middle ("burn at both
-/// ends": Dongarra, Bunch, Moler & Stewart, LINPACK Users' Guide, SIAM, 1979, chapter 7; twisted factorisation:
-/// Meurant, SIAM J. Matrix Anal. Appl. 13, 1992, 707–728). In a sweep each unknown waits for the one before; the two
-/// halves do not wait for each other.
-class TwistedFactors {
+/// LDLᵀ of a banded matrix, whose solution takes half the time of a sparse one's.
+class BandFactors {
  public:
-  /// False if a pivot is not positive.
-  bool factorise(const Eigen::SparseMatrix<double>& S) {
-    nodes_.resize(static_cast<std::size_t>(S.rows() / 2));
-    middle_ = S.rows() / 4;
-    const auto block = [&S](Index row, Index column) { return Matrix2d(S.block(2 * row, 2 * column, 2, 2)); };
-    bool positive = true;
-    const auto factorise_pivot = [&](Index i, const Matrix2d& pivot) {  // of which the lower triangle is stored
-      Node& f = node(i);
-      f.within = pivot(1, 0) / pivot(0, 0);
-      const double second = pivot(1, 1) - f.within * pivot(1, 0);
-      positive = positive && pivot(0, 0) > 0.0 && second > 0.0;
-      f.inverse = {1.0 / pivot(0, 0), 1.0 / second};
-    };
-    const auto eliminate = [&](Index i, Index next, const Matrix2d& carried) -> Matrix2d {
-      factorise_pivot(i, block(i, i) - carried);
-      Node& f = node(i);
-      Matrix2d coupling = next > i ? block(next, i) : Matrix2d(block(i, next).transpose());
-      coupling.col(1) -= f.within * coupling.col(0);
-      f.next = coupling * f.inverse.asDiagonal();
-      return f.next * coupling.transpose();
-    };
-    Matrix2d left = Matrix2d::Zero(), right = left;
-    for (Index i = 0; i < middle_; ++i) left = eliminate(i, i + 1, left);
-    for (Index i = S.rows() / 2 - 1; i > middle_; --i) right = eliminate(i, i - 1, right);
-    factorise_pivot(middle_, block(middle_, middle_) - left - right);
-    return positive;
+  /// Of a lower triangle in which `width` entries are below each of the diagonal. False if a pivot is not positive.
+  bool factorise(const Eigen::SparseMatrix<double>& S, Index width) {
+    rows_.setZero(width + 1, S.rows());
+    for (Index j = 0; j < S.cols(); ++j)
+      for (Eigen::SparseMatrix<double>::InnerIterator entry(S, j); entry; ++entry)
+        rows_(entry.row() - j, entry.row()) = entry.value();
+    VectorXd scaled(width + 1);  // a row of L times D
+    for (Index i = 0; i < S.rows(); ++i) {
+      double pivot = rows_(0, i);
+      const Index before = std::min(i, width);
+      for (Index k = before; k > 0; --k) {
+        scaled[k] = rows_(k, i);
+        for (Index m = before; m > k; --m) scaled[k] -= rows_(m - k, i - k) * scaled[m];
+        rows_(k, i) = scaled[k] * rows_(0, i - k);
+        pivot -= scaled[k] * rows_(k, i);
+      }
+      if (!(pivot > 0.0)) return false;
+      rows_(0, i) = 1.0 / pivot;
+    }
+    return true;
   }
 
-  /// x = (LDLᵀ)⁻¹ b
-  void solve(const VectorXd& b, VectorXd& x) const {
-    x.resize(b.size());
-    const Index last = b.size() / 2 - 1;
-    Values left = {b[0], b[1]}, right = {b[2 * last], b[2 * last + 1]};
-    for (Index i = 0, j = last; i < middle_; ++i, --j) {
-      left = eliminate(i, left, b, i + 1, x);
-      if (j > middle_) right = eliminate(j, right, b, j - 1, x);  // one less where the number of nodes is even
-    }
-    const Node& f = node(middle_);
-    double &x0 = x[2 * middle_], &x1 = x[2 * middle_ + 1];
-    const double y0 = left[0] + right[0] - b[2 * middle_];
-    x1 = f.inverse[1] * (left[1] + right[1] - b[2 * middle_ + 1] - f.within * y0);
-    x0 = f.inverse[0] * y0 - f.within * x1;
-    left = right = {x0, x1};
-    for (Index i = middle_ - 1, j = middle_ + 1; i >= 0; --i, ++j) {
-      left = substitute(i, left, x);
-      if (j <= last) right = substitute(j, right, x);
-    }
+  /// x becomes (LDLᵀ)⁻¹ x.
+  void solve(VectorXd& x) const {
+    // Of linear elements the width is known to the compiler.
+    rows_.rows() == 4 ? sweep(std::integral_constant<Index, 3>(), x.data()) : sweep(rows_.rows() - 1, x.data());
   }
 
  private:
-  struct Node {
-    double within;     // L in the rows of the node
-    Vector2d inverse;  // of D
-    Matrix2d next;     // L in the rows of the next node towards the middle
-  };
-  using Values = std::array<double, 2>;  // at a node
-
-  // y: right-hand side of node i less what was eliminated before; returns that of the next. Inlined, so that it stays
-  // in registers; what is waited for comes last in each sum.
-  EIGEN_ALWAYS_INLINE Values eliminate(Index i, const Values& y, const VectorXd& b, Index next, VectorXd& x) const {
-    const Node& f = node(i);
-    const double y0 = y[0], y1 = y[1] - f.within * y0;
-    x[2 * i] = f.inverse[0] * y0;
-    x[2 * i + 1] = f.inverse[1] * y1;
-    return {b[2 * next] - f.next(0, 0) * y0 - f.next(0, 1) * y1,
-            b[2 * next + 1] - f.next(1, 0) * y0 - f.next(1, 1) * y1};
+  template <typename Width>
+  void sweep(Width width, double* x) const {
+    const Index n = rows_.cols();
+    const double* row = rows_.data();
+    for (Index i = 0; i < n; ++i, row += width + 1) {
+      double value = x[i];
+      for (Index k = width; k > 0; --k)  // what is waited for comes last
+        if (k <= i) value -= row[k] * x[i - k];
+      x[i] = value;
+    }
+    for (Index i = n - 1; i >= 0; --i) {
+      row -= width + 1;
+      double value = x[i] * row[0];
+      for (Index k = width; k > 0; --k)
+        if (k < n - i) value -= row[k * (width + 2)] * x[i + k];
+      x[i] = value;
+    }
   }
 
-  // z: the solution at the next node towards the middle; returns that at node i.
-  EIGEN_ALWAYS_INLINE Values substitute(Index i, const Values& z, VectorXd& x) const {
-    const Node& f = node(i);
-    double &x0 = x[2 * i], &x1 = x[2 * i + 1];
-    x1 = x1 - f.next(1, 1) * z[1] - f.next(0, 1) * z[0];
-    x0 = x0 - f.next(1, 0) * z[1] - f.next(0, 0) * z[0] - f.within * x1;
-    return {x0, x1};
-  }
-
-  Node& node(Index i) { return nodes_[static_cast<std::size_t>(i)]; }
-  const Node& node(Index i) const { return nodes_[static_cast<std::size_t>(i)]; }
-
-  std::vector<Node> nodes_;
-  Index middle_ = 0;
+  Eigen::MatrixXd rows_;  // 1/D, then L, in the k-th row L(i, i − k)
 };
 
 /// S = mass M + stiffness K of one step size, factorised.
 struct StepMatrix {
   double mass = 0.0, stiffness = 0.0;
-  Eigen::SparseMatrix<double> matrix;
-  Factorisation factorisation;
-  TwistedFactors twisted;  // instead, of linear elements
+  BandFactors factors;
 };
 
 /// The midpoint rule's w without tip force. It is linear in that force: a coupling that repeats a step from one state
@@ -142,7 +99,6 @@ class GeneralizedAlphaBeam final : public Beam {
         mu_(mesh_.mass_per_length()),
         alpha_(p.alpha_b),
         midpoint_(p.rho_inf == 1.0),
-        linear_(p.element_degree == 1),
         alpha_m_((2.0 * p.rho_inf - 1.0) / (p.rho_inf + 1.0)),
         alpha_f_(p.rho_inf / (p.rho_inf + 1.0)),
         beta_(0.25 * (1.0 - alpha_m_ + alpha_f_) * (1.0 - alpha_m_ + alpha_f_)),
@@ -160,12 +116,9 @@ class GeneralizedAlphaBeam final : public Beam {
         a0_(a_),
         rhs_(mesh_.size()) {
     require_factor(mass_factor_);
-    const auto largest = [](const auto& values) { return values.cwiseAbs().maxCoeff(); };
-    ordinary_ = true;
-    for (const double value : {largest(K_.coeffs()), largest(shape(Loads::distributed)), largest(tip_response_), mu_,
-                               1.0 / mu_, alpha_, 1.0 / mesh_.radius_of_gyration()}) {
-      ordinary_ = ordinary_ && value < ordinary;
-    }
+    const auto most = [](const auto& values) { return values.cwiseAbs().maxCoeff(); };
+    require_coefficients({most(K_.coeffs()), most(shape(Loads::distributed)), most(tip_response_), mu_, 1.0 / mu_,
+                          alpha_, 1.0 / mesh_.radius_of_gyration()});
   }
 
   double tip_displacement() const override { return q_[mesh_.tip_index()]; }
@@ -340,40 +293,21 @@ class GeneralizedAlphaBeam final : public Beam {
     return load_;
   }
 
-  void solve_once(const StepMatrix& S, VectorXd& x) {
-    if (linear_) {
-      S.twisted.solve(rhs_, x);
-    } else {
-      x = S.factorisation.solve(rhs_);
-    }
-  }
-
   /// x = S⁻¹ rhs_ with one step of iterative refinement.
   void solve(const StepMatrix& S, VectorXd& x) {
-    solve_once(S, x);
+    x = rhs_;
+    S.factors.solve(x);
     mesh_.add_mass_times(-S.mass, x.data(), rhs_.data());
     mesh_.add_stiffness_times(-S.stiffness, x.data(), rhs_.data());
-    solve_once(S, correction_);
-    x += correction_;
+    S.factors.solve(rhs_);
+    x += rhs_;
   }
 
   void factorise(double h, StepMatrix& S) const {
     const double f = 1.0 - alpha_f_;
     S.mass = midpoint_ ? 1.0 : 1.0 - alpha_m_;
     S.stiffness = midpoint_ ? 0.25 * h * h + 0.5 * alpha_ * h : f * (alpha_ * gamma_ * h + beta_ * h * h);
-    if (S.matrix.size() == 0) {
-      S.matrix = K_;
-      if (!linear_) S.factorisation.analyzePattern(K_);
-    }
-    S.matrix.coeffs() = S.mass * M_.coeffs() + S.stiffness * K_.coeffs();
-    bool factorised = false;
-    if (linear_) {
-      factorised = S.twisted.factorise(S.matrix);
-    } else {
-      S.factorisation.factorize(S.matrix);
-      factorised = S.factorisation.info() == Eigen::Success;
-    }
-    if (!factorised) {
+    if (!S.factors.factorise(S.mass * M_ + S.stiffness * K_, mesh_.band_width())) {
       throw std::domain_error("beam: the matrix of the time step cannot be factorised; use a smaller step size");
     }
   }
@@ -381,7 +315,7 @@ class GeneralizedAlphaBeam final : public Beam {
   Timoshenko mesh_;
   double mu_;     // ρA [kg/m]: matrices and what is solved for them are per ρA
   double alpha_;  // α_b [s]
-  bool midpoint_, linear_;
+  bool midpoint_;
   double alpha_m_, alpha_f_, beta_, gamma_;
   Eigen::SparseMatrix<double> K_, M_;                  // with the same pattern
   mutable std::array<VectorXd, Loads::count> shapes_;  // of the loads, where one was asked for
@@ -403,8 +337,8 @@ class GeneralizedAlphaBeam final : public Beam {
   FreeStep free_;
   VectorXd response_;  // w of a unit tip force, for steps of response_size_
   double response_size_ = 0.0;
-  VectorXd q0_, v0_, a0_;          // those of the last step's start
-  VectorXd rhs_, w_, correction_;  // work space
+  VectorXd q0_, v0_, a0_;  // those of the last step's start
+  VectorXd rhs_, w_;       // work space
   StepCache<StepMatrix> cache_;
 };
 

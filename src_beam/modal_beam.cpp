@@ -46,19 +46,13 @@ class ModalBeam final : public Beam {
         v_(p.initial_velocity_slope * modes_.linear_shape.array()),
         eta_next_(eta_.size()),
         v_next_(eta_.size()) {
-    ordinary_ = modes_.omega.minCoeff() > 1.0 / ordinary;
-    const auto bound = [this](const auto& values) {
-      ordinary_ = ordinary_ && values.template lpNorm<Eigen::Infinity>() < ordinary;
-    };
+    require_coefficients({1.0 / modes_.omega.minCoeff(), omega2_.maxCoeff(), damping_.maxCoeff()});
+    const auto bound = [](const auto& values) { require_coefficients({values.template lpNorm<Eigen::Infinity>()}); };
     bound(modes_.tip);
     bound(modes_.tip_rotation);
     for (const Eigen::VectorXd& load : modes_.loads) bound(load);
-    bound(modes_.deflection);
-    bound(modes_.rotation);
-    bound(modes_.shear);
-    bound(modes_.moment);
-    bound(omega2_.matrix());
-    bound(damping_.matrix());
+    for (const Eigen::MatrixXd* rows : {&modes_.deflection, &modes_.rotation, &modes_.shear, &modes_.moment})
+      bound(*rows);
   }
 
   double tip_displacement() const override { return (tip_ * eta_).sum(); }

@@ -38,6 +38,11 @@ struct Modes {
   double residual = 0.0;  ///< largest ‖φ − ω² K⁻¹M φ‖_K / ω of the computed modes, φ with unit M-norm
 };
 
+/// Lowest modes by implicitly restarted Lanczos on K⁻¹M, M-orthonormal columns.
+/// @throws std::runtime_error if it does not converge
+Eigen::MatrixXd lanczos_modes(const Timoshenko& mesh, Eigen::Index count);
+inline constexpr const char* remedy = "; keep fewer n_modes, or use the integrator generalized_alpha";
+
 /// @throws std::runtime_error if the eigensolver does not converge
 Modes compute_modes(const Timoshenko& mesh, const Parameters& parameters);
 

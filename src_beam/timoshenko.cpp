@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "gauss.hpp"
@@ -37,12 +39,16 @@ Timoshenko::Timoshenko(const Parameters& p)
       length_(p.length),
       point_force_position_(p.point_force_position) {
   if (!p.reduced_integration) b_top_ += s_ * (h_ / r_) * (h_ / r_) / (4.0 * static_cast<double>(4 * p_ * p_ - 1));
-  for (const double value : {h_, mu_, r_, b_, b_top_, s_}) {
-    if (!std::isnormal(value)) {
-      throw std::invalid_argument(
-          "beam: the parameters leave the range of floating-point numbers (length, density, "
-          "area, moduli or their ratios)");
-    }
+  // Each factor may be harmless and the product still leave the range of a double.
+  const std::pair<const char*, double> products[] = {{"length / n_elements", h_},
+                                                     {"density * area", mu_},
+                                                     {"second_moment_of_area / area", r_},
+                                                     {"young_modulus / density", b_},
+                                                     {"the bending stiffness of an element", b_top_},
+                                                     {"shear_modulus * shear_coefficient / density", s_}};
+  for (const auto& [name, value] : products) {
+    if (!std::isnormal(value))
+      throw std::invalid_argument(std::string("beam: ") + name + " leaves the range of floating-point numbers");
   }
 }
 

@@ -56,6 +56,7 @@ class Timoshenko {
 
   Eigen::Index size() const { return 2 * p_ * n_; }               ///< number of unknowns
   Eigen::Index elements() const { return n_; }                    ///< n
+  Eigen::Index band_width() const { return 2 * p_ + 1; }          ///< of M and K, on one side of the diagonal
   double mass_per_length() const { return mu_; }                  ///< ρA [kg/m]
   double radius_of_gyration() const { return r_; }                ///< r = √(I/A) [m]
   Eigen::Index tip_index() const { return size() - 1; }           ///< of u(L) in q

@@ -24,15 +24,13 @@ double Compliance::energy(double depth) const {
 }
 
 double Compliance::continued_elastic(double depth) const {
-  if (depth >= 0.0) return elastic(depth);
-  const bool even = analytic() && p_ / 2.0 == std::floor(p_ / 2.0);
-  return (even ? lambda_ : -lambda_) * power(-depth, p_);
+  const double sign = depth < 0.0 && !even() ? -1.0 : 1.0;
+  return sign * lambda_ * power(std::abs(depth), p_);
 }
 
 double Compliance::continued_slope(double depth) const {
-  if (depth >= 0.0) return lambda_ * p_ * power(depth, p_ - 1.0);
-  const bool even = analytic() && p_ / 2.0 == std::floor(p_ / 2.0);
-  return (even ? -lambda_ : lambda_) * p_ * power(-depth, p_ - 1.0);
+  const double sign = depth < 0.0 && even() ? -1.0 : 1.0;
+  return sign * lambda_ * p_ * power(std::abs(depth), p_ - 1.0);
 }
 
 Compliance::Effect Compliance::continued(double depth, double rate) const {
@@ -82,5 +80,6 @@ void Compliance::extend(Along& along, std::size_t n, const Series& depth, double
 }
 
 bool Compliance::analytic() const { return p_ == std::floor(p_); }
+bool Compliance::even() const { return p_ / 2.0 == std::floor(p_ / 2.0); }
 
 }  // namespace spring

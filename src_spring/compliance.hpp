@@ -53,6 +53,7 @@ class Compliance {
   bool polynomial() const { return analytic() && p_ <= highest_power; }
 
  private:
+  bool even() const;  ///< p is an even number
   double continued_elastic(double depth) const;
   double continued_slope(double depth) const;
   double elastic_coefficient(Along& along, std::size_t n, const Series& depth) const;

@@ -35,17 +35,14 @@ void check(int code, const char* what) {
   if (code < 0) fail(what, code);
 }
 
-template <class Owned, class Handle>
-void own(Owned& owner, Handle made) {
+/// @throws std::bad_alloc
+template <class Handle, class Destroy>
+std::shared_ptr<std::remove_pointer_t<Handle>> own(Handle made, const Destroy& destroy) {
   if (made == nullptr) throw std::bad_alloc();
-  owner.reset(made);
+  return {made, destroy};
 }
 
 }  // namespace
-
-void IdaSolver::free_context(SUNContext context) { SUNContext_Free(&context); }
-void IdaSolver::free_solver(SUNLinearSolver solver) { SUNLinSolFree(solver); }
-void IdaSolver::free_ida(void* ida) { IDAFree(&ida); }
 
 int IdaSolver::residual(double s, N_Vector Y, N_Vector Yp, N_Vector F, void* solver) {
   const ImplicitSystem& system = *static_cast<const IdaSolver*>(solver)->system_;
@@ -61,8 +58,7 @@ int IdaSolver::jacobian(double s, double c, N_Vector Y, N_Vector Yp, N_Vector, S
 }
 
 IdaSolver::Vector IdaSolver::new_vector() const {
-  Vector vector;
-  own(vector, N_VNew_Serial(n_, context_.get()));
+  Vector vector = own(N_VNew_Serial(n_, context_.get()), N_VDestroy);
   N_VEnableFusedOps_Serial(vector.get(), SUNTRUE);
   return vector;
 }
@@ -70,13 +66,13 @@ IdaSolver::Vector IdaSolver::new_vector() const {
 IdaSolver::IdaSolver(int unknowns) : n_(unknowns) {
   SUNContext context = nullptr;
   if (SUNContext_Create(SUN_COMM_NULL, &context) != 0) throw std::bad_alloc();
-  context_.reset(context);
+  context_ = own(context, [](SUNContext made) { SUNContext_Free(&made); });
   for (Vector* vector : {&Y0_, &Yp0_, &tolerance_, &Y_, &Yp_}) *vector = new_vector();
   for (const Vector* vector : {&Y0_, &Yp0_}) N_VConst(0.0, vector->get());
   N_VConst(1.0, tolerance_.get());
-  own(J_, SUNDenseMatrix(unknowns, unknowns, context));
-  own(linear_solver_, SUNLinSol_Dense(Y0_.get(), J_.get(), context));
-  own(ida_, IDACreate(context));
+  J_ = own(SUNDenseMatrix(unknowns, unknowns, context), SUNMatDestroy);
+  linear_solver_ = own(SUNLinSol_Dense(Y0_.get(), J_.get(), context), SUNLinSolFree);
+  ida_ = own(IDACreate(context), [](void* made) { IDAFree(&made); });
   void* const ida = ida_.get();
   // What IDA would print is said by whoever catches IdaError.
 #if SUNDIALS_VERSION_MAJOR >= 7

@@ -66,16 +66,9 @@ class IdaSolver {
   long steps() const;                                                   ///< internal steps since start()
 
  private:
-  template <class Handle, void (*destroy)(Handle)>
-  struct Destroy {
-    void operator()(Handle handle) const { destroy(handle); }
-  };
-  template <class Handle, void (*destroy)(Handle)>
-  using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Destroy<Handle, destroy>>;
-  static void free_context(SUNContext context);
-  static void free_solver(SUNLinearSolver solver);
-  static void free_ida(void* ida);
-  using Vector = Owned<N_Vector, N_VDestroy>;
+  template <class Handle>
+  using Owned = std::shared_ptr<std::remove_pointer_t<Handle>>;
+  using Vector = Owned<N_Vector>;
 
   static int residual(double s, N_Vector Y, N_Vector Yp, N_Vector F, void* solver);
   static int jacobian(double s, double c, N_Vector Y, N_Vector Yp, N_Vector F, SUNMatrix J, void* solver, N_Vector,
@@ -92,11 +85,11 @@ class IdaSolver {
   const ImplicitSystem* system_ = nullptr;
   double s_ = 0.0;
   long most_steps_ = 0;
-  Owned<SUNContext, free_context> context_;  // outlives everything made in it
+  Owned<SUNContext> context_;  // outlives everything made in it
   Vector Y0_, Yp0_, tolerance_, Y_, Yp_;
-  Owned<SUNMatrix, SUNMatDestroy> J_;
-  Owned<SUNLinearSolver, free_solver> linear_solver_;
-  Owned<void*, free_ida> ida_;
+  Owned<SUNMatrix> J_;
+  Owned<SUNLinearSolver> linear_solver_;
+  Owned<void*> ida_;
 };
 
 }  // namespace spring

@@ -17,24 +17,9 @@ Model::Reached Component::step(const char* function, double time, double size, b
   return reached;
 }
 
-bool Component::set_debugging(const char* function, bool on, std::size_t n, const char* const categories[]) {
-  bool all_known = true, events = n == 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    require(categories[i], "a category");
-    const std::string name = categories[i];
-    const auto same = [&](const LogCategory& category) { return name == category.name; };
-    events = events || name == "logEvents" || name == "logAll";
-    if (std::any_of(std::begin(log_categories), std::end(log_categories), same)) continue;
-    all_known = false;
-    log(Status::warning, "logStatusWarning", std::string(function) + ": there is no log category '" + name + "'");
-  }
-  events_ = on && events;
-  return all_known;
-}
-
 Snapshot& Component::state(void* key) {
-  const auto found = states_.find(key);
-  if (found == states_.end()) {
+  const auto found = states.find(key);
+  if (found == states.end()) {
     throw std::invalid_argument("the FMU state was not made by this instance, or is already freed");
   }
   return *found->second;
@@ -43,23 +28,8 @@ Snapshot& Component::state(void* key) {
 void* Component::keep(Snapshot snapshot) {
   auto owned = std::make_unique<Snapshot>(std::move(snapshot));
   void* const key = owned.get();
-  states_[key] = std::move(owned);
+  states[key] = std::move(owned);
   return key;
-}
-
-void Component::save(void*& key) {
-  Snapshot* const into = key ? &state(key) : nullptr;
-  instance.save(spare_);
-  if (into) {
-    std::swap(*into, spare_);
-  } else {
-    key = keep(std::exchange(spare_, {}));
-  }
-}
-
-void Component::free_state(void* key) {
-  state(key);
-  states_.erase(key);
 }
 
 const char* Component::phase_text() const {
@@ -93,9 +63,20 @@ Status set_debugging(void* c, const char* function, bool on, std::size_t n, cons
   bool all_known = true;
   const Status status = guard(c, function, any_phase, [&](Component& k) {
     require_arrays(n, {{categories, "categories"}});
-    all_known = k.set_debugging(function, on, n, categories);
+    bool events = n == 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      require(categories[i], "a category");
+      const std::string name = categories[i];
+      const auto same = [&](const LogCategory& category) { return name == category.name; };
+      if (std::none_of(std::begin(log_categories), std::end(log_categories), same)) {
+        all_known = false;
+        k.log(Status::warning, "logStatusWarning", std::string(function) + ": there is no log category '" + name + "'");
+      }
+      events = events || name == "logEvents" || name == "logAll";
+    }
+    k.log_events = on && events;
   });
-  return all_known ? status : Status::warning;
+  return status == Status::ok && !all_known ? Status::warning : status;
 }
 
 Status reset(void* c, const char* function) {
@@ -114,7 +95,13 @@ Status none_of(void* c, const char* function, unsigned legal, std::size_t n, con
 Status get_state(void* c, const char* function, void** state) {
   return guard(c, function, any_phase, [&](Component& k) {
     require(state, "the FMU state");
-    k.save(*state);
+    Snapshot* const into = *state ? &k.state(*state) : nullptr;
+    k.instance.save(k.spare);  // if that fails, nothing has changed
+    if (into) {
+      std::swap(*into, k.spare);
+    } else {
+      *state = k.keep(std::exchange(k.spare, {}));
+    }
   });
 }
 
@@ -128,8 +115,8 @@ Status set_state(void* c, const char* function, void* state) {
 Status free_state(void* c, const char* function, void** state) {
   return guard(c, function, any_phase, [&](Component& k) {
     if (!state || !*state) return;
-    k.free_state(*state);
-    *state = nullptr;
+    k.state(*state);
+    k.states.erase(std::exchange(*state, nullptr));
   });
 }
 

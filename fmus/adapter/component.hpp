@@ -42,13 +42,16 @@ using Log = std::function<void(Status, const char*, const std::string&)>;
 
 class Component {
  public:
-  Component(Log log, bool log_events) : log_(std::move(log)), events_(log_events) {}
+  Component(Log log, bool log_events) : log_events(log_events), log_(std::move(log)) {}
 
   Instance instance;
+  bool log_events;
+  std::map<void*, std::unique_ptr<Snapshot>> states;
+  Snapshot spare;  ///< of the last save, whose memory the next one uses
 
   /// Events, with Status::ok, are sent if debugging is on for them; warnings and failures always.
   void log(Status status, const char* category, const std::string& message) const {
-    if (log_ && (status != Status::ok || events_)) log_(status, category, message);
+    if (log_ && (status != Status::ok || log_events)) log_(status, category, message);
   }
   void note(const char* event) const { log(Status::ok, "logEvents", event); }
   /// Enters a phase, which is told as `event`.
@@ -56,25 +59,15 @@ class Component {
   /// A step of the instance. The model's warning is told, no more: the step is done, and some masters stop at any
   /// status but OK.
   Model::Reached step(const char* function, double time, double size, bool to_event = false);
-  /// No category: all of them. Returns whether all of them exist; a warning names each that does not.
-  bool set_debugging(const char* function, bool on, std::size_t n, const char* const categories[]);
-
   /// @throws std::invalid_argument if the state was not made by this instance, or is already freed
   Snapshot& state(void* key);
   void* keep(Snapshot snapshot);
-  /// Save the instance into the state of `key`, or a new one if it is NULL. If that fails, nothing has changed.
-  void save(void*& key);
-  void free_state(void* key);
-
   const char* phase_text() const;
   /// Reports and enters the phase `error`.
   Status fail(const char* function, const char* why);
 
  private:
   const Log log_;
-  bool events_;  ///< whether they are logged
-  std::map<void*, std::unique_ptr<Snapshot>> states_;
-  Snapshot spare_;  ///< of the last save, whose memory the next one uses
 };
 
 /// Runs `body(component)`, which may throw, if the instance is in one of the `legal` phases.
@@ -104,10 +97,12 @@ Status guard(void* c, const char* function, unsigned legal, const Body& body) no
 
 /// Whether `c` may stay: the instance has a name, and `identity` is the description's.
 Status instantiate(Component* c, const char* function, const char* name, const char* identity);
+/// No category: all of them. A warning names each that does not exist.
 Status set_debugging(void* c, const char* function, bool on, std::size_t n, const char* const categories[]);
 Status reset(void* c, const char* function);
 /// Of variables of a type that there are none of.
 Status none_of(void* c, const char* function, unsigned legal, std::size_t n, const char* type);
+/// Into the state that `*state` names, or a new one if it is NULL.
 Status get_state(void* c, const char* function, void** state);
 Status set_state(void* c, const char* function, void* state);
 Status free_state(void* c, const char* function, void** state);

@@ -121,7 +121,7 @@ class TableBuilder {
     P defaults;
     v.start = static_cast<double>(std::invoke(field, defaults));
     v.set = [=](Model& m, const Polynomial& value) {
-      assign(std::invoke(field, static_cast<M&>(m).*parameters), value[0]);
+      std::invoke(field, static_cast<M&>(m).*parameters) = static_cast<T>(value[0]);
     };
     return v;
   }
@@ -193,17 +193,6 @@ class TableBuilder {
   }
 
  private:
-  template <class T>
-  static void assign(T& field, double value) {
-    if constexpr (std::is_same_v<T, bool>) {
-      field = value != 0.0;
-    } else if constexpr (std::is_enum_v<T>) {
-      field = static_cast<T>(static_cast<int>(value));
-    } else {
-      field = static_cast<T>(value);
-    }
-  }
-
   Variable& add(const std::string& name, const std::string& unit, const std::string& description, Causality causality) {
     Variable& v = table_.variables.emplace_back();
     v.name = name;

@@ -47,7 +47,7 @@ struct BeamModel final : fmi::Model {
     forecast = {};
     tip_response = {};
     if (forecasts()) tip_response = beam->tip_response(parameters.communication_step);
-    look_again();
+    view_.reset();
     look_ahead();
   }
 
@@ -56,7 +56,7 @@ struct BeamModel final : fmi::Model {
     beam->observe(tip_force[0], loads);
     resting = initial && parameters.initial_state == InitialState::at_rest;
     if (resting) beam->rest();
-    look_again();
+    view_.reset();
     if (forecasts() && (resting || beam->loads() != before)) look_ahead();
   }
 
@@ -72,7 +72,7 @@ struct BeamModel final : fmi::Model {
       throw fmi::Discarded(e.what());
     }
     resting = false;
-    look_again();
+    view_.reset();
     return {size, false};
   }
 
@@ -80,7 +80,7 @@ struct BeamModel final : fmi::Model {
     if (tip_impulse == 0.0) return;
     beam->apply_tip_impulse(tip_impulse);
     resting = false;
-    look_again();
+    view_.reset();
     look_ahead();
   }
 
@@ -88,7 +88,7 @@ struct BeamModel final : fmi::Model {
   void require_state(const std::vector<double>& state) const override { beam->require_state(state); }
   void restore(const std::vector<double>& state) override {
     beam->restore(state);
-    look_again();
+    view_.reset();
     look_ahead();
   }
 
@@ -97,24 +97,28 @@ struct BeamModel final : fmi::Model {
     loads.set(Loads::distributed, value);
   }
 
-  /// What follows forces without delay, now, and per unit of a load (of the tip force: Loads::count), where that is not
-  /// all: a beam at rest follows them as a whole.
-  const Beam::Response& response() const {
-    if (!response_) response_ = beam->response(Beam::Order::value);
-    return *response_;
+  /// What is found for the present instant as a whole: the shape, and what follows forces without delay.
+  struct View {
+    beam::Shape deflection, rotation;
+    Beam::Response response;
+  };
+  const View& view() const {
+    if (!view_) {
+      view_.emplace();
+      beam->deflection(view_->deflection);
+      beam->rotation(view_->rotation);
+      view_->response = beam->response(Beam::Order::value);
+    }
+    return *view_;
   }
   Beam::Response response_rate() const {
     Loads::Values rates{};
     loads.for_each([&](std::size_t i, const fmi::Polynomial& f) { rates[i] = f[1]; });
     return beam->response(Beam::Order::rate, rates, tip_force[1]);
   }
-  Beam::Response response_by(std::size_t load) const { return beam->response_per_load(load); }
-  double shear_force(std::size_t i) const { return response().forces.shear[i]; }
-  double bending_moment(std::size_t i) const { return response().forces.moment[i]; }
-
   /// Of `forces`, at the point where the bending moment is largest now.
   double bending_stress(const beam::InternalForces& forces) const {
-    const beam::Shape& moment = response().forces.moment;
+    const beam::Shape& moment = view().response.forces.moment;
     const auto less = [](double a, double b) { return std::abs(a) < std::abs(b); };
     const auto most = static_cast<std::size_t>(std::max_element(moment.begin(), moment.end(), less) - moment.begin());
     const double sign = moment[most] < 0.0 ? -1.0 : 1.0;
@@ -123,9 +127,6 @@ struct BeamModel final : fmi::Model {
 
   bool resting = false;  ///< at the start, where that is a state of rest
 
-  // At point `i` of the shape.
-  double deflection(std::size_t i) const { return at(i, deflection_, &Beam::deflection); }
-  double rotation(std::size_t i) const { return at(i, rotation_, &Beam::rotation); }
   /// As the tip goes on under the tip force and the loads that are set.
   double forecast_rate() const {
     double rate = forecast.acceleration + tip_response[2] * beam->tip_force();
@@ -156,25 +157,7 @@ struct BeamModel final : fmi::Model {
     }
   }
 
-  /// A field of the shape, found for all points at once.
-  struct Field {
-    bool current = false;
-    beam::Shape values{};
-  };
-
-  double at(std::size_t i, Field& field, void (Beam::*fill)(beam::Shape&) const) const {
-    if (!field.current) ((*beam).*fill)(field.values);
-    field.current = true;
-    return field.values[i];
-  }
-
-  void look_again() {
-    deflection_.current = rotation_.current = false;
-    response_.reset();
-  }
-
-  mutable Field deflection_, rotation_;
-  mutable std::optional<Beam::Response> response_;
+  mutable std::optional<View> view_;
 };
 
 template <class Value>
@@ -379,12 +362,12 @@ fmi::Table fmi::make_table() {
   everything.emplace_back("alpha_b");
   const auto instant = [&](const char* name, const char* unit, const char* text, auto of_response) {
     add.output(
-           name, unit, text, [=](const BeamModel& m) { return of_response(m, m.response()); },
+           name, unit, text, [=](const BeamModel& m) { return of_response(m, m.view().response); },
            [=](const BeamModel& m) { return of_response(m, m.response_rate()); })
         .from(everything);
     const auto follows = [&](const std::string& input, std::size_t load) {
       add.depends(input, [=](const BeamModel& m) {
-        return m.resting ? std::numeric_limits<double>::quiet_NaN() : of_response(m, m.response_by(load));
+        return m.resting ? std::numeric_limits<double>::quiet_NaN() : of_response(m, m.beam->response_per_load(load));
       });
     };
     follows("tip_force", Loads::count);
@@ -401,19 +384,20 @@ fmi::Table fmi::make_table() {
           "largest bending stress |M| h/2I at the points x = 0, L/20, ..., L; 0 if section_height is",
           [](M m, R r) { return m.bending_stress(r.forces); });
   t.variables.back().initial_dependencies.emplace_back("section_height");
-  const auto shape = [&](const std::string& name, const char* unit, const std::string& text,
-                         double (BeamModel::*at)(std::size_t) const) {
+  const auto shape = [&](const std::string& name, const char* unit, const std::string& text, auto values) {
     for (std::size_t i = 0; i < beam::shape_points; ++i) {
       add.local(name + "[" + std::to_string(i + 1) + "]", unit, text + " at x = L*" + std::to_string(i) + "/20",
-                [i, at](const BeamModel& m) { return (m.*at)(i); })
+                [=](const BeamModel& m) { return values(m.view())[i]; })
           .elements = i == 0 ? beam::shape_points : 0;
     }
   };
-  shape("deflection", "m", "deflection", &BeamModel::deflection);
-  shape("rotation", "rad", "rotation of the cross-section", &BeamModel::rotation);
+  using V = const BeamModel::View&;
+  shape("deflection", "m", "deflection", [](V v) -> const beam::Shape& { return v.deflection; });
+  shape("rotation", "rad", "rotation of the cross-section", [](V v) -> const beam::Shape& { return v.rotation; });
   shape("bending_moment", "N.m", "bending moment, positive where it bends the beam upwards",
-        &BeamModel::bending_moment);
-  shape("shear_force", "N", "shear force, upward on the part before it", &BeamModel::shear_force);
+        [](V v) -> const beam::Shape& { return v.response.forces.moment; });
+  shape("shear_force", "N", "shear force, upward on the part before it",
+        [](V v) -> const beam::Shape& { return v.response.forces.shear; });
   return t;
 }
 
