@@ -214,13 +214,13 @@ def test_residual_is_relative_to_the_largest_energy():
         assert np.allclose(found, 6e-12 / max(stored.max(), total), rtol=1e-12, atol=0.0)
 
 
-def test_a_peak_between_the_means_is_told_beside_the_curve():
+def test_the_largest_mean_is_drawn_over_its_window():
     run = a_trajectory(contact_force=np.where(np.arange(400) == 200, 14.1, 1.0))
-    run.summary |= {"contact_force_max": 9.98, "contact_force_window": 9.9e-3}
-    said = "highest instant 14.1\u00a0N; largest mean over 9.9\u00a0ms, which the run tells, 9.98\u00a0N"
-    assert said in panel("forces", run).remarks
-    run.summary["contact_force_max"] = 14.0
-    assert not any("largest mean" in remark for remark in panel("forces", run).remarks)
+    run.summary |= {"contact_force_max": 9.98, "contact_force_window": 9.9e-3, "contact_force_max_time": 0.3}
+    drawn = panel("forces", run).curves[-1]
+    assert drawn.look.words == "largest mean, over 9.9\u00a0ms"
+    assert drawn.time == pytest.approx([0.3, 0.3099], rel=1e-12)
+    assert drawn.values.tolist() == [9.98, 9.98]
 
 
 # -- thinning -----------------------------------------------------------------------------------------------------

@@ -43,8 +43,6 @@ from .drawing import (
 
 #: Forces and energies below this part of the largest one are not seen beside it.
 _INVISIBLE = 5e-3
-#: A curve that is so much higher than the peak force that the run tells shows another number.
-_ANOTHER_PEAK = 0.01
 #: Heading, quantity, unit and words of what the beam feels.
 _OF_THE_BEAM = {
     "clamp_force": ("Force of the clamp", "force", "N", "of the clamp, upward"),
@@ -150,13 +148,14 @@ def forces(trajectory: Trajectory) -> Panel:
     words = contact.facts.force + contact.facts.damper * (contact.damping > 0.0)
     looks = FORCES | {"compliance_force": FORCES["compliance_force"]._replace(words=words)}
     seen, remarks = _seen(trajectory, looks, "N")
-    remarks += _peak_in_words(trajectory)
     panel = _lines(trajectory, "forces", "Forces", seen, "force", "N", remarks, height=2.0)
     summary = trajectory.summary
     if "contact_force_max_time" in summary and "contact_force" in seen:
         begin, peak = float(summary["contact_force_max_time"]), float(summary["contact_force_max"])
         window = np.array([begin, begin + float(summary["contact_force_window"])])
-        look = Look(VERMILLION, "largest mean, over its window", Line(2.2))
+        clock = readable_unit([np.diff(window)], "s")
+        words = f"largest mean, over {clock.factor * np.diff(window)[0]:.3g}\u00a0{clock.name}"
+        look = Look(VERMILLION, words, Line(2.2))
         panel.curves.append(Curve("contact_force_max", look, window, np.array([peak, peak])))
     return panel
 
@@ -182,19 +181,6 @@ def inside(trajectory: Trajectory) -> list[Panel]:
         look = {column: Look(BLUE, words)}
         found.append(_lines(trajectory, column.replace("_", "-"), heading, look, quantity, unit, height=1.2))
     return found
-
-
-def _peak_in_words(trajectory: Trajectory) -> list[str]:
-    """Return how the peak force that the run tells is related to the curve, where that rises higher."""
-    summary = trajectory.summary
-    if "contact_force_max" not in summary or "contact_force" not in trajectory.columns:
-        return []
-    told, drawn = float(summary["contact_force_max"]), float(np.max(trajectory["contact_force"]))
-    if drawn <= (1.0 + _ANOTHER_PEAK) * told:
-        return []
-    window = readable_unit([np.array([float(summary["contact_force_window"])])], "s")
-    over = f"{window.factor * float(summary['contact_force_window']):.3g}\u00a0{window.name}"
-    return [f"highest instant {drawn:.4g}\u00a0N; largest mean over {over}, which the run tells, {told:.4g}\u00a0N"]
 
 
 def impulses(trajectory: Trajectory) -> Panel:
