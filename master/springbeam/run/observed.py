@@ -217,9 +217,8 @@ def _of_soft_contact(scene: Scene, pair: Pair, law: SoftLaw, steps: np.ndarray) 
     if law.one_sided:
         rates = before["z_after"] - before["v_tip_after"], step["z"] - step["v_tip"]
         path: Any = Path.through((start, rates[0]), (end, rates[1]), size, (mean, 0.5 * early))  # type: ignore[arg-type]
-        asked, asked_early = np.zeros(
-            (2, len(step))
-        )  # means of the law's force in each step [N], early with the weight
+        # Means of the law's force in each step [N], the second with the weight.
+        asked, asked_early = np.zeros((2, len(step)))
         for s, share in zip(*_INSIDE, strict=True):
             p, rate = path.at(s), path.slope(s) / size
             closed = np.flatnonzero(p > 0.0)
