@@ -104,6 +104,8 @@ def test_changes_of_contact_are_named_in_their_order():
     expected = [("closes", 0.0), ("strikes", 0.3), ("leaves", 0.35), ("opens", 0.4)]
     assert contact_changes(events, 0.01) == expected  # the last contact is too short
     assert contact_changes(events, 0.004)[-2:] == [("closes", 0.6), ("opens", 0.605)]
+    # What closes and opens at once is seen without a window.
+    assert contact_changes(GRAZE, 0.0)[-2:] == [("closes", 0.7), ("opens", 0.7)]
 
 
 @pytest.mark.parametrize(("phase", "last"), [("free", [("opens", 0.4)]), ("touch", [])])

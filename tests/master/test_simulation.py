@@ -6,6 +6,7 @@ from bodies import DuffingBody, Upper, simulate, stopping
 from references import dips
 from scenes import kinds, scene_from_dict
 
+from springbeam.bodies.abilities import Abilities
 from springbeam.bodies.gate import admit
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 from springbeam.contact.phases import Joint, Phase
@@ -214,8 +215,9 @@ def wrapped(**overrides):
     return wrap
 
 
-def test_a_step_that_stays_refused_is_halved_20_times():
-    """The run then stops where that step begins; what was made before is kept."""
+@pytest.mark.parametrize(("any_size", "halvings"), [(True, 20), (False, 0)])
+def test_a_step_that_stays_refused_is_halved_20_times(any_size, halvings):
+    """If it may have any size. The run then stops where that step begins; what was made before is kept."""
     scene, tried = with_changes(load_scene("duffing"), time={"t_end": 0.1}, coupling={"macro_step": 1e-3}), []
 
     def advance(own, time, size, *forces):
@@ -224,9 +226,13 @@ def test_a_step_that_stays_refused_is_halved_20_times():
         tried.append(size)
         raise StepRefused("stuck")
 
-    trajectory, stopped = stopping(scene, wrapped(advance=advance))
-    assert tried == pytest.approx([1e-3 * 0.5**n for n in range(21)], rel=1e-12)
-    assert (stopped.cause, trajectory.summary["halved_steps"]) == ("stuck", 20)
+    def wrap(beam, spring):
+        spring.abilities = Abilities(any_size=any_size)
+        return wrapped(advance=advance)(beam, spring)
+
+    trajectory, stopped = stopping(scene, wrap)
+    assert tried == pytest.approx([1e-3 * 0.5**n for n in range(halvings + 1)], rel=1e-12)
+    assert (stopped.cause, trajectory.summary["halved_steps"]) == ("stuck", halvings)
     assert stopped.time == trajectory.time[-1] == pytest.approx(0.05, rel=1e-12)
 
 

@@ -157,6 +157,15 @@ def moving(ends, path):
     return steps_with(lambda t: (0.0, 0.0, 0.0), ends, path, path.deriv(), integrals)
 
 
+def test_a_window_over_steps_of_different_curvature_begins_where_both_its_ends_have_one_force():
+    """C = 1 − 4 s² before the peak, 1 − 16 s² after it, s from the peak: a window w begins 2w/3 before it and has the
+    mean 1 − 16 w²/27."""
+    steps = steps_with(lambda t: (0.0, 4.0, -8.0) if t < 0.5 else (1.0, 0.0, -32.0), [0.0, 0.5, 1.0])
+    numbers = found(steps, window=0.3)
+    assert numbers["contact_force_max"] == pytest.approx(1.0 - 16.0 * 0.3**2 / 27.0, rel=1e-13)
+    assert numbers["contact_force_max_time"] == pytest.approx(0.5 - 0.2, rel=1e-13)
+
+
 def test_the_window_is_a_fiftieth_of_the_slowest_period():
     assert force_window(SCENE) == pytest.approx(2.0 * np.pi / slowest_frequency(SCENE.beam) / 50.0, rel=1e-15)
     assert force_window(with_changes(SCENE, contact={"force_window": 0.25})) == 0.25

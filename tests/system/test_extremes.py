@@ -125,3 +125,21 @@ def test_finite_outputs_whose_sum_is_not_are_taken():
     assert body.energies()[:2] == pytest.approx([1.44e308] * 2, rel=1e-14)
     assert not np.isfinite(sum(body.energies()[:2]))
     body.close()
+
+
+def test_a_force_too_large_for_a_double_halves_the_step():
+    """Two masses at 10 km/s, C = λ p¹⁰⁰: over a whole step the tip would go 10 km deep. They leave as after any elastic
+    impact, (m1 − m2)/(m1 + m2) V and 2 m1/(m1 + m2) V."""
+    beam, spring = ({"element": "point_mass", "mass": mass} for mass in (1.0, 2.0))
+    scene = with_changes(
+        load_scene("soft"),
+        time={"t_end": 6.0},
+        beam={**beam, "displacement": 1.0, "velocity": -1e4},
+        spring=spring,
+        stop=None,
+        contact={"law": "compliance", "stiffness": 5e-193, "exponent": 100.0},
+        coupling={"macro_step": 1.0},
+    )
+    run = simulate(scene)
+    assert run.summary["halved_steps"] > 0
+    assert (run.v_tip[-1], run.z[-1]) == pytest.approx((1e4 / 3.0, -2e4 / 3.0), rel=1e-10)
