@@ -106,16 +106,6 @@ double HeldContact::solve(double start, double free, const Top& top) const {
   return infinite;
 }
 
-HeldContact::Sensitivity HeldContact::sensitivity(double y, const Top& top) const {
-  const double start = now_.depth, C = now_.force;
-  if (!(C > 0.0) || untold_) return {0.0, 0.0, 0.0};
-  const double change = 1e-5 * (C + (std::abs(y) + 1e-6) / yielding_);
-  const double gives = (top(C - change) - top(C + change)) / (2.0 * change);  // what an upward force adds to y
-  const Mean mean = this->mean(start, top(C) - free_of_first() - response_[0] * C);
-  const double stiff = 1.0 + mean.by_end * (gives + response_[0]);
-  return {-mean.by_start / stiff, -mean.by_end / stiff, mean.by_end * gives / stiff};
-}
-
 void HeldContact::send(double force, double free) {
   now_.next = free + response_[0] * force;
   now_.force = std::isfinite(now_.next) ? force : std::numeric_limits<double>::infinity();

@@ -42,12 +42,6 @@ class HeldContact {
 
   /// C over the next step [N]; not finite if none was found, or where the tip goes leaves the range of numbers.
   double force() const { return now_.force; }
-  /// How the force of the first step follows what begin() was given, its sum with `free` = u + H w taken apart.
-  struct Sensitivity {
-    double by_start, by_free;  ///< ∂C/∂u at the start, ∂C/∂free [N/m]
-    double by_load;            ///< ∂C by an upward force on the top [–]
-  };
-  Sensitivity sensitivity(double y, const Top& top) const;
   double elastic(double y) const { return law_.elastic(y - now_.tip); }  ///< Φ' [N]
   double energy(double y) const { return law_.energy(y - now_.tip); }    ///< Φ [J]
   double dissipated() const { return now_.dissipated; }                  ///< by the contact since the start [J]

@@ -107,7 +107,7 @@ int IdaSolver::advance() {
   std::array<double, distances> rates;  // at the last step's start
   for (int i = 0; i < distances; ++i) rates[i] = distance(i).rate;
   while (s_ < 1.0) {
-    if (steps() >= most_steps_) throw TooMuchWork();
+    if (steps() >= most_steps_) throw IdaError("it spans too much of the motion");
     const int code = IDASolve(ida_.get(), 1.0, &s_, Y_.get(), Yp_.get(), IDA_ONE_STEP);
     if (code == IDA_REP_RES_ERR || code == IDA_FIRST_RES_FAIL)
       fail("values leave the range of floating-point numbers", code);

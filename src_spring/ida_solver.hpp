@@ -37,12 +37,6 @@ class IdaError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The steps allowed did not suffice.
-class TooMuchWork : public IdaError {
- public:
-  TooMuchWork() : IdaError("it spans too much of the motion") {}
-};
-
 class IdaSolver {
  public:
   explicit IdaSolver(int unknowns);

@@ -127,9 +127,12 @@ struct SpringModel final : fmi::Model {
   double contact_power() const { return elastic_reaction() * approach(); }
   double elastic_reaction() const { return held ? held->elastic(spring->displacement()) : spring->elastic_reaction(); }
 
-  // The held force follows inputs before its first step only.
+  /// Not known, so found by differences, where the held force follows an input: before its first step.
+  double held_force_by_input() const {
+    return held && !held->started() ? std::numeric_limits<double>::quiet_NaN() : 0.0;
+  }
   double reaction_by_tip_displacement() const {
-    return held ? sensitivity().by_start + sensitivity().by_free : -spring->reaction_slopes().force_by_depth;
+    return held ? held_force_by_input() : -spring->reaction_slopes().force_by_depth;
   }
   double reaction_by_tip_velocity() const {
     const bool read = spring->extrapolated() || !is_set(tip_displacement[1]);
@@ -138,8 +141,6 @@ struct SpringModel final : fmi::Model {
   double reaction_by_tip_rate() const {
     return is_set(tip_displacement[1]) && !held ? -spring->reaction_slopes().force_by_rate : 0.0;
   }
-  double reaction_by_forecast() const { return held ? held->size() * sensitivity().by_free : 0.0; }
-  double reaction_by_load() const { return held ? sensitivity().by_load : 0.0; }
   double contact_energy_by_tip_displacement() const { return held && held->started() ? 0.0 : -elastic_reaction(); }
 
   int warnings() const {
@@ -171,7 +172,7 @@ struct SpringModel final : fmi::Model {
 
  private:
   static constexpr std::int64_t most_trial_work = 250'000;  ///< of IDA's steps for one force, as for one step
-  static constexpr double rounding = 1e-6;                    ///< of communication_step
+  static constexpr double rounding = 1e-6;                  ///< of communication_step
   struct Misses {
     HeldContact::Miss kind;
     int most;  ///< steps: a sudden load takes 2, a harmonic one from rest up to 8
@@ -260,9 +261,6 @@ struct SpringModel final : fmi::Model {
   }
 
   spring::TipMessage message() const { return {tip_displacement[0], forecast[0]}; }
-  HeldContact::Sensitivity sensitivity() const {
-    return held->started() ? HeldContact::Sensitivity{} : held->sensitivity(spring->displacement(), trial());
-  }
 
   /// Where the top would be after the next step, other inputs staying as they are; the spring is left as it was.
   HeldContact::Top trial() const {
@@ -418,10 +416,10 @@ fmi::Table fmi::make_table() {
   add.depends("tip_displacement", [](M m) { return m.reaction_by_tip_displacement(); });
   add.depends("tip_displacement", [](M m) { return m.reaction_by_tip_rate(); }, 1);
   add.depends("tip_velocity", [](M m) { return m.reaction_by_tip_velocity(); });
-  add.depends("tip_velocity_forecast", [](M m) { return m.reaction_by_forecast(); });
-  add.depends("external_force", [](M m) { return m.reaction_by_load(); });
-  add.depends("base_acceleration", [](M m) { return -m.parameters.mass * m.reaction_by_load(); });
-  add.depends("foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : m.reaction_by_load(); });
+  add.depends("tip_velocity_forecast", [](M m) { return m.held_force_by_input(); });
+  add.depends("external_force", [](M m) { return m.held_force_by_input(); });
+  add.depends("base_acceleration", [](M m) { return -m.parameters.mass * m.held_force_by_input(); });
+  add.depends("foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : m.held_force_by_input(); });
   add.output("acceleration", "m/s2", "acceleration of the top", of(&Spring::acceleration), [](M m) { return m.jerk(); })
       .from(motion);
   t.variables.back().initial_dependencies.emplace_back("contact_force");
@@ -432,15 +430,15 @@ fmi::Table fmi::make_table() {
   follows("contact_force", [](M m) { return m.parameters.compliant() ? 0.0 : -1.0; }, none);
   follows(
       "foundation_force", [](M m) { return m.parameters.stop_enabled ? 0.0 : 1.0; },
-      [](M m) { return m.parameters.stop_enabled ? 0.0 : m.reaction_by_load(); });
-  follows("external_force", [](M) { return 1.0; }, [](M m) { return m.reaction_by_load(); });
+      [](M m) { return m.parameters.stop_enabled ? 0.0 : m.held_force_by_input(); });
+  follows("external_force", [](M) { return 1.0; }, [](M m) { return m.held_force_by_input(); });
   follows(
       "base_acceleration", [](M m) { return -m.parameters.mass; },
-      [](M m) { return -m.parameters.mass * m.reaction_by_load(); });
+      [](M m) { return -m.parameters.mass * m.held_force_by_input(); });
   follows("tip_displacement", none, [](M m) { return m.reaction_by_tip_displacement(); });
   follows("tip_displacement", none, [](M m) { return m.reaction_by_tip_rate(); }, 1);
   follows("tip_velocity", none, [](M m) { return m.reaction_by_tip_velocity(); });
-  follows("tip_velocity_forecast", none, [](M m) { return m.reaction_by_forecast(); });
+  follows("tip_velocity_forecast", none, [](M m) { return m.held_force_by_input(); });
   add.output("seated", "", "whether the top rests on the foundation inside", of(&Spring::seated)).type =
       fmi::Type::boolean;
   add.output("number_of_impacts", "", "impacts on the foundation inside since the start", of(&Spring::impacts)).whole();
