@@ -1,5 +1,7 @@
 """The master on exact bodies: events against the event-driven reference, refused steps, the ledger."""
 
+from itertools import count
+
 import numpy as np
 import pytest
 from bodies import DuffingBody, Upper, simulate, stopping
@@ -11,7 +13,9 @@ from springbeam.bodies.gate import admit
 from springbeam.bodies.protocol import NO_FORCE, StepRefused
 from springbeam.contact.phases import Joint, Phase
 from springbeam.monolithic import event_driven
+from springbeam.results.recording import MemoryRecorder
 from springbeam.results.steps import STEP
+from springbeam.run import log, master
 from springbeam.run.ledger import bounds, errors
 from springbeam.run.stepping import Pair
 from springbeam.scene import SceneError, load_scene, with_changes
@@ -213,6 +217,22 @@ def wrapped(**overrides):
         return beam, spring
 
     return wrap
+
+
+@pytest.mark.parametrize(("seconds", "together"), [(0.3, 4), (1e-6, 256)])
+def test_records_wait_for_others_a_second_at_most(monkeypatch, seconds, together):
+    """Each look at the clock finds it so much later. What slow steps have come to is checked and kept, too."""
+    clock, keep, kept = count(), MemoryRecorder.keep, []
+
+    def noted(own, steps, *rest):
+        kept.append(len(steps))
+        keep(own, steps, *rest)
+
+    for module in (log, master):
+        monkeypatch.setattr(module, "monotonic", lambda: seconds * next(clock))
+    monkeypatch.setattr(MemoryRecorder, "keep", noted)
+    simulate(with_changes(load_scene("duffing"), time={"t_end": 0.6}, coupling={"macro_step": 1e-3}))
+    assert set(kept[1:-1]) == {together}
 
 
 @pytest.mark.parametrize(("any_size", "halvings"), [(True, 20), (False, 0)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from time import monotonic
 
 import numpy as np
 
@@ -14,8 +15,8 @@ from ..scene import Scene
 from .ledger import Wrong
 from .outcome import RunStopped
 
-#: Records that are checked and handed on together.
-TOGETHER = 256
+#: Most records that are checked and handed on together, and the longest that one waits for it [s].
+TOGETHER, _WAITS = 256, 1.0
 #: Judges the next records of a run, shape (n,), beside its first one, shape (1,).
 Check = Callable[[np.ndarray, np.ndarray], Wrong | None]
 
@@ -29,6 +30,7 @@ class Log:
         #: What the recorder does not have yet; records are as of `springbeam.results.steps.packed`.
         self.records, self._events, self._shapes = list[bytes](), list[Event](), list[list[float]]()
         self._first = np.empty(0, STEP)  #: record of the run
+        self.due = monotonic() + _WAITS  #: when the next records are handed on, however few [s]
 
     def happened(self, event: Event) -> None:
         """Take an event of the step whose record comes next."""
@@ -53,6 +55,7 @@ class Log:
 
         Raises RunStopped where one shows that the run has gone wrong; what came after it is dropped.
         """
+        self.due = monotonic() + _WAITS
         if not self.records:
             return
         steps, stopped = self._sound(np.frombuffer(b"".join(self.records), STEP))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from itertools import islice
 from math import inf
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -130,7 +131,7 @@ class Master(Stateful):
                 self._begin()
             if not self.done:
                 self._step()
-            if len(self._log.records) >= TOGETHER or self.done:
+            if len(self._log.records) >= TOGETHER or monotonic() >= self._log.due or self.done:
                 self.hand_over()
         except (BodyFailed, OverflowError, RunStopped) as failed:
             if isinstance(failed, OverflowError) and not raised_here(failed):
